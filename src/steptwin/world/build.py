@@ -109,7 +109,10 @@ class _Builder:
 
         order = {name: i for i, name in enumerate(joined)}
         named = {*joined, *(one.name for element in ELEMENTS.values() for one in element.named(self.spec.elements[element.name]))}
-        for one, other, path in self._joints():
+        placed = self._placed()
+        for reference in self._joints():
+            path = reference.path
+            one, other = (placed.get(name, name) for name in reference[:2])
             unknown = [name for name in dict.fromkeys((one, other)) if name not in joined]
             for name in unknown:
                 if not self.spec.text.may_be_broken(name):
@@ -138,6 +141,15 @@ class _Builder:
             if element.terminals is not None:
                 for spec in element.named(self.spec.elements[element.name]):
                     yield spec, element.terminals(spec)
+
+    def _placed(self) -> Mapping[str, str]:
+        """For each element without terminals of its own the first thing that it refers to, in whose kernel it is."""
+        return {
+            one.name: next(iter(element.refers(one, self.spec))).one
+            for element in ELEMENTS.values()
+            if element.terminals is None
+            for one in element.named(self.spec.elements[element.name])
+        }
 
     def _add_board(self, spec: NamedSpec, terminals: Terminals, kernel: Kernel) -> None:
         if not kernel.machines and not self.spec.text.findings:

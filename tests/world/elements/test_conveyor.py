@@ -224,7 +224,7 @@ def test_snapshots_have_it(moment_s: float) -> None:
     [
         ("speed = 125.0", "", "a conveyor needs one of speed and axis"),
         ("speed = 125.0", 'speed = 125.0\naxis = "x"', "a conveyor needs one of speed and axis"),
-        ("speed = 125.0", 'axis = "x"', "no axis is called 'x'"),
+        ("speed = 125.0", 'axis = "x"', "nothing is called 'x'"),
         ("at = 300.0", "at = 400.5", "at = 400.5 is beyond length = 400"),
         ("at = 300.0", "", r"\[conveyor.sensor\]: at is missing"),
         ("workpiece = 40.0", 'next = "belt"', "belt is followed by itself"),

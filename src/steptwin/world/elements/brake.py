@@ -9,7 +9,7 @@ from typing import ClassVar
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.world.board import Board
-from steptwin.world.elements.axis import AXIS, find_axis
+from steptwin.world.elements.axis import find_axis
 from steptwin.world.elements.logic import STUCK_OUTPUT, BoardPart, BoardSpec, Joint, with_terminals
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.table import ElementEffect, number
@@ -44,7 +44,7 @@ class BrakeSpec(BoardSpec):
             yield Joint("release", RELEASE, self.release)
 
     def others(self, world: WorldSpec) -> Iterator[tuple[str, str]]:
-        yield from (("axis", axis.drive[0]) for axis in world.elements_of(AXIS) if axis.name == self.axis)
+        yield "axis", self.axis
 
 
 class Brake(BoardPart):

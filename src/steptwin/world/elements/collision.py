@@ -48,8 +48,7 @@ class CollisionSpec(BoardSpec):
             return ()
 
     def others(self, world: WorldSpec) -> Iterator[tuple[str, str]]:
-        drives = {axis.name: axis.drive[0] for axis in world.elements_of(AXIS)}
-        yield from (("when", drives.get(owner, owner)) for owner in self.owners)
+        yield from (("when", owner) for owner in self.owners if owner != "time")
 
     def check(self, text: TomlText) -> None:
         try:

@@ -21,7 +21,7 @@ from steptwin.world.chance import Chance
 from steptwin.world.contacts import Circuit, Contact
 from steptwin.world.drawing import BELT, Drawing, SensorZone
 from steptwin.world.element import Reference, Table
-from steptwin.world.elements.axis import AXIS, find_axis
+from steptwin.world.elements.axis import find_axis
 from steptwin.world.elements.contact import CONTACT_KEYS
 from steptwin.world.elements.logic import BoardPart, BoardSpec, Inner, Joint, with_terminals
 from steptwin.world.faults import ActiveFault, Fault, FaultKind, Layer, Occasion
@@ -96,7 +96,7 @@ class ConveyorSpec(BoardSpec):
 
     def others(self, world: WorldSpec) -> Iterable[tuple[str, str]]:
         if self.axis is not None:
-            yield from (("axis", axis.drive[0]) for axis in world.elements_of(AXIS) if axis.name == self.axis)
+            yield "axis", self.axis
         if self.next is not None:
             yield "next", self.next
 

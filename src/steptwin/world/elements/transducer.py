@@ -14,7 +14,6 @@ from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.state import Stateful
 from steptwin.world.element import Element, NamedSpec, Reference, Row, Table
-from steptwin.world.elements.axis import AXIS
 from steptwin.world.expression import Signal, crossing
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.table import ElementEffect, number
@@ -149,10 +148,8 @@ def _read(text: TomlText, row: Row, table: Table) -> TransducerSpec:
 
 
 def _refers(spec: TransducerSpec, world: WorldSpec) -> Iterator[Reference]:
-    owner = spec.of.partition(".")[0]
-    drives = {axis.name: axis.drive[0] for axis in world.elements_of(AXIS)}
     yield Reference(spec.target[0], spec.target[0], (*spec.path, "to"))
-    yield Reference(spec.target[0], drives.get(owner, owner), (*spec.path, "of"))
+    yield Reference(spec.target[0], spec.of.partition(".")[0], (*spec.path, "of"))
 
 
 def _build(spec: TransducerSpec, site: Site) -> Transducer:

@@ -1,0 +1,67 @@
+"""The example worlds: each does what its script checks, survives one fault, and reports another."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from steptwin.files.world import World
+
+EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
+ENDS = {"hoist": "three floors served", "press": "the press is safe", "indexer": "two revolutions"}
+
+
+def example(name: str) -> World:
+    return World.load(EXAMPLES / name / f"{name}.toml")
+
+
+@pytest.mark.parametrize("name", ENDS)
+def test_it_does_what_it_is_for(name: str) -> None:
+    with example(name) as world:
+        assert world.run(for_=60) == ENDS[name]
+        assert not world.failures
+        assert not world.overdue
+
+
+@pytest.mark.parametrize(
+    ("name", "fault"),
+    [
+        ("hoist", "worn-brake element=hold share=0.6"),
+        ("press", "no-air element=ram from_s=2.2 until_s=2.25"),
+        ("indexer", "lost-steps machine=cell at_s=5 pulses=64"),
+    ],
+)
+def test_it_survives_a_fault(name: str, fault: str) -> None:
+    with example(name) as world:
+        world.fault(fault)
+        assert world.run(for_=60) == ENDS[name]
+        assert not world.failures
+        assert not world.overdue
+
+
+@pytest.mark.parametrize(
+    ("name", "fault", "failure"),
+    [
+        ("hoist", "worn-brake element=hold share=0.2", "abs(z.position - 500) < 0.2"),
+        ("press", "welded-contact element=safety", "strokes.count == 1 and danger.count == 0"),
+        ("indexer", "lost-steps machine=cell at_s=5 pulses=640", "nests.count == 16 and not cell.OUT2 and crash.count == 0"),
+    ],
+)
+def test_it_reports_another(name: str, fault: str, failure: str) -> None:
+    with example(name) as world:
+        world.fault(fault)
+        world.run(for_=60)
+        assert failure in [str(record.value) for record in world.failures]
+
+
+@pytest.mark.parametrize("name", ENDS)
+@pytest.mark.parametrize("moment_s", [0.31, 1.77, 2.503])
+def test_it_can_be_restored_anywhere(name: str, moment_s: float) -> None:
+    with example(name) as world, example(name) as other:
+        world.run(until=moment_s)
+        snapshot = world.snapshot()
+        world.run(for_=3.0)
+        other.restore(snapshot)
+        other.run(for_=3.0)
+        assert other.trace.digest() == world.trace.digest()
