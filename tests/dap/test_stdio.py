@@ -204,8 +204,6 @@ def test_requests_that_make_no_sense_are_refused_and_the_session_goes_on(client:
         client.ask("threads")
     with pytest.raises(Refused, match="there is no such request"):
         client.ask("fly")
-    with pytest.raises(Refused, match="cannot be stopped yet"):
-        client.ask("attach", twin="mic488")
     client.launch(program=program, stopOnEntry=True)
     client.ask("configurationDone")
     client.event("stopped")

@@ -6,17 +6,20 @@ It reads and writes nothing by itself. What runs is run in parts (`Adapter.go_on
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, TypeAlias
 
+from steptwin.dap.attach import AttachedTwin
 from steptwin.dap.launch import Launch, open_world, read_launch
+from steptwin.dap.sources import Sources, texts_of
+from steptwin.dap.target import Target
 from steptwin.debug.debugger import Debugger, Travel
-from steptwin.debug.observer import Logged
 from steptwin.debug.points import AnyPoint
 from steptwin.debug.values import DataPoint, Events, LabelPoint, LinePoint, Location, SetPoint, Stop, StopReason, Value
 from steptwin.durations import duration
-from steptwin.errors import Misuse, SteptwinError
+from steptwin.errors import LineFailure, Misuse, SteptwinError
 from steptwin.files.world import World
 from steptwin.machine import SECOND
 from steptwin.subject.debugcommands import SCOPES
@@ -26,6 +29,8 @@ Send: TypeAlias = Callable[[str, Body], None]
 """An event and its body."""
 Arguments: TypeAlias = Mapping[str, Any]
 
+LOOK_S = 0.1
+"""While an attached twin stands, it is looked so often whether somebody else has it go on."""
 FRAMES = 1000
 """Frames of a thread, at most: a frame has the number of its thread times this, and its depth."""
 _STOPS_USUALLY = (Events.PROGRAM_ERROR, Events.WRONG_DATA)
@@ -63,24 +68,18 @@ _HELP = (
 )
 
 
-class _Text(NamedTuple):
-    """A text of a controller, and its file."""
-
-    machine: str
-    text: str
-    path: Path
-
-
 class Adapter:
     """One session. ``send`` takes the events."""
 
     def __init__(self, send: Send) -> None:
         self._send = send
-        self._debugger: Debugger | None = None
+        self._debugger: Target | None = None
         self._world: World | None = None
         self._launch: Launch | None = None
+        self._attached: AttachedTwin | None = None
+        self._stops_on_entry = self._is_no_debug = False
         self._travel: Travel | None = None
-        self._texts: list[_Text] = []
+        self._sources = Sources(())
         self._lines: dict[Path, list[AnyPoint]] = {}
         """Breakpoints in lines, by file."""
         self._labels: list[AnyPoint] = []
@@ -92,6 +91,11 @@ class Adapter:
     @property
     def is_running(self) -> bool:
         return self._travel is not None
+
+    @property
+    def patience_s(self) -> float | None:
+        """How long a request may be waited for before `go_on`; None: for ever."""
+        return 0.0 if self.is_running else None if self._attached is None else LOOK_S
 
     # ------------------------------------------------------------------ requests
 
@@ -112,15 +116,15 @@ class Adapter:
         if command in ("launch", "attach"):
             self._send("initialized", {})
 
-    def _stopped(self) -> Debugger:
+    def _stopped(self) -> Target:
         """The debugger, which stands."""
         if self.is_running:
             raise Misuse("the program runs: pause it first")
         return self._started()
 
-    def _started(self) -> Debugger:
+    def _started(self) -> Target:
         if self._debugger is None:
-            raise Misuse("nothing was launched")
+            raise Misuse("nothing was launched, and no twin was attached to")
         return self._debugger
 
     def _initialize(self, arguments: Arguments) -> Body:
@@ -129,36 +133,44 @@ class Adapter:
         return CAPABILITIES
 
     def _launch_world(self, arguments: Arguments) -> Body:
-        if self._debugger is not None:
-            raise Misuse("launch: a program was launched already")
+        self._check_fresh("launch")
         asked = read_launch(arguments)
         world = open_world(asked, self._tell)
         try:
             debugger = Debugger(world)
-            texts = [
-                _Text(machine, text, (asked.folder / source.name).resolve())
-                for machine in debugger.threads
-                for text, source in debugger.texts(machine).items()
-            ]
+            sources = Sources(texts_of(debugger, asked.folder))
             if asked.world is not None and asked.program is not None:
-                _check_program(asked.program, asked.world, texts)
+                sources.check(asked.program, asked.world)
         except SteptwinError:
             world.close()
             raise
-        debugger.on_log = self._log
-        self._world, self._launch, self._debugger, self._texts = world, asked, debugger, texts
+        debugger.on_log = lambda logged: self._log(logged.time, logged.text, debugger.location(logged.machine, logged.place))
+        self._world, self._launch, self._debugger, self._sources = world, asked, debugger, sources
+        self._stops_on_entry, self._is_no_debug = asked.stop_on_entry, asked.no_debug
         return {}
 
     def _attach(self, arguments: Arguments) -> Body:
-        twin = arguments.get("twin")
-        raise Misuse(f"attach: twin = {twin!r}: a twin that runs cannot be stopped yet; launch its description as 'world'")
+        self._check_fresh("attach")
+        twin, stops = arguments.get("twin"), arguments.get("stopOnEntry", False)
+        if twin is not None and not isinstance(twin, str):
+            raise Misuse(f"attach: twin = {twin!r}: expected the name, file or address of a running twin")
+        attached = AttachedTwin(twin, self._log_of_twin)
+        self._debugger = self._attached = attached
+        self._sources, self._stops_on_entry = Sources(texts_of(attached, attached.folder)), bool(stops)
+        return {}
+
+    def _check_fresh(self, command: str) -> None:
+        if self._debugger is not None:
+            raise Misuse(f"{command}: this session has something to debug already")
 
     def _configuration_done(self, arguments: Arguments) -> Body:
-        debugger, asked = self._stopped(), self._launch
-        self._run(debugger.running_to_entry() if asked is not None and asked.stop_on_entry else debugger.running())
+        debugger = self._stopped()
+        self._run(debugger.running_to_entry() if self._stops_on_entry else debugger.running())
         return {}
 
     def _restart(self, arguments: Arguments) -> Body:
+        if self._world is None:
+            raise Misuse("restart: a twin that runs has no beginning to go to; disconnect and attach again")
         if self.is_running:
             self._end_travel()
         debugger = self._started()
@@ -173,17 +185,20 @@ class Adapter:
             self._send("terminated", {})
         if self._world is not None:
             self._world.close()
+        if self._attached is not None:
+            attached, self._attached, self._debugger = self._attached, None, None
+            with suppress(LineFailure):  # it has ended already
+                attached.close()
         return {}
 
     # ------------------------------------------------------------------ breakpoints
 
     def _set_lines(self, arguments: Arguments) -> Body:
-        path = Path(arguments["source"]["path"]).resolve()
-        texts = [text for text in self._texts if text.path == path]
+        path = self._sources.path(arguments["source"])
+        texts = self._sources.of(path)
         wanted: Sequence[Arguments] = arguments.get("breakpoints") or ()
         if not texts:
-            known = ", ".join(str(text.path) for text in self._texts) or "none"
-            reason = f"{path.name} is no program of this session: there are {known}"
+            reason = f"{path.name} is no program of this session: there are {self._sources.known}"
             return {"breakpoints": [{"verified": False, "message": reason} for _ in wanted]}
         points: list[AnyPoint] = []
         for one in wanted:
@@ -224,7 +239,7 @@ class Adapter:
         everything: list[AnyPoint] = [*(point for points in self._lines.values() for point in points), *self._labels, *self._data]
         debugger = self._started()
         found = debugger.set_breakpoints(everything)
-        if self._launch is not None and self._launch.no_debug:
+        if self._is_no_debug:
             debugger.set_breakpoints(())
         by_point = dict(zip(everything, found, strict=True))
         return [by_point[point] for point in wanted]
@@ -242,18 +257,17 @@ class Adapter:
         unknown = [name for name in arguments["filters"] if name not in known]
         if unknown:
             raise Misuse(f"setExceptionBreakpoints: {unknown[0]!r} is none of {', '.join(known)}")
-        if not (self._launch is not None and self._launch.no_debug):
+        if not self._is_no_debug:
             self._started().set_events([known[name] for name in arguments["filters"]])
         return {}
 
     def _locations(self, arguments: Arguments) -> Body:
-        path = Path(arguments["source"]["path"]).resolve()
+        texts = self._sources.of(self._sources.path(arguments["source"]))
         first = arguments["line"] - self._first_line + 1
         last = arguments.get("endLine", arguments["line"]) - self._first_line + 1
-        text = next((text for text in self._texts if text.path == path), None)
-        if text is None:
+        if not texts:
             return {"breakpoints": []}
-        lines = self._started().statement_lines(text.machine, text.text)
+        lines = self._started().statement_lines(texts[0].machine, texts[0].text)
         return {"breakpoints": [{"line": line - 1 + self._first_line} for line in sorted(set(lines)) if first <= line <= last]}
 
     # ------------------------------------------------------------------ running
@@ -276,18 +290,28 @@ class Adapter:
         return {"allThreadsContinued": True} if name == "continue" else {}
 
     def go_on(self) -> None:
-        """Do a part of what runs; nothing where nothing does."""
-        if self._travel is None:
-            return
+        """Do a part of what runs; where nothing does, see what others do with an attached twin."""
         try:
-            next(self._travel)
+            if self._travel is None:
+                self._look()
+            else:
+                next(self._travel)
         except StopIteration as end:
             self._travel = None
             self._report(end.value)
         except SteptwinError as error:
             self._travel = None
             self._tell(f"error: {error}", "stderr")
-            self._report(self._started().pause())
+            if self._attached is None:
+                self._report(self._started().pause())
+            else:
+                self._end({})
+
+    def _look(self) -> None:
+        travel = None if self._attached is None else self._attached.unasked()
+        if travel is not None:
+            self._run(travel)
+            self._send("continued", {"threadId": 1, "allThreadsContinued": True})
 
     def _end_travel(self) -> None:
         if self._travel is not None:
@@ -349,19 +373,20 @@ class Adapter:
         return {"stackFrames": shown, "totalFrames": len(frames)}
 
     def _placed(self, location: Location) -> Body:
-        path = next(t.path for t in self._texts if (t.machine, t.text) == (location.machine, location.text))
         line, column = self._first_line - 1, self._first_column - 1
         return {
-            "source": {"name": path.name, "path": str(path)},
+            "source": self._sources.plain(location.machine, location.text),
             "line": location.line + line,
             "column": location.column + column,
             "endLine": location.end_line + line,
             "endColumn": location.end_column + column,
         }
 
-    def _sources(self, arguments: Arguments) -> Body:
-        paths = dict.fromkeys(text.path for text in self._texts)
-        return {"sources": [{"name": path.name, "path": str(path)} for path in paths]}
+    def _loaded(self, arguments: Arguments) -> Body:
+        return {"sources": self._sources.all()}
+
+    def _source(self, arguments: Arguments) -> Body:
+        return {"content": self._sources.numbered(arguments["sourceReference"]).source.text}
 
     def _scopes(self, arguments: Arguments) -> Body:
         thread = arguments["frameId"] // FRAMES
@@ -417,9 +442,11 @@ class Adapter:
     def _tell(self, text: str, category: str = "console") -> None:
         self._send("output", {"category": category, "output": f"{text}\n"})
 
-    def _log(self, logged: Logged) -> None:
-        placed = self._placed(self._started().location(logged.machine, logged.place))
-        self._send("output", {"category": "console", "output": f"{_seconds(logged.time)}  {logged.text}\n", **placed})
+    def _log(self, time: int, text: str, location: Location) -> None:
+        self._send("output", {"category": "console", "output": f"{_seconds(time)}  {text}\n", **self._placed(location)})
+
+    def _log_of_twin(self, time: int, machine: str, text: str, program: str, line: int) -> None:
+        self._log(time, text, Location(machine, program, "", line, 1, line, 1))
 
 
 _OF_POINTS = {"condition": "condition", "hits": "hitCondition", "log": "logMessage"}
@@ -442,7 +469,8 @@ _HANDLERS: Mapping[str, Callable[[Adapter, Arguments], Body]] = {
     "pause": Adapter._pause,
     "threads": Adapter._threads,
     "stackTrace": Adapter._stack,
-    "loadedSources": Adapter._sources,
+    "loadedSources": Adapter._loaded,
+    "source": Adapter._source,
     "scopes": Adapter._scopes,
     "variables": Adapter._variables,
     "evaluate": Adapter._evaluate,
@@ -450,13 +478,6 @@ _HANDLERS: Mapping[str, Callable[[Adapter, Arguments], Body]] = {
     "setExpression": Adapter._set_expression,
     **{name: partial(Adapter._starting, name=name) for name in _RUNNING},
 }
-
-
-def _check_program(program: Path, world: Path, texts: Sequence[_Text]) -> None:
-    """Raises `Misuse` for a program that is none of a world."""
-    if program.resolve() not in [text.path for text in texts]:
-        known = ", ".join(str(text.path) for text in texts)
-        raise Misuse(f"launch: {program} is no program of {world}: there are {known}")
 
 
 def _variable(value: Value) -> Body:

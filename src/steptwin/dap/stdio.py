@@ -38,7 +38,8 @@ class _Session:
         Thread(target=self._read, daemon=True).start()
         while True:
             try:
-                message = self._waiting.get(block=not self._adapter.is_running)
+                patience_s = self._adapter.patience_s
+                message = self._waiting.get(block=patience_s != 0.0, timeout=patience_s)
             except Empty:
                 self._adapter.go_on()
                 continue

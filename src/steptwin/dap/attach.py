@@ -1,0 +1,281 @@
+"""The debugger of a twin that runs in another process, over its control endpoint (`steptwin.live.debugging`)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from steptwin.debug.debugger import Travel
+from steptwin.debug.points import AnyPoint
+from steptwin.debug.values import (
+    DataPoint,
+    Events,
+    LabelPoint,
+    LinePoint,
+    Location,
+    Scope,
+    SetPoint,
+    StackFrame,
+    Stop,
+    StopReason,
+    Value,
+)
+from steptwin.diagnostics import SourceText
+from steptwin.errors import Misuse
+from steptwin.live.remote import RemoteSubject
+from steptwin.live.twins import find_controller
+from steptwin.machine import Nanos
+from steptwin.subject import debugcommands as command
+from steptwin.subject.commands import Command, EndPoints, Pause, Resume, Time
+from steptwin.subject.events import Event
+from steptwin.subject.following import filter_of
+from steptwin.subject.payloads import LogPayload, PacePayload, StoppedPayload
+
+PART_S = 0.05
+"""So long is waited for the twin before the editor is served again."""
+MOST_EVENTS = 10_000
+
+Log = Callable[[Nanos, str, str, str, int], None]
+"""Moment, controller, text that is logged, program and line."""
+
+
+class AttachedTwin:
+    """The twin that ``text`` names (None: the only one), found as by commands (`steptwin.live.twins`). See `Target`.
+
+    Raises `LineFailure` where it does not answer, `Misuse` and `Refusal` where it is none or cannot be debugged.
+    """
+
+    def __init__(self, text: str | None, log: Log) -> None:
+        name, _ = find_controller(text)
+        self._subject = RemoteSubject(name)
+        self._log = log
+        self._set: dict[AnyPoint, SetPoint] = {}
+        try:
+            self._following = self._subject.follow(filter_of(["stopped", "log", "pace"]), MOST_EVENTS)
+            self._found = self._ask(command.Debug())
+            self._texts = {one["name"]: self._sources(one) for one in self._found["machines"]}
+            file = self._ask(EndPoints()).get("file")
+        except BaseException:
+            self._subject.close()
+            raise
+        self.folder = Path(file).parent if file else Path()
+        """Names of files in the world begin here."""
+        self._was_going = bool(self._found["going"])
+
+    def _ask(self, wanted: Command) -> Any:
+        return self._subject.do(wanted).value
+
+    def _sources(self, machine: Mapping[str, Any]) -> dict[str, SourceText]:
+        found = [self._ask(command.ProgramSource(machine["name"], one["program"])) for one in machine["programs"]]
+        return {one["program"]: SourceText(one["source"], one["text"]) for one in found}
+
+    def close(self) -> None:
+        """Debug no more; a twin that went on when this began goes on."""
+        try:
+            self.set_breakpoints(())
+            if self._was_going and self._ask(Time())["paused"]:
+                self._ask(Resume())
+        finally:
+            self._subject.close()
+
+    # ------------------------------------------------------------------ where it stands
+
+    def _place(self) -> Mapping[str, Any]:
+        return self._ask(command.Debug())
+
+    @property
+    def now(self) -> Nanos:
+        return int(self._place()["time_ns"])
+
+    @property
+    def present(self) -> Nanos:
+        return int(self._place()["present_ns"])
+
+    @property
+    def begin(self) -> Nanos:
+        return int(self._place()["begin_ns"])
+
+    @property
+    def is_past(self) -> bool:
+        return bool(self._place()["past"])
+
+    @property
+    def has_ended(self) -> bool:
+        """A twin that runs waits for what comes from outside."""
+        return False
+
+    @property
+    def threads(self) -> Sequence[str]:
+        return list(self._texts)
+
+    def texts(self, machine: str) -> Mapping[str, SourceText]:
+        return self._texts[machine]
+
+    def statement_lines(self, machine: str, text: str) -> Sequence[int]:
+        programs = next(one["programs"] for one in self._found["machines"] if one["name"] == machine)
+        return next(one["lines"] for one in programs if one["program"] == text)
+
+    def stack(self, machine: str) -> Sequence[StackFrame]:
+        return [
+            StackFrame(
+                one["name"],
+                Location(
+                    machine,
+                    one["program"],
+                    one["source"],
+                    one["line"],
+                    one["column"],
+                    one["end_line"],
+                    one["end_column"],
+                ),
+            )
+            for one in self._ask(command.Stack(machine))
+        ]
+
+    # ------------------------------------------------------------------ values
+
+    def scope(self, machine: str, name: str) -> Scope:
+        return Scope(name, [_value(one) for one in self._ask(command.Values(machine, name))])
+
+    def evaluate(self, machine: str, text: str) -> Value:
+        return _value(self._ask(command.Evaluate(machine, text)))
+
+    def set_value(self, machine: str, name: str, text: str) -> Value:
+        return _value(self._ask(command.SetValue(machine, name, text)))
+
+    # ------------------------------------------------------------------ breakpoints
+
+    def set_breakpoints(self, points: Sequence[AnyPoint]) -> Sequence[SetPoint]:
+        """Set these and none of the others that were set here; those of other clients stay."""
+        for point in [one for one in self._set if one not in points]:
+            number = self._set.pop(point).number
+            if number in [one["number"] for one in self._ask(command.ListBreakpoints())]:
+                self._ask(command.ClearBreakpoint(number))
+        return [self._one(point) for point in points]
+
+    def _one(self, point: AnyPoint) -> SetPoint:
+        if point not in self._set:
+            try:
+                answer = self._ask(_wanted(point))
+            except Misuse as error:
+                return SetPoint(0, problem=str(error))
+            self._set[point] = SetPoint(answer["number"], (), answer["line"])
+        return self._set[point]
+
+    def set_events(self, events: Iterable[Events]) -> None:
+        self._ask(command.StopOn(tuple(event.code for event in events)))
+
+    # ------------------------------------------------------------------ time
+
+    def running(self) -> Travel:
+        if self._place()["going"]:
+            return self._until_stopped()
+        return self._after(command.RunProgram())
+
+    def running_to_entry(self) -> Travel:
+        """A twin that runs has no entry: it is paused."""
+        return self._at_once(self.pause())
+
+    def running_back(self) -> Travel:
+        return self._after(command.RunProgram(command.BACKWARDS))
+
+    def stepping_in(self, machine: str) -> Travel:
+        return self._after(command.StepProgram(machine, "in"))
+
+    def stepping_over(self, machine: str) -> Travel:
+        return self._after(command.StepProgram(machine, "over"))
+
+    def stepping_out(self, machine: str) -> Travel:
+        return self._after(command.StepProgram(machine, "out"))
+
+    def stepping_back(self, machine: str) -> Travel:
+        return self._after(command.StepProgram(machine, "back"))
+
+    def go(self, moment: Nanos) -> Stop:
+        travel = self._after(command.LookAt(moment))
+        while True:
+            try:
+                next(travel)
+            except StopIteration as end:
+                return end.value
+
+    def branch(self) -> None:
+        self._ask(command.Branch())
+        self._drop()
+
+    def pause(self) -> Stop:
+        self._ask(Pause())
+        return Stop(StopReason.PAUSE, self._drop())
+
+    def _drop(self) -> Nanos:
+        """Where the debugger stands; what was said of it so far is known then."""
+        now = self.now
+        for _ in self._stops(0.0):
+            pass
+        return now
+
+    def _after(self, wanted: Command) -> Travel:
+        self._drop()
+        self._ask(wanted)
+        return self._until_stopped()
+
+    def _until_stopped(self) -> Travel:
+        while True:
+            for stop in self._stops(PART_S):
+                return stop
+            yield
+
+    def _at_once(self, stop: Stop) -> Travel:
+        yield from ()
+        return stop
+
+    def unasked(self) -> Travel | None:
+        """What somebody else has begun meanwhile; None where nothing was."""
+        for event in self._events(0.0):
+            if isinstance(event.payload, StoppedPayload):
+                return self._at_once(self._stop(event, event.payload))
+            if isinstance(event.payload, PacePayload) and not event.payload.paused:
+                return self._until_stopped()
+        return None
+
+    def _stops(self, timeout_s: float) -> Iterator[Stop]:
+        for event in self._events(timeout_s):
+            if isinstance(event.payload, StoppedPayload):
+                yield self._stop(event, event.payload)
+
+    def _events(self, timeout_s: float) -> Iterator[Event]:
+        if not len(self._following):
+            self._subject.pump(timeout_s)
+        while len(self._following):
+            (event,) = self._following.take(1).events
+            if isinstance(event.payload, LogPayload):
+                said = event.payload
+                self._log(event.time, event.machine, said.words, said.program, said.line)
+            else:
+                yield event
+
+    def _stop(self, event: Event, stopped: StoppedPayload) -> Stop:
+        machine = event.machine if event.machine in self._texts else None
+        return Stop(StopReason(stopped.reason), event.time, machine, stopped.what, stopped.breakpoints)
+
+
+def _value(found: Mapping[str, Any]) -> Value:
+    return Value(found["name"], found["value"], found["number"], found["settable"])
+
+
+def _wanted(point: AnyPoint) -> command.SetBreakpoint:
+    match point:
+        case LinePoint():
+            return command.SetBreakpoint(
+                machine=point.machine,
+                program=point.text,
+                line=point.line,
+                condition=point.condition,
+                hits=point.hits,
+                log=point.log,
+            )
+        case LabelPoint():
+            return command.SetBreakpoint(label=point.label, condition=point.condition, hits=point.hits)
+        case DataPoint():
+            return command.SetBreakpoint(machine=point.machine, value=point.name, condition=point.condition)

@@ -1,0 +1,135 @@
+"""`steptwin dap` attached to a twin that runs in a process of its own."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from dap_client import DapClient, Refused
+from debug_rig import BOTH, CHIP, WBC
+from tests.conftest import until
+
+from steptwin.live.remote import ask
+from steptwin.subject.commands import Pause, ReadPoints, Resume, Time
+
+
+@pytest.fixture
+def twin(tmp_path: Path) -> Iterator[Path]:
+    """The folder of a running twin called ``two``."""
+    (tmp_path / "m.prg").write_text(WBC)
+    (tmp_path / "c.m1486").write_text(CHIP)
+    (tmp_path / "two.toml").write_text(BOTH)
+    ready = tmp_path / "ready.json"
+    with (tmp_path / "out").open("w") as out:
+        command = [sys.executable, "-m", "steptwin", "up", "two.toml", "--ready-file", "ready.json"]
+        process = subprocess.Popen(command, cwd=tmp_path, stdout=out, stderr=out, env={**os.environ, "TERM": "dumb"})
+    try:
+        until(lambda: ready.exists() or process.poll() is not None, "the twin is ready")
+        assert process.poll() is None, (tmp_path / "out").read_text()
+        yield tmp_path
+    finally:
+        process.terminate()
+        process.wait()
+
+
+@pytest.fixture
+def client() -> Iterator[DapClient]:
+    client = DapClient()
+    yield client
+    assert client.close() == 0
+
+
+def attach(client: DapClient, **arguments: object) -> None:
+    client.ask("initialize", adapterID="steptwin")
+    client.ask("attach", **arguments)
+    client.event("initialized")
+
+
+def line(client: DapClient) -> int:
+    return client.ask("stackTrace", threadId=1)["stackFrames"][0]["line"]
+
+
+def go(client: DapClient, command: str) -> dict[str, Any]:
+    client.ask(command, threadId=1)
+    return client.event("stopped")
+
+
+def paused() -> bool:
+    return ask("two", Time())["paused"]
+
+
+def test_breakpoints_steps_and_the_past_of_a_running_twin(twin: Path, client: DapClient) -> None:
+    attach(client, twin="two")
+    source = {"path": str(twin / "m.prg")}
+    (point,) = client.ask("setBreakpoints", source=source, breakpoints=[{"line": 7}])["breakpoints"]
+    assert (point["verified"], point["line"]) == (True, 8)
+    client.ask("configurationDone")
+    stopped = client.event("stopped")
+    assert (stopped["reason"], stopped["hitBreakpointIds"]) == ("breakpoint", [point["id"]])
+    assert paused()
+    frame = client.ask("stackTrace", threadId=1)["stackFrames"][0]
+    assert (frame["line"], frame["source"]["path"]) == (8, str(twin / "m.prg"))
+    count = int(client.ask("evaluate", expression="n", frameId=1000)["result"])
+    assert [go(client, "next") and line(client) for _ in range(2)] == [9, 10]
+    assert [go(client, "stepBack") and line(client) for _ in range(2)] == [9, 8]
+    go(client, "continue")  # through the past, to the breakpoint in the next round
+    assert line(client) == 8
+    assert int(client.ask("evaluate", expression="n", frameId=1000)["result"]) == count + 1
+    pins = client.ask("variables", variablesReference=1003)["variables"]
+    assert {"IN1", "OUT1"} <= {one["name"] for one in pins}
+    assert client.ask("setVariable", variablesReference=1001, name="n", value="1000")["value"] == "1000"
+    assert ask("two", ReadPoints(("time",)))[0]["quality"] == "good"
+    go(client, "continue")
+    assert client.ask("evaluate", expression="n", frameId=1000)["result"] == "1001"
+
+
+def test_who_detaches_leaves_the_twin_as_it_was_found(twin: Path, client: DapClient) -> None:
+    attach(client, twin=str(twin / "two.toml"), stopOnEntry=True)
+    client.ask("configurationDone")
+    assert client.event("stopped")["reason"] == "pause"
+    assert paused()
+    client.ask("disconnect")
+    until(lambda: not paused(), "it goes on")
+
+
+def test_what_others_do_is_seen(twin: Path, client: DapClient) -> None:
+    attach(client)
+    client.ask("configurationDone")
+    with pytest.raises(Refused, match="pause it first"):
+        client.ask("stackTrace", threadId=1)
+    ask("two", Pause())
+    assert client.event("stopped")["reason"] == "pause"
+    ask("two", Resume())
+    client.event("continued")
+    client.ask("pause", threadId=1)
+    assert client.event("stopped")["reason"] == "pause"
+
+
+def test_logs_labels_and_texts_without_files(twin: Path, client: DapClient) -> None:
+    (twin / "m.prg").unlink()
+    attach(client, twin="two")
+    named = {source["name"]: source for source in client.ask("loadedSources")["sources"]}
+    assert set(named) == {"m, m.prg", "c.m1486"}
+    source = named["m, m.prg"]
+    assert client.ask("source", sourceReference=source["sourceReference"])["content"] == WBC
+    client.ask("setBreakpoints", source=source, breakpoints=[{"line": 9, "logMessage": "n is {n}"}])
+    (label, wrong) = client.ask("setFunctionBreakpoints", breakpoints=[{"name": "@2"}, {"name": "CUONT"}])["breakpoints"]
+    assert (label["verified"], wrong["verified"]) == (True, False)
+    client.ask("configurationDone")
+    client.event("output", lambda body: "n is" in body["output"])
+    stopped = client.event("stopped")
+    assert (stopped["reason"], stopped["threadId"]) == ("function breakpoint", 2)
+
+
+def test_what_cannot_be_attached_to_has_its_reason(client: DapClient) -> None:
+    with pytest.raises(Refused, match="no twin"):
+        client.ask("attach", twin="nowhere")
+    with pytest.raises(Refused, match="twin = 5: expected the name"):
+        client.ask("attach", twin=5)
+    with pytest.raises(Refused, match="nothing was launched"):
+        client.ask("threads")
