@@ -1,0 +1,187 @@
+"""Lines of worlds: places of programs, what they ask and get, and the words for it."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import pytest
+
+from steptwin.errors import Misuse, Refusal
+from steptwin.files.world import World
+from steptwin.machine import MILLISECOND
+from steptwin.wire.crc import with_crc
+from steptwin.world.actions import Download, SetVariable
+from steptwin.world.kinds import line_kinds
+
+READ_STATUS = bytes.fromhex("03 27 1A 00 01")
+"""M1_STATUS with firmware 1.70."""
+OFF = bytes.fromhex("03 02 00 00")
+ON = bytes.fromhex("06 00 05 00 07")
+"""A write of 7 to user register 5."""
+TEXT = """
+[[line]]
+name = "bus"
+kind = "modbus"
+{bus}
+[[line]]
+name = "chips"
+kind = "m1486"
+{chips}
+[[mic488]]
+name = "a"
+line = "bus"
+[[mic488]]
+name = "b"
+line = "bus"
+unit = 2
+[[m1486]]
+name = "c"
+line = "chips"
+address = 7
+"""
+
+
+def world(bus: str = "", chips: str = "") -> World:
+    return World.from_toml(TEXT.format(bus=bus, chips=chips))
+
+
+def rtu(pdu: bytes, unit: int = 1) -> bytes:
+    return with_crc(bytes((unit,)) + pdu)
+
+
+def tcp(pdu: bytes, unit: int = 1) -> bytes:
+    return b"\0\1\0\0" + (len(pdu) + 1).to_bytes(2, "big") + bytes((unit,)) + pdu
+
+
+def followed(there: World, line: str) -> list[str]:
+    """The frames of a line as text, from now on."""
+    found: list[str] = []
+    spec = next(one for one in there.spec.lines if one.name == line)
+    words = line_kinds()[spec.kind].words(there.lines[line], "", lambda frame: found.append(str(frame)))
+    there.lines[line].follow_frames(words)
+    there.trace.watchers.append(words.recorded)
+    return found
+
+
+@pytest.mark.parametrize(("line", "kinds"), [("bus", "rtu, serial, tcp"), ("chips", "raw")])
+def test_kinds_of_connections(line: str, kinds: str) -> None:
+    there = world().lines[line]
+    with pytest.raises(Misuse, match=f"line {line!r} takes no connection of kind 'usb': permitted are {kinds}"):
+        there.connect("p", "usb")
+    assert "p" not in there.places
+    names = kinds.split(", ")
+    first, last = names[0], names[-1]
+    assert there.connect("p") is there.connect("p", last)  # known by its name
+    assert there.places["p"].kind == first
+
+
+def test_rates_and_timing() -> None:
+    there = world()
+    assert {name: (line.baud, line.is_timed) for name, line in there.lines.items()} == {
+        "bus": (38400, False),
+        "chips": (4800, False),
+    }
+    there = world('timing = "real"\nbaud = 9600', 'timing = "real"')
+    assert {name: (line.baud, line.is_timed) for name, line in there.lines.items()} == {
+        "bus": (9600, True),
+        "chips": (4800, True),
+    }
+    assert there.lines["bus"].units == (1, 2)
+
+
+@pytest.mark.parametrize("kind", ["rtu", "tcp"])
+def test_answers_of_a_line_with_timing_come_later(kind: str) -> None:
+    """8 characters of 1.04 ms at 9600 bit/s, the pause that ends the request, and 7 characters back."""
+    framed = rtu if kind == "rtu" else tcp
+    for timing, early in (("off", True), ("real", False)):
+        there = world(f'timing = "{timing}"\nbaud = 9600')
+        line = there.lines["bus"]
+        place = line.connect("p", kind)
+        outputs: list[int] = []
+        place.on_output = partial(outputs.append, 1)
+        assert place.at_once is (kind == "tcp" and early)
+        line.receive("p", framed(READ_STATUS), there.now)
+        there.run(for_="5 ms")
+        assert bool(place.received) is early
+        there.run(for_="30 ms")
+        ((moment, answer),) = place.take(there.now)
+        assert answer == framed(OFF)
+        assert (moment == 0) is early
+        assert outputs == [1]
+        assert place.take(there.now) == []
+
+
+def test_what_cannot_change_anything_is_not_recorded() -> None:
+    """A whole read request of a line without timing, faults and held bytes; nothing else."""
+    there = world()
+    line = there.lines["bus"]
+    place = line.connect("p", "rtu")
+    assert line.is_idle_read(place, rtu(READ_STATUS))
+    assert not line.is_idle_read(place, rtu(ON))
+    frames = len(list(there.trace.frames()))
+    assert line.exchange_unrecorded("p", place, rtu(READ_STATUS), there.now) == rtu(OFF)
+    assert len(list(there.trace.frames())) == frames
+    assert line.exchange("p", place, rtu(READ_STATUS), there.now) == rtu(OFF)
+    assert len(list(there.trace.frames())) == frames + 2
+    timed = world('timing = "real"').lines["bus"]
+    assert not timed.is_idle_read(timed.connect("p", "rtu"), rtu(READ_STATUS))
+    chips = there.lines["chips"]
+    assert not chips.is_idle_read(chips.connect("p"), b"u20\r")
+
+
+def test_frames_in_words() -> None:
+    there = world()
+    words = followed(there, "bus")
+    line = there.lines["bus"]
+    line.receive("p", rtu(READ_STATUS), there.now)
+    line.connect("q", "tcp")
+    line.receive("q", tcp(ON, 2), there.now)
+    assert [text.rpartition("  ")[2] for text in words] == [
+        "unit 1: read M1_STATUS", "unit 1: read M1_STATUS = off (0)", "unit 2: write USER_REGISTER 5 = 7",
+        "unit 2: wrote USER_REGISTER 5 = 7",
+    ]  # fmt: skip
+    assert [text[15:22].strip() for text in words] == ["p", "p", "q", "q"]
+
+
+def test_bytes_that_belong_to_no_frame_are_counted_for_followers() -> None:
+    there = world()
+    words = followed(there, "bus")
+    line = there.lines["bus"]
+    for count, expected in ((2, "2 bytes that belong to no frame"), (1, "1 byte that belongs to no frame")):
+        line.receive("p", b"\x55" * count + rtu(READ_STATUS), there.now)
+        there.run(for_="2 s")
+        assert [text for text in words if text.endswith(expected)]
+        assert len(words) == 3
+        words.clear()
+
+
+def test_characters_in_words() -> None:
+    there = world()
+    words = followed(there, "chips")
+    line = there.lines["chips"]
+    line.receive("p", b"u20\r", there.now)
+    there.run(for_="10 ms")
+    assert [text.rpartition("  ")[2] for text in words] == ["Upload 20", "U20 type letter in ASCII = 66"]
+    line.leave("p")
+    line.receive("q", b"r\r", there.now)
+    assert words[-1].rpartition("  ")[2] == "Run"
+
+
+def test_a_program_that_has_disconnected_gets_nothing_more() -> None:
+    there = world('timing = "real"')
+    line = there.lines["bus"]
+    place = line.connect("p", "rtu")
+    line.receive("p", rtu(READ_STATUS), there.now)
+    line.leave("p")
+    line.leave("p")
+    there.run(for_="1 s")
+    assert (place.is_connected, list(place.received), line.places) == (False, [], {})
+
+
+def test_what_a_controller_lacks_is_a_refusal() -> None:
+    there = World.from_toml('[[mic488]]\nname = "m"\n')
+    with pytest.raises(Misuse, match="no variable 'x'"):
+        there.apply_input(SetVariable("m", "x", 1.0))
+    with pytest.raises((Misuse, Refusal), match="m has no place 'program 9' for a program"):
+        there.apply_input(Download("m", "program 9", "END\n"))
+    assert there.now < MILLISECOND
