@@ -109,12 +109,12 @@ def integrated(commands: list[tuple[int, bool]], end: int) -> list[tuple[int, bo
     due: int | None = None
     wanted, before = False, False
     for step in range(end):
+        if due == step:
+            spool, due = wanted, None
         for at, level in commands:
             if at == step and level is not wanted:
                 wanted = level
                 due = None if wanted is spool else step + 120
-        if due == step:
-            spool, due = wanted, None
         is_out = place >= 50.0 - 1e-9
         if is_out is not before:
             edges.append((step, is_out))

@@ -72,17 +72,22 @@ class Brake(BoardPart):
         return self._mechanism is mechanism
 
     def update(self, now: Nanos) -> None:
+        self._move(now)  # before the input changes: an input at a moment comes after what is due then
         is_on = self.board.is_on(RELEASE)
         if is_on is not self._was_on:
             self._was_on = is_on
             wait = self._spec.release_time if is_on else self._spec.apply_time
             self._due = None if is_on is self._is_released else now + wait
-        if self._due is not None and self._due <= now:
-            self._due = None
-            self._is_released = is_on
+            self._move(now)
         is_open = self._is_released and not self.is_stuck
         self._mechanism.brake(0.0 if is_open else self._spec.torque * self.share, now)
         self.board.put(RELEASED, float(is_open))
+
+    def _move(self, now: Nanos) -> None:
+        """Let go or act, if that is due."""
+        if self._due is not None and self._due <= now:
+            self._due = None
+            self._is_released = self._was_on
 
     def deadline(self) -> Nanos | None:
         return self._due
