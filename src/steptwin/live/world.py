@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from heapq import heappop, heappush
 from typing import Protocol
 
 from steptwin.errors import Misuse, Refusal
@@ -20,6 +19,7 @@ from steptwin.world.kernel import Kernel
 from steptwin.world.kinds import line_kinds
 from steptwin.world.lines import LineEndPoint
 from steptwin.world.plant import PlantSnapshot
+from steptwin.world.turns import Dues
 
 MOST_INPUTS = 200_000
 MOST_INPUT_BYTES = 16 << 20
@@ -235,30 +235,24 @@ class _Dues:
 
     def __init__(self, kernels: list[Kernel]) -> None:
         self.changed = dict.fromkeys(kernels)
-        self._order = {kernel: i for i, kernel in enumerate(kernels)}
-        self._due_of: dict[Kernel, Nanos] = {}
-        self._queue: list[tuple[Nanos, int, Kernel]] = []
+        self._kernels = kernels
+        self._number_of = {kernel: number for number, kernel in enumerate(kernels)}
+        self._dues = Dues()
 
     def first(self) -> Nanos | None:
         while self.changed:
             kernel, _ = self.changed.popitem()
             due = kernel.deadline()  # signals may settle: it has changed again then
-            if due is None:
-                self._due_of.pop(kernel, None)
-            elif self._due_of.get(kernel) != due:
-                self._due_of[kernel] = due
-                heappush(self._queue, (due, self._order[kernel], kernel))
-        queue = self._queue
-        while queue and self._due_of.get(queue[0][2]) != queue[0][0]:
-            heappop(queue)
-        return queue[0][0] if queue else None
+            self._dues.put(self._number_of[kernel], due)
+        return self._dues.first()
 
     def advance(self, now: Nanos) -> None:
         """Advance the kernels with deadlines up to ``now``, in order."""
         while (due := self.first()) is not None and due <= now:
-            kernel = self._queue[0][2]
-            kernel.advance(now)
-            self.changed[kernel] = None
+            for number in self._dues.take(due):
+                kernel = self._kernels[number]
+                kernel.advance(now)
+                self.changed[kernel] = None
 
 
 class VisionPort:

@@ -171,7 +171,7 @@ class LineRig(Rig):
             try:
                 return act(live.world)
             finally:
-                kernel.mark()  # what acted on the machine itself has changed it behind the kernel's back
+                kernel.mark(self._machine)  # what acted on the machine itself has changed it behind the kernel's back
                 live.stale = True
 
         return self._at_present(at)

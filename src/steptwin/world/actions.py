@@ -97,6 +97,7 @@ def _now(plant: Plant, name: str) -> Generator[Kernel]:
     """The kernel of a machine or line, advanced to the present; it settles after the action."""
     kernel = plant.touch(name)
     yield kernel
+    kernel.mark(name)
     kernel.settle()
 
 
@@ -143,6 +144,7 @@ def _write(plant: Plant, step: do.Write) -> None:
             else:
                 _record(plant, name, "request", pdu)
                 execute(machine, pdu, now)
+        kernel.mark(name if on is None else on[0].name)
         kernel.settle()
 
 

@@ -189,7 +189,7 @@ class _Builder:
             raise Misuse("nothing is on this line")
         kernel = self.site.kernel(spec.name)
         line = kind.make(spec, members, kernel, parts.record, parts.faults)
-        kernel.add_part(line)
+        kernel.add_part(line, (spec.name, *(member.spec.name for member in members)))
         parts.lines[spec.name] = line
         for member in members:
             parts.line_of[member.spec.name] = line, member.address
@@ -218,7 +218,7 @@ class _Builder:
                 kernel = self.site.kernel_of(element, named)
                 failing = FaultyElement(kernel, named.name, self.parts.faults, element.faults, found[0])
                 self.parts.faults.elements[named.name] = failing
-                kernel.add_part(failing)
+                kernel.add_part(failing, ())
         return found[0]
 
 

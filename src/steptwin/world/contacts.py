@@ -143,7 +143,7 @@ class Circuit:
 
     def mark(self) -> None:
         """One of the contacts bounces from now on."""
-        self._kernel.mark()
+        self._kernel.mark(self.target.machine)
 
     def report(self, lane: str, level: float) -> None:
         """The level of one of the contacts, whatever the input has of it."""
@@ -331,5 +331,7 @@ def place(kernel: Kernel, switch: PositionSwitch) -> None:
         raise Misuse(f"switch on {switch.target}: {error}") from None
     zone = Zone(switch.low, switch.high)
     circuit = Circuit(kernel, switch.target)
-    kernel.add_part(Switch(circuit, CountedPosition(drive), zone, kernel.now, normally_closed=switch.normally_closed))
+    kernel.add_part(
+        Switch(circuit, CountedPosition(drive), zone, kernel.now, normally_closed=switch.normally_closed), (switch.machine,)
+    )
     circuit.close()

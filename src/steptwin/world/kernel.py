@@ -6,8 +6,9 @@ advanced only when an event concerns it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple, Protocol
 
 from steptwin.errors import Misuse, Runaway, TimeReversal
@@ -17,6 +18,7 @@ from steptwin.motion.divisions import profile_of
 from steptwin.state import Plain
 from steptwin.world.board import Board
 from steptwin.world.trace import Recorder, TraceRecord
+from steptwin.world.turns import Dues, Turns
 
 MAX_ROUNDS_PER_INSTANT = 1000
 """Signals propagate in zero time; more rounds than this at one moment mean a feedback loop of wires."""
@@ -30,7 +32,8 @@ class KernelPart(Protocol):
         ...
 
     def update(self, now: Nanos) -> None:
-        """Process events due by ``now`` and changes of machines; called until nothing changes. Levels go to `Kernel.drive`."""
+        """Process events due by ``now`` and changes of what it watches, repeatedly until nothing changes. Levels go to
+        `Kernel.drive`."""
         ...
 
     def copy_state(self) -> Plain: ...
@@ -86,6 +89,9 @@ class KernelState(NamedTuple):
 class Kernel:
     """Runs machines together. Ties in time are broken by the order in which machines and parts were added.
 
+    An event costs what it changes: only machines and parts that are due, or that something they watch has changed (`mark`), are
+    looked at.
+
     Before a machine is changed directly (by a request or a pin), the kernel must be advanced to that moment, so that delayed
     levels arrive in order; the effects propagate with the next `advance`, `deadline` or `settle`.
 
@@ -115,6 +121,18 @@ class Kernel:
         self._flights: list[DelayedLevel] = []
         self._plans: list[_Plans] = []
         """The plans of each machine that were recorded last."""
+        self._names: list[str] = []
+        """The names of the machines, by number."""
+        self._numbers: dict[str, int] = {}
+        self._watching: dict[str, list[int]] = {}
+        """The numbers of the parts that watch a name."""
+        self._watching_all: list[int] = []
+        self._machine_turns, self._part_turns = Turns(), Turns()
+        """What has to be looked at when the signals settle."""
+        self._machine_dues, self._part_dues = Dues(), Dues()
+        self._machines_looked_at: set[int] = set()
+        self._parts_looked_at: set[int] = set()
+        """Those whose deadlines may have changed since the signals last settled."""
         self._due: Nanos | None = None
 
     # ------------------------------------------------------------------ what is in it
@@ -125,26 +143,38 @@ class Kernel:
             raise Misuse(f"there is a machine {name!r} already")
         machine.advance(self.now)
         self.machines[name] = machine
+        self._numbers[name] = len(self._names)
+        self._names.append(name)
         self._plans.append(_Plans(name, machine))
-        machine.changed = self.mark
-        self.mark()
+        machine.changed = partial(self.mark, name)
+        self.mark(name)
 
     def replace(self, name: str, machine: MotionController) -> None:
         """Replace the machine ``name`` by a wrapper with the same pins and axes."""
         if name not in self.machines:
             raise Misuse(f"no machine {name!r}: there are {', '.join(self.machines) or 'none'}")
         self.machines[name] = machine
-        machine.changed = self.mark
-        self.mark()
+        machine.changed = partial(self.mark, name)
+        self.mark(name)
 
     def add_board(self, board: Board) -> None:
         """Add the terminals of an element, whose part has their state."""
         self.boards[board.name] = board
 
-    def add_part(self, part: KernelPart) -> None:
-        """Add a part; it is first updated when the signals settle next."""
+    def add_part(self, part: KernelPart, watches: Iterable[str] | None = None) -> None:
+        """Add a part; it is first updated when the signals settle next, then whenever it is due or something that it watches has
+        changed.
+
+        ``watches``: names of machines, lines and elements; None: every change.
+        """
+        number = len(self.parts)
         self.parts.append(part)
-        self.mark()
+        for name in () if watches is None else dict.fromkeys(watches):
+            self._watching.setdefault(name, []).append(number)
+        if watches is None:
+            self._watching_all.append(number)
+        self._part_turns.add(number)
+        self._changed()
 
     def connect(self, wire: Wire) -> None:
         """Add a wire. The target takes the present level of the source at once, without the delay."""
@@ -152,7 +182,7 @@ class Kernel:
         self.check(wire.target)
         self.drive(wire.target, wire.transmitted(self._pins_of(wire.source.machine)[wire.source.pin]))
         self._wires.setdefault(wire.source, []).append(wire)
-        self.mark()
+        self.mark(wire.target.machine)
 
     def check(self, name: PinName) -> None:
         """Raises `Misuse` if the machine or its pin does not exist."""
@@ -174,8 +204,22 @@ class Kernel:
             raise Misuse(f"no axis {axis} of {machine!r}, which has {len(axes)} axes")
         return axes[axis - 1]
 
-    def mark(self) -> None:
-        """Register a change: the signals have to settle."""
+    def mark(self, name: str | None = None) -> None:
+        """Register a change of a machine, a line or an element, or of anything: the signals have to settle."""
+        if name is None:
+            for number in range(len(self._names)):
+                self._machine_turns.add(number)
+            for number in range(len(self.parts)):
+                self._part_turns.add(number)
+        else:
+            number = self._numbers.get(name, -1)
+            if number >= 0:
+                self._machine_turns.add(number)
+            for number in self._watching.get(name, ()):
+                self._part_turns.add(number)
+        self._changed()
+
+    def _changed(self) -> None:
         self.stale = True
         if self.on_change is not None:
             self.on_change(self)
@@ -198,7 +242,7 @@ class Kernel:
         board = self.boards.get(target.machine)
         if board is not None:
             board.set_pin(target.pin, level, self.now)
-            self.mark()
+            self.mark(target.machine)
             return
         machine, (_, pin) = self.machines[target.machine], target
         if self._record is None:
@@ -225,7 +269,7 @@ class Kernel:
         self.report(self.owner(element), "edge", f"{element}.{output.lower()}", level)
         for wire in self._wires.get(PinName(element, output), ()):
             self._send(wire, level)
-        self.mark()
+        self.mark(element)
 
     def _send(self, wire: Wire, value: float) -> None:
         level = wire.transmitted(value)
@@ -257,10 +301,12 @@ class Kernel:
             self._advance_alone(now)
         while self._due is not None and self._due <= now:
             self.now = self._due
-            for machine in self.machines.values():
-                due = machine.deadline()
-                if due is not None and due <= self.now:
-                    machine.advance(self.now)
+            for number in self._machine_dues.take(self.now):
+                name = self._names[number]
+                self.machines[name].advance(self.now)
+                self.mark(name)
+            for number in self._part_dues.take(self.now):
+                self._part_turns.add(number)
             if self._flights:
                 self._arrive()
             self.settle()
@@ -280,6 +326,7 @@ class Kernel:
             if self._record is not None:
                 plans.report(self._record, due)
             due = machine.deadline()
+        self._machine_dues.put(0, due)
         self._due = due
         self.stale = False
         if self.on_change is not None:
@@ -295,26 +342,42 @@ class Kernel:
         """Propagate edges along wires and update parts until nothing changes; then find the next deadline."""
         for _ in range(MAX_ROUNDS_PER_INSTANT):
             self.stale = False
-            for part in self.parts:
-                part.update(self.now)
-            for name, machine in self.machines.items():
-                for edge in machine.take_edges():
-                    self._edge(name, edge)
+            for number in self._watching_all:
+                self._part_turns.add(number)
+            self._update_parts()
+            self._take_edges()
             if not self.stale:
                 break
         else:
             raise Runaway(f"signals did not settle after {MAX_ROUNDS_PER_INSTANT} rounds at {self.now} ns: a loop of wires")
-        if self._record is not None:
-            for plans in self._plans:
-                plans.report(self._record, self.now)
-        soonest = min(self._flights).arrival if self._flights else None
-        for one in (*self.machines.values(), *self.parts):
-            due = one.deadline()
-            if due is not None and (soonest is None or due < soonest):
-                soonest = due
-        self._due = soonest
+        self._find_deadlines()
         if self.on_change is not None:
             self.on_change(self)
+
+    def _update_parts(self) -> None:
+        while (number := self._part_turns.take()) is not None:
+            self._parts_looked_at.add(number)
+            self.parts[number].update(self.now)
+
+    def _take_edges(self) -> None:
+        while (number := self._machine_turns.take()) is not None:
+            self._machines_looked_at.add(number)
+            name = self._names[number]
+            for edge in self.machines[name].take_edges():
+                self._edge(name, edge)
+
+    def _find_deadlines(self) -> None:
+        """Record new plans of the machines that were looked at, and find when anything is due next."""
+        for number in sorted(self._machines_looked_at):
+            if self._record is not None:
+                self._plans[number].report(self._record, self.now)
+            self._machine_dues.put(number, self.machines[self._names[number]].deadline())
+        for number in self._parts_looked_at:
+            self._part_dues.put(number, self.parts[number].deadline())
+        self._machines_looked_at.clear()
+        self._parts_looked_at.clear()
+        dues = (self._machine_dues.first(), self._part_dues.first(), min(self._flights).arrival if self._flights else None)
+        self._due = min((due for due in dues if due is not None), default=None)
 
     def _edge(self, name: str, edge: PinEdge) -> None:
         pin = PinName(name, edge.pin)
@@ -360,6 +423,7 @@ class Kernel:
         self._flights = list(state.flights)
         for plans in self._plans:
             plans.mark_reported()
+        self.mark()
         self.settle()
 
 

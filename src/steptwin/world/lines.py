@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, ClassVar, Protocol
 
 from steptwin.errors import Misuse
@@ -154,7 +155,7 @@ class Line(Stateful):
             faulty: FaultyPort = FaultySendingPort(
                 port, place, self._faults, self.fault_kinds[kind], line_name=self.name, is_read=place != SCRIPTS
             )
-            port.on_output = self._kernel.mark
+            port.on_output = partial(self._kernel.mark, self.name)
             is_busy = True
         else:
             faulty = FaultyPort(
@@ -197,8 +198,8 @@ class Line(Stateful):
         answer = found.port.exchange(data, now)
         if place in self._busy or found.port.deadline() is not None:
             self._busy[place] = found
-            self._kernel.mark()
-        elif self._kernel.is_attentive:
+            self._kernel.mark(self.name)
+        if self._kernel.is_attentive:
             self._kernel.mark()
         if self._followers:
             self._count_rubbish(place, found, now)
@@ -222,7 +223,7 @@ class Line(Stateful):
         answer = self.exchange(place, found, data, now)
         if answer:
             self._came(place, found, [(now, answer)])
-        self._kernel.mark()
+        self._kernel.mark(self.name)
 
     def _came(self, place: str, found: LineEndPoint, pieces: list[tuple[Nanos, bytes]]) -> None:
         found.received.extend(pieces)

@@ -309,7 +309,7 @@ class Mechanism(Stateful):
         state = self.at(now)
         self._brake = torque
         self._renew(self._drive, now, state)
-        self._kernel.mark()
+        self._kernel.mark(self.machine)
 
     # ------------------------------------------------------------------ encoders
 
@@ -355,7 +355,7 @@ class Mechanism(Stateful):
         self._blockers = (*others, by) if blocked else ()
         stalled = state.stalled or (not blocked and self.build.motor is not None)
         self._renew(self._drive, now, state._replace(stalled=stalled))
-        self._kernel.mark()
+        self._kernel.mark(self.machine)
 
     def lose(self, pulses: int, now: Nanos) -> None:
         """Move the rotor ``pulses`` behind the field (negative: ahead), within the hard stops."""
@@ -369,13 +369,13 @@ class Mechanism(Stateful):
         self._simple = False
         behind = self.course(now).field(now) - rotor
         self._renew(self._drive, now, MechanicalState(rotor, min(max(load, rotor), rotor + build.play), stalled, behind))
-        self._kernel.mark()
+        self._kernel.mark(self.machine)
 
     def slip(self, counts: int, now: Nanos) -> None:
         """Let the encoders slip by ``counts`` on their shaft."""
         for encoder in self._encoders:
             encoder.device.turn_encoder(encoder.axis, counts, now)
-        self._kernel.mark()
+        self._kernel.mark(self.machine)
 
     # Revisions of a drive are not restored, so the state only holds whether the course belongs to the drive's present plan.
 

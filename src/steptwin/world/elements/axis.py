@@ -108,7 +108,7 @@ def _build(spec: AxisSpec, site: Site) -> BuiltAxis:
         is_free=spec.motor is not None and spec.motor.when_off == "free",
     )
     mechanism = Mechanism(kernel, machine, number, build, spec.name)
-    kernel.add_part(mechanism)
+    kernel.add_part(mechanism, (machine,))
     fitted = BuiltAxis(spec, kernel, mechanism, scale)
     for n, switch in enumerate(spec.switches, start=1):
         site.unless_wrong(switch.path, partial(_put_switch, fitted, switch, lane_of(spec.name, n), site))
@@ -118,7 +118,7 @@ def _build(spec: AxisSpec, site: Site) -> BuiltAxis:
 def _put_switch(axis: BuiltAxis, spec: SwitchSpec, lane: str, site: Site) -> None:
     usual = axis.scale.turn if axis.spec.kind == "rotary" else None
     period = usual if spec.period is None else axis.scale.pulses(spec.period)
-    put_switch(axis.kernel, axis.mechanism, zone_of(spec, axis.scale.nearest, period), spec, lane, site)
+    put_switch(axis.kernel, axis.mechanism, axis.spec.drive[0], zone_of(spec, axis.scale.nearest, period), spec, lane, site)
 
 
 def _connect(spec: AxisSpec, fitted: BuiltAxis, site: Site) -> None:

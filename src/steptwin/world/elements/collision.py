@@ -77,6 +77,10 @@ class Collision(BoardPart):
         self.count = 0
         """How often they touched."""
 
+    @property
+    def watches(self) -> None:
+        """The condition may be over anything."""
+
     def update(self, now: Nanos) -> None:
         touches = self._condition.holds(now)
         if touches is not self._touches:

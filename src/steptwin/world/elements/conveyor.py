@@ -123,6 +123,7 @@ class Conveyor(BoardPart):
     __slots__ = (
         "_due",
         "_is_fed",
+        "_moved_by",
         "_next_feed",
         "_own",
         "_version",
@@ -135,15 +136,26 @@ class Conveyor(BoardPart):
         "per_mm",
         "spec",
     )
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_version", "drive", "following", "per_mm", "spec"}) | BoardPart.FIXED
+    FIXED: ClassVar[frozenset[str]] = (
+        frozenset({"_moved_by", "_version", "drive", "following", "per_mm", "spec"}) | BoardPart.FIXED
+    )
 
-    def __init__(self, board: Board, spec: ConveyorSpec, drive: BeltDrive, per_mm: Fraction, own: ConstantDrive | None) -> None:
-        """``own``: the drive, where it is the conveyor's own."""
+    def __init__(
+        self,
+        board: Board,
+        spec: ConveyorSpec,
+        drive: BeltDrive,
+        per_mm: Fraction,
+        own: ConstantDrive | None,
+        moved_by: tuple[str, ...] = (),
+    ) -> None:
+        """``own``: the drive, where it is the conveyor's own; ``moved_by``: otherwise the machine that moves it."""
         super().__init__(board)
         self.spec = spec
         self.drive = drive
         self.per_mm = per_mm
         self._own = own
+        self._moved_by = moved_by
         self.following: Conveyor | None = None
         self.load = Load()
         self.fed = 0
@@ -170,6 +182,10 @@ class Conveyor(BoardPart):
         """Another value whenever predictions no longer hold."""
         return self.drive.version(), self.load.version()
 
+    @property
+    def watches(self) -> tuple[str, ...]:
+        return (self.board.name, *self._moved_by)
+
     def update(self, now: Nanos) -> None:
         if self._own is not None:
             self._own.run(self.board.is_on(RUN) and not self.is_stopped, now)
@@ -184,6 +200,7 @@ class Conveyor(BoardPart):
         if version != self._version or (self._due is not None and self._due <= now):
             self._deliver(now)
             self._version = self.version()
+            self.board.kernel.mark(self.board.name)
             self._due = next_change(self.drive, *self._ends(now), now)
 
     def _feed(self, now: Nanos) -> None:
@@ -197,12 +214,12 @@ class Conveyor(BoardPart):
         """Put a workpiece with its front ``front`` mm from the beginning. ``length`` in places of this belt."""
         self.load.put(Workpiece(name, self.drive.place(now) - self.places(front), length))
         self.report(f"{name} is on {self.spec.name}", name, "on")
-        self.board.kernel.mark()
+        self.board.kernel.mark(self.board.name)
 
     def take(self, piece: Workpiece) -> None:
         """Take a workpiece off the belt."""
         self.load.take(piece)
-        self.board.kernel.mark()
+        self.board.kernel.mark(self.board.name)
 
     def front(self, number: int, now: Nanos) -> float:
         """How far the front of a workpiece is from the beginning, mm. 0 is the workpiece that was put there first; NaN if
@@ -301,7 +318,8 @@ def _make(spec: ConveyorSpec, site: Site) -> Conveyor:
         own = ConstantDrive(Fraction(str(spec.speed)), board.kernel.now)
         return Conveyor(board, spec, own, Fraction(PICOMETRES), own)
     axis = find_axis(spec.axis, site)
-    return Conveyor(board, spec, axis.mechanism, axis.scale.pulses_per_unit / Fraction(str(spec.mm_per_unit)), None)
+    per_mm = axis.scale.pulses_per_unit / Fraction(str(spec.mm_per_unit))
+    return Conveyor(board, spec, axis.mechanism, per_mm, None, (axis.mechanism.machine,))
 
 
 def _connect(spec: ConveyorSpec, conveyor: Conveyor, site: Site) -> None:
@@ -346,7 +364,7 @@ def _put_sensors(spec: ConveyorSpec, conveyor: Conveyor, site: Site) -> None:
 def _put_sensor(conveyor: Conveyor, spec: SensorSpec, lane: str, site: Site) -> None:
     kernel = conveyor.board.kernel
     circuit = site.circuit(kernel, spec.target, (*spec.path, "to"), spec.join)
-    kernel.add_part(Sensor(circuit, conveyor, spec, site.bounce_of(circuit), lane))
+    kernel.add_part(Sensor(circuit, conveyor, spec, site.bounce_of(circuit), lane), (conveyor.board.name,))
 
 
 def _place_names(spec: ConveyorSpec) -> tuple[str, ...]:

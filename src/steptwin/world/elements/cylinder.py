@@ -89,7 +89,10 @@ class Cylinder(BoardPart):
             self._wanted = wanted
             self._due = None if wanted == self._spool else now + self._spec.switching
             self._switch(now)
-        self.travel.send(self._force(), now)
+        force = self._force()
+        if force != self.travel.direction:
+            self.travel.send(force, now)
+            self.board.kernel.mark(self.board.name)
         place = self.travel.place(now)
         self.board.put(EXTENDED, float(place == self.travel.full))
         self.board.put(RETRACTED, float(place == 0))
@@ -166,7 +169,7 @@ def _put_switches(spec: CylinderSpec, cylinder: Cylinder, site: Site) -> None:
 
 def _put_switch(cylinder: Cylinder, spec: SwitchSpec, lane: str, site: Site) -> None:
     zone = zone_of(spec, cylinder.places, None if spec.period is None else cylinder.places(spec.period))
-    put_switch(cylinder.board.kernel, cylinder.travel, zone, spec, lane, site)
+    put_switch(cylinder.board.kernel, cylinder.travel, cylinder.board.name, zone, spec, lane, site)
 
 
 def _signals(cylinder: Cylinder) -> Mapping[str, SignalOf]:

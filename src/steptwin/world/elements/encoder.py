@@ -97,7 +97,7 @@ def fit_encoder(axis: BuiltAxis, spec: EncoderSpec | None, axes: Mapping[str, Bu
         target = (name, encoders.index_input(mechanism.number))
         circuit = site.circuit(axis.kernel, target, (*spec.path, "index"), None)
         zone = Zone(low, low + spec.index_width - 1, 0, axis.scale.pulses_per_rev)
-        axis.kernel.add_part(Switch(circuit, RotorMark(turned.mechanism), zone, now))
+        axis.kernel.add_part(Switch(circuit, RotorMark(turned.mechanism), zone, now), (turned.mechanism.machine,))
 
 
 def _counts(spec: EncoderSpec, turned: BuiltAxis, encoders: EncoderInputs[Any], machine: Any, number: int) -> Fraction | None:

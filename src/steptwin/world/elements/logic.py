@@ -64,6 +64,11 @@ class BoardPart(Stateful):
     def __init__(self, board: Board) -> None:
         self.board = board
 
+    @property
+    def watches(self) -> tuple[str, ...] | None:
+        """The machines and elements whose changes concern it; None: all."""
+        return (self.board.name,)
+
     def update(self, now: Nanos) -> None:
         """As `KernelPart.update`."""
         raise NotImplementedError
@@ -159,7 +164,7 @@ def with_terminals(
 
     def build(found: S, site: Site) -> P:
         part = make(found, site)
-        part.board.kernel.add_part(part)
+        part.board.kernel.add_part(part, part.watches)
         for joint in found.joints:
             site.join(joint.source, (found.name, joint.input), (*found.path, joint.key))
         if inner is not None:

@@ -69,7 +69,7 @@ def _build(spec: SourceSpec, site: Site) -> AnalogSource:
     kernel = site.kernel(spec.target[0])
     target = site.input(spec.target, spec.path, ANALOG_INPUT)
     source = AnalogSource(kernel, target, WAVEFORMS[spec.kind](spec), spec.period)
-    kernel.add_part(source)
+    kernel.add_part(source, ())
     return source
 
 

@@ -84,8 +84,8 @@ def lane_of(axis: str, number: int) -> str:
     return f"{axis}.switch{number}"
 
 
-def put_switch(kernel: Kernel, carriage: Carriage, zone: Zone, spec: SwitchSpec, lane: str, site: Site) -> None:
-    """Put a switch where a carriage runs over it."""
+def put_switch(kernel: Kernel, carriage: Carriage, moved_by: str, zone: Zone, spec: SwitchSpec, lane: str, site: Site) -> None:
+    """Put a switch where a carriage, which the machine or element ``moved_by`` moves, runs over it."""
     circuit = site.circuit(kernel, spec.target, (*spec.path, "to"), spec.join)
     part = Switch(
         circuit,
@@ -98,7 +98,7 @@ def put_switch(kernel: Kernel, carriage: Carriage, zone: Zone, spec: SwitchSpec,
         chance=site.bounce_of(circuit),
         lane=lane,
     )
-    kernel.add_part(part)
+    kernel.add_part(part, (moved_by,))
 
 
 def zone_of(spec: SwitchSpec, places: Callable[[float], int], period: Fraction | int | None = None) -> Zone:

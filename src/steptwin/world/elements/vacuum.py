@@ -127,6 +127,10 @@ class Vacuum(BoardPart):
 
     # ------------------------------------------------------------------ time
 
+    @property
+    def watches(self) -> tuple[str, ...]:
+        return (self.board.name, *(() if self.source is None else (self.source.board.name,)))
+
     def update(self, now: Nanos) -> None:
         goal = self.spec.vacuum if self.board.is_on(EJECTOR) and self._is_closed(now) and not self.leaks else 0.0
         if goal != self._goal:

@@ -64,7 +64,7 @@ class ProgramWatch:
         """The one that was executed last."""
         self._axes = [(axis.status, axis.revision, axis.velocity_p) for axis in device.axes]
         device.program.interpreter.hook(self._begins)
-        kernel.add_part(self)
+        kernel.add_part(self, (name,))
         kernel.observers.append(self._edge)
 
     # ------------------------------------------------------------------ what the program does

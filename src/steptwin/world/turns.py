@@ -1,0 +1,81 @@
+"""Work lists of a kernel by number: what has to be looked at, and what is due when, without a scan of everything."""
+
+from __future__ import annotations
+
+from heapq import heapify, heappop, heappush
+
+from steptwin.machine import Nanos
+
+_FEW = 64
+"""Number of outdated entries that a queue tolerates before it removes them."""
+
+
+class Turns:
+    """Numbers that wait for their turn, each once, in passes of ascending order.
+
+    A number that is added behind the present turn waits for the next pass.
+    """
+
+    __slots__ = ("_last", "_next", "_present", "_waiting")
+
+    def __init__(self) -> None:
+        self._waiting: set[int] = set()
+        self._present: list[int] = []
+        self._next: list[int] = []
+        self._last = -1
+        """The number whose turn it is."""
+
+    def add(self, number: int) -> None:
+        if number not in self._waiting:
+            self._waiting.add(number)
+            heappush(self._present if number > self._last else self._next, number)
+
+    def take(self) -> int | None:
+        """Remove and return the next number of this pass; None at its end, after which the next pass begins."""
+        if self._present:
+            number = self._last = heappop(self._present)
+            self._waiting.discard(number)
+            return number
+        self._present, self._next = self._next, self._present
+        self._last = -1
+        return None
+
+
+class Dues:
+    """The next due moment of each number."""
+
+    __slots__ = ("_due", "_entries", "_room")
+
+    def __init__(self) -> None:
+        self._due: dict[int, Nanos] = {}
+        self._entries: list[tuple[Nanos, int]] = []
+        """By moment; those that are not the due moment of their number are outdated."""
+        self._room = _FEW
+
+    def put(self, number: int, due: Nanos | None) -> None:
+        """Make a number due at ``due`` instead of before; None: never."""
+        if due is None:
+            self._due.pop(number, None)
+        elif self._due.get(number) != due:
+            self._due[number] = due
+            heappush(self._entries, (due, number))
+            if len(self._entries) > self._room:
+                self._entries = [(moment, one) for one, moment in self._due.items()]
+                heapify(self._entries)
+                self._room = 2 * len(self._entries) + _FEW
+
+    def first(self) -> Nanos | None:
+        """The earliest due moment; None if nothing is due."""
+        entries = self._entries
+        while entries and self._due.get(entries[0][1]) != entries[0][0]:
+            heappop(entries)
+        return entries[0][0] if entries else None
+
+    def take(self, now: Nanos) -> list[int]:
+        """Remove and return the numbers that are due by ``now``, in ascending order."""
+        found = []
+        while (first := self.first()) is not None and first <= now:
+            number = heappop(self._entries)[1]
+            del self._due[number]
+            found.append(number)
+        return sorted(found)
