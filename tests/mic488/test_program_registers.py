@@ -5,7 +5,9 @@ from __future__ import annotations
 import pytest
 from mic488_rig import MM, RUNNING, STOPPED, controller, programmed, started
 
+from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.config import AxisConfig
+from steptwin.mic488.encoder import Coupling
 from steptwin.mic488.program_registers import position_p
 from steptwin.wbc.real import ProgramFault
 
@@ -227,3 +229,35 @@ def test_velocities_of_programs_are_in_units() -> None:
     rig = started("M2 = ON\nVABS M2 -12.5\nDELAY 1\n$R0 = VactM2\nWAIT IN9 = ON\n")
     rig.wait(1.5)
     assert rig.r(0) == rig.velocity(2) == -12.5
+
+
+@pytest.mark.parametrize("coupling", [Coupling.FREE, Coupling.BLOCKED])
+def test_a_wait_for_an_encoder_that_nothing_turns_ends_when_a_hand_does(coupling: Coupling) -> None:
+    """WBC-18: nothing happens by itself meanwhile; after the hand the program looks at its next statement time, 1 ms."""
+    rig = programmed("WAIT ENC1 >= 100\nOUT1 = ON\nWAIT IN9 = ON\n")
+    rig.device.couple_encoder(1, coupling, 0)
+    rig.start()
+    rig.wait(0.5)
+    assert rig.device.deadline() is None
+    rig.wait_ns(300_000)
+    rig.device.turn_encoder(1, 99, rig.now)
+    rig.wait(0.5)
+    assert not rig.out(1)
+    rig.device.turn_encoder(1, 1, rig.now)
+    looks = rig.now // MILLISECOND + 1
+    assert rig.pin_until("OUT1", 1.0) == pytest.approx((looks + 1) / 1000)
+
+
+class Roller:
+    """Mechanics that turn a shaft by 1600 pulses a second from the first second on."""
+
+    def count(self, now: int) -> int:
+        return max(0, now - SECOND) * 1600 // SECOND
+
+
+def test_a_wait_for_an_encoder_that_mechanics_turn_looks_at_every_statement_time() -> None:
+    """400 counts in 3200 pulses (the defaults): 100 counts are 800 pulses, reached 0.5 s after the first second."""
+    rig = programmed("WAIT ENC1 >= 100\nOUT1 = ON\nWAIT IN9 = ON\n")
+    rig.device.follow_shaft(1, Roller(), 0)
+    rig.start()
+    assert rig.pin_until("OUT1", 1.0) == pytest.approx(1.501, abs=1e-9)

@@ -414,3 +414,23 @@ def test_a_rotor_that_would_be_caught_and_lost_at_once_stays_lost() -> None:
         assert course.at(moment).stalled, moment
         assert course.at(moment).rotor == 0
     assert [piece.begin for piece in course.pieces] == sorted({piece.begin for piece in course.pieces})
+
+
+@pytest.mark.parametrize(
+    ("q", "end", "found"),
+    [
+        ((0.0, -1.0, 0.0), 2.0, 0.0),  # a line
+        ((0.0, -1e-10, -1.0), 1.0, 0.0),  # falls steeper and steeper
+        ((0.0, -1.0, 0.25), 8.0, 0.0),  # down to -1 at 2, and up again
+        ((0.0, -1.0, 0.25), 0.5, 0.0),  # not as far as the lowest point
+        ((1e-10, -1.0, 0.25), 8.0, 0.0),  # rounding apart, at the beginning
+        ((0.0, -1e-6, 0.25), 8.0, None),  # never lower than rounding
+        ((0.0, -1e-10, 0.0), 2.0, None),
+        ((0.0, -1e-10, -1e-10), 1.0, None),
+    ],
+)
+def test_what_falls_from_0_at_the_beginning_is_below_0_there(
+    q: tuple[float, float, float], end: float, found: float | None
+) -> None:
+    """Unless it falls by no more than rounding, 1e-9 here."""
+    assert _first_below_0(q, 0.0, end, 1e-9) == found
