@@ -1,0 +1,38 @@
+"""What a program uses, found without executing it."""
+
+from __future__ import annotations
+
+import pytest
+
+from steptwin.wbc.check import check
+from steptwin.wbc.positions import parse_positions
+from steptwin.wbc.usage import homing_sides
+
+NONE, LEFT, RIGHT, UNKNOWN = frozenset[int](), frozenset({-1}), frozenset({1}), frozenset({0})
+
+
+def sides(text: str) -> dict[int, frozenset[int]]:
+    checked = check(text, parse_positions("")[0])
+    assert checked.executable is not None, checked.errors
+    return homing_sides(checked.executable.steps)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("HOME M1 -5\n", {1: LEFT}),  # the sign of the velocity: - KL, + KR
+        ("HOME M4 0.5\n", {4: RIGHT}),
+        ("v = 0\nHOME M2 v\n", {2: NONE}),  # MIC-41: accepted, does nothing
+        ("#v -7\nHOME M1 v\n", {1: LEFT}),
+        ("v = -3\nHOME M1 v\n", {1: LEFT}),
+        ("v = -3\nv = 2\nHOME M1 v\n", {1: LEFT | RIGHT}),
+        ("v = -3\nw = 2\nHOME M1 v\n", {1: LEFT}),
+        ("v = $R0\nHOME M1 v\n", {1: UNKNOWN}),
+        ("v = -3\nv = v + 4\nHOME M1 v\n", {1: UNKNOWN}),
+        ("HOME M3 $R0\n", {3: UNKNOWN}),
+        ("HOME M1 -5\nHOME M1 5\nHOME M2 5\n", {1: LEFT | RIGHT, 2: RIGHT}),
+        ("VABS M1 -5\nPABS M1 5\n", {}),
+    ],
+)
+def test_sides_to_which_a_program_homes(text: str, expected: dict[int, frozenset[int]]) -> None:
+    assert sides(text) == expected
