@@ -89,7 +89,7 @@ def test_a_dump_and_a_timeline_have_both(ran: tuple[World, list[tuple[float, flo
     found = re.search(r'(\{"begin":.*\})', page)
     assert found is not None
     axes = json.loads(found[1])["axes"]
-    ends = [pieces[-7] / 640 for pieces in (axes[0]["pieces"], axes[0]["counted"]["pieces"])]
+    ends = [(plan["base"] + plan["final"]) / 640 for plan in (axes[0]["plans"][-1], axes[0]["counted"]["plans"][-1])]
     assert ends == pytest.approx(shown[-1], abs=1.001 / 640)
     assert "counted" not in axes[1]
 

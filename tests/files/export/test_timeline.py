@@ -7,8 +7,9 @@ import re
 import subprocess
 from collections.abc import Callable
 from itertools import pairwise
+from math import cos, pi
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 from world_rig import Run
@@ -39,23 +40,44 @@ def data_of(page: str) -> dict[str, Any]:
     return json.loads(text)
 
 
-class Pieces:
-    """The cubics of an axis as the page takes them."""
+class Piece(NamedTuple):
+    begin: int
+    plan: int
+    segment: int
+    count: int
+    direction: int
+    grid: int
 
-    def __init__(self, numbers: list[float]) -> None:
-        self.pieces = [numbers[i : i + 8] for i in range(0, len(numbers), 8)]
 
-    def at(self, t: Nanos) -> list[float]:
-        return [piece for piece in self.pieces if piece[0] <= t][-1]
+class Motion:
+    """The motion of an axis as the page takes it, with the formulas of docs/control.md."""
 
-    def position(self, t: Nanos) -> float:
-        begin, c0, c1, c2, c3, *_ = self.at(t)
-        u = (t - begin) / SECOND
-        return c0 + u * (c1 + u * (c2 + u * c3))
+    def __init__(self, axis: dict[str, Any], begin: Nanos = 0) -> None:
+        self._plans = axis["plans"]
+        self._begin = begin
+        numbers = axis["pieces"]
+        self.pieces = [Piece(*numbers[i : i + 6]) for i in range(0, len(numbers), 6)]
+
+    def position(self, now: Nanos) -> float:
+        piece = [piece for piece in self.pieces if self._begin + piece.begin <= now][-1]
+        plan = self._plans[piece.plan]
+        if piece.segment < 0:
+            return plan["base"] + plan["final"]
+        segment, t = plan["segments"][piece.segment], (now - int(plan["start_ns"])) / SECOND
+        if isinstance(segment, list):
+            return plan["base"] + polynomial(segment, t)
+        centre, radius, angle, turn = segment["course"]
+        return plan["base"] + centre + radius * cos((angle + turn * polynomial(segment["way"], t)) * pi / 2)
+
+
+def polynomial(segment: list[float], t: float) -> float:
+    _, anchor, c0, c1, c2, c3, _ = segment
+    u = t - anchor
+    return c0 + c1 * u + c2 * u**2 + c3 * u**3
 
 
 @pytest.mark.parametrize(("name", "begin"), [("mic488", 0), ("mic488", 9_060_000_000), ("m1486", 0), ("m1486", 412_345_678)])
-def test_the_cubics_of_a_page_are_the_motion(name: str, begin: Nanos, request: pytest.FixtureRequest) -> None:
+def test_the_plans_of_a_page_are_the_motion(name: str, begin: Nanos, request: pytest.FixtureRequest) -> None:
     run: Run = request.getfixturevalue(name)
     data = data_of(page_of(run.trace, run.views, run.until, begin))
     assert data["span"] == run.until - begin
@@ -64,28 +86,26 @@ def test_the_cubics_of_a_page_are_the_motion(name: str, begin: Nanos, request: p
     assert len(data["axes"]) == len(tracks) > 0
     for axis, track in zip(data["axes"], tracks, strict=True):
         (number,) = (number for (_, number), view in run.views.items() if view is track.view)
-        pieces = Pieces(axis["pieces"])
+        motion = Motion(axis, begin)
         for now in [chance.randrange(begin, run.until) for _ in range(300)] + [t for t in track.times if t >= begin]:
             plan = track.plan(now)
             profile = profile_of(plan)
             position = profile.position(max(now, profile.start)) + run.origin_p(number, now)
-            assert pieces.position(now - begin) == pytest.approx(position, abs=2e-5)
-        for piece in pieces.pieces:
-            now = begin + int(piece[0])
+            assert motion.position(now) == pytest.approx(position, abs=2e-5)
+        for piece in motion.pieces:
+            now = begin + piece.begin
             plan = track.plan(now)
-            assert piece[5] == plan.count(max(now, profile_of(plan).start)) + run.origin_p(number, now)
-            if isinstance(plan, StepTrain) and piece[6]:
-                assert piece[7] == plan.division(now).grid
+            assert piece.count == plan.count(max(now, profile_of(plan).start)) + run.origin_p(number, now)
+            if isinstance(plan, StepTrain) and piece.direction:
+                assert piece.grid == plan.division(now).grid
 
 
 def test_pulses_can_be_found_from_the_pieces(m1486: Run) -> None:
-    """What the page does: pulse k of a piece is where its cubic is k grids beyond its count."""
+    """What the page does: pulse k of a piece is where its segment is k grids beyond its count."""
     (axis,) = data_of(page_of(m1486.trace, m1486.views, m1486.until + SECOND))["axes"]
-    pieces = Pieces(axis["pieces"]).pieces
     given = 0
-    for piece, following in pairwise(pieces):
-        direction, grid = int(piece[6]), int(piece[7])
-        ways = (following[5] - piece[5]) * direction / grid
+    for piece, following in pairwise(Motion(axis).pieces):
+        ways = (following.count - piece.count) * piece.direction / piece.grid
         assert ways == round(ways) >= 0
         given += round(ways)
     plans = [(record.time, record.value) for record in m1486.trace.plans()]
@@ -94,18 +114,18 @@ def test_pulses_can_be_found_from_the_pieces(m1486: Run) -> None:
     assert given == sum(map(len, pulses)) > 10_000
 
 
-def test_arcs_are_followed_closely() -> None:
+def test_arcs_are_exact() -> None:
     arc = circle(5000.0, 0.0, 5000.0, 4.0)
     course = Circular(arc.centre_x, arc.radius, arc.begin_q, arc.sweep_q / arc.length)
     profile = course.profile(plan_position(MotionState(0, 0, 0.0, 0.0), round(arc.length), 1e4, 1e4, 4e3), 0, None)
     trace = Trace()
     trace.add(TraceRecord(0, "a", "plan", "1", profile))
     (axis,) = data_of(page_of(trace))["axes"]
-    pieces = Pieces(axis["pieces"])
+    motion = Motion(axis)
     assert profile.end is not None
     for n in range(1000):
         now = profile.end * n // 1000
-        assert pieces.position(now) == pytest.approx(profile.position(now), abs=0.02)
+        assert motion.position(now) == pytest.approx(profile.position(now), abs=1e-6)
 
 
 def test_a_page_of_many_machines_stays_small() -> None:
@@ -120,8 +140,8 @@ def test_a_page_of_many_machines_stays_small() -> None:
     data = data_of(page)
     assert (len(data["machines"]), len(data["axes"])) == (100, 400)
     empty = len(page_of(Trace(), until=SECOND))
-    # A move is three segments and a rest, each of eight numbers.
-    assert (len(page) - empty) / (400 * moves) < 4 * 60
+    # A move is a plan of three segments, and with the rest four pieces of six numbers.
+    assert (len(page) - empty) / (400 * moves) < 5 * 60
 
 
 def test_the_page_needs_nothing_from_outside(mic488: Run) -> None:
@@ -173,3 +193,30 @@ def test_lanes_in_a_browser(require_peer: Callable[[str], str], tmp_path: Path) 
     assert lanes[:3] == ["table", "M1 position, x true", "M1 since power-on"]
     assert lanes[3:6] == ["M1 velocity", "M1 pulses", "no motion: M2, M3, M4"]
     assert not [name for name in lanes if name.startswith("M2 ")]
+
+
+def test_the_page_computes_the_motion_in_a_browser(require_peer: Callable[[str], str], tmp_path: Path) -> None:
+    """Position, velocity and count of a move along an arc, and the range of its lane, as the scripts of the page have them."""
+    arc = circle(5000.0, 0.0, 5000.0, 4.0)
+    course = Circular(arc.centre_x, arc.radius, arc.begin_q, arc.sweep_q / arc.length)
+    profile = course.profile(plan_position(MotionState(0, 0, 0.0, 0.0), round(arc.length), 1e4, 1e4, 4e3), 0, None)
+    trace = Trace()
+    trace.add(TraceRecord(0, "a", "plan", "1", profile))
+    assert profile.end is not None
+    moments = [profile.end * n // 101 for n in range(101)]
+    script = """
+      const asked = new Motion(DATA.axes[0]);
+      const looks = %s.map((t) => [asked.pulses(asked.at(t), t), asked.velocity(asked.at(t), t), asked.count(t)]);
+      document.body.append(Object.assign(document.createElement("output"), {
+        textContent: JSON.stringify({ looks, range: asked.range(false, 0, SPAN) }),
+      }));
+    """
+    page = tmp_path / "t.html"
+    page.write_text(page_of(trace).replace("</script>\n</body>", script % moments + "</script></body>"), "utf-8")
+    (shown_output,) = re.findall(r"<output>(.*?)</output>", shown(require_peer("chromium"), page))
+    found = json.loads(shown_output)
+    for now, (position, velocity, count) in zip(moments, found["looks"], strict=True):
+        assert position == pytest.approx(profile.position(now), abs=1e-6)
+        assert velocity == pytest.approx(profile.velocity(now), abs=1e-6)
+        assert count == profile.count(now)
+    assert found["range"] == pytest.approx([0.0, 10_000.0], abs=50.0)

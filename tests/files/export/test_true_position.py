@@ -148,7 +148,8 @@ def test_a_picture_and_a_page_have_a_lane_of_it(stalled: Ran, tmp_path: Path) ->
     data = json.loads(re.findall(r'id="data">(.*?)</script>', page.getvalue(), re.DOTALL)[0])
     loads = {axis["name"]: axis["true"] for axis in data["axes"] if "true" in axis}
     assert [(name, load["name"], load["unit"]) for name, load in loads.items()] == [("M1", "x true", "mm")]
-    assert loads["M1"]["pieces"][-7] / loads["M1"]["scale"] == stalled.positions[-1]
+    last = loads["M1"]["plans"][-1]
+    assert (last["base"] + last["final"]) / loads["M1"]["scale"] == stalled.positions[-1]
 
 
 def test_a_file_keeps_it(stalled: Ran, tmp_path: Path) -> None:

@@ -1,6 +1,6 @@
 """A page with a timeline: one file without anything from outside that any browser opens, exact at every scale.
 
-Motion goes into the page as polynomials, not as samples, so that the page can be looked at down to single pulses.
+Motion goes into the page as plans, not as samples, so that the page can be looked at down to single pulses.
 """
 
 from __future__ import annotations
@@ -15,16 +15,12 @@ from typing import IO
 from steptwin.files.export.polyline import PolylinePiece, pieces_of
 from steptwin.files.export.progress import Progress
 from steptwin.files.export.recording import AxisTrack, PinTrack, Recording
-from steptwin.machine import SECOND, Nanos
-from steptwin.motion import Profile, Segment
+from steptwin.machine import Nanos
 from steptwin.motion.divisions import Plan, StepTrain, profile_of
+from steptwin.motion.plain import plain_plan
 from steptwin.world.trace import TraceRecord
 
 _SCRIPTS = ("model.js", "draw.js", "timeline.js")
-_CLOSE_P = 0.01
-"""Cubics that stand for an arc are off by about as much at most."""
-_LEAST_NS = 100_000
-"""Shorter stretches of an arc are not divided."""
 _MOST_BYTES = 64
 """Of a frame in the page."""
 
@@ -66,20 +62,24 @@ def _axis(track: AxisTrack, recording: Recording, progress: Progress, number: in
 
 
 def _motion(track: AxisTrack, recording: Recording) -> dict[str, object]:
-    """Flat ``pieces``, eight numbers each: begin (ns from that of the window), coefficients c0…c3 of the position (pulses) in
-    powers of seconds from there, counted position, direction (0: no pulses), pulses of the profile for one STEP pulse.
+    """The ``plans``, as `steptwin.motion.plain` writes them, and flat ``pieces`` of them, six numbers each: begin (ns from that
+    of the window), number of the plan and of its segment (-1: at rest), counted position, direction (0: no pulses), pulses of
+    the profile for one STEP pulse.
     """
-    numbers: list[float] = []
+    plans: list[dict[str, object]] = []
+    pieces: list[int] = []
     for plan, after, until in track.stretches(recording.begin, recording.until):
-        for piece, grid, stood in _divided(plan, after, until):
-            for begin, cubic in _cubics(piece):
-                direction = 0 if piece.segment is None else piece.segment.direction
-                count = stood if begin == piece.begin else plan.count(begin)
-                rounded = [float(f"{c:.12g}") for c in cubic]
-                numbers += [begin - recording.begin, *rounded, count, direction, grid]
+        profile = profile_of(plan)
+        for piece, grid, count in _divided(plan, after, until):
+            number, direction = -1, 0
+            if piece.segment is not None:
+                number, direction = profile.segments.index(piece.segment), piece.segment.direction
+            pieces += [piece.begin - recording.begin, len(plans), number, count, direction, grid]
+        plans.append(plain_plan(profile))
     view = track.view
     return {
-        "machine": track.machine, "name": view.name, "unit": view.unit, "scale": view.pulses_per_unit, "pieces": numbers,
+        "machine": track.machine, "name": view.name, "unit": view.unit, "scale": view.pulses_per_unit,
+        "plans": plans, "pieces": pieces,
     }  # fmt: skip
 
 
@@ -95,49 +95,6 @@ def _divided(plan: Plan, after: Nanos, until: Nanos) -> Iterator[tuple[PolylineP
         grid = plan.division(now).grid if isinstance(plan, StepTrain) else 1
         for piece in pieces_of(profile, begin, end):
             yield piece, grid, plan.count(max(piece.begin, profile.start))
-
-
-def _cubics(piece: PolylinePiece) -> Iterator[tuple[Nanos, tuple[float, float, float, float]]]:
-    """Moments and coefficients, in seconds from there, of the polynomials that make up ``piece``."""
-    segment = piece.segment
-    if segment is None:
-        yield piece.begin, (piece.look(piece.begin)[0], 0.0, 0.0, 0.0)
-    elif isinstance(segment, Segment):
-        yield piece.begin, _from(segment, piece.profile, piece.begin)
-    else:
-        yield from _along_arc(piece, piece.begin, piece.end)
-
-
-def _along_arc(piece: PolylinePiece, begin: Nanos, end: Nanos) -> Iterator[tuple[Nanos, tuple[float, float, float, float]]]:
-    """Halved until the cubics are close."""
-    c0, c1, c2, c3 = cubic = _between(piece, begin, end)
-    middle = (begin + end) // 2
-    u = (middle - begin) / SECOND
-    if end - begin < _LEAST_NS or abs(c0 + u * (c1 + u * (c2 + u * c3)) - piece.look(middle)[0]) < _CLOSE_P:
-        yield begin, cubic
-    else:
-        yield from _along_arc(piece, begin, middle)
-        yield from _along_arc(piece, middle, end)
-
-
-def _from(s: Segment, profile: Profile, begin: Nanos) -> tuple[float, float, float, float]:
-    u = (begin - profile.start) / SECOND - s.anchor_s
-    return (
-        profile.base + s.c0 + u * (s.c1 + u * (s.c2 + u * s.c3)),
-        s.c1 + u * (2.0 * s.c2 + u * 3.0 * s.c3),
-        s.c2 + 3.0 * s.c3 * u,
-        s.c3,
-    )
-
-
-def _between(piece: PolylinePiece, begin: Nanos, end: Nanos) -> tuple[float, float, float, float]:
-    """The cubic with the positions and velocities of ``piece`` at both moments."""
-    (p0, v0), (p1, v1) = piece.look(begin), piece.look(end)
-    d = (end - begin) / SECOND
-    if d == 0.0:
-        return p0, v0, 0.0, 0.0
-    mean = (p1 - p0) / d
-    return p0, v0, (3.0 * mean - 2.0 * v0 - v1) / d, (v0 + v1 - 2.0 * mean) / (d * d)
 
 
 # ---------------------------------------------------------------------- pins and marks

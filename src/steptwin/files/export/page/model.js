@@ -13,11 +13,28 @@ function lastAt(flat, size, t) {
   return low - 1;
 }
 
-// The motion of an axis: cubics, eight numbers each (begin, c0, c1, c2, c3, count, direction, grid).
-const PIECE = 8;
+// Position and velocity, in pulses, on a segment of a plan `t` seconds after its start: docs/control.md has the formulas.
+function polynomial([, anchor, c0, c1, c2, c3], t) {
+  const u = t - anchor;
+  return [c0 + u * (c1 + u * (c2 + u * c3)), c1 + u * (2 * c2 + u * 3 * c3)];
+}
+
+const QUARTER = Math.PI / 2;
+
+function onSegment(segment, t) {
+  if (Array.isArray(segment)) return polynomial(segment, t);
+  const [centre, radius, angle, turn] = segment.course, [way, speed] = polynomial(segment.way, t);
+  const phi = (angle + turn * way) * QUARTER;
+  return [centre + radius * Math.cos(phi), -radius * Math.sin(phi) * turn * QUARTER * speed];
+}
+
+// The motion of an axis: plans, and pieces of them, six numbers each (begin, plan, segment, count, direction, grid).
+const PIECE = 6;
+const MOST_SAMPLES = 1000;
 
 class Motion {
   constructor(axis) {
+    this.plans = axis.plans.map((plan) => ({ ...plan, start: Number(BigInt(plan.start_ns) - BigInt(DATA.begin)) }));
     this.pieces = axis.pieces;
     this.size = axis.pieces.length / PIECE;
     this.scale = axis.scale;
@@ -25,18 +42,33 @@ class Motion {
   at(t) { return Math.max(lastAt(this.pieces, PIECE, t), 0); }
   begin(i) { return this.pieces[i * PIECE]; }
   end(i) { return i + 1 < this.size ? this.pieces[(i + 1) * PIECE] : SPAN; }
-  pulses(i, t) {
-    const p = this.pieces, o = i * PIECE, u = (t - p[o]) / 1e9;
-    return p[o + 1] + u * (p[o + 2] + u * (p[o + 3] + u * p[o + 4]));
+  plan(i) { return this.plans[this.pieces[i * PIECE + 1]]; }
+  // null at rest.
+  segment(i) { return this.plan(i).segments[this.pieces[i * PIECE + 2]] ?? null; }
+  counted(i) { return this.pieces[i * PIECE + 3]; }
+  direction(i) { return this.pieces[i * PIECE + 4]; }
+  grid(i) { return this.pieces[i * PIECE + 5]; }
+  look(i, t) {
+    const plan = this.plan(i), segment = this.segment(i);
+    if (segment === null) return [plan.base + plan.final, 0];
+    const [position, velocity] = onSegment(segment, (t - plan.start) / 1e9);
+    return [plan.base + position, velocity];
   }
-  position(i, t) { return this.pulses(i, t) / this.scale; }
-  velocity(i, t) {
-    const p = this.pieces, o = i * PIECE, u = (t - p[o]) / 1e9;
-    return (p[o + 2] + u * (2 * p[o + 3] + u * 3 * p[o + 4])) / this.scale;
-  }
+  pulses(i, t) { return this.look(i, t)[0]; }
+  position(i, t) { return this.look(i, t)[0] / this.scale; }
+  velocity(i, t) { return this.look(i, t)[1] / this.scale; }
   isCurved(i, velocity) {
-    const o = i * PIECE;
-    return this.pieces[o + 4] !== 0 || (!velocity && this.pieces[o + 3] !== 0);
+    const segment = this.segment(i);
+    if (segment === null) return false;
+    return !Array.isArray(segment) || segment[5] !== 0 || (!velocity && segment[4] !== 0);
+  }
+  // Into how many parts piece i is divided between a and b to find its least and most: an eighth of a quarter turn each on an arc.
+  parts(i, velocity, a, b) {
+    if (!this.isCurved(i, velocity)) return 1;
+    const segment = this.segment(i), seconds = (t) => (t - this.plan(i).start) / 1e9;
+    if (Array.isArray(segment)) return 3;
+    const turned = segment.course[3] * (polynomial(segment.way, seconds(b))[0] - polynomial(segment.way, seconds(a))[0]);
+    return Math.min(Math.ceil(Math.abs(turned) * 8) + 3, MOST_SAMPLES);
   }
   moves() {
     for (let i = 0; i < this.size; i++) if (this.direction(i) !== 0) return true;
@@ -47,23 +79,21 @@ class Motion {
     const [least, most] = this.range(false, 0, SPAN);
     return most > least;
   }
-  direction(i) { return this.pieces[i * PIECE + 6]; }
-  grid(i) { return this.pieces[i * PIECE + 7]; }
   // STEP pulses given within piece i up to t.
   given(i, t) {
-    const o = i * PIECE, direction = this.pieces[o + 6], grid = this.pieces[o + 7], count = this.pieces[o + 5];
+    const direction = this.direction(i), grid = this.grid(i), count = this.counted(i);
     if (direction === 0) return 0;
-    const all = i + 1 < this.size ? Math.round((this.pieces[o + PIECE + 5] - count) * direction / grid) : Infinity;
+    const all = i + 1 < this.size ? Math.round((this.counted(i + 1) - count) * direction / grid) : Infinity;
     if (t >= this.end(i) && all !== Infinity) return Math.max(all, 0);
     return Math.max(Math.min(Math.floor((this.pulses(i, t) - count) * direction / grid + 1e-9), all), 0);
   }
   count(t) {
-    const i = this.at(t), o = i * PIECE;
-    return this.pieces[o + 5] + this.direction(i) * this.grid(i) * this.given(i, t);
+    const i = this.at(t);
+    return this.counted(i) + this.direction(i) * this.grid(i) * this.given(i, t);
   }
   // The moment of pulse number k (from 1) of piece i.
   pulseTime(i, k) {
-    const o = i * PIECE, direction = this.direction(i), wanted = (this.pieces[o + 5] + direction * this.grid(i) * k) * direction;
+    const direction = this.direction(i), wanted = (this.counted(i) + direction * this.grid(i) * k) * direction;
     let low = this.begin(i), high = this.end(i);
     while (high - low > 0.5) {
       const middle = (low + high) / 2;
@@ -90,8 +120,9 @@ class Motion {
     let least = Infinity, most = -Infinity;
     for (let i = this.at(from); i < this.size && this.begin(i) <= to; i++) {
       const a = Math.max(this.begin(i), from), b = Math.min(this.end(i), to);
-      for (const t of this.isCurved(i, velocity) ? [a, a + (b - a) / 3, a + (b - a) * 2 / 3, b] : [a, b]) {
-        const value = velocity ? this.velocity(i, t) : this.position(i, t);
+      const parts = this.parts(i, velocity, a, b);
+      for (let n = 0; n <= parts; n++) {
+        const t = a + (b - a) * n / parts, value = velocity ? this.velocity(i, t) : this.position(i, t);
         if (value < least) least = value;
         if (value > most) most = value;
       }
