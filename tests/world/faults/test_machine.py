@@ -481,3 +481,35 @@ def test_state_of_physics_taken_out_and_put_back_changes_nothing() -> None:
     rig.now = now
     del rig.records[told:]
     assert go_on() == first
+
+
+def test_a_machine_with_faults_is_switched_off_and_on() -> None:
+    """EN and the outputs fall with the power (MIC-27); a pulse that nobody gives any more turns nothing."""
+    rig = moving("stall at_s=100")
+    machine = rig.kernel.machines["1"]
+    rig.wait(1.0)
+    assert machine.pins()["M1_EN"] == 1.0
+    machine.power_off(rig.now)
+    assert machine.pins()["M1_EN"] == 0.0
+    before = counts(rig)
+    rig.wait(1.0)
+    assert counts(rig)[0] == before[0]
+    assert rig.ask(ENABLE, ms=0) != ENABLE
+    machine.power_cycle(rig.now)
+    rig.wait(0.1)
+    assert rig.device.axes[0].status is AxisStatus.OFF
+    rig.ask(ENABLE, ms=0)
+    assert machine.pins()["M1_EN"] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("fault", "message"),
+    [
+        ("stuck pin=1.IN4 value=1", r"fault stuck: pin = '1\.IN4': name the machine as machine=NAME, and the pin alone"),
+        ("stuck pin=IN99 value=1", r"fault stuck: pin = 'IN99': '1' has .*IN20"),
+        ("stall axis=5", "fault stall: axis = 5: permitted are 1 to 4"),
+    ],
+)
+def test_what_a_machine_does_not_have_cannot_fail(fault: str, message: str) -> None:
+    with pytest.raises(Misuse, match=message):
+        FaultRig(fault)
