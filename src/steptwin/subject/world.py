@@ -27,6 +27,7 @@ from steptwin.world.faults.kinds import rows
 from steptwin.world.heldjog import HeldJog
 from steptwin.world.kinds import line_kinds
 from steptwin.world.lines import LineWords
+from steptwin.world.motions import ordered
 from steptwin.world.plant import WORLD, Plant, PlantSnapshot
 from steptwin.world.programs import StatementFollower
 from steptwin.world.trace import TraceRecord
@@ -119,14 +120,11 @@ class WorldSubject:
     def _control(self, wanted: ControllerCommand) -> None:
         """Execute a command for a controller as its master does."""
         world, name = self.world, wanted.machine
-        kind, machine = world.kind(name), world.machine(name)
-        make = kind.control.get(type(wanted))
-        if make is None:
+        kind = world.kind(name)
+        if type(wanted) not in kind.control:
             known = ", ".join(command.name_of(one) for one in kind.control)
             raise Refusal(f"{name!r} is {kind.title}, which cannot do {command.name_of(type(wanted))}; it can do {known}")
-        world.touch(name)
-        on = world.parts.line_of.get(name)
-        self._apply_input(make(machine, None if on is None else on[0].name, wanted))
+        self._apply_input(ordered(world, wanted))
 
     def held_jog(self, wanted: Jog) -> HeldJog:
         """A jog that lasts only while it is extended; it has not started yet. Raises `Misuse` and `Refusal`."""

@@ -94,6 +94,15 @@ class Terminals:
             raise Misuse(f"{name} is not {article} {kind}: {kind}s of {name.machine!r} are {there}")
 
 
+class MotionEnds(NamedTuple):
+    """Conditions on an axis."""
+
+    over: str
+    """No motion to a target is in progress."""
+    reached: str
+    """The last one has come to its target."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Selection:
     """How options behind an address of a device select a controller on its line (``,unit=2``), and name its variant. Running
@@ -209,6 +218,8 @@ class ControllerKind(Generic[S, M, V]):
     point: Callable[[M, str], LivePoint | None]
     """The point of its data sheet that a name or an address means: what conditions, scripts and programs outside read of it. None
     where there is none; raises `Misuse` for what is half a value."""
+    motion_ends: Callable[[str], MotionEnds] | None = None
+    """Conditions on an axis, which has that name in conditions; None where its state does not show how a motion ended."""
     control: Mapping[type[ControllerCommand], Callable[[M, str | None, Any], Step]]
     """The steps by which its master does the commands for controllers that it can do. The text is the name of its line; the
     machine is at the present. Raises `Misuse`, and `Refusal` for what cannot be done now."""

@@ -11,6 +11,7 @@ from steptwin.tables import complete
 from steptwin.world import script as do
 from steptwin.world.actions import Bytes, Download, ExternalInput, Leave, See, SetVariable
 from steptwin.world.faults import Fault
+from steptwin.world.motions import motion_ends, ordered
 from steptwin.world.script import STEPS
 from steptwin.world.spec import ScriptSpec
 from steptwin.world.tomlplaces import Path
@@ -102,6 +103,15 @@ def _condition(plant: Plant, step: do.Until | do.Expect) -> None:
     plant.condition(step.condition)
 
 
+def _order(plant: Plant, step: do.Order) -> None:
+    motion_ends(plant, step.command.machine, step.command.axis)
+    check_step(plant, ordered(plant, step.command))
+
+
+def _motion(plant: Plant, step: do.UntilOver | do.ExpectReached) -> None:
+    motion_ends(plant, step.machine, step.axis)
+
+
 def _set(plant: Plant, step: do.Set) -> None:
     for name, pin, level in step.levels:
         plant.input_pin(name, pin, level)
@@ -167,6 +177,9 @@ _CHECKS: Mapping[type, Callable[[Plant, Any], None]] = complete(
     {
         do.Until: _condition,
         do.Expect: _condition,
+        do.Order: _order,
+        do.UntilOver: _motion,
+        do.ExpectReached: _motion,
         do.Set: _set,
         do.Press: _button,
         do.Release: _button,

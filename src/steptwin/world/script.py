@@ -14,6 +14,7 @@ from typing import Any, TypeAlias, cast
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.world.control import Home, Move
 from steptwin.world.expression import parse
 from steptwin.world.faults import Fault
 from steptwin.world.faults import parse as parse_fault
@@ -185,6 +186,33 @@ class Call:
 
 
 @dataclass(frozen=True, slots=True)
+class Order:
+    """Command an axis as the master of its controller does, and wait for the answer."""
+
+    command: Move | Home
+
+
+@dataclass(frozen=True, slots=True)
+class UntilOver:
+    """Wait until an axis (from 1) has no motion to a target in progress, at most for ``within``. Result: whether it is so."""
+
+    machine: str
+    axis: int
+    within: Nanos | None = None
+
+    def __post_init__(self) -> None:
+        _check_ns(self.within)
+
+
+@dataclass(frozen=True, slots=True)
+class ExpectReached:
+    """Expect that the last motion of an axis (from 1) has come to its target."""
+
+    machine: str
+    axis: int
+
+
+@dataclass(frozen=True, slots=True)
 class Repeat:
     times: int
     steps: tuple[Step, ...]
@@ -210,6 +238,9 @@ Step: TypeAlias = (
     | Stop
     | Read
     | Call
+    | Order
+    | UntilOver
+    | ExpectReached
     | Repeat
 )
 Steps: TypeAlias = Generator[Step, Any, None]
@@ -349,6 +380,24 @@ def _turn(axis: tuple[str, int], counts: int) -> Turn:
     return Turn(*axis, counts)
 
 
+def _motion(command: Move | Home, within: Nanos | None) -> Repeat:
+    """The motion that is commanded, to its end: a status from before does not count."""
+    place = command.machine, command.axis
+    return Repeat(1, (Order(command), UntilOver(*place, within), ExpectReached(*place)))
+
+
+def _move(axis: tuple[str, int], to: float | None, by: float | None, within: Nanos | None) -> Repeat:
+    return _motion(Move(*axis, to, by), within)
+
+
+def _home(axis: tuple[str, int], velocity: float, within: Nanos | None) -> Repeat:
+    return _motion(Home(*axis, velocity), within)
+
+
+def _wait_for(axis: tuple[str, int], within: Nanos | None) -> Repeat:
+    return Repeat(1, (UntilOver(*axis, within), ExpectReached(*axis)))
+
+
 def _couple(axis: tuple[str, int], coupling: str) -> Couple:
     return Couple(*axis, coupling)
 
@@ -381,6 +430,24 @@ ACTIONS: Mapping[str, StepKind] = dict(
         ),
         _action(Key("release", name_value, "a button"), Release),
         _action(Key("write", _levels, "{ 'MACHINE.REGISTER' = VALUE }"), Write),
+        _action(
+            Key("move", _turned, "MACHINE.M1 to M4: moves it, waits for the end and expects it at its target"),
+            _move,
+            Key("to", number(), "a position, in the unit of the controller", None),
+            Key("by", number(), "a distance, in the unit of the controller", None),
+            _WITHIN,
+        ),
+        _action(
+            Key("home", _turned, "MACHINE.M1 to M4: homes it, waits for the end and expects it there"),
+            _home,
+            Key("velocity", number(), "its sign chooses the switch"),
+            _WITHIN,
+        ),
+        _action(
+            Key("wait_for", _turned, "MACHINE.M1 to M4: waits for its motion to end at the target"),
+            _wait_for,
+            _WITHIN,
+        ),
         _action(
             Key("send", name_value, "a line that carries characters"),
             Send,
@@ -451,4 +518,8 @@ def _step(text: TomlText, path: Path, n: int, table: object) -> Step | None:
     values = read_table(text, path, table, (action.main, *action.others))
     if len(text.findings) > before:
         return None
-    return action.make(*(values[key.attribute or key.name] for key in (action.main, *action.others)))
+    try:
+        return action.make(*(values[key.attribute or key.name] for key in (action.main, *action.others)))
+    except Misuse as error:
+        text.wrong(path, "D007", f"step {n}: {error}")
+        return None

@@ -14,6 +14,7 @@ from steptwin.world.actions import FOR_SCRIPTS, ExternalInput
 from steptwin.world.agenda import Agenda, Watchers
 from steptwin.world.kernel import Kernel
 from steptwin.world.master import Master
+from steptwin.world.motions import motion_ends, ordered
 from steptwin.world.running import PendingRequests, Script, ScriptState, ScriptWait
 
 if TYPE_CHECKING:
@@ -226,6 +227,13 @@ class Scripts:
     def _wait_for_condition(self, step: do.Until, script: Script) -> StepResult:
         return ScriptWait(None if step.within is None else self._plant.now + step.within, step.condition), None
 
+    def _order(self, step: do.Order, script: Script) -> StepResult:
+        return self._take(ordered(self._plant, step.command), script)
+
+    def _wait_for_end(self, step: do.UntilOver, script: Script) -> StepResult:
+        over = motion_ends(self._plant, step.machine, step.axis).over
+        return ScriptWait(None if step.within is None else self._plant.now + step.within, over), None
+
     def _stop(self, step: do.Stop, script: Script) -> StepResult:
         plant = self._plant
         plant.stopped = step.reason if plant.stopped is None else plant.stopped
@@ -290,6 +298,8 @@ _TAKING: Mapping[type, Callable[[Scripts, Any, Script], StepResult]] = complete(
         do.Call: Scripts._call,
         do.Request: Scripts._request,
         do.Write: Scripts._write,
+        do.Order: Scripts._order,
+        do.UntilOver: Scripts._wait_for_end,
     },
 )
 """The execution of steps that wait or have a result (`steptwin.world.script.Walk` resolves `Repeat`)."""

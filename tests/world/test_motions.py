@@ -1,0 +1,151 @@
+"""Steps that move axes: they mean the motion that they command, whatever the status was before."""
+
+from __future__ import annotations
+
+import pytest
+
+from steptwin.files.session import load, save, session_of
+from steptwin.files.world import World
+from steptwin.machine import SECOND
+from steptwin.world.reader import WorldError
+
+TEXT = """
+[[mic488]]
+name = "a"
+{line}
+[mic488.M1]
+unit = "mm"
+gear = 640.0
+acc = 100.0
+dec = 100.0
+vel = 50.0
+mot_resol = 3200
+in_kl = "IN1"
+home_mode = "HOME0"
+limit_mode = "KR"
+in_kr = "IN2"
+[[axis]]
+name = "x"
+drive = "a.M1"
+pitch = 5.0
+start = 30.0
+travel = [-5.0, 205.0]
+[[axis.switch]]
+below = 0.0
+to = "a.IN1"
+[[axis.switch]]
+above = 200.0
+to = "a.IN2"
+[[script]]
+name = "s"
+steps = [
+  {{ write = {{ "a.M1_EN" = 1 }} }},
+  {steps}
+]
+"""
+LINE = 'line = "bus"\nunit = 1\n[[line]]\nname = "bus"\nbaud = 9600\n[[mic488]]\nname = "other"\nline = "bus"\nunit = 2\n'
+
+
+def world(*steps: str, line: str = "") -> World:
+    return World.from_toml(TEXT.format(line=line, steps=",\n  ".join(steps)), name="t.toml")
+
+
+def notes(found: World) -> list[tuple[float, object]]:
+    return [(record.time / SECOND, record.value) for record in found.trace.of("event") if record.subject == "note"]
+
+
+def test_each_waits_for_its_own_end() -> None:
+    found = world(
+        '{ home = "a.M1", velocity = -20.0, within = "10 s" }',
+        '{ note = "home" }',
+        '{ move = "a.M1", to = 100.0, within = "10 s" }',
+        '{ note = "there" }',
+        '{ move = "a.M1", by = -50.0, within = "10 s" }',
+        '{ note = "back" }',
+        '{ move = "a.M1", to = 50.0 }',
+        '{ note = "there already" }',
+    )
+    found.run(for_=20)
+    assert not found.failures
+    assert not found.overdue
+    (home, _), (there, _), (back, _), (already, _) = notes(found)
+    # 100 mm at 50 mm/s with ramps of 0.5 s are 2.5 s, 50 mm 1.5 s; homing: 0.2 s to 20 mm/s over 2 mm, then 28 mm.
+    assert home == pytest.approx(0.2 + 28 / 20, abs=1e-3)
+    assert there == pytest.approx(home + 2.5, abs=1e-3)
+    assert back == pytest.approx(there + 1.5, abs=1e-3)
+    assert already == pytest.approx(back, abs=1e-3)
+    assert found.axis["x"].position == pytest.approx(50.0, abs=0.01)
+
+
+def test_on_a_slow_line_the_request_is_waited_for() -> None:
+    text = TEXT.format(line='line = "bus"\nunit = 1', steps='{ move = "a.M1", to = 10.0 }, { note = "end" }')
+    found = World.from_toml(text + '[[line]]\nname = "bus"\nbaud = 9600\ntiming = "real"\n')
+    found.run(for_=5)
+    assert not found.failures
+    # 10 mm: 2·√(10/100) s, after two requests of at least 8 + 13 characters and their answers.
+    ((end, _),) = notes(found)
+    assert end > 2 * (10 / 100) ** 0.5 + 0.02
+    assert found.axis["x"].position == 40.0
+
+
+def test_a_motion_that_fails_is_a_failure() -> None:
+    found = world('{ move = "a.M1", to = 190.0 }', '{ note = "end" }')
+    found.run(for_=10)
+    assert [str(record.value) for record in found.failures] == ["a.M1.status == 4"]
+    assert found.axis["x"].position == pytest.approx(200.0, abs=0.01)
+    off = World.from_toml(TEXT.format(line="", steps='{ write = { "a.M1_EN" = 0 } }, { move = "a.M1", to = 10.0 }'))
+    off.run(for_=1)
+    assert [str(record.value) for record in off.failures] == ["a.M1.status == 4"]
+
+
+def test_wait_for_waits_for_what_is_in_progress() -> None:
+    found = world(
+        '{ write = { "a.M1_POS_ABS" = 100.0 } }',
+        '{ wait_for = "a.M1", within = "1 s" }',
+        '{ wait_for = "a.M1" }',
+        '{ note = "end" }',
+    )
+    found.run(for_=10)
+    assert [str(record.value) for record in found.overdue] == [
+        "s waited in vain for a.M1.status != 3 and a.M1.status != 6 and a.M1.status != 8"
+    ]
+    assert notes(found)[0][0] == pytest.approx(2.5, abs=1e-3)
+
+
+@pytest.mark.parametrize("moment_s", [0.0, 1.0, 2.0, 4.3])
+def test_it_can_be_restored_anywhere(moment_s: float, tmp_path: object) -> None:
+    steps = ('{ home = "a.M1", velocity = -20.0 }', '{ repeat = 3, steps = [{ move = "a.M1", by = 20.0 }, { note = "next" }] }')
+    found, other = world(*steps), world(*steps)
+    found.run(until=moment_s)
+    snapshot = found.snapshot()
+    found.run(until=10.0)
+    assert len(notes(found)) == 3
+    other.restore(snapshot)
+    other.run(until=10.0)
+    assert other.trace.digest() == found.trace.digest()
+    place = f"{tmp_path}/s.json"
+    save(session_of(found), place)
+    assert load(place).replay().trace.digest() == found.trace.digest()
+
+
+@pytest.mark.parametrize(
+    ("step", "text"),
+    [
+        ('{ move = "a.M1" }', "t.toml:32.*step 2: move: give either to"),
+        ('{ move = "a.M1", to = 1.0, by = 2.0 }', "move: give either to"),
+        ('{ move = "a.M7", to = 1.0 }', "t.toml:32.*a.M7: a has M1, M2, M3, M4"),
+        ('{ move = "b.M1", to = 1.0 }', "no machine is called 'b'"),
+        ('{ mov = "a.M1", to = 1.0 }', r"has 'mov', 'to' \(did you mean 'move'\?\)"),
+        ('{ home = "a.M1" }', "velocity is missing"),
+        ('{ move = "a.IN1", to = 1.0 }', "expected MACHINE.M1 to M4"),
+        ('{ move = "a.M1", to = 1e39 }', "t.toml:32.*does not fit a REAL"),
+    ],
+)
+def test_mistakes_have_their_places(step: str, text: str) -> None:
+    with pytest.raises(WorldError, match=f"(?s){text}"):
+        world(step)
+
+
+def test_a_chip_has_no_status_of_motions() -> None:
+    with pytest.raises(WorldError, match=r"'c' is an? .*M1486, which has no status of motions"):
+        World.from_toml('[[m1486]]\nname = "c"\n[[script]]\nname = "s"\nsteps = [{ move = "c.M1", to = 5 }]\n')
