@@ -21,12 +21,12 @@ class ConstantDrive(Stateful):
     """Moves forward at a constant speed while it runs, and stands at once when it does not. Places are picometres, so that a
     millimetre per second is a place per nanosecond."""
 
-    __slots__ = ("_base", "_begin", "_changes", "_speed", "runs")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_speed"})
+    __slots__ = ("_base", "_begin", "_changes", "_divisor", "_speed", "runs")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_divisor", "_speed"})
 
     def __init__(self, speed: Fraction, now: Nanos) -> None:
         """``speed`` in mm/s."""
-        self._speed = speed
+        self._speed, self._divisor = speed.as_integer_ratio()
         self._base = 0
         self._begin = now
         self._changes = 0
@@ -41,14 +41,14 @@ class ConstantDrive(Stateful):
         return self._changes
 
     def place(self, now: Nanos) -> int:
-        return self._base + (int(self._speed * (now - self._begin)) if self.runs else 0)
+        return self._base + (self._speed * (now - self._begin) // self._divisor if self.runs else 0)
 
     def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
         """As `Carriage.reaches`."""
         if not self.runs or direction < 0 or position <= self.place(after):
             return None
-        way = Fraction(position - self._base) / self._speed
-        return self._begin - (-way.numerator // way.denominator)
+        way = (position - self._base) * self._divisor
+        return self._begin - (-way // self._speed)
 
 
 class Workpiece(NamedTuple):

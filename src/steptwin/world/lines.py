@@ -5,6 +5,7 @@ Each program has its own place on the line. Responses are collected at the momen
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -81,7 +82,7 @@ class LineEndPoint(Stateful):
         return taken
 
 
-class Line(Stateful):
+class Line(Stateful, ABC):
     """Base class of lines; a part of its kernel."""
 
     __slots__ = ("_busy", "_faults", "_followers", "_kernel", "_record", "name", "places")
@@ -105,9 +106,9 @@ class Line(Stateful):
 
     # ------------------------------------------------------------------ implemented by kinds of lines
 
+    @abstractmethod
     def _port(self, place: str, kind: str) -> Port:
         """A new port for a program. Its state is copied by `_port_state`."""
-        raise NotImplementedError
 
     def _answers_at_once(self, kind: str) -> bool:
         """Whether ports of a kind answer every request immediately."""
@@ -126,18 +127,19 @@ class Line(Stateful):
         """Replace the devices that execute external Modbus requests: ``served`` maps those by unit to their wrappers."""
 
     @property
+    @abstractmethod
     def units(self) -> tuple[int, ...]:
-        raise NotImplementedError
+        """The addresses of its controllers."""
 
     @property
+    @abstractmethod
     def baud(self) -> int:
         """The present rate of the line, bit/s."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def is_timed(self) -> bool:
         """Whether characters take transmission time."""
-        raise NotImplementedError
 
     # ------------------------------------------------------------------ places
 

@@ -123,6 +123,7 @@ class Conveyor(BoardPart):
     __slots__ = (
         "_due",
         "_is_fed",
+        "_length",
         "_moved_by",
         "_next_feed",
         "_own",
@@ -137,7 +138,7 @@ class Conveyor(BoardPart):
         "spec",
     )
     FIXED: ClassVar[frozenset[str]] = (
-        frozenset({"_moved_by", "_version", "drive", "following", "per_mm", "spec"}) | BoardPart.FIXED
+        frozenset({"_length", "_moved_by", "_version", "drive", "following", "per_mm", "spec"}) | BoardPart.FIXED
     )
 
     def __init__(
@@ -154,6 +155,7 @@ class Conveyor(BoardPart):
         self.spec = spec
         self.drive = drive
         self.per_mm = per_mm
+        self._length = self.places(spec.length)
         self._own = own
         self._moved_by = moved_by
         self.following: Conveyor | None = None
@@ -235,7 +237,7 @@ class Conveyor(BoardPart):
 
     def _deliver(self, now: Nanos) -> None:
         """Let go what has come to an end of the belt."""
-        belt, length = self.drive.place(now), self.places(self.spec.length)
+        belt, length = self.drive.place(now), self._length
         for piece in self.load.pieces:
             front = belt - piece.origin
             if front >= length:
@@ -254,9 +256,8 @@ class Conveyor(BoardPart):
 
     def _ends(self, now: Nanos) -> tuple[int | None, int | None]:
         """Places of the belt at which the next workpiece is lost at its beginning, and delivered at its end."""
-        length = self.places(self.spec.length)
         origins = [piece.origin for piece in self.load.pieces]
-        return (max(origins) - 1, min(origins) + length) if origins else (None, None)
+        return (max(origins) - 1, min(origins) + self._length) if origins else (None, None)
 
     def deadline(self) -> Nanos | None:
         moments = (moment for moment in (self._due, self._next_feed) if moment is not None)

@@ -3,6 +3,7 @@ and the fault of an output that is stuck."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -35,17 +36,18 @@ class Joint(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BoardSpec(NamedSpec):
+class BoardSpec(NamedSpec, ABC):
     """The table of an element with terminals."""
 
     @property
+    @abstractmethod
     def terminals(self) -> Terminals:
-        raise NotImplementedError
+        """Its inputs and outputs."""
 
     @property
+    @abstractmethod
     def joints(self) -> Iterable[Joint]:
         """What its keys join to its inputs."""
-        raise NotImplementedError
 
     def others(self, world: WorldSpec) -> Iterable[tuple[str, str]]:
         """Keys that name other elements, and the names of these or of what they are in one kernel with."""
@@ -55,7 +57,7 @@ class BoardSpec(NamedSpec):
         """Report keys that do not fit together."""
 
 
-class BoardPart(Stateful):
+class BoardPart(Stateful, ABC):
     """The part of a kernel that gives the outputs of a board their levels."""
 
     __slots__ = ("board",)
@@ -69,9 +71,9 @@ class BoardPart(Stateful):
         """The machines and elements whose changes concern it; None: all."""
         return (self.board.name,)
 
+    @abstractmethod
     def update(self, now: Nanos) -> None:
         """As `KernelPart.update`."""
-        raise NotImplementedError
 
     def deadline(self) -> Nanos | None:
         """As `KernelPart.deadline`; none for an element whose outputs follow its inputs alone."""

@@ -76,13 +76,27 @@ class Vacuum(BoardPart):
     A workpiece is in the cup while it is held. Then it lies on the belt below, or has fallen.
     """
 
-    __slots__ = ("_begin", "_due", "_first", "_goal", "_is_held", "carried", "dropped", "leaks", "onto", "source", "spec")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"onto", "source", "spec"}) | BoardPart.FIXED
+    __slots__ = (
+        "_begin",
+        "_due",
+        "_first",
+        "_goal",
+        "_is_held",
+        "_pick_at",
+        "carried",
+        "dropped",
+        "leaks",
+        "onto",
+        "source",
+        "spec",
+    )
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_pick_at", "onto", "source", "spec"}) | BoardPart.FIXED
 
     def __init__(self, board: Board, spec: VacuumSpec, source: Conveyor | None, onto: Conveyor | None) -> None:
         super().__init__(board)
         self.spec = spec
         self.source = source
+        self._pick_at = 0 if source is None else source.places(spec.pick_at)
         self.onto = onto
         self.carried: Workpiece | None = None
         """The workpiece in the cup, as it was on the belt it was taken from."""
@@ -155,7 +169,7 @@ class Vacuum(BoardPart):
         source = self.source
         if source is None:
             return Workpiece("workpiece", 0, 0)
-        return source.load.covering(source.places(self.spec.pick_at), source.drive.place(now))
+        return source.load.covering(self._pick_at, source.drive.place(now))
 
     def _pick(self, now: Nanos) -> None:
         piece = self._below(now)
@@ -187,7 +201,7 @@ class Vacuum(BoardPart):
         source, now = self.source, self.board.kernel.now
         if source is None or self.carried is not None or not (self.board.is_on(EJECTOR) and self.board.is_on(PICK)):
             return None
-        edges = source.load.edges(source.places(self.spec.pick_at), source.drive.place(now))
+        edges = source.load.edges(self._pick_at, source.drive.place(now))
         return next_change(source.drive, *edges, now)
 
 
