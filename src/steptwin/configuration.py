@@ -10,7 +10,7 @@ from steptwin.diagnostics import Diagnostic, SourceText
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Setting:
+class ConfigurationKey:
     """A key of the file."""
 
     name: str
@@ -37,7 +37,7 @@ class Section:
     """``Axis0``."""
     title: str
     """What it is about: ``M1``."""
-    settings: tuple[Setting, ...]
+    settings: tuple[ConfigurationKey, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import TypeVar
 
-Key = TypeVar("Key")
+RowKey = TypeVar("RowKey")
 Behaviour = TypeVar("Behaviour")
 
 
@@ -14,7 +14,7 @@ class IncompleteTable(Exception):
     """A row lacks its behaviour, or a behaviour its row; the text names both tables and the row."""
 
 
-def complete(row: str, keys: Iterable[Key], behaviour: str, given: Mapping[Key, Behaviour]) -> Mapping[Key, Behaviour]:
+def complete(row: str, keys: Iterable[RowKey], behaviour: str, given: Mapping[RowKey, Behaviour]) -> Mapping[RowKey, Behaviour]:
     """``given``, read-only, when it has exactly ``keys``; else `IncompleteTable`.
 
     ``row`` and ``behaviour`` are what one row and one behaviour are called in the message: ``statement SWAP lacks its step``.

@@ -8,13 +8,13 @@ from hypothesis import strategies as st
 
 from steptwin.m1486.commands import TABLE, ArgType, When, takes_variable
 from steptwin.m1486.encoding import LONGEST, SIZES, decode, encode
-from steptwin.m1486.syntax import Command, JumpCondition, parse_line
+from steptwin.m1486.syntax import ChipCommand, JumpCondition, parse_line
 from steptwin.m1486.variants import variant
 
 B = variant("B")
 
 
-def command(text: str) -> Command:
+def command(text: str) -> ChipCommand:
     read = parse_line(text).line.command
     assert read is not None
     return read
@@ -28,26 +28,26 @@ def test_a_command_takes_the_bits_the_manual_says(text: str, bits: int) -> None:
     assert 8 * len(encode(command(text))) == bits
 
 
-def stored_commands() -> list[Command]:
+def stored_commands() -> list[ChipCommand]:
     cases = []
     for spec in TABLE:
         if spec.when is not When.QUEUED:
             continue
         if spec.kind is ArgType.NONE:
-            cases.append(Command(spec.key))
+            cases.append(ChipCommand(spec.key))
             continue
         values = spec.permitted(B)
         cases += [
-            Command(spec.key, JumpCondition(number, number % 2 == 0, 80) if spec.kind is ArgType.CONDITION else number)
+            ChipCommand(spec.key, JumpCondition(number, number % 2 == 0, 80) if spec.kind is ArgType.CONDITION else number)
             for number in {values[0], values[-1], values[len(values) // 2]}
         ]
         if takes_variable(spec.key):
-            cases.append(Command(spec.key))
+            cases.append(ChipCommand(spec.key))
     return cases
 
 
 @pytest.mark.parametrize("case", stored_commands(), ids=str)
-def test_a_stored_command_is_read_back(case: Command) -> None:
+def test_a_stored_command_is_read_back(case: ChipCommand) -> None:
     raw = encode(case)
     assert len(raw) == SIZES[case.key[0]]
     # What lies behind it in the memory does not matter.
@@ -57,7 +57,7 @@ def test_a_stored_command_is_read_back(case: Command) -> None:
 
 
 def test_m_24_g_plus_and_minus_take_as_much_as_g() -> None:
-    assert len(encode(Command("G+"))) == len(encode(Command("G-"))) == len(encode(Command("G", 1)))
+    assert len(encode(ChipCommand("G+"))) == len(encode(ChipCommand("G-"))) == len(encode(ChipCommand("G", 1)))
 
 
 @given(st.binary(min_size=LONGEST, max_size=LONGEST))
@@ -68,6 +68,6 @@ def test_m_29_any_bytes_are_a_command_or_none(raw: bytes) -> None:
 
 
 def test_m_29_the_number_left_out_is_no_number() -> None:
-    assert decode(encode(Command(":"))) == (Command(":"), 4)
-    assert decode(encode(Command(":", 0))) == (Command(":", 0), 4)
-    assert decode(encode(Command(":", 2**24 - 1))) == (Command(":", 2**24 - 1), 4)
+    assert decode(encode(ChipCommand(":"))) == (ChipCommand(":"), 4)
+    assert decode(encode(ChipCommand(":", 0))) == (ChipCommand(":", 0), 4)
+    assert decode(encode(ChipCommand(":", 2**24 - 1))) == (ChipCommand(":", 2**24 - 1), 4)

@@ -9,7 +9,7 @@ from m1486_rig import Bench
 
 from steptwin.m1486.commands import TABLE, ArgType, CommandSpec, When, find, memory_bits, takes_variable
 from steptwin.m1486.encoding import decode
-from steptwin.m1486.syntax import Command, JumpCondition
+from steptwin.m1486.syntax import ChipCommand, JumpCondition
 from steptwin.m1486.variants import VARIANTS, Variant
 from steptwin.machine import MILLISECOND
 
@@ -18,16 +18,16 @@ QUEUED = [spec for spec in TABLE if spec.when is When.QUEUED]
 every_variant = pytest.mark.parametrize("v", VARIANTS, ids=lambda v: v.name)
 
 
-def taken(spec: CommandSpec, v: Variant) -> Iterator[Command]:
+def taken(spec: CommandSpec, v: Variant) -> Iterator[ChipCommand]:
     """A row's command with its least and largest number, and without one."""
     if spec.kind is ArgType.NONE:
-        yield Command(spec.key)
+        yield ChipCommand(spec.key)
         return
     values = spec.permitted(v)
     for number in (values[0], values[-1]):
-        yield Command(spec.key, JumpCondition(number, True, v.labels) if spec.kind is ArgType.CONDITION else number)
+        yield ChipCommand(spec.key, JumpCondition(number, True, v.labels) if spec.kind is ArgType.CONDITION else number)
     if takes_variable(spec.key):
-        yield Command(spec.key)
+        yield ChipCommand(spec.key)
 
 
 def refused(spec: CommandSpec, v: Variant) -> Iterator[str]:
@@ -84,7 +84,7 @@ def test_m_19_a_command_takes_its_time(v: Variant) -> None:
     for spec in QUEUED:
         if spec.key in {"W", "R", "(", ")", "O", "Z", "E", ".", "J", "I", "'", "U"}:
             continue
-        command = Command(spec.key, 64) if spec.unit == "min. microsteps" else next(taken(spec, v))
+        command = ChipCommand(spec.key, 64) if spec.unit == "min. microsteps" else next(taken(spec, v))
         bench = Bench(v.name)
         bench.send("[", str(command), "u20", "]")
         bench.finish()

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from steptwin.m1486.structure import CommandStream, File, streams
+from steptwin.m1486.structure import CommandFile, CommandStream, streams
 from steptwin.m1486.syntax import parse
 
 
@@ -22,7 +22,7 @@ def test_each_chip_gets_what_follows_its_address_and_what_is_for_all() -> None:
 
 def test_files_and_what_stands_in_them() -> None:
     stream = only_stream("F64\n[\nR\nW5\n]\nD\n[\nR")
-    assert stream.files == [File(1, 4, 40), File(6, None, 8)]
+    assert stream.files == [CommandFile(1, 4, 40), CommandFile(6, None, 8)]
     assert stream.in_file == [None, None, 0, 0, 0, None, None, 1]
     assert [stream.present(i) for i in range(8)] == [0, 1, 4, 4, 4, 5, 6, 7]
 

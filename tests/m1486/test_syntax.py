@@ -9,14 +9,14 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from steptwin.diagnostics import Fix, Span
-from steptwin.m1486.syntax import Command, JumpCondition, ParsedProgram, ProgramLine, format_program, parse, parse_line
+from steptwin.m1486.syntax import ChipCommand, JumpCondition, ParsedProgram, ProgramLine, format_program, parse, parse_line
 from steptwin.m1486.variants import Variant, variant
 
 if TYPE_CHECKING:
     from m1486_programs import Programs
 
 
-def commands(text: str) -> list[Command]:
+def commands(text: str) -> list[ChipCommand]:
     """The commands of a text that is sound."""
     program, diagnostics = parse(text)
     assert diagnostics == []
@@ -29,63 +29,63 @@ def problems(text: str) -> list[tuple[str, str]]:
 
 # Every command example of the manual's chapter VII, and what it means.
 MANUAL = {
-    "@2": Command("@", 2),
-    "J6": Command("J", 6),
-    "U3": Command("U", 3),
-    "W3000": Command("W", 3000),
-    "B640": Command("B", 640),
-    "R": Command("R"),
-    "D": Command("D"),
-    "F640": Command("F", 640),
-    "G10000": Command("G", 10_000),
-    "G+": Command("G+"),
-    "G-": Command("G-"),
-    "H": Command("H"),
-    "=1200": Command("=", 1200),
-    "C100": Command("C", 100),
-    "C75": Command("C", 75),
-    "P2500": Command("P", 2500),
-    "V12500": Command("V", 12_500),
-    ")7": Command(")", 7),
-    "(2": Command("(", 2),
-    "C7": Command("C", 7),
-    "O2": Command("O", 2),
-    "T1": Command("T", 1),
-    "Z3": Command("Z", 3),
-    "\\": Command("\\"),
-    "X3": Command("X", 3),
-    "XG": Command("XG"),
-    "T51": Command("T", 51),
-    "C43": Command("C", 43),
-    "T85": Command("T", 85),
-    "C85": Command("C", 85),
-    "?14": Command("?", 14),
-    "-10": Command("-", 10),
-    "i87H5": Command("I", JumpCondition(87, True, 5)),
-    "i7h3": Command("I", JumpCondition(7, True, 3)),
-    "i1l6": Command("I", JumpCondition(1, False, 6)),
-    "<3": Command("<", 3),
-    "+5": Command("+", 5),
-    "*2": Command("*", 2),
-    "F": Command("F"),
-    "a": Command("A"),
-    "J": Command("J"),
-    "+184": Command("+", 184),
-    "'3": Command("'", 3),
-    ".": Command("."),
-    "[": Command("["),
-    "]": Command("]"),
-    ":0": Command(":", 0),
-    "L5": Command("L", 5),
-    "e": Command("E"),
-    "M64": Command("M", 64),
-    "Q4": Command("Q", 4),
-    "N2": Command("N", 2),
-    "!184": Command("!", 184),
-    ">10": Command(">", 10),
-    "/64": Command("/", 64),
-    "S70": Command("S", 70),
-    "K": Command("K"),
+    "@2": ChipCommand("@", 2),
+    "J6": ChipCommand("J", 6),
+    "U3": ChipCommand("U", 3),
+    "W3000": ChipCommand("W", 3000),
+    "B640": ChipCommand("B", 640),
+    "R": ChipCommand("R"),
+    "D": ChipCommand("D"),
+    "F640": ChipCommand("F", 640),
+    "G10000": ChipCommand("G", 10_000),
+    "G+": ChipCommand("G+"),
+    "G-": ChipCommand("G-"),
+    "H": ChipCommand("H"),
+    "=1200": ChipCommand("=", 1200),
+    "C100": ChipCommand("C", 100),
+    "C75": ChipCommand("C", 75),
+    "P2500": ChipCommand("P", 2500),
+    "V12500": ChipCommand("V", 12_500),
+    ")7": ChipCommand(")", 7),
+    "(2": ChipCommand("(", 2),
+    "C7": ChipCommand("C", 7),
+    "O2": ChipCommand("O", 2),
+    "T1": ChipCommand("T", 1),
+    "Z3": ChipCommand("Z", 3),
+    "\\": ChipCommand("\\"),
+    "X3": ChipCommand("X", 3),
+    "XG": ChipCommand("XG"),
+    "T51": ChipCommand("T", 51),
+    "C43": ChipCommand("C", 43),
+    "T85": ChipCommand("T", 85),
+    "C85": ChipCommand("C", 85),
+    "?14": ChipCommand("?", 14),
+    "-10": ChipCommand("-", 10),
+    "i87H5": ChipCommand("I", JumpCondition(87, True, 5)),
+    "i7h3": ChipCommand("I", JumpCondition(7, True, 3)),
+    "i1l6": ChipCommand("I", JumpCondition(1, False, 6)),
+    "<3": ChipCommand("<", 3),
+    "+5": ChipCommand("+", 5),
+    "*2": ChipCommand("*", 2),
+    "F": ChipCommand("F"),
+    "a": ChipCommand("A"),
+    "J": ChipCommand("J"),
+    "+184": ChipCommand("+", 184),
+    "'3": ChipCommand("'", 3),
+    ".": ChipCommand("."),
+    "[": ChipCommand("["),
+    "]": ChipCommand("]"),
+    ":0": ChipCommand(":", 0),
+    "L5": ChipCommand("L", 5),
+    "e": ChipCommand("E"),
+    "M64": ChipCommand("M", 64),
+    "Q4": ChipCommand("Q", 4),
+    "N2": ChipCommand("N", 2),
+    "!184": ChipCommand("!", 184),
+    ">10": ChipCommand(">", 10),
+    "/64": ChipCommand("/", 64),
+    "S70": ChipCommand("S", 70),
+    "K": ChipCommand("K"),
 }
 
 
@@ -96,33 +96,33 @@ def test_command_examples_of_the_manual(text: str, form: Callable[[str], str]) -
 
 
 def test_addresses_are_hexadecimal() -> None:
-    assert commands("xA\nXf") == [Command("X", 10), Command("X", 15)]
-    assert str(Command("X", 10)) == "XA"
+    assert commands("xA\nXf") == [ChipCommand("X", 10), ChipCommand("X", 15)]
+    assert str(ChipCommand("X", 10)) == "XA"
 
 
 def test_m_1_comments_and_line_feeds_are_ignored() -> None:
-    assert commands("F640 ; ten steps; forward\r\n;\r\n; R\r\nR") == [Command("F", 640), Command("R")]
+    assert commands("F640 ; ten steps; forward\r\n;\r\n; R\r\nR") == [ChipCommand("F", 640), ChipCommand("R")]
 
 
 def test_m_2_blanks_are_ignored() -> None:
     assert commands("  F\t640 \n i 2 H 3\nG +\nX G") == [
-        Command("F", 640),
-        Command("I", JumpCondition(2, True, 3)),
-        Command("G+"),
-        Command("XG"),
+        ChipCommand("F", 640),
+        ChipCommand("I", JumpCondition(2, True, 3)),
+        ChipCommand("G+"),
+        ChipCommand("XG"),
     ]
 
 
 def test_m_2_a_blank_between_digits_is_ignored_too_and_reported() -> None:
     program, diagnostics = parse("F 12 800")
-    assert program.commands == [Command("F", 12_800)]
+    assert program.commands == [ChipCommand("F", 12_800)]
     assert [(d.code, d.fix) for d in diagnostics] == [("M202", Fix(Span(2, 8), "12800"))]
 
 
 @pytest.mark.parametrize("end", ["\r", "\n", "\r\n"])
 def test_cr_lf_and_both_end_a_line(end: str) -> None:
     text = end.join(["F640", "R", "", "D", ""])
-    assert commands(text) == [Command("F", 640), Command("R"), Command("D")]
+    assert commands(text) == [ChipCommand("F", 640), ChipCommand("R"), ChipCommand("D")]
     assert len(parse(text).program.lines) == 4
 
 
@@ -223,14 +223,14 @@ def test_no_suggestion_where_nothing_sensible_is_near() -> None:
 def test_a_broken_line_does_not_hide_the_next() -> None:
     text = "F640\n%%\nI2\nR\nR5\nD"
     program, diagnostics = parse(text)
-    assert program.commands == [Command("F", 640), Command("R"), Command("D")]
+    assert program.commands == [ChipCommand("F", 640), ChipCommand("R"), ChipCommand("D")]
     assert [d.code for d in diagnostics] == ["M101", "M106", "M104"]
 
 
 def test_what_can_be_understood_of_a_broken_line_is_kept() -> None:
     program, _ = parse("@1 F640\nR5")
     assert program.commands == []
-    assert program.all_commands == [Command("@", 1), Command("F", 640), Command("R")]
+    assert program.all_commands == [ChipCommand("@", 1), ChipCommand("F", 640), ChipCommand("R")]
 
 
 def test_one_form_in_print() -> None:
@@ -282,7 +282,7 @@ def test_any_text_is_read_and_survives_print(text: str) -> None:
 
 
 def test_equality_is_about_meaning_not_place() -> None:
-    assert parse("F640").program == parse("  f 640").program == ParsedProgram((ProgramLine(Command("F", 640)),))
+    assert parse("F640").program == parse("  f 640").program == ParsedProgram((ProgramLine(ChipCommand("F", 640)),))
     assert parse("I2H3").program != parse("I2L3").program
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from mic488_rig import WORDS, Rig, word_pdu
 
-from steptwin.mic488.behaviour import BEHAVIOUR, AxisBehaviour, Behaviour, Bit, DeviceBehaviour, checked
+from steptwin.mic488.behaviour import BEHAVIOUR, AxisBehaviour, Bit, DeviceBehaviour, RegisterBehaviour, checked
 from steptwin.mic488.registermap import MapRow, Space, Type
 from steptwin.mic488.registers import ROWS
 from steptwin.tables import IncompleteTable
@@ -62,7 +62,9 @@ def _write(*_: object) -> None: ...
         ),
     ],
 )
-def test_a_register_without_what_it_does_is_refused(row: MapRow | None, behaviour: Behaviour | None, message: str) -> None:
+def test_a_register_without_what_it_does_is_refused(
+    row: MapRow | None, behaviour: RegisterBehaviour | None, message: str
+) -> None:
     rows = ROWS if row is None else (*ROWS, row)
     with pytest.raises(IncompleteTable) as caught:
         checked(rows, BEHAVIOUR if behaviour is None else {**BEHAVIOUR, "NEW": behaviour})

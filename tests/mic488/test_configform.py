@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from steptwin.configuration import Section, Setting
+from steptwin.configuration import ConfigurationKey, Section
 from steptwin.datasheet import Limits
 from steptwin.errors import Misuse
 from steptwin.mic488.config import (
@@ -54,7 +54,7 @@ def section(name: str, text: str = FILE, firmware: str = "1.70") -> Section:
     return next(section for section in config_form(text, "m.cfg", firmware).sections if section.name == name)
 
 
-def setting(place: str, text: str = FILE, firmware: str = "1.70") -> Setting:
+def setting(place: str, text: str = FILE, firmware: str = "1.70") -> ConfigurationKey:
     name, key = place.split(".")
     return next(setting for setting in section(name, text, firmware).settings if setting.name == key)
 

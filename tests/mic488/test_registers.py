@@ -15,7 +15,7 @@ from steptwin.mic488.registermap import (
     Firmware,
     MapRow,
     Per,
-    Quantity,
+    QuantityKind,
     Register,
     RegisterMap,
     RegisterMapError,
@@ -239,7 +239,7 @@ def test_mic_24_what_cannot_be_written_accepts_no_function() -> None:
 
 
 def test_mic_25_upper_bits_of_masks_are_accepted_and_ignored() -> None:
-    masks = [r for r in register_map() if r.kind is Quantity.MASK]
+    masks = [r for r in register_map() if r.kind is QuantityKind.MASK]
     assert [r.name for r in masks] == [
         "AXIS_VEL_ABS_TRIG",
         "AXIS_VEL_REL_TRIG",
@@ -408,7 +408,7 @@ GOOD = MapRow(
     type=Type.VALUE,
     reads=(3,),
     writes=(16,),
-    kind=Quantity.POSITION,
+    kind=QuantityKind.POSITION,
     effect=WriteEffect.STORE,
     meaning="Good.",
     sections={"1.70": "3.2"},

@@ -9,7 +9,19 @@ from hypothesis import strategies as st
 from steptwin.errors import Misuse
 from steptwin.mic488.registermap import DataType, Space, Type
 from steptwin.mic488.registers import register_map
-from steptwin.mic488.values import FORM, RegisterItem, View, decoded, encoded, moves, named, plan, repeatable, user_item, value_of
+from steptwin.mic488.values import (
+    FORM,
+    RegisterItem,
+    UserFormat,
+    decoded,
+    encoded,
+    moves,
+    named,
+    plan,
+    repeatable,
+    user_item,
+    value_of,
+)
 from steptwin.wire import pdu
 
 MAP = register_map("1.70")
@@ -98,12 +110,12 @@ ONCE = [
 
 
 @pytest.mark.parametrize("request_", REPEATED, ids=str)
-def test_what_may_be_repeated(request_: pdu.Request) -> None:
+def test_what_may_be_repeated(request_: pdu.ModbusRequest) -> None:
     assert repeatable(MAP, request_)
 
 
 @pytest.mark.parametrize("request_", ONCE, ids=str)
-def test_what_is_sent_once(request_: pdu.Request) -> None:
+def test_what_is_sent_once(request_: pdu.ModbusRequest) -> None:
     assert not repeatable(MAP, request_)
 
 
@@ -112,7 +124,7 @@ MOVING = {10005, 10007, 10060, 10068, 10076, 10084, 10090, 10092, 2008, 9000}
 
 
 @pytest.mark.parametrize("request_", [*REPEATED, *ONCE], ids=str)
-def test_what_may_begin_a_motion(request_: pdu.Request) -> None:
+def test_what_may_begin_a_motion(request_: pdu.ModbusRequest) -> None:
     starts_program = request_ in (pdu.WriteRegisterRequest(10003, 1), pdu.WriteRegisterRequest(10003, 2))
     assert moves(MAP, request_) == (request_.address in MOVING or starts_program)
 
@@ -158,11 +170,11 @@ def test_names_that_are_none(text: str, message: str) -> None:
 
 
 def test_several_user_registers_from_one_on() -> None:
-    assert user_item(MAP, 1990, View.REAL, 5).at(1992).name == "USER_REGISTER[1992]:real"
+    assert user_item(MAP, 1990, UserFormat.REAL, 5).at(1992).name == "USER_REGISTER[1992]:real"
     with pytest.raises(Misuse, match=r"user register 1992 as REAL × 5 is outside 0 to 1990"):
-        user_item(MAP, 1992, View.REAL, 5)
+        user_item(MAP, 1992, UserFormat.REAL, 5)
     with pytest.raises(Misuse, match="user register -1 as INT is outside 0 to 1999"):
-        user_item(MAP, -1, View.INT)
+        user_item(MAP, -1, UserFormat.INT)
 
 
 def test_items_of_one_register_and_view_are_one() -> None:
@@ -195,7 +207,7 @@ WRITTEN = [
 
 
 @pytest.mark.parametrize(("name", "value", "data_type", "request_"), WRITTEN, ids=str)
-def test_values_that_are_written_and_read(name: str, value: float, data_type: DataType, request_: pdu.Request) -> None:
+def test_values_that_are_written_and_read(name: str, value: float, data_type: DataType, request_: pdu.ModbusRequest) -> None:
     item = named(MAP, name)
     assert encoded(item, value, data_type) == request_
     match request_:

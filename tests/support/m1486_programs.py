@@ -8,7 +8,7 @@ from typing import Protocol
 from hypothesis import strategies as st
 
 from steptwin.m1486.commands import TABLE, ArgType, CommandSpec, takes_variable
-from steptwin.m1486.syntax import Command, JumpCondition, ParsedProgram, ProgramLine
+from steptwin.m1486.syntax import ChipCommand, JumpCondition, ParsedProgram, ProgramLine
 from steptwin.m1486.variants import Variant
 
 
@@ -26,13 +26,13 @@ def permitted_programs(variant: Variant, *, numbered: bool = False) -> st.Search
     return st.lists(line, max_size=30).map(lambda lines: ParsedProgram(tuple(lines)))
 
 
-def _command(spec: CommandSpec, variant: Variant, numbered: bool) -> st.SearchStrategy[Command]:
+def _command(spec: CommandSpec, variant: Variant, numbered: bool) -> st.SearchStrategy[ChipCommand]:
     if spec.kind is ArgType.NONE:
-        return st.just(Command(spec.key))
+        return st.just(ChipCommand(spec.key))
     numbers = st.sampled_from(spec.permitted(variant))
     if spec.kind is ArgType.CONDITION:
         labels = st.integers(1, variant.labels)
-        return st.builds(JumpCondition, numbers, st.booleans(), labels).map(lambda condition: Command(spec.key, condition))
+        return st.builds(JumpCondition, numbers, st.booleans(), labels).map(lambda condition: ChipCommand(spec.key, condition))
     if takes_variable(spec.key) and not numbered:
         numbers = st.none() | numbers
-    return numbers.map(lambda number: Command(spec.key, number))
+    return numbers.map(lambda number: ChipCommand(spec.key, number))

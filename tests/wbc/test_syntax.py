@@ -22,11 +22,11 @@ from steptwin.wbc.tree import (
     ImageRecord,
     KeywordStatement,
     Label,
-    Node,
     Position,
     PositionRecord,
     Relation,
-    Statement,
+    StatementNode,
+    TreeNode,
 )
 
 PLACE = (0, 0)
@@ -40,7 +40,7 @@ def number(text: str, value: float) -> DecimalNumber:
     return DecimalNumber(*PLACE, text, value)
 
 
-def only(text: str) -> Statement:
+def only(text: str) -> StatementNode:
     program, diagnostics = parse(text)
     assert diagnostics == []
     (line,) = program.lines
@@ -49,7 +49,7 @@ def only(text: str) -> Statement:
 
 
 # fmt: off
-STATEMENTS_READ: list[tuple[str, Statement]] = [
+STATEMENTS_READ: list[tuple[str, StatementNode]] = [
     ("#speed 60", ConstantDefinition(*PLACE, name("speed"), number("60", 60))),
     ("#home -70", ConstantDefinition(*PLACE, name("home"), number("-70", -70))),
     ("#pump OUT3", ConstantDefinition(*PLACE, name("pump"), name("OUT3"))),
@@ -97,7 +97,7 @@ STATEMENTS_READ: list[tuple[str, Statement]] = [
 
 
 @pytest.mark.parametrize(("text", "expected"), STATEMENTS_READ, ids=[text for text, _ in STATEMENTS_READ])
-def test_statement(text: str, expected: Statement) -> None:
+def test_statement(text: str, expected: StatementNode) -> None:
     assert only(text) == expected
     comment = "" if text.startswith("//") else "  // why"
     assert only(f"\t {text}{comment}").start == 2
@@ -125,7 +125,7 @@ def test_spans_are_the_words() -> None:
     assert isinstance(call, FunctionCall)
     assert isinstance(second.statement, KeywordStatement)
 
-    def words(node: Node) -> str:
+    def words(node: TreeNode) -> str:
         return text[node.start : node.end]
 
     assert words(first) == "  SET speed = max(count, -2,5) // fast"

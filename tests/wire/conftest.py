@@ -25,7 +25,7 @@ class RegisterBank:
         except modbus.ModbusException as refusal:
             return refusal.pdu
 
-    def _respond(self, request: modbus.Request) -> modbus.Response:
+    def _respond(self, request: modbus.ModbusRequest) -> modbus.ModbusResponse:
         match request:
             case modbus.ReadRequest(function, address, count):
                 self._check(function, address, count)
@@ -62,9 +62,9 @@ class Example(NamedTuple):
     """One exchange as bytes and as values."""
 
     request_pdu: str
-    request: modbus.Request
+    request: modbus.ModbusRequest
     response_pdu: str
-    response: modbus.Response
+    response: modbus.ModbusResponse
 
 
 # Printed in the Modbus application protocol V1.1b3, sections 6.1 to 6.12 (addresses there count from 1 in the text).
@@ -111,7 +111,7 @@ GOLDEN = {
 
 
 @pytest.fixture(params=GOLDEN.items(), ids=lambda item: item[0])
-def golden(request: pytest.FixtureRequest) -> tuple[bytes, modbus.Request]:
+def golden(request: pytest.FixtureRequest) -> tuple[bytes, modbus.ModbusRequest]:
     """A whole RTU request frame of a manual and what it says."""
     text, decoded = request.param
     return bytes.fromhex(text), decoded

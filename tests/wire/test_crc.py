@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from steptwin.wire.crc import crc16, is_intact, table_crc16, with_crc
-from steptwin.wire.pdu import Request
+from steptwin.wire.pdu import ModbusRequest
 
 
 def bitwise_crc(data: bytes) -> int:
@@ -26,7 +26,7 @@ def test_equals_the_definition(data: bytes) -> None:
     assert crc16(data) == table_crc16(data) == bitwise_crc(data)
 
 
-def test_golden_frames_are_intact(golden: tuple[bytes, Request]) -> None:
+def test_golden_frames_are_intact(golden: tuple[bytes, ModbusRequest]) -> None:
     frame, _ = golden
     assert is_intact(frame)
     assert with_crc(frame[:-2]) == frame

@@ -16,10 +16,10 @@ from steptwin.wire.pdu import (
     BitsResponse,
     ExceptionResponse,
     ModbusException,
+    ModbusRequest,
+    ModbusResponse,
     ReadRequest,
     RegistersResponse,
-    Request,
-    Response,
     WriteCoilRequest,
     WriteRegisterRequest,
     WriteRegistersRequest,
@@ -42,7 +42,7 @@ def spans(most: int) -> st.SearchStrategy[tuple[int, int]]:
     return st.integers(1, most).flatmap(lambda count: st.tuples(st.integers(0, 0x10000 - count), st.just(count)))
 
 
-requests: st.SearchStrategy[Request] = st.one_of(
+requests: st.SearchStrategy[ModbusRequest] = st.one_of(
     st.builds(lambda f, span: ReadRequest(f, *span), st.sampled_from([1, 2]), spans(2000)),
     st.builds(lambda span: ReadRequest(3, *span), spans(125)),
     st.builds(WriteCoilRequest, addresses, st.booleans()),
@@ -62,7 +62,7 @@ def test_examples_of_the_specification_in_both_directions(example: Any) -> None:
     assert answer(example.request, answered) == example.response
 
 
-def test_golden_requests_of_the_manual(golden: tuple[bytes, Request]) -> None:
+def test_golden_requests_of_the_manual(golden: tuple[bytes, ModbusRequest]) -> None:
     frame, request = golden
     assert decode_request(frame[1:-2]) == request
     assert encode_request(request) == frame[1:-2]
@@ -95,14 +95,14 @@ def test_more_bits_than_there_are() -> None:
 
 
 @given(requests)
-def test_requests_survive_the_wire(request: Request) -> None:
+def test_requests_survive_the_wire(request: ModbusRequest) -> None:
     pdu = encode_request(request)
     assert decode_request(pdu) == request
     assert pdu[0] == request.function
 
 
 @given(requests)
-def test_requests_are_those_of_pymodbus(request: Request) -> None:
+def test_requests_are_those_of_pymodbus(request: ModbusRequest) -> None:
     match request:
         case ReadRequest(1, address, count):
             peer: Any = peer_bits.ReadCoilsRequest(address=address, count=count)
@@ -227,7 +227,7 @@ def test_any_pdu_is_a_response_or_a_bad_one(pdu: bytes) -> None:
         (WriteRegistersRequest(0, (1, -1)), "register value -1 is outside 0 to 65535"),
     ],
 )
-def test_what_cannot_be_asked(request_: Request, message: str) -> None:
+def test_what_cannot_be_asked(request_: ModbusRequest, message: str) -> None:
     with pytest.raises(Misuse) as misuse:
         encode_request(request_)
     assert str(misuse.value) == message
@@ -243,7 +243,7 @@ def test_what_cannot_be_asked(request_: Request, message: str) -> None:
         (ExceptionResponse(3, 0), "exception code 0 is outside 1 to 255"),
     ],
 )
-def test_what_cannot_be_answered(response: Response, message: str) -> None:
+def test_what_cannot_be_answered(response: ModbusResponse, message: str) -> None:
     with pytest.raises(Misuse) as misuse:
         encode_response(response)
     assert str(misuse.value) == message
@@ -284,7 +284,7 @@ def test_responses_without_form(text: str, message: str) -> None:
         (WriteRegistersRequest(5, (1, 2)), "10 00 04 00 02"),
     ],
 )
-def test_answers_to_something_else(request_: Request, text: str) -> None:
+def test_answers_to_something_else(request_: ModbusRequest, text: str) -> None:
     with pytest.raises(BadResponse, match="does not answer"):
         answer(request_, bytes.fromhex(text))
 
@@ -299,7 +299,7 @@ def test_answers_to_something_else(request_: Request, text: str) -> None:
         WriteRegistersRequest(0, (1,)),
     ],
 )
-def test_a_refusal_is_raised_as_one(request_: Request) -> None:
+def test_a_refusal_is_raised_as_one(request_: ModbusRequest) -> None:
     with pytest.raises(ModbusException) as refusal:
         answer(request_, bytes((request_.function | 0x80, 2)))
     assert isinstance(refusal.value, Refusal)

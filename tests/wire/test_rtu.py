@@ -12,7 +12,14 @@ from pymodbus.pdu import DecodePDU
 from steptwin.errors import Misuse
 from steptwin.wire import rtu
 from steptwin.wire.crc import crc16, with_crc
-from steptwin.wire.pdu import ReadRequest, Request, WriteRegisterRequest, WriteRegistersRequest, decode_request, encode_request
+from steptwin.wire.pdu import (
+    ModbusRequest,
+    ReadRequest,
+    WriteRegisterRequest,
+    WriteRegistersRequest,
+    decode_request,
+    encode_request,
+)
 from steptwin.wire.rtu import (
     BURSTY_GAP_NS,
     PAUSE_NS,
@@ -67,7 +74,7 @@ CONVERSATION = [
 STREAM = b"".join(frame for frame, _ in CONVERSATION)
 
 
-def test_golden_frames_are_whole_requests(golden: tuple[bytes, Request]) -> None:
+def test_golden_frames_are_whole_requests(golden: tuple[bytes, ModbusRequest]) -> None:
     raw, request = golden
     (frame,) = RtuFramer(own={1}).feed(raw, 0)
     assert frame == RtuFrame(raw, FrameRole.REQUEST, 8)
@@ -76,7 +83,7 @@ def test_golden_frames_are_whole_requests(golden: tuple[bytes, Request]) -> None
     assert encode_frame(1, frame.pdu) == raw
 
 
-def test_frames_are_those_of_pymodbus(golden: tuple[bytes, Request]) -> None:
+def test_frames_are_those_of_pymodbus(golden: tuple[bytes, ModbusRequest]) -> None:
     raw, _ = golden
     used, unit, _, pdu = FramerRTU(DecodePDU(True)).decode(raw)
     assert (used, unit, pdu) == (8, 1, raw[1:-2])
@@ -112,7 +119,7 @@ requests = st.one_of(
 
 
 @given(st.lists(st.tuples(st.sampled_from([0, 1, 5]), requests), max_size=12), st.randoms(use_true_random=False))
-def test_any_requests_in_any_pieces(sent: list[tuple[int, Request]], random: Any) -> None:
+def test_any_requests_in_any_pieces(sent: list[tuple[int, ModbusRequest]], random: Any) -> None:
     frames = [encode_frame(unit, encode_request(request)) for unit, request in sent]
     stream, framer, found = b"".join(frames), RtuFramer({1, 5}), []
     while stream:

@@ -15,16 +15,16 @@ from steptwin.wire.crc import is_intact, with_crc
 from steptwin.wire.line import SerialLine
 from steptwin.wire.pdu import (
     ModbusException,
+    ModbusRequest,
+    ModbusResponse,
     ReadRequest,
-    Request,
-    Response,
     WriteCoilRequest,
     WriteRegisterRequest,
     WriteRegistersRequest,
     answer,
     encode_request,
 )
-from steptwin.wire.slave import Device, FrameDirection, RtuSlavePort, TcpSlavePort
+from steptwin.wire.slave import FrameDirection, RtuSlavePort, SlaveDevice, TcpSlavePort
 from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
 
 NewBank = Callable[[], Any]
@@ -35,7 +35,7 @@ def hexed(text: str) -> bytes:
     return with_crc(bytes.fromhex(text))
 
 
-def over_rtu(port: RtuSlavePort, unit: int, request: Request, now: int = 0) -> Response:
+def over_rtu(port: RtuSlavePort, unit: int, request: ModbusRequest, now: int = 0) -> ModbusResponse:
     """What a master on the other end makes of it."""
     data = port.exchange(rtu.encode_frame(unit, encode_request(request)), now)
     assert rtu.response_length(data) == len(data)
@@ -44,7 +44,7 @@ def over_rtu(port: RtuSlavePort, unit: int, request: Request, now: int = 0) -> R
     return answer(request, data[1:-2])
 
 
-def over_tcp(port: TcpSlavePort, unit: int, request: Request, transaction: int = 7) -> Response:
+def over_tcp(port: TcpSlavePort, unit: int, request: ModbusRequest, transaction: int = 7) -> ModbusResponse:
     (frame,) = mbap.TcpFramer().feed(port.exchange(mbap.encode_frame(transaction, unit, encode_request(request)), 0))
     assert (frame.transaction, frame.unit) == (transaction, unit)
     return answer(request, frame.pdu)
@@ -80,7 +80,7 @@ def test_golden_requests_beyond_the_memory_of_the_bank_are_refused(bank: Any, te
     ],
     ids=str,
 )
-def test_two_ends_joined(new_bank: NewBank, request_: Request) -> None:
+def test_two_ends_joined(new_bank: NewBank, request_: ModbusRequest) -> None:
     """Both framings and both ways through a port give what the device answers."""
     pdu = encode_request(request_)
     expected = answer(request_, new_bank().execute(pdu, 0))
@@ -231,7 +231,7 @@ def test_glued_requests_are_answered_in_order(bank: Any) -> None:
 
 @pytest.mark.parametrize("units", [[], [0], [248], [1, -1]])
 def test_units_of_a_line(new_bank: NewBank, units: list[int]) -> None:
-    devices: dict[int, Device] = {unit: new_bank() for unit in units}
+    devices: dict[int, SlaveDevice] = {unit: new_bank() for unit in units}
     for port in (RtuSlavePort, TcpSlavePort):
         with pytest.raises(Misuse, match=r"at least one unit|is outside 1 to 247"):
             port(devices)

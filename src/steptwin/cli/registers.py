@@ -157,11 +157,11 @@ def _functions(codes: Iterable[int]) -> str:
 
 
 def _permitted(register: Register) -> str:
-    from steptwin.mic488.registermap import Quantity
+    from steptwin.mic488.registermap import QuantityKind
 
     if not register.accepts:
         return ""
-    return {Quantity.SWITCH: "ON, OFF", Quantity.MASK: "bit 0 M1 … bit 3 M4"}.get(register.kind, str(register.permitted))
+    return {QuantityKind.SWITCH: "ON, OFF", QuantityKind.MASK: "bit 0 M1 … bit 3 M4"}.get(register.kind, str(register.permitted))
 
 
 def _meaning(sentence: str, values: Mapping[int, str]) -> str:

@@ -15,7 +15,7 @@ from steptwin.m1486.lines import INTERFACES
 from steptwin.m1486.ranges import out_of_range
 from steptwin.m1486.receiver import EMPTY, NO_ROOM, THREE_FREE
 from steptwin.m1486.registers import UPLOADS
-from steptwin.m1486.syntax import Command, parse_line
+from steptwin.m1486.syntax import ChipCommand, parse_line
 from steptwin.m1486.variants import VARIANTS, Store, Variant
 from steptwin.machine import SECOND
 from steptwin.wire.line import SerialLine
@@ -36,7 +36,7 @@ _UPLOAD = re.compile(rb"\s*[Uu]\s*(\d+)\s*")
 _SELECT = re.compile(r"[Xx]\s*([0-9A-Fa-fGg])")
 
 
-def command_of(text: str, variant: Variant | None) -> Command | None:
+def command_of(text: str, variant: Variant | None) -> ChipCommand | None:
     """The command in a typed line; None for a comment. Raises `Misuse` for a command that the chip would drop as wrong data
     (M-11).
 

@@ -45,7 +45,7 @@ class Query:
         "tcp_tail",
     )
 
-    def __init__(self, unit: int, request: pdu.Request, describe: Callable[[bytes], str] | None = None) -> None:
+    def __init__(self, unit: int, request: pdu.ModbusRequest, describe: Callable[[bytes], str] | None = None) -> None:
         self.device = unit
         self.request = request
         self.pdu = pdu.encode_request(request)

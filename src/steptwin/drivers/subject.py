@@ -32,8 +32,8 @@ from steptwin.subject.payloads import Payload, SamplePayload
 
 PERIOD_S = 0.2
 PERIODS_S = (0.02, 60.0)
-Action: TypeAlias = Callable[[Any], Awaitable[object]]
-Value: TypeAlias = tuple[float | None, str]
+DeviceAction: TypeAlias = Callable[[Any], Awaitable[object]]
+PointValue: TypeAlias = tuple[float | None, str]
 """The value of a point, None if unknown; and its unit."""
 
 
@@ -56,7 +56,7 @@ class DevicePart(Protocol):
         """The data sheet, with axes in the units of the driver."""
         ...
 
-    async def values(self, points: Sequence[str]) -> Mapping[str, Value]:
+    async def values(self, points: Sequence[str]) -> Mapping[str, PointValue]:
         """The values by name. Raises `Misuse` for an unknown point."""
         ...
 
@@ -77,7 +77,7 @@ class DevicePart(Protocol):
         """The unit of a point. Raises `Misuse` for an unknown point."""
         ...
 
-    def actions(self) -> Mapping[type, Action]:
+    def actions(self) -> Mapping[type, DeviceAction]:
         """The commands that the device can execute; names of machine and line have been checked."""
         ...
 
@@ -147,7 +147,7 @@ class AsyncDeviceSubject:
         begin = self._line.now()
         self.now = (lambda: self._line.now() - begin) if clock is None else clock
         """The present moment, ns."""
-        self._actions: dict[type, Action] = {
+        self._actions: dict[type, DeviceAction] = {
             **device.actions(),
             command.Describe: self._describe,
             command.ReadPoints: self._read,
@@ -173,7 +173,7 @@ class AsyncDeviceSubject:
         """Read points, in as few exchanges as possible."""
         paths = {point: self._path(point) for point in points if point != "time"}
         values = await self._device.values(tuple(dict.fromkeys(paths.values()))) if paths else {}
-        found: dict[str, Value] = {point: values[path] for point, path in paths.items()}
+        found: dict[str, PointValue] = {point: values[path] for point, path in paths.items()}
         found["time"] = self.now() / SECOND, "s"
         return tuple(Reading(point, *found[point], UNKNOWN if found[point][0] is None else GOOD) for point in points)
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from steptwin.live.cell import Cell
 from steptwin.machine import Nanos
 from steptwin.wire.pdu import READS
-from steptwin.wire.slave import Device
+from steptwin.wire.slave import SlaveDevice
 
 
 class _SharedReads:
@@ -15,7 +15,7 @@ class _SharedReads:
 
     __slots__ = ("_answers", "_cell", "_execute", "_moment")
 
-    def __init__(self, device: Device, cell: Cell) -> None:
+    def __init__(self, device: SlaveDevice, cell: Cell) -> None:
         self._execute = device.execute
         self._cell = cell
         self._moment = -1
@@ -35,6 +35,6 @@ class _SharedReads:
         return answer
 
 
-def share_reads(devices: Mapping[int, Device], cell: Cell) -> dict[int, Device]:
+def share_reads(devices: Mapping[int, SlaveDevice], cell: Cell) -> dict[int, SlaveDevice]:
     """The units of a line for clients that a cell serves together. Units must not change each other but by the cell's kernel."""
     return {unit: _SharedReads(device, cell) for unit, device in devices.items()}

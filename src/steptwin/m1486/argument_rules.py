@@ -10,7 +10,7 @@ from steptwin.m1486.commands import ArgType, CommandSpec, find, grouped, permitt
 from steptwin.m1486.functions import CARRY, is_reserved
 from steptwin.m1486.lines import LINES, Interface, line_group
 from steptwin.m1486.registers import UPLOADS
-from steptwin.m1486.syntax import Command, JumpCondition
+from steptwin.m1486.syntax import ChipCommand, JumpCondition
 from steptwin.m1486.variants import VARIANTS, Variant
 
 _REFUSES_OCCUPIED = frozenset("CT!OZ()")
@@ -18,7 +18,7 @@ _REFUSES_OCCUPIED = frozenset("CT!OZ()")
 _INSTEAD_OF_ZERO = {"=": "C100", "G": "H"}
 
 
-def argument_rules(command: Command, variant: Variant, interface: Interface) -> Iterator[Diagnostic]:
+def argument_rules(command: ChipCommand, variant: Variant, interface: Interface) -> Iterator[Diagnostic]:
     """Findings about the number written in the command."""
     number = command.number
     if number is None:
@@ -30,7 +30,7 @@ def argument_rules(command: Command, variant: Variant, interface: Interface) -> 
         yield from _label_of_condition(command.argument, variant)
 
 
-def number_problem(command: Command, number: int, variant: Variant, interface: Interface) -> Diagnostic | None:
+def number_problem(command: ChipCommand, number: int, variant: Variant, interface: Interface) -> Diagnostic | None:
     """The error of ``number`` as the argument of the command, written or from the internal variable."""
     spec = find(command.key, number, variant)
     if spec is None:
@@ -50,7 +50,7 @@ def lines_text(lines: range | list[int]) -> str:
     return ", ".join(f"B{line}" for line in lines)
 
 
-def _out_of_range(command: Command, number: int, variant: Variant) -> Diagnostic:
+def _out_of_range(command: ChipCommand, number: int, variant: Variant) -> Diagnostic:
     key = command.key
     hint = permitted_text(key, variant)
     fix = None
@@ -89,7 +89,7 @@ def _label_of_condition(condition: JumpCondition, variant: Variant) -> Iterator[
         yield findings.OUT_OF_RANGE(condition.label_span, f"label {grouped(condition.label)} is out of range", hint)
 
 
-def _reserved(command: Command, spec: CommandSpec, number: int) -> Diagnostic | None:
+def _reserved(command: ChipCommand, spec: CommandSpec, number: int) -> Diagnostic | None:
     if spec.kind is ArgType.FUNCTION and is_reserved(number):
         return findings.RESERVED(command.argument_span, f"function {number} is reserved", "the manual gives it no meaning")
     if spec.kind is ArgType.UPLOAD and number not in UPLOADS:
@@ -98,7 +98,7 @@ def _reserved(command: Command, spec: CommandSpec, number: int) -> Diagnostic | 
     return None
 
 
-def _occupied(command: Command, spec: CommandSpec, number: int, interface: Interface) -> Diagnostic | None:
+def _occupied(command: ChipCommand, spec: CommandSpec, number: int, interface: Interface) -> Diagnostic | None:
     taken = [line for line in lines_of(spec, number) if line in interface.occupied]
     if not taken:
         return None

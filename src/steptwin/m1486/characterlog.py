@@ -8,7 +8,7 @@ from collections.abc import Callable
 from steptwin.m1486.commands import ArgType, find, grouped
 from steptwin.m1486.receiver import CR, EMPTY, NO_ROOM, THREE_FREE
 from steptwin.m1486.registers import UPLOADS
-from steptwin.m1486.syntax import Command, JumpCondition, parse_line
+from steptwin.m1486.syntax import ChipCommand, JumpCondition, parse_line
 from steptwin.m1486.variants import Variant
 from steptwin.machine import Nanos
 from steptwin.wire.frameline import FrameLine
@@ -92,7 +92,7 @@ def _typed(raw: bytes, variant: Variant) -> str:
     return "a comment" if line.comment is not None else "an empty line"
 
 
-def in_words(command: Command, variant: Variant) -> str:
+def in_words(command: ChipCommand, variant: Variant) -> str:
     """``Forward 12 800 min. microsteps``."""
     argument = command.argument
     if isinstance(argument, JumpCondition):

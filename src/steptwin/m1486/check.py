@@ -11,7 +11,7 @@ from steptwin.m1486.lines import STEP_DIRECTION, Interface
 from steptwin.m1486.position_rules import position_rules
 from steptwin.m1486.structure import CommandStream, stored_bits, streams
 from steptwin.m1486.structure_rules import structure_rules
-from steptwin.m1486.syntax import Command, ParsedProgram, parse
+from steptwin.m1486.syntax import ChipCommand, ParsedProgram, parse
 from steptwin.m1486.variants import DEFAULT, Variant
 
 
@@ -47,7 +47,7 @@ class ChipMemory:
 
 @dataclass(frozen=True, slots=True)
 class CommandSize:
-    command: Command
+    command: ChipCommand
     bits: int
     in_file: bool
 

@@ -13,11 +13,11 @@ from steptwin.m1486.encoding import decode
 from steptwin.m1486.functions import CARRY, FUNCTIONS, USER_FLAGS
 from steptwin.m1486.points import UNIT
 from steptwin.m1486.registers import GENERAL
-from steptwin.m1486.syntax import Command
+from steptwin.m1486.syntax import ChipCommand
 from steptwin.machine import Nanos
 
 
-def next_command(chip: M1486Chip) -> Command | None:
+def next_command(chip: M1486Chip) -> ChipCommand | None:
     """The command the program stands before, None at the end of what is stored."""
     if chip.program.is_at_end or chip.program.pc == chip.memory.end:
         return None

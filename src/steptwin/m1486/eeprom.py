@@ -11,7 +11,7 @@ from steptwin.m1486.commands import When, when
 from steptwin.m1486.encoding import encode
 from steptwin.m1486.memory import StoredFile
 from steptwin.m1486.ranges import out_of_range
-from steptwin.m1486.syntax import Command, ParsedProgram
+from steptwin.m1486.syntax import ChipCommand, ParsedProgram
 from steptwin.m1486.variants import Variant
 
 _VERSION = 1
@@ -40,7 +40,7 @@ def unpack(data: bytes, variant: Variant) -> StoredFile | None:
     return StoredFile(code, labels)
 
 
-def stored_commands(program: ParsedProgram) -> list[Command]:
+def stored_commands(program: ParsedProgram) -> list[ChipCommand]:
     """The commands and labels between ``[`` and ``]``; all of a program that has none around it."""
     commands = program.all_commands
     is_file = len(commands) > 1 and (commands[0].key, commands[-1].key) == ("[", "]")

@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from steptwin.m1486.commands import LETTERS, When, memory_bits, rows, takes_number, takes_variable
-from steptwin.m1486.syntax import Command, JumpCondition
+from steptwin.m1486.syntax import ChipCommand, JumpCondition
 
 FROM_VARIABLE = 0x80
 _ENDLESS = {"G+": 0xFFFFFF, "G-": 0xFFFFFE}
@@ -25,11 +25,11 @@ LONGEST = max(SIZES.values())
 class Stored(NamedTuple):
     """A command read from memory, and how many bytes it takes."""
 
-    command: Command
+    command: ChipCommand
     size: int
 
 
-def encode(command: Command) -> bytes:
+def encode(command: ChipCommand) -> bytes:
     """The bytes of a command that is stored."""
     letter = command.key[0]
     first = ord(letter) | (FROM_VARIABLE if command.from_variable else 0)
@@ -51,13 +51,13 @@ def decode(raw: bytes) -> Stored | None:
     if size is None:
         return None
     if raw[0] & FROM_VARIABLE:
-        return Stored(Command(letter), size) if takes_variable(letter) else None
+        return Stored(ChipCommand(letter), size) if takes_variable(letter) else None
     if letter == "I":
         level = chr(raw[2])
-        return Stored(Command("I", JumpCondition(raw[1], level == "H", raw[3])), size) if level in "HL" else None
+        return Stored(ChipCommand("I", JumpCondition(raw[1], level == "H", raw[3])), size) if level in "HL" else None
     if not takes_number(letter):
-        return Stored(Command(letter), size)
+        return Stored(ChipCommand(letter), size)
     number = int.from_bytes(raw[1:size], "little")
     if letter == "G" and number in _ENDLESS_KEYS:
-        return Stored(Command(_ENDLESS_KEYS[number]), size)
-    return Stored(Command(letter, number), size)
+        return Stored(ChipCommand(_ENDLESS_KEYS[number]), size)
+    return Stored(ChipCommand(letter, number), size)

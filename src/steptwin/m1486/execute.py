@@ -8,7 +8,7 @@ from steptwin.m1486 import flow_effects, io_effects, motion_effects, numeric_eff
 from steptwin.m1486.commands import TABLE, When, find
 from steptwin.m1486.effects import CommandHost, Effect, Making, WrongData, refusing
 from steptwin.m1486.ranges import out_of_range
-from steptwin.m1486.syntax import Command, JumpCondition
+from steptwin.m1486.syntax import ChipCommand, JumpCondition
 from steptwin.machine import Nanos
 
 
@@ -23,7 +23,7 @@ class CompiledCommand(NamedTuple):
 _MAKERS: dict[str, Making] = flow_effects.MAKERS | motion_effects.MAKERS | io_effects.MAKERS | numeric_effects.MAKERS
 
 
-def compile_command(chip: CommandHost, command: Command, place: int, following: int) -> CompiledCommand:
+def compile_command(chip: CommandHost, command: ChipCommand, place: int, following: int) -> CompiledCommand:
     """The closure of a command that stands in the memory at ``place``."""
     if command.from_variable:
         return CompiledCommand(_with_variable(chip, command.key, place, following), computes=False, is_linked=False)
@@ -45,7 +45,7 @@ def _with_variable(chip: CommandHost, key: str, place: int, following: int) -> E
         number = chip.unit.variable
         spec = find(key, number, chip.variant)
         if spec is None:
-            raise WrongData(f"the internal variable gives: {out_of_range(Command(key, number), chip.variant)}")
+            raise WrongData(f"the internal variable gives: {out_of_range(ChipCommand(key, number), chip.variant)}")
         return _MAKERS[spec.name].make(chip, number, place, following)(now)
 
     return run

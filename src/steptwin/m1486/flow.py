@@ -17,7 +17,7 @@ from steptwin.m1486.functions import INPUT, REGISTER, RUNSIGN
 from steptwin.m1486.lines import Interface, line_group
 from steptwin.m1486.microsteps import DEFAULT_DISTANCE_U, DEFAULT_PROFILE, DEFAULT_VELOCITY, microstep_size
 from steptwin.m1486.structure import CommandStream
-from steptwin.m1486.syntax import Command, JumpCondition
+from steptwin.m1486.syntax import ChipCommand, JumpCondition
 from steptwin.m1486.variants import Variant
 
 #: Enough for a line group of five lines; more settings at one place are merged.
@@ -87,7 +87,7 @@ class FlowAnalysis:
     endless_calls: list[int] = field(default_factory=list)
 
 
-def value(command: Command, state: Settings) -> int | None:
+def value(command: ChipCommand, state: Settings) -> int | None:
     """The number of a command: its own or the internal variable; None if unknown or without number."""
     return state.variable if command.from_variable else command.number
 
@@ -214,7 +214,7 @@ class _Walk:
             self.arrive(call + 1, _MAIN, state)
 
 
-def _after(command: Command, state: Settings, variant: Variant) -> Iterable[Settings]:
+def _after(command: ChipCommand, state: Settings, variant: Variant) -> Iterable[Settings]:
     """The settings after a command that goes on to the next one."""
     key = command.key
     number = value(command, state)
@@ -241,7 +241,7 @@ def _is_wrong_multiple(key: str, number: int, state: Settings) -> bool:
     return key in "FB" and state.microstep is not None and number % microstep_size(state.microstep) != 0
 
 
-def _after_unknown(command: Command, state: Settings) -> Settings:
+def _after_unknown(command: ChipCommand, state: Settings) -> Settings:
     if not command.from_variable:
         return state
     if command.key in "TC":

@@ -17,7 +17,7 @@ from steptwin.m1486.microsteps import HIGHEST_SPEED, PAIRS, low_range_limit, mic
 from steptwin.m1486.registers import GENERAL
 from steptwin.m1486.structure import CommandStream, written_label
 from steptwin.m1486.structure_rules import label_problem
-from steptwin.m1486.syntax import Command
+from steptwin.m1486.syntax import ChipCommand
 from steptwin.m1486.variants import Variant
 
 #: Acceleration per start/stop speed above which the lost table would have to be asked (M-4).
@@ -28,7 +28,7 @@ _DISTANCES = frozenset("FBG=")
 _ARITHMETIC = frozenset("+-*/")
 #: What a setting makes wrong: the finding, the message, the hint.
 _Fault = tuple[ChipFinding, str, str | None]
-_Rule = Callable[[Command, Settings], _Fault | None]
+_Rule = Callable[[ChipCommand, Settings], _Fault | None]
 
 
 def flow_rules(stream: CommandStream, variant: Variant, interface: Interface) -> Iterator[Diagnostic]:
@@ -49,7 +49,7 @@ def flow_rules(stream: CommandStream, variant: Variant, interface: Interface) ->
     yield from _shared_registers(stream, flow, variant)
 
 
-def _judge(command: Command, states: set[Settings], rule: _Rule) -> Iterator[Diagnostic]:
+def _judge(command: ChipCommand, states: set[Settings], rule: _Rule) -> Iterator[Diagnostic]:
     """An error if it occurs with every setting, else a warning if it can occur."""
     faults = [rule(command, state) for state in states]
     found = sorted({fault for fault in faults if fault is not None}, key=lambda fault: fault[1])
@@ -63,7 +63,7 @@ def _judge(command: Command, states: set[Settings], rule: _Rule) -> Iterator[Dia
     yield finding(span, message, hint, fix)
 
 
-def _distance(command: Command, state: Settings) -> _Fault | None:
+def _distance(command: ChipCommand, state: Settings) -> _Fault | None:
     distance = value(command, state) if command.key in _DISTANCES else state.distance if command.key == "R" else None
     if not distance or state.microstep is None:
         return None
@@ -75,7 +75,7 @@ def _distance(command: Command, state: Settings) -> _Fault | None:
     return findings.NOT_A_MULTIPLE, f"{what} {grouped(distance)} is not a multiple of {size}", hint
 
 
-def _nearest_multiple(command: Command, states: set[Settings]) -> Fix | None:
+def _nearest_multiple(command: ChipCommand, states: set[Settings]) -> Fix | None:
     """The nearest distance that is right with every setting."""
     sizes = [microstep_size(state.microstep) for state in states if state.microstep is not None]
     if command.number is None or not sizes:
@@ -84,7 +84,7 @@ def _nearest_multiple(command: Command, states: set[Settings]) -> Fix | None:
     return Fix(command.argument_span, str(max(size, (command.number + size // 2) // size * size)))
 
 
-def _pair(command: Command, state: Settings) -> _Fault | None:
+def _pair(command: ChipCommand, state: Settings) -> _Fault | None:
     if command.key not in _MOVES or state.microstep is None or state.qualification is None:
         return None
     allowed = PAIRS[state.microstep]
@@ -94,14 +94,14 @@ def _pair(command: Command, state: Settings) -> _Fault | None:
     return findings.FORBIDDEN_PAIR, f"M{state.microstep} and Q{state.qualification} do not go together", hint
 
 
-def _no_ramp(command: Command, state: Settings) -> _Fault | None:
+def _no_ramp(command: ChipCommand, state: Settings) -> _Fault | None:
     if command.key != "R" or state.velocity is None or state.start_stop is None or state.velocity > state.start_stop:
         return None
     message = f"V {state.velocity} is not above S {state.start_stop}"
     return findings.NO_RAMP, message, "the move runs at V without a ramp"
 
 
-def _too_fast(command: Command, state: Settings) -> _Fault | None:
+def _too_fast(command: ChipCommand, state: Settings) -> _Fault | None:
     if command.key != "R" or state.velocity is None or state.qualification is None or state.microstep is None:
         return None
     highest = HIGHEST_SPEED[state.qualification]
@@ -111,7 +111,7 @@ def _too_fast(command: Command, state: Settings) -> _Fault | None:
     return findings.SPEED_ABOVE_Q, message, "Q1 goes as far as V"
 
 
-def _fine_end(command: Command, state: Settings) -> _Fault | None:
+def _fine_end(command: ChipCommand, state: Settings) -> _Fault | None:
     """M-39: what is left of a distance below one step of Q."""
     m, q, distance = state.microstep, state.qualification, state.distance
     if command.key != "R" or m is None or q is None or distance is None or state.start_stop is None or state.velocity is None:
@@ -128,7 +128,7 @@ def _fine_end(command: Command, state: Settings) -> _Fault | None:
     )
 
 
-def _profile(command: Command, state: Settings) -> _Fault | None:
+def _profile(command: ChipCommand, state: Settings) -> _Fault | None:
     if command.key != "R" or state.profile is None or state.velocity is None:
         return None
     if state.profile in PROFILE_RANGE or state.profile > state.velocity:
@@ -138,7 +138,7 @@ def _profile(command: Command, state: Settings) -> _Fault | None:
     return findings.PROFILE_OUT_OF_RANGE, message, hint
 
 
-def _acceleration(command: Command, state: Settings) -> _Fault | None:
+def _acceleration(command: ChipCommand, state: Settings) -> _Fault | None:
     # M-4: nothing is enforced; the table with the limits is missing.
     if command.key != "R" or state.acceleration is None or state.start_stop is None:
         return None
@@ -152,7 +152,7 @@ def _acceleration(command: Command, state: Settings) -> _Fault | None:
 _RULES: tuple[_Rule, ...] = (_distance, _pair, _no_ramp, _too_fast, _fine_end, _profile, _acceleration)
 
 
-def _operand(command: Command, state: Settings, interface: Interface) -> _Fault | None:
+def _operand(command: ChipCommand, state: Settings, interface: Interface) -> _Fault | None:
     """The number after + - * / where functions 46 and 58 make it lines or a register, and the dividend."""
     number = value(command, state)
     if number is None:
@@ -213,7 +213,7 @@ def _variable_problem(
     return problem if problem is not None and problem.severity is Severity.ERROR else None
 
 
-def _runsign(command: Command, states: set[Settings], variant: Variant) -> Iterator[Diagnostic]:
+def _runsign(command: ChipCommand, states: set[Settings], variant: Variant) -> Iterator[Diagnostic]:
     for state in states:
         number = value(command, state)
         spec = None if number is None else find(command.key, number, variant)

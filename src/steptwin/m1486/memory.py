@@ -36,7 +36,7 @@ class StoredFile(NamedTuple):
     labels: dict[int, int]
 
 
-class Reader(Protocol):
+class MemoryObserver(Protocol):
     """The executor of the commands, which is notified of overwritten ones."""
 
     def bytes_changed(self, first: int, count: int) -> None: ...
@@ -62,7 +62,7 @@ class CommandMemory(Stateful):
     )
     FIXED: ClassVar[frozenset[str]] = frozenset({"_reader", "_shared", "size", "span"})
 
-    def __init__(self, variant: Variant, reader: Reader) -> None:
+    def __init__(self, variant: Variant, reader: MemoryObserver) -> None:
         self._reader = reader
         self.size = variant.memory_bits // 8
         #: How many places there are.

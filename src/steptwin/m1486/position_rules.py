@@ -14,7 +14,7 @@ from steptwin.m1486 import findings
 from steptwin.m1486.commands import CLEAR_POSITION, When, find, grouped, when
 from steptwin.m1486.microsteps import DEFAULT_DISTANCE_U
 from steptwin.m1486.structure import CommandStream
-from steptwin.m1486.syntax import Command, JumpCondition
+from steptwin.m1486.syntax import ChipCommand, JumpCondition
 from steptwin.m1486.variants import Variant
 
 #: Commands that are followed along all paths together; a program is left at that.
@@ -101,7 +101,7 @@ def _after(stream: CommandStream, state: _State, variant: Variant) -> list[_Stat
     return [following]
 
 
-def _is_refused(command: Command, variant: Variant) -> bool:
+def _is_refused(command: ChipCommand, variant: Variant) -> bool:
     return command.number is not None and find(command.key, command.number, variant) is None
 
 

@@ -16,7 +16,7 @@ from steptwin.m1486.encoding import SIZES, encode
 from steptwin.m1486.functions import REPORT, RETURN
 from steptwin.m1486.memory import CommandMemory, FileState
 from steptwin.m1486.ranges import out_of_range
-from steptwin.m1486.syntax import Command, parse_line
+from steptwin.m1486.syntax import ChipCommand, parse_line
 from steptwin.m1486.unit import NumericUnit
 from steptwin.m1486.variants import Store, Variant
 from steptwin.machine import Fact, Nanos
@@ -268,13 +268,13 @@ class Receiver(Stateful):
             length = self._buffer.index(CR)
             text = bytes(self._buffer[i] for i in range(length)).decode("latin-1")
             command = _read(text, self._chip.variant)
-            if self._is_stopped_by_motor() or (isinstance(command, Command) and self._lacks_memory(command)):
+            if self._is_stopped_by_motor() or (isinstance(command, ChipCommand) and self._lacks_memory(command)):
                 return
             for _ in range(length + 1):
                 self._buffer.popleft()
             self._lines -= 1
             self._removed(length + 1, now)
-            if isinstance(command, Command):
+            if isinstance(command, ChipCommand):
                 self._take(command, now)
             else:
                 self._chip.wrong_data_received(command, now)
@@ -283,7 +283,7 @@ class Receiver(Stateful):
         """Compression stands still while the motor runs, but not inside ``[ ]``."""
         return self._chip.drive.is_busy and self._chip.memory.file is FileState.CLOSED
 
-    def _lacks_memory(self, command: Command) -> bool:
+    def _lacks_memory(self, command: ChipCommand) -> bool:
         """Whether a command would overwrite others that are still to be done."""
         chip = self._chip
         memory = chip.memory
@@ -294,7 +294,7 @@ class Receiver(Stateful):
             return False
         return not memory.has_room(size, chip.program.pc)
 
-    def _take(self, command: Command, now: Nanos) -> None:
+    def _take(self, command: ChipCommand, now: Nanos) -> None:
         chip = self._chip
         memory = chip.memory
         match command.key:
@@ -312,7 +312,7 @@ class Receiver(Stateful):
             case _:
                 self._store_command(command, now)
 
-    def _store_command(self, command: Command, now: Nanos) -> None:
+    def _store_command(self, command: ChipCommand, now: Nanos) -> None:
         chip = self._chip
         memory = chip.memory
         if memory.file is FileState.REFUSED:
@@ -345,11 +345,11 @@ class Receiver(Stateful):
 
 
 @lru_cache(_LINES_KEPT)
-def _read(text: str, variant: Variant) -> Command | str:
+def _read(text: str, variant: Variant) -> ChipCommand | str:
     """The command of a line, or what is wrong with the line."""
     line, found = parse_line(text)
     command = line.command
     if command is None:
         return f"{text}: {found[0].message if found else 'no command'}"
     # Where in the line it stood is not part of a command that may be kept.
-    return out_of_range(command, variant) or Command(command.key, command.argument)
+    return out_of_range(command, variant) or ChipCommand(command.key, command.argument)

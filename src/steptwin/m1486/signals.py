@@ -10,7 +10,7 @@ from steptwin.motion.divisions import StepTrain
 from steptwin.motion.waveforms import currents
 
 if TYPE_CHECKING:
-    from steptwin.motion.pulses import Times
+    from steptwin.motion.pulses import PulseTimes
 
 #: Chapter IV: a STEP pulse is at least this long, and data are valid for at least this long before STROBE goes low.
 STEP_PULSE_NS: Nanos = 1_800
@@ -31,7 +31,7 @@ class Strobe(NamedTuple):
     phase: int
 
 
-def step_pulses(train: StepTrain, after: Nanos, until: Nanos) -> Times:
+def step_pulses(train: StepTrain, after: Nanos, until: Nanos) -> PulseTimes:
     """Moments at which STEP goes low, with ``after`` < time <= ``until`` (int64 ns)."""
     from steptwin.motion.pulses import step_times
 

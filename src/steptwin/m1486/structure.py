@@ -9,17 +9,17 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from steptwin.m1486.commands import When, memory_bits, when
-from steptwin.m1486.syntax import Command, JumpCondition, ParsedProgram
+from steptwin.m1486.syntax import ChipCommand, JumpCondition, ParsedProgram
 
 
-def stored_bits(command: Command) -> int:
+def stored_bits(command: ChipCommand) -> int:
     """Command memory one command takes. Commands that act when received are never stored."""
     if when(command.key, command.number) is not When.QUEUED:
         return 0
     return memory_bits(command.key)
 
 
-def written_label(command: Command) -> int | None:
+def written_label(command: ChipCommand) -> int | None:
     """The label a jump, condition or call names as a number."""
     if isinstance(command.argument, JumpCondition):
         return command.argument.label
@@ -27,7 +27,7 @@ def written_label(command: Command) -> int | None:
 
 
 @dataclass(frozen=True, slots=True)
-class File:
+class CommandFile:
     """The commands from ``[`` at index ``opens`` to ``]`` at index ``closes``, None where it is missing."""
 
     opens: int
@@ -43,8 +43,8 @@ class CommandStream:
     """
 
     address: int | None
-    commands: tuple[Command, ...]
-    files: list[File] = field(default_factory=list)
+    commands: tuple[ChipCommand, ...]
+    files: list[CommandFile] = field(default_factory=list)
     #: ``[`` inside ``[ ]`` and ``]`` outside.
     nested_opens: list[int] = field(default_factory=list)
     lone_closes: list[int] = field(default_factory=list)
@@ -110,7 +110,7 @@ def streams(program: ParsedProgram) -> list[CommandStream]:
     addresses = sorted({c.number for c in commands if c.key == "X" and c.number is not None})
     if not addresses:
         return [_stream(None, [c for c in commands if c.key != "XG"])]
-    received: dict[int, list[Command]] = {address: [] for address in addresses}
+    received: dict[int, list[ChipCommand]] = {address: [] for address in addresses}
     listening: int | None = None
     for command in commands:
         if command.key in ("X", "XG"):
@@ -121,7 +121,7 @@ def streams(program: ParsedProgram) -> list[CommandStream]:
     return [_stream(address, taken) for address, taken in received.items()]
 
 
-def _stream(address: int | None, commands: list[Command]) -> CommandStream:
+def _stream(address: int | None, commands: list[ChipCommand]) -> CommandStream:
     stream = CommandStream(address, tuple(commands))
     _measure(stream)
     _find_files(stream)
@@ -155,12 +155,12 @@ def _find_files(stream: CommandStream) -> None:
             if opens is None:
                 stream.lone_closes.append(index)
             else:
-                stream.files.append(File(opens, index, stream.bits_before[index] - stream.bits_before[opens]))
+                stream.files.append(CommandFile(opens, index, stream.bits_before[index] - stream.bits_before[opens]))
                 opens = None
         elif command.key == "\\" and opens is None:
             resets += 1
     if opens is not None:
-        stream.files.append(File(opens, None, stream.bits - stream.bits_before[opens]))
+        stream.files.append(CommandFile(opens, None, stream.bits - stream.bits_before[opens]))
 
 
 def _find_loops(stream: CommandStream) -> None:

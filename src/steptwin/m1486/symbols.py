@@ -9,14 +9,14 @@ from steptwin.m1486.commands import ArgType, rows
 from steptwin.m1486.functions import CARRY, FUNCTIONS, USER_FLAGS
 from steptwin.m1486.lines import LINES
 from steptwin.m1486.structure import written_label
-from steptwin.m1486.syntax import Command, JumpCondition, ParsedProgram
+from steptwin.m1486.syntax import ChipCommand, JumpCondition, ParsedProgram
 from steptwin.symbols import Symbol, SymbolKind, SymbolRole, Use
 
 _WRITES = frozenset("TC>")
 FLAGS = range(USER_FLAGS.start, CARRY + 1)
 
 
-def by_chip(program: ParsedProgram) -> Iterator[tuple[int | None, Command]]:
+def by_chip(program: ParsedProgram) -> Iterator[tuple[int | None, ChipCommand]]:
     """The commands with the address of the chip that listens; None while all do, or there is only one."""
     listening: int | None = None
     for command in program.all_commands:
@@ -47,7 +47,7 @@ def _label(chip: int | None, label: int, span: Span, role: SymbolRole) -> Use:
     return Use(Symbol(SymbolKind.LABEL, label_key(chip, label), str(label)), span, role)
 
 
-def _of_number(command: Command) -> Iterator[Use]:
+def _of_number(command: ChipCommand) -> Iterator[Use]:
     number = command.number
     if number is None:
         return

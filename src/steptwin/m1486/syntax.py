@@ -41,7 +41,7 @@ class JumpCondition:
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
+class ChipCommand:
     """One command. ``key`` leads to the command table; ``argument`` is None where no number stands.
 
     ``argument_span`` is the place of the number, in a condition of the line or flag. Two commands are equal if they say the
@@ -78,10 +78,10 @@ class ProgramLine:
     ``salvaged`` holds what of a broken line could be understood, for checks that would otherwise miss a label or a bracket.
     """
 
-    command: Command | None = None
+    command: ChipCommand | None = None
     comment: str | None = None
     broken: str | None = None
-    salvaged: tuple[Command, ...] = ()
+    salvaged: tuple[ChipCommand, ...] = ()
 
     def __str__(self) -> str:
         if self.broken is not None:
@@ -97,12 +97,12 @@ class ParsedProgram:
     lines: tuple[ProgramLine, ...]
 
     @property
-    def commands(self) -> list[Command]:
+    def commands(self) -> list[ChipCommand]:
         """The sound commands in order."""
         return [line.command for line in self.lines if line.command is not None]
 
     @property
-    def all_commands(self) -> list[Command]:
+    def all_commands(self) -> list[ChipCommand]:
         """The sound commands and those salvaged from broken lines, in order."""
         return [c for line in self.lines for c in (line.salvaged if line.command is None else (line.command,))]
 
@@ -137,7 +137,7 @@ def parse_line(text: str, offset: int = 0) -> ParsedLine:
     """Read one line without its end. ``offset`` is where it begins in the text that spans point into."""
     body, semicolon, rest = text.partition(";")
     reader = _LineReader(body, offset)
-    commands: list[Command] = []
+    commands: list[ChipCommand] = []
     try:
         while reader.left:
             commands.append(_command(reader))
@@ -212,7 +212,7 @@ class _LineReader:
         raise _BrokenLine
 
 
-def _command(reader: _LineReader) -> Command:
+def _command(reader: _LineReader) -> ChipCommand:
     start = reader.at
     if reader.next not in LETTERS:
         _unknown(reader)
@@ -236,7 +236,7 @@ def _command(reader: _LineReader) -> Command:
         if argument is None and not takes_variable(key):
             hint = "the internal variable cannot replace it"
             reader.give_up(findings.ARGUMENT_MISSING, reader.span(reader.at), f"number expected, {reader.found}", hint)
-    return Command(key, argument, reader.span(start), reader.span(argument_start, argument_end))
+    return ChipCommand(key, argument, reader.span(start), reader.span(argument_start, argument_end))
 
 
 def _number(reader: _LineReader) -> int | None:
@@ -327,7 +327,7 @@ def _unknown(reader: _LineReader) -> NoReturn:
     reader.give_up(findings.UNKNOWN_COMMAND, span, f"no command begins with {char!r}", None, fix)
 
 
-def _end_of_command(reader: _LineReader, command: Command) -> None:
+def _end_of_command(reader: _LineReader, command: ChipCommand) -> None:
     """Nothing may follow a command on its line. A second command is reported and may be read; anything else ends the line."""
     rest = reader.left
     if not rest:

@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 
 from steptwin.machine import Nanos
 from steptwin.mic488.axis import Axis
-from steptwin.mic488.core import Action, CoilAction, ControllerCore
+from steptwin.mic488.core import CoilAction, ControllerCore, RegisterAction
 from steptwin.mic488.encoding import DINT_MAX, DINT_MIN, wrapped_dint
 from steptwin.mic488.registermap import MapRow, Per, Type
 from steptwin.mic488.registers import MOTION_REGISTERS, ROWS, axes_of_mask
@@ -44,7 +44,7 @@ class DeviceBehaviour:
     """A holding register of the controller. ``quiet``: a write only keeps the value, nothing happens earlier or later for it."""
 
     read: Getter = _nothing
-    write: Action = _nothing
+    write: RegisterAction = _nothing
     quiet: bool = False
 
 
@@ -62,10 +62,10 @@ class AxisBehaviour:
     waits: bool = False
 
 
-Behaviour: TypeAlias = Bit | DeviceBehaviour | AxisBehaviour
+RegisterBehaviour: TypeAlias = Bit | DeviceBehaviour | AxisBehaviour
 
 
-def checked(rows: Iterable[MapRow], given: Mapping[str, Behaviour]) -> Mapping[str, Any]:
+def checked(rows: Iterable[MapRow], given: Mapping[str, RegisterBehaviour]) -> Mapping[str, Any]:
     """``given``, read-only. `IncompleteTable` for a row without behaviour, a behaviour without row, or one that does not fit its
     row. User registers are plain memory and have none."""
     served = {row.key: row for row in rows if row.type is not Type.MEMORY}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from steptwin.configuration import Form, Section, Setting
+from steptwin.configuration import ConfigurationKey, Form, Section
 from steptwin.datasheet import Limits
 from steptwin.errors import Misuse
 from steptwin.mic488.config import (
@@ -153,11 +153,11 @@ def _setting(
     held: Mapping[str, float],
     base: Mapping[str, float],
     unit: str,
-) -> Setting:
+) -> ConfigurationKey:
     row = _AXIS[key.name] if kind == "Axis" else _OTHERS[kind, key.name]
     choices = key.choices or _inputs(key)
     register = _REGISTERS.get(key.name, "") if kind == "Axis" else ""
-    return Setting(
+    return ConfigurationKey(
         name=key.name,
         meaning=row.meaning,
         unit=row.unit.replace("u", unit) if row.unit in ("imp/u", "u/s", "u/s²") else row.unit,

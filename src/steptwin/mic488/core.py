@@ -30,7 +30,7 @@ MAX_EVENTS_PER_INSTANT = 10_000
 
 EVENTS_KEPT = 1000
 
-Action: TypeAlias = "Callable[[ControllerCore, float, Nanos], None]"
+RegisterAction: TypeAlias = "Callable[[ControllerCore, float, Nanos], None]"
 """The effect of a write of a holding register."""
 CoilAction: TypeAlias = "Callable[[ControllerCore, int, bool, Nanos], None]"
 """The effect of a write of a coil, called with the number of the axis or output, from 0."""
@@ -292,7 +292,7 @@ class ControllerCore(Stateful):
         action(self, number, on, self.now)
         self._settle()
 
-    def write_registers(self, actions: Sequence[Action], values: Sequence[float], *, quiet: bool) -> None:
+    def write_registers(self, actions: Sequence[RegisterAction], values: Sequence[float], *, quiet: bool) -> None:
         """Write registers, in the order of their addresses, at the present moment.
 
         ``quiet``: the registers only keep their values, which affects a running program at most.

@@ -10,7 +10,7 @@ from itertools import groupby
 from typing import NamedTuple
 
 from steptwin.mic488.encoding import word_to_int, words_to_dint, words_to_real
-from steptwin.mic488.registermap import DataType, Quantity, Register, RegisterMap, RequestPart, Space, Type, show_address
+from steptwin.mic488.registermap import DataType, QuantityKind, Register, RegisterMap, RequestPart, Space, Type, show_address
 from steptwin.mic488.registers import axes_of_mask
 from steptwin.wire import pdu as modbus
 
@@ -146,7 +146,7 @@ class Wording:
         """DINT values, and what they are in units where that is known."""
         text = _with_units([str(count) for count in counts], [self._unit(r) for r in registers])
         scales = [self._scale(r) for r in registers]
-        if registers[0].kind is Quantity.ENCODER or any(s is None or s.unit == "imp" or s.gear == 0 for s in scales):
+        if registers[0].kind is QuantityKind.ENCODER or any(s is None or s.unit == "imp" or s.gear == 0 for s in scales):
             return text
         known = [s for s in scales if s is not None]
         units = [r.unit(DataType.REAL, s.unit) for r, s in zip(registers, known, strict=True)]
@@ -160,7 +160,7 @@ _SPACES = {
 }
 
 
-def _decoded(request: bytes | None) -> modbus.Request | None:
+def _decoded(request: bytes | None) -> modbus.ModbusRequest | None:
     try:
         return None if request is None else modbus.decode_request(request)
     except modbus.ModbusException:
@@ -201,7 +201,7 @@ def _switches(group: list[RequestPart], states: Sequence[bool]) -> str:
 
 
 def _meaning(register: Register, word: int) -> str:
-    if register.kind is Quantity.MASK:
+    if register.kind is QuantityKind.MASK:
         return f"{' '.join(f'M{axis}' for axis in axes_of_mask(word)) or 'none'} ({word})"
     text = register.values.get(word)
     return str(word) if text is None else f"{text} ({word})"

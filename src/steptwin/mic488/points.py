@@ -22,7 +22,7 @@ from steptwin.mic488.ranges import Range
 from steptwin.mic488.registermap import Register, RegisterMap, Space, Type, UnknownRegister
 from steptwin.mic488.registers import AXES
 from steptwin.mic488.status import AXIS_CONDITIONS, CONTROLLER_CONDITIONS
-from steptwin.mic488.values import RegisterItem, View, named
+from steptwin.mic488.values import RegisterItem, UserFormat, named
 from steptwin.motion import Profile
 from steptwin.points import LivePoint, Turns, turns_of, turns_of_round
 from steptwin.tables import complete
@@ -197,7 +197,7 @@ def item_of(registers: RegisterMap, text: str) -> RegisterItem | None:
         raise Misuse(f"{text!r}: addresses begin with {', '.join(f'{name}:' for name in SPACES)}")
     register = registers.at(space, address)
     if register.type is Type.MEMORY:
-        return named(registers, f"{register.name}[{address - register.address}]:{match['view'] or View.WORD.value}")
+        return named(registers, f"{register.name}[{address - register.address}]:{match['view'] or UserFormat.WORD.value}")
     if match["view"] is not None:
         raise Misuse(f"{text!r}: {register.name} is of type {register.type.value}; leave out :{match['view']}")
     if address != register.address:
@@ -221,13 +221,13 @@ def _bit(device: Mic488Device, read: Callable[[Mic488Device], bool]) -> Callable
 def _user_value(device: Mic488Device, item: RegisterItem) -> Callable[[Nanos], float]:
     cell = item.cell
     match item.view:
-        case View.WORD:
+        case UserFormat.WORD:
             return lambda now: device.user[cell]
-        case View.INT:
+        case UserFormat.INT:
             return lambda now: word_to_int(device.user[cell])
-        case View.DINT:
+        case UserFormat.DINT:
             return lambda now: words_to_dint(device.user[cell], device.user[cell + 1])
-        case View.REAL:
+        case UserFormat.REAL:
             return lambda now: words_to_real(device.user[cell], device.user[cell + 1])
 
 

@@ -28,7 +28,7 @@ class LoadedProgram:
     """A program in a bank, ready to run. Code has no state: any number of controllers may share it."""
 
     source: SourceText
-    steps: tuple[s.Step, ...]
+    steps: tuple[s.ProgramStep, ...]
     code: Code
     position_records: Mapping[int, bytes]
     uses_positions: bool
@@ -136,7 +136,7 @@ def _table(text: str | None) -> PositionTable | None:
     return None if text is None else parse_positions(text)[0]
 
 
-def _uses_positions(steps: Sequence[s.Step]) -> bool:
+def _uses_positions(steps: Sequence[s.ProgramStep]) -> bool:
     """Whether rows are needed that the program does not write itself (WBC-25)."""
     rows = [step.row for step in steps if isinstance(step, s.RowMotionStep)]
     if any(isinstance(step, s.SetStep) and _is_row_0(step.target) for step in steps):

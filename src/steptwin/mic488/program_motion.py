@@ -23,7 +23,7 @@ from steptwin.wbc.paths import row_problem
 from steptwin.wbc.real import ProgramFault, real_text
 from steptwin.wbc.statements import HALTS, MOTIONS, ROW_MOTIONS
 
-Row: TypeAlias = tuple[float | None, ...]
+RowValues: TypeAlias = tuple[float | None, ...]
 
 DEGREES_PER_QUARTER = 90.0
 
@@ -78,7 +78,7 @@ class ChosenRow(NamedTuple):
 
     keyword: str
     index: float
-    values: Row
+    values: RowValues
 
 
 def row_motion(device: ProgramDevice, row: ChosenRow, lin_acc_u: float | None, now: Nanos) -> bool | None:
@@ -211,23 +211,23 @@ class _Plane:
         return end_w, met
 
 
-def _line(plane: _Plane, row: Row) -> bool:
+def _line(plane: _Plane, row: RowValues) -> bool:
     return plane.line(plane.motor_p((row[0], row[1]), "MOVELIN"), row[2])
 
 
-def _line_by(plane: _Plane, row: Row) -> bool:
+def _line_by(plane: _Plane, row: RowValues) -> bool:
     ways_p = [
         position_p(axis, way_u or 0.0, f"MOVELIN_REL M{axis.number}") for axis, way_u in zip(plane.axes, row[:2], strict=True)
     ]
     return plane.line([count + way_p for count, way_p in zip(plane.counts, ways_p, strict=True)], row[2])
 
 
-def _to_circle(plane: _Plane, row: Row) -> bool:
+def _to_circle(plane: _Plane, row: RowValues) -> bool:
     """WBC-26: on a straight line, at M1's VMAX, for p3 is the radius."""
     return plane.line(plane.motor_p(_circle(row, 0.0).begin, "MOVETOCIRC"), None)
 
 
-def _do_circle(plane: _Plane, row: Row) -> bool:
+def _do_circle(plane: _Plane, row: RowValues) -> bool:
     arc = _circle(row, row[3] or 0.0)
     begin_p = plane.motor_p(arc.begin, "DOCIRC")
     if any(abs(begin - count) > 1 for begin, count in zip(begin_p, plane.counts, strict=True)):
@@ -237,7 +237,7 @@ def _do_circle(plane: _Plane, row: Row) -> bool:
     return plane.arc(arc, plane.motor_p(arc.end, "DOCIRC"))
 
 
-def _do_arc(plane: _Plane, row: Row) -> bool:
+def _do_arc(plane: _Plane, row: RowValues) -> bool:
     x, y = plane.axes
     x0, y0 = plane.place_u()
     targets_p = plane.motor_p((row[0], row[1]), "DOARC")
@@ -246,7 +246,7 @@ def _do_arc(plane: _Plane, row: Row) -> bool:
     return plane.arc(arc_between(x0, y0, x1, y1, _given(row[2]), outward=row[3] == 0.0, slack=slack_u), targets_p)
 
 
-def _circle(row: Row, angle_deg: float) -> Arc:
+def _circle(row: RowValues, angle_deg: float) -> Arc:
     """Angles of rows are clockwise."""
     return circle(_given(row[0]), _given(row[1]), _given(row[2]), -angle_deg / DEGREES_PER_QUARTER)
 
@@ -258,7 +258,7 @@ def _given(value: float | None) -> float:
     return value
 
 
-_PATHS: Mapping[str, Callable[[_Plane, Row], bool]] = complete(
+_PATHS: Mapping[str, Callable[[_Plane, RowValues], bool]] = complete(
     "statement with a row",
     ROW_MOTIONS - {"MOVEPTP"},
     "path",

@@ -20,7 +20,7 @@ from steptwin.mic488.status import AxisStatus
 from steptwin.motion.paths import ArcProfile
 from steptwin.motion.planner import LEAST, MOST
 from steptwin.state import Stateful
-from steptwin.wbc.controller import FOREVER, Reader, RegisterFamily, Tendency, Writer, complete_access
+from steptwin.wbc.controller import FOREVER, RegisterFamily, RegisterReader, RegisterWriter, Tendency, complete_access
 from steptwin.wbc.dialect import Dialect
 from steptwin.wbc.events import BY_REGISTER, EVENTS, INPUTS
 from steptwin.wbc.positions import PARAMETERS
@@ -116,16 +116,16 @@ class RegisterHost(Protocol):
 _OfAxis: TypeAlias = Callable[[Axis, Nanos], float]
 
 
-def _axis_reader(get: _OfAxis) -> Callable[[int], Reader]:
-    def of(number: int) -> Reader:
+def _axis_reader(get: _OfAxis) -> Callable[[int], RegisterReader]:
+    def of(number: int) -> RegisterReader:
         index = number - 1
         return lambda control, at: real(get(control.device.axes[index], at))
 
     return of
 
 
-def _axis_writer(put: Callable[[Axis, float, Nanos], bool]) -> Callable[[int], Writer]:
-    def of(number: int) -> Writer:
+def _axis_writer(put: Callable[[Axis, float, Nanos], bool]) -> Callable[[int], RegisterWriter]:
+    def of(number: int) -> RegisterWriter:
         index = number - 1
         return lambda control, value, now: put(control.device.axes[index], value, now)
 
@@ -256,12 +256,12 @@ def _xenc(axis: Axis, at: Nanos) -> float:
 # ---------------------------------------------------------------------- inputs, outputs, user registers
 
 
-def _out(number: int) -> Reader:
+def _out(number: int) -> RegisterReader:
     index = number - 1
     return lambda control, at: 1.0 if control.device.outputs[index] else 0.0
 
 
-def _set_out(number: int) -> Writer:
+def _set_out(number: int) -> RegisterWriter:
     index = number - 1
 
     def put(control: RegisterHost, value: float, now: Nanos) -> bool:
@@ -280,12 +280,12 @@ def _bits(levels: Iterable[bool]) -> float:
     return float(sum(1 << bit for bit, level in enumerate(levels) if level))
 
 
-def _in(number: int) -> Reader:
+def _in(number: int) -> RegisterReader:
     index = number - 1
     return lambda control, at: 1.0 if control.device.inputs.filtered[index] else 0.0
 
 
-def _ain(number: int) -> Reader:
+def _ain(number: int) -> RegisterReader:
     index = number - 1
     return lambda control, at: real(control.device.analog(index))
 
@@ -297,7 +297,7 @@ def _user(layout: struct.Struct) -> RegisterFamily:
     """One memory: a register of two words has the low word first."""
     words = layout.size // 2
 
-    def read(number: int) -> Reader:
+    def read(number: int) -> RegisterReader:
         place = slice(number, number + words)
 
         def get(control: RegisterHost, at: Nanos) -> float:
@@ -306,7 +306,7 @@ def _user(layout: struct.Struct) -> RegisterFamily:
 
         return get
 
-    def write(number: int) -> Writer:
+    def write(number: int) -> RegisterWriter:
         place = slice(number, number + words)
 
         def put(control: RegisterHost, value: float, now: Nanos) -> bool:
@@ -325,10 +325,10 @@ def _user(layout: struct.Struct) -> RegisterFamily:
 
 
 def _timer(name: str) -> RegisterFamily:
-    def read(number: int) -> Reader:
+    def read(number: int) -> RegisterReader:
         return lambda control, at: float(control.registers.timer(name, number - 1, at))
 
-    def write(number: int) -> Writer:
+    def write(number: int) -> RegisterWriter:
         def put(control: RegisterHost, value: float, now: Nanos) -> bool:
             control.registers.set_timer(name, number - 1, int(value), now)
             return True
@@ -351,11 +351,11 @@ def _switch(name: str) -> RegisterFamily:
     def event(number: int) -> int:
         return EVENTS.index(BY_REGISTER[f"{name}{number}" if number else name])
 
-    def read(number: int) -> Reader:
+    def read(number: int) -> RegisterReader:
         index = event(number)
         return lambda control, at: float(control.registers.switches[index])
 
-    def write(number: int) -> Writer:
+    def write(number: int) -> RegisterWriter:
         index = event(number)
         return lambda control, value, now: control.set_switch(index, int(value), now)
 
@@ -368,7 +368,7 @@ def _row_0(parameter: int | None = None) -> RegisterFamily:
     def index_of(number: int) -> int:
         return number - 1 if parameter is None else parameter
 
-    def read(number: int) -> Reader:
+    def read(number: int) -> RegisterReader:
         index = index_of(number)
 
         def get(control: RegisterHost, at: Nanos) -> float:
@@ -377,7 +377,7 @@ def _row_0(parameter: int | None = None) -> RegisterFamily:
 
         return get
 
-    def write(number: int) -> Writer:
+    def write(number: int) -> RegisterWriter:
         index = index_of(number)
 
         def put(control: RegisterHost, value: float, now: Nanos) -> bool:
@@ -410,7 +410,9 @@ def _vision(index: int) -> RegisterFamily:
     return _single(lambda control, at: control.registers.vision[index], put)
 
 
-def _single(read: Callable[[RegisterHost, Nanos], float], write: Writer | None = None, *, quiet: bool = True) -> RegisterFamily:
+def _single(
+    read: Callable[[RegisterHost, Nanos], float], write: RegisterWriter | None = None, *, quiet: bool = True
+) -> RegisterFamily:
     return RegisterFamily(lambda number: read, None if write is None else lambda number: write, quiet=quiet)
 
 

@@ -18,7 +18,7 @@ from steptwin.mic488.registers import AXES
 from steptwin.wire.pdu import ILLEGAL_DATA_ADDRESS, ModbusException, ReadRequest, pack_bits
 
 
-class ValueSource(NamedTuple):
+class RegisterSource(NamedTuple):
     """Where a value comes from: ``place`` 0–3 is an axis, `DEVICE` the controller."""
 
     place: int
@@ -75,13 +75,13 @@ def _registers_plan(request: ReadRequest, pieces: list[RequestPart], data_type: 
     if len(pieces) == 1 and pieces[0].register is not None and pieces[0].register.type is Type.MEMORY:
         return _memory_plan(head, request.address, request.count)
     layout = "<"
-    sources: list[ValueSource] = []
+    sources: list[RegisterSource] = []
     for register, address, size in pieces:
         if register is None:
-            sources += [ValueSource(DEVICE, lambda device, now: 0)] * size
+            sources += [RegisterSource(DEVICE, lambda device, now: 0)] * size
             layout += "H" * size
         elif register.type is Type.MEMORY:
-            sources += [ValueSource(DEVICE, _user_word(a)) for a in range(address, address + size)]
+            sources += [RegisterSource(DEVICE, _user_word(a)) for a in range(address, address + size)]
             layout += "H" * size
         else:
             sources.append(_source(register, data_type))
@@ -92,7 +92,7 @@ def _registers_plan(request: ReadRequest, pieces: list[RequestPart], data_type: 
 
 
 def _packing_plan(
-    head: bytes, layout: struct.Struct, sources: list[ValueSource], asked: slice
+    head: bytes, layout: struct.Struct, sources: list[RegisterSource], asked: slice
 ) -> Callable[[ControllerCore], bytes]:
     """``asked`` are the bytes of the values that the request covers: it may begin and end inside one (MIC-5)."""
     pack = layout.pack
@@ -129,14 +129,14 @@ def _user_word(address: int) -> Getter:
     return lambda device, now: device.user[address]
 
 
-def _source(register: Register, data_type: DataType) -> ValueSource:
+def _source(register: Register, data_type: DataType) -> RegisterSource:
     if 3 not in register.reads:
-        return ValueSource(DEVICE, _last_written(register, data_type))
+        return RegisterSource(DEVICE, _last_written(register, data_type))
     behaviour = BEHAVIOUR[register.key]
     if register.axis is None:
-        return ValueSource(DEVICE, behaviour.read)
+        return RegisterSource(DEVICE, behaviour.read)
     in_pulses = register.type is Type.VALUE and data_type is DataType.DINT
-    return ValueSource(register.axis - 1, behaviour.read_p if in_pulses else behaviour.read)
+    return RegisterSource(register.axis - 1, behaviour.read_p if in_pulses else behaviour.read)
 
 
 def _last_written(register: Register, data_type: DataType) -> Getter:

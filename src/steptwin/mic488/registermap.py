@@ -74,7 +74,7 @@ class Type(enum.Enum):
         return "i" if self is Type.DINT or (self is Type.VALUE and data_type is DataType.DINT) else "f"
 
 
-class Quantity(enum.Enum):
+class QuantityKind(enum.Enum):
     """What quantity a value is; the unit follows from it."""
 
     SWITCH = "switch"
@@ -87,7 +87,7 @@ class Quantity(enum.Enum):
     NUMBER = "number"
 
 
-_UNIT_ENDS = {Quantity.POSITION: "", Quantity.VELOCITY: "/s", Quantity.ACCELERATION: "/s²"}
+_UNIT_ENDS = {QuantityKind.POSITION: "", QuantityKind.VELOCITY: "/s", QuantityKind.ACCELERATION: "/s²"}
 
 
 class WriteEffect(enum.Enum):
@@ -153,7 +153,7 @@ class MapRow:
     type: Type
     reads: tuple[int, ...]
     writes: tuple[int, ...]
-    kind: Quantity
+    kind: QuantityKind
     effect: WriteEffect
     meaning: str
     sections: Mapping[str, str]
@@ -195,7 +195,7 @@ class Register:
     """Function codes that write it, as the manual lists them."""
     accepts: tuple[int, ...]
     """Function codes with which a write is really taken (MIC-4, MIC-5, MIC-6)."""
-    kind: Quantity
+    kind: QuantityKind
     effect: WriteEffect
     permitted: Range
     values: Mapping[int, str]
@@ -230,7 +230,7 @@ class Register:
 
     def unit(self, data_type: DataType = DataType.REAL, unit: str = "u") -> str:
         """Unit of the value: ``u``, ``u/s``, ``u/s²`` with the axis' configured unit for ``u``; ``imp…`` in DINT; else empty."""
-        if self.kind is Quantity.ENCODER:
+        if self.kind is QuantityKind.ENCODER:
             return "imp"
         if self.kind not in _UNIT_ENDS:
             return ""

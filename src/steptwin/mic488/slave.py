@@ -27,7 +27,7 @@ from steptwin.wire.pdu import (
 PLANS_KEPT = 4096
 """For all controllers together; then compiling begins anew, so that a master that tries everything fills no memory."""
 
-Plan: TypeAlias = Callable[[ControllerCore], bytes]
+RequestPlan: TypeAlias = Callable[[ControllerCore], bytes]
 """Serves one request at the controller's present moment."""
 
 
@@ -40,7 +40,7 @@ class Slave:
         self._map = register_map(firmware)
         self._lenient = lenient
         # By DATA_TYPE: reads and coil writes by the whole PDU, register writes by what comes before their values.
-        self._whole: tuple[dict[bytes, Plan], ...] = tuple({} for _ in DataType)
+        self._whole: tuple[dict[bytes, RequestPlan], ...] = tuple({} for _ in DataType)
         self._heads: tuple[dict[bytes, WritePlan], ...] = tuple({} for _ in DataType)
 
     def __len__(self) -> int:
@@ -63,7 +63,7 @@ class Slave:
         except ModbusException as refusal:
             return refusal.pdu
 
-    def _compiled(self, data_type: DataType, pdu: bytes) -> Plan:
+    def _compiled(self, data_type: DataType, pdu: bytes) -> RequestPlan:
         request = decode_request(pdu)
         if isinstance(request, ReadRequest):
             plan = compile_read(self._map, request, data_type, lenient=self._lenient)

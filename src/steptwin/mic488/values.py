@@ -13,7 +13,7 @@ from steptwin.mic488.encoding import dint_to_words, real_to_words, word_to_int, 
 from steptwin.mic488.registermap import DataType, Register, RegisterMap, Space, Type, WriteEffect
 from steptwin.wire import pdu
 
-Value: TypeAlias = bool | int | float
+RegisterValue: TypeAlias = bool | int | float
 
 BRIDGE = {Space.HOLDING: 16, Space.COIL: 256, Space.INPUT: 256}
 """Addresses read in addition, to save a frame: at 38400 bit/s a frame costs as much as 38 characters."""
@@ -26,7 +26,7 @@ _SWITCHES = {"on": 1.0, "true": 1.0, "off": 0.0, "false": 0.0}
 FORM = "expected NAME, or USER_REGISTER[N] with :int, :dint or :real behind it if it is no WORD"
 
 
-class View(enum.Enum):
+class UserFormat(enum.Enum):
     """How user registers are looked at."""
 
     WORD = "word"
@@ -36,7 +36,7 @@ class View(enum.Enum):
 
     @property
     def size(self) -> int:
-        return 2 if self in (View.DINT, View.REAL) else 1
+        return 2 if self in (UserFormat.DINT, UserFormat.REAL) else 1
 
     @property
     def range(self) -> str:
@@ -48,7 +48,7 @@ class RegisterItem:
 
     __slots__ = ("_key", "address", "cell", "register", "size", "view")
 
-    def __init__(self, register: Register, cell: int = 0, view: View = View.WORD) -> None:
+    def __init__(self, register: Register, cell: int = 0, view: UserFormat = UserFormat.WORD) -> None:
         self.register = register
         self.cell = cell
         self.view = view
@@ -76,7 +76,7 @@ class RegisterItem:
     def name(self) -> str:
         if self.register.type is not Type.MEMORY:
             return self.register.name
-        return f"{self.register.name}[{self.cell}]{'' if self.view is View.WORD else f':{self.view.value}'}"
+        return f"{self.register.name}[{self.cell}]{'' if self.view is UserFormat.WORD else f':{self.view.value}'}"
 
 
 def named(registers: RegisterMap, text: str) -> RegisterItem:
@@ -92,13 +92,13 @@ def named(registers: RegisterMap, text: str) -> RegisterItem:
     if match["cell"] is None:
         raise Misuse(f"{text!r}: choose one of {register.name}[0] to {register.name}[{register.cells - 1}]")
     try:
-        view = View((match["view"] or "word").lower())
+        view = UserFormat((match["view"] or "word").lower())
     except ValueError:
         raise Misuse(f"{text!r}: permitted behind : are word, int, dint and real") from None
     return user_item(registers, int(match["cell"]), view)
 
 
-def user_item(registers: RegisterMap, number: int, view: View, count: int = 1) -> RegisterItem:
+def user_item(registers: RegisterMap, number: int, view: UserFormat, count: int = 1) -> RegisterItem:
     """User register ``number`` as ``view``. Raises `Misuse` unless ``count`` values from there on are user registers."""
     register = registers.of("USER_REGISTER")
     last = register.cells - view.size * count
@@ -128,7 +128,7 @@ def value_of(register: Register, typed: str) -> float:
 # ---------------------------------------------------------------------- values and words
 
 
-def decoded(item: RegisterItem, words: Sequence[int], data_type: DataType) -> Value:
+def decoded(item: RegisterItem, words: Sequence[int], data_type: DataType) -> RegisterValue:
     """The value in its words (or its bit)."""
     kind = _kind(item, data_type)
     if kind is Type.BIT:
@@ -137,7 +137,7 @@ def decoded(item: RegisterItem, words: Sequence[int], data_type: DataType) -> Va
         return words_to_real(words[0], words[1])
     if kind is Type.DINT:
         return words_to_dint(words[0], words[1])
-    return word_to_int(words[0]) if item.view is View.INT else words[0]
+    return word_to_int(words[0]) if item.view is UserFormat.INT else words[0]
 
 
 def _kind(item: RegisterItem, data_type: DataType) -> Type:
@@ -145,11 +145,11 @@ def _kind(item: RegisterItem, data_type: DataType) -> Type:
     if kind is Type.VALUE:
         return Type.DINT if data_type is DataType.DINT else Type.REAL
     if kind is Type.MEMORY:
-        return {View.DINT: Type.DINT, View.REAL: Type.REAL}.get(item.view, Type.WORD)
+        return {UserFormat.DINT: Type.DINT, UserFormat.REAL: Type.REAL}.get(item.view, Type.WORD)
     return kind
 
 
-def encoded(item: RegisterItem, value: Value, data_type: DataType, unit: str = "u") -> pdu.Request:
+def encoded(item: RegisterItem, value: RegisterValue, data_type: DataType, unit: str = "u") -> pdu.ModbusRequest:
     """The request that writes ``value``, which is in units with DATA_TYPE REAL and in pulses with DINT.
 
     Raises `Misuse` when the register cannot be written or does not take the value.
@@ -167,16 +167,16 @@ def encoded(item: RegisterItem, value: Value, data_type: DataType, unit: str = "
     return pdu.WriteRegistersRequest(item.address, words)
 
 
-def _words(item: RegisterItem, value: Value, data_type: DataType, unit: str) -> tuple[int, ...]:
+def _words(item: RegisterItem, value: RegisterValue, data_type: DataType, unit: str) -> tuple[int, ...]:
     register = item.register
     kind = _kind(item, data_type)
     shown = f"{item.name} = {value:g} {register.unit(data_type, unit)}".rstrip()
     if kind is not Type.REAL and not (isfinite(value) and value == int(value)):
         raise Misuse(f"{shown}: a whole number is needed")
     if register.type is Type.MEMORY:
-        if item.view is View.INT and -0x8000 <= value <= 0x7FFF:
+        if item.view is UserFormat.INT and -0x8000 <= value <= 0x7FFF:
             return (int(value) & 0xFFFF,)
-        if item.view in (View.INT, View.WORD) and (item.view is View.INT or not 0 <= value <= 0xFFFF):
+        if item.view in (UserFormat.INT, UserFormat.WORD) and (item.view is UserFormat.INT or not 0 <= value <= 0xFFFF):
             raise Misuse(f"{shown}: permitted {item.view.range}")
     elif not register.permits(value):
         raise Misuse(f"{shown}: permitted {register.permitted} {register.unit(data_type, unit)}".rstrip())
@@ -194,7 +194,7 @@ class Block(NamedTuple):
     request: pdu.ReadRequest
     items: tuple[tuple[RegisterItem, int], ...]
 
-    def values(self, words: Sequence[int], data_type: DataType) -> dict[RegisterItem, Value]:
+    def values(self, words: Sequence[int], data_type: DataType) -> dict[RegisterItem, RegisterValue]:
         return {item: decoded(item, words[place : place + item.size], data_type) for item, place in self.items}
 
 
@@ -235,14 +235,14 @@ def _block(group: list[RegisterItem]) -> Block:
 # ---------------------------------------------------------------------- repeating
 
 
-def repeatable(registers: RegisterMap, request: pdu.Request) -> bool:
+def repeatable(registers: RegisterMap, request: pdu.ModbusRequest) -> bool:
     """Whether a request whose answer was lost may be sent again: only where that cannot move anything twice."""
     if isinstance(request, pdu.ReadRequest) or _stops(registers, request):
         return True
     return all(register is not None and _repeatable(register) for register in _written(registers, request))
 
 
-def moves(registers: RegisterMap, request: pdu.Request) -> bool:
+def moves(registers: RegisterMap, request: pdu.ModbusRequest) -> bool:
     """Whether a request may start a motion, as far as it can be decoded."""
     if isinstance(request, pdu.ReadRequest) or _stops(registers, request):
         return False
@@ -251,7 +251,7 @@ def moves(registers: RegisterMap, request: pdu.Request) -> bool:
     )
 
 
-def _stops(registers: RegisterMap, request: pdu.Request) -> bool:
+def _stops(registers: RegisterMap, request: pdu.ModbusRequest) -> bool:
     """Whether it stops the program. (Starting and pausing it depends on what happened meanwhile.)"""
     if not isinstance(request, pdu.WriteRegisterRequest) or request.value != 0:
         return False
@@ -259,7 +259,7 @@ def _stops(registers: RegisterMap, request: pdu.Request) -> bool:
     return register is not None and register.key == "PROGRAM_CTRL"
 
 
-def _written(registers: RegisterMap, request: pdu.Request) -> list[Register | None]:
+def _written(registers: RegisterMap, request: pdu.ModbusRequest) -> list[Register | None]:
     match request:
         case pdu.WriteCoilRequest(address):
             return [registers.find(Space.COIL, address)]

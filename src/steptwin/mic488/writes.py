@@ -8,9 +8,9 @@ from typing import Protocol, TypeAlias
 
 from steptwin.machine import Nanos
 from steptwin.mic488.behaviour import BEHAVIOUR, AxisAction
-from steptwin.mic488.core import Action, ControllerCore
+from steptwin.mic488.core import ControllerCore, RegisterAction
 from steptwin.mic488.encoding import DINT_MAX, DINT_MIN, swap_bytes
-from steptwin.mic488.registermap import DataType, Quantity, Register, RegisterMap, Space, Type
+from steptwin.mic488.registermap import DataType, QuantityKind, Register, RegisterMap, Space, Type
 from steptwin.motion.planner import LEAST, MOST
 from steptwin.wire.pdu import (
     ILLEGAL_DATA_ADDRESS,
@@ -153,7 +153,7 @@ def _check(register: Register, data_type: DataType) -> Check:
     if register.type is not Type.VALUE:
         return lambda device, value: value if permits(value) else None
     number = (register.axis or 1) - 1
-    held = _position_p if register.kind is Quantity.POSITION else _rate_p if register.permitted.above else _velocity_p
+    held = _position_p if register.kind is QuantityKind.POSITION else _rate_p if register.permitted.above else _velocity_p
     if data_type is DataType.DINT:
         return lambda device, value: held(value) if permits(value) else None
     if register.key in ("POSLIM_L", "POSLIM_R"):
@@ -187,7 +187,7 @@ def _rate_p(pulses: float) -> float | None:
     return float(pulses) if LEAST <= pulses <= MOST else None
 
 
-def _action(register: Register) -> Action:
+def _action(register: Register) -> RegisterAction:
     behaviour = BEHAVIOUR[register.key]
     act = behaviour.write
     if register.axis is None:
@@ -198,7 +198,7 @@ def _action(register: Register) -> Action:
     return lambda device, value, now: act(device.axes[number], value, now)
 
 
-def _motion(move: AxisAction, key: str, number: int) -> Action:
+def _motion(move: AxisAction, key: str, number: int) -> RegisterAction:
     def command(device: ControllerCore, value: float, now: Nanos) -> None:
         """DIRECT: at once. TRIGGER: kept for the trigger register (MIC-16)."""
         axis = device.axes[number]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from steptwin.mic488.registermap import DataType, Register, RegisterMap, Space, Type
-from steptwin.mic488.values import Value
+from steptwin.mic488.values import RegisterValue
 
 AXES = "M"
 CONTROLLER, INPUTS, OUTPUTS, USER = "Controller", "Inputs", "Outputs", "User"
@@ -33,7 +33,7 @@ def groups_of(registers: RegisterMap) -> Mapping[str, list[Register]]:
     return groups
 
 
-def shown(register: Register, value: Value) -> str:
+def shown(register: Register, value: RegisterValue) -> str:
     """A value as text: ``REAL (0)``, ``on``, ``12.5``."""
     if register.type is Type.BIT:
         return "on" if value else "off"

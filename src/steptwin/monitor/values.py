@@ -11,9 +11,9 @@ from steptwin.live.remote import RemoteSubject
 from steptwin.live.twins import TwinController
 from steptwin.live.watching import TwinWatch
 from steptwin.mic488.registers import AXES, INPUTS, OUTPUTS
-from steptwin.mic488.values import Value
+from steptwin.mic488.values import RegisterValue
 
-Values: TypeAlias = Mapping[str, tuple[Value, str]]
+Values: TypeAlias = Mapping[str, tuple[RegisterValue, str]]
 """Value and unit of registers by name."""
 
 

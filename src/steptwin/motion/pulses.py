@@ -17,7 +17,7 @@ from steptwin.motion.paths import ArcSegment, Circular
 from steptwin.motion.profile import NEWTON_STEPS, Profile, Segment
 from steptwin.motion.trig import QUARTER, arcsine_below_45, cosine_near_0, sine_near_0
 
-Times: TypeAlias = NDArray[np.int64]
+PulseTimes: TypeAlias = NDArray[np.int64]
 Reals: TypeAlias = NDArray[np.float64]
 
 _BLOCK = 4096
@@ -36,16 +36,16 @@ class _Run(NamedTuple):
     size: int
 
 
-def pulse_times(profile: Profile, after: Nanos, until: Nanos) -> Times:
+def pulse_times(profile: Profile, after: Nanos, until: Nanos) -> PulseTimes:
     """Moments of all pulses with ``after`` < time <= ``until``, in order (int64 ns)."""
     return _times(profile, _runs(profile, after, until))
 
 
-def pulse_runs(profile: Profile, after: Nanos, until: Nanos) -> list[tuple[int, Times]]:
+def pulse_runs(profile: Profile, after: Nanos, until: Nanos) -> list[tuple[int, PulseTimes]]:
     """The same, one pair (direction, times) for each stretch of one direction."""
     runs = _runs(profile, after, until)
     times = _times(profile, runs)
-    stretches: list[tuple[int, Times]] = []
+    stretches: list[tuple[int, PulseTimes]] = []
     begin = end = 0
     for i, run in enumerate(runs):
         end += run.size
@@ -55,7 +55,7 @@ def pulse_runs(profile: Profile, after: Nanos, until: Nanos) -> list[tuple[int, 
     return stretches
 
 
-def step_times(train: StepTrain, after: Nanos, until: Nanos) -> Times:
+def step_times(train: StepTrain, after: Nanos, until: Nanos) -> PulseTimes:
     """Moments of all STEP pulses of ``train`` with ``after`` < time <= ``until``, in order (int64 ns)."""
     profile = train.profile
     runs: list[_Run] = []
@@ -94,7 +94,7 @@ def _runs(profile: Profile, after: Nanos, until: Nanos) -> list[_Run]:
     return runs
 
 
-def _times(profile: Profile, runs: list[_Run]) -> Times:
+def _times(profile: Profile, runs: list[_Run]) -> PulseTimes:
     out = np.empty(sum(run.size for run in runs), dtype=np.int64)
     done = 0
     for run in runs:
@@ -103,7 +103,7 @@ def _times(profile: Profile, runs: list[_Run]) -> Times:
     return out
 
 
-def _fill(profile: Profile, run: _Run, out: Times) -> None:
+def _fill(profile: Profile, run: _Run, out: PulseTimes) -> None:
     """Times of the pulses of ``run``. The first and the last, where limits may apply, come from the profile itself."""
     index, first, step, size = run
     if size <= _FEW:
@@ -218,17 +218,17 @@ def _cubic(s: Segment, u: Reals, buffers: Reals) -> None:
         np.subtract(s.anchor_s, x, out=u)
 
 
-def positions(profile: Profile, times: Times) -> Reals:
+def positions(profile: Profile, times: PulseTimes) -> Reals:
     """Real commanded positions (pulses) at ``times`` (int64 ns)."""
     return _evaluate(profile, times, derivative=False)
 
 
-def velocities(profile: Profile, times: Times) -> Reals:
+def velocities(profile: Profile, times: PulseTimes) -> Reals:
     """Commanded velocities (pulses/s) at ``times`` (int64 ns)."""
     return _evaluate(profile, times, derivative=True)
 
 
-def _evaluate(profile: Profile, times: Times, *, derivative: bool) -> Reals:
+def _evaluate(profile: Profile, times: PulseTimes, *, derivative: bool) -> Reals:
     n = np.asarray(times, dtype=np.int64) - profile.start
     out = np.full(n.shape, 0.0 if derivative else profile.base + profile.final_p)
     begin: float = -inf

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Protocol
 
-from steptwin.configuration import Form, Section, Setting
+from steptwin.configuration import ConfigurationKey, Form, Section
 from steptwin.datasheet import Datasheet, plain
 from steptwin.diagnostics import SourceText, to_json
 from steptwin.errors import Refusal
@@ -76,5 +76,5 @@ def _section(section: Section) -> Mapping[str, object]:
     return {"name": section.name, "title": section.title, "settings": [_setting(one) for one in section.settings]}
 
 
-def _setting(setting: Setting) -> Mapping[str, object]:
+def _setting(setting: ConfigurationKey) -> Mapping[str, object]:
     return plain(setting)

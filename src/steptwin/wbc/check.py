@@ -10,7 +10,7 @@ from steptwin.wbc.dialect import DEFAULT, Dialect
 from steptwin.wbc.memory import StepMemory
 from steptwin.wbc.positions import PositionTable
 from steptwin.wbc.resolve import resolve
-from steptwin.wbc.scope import Scope
+from steptwin.wbc.scope import ProgramScope
 from steptwin.wbc.steps import Executable, IllegalStep
 from steptwin.wbc.syntax import parse
 from steptwin.wbc.tree import ProgramTree
@@ -56,7 +56,7 @@ def check_program(
     dialect: Dialect,
     *,
     memory: StepMemory | None = None,
-) -> tuple[CheckedProgram, Scope]:
+) -> tuple[CheckedProgram, ProgramScope]:
     """As `check`, for a parsed program; also returns the scope of its names. ``memory`` is that of `resolve`."""
     resolution = resolve(program, positions, dialect, memory)
     executable = resolution.executable

@@ -10,14 +10,14 @@ from steptwin.machine import MILLISECOND, Nanos
 from steptwin.tables import complete
 from steptwin.wbc import steps as s
 from steptwin.wbc.code import Cells, Code, Execution, InterruptEntry, Seen, StepCode, WatchedValue
-from steptwin.wbc.controller import Reader, RegisterFamily, Tendency
+from steptwin.wbc.controller import RegisterFamily, RegisterReader, Tendency
 from steptwin.wbc.events import EVENTS
 from steptwin.wbc.real import COMPARISONS, FUNCTIONS, OPERATIONS, ProgramFault, real, real_text
 from steptwin.wbc.registers import REAL, REAL_MAX, RegisterRow
 from steptwin.wbc.statements import COMPARISONS as SIGNS
 from steptwin.wbc.usage import sources
 
-Value: TypeAlias = Callable[[Execution, Cells], float]
+ValueCode: TypeAlias = Callable[[Execution, Cells], float]
 
 
 def compile_program(executable: s.Executable, registers: Mapping[str, RegisterFamily]) -> Code:
@@ -58,17 +58,17 @@ class _Compiler:
             self._cells.append(value)
         return self._constants[value]
 
-    def _reader(self, register: s.RegisterOperand) -> Reader:
+    def _reader(self, register: s.RegisterOperand) -> RegisterReader:
         return self._registers[register.row.key].read(register.number)
 
-    def value(self, source: s.Source) -> Value:
+    def value(self, source: s.Source) -> ValueCode:
         if isinstance(source, s.RegisterOperand):
             read = self._reader(source)
             return lambda m, cells: read(m.controller, m.now)
         cell = self._cell_of(source)
         return lambda m, cells: cells[cell]
 
-    def _calculated(self, value: s.Source | s.Operation | s.FunctionOperation) -> Value:
+    def _calculated(self, value: s.Source | s.Operation | s.FunctionOperation) -> ValueCode:
         if isinstance(value, s.Operation):
             apply = OPERATIONS[value.operator]
             left, right = self.value(value.left), self.value(value.right)
@@ -109,7 +109,7 @@ class _Compiler:
                 return _set_cell_of_cells(target, OPERATIONS[value.operator], (a, b), following)
         return _set_cell(target, self._calculated(value), following)
 
-    def _set_register(self, register: s.RegisterOperand, value: Value, following: int, *, calculated: bool) -> StepCode:
+    def _set_register(self, register: s.RegisterOperand, value: ValueCode, following: int, *, calculated: bool) -> StepCode:
         access = self._registers[register.row.key]
         if access.write is None:
             raise ValueError(f"{register.name} cannot be written")
@@ -137,7 +137,7 @@ class _Compiler:
 
     # -- what changes with time
 
-    def _watches(self, step: s.Step) -> list[WatchedValue]:
+    def _watches(self, step: s.ProgramStep) -> list[WatchedValue]:
         if isinstance(step, s.IfStep | s.WhileStep | s.WaitStep):
             condition = step.condition
             tendencies = [t for side in (condition.left, condition.right) if (t := self._tendency(side)) is not None]
@@ -203,7 +203,7 @@ def _goes_to(following: int) -> StepCode:
     return lambda m, cells: following
 
 
-def _set_cell(target: int, value: Value, following: int) -> StepCode:
+def _set_cell(target: int, value: ValueCode, following: int) -> StepCode:
     def step(m: Execution, cells: Cells) -> int:
         x = value(m, cells)
         cells[target] = x if -REAL_MAX <= x <= REAL_MAX else real(x)
@@ -284,7 +284,7 @@ def _wait_for_rest(number: int) -> StepCode:
     return _wait(lambda m, cells: m.acting().at_rest(m.now), number)
 
 
-def _delay(seconds: Value, following: int) -> StepCode:
+def _delay(seconds: ValueCode, following: int) -> StepCode:
     around = ~following
 
     def step(m: Execution, cells: Cells) -> int:
@@ -370,7 +370,7 @@ def _pulse(compiler: _Compiler, step: s.PulseStep, number: int) -> StepCode:
     return _acting(lambda m, cells: m.acting().pulse(output, duration(seconds(m, cells)), m.now), number + 1)
 
 
-_CODES: Mapping[type[s.Step], Callable[[_Compiler, Any, int], StepCode]] = complete(
+_CODES: Mapping[type[s.ProgramStep], Callable[[_Compiler, Any, int], StepCode]] = complete(
     "step",
     s.STEPS,
     "code",

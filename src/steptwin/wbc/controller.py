@@ -10,10 +10,10 @@ from steptwin.machine import Nanos
 from steptwin.tables import IncompleteTable, complete
 from steptwin.wbc.registers import RegisterRow
 
-Reader: TypeAlias = Callable[[Any, Nanos], float]
+RegisterReader: TypeAlias = Callable[[Any, Nanos], float]
 """(controller, moment) → REAL. Also right for moments to come, as long as nothing happens."""
 
-Writer: TypeAlias = Callable[[Any, float, Nanos], bool]
+RegisterWriter: TypeAlias = Callable[[Any, float, Nanos], bool]
 """(controller, REAL, moment) → whether that changed anything."""
 
 Tendency: TypeAlias = Callable[[Any, Nanos], Iterable[Nanos] | None]
@@ -31,8 +31,8 @@ class RegisterFamily:
     outputs. Registers without ``tendency`` change only when something happens.
     """
 
-    read: Callable[[int], Reader]
-    write: Callable[[int], Writer] | None = None
+    read: Callable[[int], RegisterReader]
+    write: Callable[[int], RegisterWriter] | None = None
     tendency: Callable[[int], Tendency] | None = None
     quiet: bool = True
 

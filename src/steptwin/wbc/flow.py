@@ -22,7 +22,7 @@ from steptwin.wbc.conditions import outcome
 class ControlFlow:
     """Per step: where it goes on within its level (``after``, past the end is ``len(steps)``) and whether it can return."""
 
-    steps: tuple[s.Step, ...]
+    steps: tuple[s.ProgramStep, ...]
     after: list[tuple[int, ...]]
     returns: list[bool]
 
@@ -33,12 +33,12 @@ def flow_of(executable: s.Executable) -> ControlFlow:
     return ControlFlow(steps, after, _returns(steps, after))
 
 
-def returning(steps: tuple[s.Step, ...]) -> list[bool]:
+def returning(steps: tuple[s.ProgramStep, ...]) -> list[bool]:
     """Whether each step, and last the end, can come to a RETURN that takes back the JUMP which led to it."""
     return _returns(steps, [_after(number, step) for number, step in enumerate(steps)])
 
 
-def _after(number: int, step: s.Step) -> tuple[int, ...]:
+def _after(number: int, step: s.ProgramStep) -> tuple[int, ...]:
     """Where a step goes on. For JUMP: the next line, which it reaches only when its target can return."""
     return _AFTER[type(step)](number, step)
 
@@ -51,7 +51,7 @@ def _branch(number: int, step: s.IfStep | s.WhileStep) -> tuple[int, ...]:
     return (number + 1,) if known else (failed,)
 
 
-_AFTER: Mapping[type[s.Step], Callable[[int, Any], tuple[int, ...]]] = complete(
+_AFTER: Mapping[type[s.ProgramStep], Callable[[int, Any], tuple[int, ...]]] = complete(
     "step",
     s.STEPS,
     "successors",
@@ -69,7 +69,7 @@ _AFTER: Mapping[type[s.Step], Callable[[int, Any], tuple[int, ...]]] = complete(
 )
 
 
-def _returns(steps: tuple[s.Step, ...], after: list[tuple[int, ...]]) -> list[bool]:
+def _returns(steps: tuple[s.ProgramStep, ...], after: list[tuple[int, ...]]) -> list[bool]:
     """Found backwards from every RETURN. A JUMP can return when both its target and the line after it can."""
     count = len(steps)
     before: list[list[int]] = [[] for _ in range(count + 1)]

@@ -129,7 +129,7 @@ class _Record:
         self._number = number
         self.inferred: list[str] = []
 
-    def of(self, step: s.Step) -> bytes:
+    def of(self, step: s.ProgramStep) -> bytes:
         return _ENCODINGS[type(step)](self, step)
 
     def if_(self, step: s.IfStep) -> bytes:
@@ -198,7 +198,7 @@ class _Record:
         return REGISTER_CLASSES[key], source.number
 
 
-_ENCODINGS: Mapping[type[s.Step], Callable[[_Record, Any], bytes]] = complete(
+_ENCODINGS: Mapping[type[s.ProgramStep], Callable[[_Record, Any], bytes]] = complete(
     "step",
     s.STEPS,
     "encoding",

@@ -18,7 +18,7 @@ from steptwin.wbc.check import CheckedProgram, check_program
 from steptwin.wbc.dialect import DEFAULT, Dialect
 from steptwin.wbc.memory import StepMemory
 from steptwin.wbc.positions import PositionTable
-from steptwin.wbc.scope import Scope
+from steptwin.wbc.scope import ProgramScope
 from steptwin.wbc.syntax import Parser
 from steptwin.wbc.tree import ProgramTree, SourceLine
 from steptwin.wbc.usage import Setup
@@ -85,7 +85,7 @@ class Edited:
 
     def check(
         self, positions: PositionTable | None = None, setup: Setup | None = None, dialect: Dialect = DEFAULT
-    ) -> tuple[CheckedProgram, Scope]:
+    ) -> tuple[CheckedProgram, ProgramScope]:
         """The findings of `steptwin.wbc.check.check`, with places in the text, and the scope of the names."""
         checked, scope = check_program(self.text, self.program, list(self._found), positions, setup, dialect, memory=self._memory)
         diagnostics = in_order([self.placed(diagnostic) for diagnostic in checked.diagnostics])

@@ -15,7 +15,7 @@ from steptwin.wbc.tree import (
     Label,
     PositionRecord,
     SourceLine,
-    Statement,
+    StatementNode,
 )
 
 INDENT = 4
@@ -83,7 +83,7 @@ def aligned(cells: Sequence[LayoutCell | None], borders: Sequence[bool]) -> list
     return found
 
 
-def keyword_of(statement: Statement | None) -> str | None:
+def keyword_of(statement: StatementNode | None) -> str | None:
     return statement.keyword if isinstance(statement, KeywordStatement | Broken) else None
 
 

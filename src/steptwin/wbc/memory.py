@@ -10,9 +10,19 @@ from collections.abc import Iterator, Sequence
 
 from steptwin.wbc import steps as s
 from steptwin.wbc.positions import PositionTable
-from steptwin.wbc.scope import Scope
+from steptwin.wbc.scope import ProgramScope
 from steptwin.wbc.statements import ROW_MOTIONS
-from steptwin.wbc.tree import Assign, Binary, Expression, FunctionCall, Identifier, KeywordStatement, Operand, Relation, Statement
+from steptwin.wbc.tree import (
+    Assign,
+    Binary,
+    ExpressionNode,
+    FunctionCall,
+    Identifier,
+    KeywordStatement,
+    OperandNode,
+    Relation,
+    StatementNode,
+)
 
 _BY_NUMBER = frozenset({"IF", "ELSE", "WHILE", "ENDWHILE", "JUMP"})
 
@@ -21,13 +31,13 @@ class StepMemory:
     """Steps by statement. Begin with `begin`, ask for the `steps`, `keep` those that were made, then `end`."""
 
     def __init__(self) -> None:
-        self._kept: dict[int, tuple[Statement, s.Step, tuple[str, ...]]] = {}
-        self._next: dict[int, tuple[Statement, s.Step, tuple[str, ...]]] = {}
+        self._kept: dict[int, tuple[StatementNode, s.ProgramStep, tuple[str, ...]]] = {}
+        self._next: dict[int, tuple[StatementNode, s.ProgramStep, tuple[str, ...]]] = {}
         self._meanings: dict[str, object] = {}
         self._positions: PositionTable | None = None
         self._rest: object = None
 
-    def begin(self, scope: Scope, positions: PositionTable | None, rest: object) -> None:
+    def begin(self, scope: ProgramScope, positions: PositionTable | None, rest: object) -> None:
         """Forget the steps whose names mean something else now, and all when the table or the ``rest`` is another."""
         meanings = scope.meanings()
         if positions is not self._positions or rest != self._rest:
@@ -36,14 +46,14 @@ class StepMemory:
             self._kept = {key: entry for key, entry in self._kept.items() if changed.isdisjoint(entry[2])}
         self._meanings, self._positions, self._rest = meanings, positions, rest
 
-    def steps(self, statements: Sequence[Statement]) -> list[s.Step | None]:
+    def steps(self, statements: Sequence[StatementNode]) -> list[s.ProgramStep | None]:
         """The step of each statement, None where it must be made."""
         known = self._kept
         entries = [known.get(id(statement)) for statement in statements]
         self._next = {id(entry[0]): entry for entry in entries if entry is not None}
         return [None if entry is None else entry[1] for entry in entries]
 
-    def keep(self, statement: Statement, step: s.Step, scope: Scope) -> None:
+    def keep(self, statement: StatementNode, step: s.ProgramStep, scope: ProgramScope) -> None:
         """Keep a step nothing was said about, if it may be kept."""
         if isinstance(statement, KeywordStatement):
             if statement.keyword in _BY_NUMBER or (self._positions is None and statement.keyword in ROW_MOTIONS):
@@ -59,7 +69,7 @@ class StepMemory:
         self._kept = self._next
 
 
-def _names(node: Assign | KeywordStatement | Expression | Operand) -> Iterator[str]:
+def _names(node: Assign | KeywordStatement | ExpressionNode | OperandNode) -> Iterator[str]:
     """The names with a meaning in the program; labels and positions are looked up elsewhere."""
     match node:
         case Identifier(key=key):

@@ -10,7 +10,7 @@ from steptwin.wbc import findings as f
 from steptwin.wbc import steps as s
 from steptwin.wbc.dialect import Dialect
 from steptwin.wbc.registers import ROWS
-from steptwin.wbc.scope import Scope
+from steptwin.wbc.scope import ProgramScope
 from steptwin.wbc.usage import sources
 
 _FAMILIES: Mapping[str, str] = {
@@ -51,7 +51,7 @@ def register_meant(key: str, dialect: Dialect, families: Iterable[str] = _FAMILI
     return f"{row.name}{int(match[2])}" if int(match[2]) in row.numbers(dialect) else None
 
 
-def unused_variables(executable: s.Executable, scope: Scope, dialect: Dialect) -> list[Diagnostic]:
+def unused_variables(executable: s.Executable, scope: ProgramScope, dialect: Dialect) -> list[Diagnostic]:
     """Variables that are set and never read, and those whose names leave no doubt that a register was meant."""
     read = {source.index for step in executable.steps for source in sources(step) if isinstance(source, s.Variable)}
     found: list[Diagnostic] = []

@@ -11,7 +11,7 @@ from steptwin.wbc.dialect import Dialect
 from steptwin.wbc.events import BY_LABEL, HARD_PREFIX, HARD_SINCE, INPUT_LABELS, PREFIX, InterruptEvent
 from steptwin.wbc.positions import PositionTable, rows_text
 from steptwin.wbc.registers import PREDEFINED, ROW_0, parts
-from steptwin.wbc.scope import Scope
+from steptwin.wbc.scope import ProgramScope
 from steptwin.wbc.statements import FUNCTIONS, KEYWORDS
 from steptwin.wbc.tree import (
     Assign,
@@ -22,15 +22,15 @@ from steptwin.wbc.tree import (
     Label,
     PositionRecord,
     ProgramTree,
-    Statement,
+    StatementNode,
 )
 
 
 @dataclass(slots=True)
-class Outline:
+class ProgramOutline:
     """The structure of a program. Steps are numbered from 0."""
 
-    lines: list[Statement] = field(default_factory=list)
+    lines: list[StatementNode] = field(default_factory=list)
     """The statement of each step."""
     labels: dict[str, int] = field(default_factory=dict)
     """Steps at labels, by name in upper case."""
@@ -46,23 +46,25 @@ class Outline:
 
 
 def outline(
-    program: ProgramTree, scope: Scope, positions: PositionTable | None, dialect: Dialect, diagnostics: list[Diagnostic]
-) -> Outline:
+    program: ProgramTree, scope: ProgramScope, positions: PositionTable | None, dialect: Dialect, diagnostics: list[Diagnostic]
+) -> ProgramOutline:
     """The structure of ``program``; ``diagnostics`` gets what is wrong with labels, blocks, records and the number of steps."""
     return _Outliner(scope, positions, dialect, diagnostics).outline(program)
 
 
 class _Outliner:
-    def __init__(self, scope: Scope, positions: PositionTable | None, dialect: Dialect, diagnostics: list[Diagnostic]) -> None:
+    def __init__(
+        self, scope: ProgramScope, positions: PositionTable | None, dialect: Dialect, diagnostics: list[Diagnostic]
+    ) -> None:
         self._scope = scope
         self._positions = positions
         self._dialect = dialect
         self._diagnostics = diagnostics
         self._matcher = BlockMatcher(diagnostics)
         self._defined: set[str] = set()
-        self._outline = Outline()
+        self._outline = ProgramOutline()
 
-    def outline(self, program: ProgramTree) -> Outline:
+    def outline(self, program: ProgramTree) -> ProgramOutline:
         result = self._outline
         assigned: dict[str, Identifier] = {}
         last: Label | None = None
@@ -83,7 +85,7 @@ class _Outliner:
         result.blocks = self._matcher.finish()
         return result
 
-    def _take(self, statement: Statement) -> bool:
+    def _take(self, statement: StatementNode) -> bool:
         """Take in a statement other than a label. Result: whether it is a step."""
         result = self._outline
         if isinstance(statement, KeywordStatement):

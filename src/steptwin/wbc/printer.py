@@ -22,12 +22,12 @@ from steptwin.wbc.tree import (
     ImageRecord,
     KeywordStatement,
     Label,
-    Operand,
+    OperandNode,
     Position,
     PositionRecord,
     Relation,
     SourceLine,
-    Statement,
+    StatementNode,
 )
 
 _BEFORE_COMMENT = 2
@@ -97,7 +97,7 @@ def _borders(lines: Sequence[SourceLine]) -> list[bool]:
     return [isinstance(line.statement, Label) or (line.statement is None and line.comment is None) for line in lines]
 
 
-def print_statement(statement: Statement) -> str:
+def print_statement(statement: StatementNode) -> str:
     """One statement without indentation and comment."""
     match statement:
         case Assign(has_set=has_set, target=target, value=value):
@@ -119,7 +119,7 @@ def print_statement(statement: Statement) -> str:
             return text
 
 
-def _expression(node: Operand | Binary | FunctionCall) -> str:
+def _expression(node: OperandNode | Binary | FunctionCall) -> str:
     match node:
         case Position(name=name):
             return f"@{name.text}"

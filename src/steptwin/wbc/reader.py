@@ -34,16 +34,16 @@ from steptwin.wbc.tree import (
     Binary,
     ConstantDefinition,
     DecimalNumber,
-    Expression,
+    ExpressionNode,
     FunctionCall,
     Identifier,
     KeywordStatement,
     Label,
-    Operand,
+    OperandNode,
     Position,
     Relation,
-    Statement,
-    Value,
+    StatementNode,
+    ValueNode,
 )
 
 _USER_REGISTER = re.compile(r"\$[IDR][0-9]+$", re.IGNORECASE | re.ASCII)
@@ -83,7 +83,7 @@ class StatementReader:
 
     # -- statements
 
-    def statement(self) -> Statement:
+    def statement(self) -> StatementNode:
         words = self._tokens
         first = words[0]
         second = words[1] if self._last > 1 else None
@@ -115,7 +115,7 @@ class StatementReader:
         usage = f"write {row.usage}"
         if row.in_parentheses:
             self._mark("(", usage)
-        operands: list[Operand] = []
+        operands: list[OperandNode] = []
         for number, operand in enumerate(row.operands):
             if number and row.in_parentheses:
                 self._mark(",", usage)
@@ -250,7 +250,7 @@ class StatementReader:
 
     # -- operands
 
-    def _operand(self, row: StatementRow, wanted: Wanted) -> Operand:
+    def _operand(self, row: StatementRow, wanted: Wanted) -> OperandNode:
         match wanted.kind:
             case OperandKind.CONDITION:
                 return self._condition(row)
@@ -290,7 +290,7 @@ class StatementReader:
             raise Rejected(f.BAD_LABEL.at(token, f"{token.text!r} cannot be a label", "write JUMP LABEL"))
         return Identifier(token.start, token.end, token.text, token.text.upper())
 
-    def _row(self, row: StatementRow) -> Operand:
+    def _row(self, row: StatementRow) -> OperandNode:
         if self._at == self._last or self._tokens[self._at].text != "@":
             usage = f"write {row.usage} or {row.keyword} n with the index of a row"
             return self._value(f.TOO_FEW, f.WRONG_ARGUMENT, row.keyword, usage, "the position")
@@ -319,7 +319,7 @@ class StatementReader:
         right = self._value(f.MISSING_WAIT, f.WRONG_WAIT, row.keyword, usage)
         return Relation(left.start, right.end, left, token.text, right)
 
-    def _expression(self) -> Expression:
+    def _expression(self) -> ExpressionNode:
         first = self._tokens[self._at] if self._at < self._last else None
         if first is not None and first.kind == WORD:
             following = self._tokens[self._at + 1] if self._at + 1 < self._last else None
@@ -365,7 +365,7 @@ class StatementReader:
             place.start, place.end, Identifier(token.start, token.end, token.text, token.text.upper()), tuple(arguments)
         )
 
-    def _divided(self, only: Value) -> list[Value]:
+    def _divided(self, only: ValueNode) -> list[ValueNode]:
         """``min(1,2)``: the comma looked like a decimal comma, but two numbers are needed."""
         if not isinstance(only, DecimalNumber) or "," not in only.text:
             return [only]
@@ -378,7 +378,7 @@ class StatementReader:
             DecimalNumber(middle, only.end, right, float(right)),
         ]
 
-    def _value(self, missing: Finding, wrong: Finding, what: str, usage: str, part: str = "a number or a name") -> Value:
+    def _value(self, missing: Finding, wrong: Finding, what: str, usage: str, part: str = "a number or a name") -> ValueNode:
         if self._at == self._last:
             raise Rejected(missing.at(self._end(), f"{what} lacks {part}", usage))
         token = self._tokens[self._at]

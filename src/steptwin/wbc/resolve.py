@@ -18,7 +18,7 @@ from steptwin.wbc.outline import outline
 from steptwin.wbc.paths import names_no_axis, row_problem
 from steptwin.wbc.positions import PositionTable, rows_text
 from steptwin.wbc.registers import parts
-from steptwin.wbc.scope import Scope
+from steptwin.wbc.scope import ProgramScope
 from steptwin.wbc.statements import HALTS, MOTIONS, ROW_MOTIONS, SET, STATEMENTS
 from steptwin.wbc.tree import (
     Assign,
@@ -30,11 +30,11 @@ from steptwin.wbc.tree import (
     ImageRecord,
     KeywordStatement,
     Label,
-    Operand,
+    OperandNode,
     Position,
     ProgramTree,
     Relation,
-    Statement,
+    StatementNode,
 )
 
 _LOOKS_LIKE_MS = 100
@@ -47,7 +47,7 @@ class Resolution:
     """``complete``: the executable may be run, there are no errors and every position is known."""
 
     executable: s.Executable
-    scope: Scope
+    scope: ProgramScope
     complete: bool
     diagnostics: list[Diagnostic]
 
@@ -71,7 +71,7 @@ class _Resolver:
         self._positions = positions
         self._dialect = dialect
         self._diagnostics: list[Diagnostic] = []
-        self._scope = Scope(program, positions, dialect, self._diagnostics)
+        self._scope = ProgramScope(program, positions, dialect, self._diagnostics)
         self._near = NearMiss()
         self._outline = outline(program, self._scope, positions, dialect, self._diagnostics)
         self._lines, self._blocks = self._outline.lines, self._outline.blocks
@@ -86,7 +86,7 @@ class _Resolver:
         wrong = broken or any(d.severity is Severity.ERROR for d in self._diagnostics)
         return Resolution(executable, self._scope, not wrong and not self._unchecked, self._diagnostics)
 
-    def _steps(self, memory: StepMemory) -> Iterator[s.Step]:
+    def _steps(self, memory: StepMemory) -> Iterator[s.ProgramStep]:
         memory.begin(self._scope, self._positions, (self._dialect, self._outline.writes_row_0, tuple(self._outline.records)))
         for number, (statement, kept) in enumerate(zip(self._lines, memory.steps(self._lines), strict=True)):
             if kept is not None:
@@ -99,9 +99,9 @@ class _Resolver:
             yield step
         memory.end()
 
-    def _step(self, number: int, statement: Statement) -> s.Step:
+    def _step(self, number: int, statement: StatementNode) -> s.ProgramStep:
         start, end = statement.start, statement.end
-        made: s.Step | None = None
+        made: s.ProgramStep | None = None
         keyword: str | None = None
         if isinstance(statement, Assign):
             made, keyword = self._assign(statement), SET
@@ -118,7 +118,7 @@ class _Resolver:
             keyword = SET if statement.target is not None else statement.keyword
         return made or s.IllegalStep(start, end, b"", keyword is None or keyword in _BRANCHING)
 
-    def _assign(self, statement: Assign) -> s.Step | None:
+    def _assign(self, statement: Assign) -> s.ProgramStep | None:
         name = statement.target
         target = self._scope.target(name)
         node = statement.value
@@ -162,7 +162,7 @@ class _Resolver:
             message = f"{node.function.text}({argument:g}) does not exist"
             self._report(f.ALWAYS_FAILS.at(node, message, "the program stops here with an error"))
 
-    def _comparison(self, node: Operand) -> s.StepCondition | None:
+    def _comparison(self, node: OperandNode) -> s.StepCondition | None:
         if not isinstance(node, Relation):
             return None
         left, right = self._scope.value(node.left, node.right), self._scope.value(node.right, node.left)
@@ -170,7 +170,7 @@ class _Resolver:
             return None
         return s.StepCondition(left, node.comparison, right)
 
-    def _command(self, number: int, statement: KeywordStatement) -> s.Step | None:
+    def _command(self, number: int, statement: KeywordStatement) -> s.ProgramStep | None:
         keyword = statement.keyword
         row = STATEMENTS[keyword]
         if not self._dialect.has(row.since):
@@ -178,21 +178,21 @@ class _Resolver:
             self._report(f.NOT_IN_FIRMWARE.at(statement, f"{keyword} needs firmware {row.since}", hint))
         return _STEPS[keyword](self, number, statement)
 
-    def _if(self, number: int, statement: KeywordStatement) -> s.Step | None:
+    def _if(self, number: int, statement: KeywordStatement) -> s.ProgramStep | None:
         condition, close = self._comparison(statement.operands[0]), self._blocks.close.get(number)
         if condition is None or close is None:
             return None
         return s.IfStep(statement.start, statement.end, condition, self._blocks.middle.get(number), close)
 
-    def _else(self, number: int, statement: KeywordStatement) -> s.Step | None:
+    def _else(self, number: int, statement: KeywordStatement) -> s.ProgramStep | None:
         close = self._blocks.close.get(number)
         return None if close is None else s.ElseStep(statement.start, statement.end, close)
 
-    def _while(self, number: int, statement: KeywordStatement) -> s.Step | None:
+    def _while(self, number: int, statement: KeywordStatement) -> s.ProgramStep | None:
         condition, close = self._comparison(statement.operands[0]), self._blocks.close.get(number)
         return None if condition is None or close is None else s.WhileStep(statement.start, statement.end, condition, close)
 
-    def _end_while(self, number: int, statement: KeywordStatement) -> s.Step | None:
+    def _end_while(self, number: int, statement: KeywordStatement) -> s.ProgramStep | None:
         opened = self._blocks.open.get(number)
         opening = None if opened is None else self._lines[opened]
         if opened is None or not isinstance(opening, KeywordStatement):
@@ -203,11 +203,11 @@ class _Resolver:
         del self._diagnostics[judged:]
         return None if condition is None else s.EndWhileStep(statement.start, statement.end, condition, opened)
 
-    def _wait(self, number: int, statement: KeywordStatement) -> s.Step | None:
+    def _wait(self, number: int, statement: KeywordStatement) -> s.ProgramStep | None:
         condition = self._comparison(statement.operands[0])
         return None if condition is None else s.WaitStep(statement.start, statement.end, condition)
 
-    def _delay(self, number: int, statement: KeywordStatement) -> s.Step | None:
+    def _delay(self, number: int, statement: KeywordStatement) -> s.ProgramStep | None:
         seconds = self._value(statement.operands[0])
         if isinstance(seconds, s.Literal) and seconds.value < s.SHORTEST_DELAY_S:
             message = f"DELAY {seconds.value:g} waits {s.SHORTEST_DELAY_S:g} s"
@@ -215,7 +215,7 @@ class _Resolver:
         self._check_time("DELAY", statement.operands[0], seconds)
         return None if seconds is None else s.DelayStep(statement.start, statement.end, seconds)
 
-    def _check_time(self, keyword: str, operand: Operand, seconds: s.Source | None) -> None:
+    def _check_time(self, keyword: str, operand: OperandNode, seconds: s.Source | None) -> None:
         """Warn of hundreds of seconds, which are probably milliseconds, unless they are whole minutes."""
         if not isinstance(seconds, s.Literal) or seconds.value < _LOOKS_LIKE_MS or seconds.value % 60 == 0:
             return
@@ -226,7 +226,7 @@ class _Resolver:
         hint = f"the time is in seconds: {seconds.value:.10g} ms are {milliseconds}"
         self._report(f.LONG_TIME.at(operand, message, hint, fix=fix))
 
-    def _jump(self, number: int, statement: KeywordStatement) -> s.Step | None:
+    def _jump(self, number: int, statement: KeywordStatement) -> s.ProgramStep | None:
         name = statement.operands[0]
         if not isinstance(name, Identifier):
             return None
@@ -239,7 +239,7 @@ class _Resolver:
             self._report(f.UNKNOWN_LABEL.at(name, f"there is no label {name.text}", hint, fix=meant))
         return None
 
-    def _motion(self, number: int, statement: KeywordStatement) -> s.Step | None:
+    def _motion(self, number: int, statement: KeywordStatement) -> s.ProgramStep | None:
         axis = self._axis(statement)
         operand = statement.operands[1]
         value = self._value(operand)
@@ -250,7 +250,7 @@ class _Resolver:
             self._report(f.OUT_OF_RANGE.at(operand, "HOME needs a velocity other than 0", hint))
         return s.MotionStep(statement.start, statement.end, statement.keyword, axis, value)
 
-    def _halt(self, number: int, statement: KeywordStatement) -> s.Step | None:
+    def _halt(self, number: int, statement: KeywordStatement) -> s.ProgramStep | None:
         axis = self._axis(statement)
         return None if axis is None else s.HaltStep(statement.start, statement.end, statement.keyword, axis)
 
@@ -269,7 +269,7 @@ class _Resolver:
             self._report(finding.at(name, message, f"write {STATEMENTS[statement.keyword].usage}, M1…M4"))
         return None
 
-    def _pulse(self, number: int, statement: KeywordStatement) -> s.Step | None:
+    def _pulse(self, number: int, statement: KeywordStatement) -> s.ProgramStep | None:
         name, operand = statement.operands
         seconds = self._value(operand)
         register = self._scope.register(name) if isinstance(name, Identifier) else None
@@ -284,7 +284,7 @@ class _Resolver:
 
     # -- rows of the position table
 
-    def _row_motion(self, number: int, statement: KeywordStatement) -> s.Step | None:
+    def _row_motion(self, number: int, statement: KeywordStatement) -> s.ProgramStep | None:
         operand = statement.operands[0]
         row = self._position(operand) if isinstance(operand, Position) else self._value(operand, is_row=True)
         if row is None:
@@ -316,13 +316,13 @@ class _Resolver:
         self._report(f.UNKNOWN_POSITION.at(position, f"there is no position {name.text}", hint, fix=meant and f"@{meant}"))
         return None
 
-    def _report_unchecked(self, place: Operand) -> None:
+    def _report_unchecked(self, place: OperandNode) -> None:
         if not self._has_reported_unchecked:
             hint = "give the position table to check names and rows; the program does not start without it"
             self._report(f.POSITIONS_UNCHECKED.at(place, "positions are not checked", hint))
         self._has_reported_unchecked = True
 
-    def _row_index(self, place: Operand, value: float) -> int | None:
+    def _row_index(self, place: OperandNode, value: float) -> int | None:
         rows = 0 if self._positions is None else len(self._positions.rows)
         if (0 <= value < rows and value == int(value)) or (value == 0 and self._outline.writes_row_0):
             return int(value)
@@ -343,19 +343,19 @@ class _Resolver:
         elif names_no_axis(statement.keyword, values):
             self._report(f.NO_AXIS.at(statement.operands[0], f"{name} names no axis: nothing moves", "give p1…p4 a number"))
 
-    def _value(self, operand: Operand, *, is_row: bool = False) -> s.Source | None:
+    def _value(self, operand: OperandNode, *, is_row: bool = False) -> s.Source | None:
         return self._scope.value(operand, is_row=is_row) if isinstance(operand, Identifier | DecimalNumber) else None
 
     def _report(self, diagnostic: Diagnostic) -> None:
         self._diagnostics.append(diagnostic)
 
 
-def _alone(step: type[s.Step]) -> Callable[[_Resolver, int, KeywordStatement], s.Step]:
+def _alone(step: type[s.ProgramStep]) -> Callable[[_Resolver, int, KeywordStatement], s.ProgramStep]:
     """Of a statement without operands."""
     return lambda resolver, number, statement: step(statement.start, statement.end)
 
 
-_STEPS: Mapping[str, Callable[[_Resolver, int, KeywordStatement], s.Step | None]] = complete(
+_STEPS: Mapping[str, Callable[[_Resolver, int, KeywordStatement], s.ProgramStep | None]] = complete(
     "statement",
     STATEMENTS,
     "step",

@@ -14,12 +14,12 @@ from steptwin.wbc.positions import PositionTable
 from steptwin.wbc.registers import PREDEFINED, REAL_MAX, REGISTERS, ROWS, VALUE_NAMES, RegisterRow, parts
 from steptwin.wbc.statements import FUNCTIONS, KEYWORDS, NOT_SUPPORTED
 from steptwin.wbc.steps import Literal, RegisterOperand, Source, Target, Variable
-from steptwin.wbc.tree import Assign, Broken, ConstantDefinition, DecimalNumber, Identifier, ProgramTree, Value
+from steptwin.wbc.tree import Assign, Broken, ConstantDefinition, DecimalNumber, Identifier, ProgramTree, ValueNode
 
 _STATUS_SINCE = "1.70"
 
 
-class Scope:
+class ProgramScope:
     """Names of a program. Built from the whole text first, so that a name may be used above the line that defines it."""
 
     def __init__(
@@ -126,7 +126,7 @@ class Scope:
 
     # -- using
 
-    def value(self, node: Value, other: Value | None = None, *, is_row: bool = False) -> Source | None:
+    def value(self, node: ValueNode, other: ValueNode | None = None, *, is_row: bool = False) -> Source | None:
         """The value of a number or name; None after reporting an error.
 
         ``other`` is what it is compared with or assigned to, which determines the possible names. ``is_row``: a row of the
@@ -174,7 +174,7 @@ class Scope:
         family = parts(name.key)
         return family[0].key if family is not None else None
 
-    def _look_up(self, name: Identifier, other: Value | None = None, *, is_row: bool = False) -> Source | None:
+    def _look_up(self, name: Identifier, other: ValueNode | None = None, *, is_row: bool = False) -> Source | None:
         """Registers and predefined names enter ``known`` when they are first used; anything else is a mistake."""
         key = name.key
         found = parts(key)
@@ -212,7 +212,7 @@ class Scope:
             self._report(f.STATUS_IS_ZERO.at(name, f"STATUS is always 0 in firmware {dialect.firmware}", hint))
         return RegisterOperand(row, number)
 
-    def _unknown(self, name: Identifier, other: Value | None, *, is_row: bool) -> None:
+    def _unknown(self, name: Identifier, other: ValueNode | None, *, is_row: bool) -> None:
         key = name.key
         if self._positions is not None and self._positions.index(key) is not None:
             hint = f"write @{name.text} after a motion statement"
@@ -229,7 +229,7 @@ class Scope:
         hint = hint or "a variable comes into being when it is first set"
         self._report(f.UNKNOWN_VARIABLE.at(name, f"unknown variable {name.text}", hint, fix=meant))
 
-    def _names_for(self, other: Value | None) -> str:
+    def _names_for(self, other: ValueNode | None) -> str:
         """The predefined names that make sense with a register; nothing where there are none."""
         family = self.family(other) if isinstance(other, Identifier) else None
         row = None if family is None else ROWS[family]

@@ -70,19 +70,19 @@ class FunctionOperation:
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class ProgramStep:
     start: int = field(compare=False)
     end: int = field(compare=False)
 
 
 @dataclass(frozen=True, slots=True)
-class SetStep(Step):
+class SetStep(ProgramStep):
     target: Target
     value: Source | Operation | FunctionOperation
 
 
 @dataclass(frozen=True, slots=True)
-class IfStep(Step):
+class IfStep(ProgramStep):
     """``middle`` is the step of ELSE, None without one; ``close`` that of ENDIF."""
 
     condition: StepCondition
@@ -96,25 +96,25 @@ class IfStep(Step):
 
 
 @dataclass(frozen=True, slots=True)
-class ElseStep(Step):
+class ElseStep(ProgramStep):
     """Reached only from the lines above it: goes on at ``close``, the ENDIF."""
 
     close: int
 
 
 @dataclass(frozen=True, slots=True)
-class EndIfStep(Step):
+class EndIfStep(ProgramStep):
     pass
 
 
 @dataclass(frozen=True, slots=True)
-class WhileStep(Step):
+class WhileStep(ProgramStep):
     condition: StepCondition
     close: int
 
 
 @dataclass(frozen=True, slots=True)
-class EndWhileStep(Step):
+class EndWhileStep(ProgramStep):
     """``condition`` is that of the WHILE at ``open``."""
 
     condition: StepCondition
@@ -122,39 +122,39 @@ class EndWhileStep(Step):
 
 
 @dataclass(frozen=True, slots=True)
-class WaitStep(Step):
+class WaitStep(ProgramStep):
     condition: StepCondition
 
 
 @dataclass(frozen=True, slots=True)
-class DelayStep(Step):
+class DelayStep(ProgramStep):
     """At least `SHORTEST_DELAY_S` (WBC-7)."""
 
     seconds: Source
 
 
 @dataclass(frozen=True, slots=True)
-class JumpStep(Step):
+class JumpStep(ProgramStep):
     target: int
 
 
 @dataclass(frozen=True, slots=True)
-class ReturnStep(Step):
+class ReturnStep(ProgramStep):
     pass
 
 
 @dataclass(frozen=True, slots=True)
-class EndStep(Step):
+class EndStep(ProgramStep):
     pass
 
 
 @dataclass(frozen=True, slots=True)
-class ProgResetStep(Step):
+class ProgResetStep(ProgramStep):
     pass
 
 
 @dataclass(frozen=True, slots=True)
-class MotionStep(Step):
+class MotionStep(ProgramStep):
     """HOME, VABS, VREL, PABS or PREL. ``axis`` counts from 1."""
 
     keyword: str
@@ -163,7 +163,7 @@ class MotionStep(Step):
 
 
 @dataclass(frozen=True, slots=True)
-class HaltStep(Step):
+class HaltStep(ProgramStep):
     """BRAKE or STOP. ``axis`` counts from 1."""
 
     keyword: str
@@ -171,7 +171,7 @@ class HaltStep(Step):
 
 
 @dataclass(frozen=True, slots=True)
-class RowMotionStep(Step):
+class RowMotionStep(ProgramStep):
     """A motion with the parameters of a row of the position table; ``row`` gives its index from 0."""
 
     keyword: str
@@ -179,12 +179,12 @@ class RowMotionStep(Step):
 
 
 @dataclass(frozen=True, slots=True)
-class WaitPosStep(Step):
+class WaitPosStep(ProgramStep):
     pass
 
 
 @dataclass(frozen=True, slots=True)
-class PulseStep(Step):
+class PulseStep(ProgramStep):
     """``output`` counts from 1."""
 
     output: int
@@ -192,7 +192,7 @@ class PulseStep(Step):
 
 
 @dataclass(frozen=True, slots=True)
-class InterruptStep(Step):
+class InterruptStep(ProgramStep):
     """An interrupt label. ``hard`` waits for the end of the statement in progress."""
 
     event: InterruptEvent
@@ -200,7 +200,7 @@ class InterruptStep(Step):
 
 
 @dataclass(frozen=True, slots=True)
-class IllegalStep(Step):
+class IllegalStep(ProgramStep):
     """A line that cannot be executed: an unknown record of an image, or (in a program with errors) a wrong line.
 
     ``opaque``: where the program goes on after it is not known.
@@ -210,8 +210,10 @@ class IllegalStep(Step):
     opaque: bool
 
 
-STEPS: tuple[type[Step], ...] = tuple(
-    found for found in list(globals().values()) if isinstance(found, type) and issubclass(found, Step) and found is not Step
+STEPS: tuple[type[ProgramStep], ...] = tuple(
+    found
+    for found in list(globals().values())
+    if isinstance(found, type) and issubclass(found, ProgramStep) and found is not ProgramStep
 )
 """Every class of step; each needs its code, what it reads, and where it goes on."""
 
@@ -221,7 +223,7 @@ class Executable:
     """``variables`` in the order of their indices; ``labels`` by name in upper case; ``entries`` steps of interrupt labels;
     ``position_records`` rows of the image that replace those of the table."""
 
-    steps: tuple[Step, ...]
+    steps: tuple[ProgramStep, ...]
     variables: tuple[str, ...]
     labels: Mapping[str, int]
     entries: Mapping[InterruptEvent, int]

@@ -9,7 +9,7 @@ from steptwin.symbols import Symbol, SymbolKind, SymbolRole, Use
 from steptwin.wbc.events import BY_LABEL
 from steptwin.wbc.lexer import WORD, is_name, tokens
 from steptwin.wbc.registers import PREDEFINED, parts
-from steptwin.wbc.scope import Scope
+from steptwin.wbc.scope import ProgramScope
 from steptwin.wbc.statements import FUNCTIONS, STATEMENTS, OperandKind
 from steptwin.wbc.tree import (
     Assign,
@@ -17,27 +17,27 @@ from steptwin.wbc.tree import (
     Broken,
     ConstantDefinition,
     DecimalNumber,
-    Expression,
+    ExpressionNode,
     FunctionCall,
     Identifier,
     KeywordStatement,
     Label,
-    Operand,
+    OperandNode,
     Position,
     ProgramTree,
     Relation,
-    Statement,
+    StatementNode,
 )
 
 
-def uses(program: ProgramTree, scope: Scope) -> Iterator[Use]:
+def uses(program: ProgramTree, scope: ProgramScope) -> Iterator[Use]:
     """The names of a program in the order of its lines; in wrong lines those that mean something."""
     for line in program.lines:
         if line.statement is not None:
             yield from of_statement(line.statement, scope)
 
 
-def kind_of(key: str, scope: Scope) -> SymbolKind | None:
+def kind_of(key: str, scope: ProgramScope) -> SymbolKind | None:
     """What a name in upper case is as a value or target; None for one that means nothing."""
     if key in scope.constants:
         return SymbolKind.CONSTANT
@@ -48,7 +48,7 @@ def kind_of(key: str, scope: Scope) -> SymbolKind | None:
     return SymbolKind.VALUE if key in PREDEFINED else None
 
 
-def of_statement(statement: Statement, scope: Scope) -> Iterator[Use]:
+def of_statement(statement: StatementNode, scope: ProgramScope) -> Iterator[Use]:
     match statement:
         case ConstantDefinition(name=name, value=value):
             yield _use(name, SymbolKind.CONSTANT, SymbolRole.DEFINE)
@@ -74,14 +74,14 @@ def _use(name: Identifier, kind: SymbolKind, role: SymbolRole = SymbolRole.READ)
     return Use(Symbol(kind, name.key, name.text), Span(name.start, name.end), role)
 
 
-def _target(name: Identifier, scope: Scope) -> Iterator[Use]:
+def _target(name: Identifier, scope: ProgramScope) -> Iterator[Use]:
     kind = kind_of(name.key, scope)
     if kind is not None:
         first = kind is SymbolKind.VARIABLE and scope.variables[name.key].start == name.start
         yield _use(name, kind, SymbolRole.DEFINE if first else SymbolRole.WRITE)
 
 
-def _value(node: Expression | Operand, scope: Scope) -> Iterator[Use]:
+def _value(node: ExpressionNode | OperandNode, scope: ProgramScope) -> Iterator[Use]:
     match node:
         case Identifier(key=key):
             kind = kind_of(key, scope)
@@ -100,7 +100,7 @@ def _value(node: Expression | Operand, scope: Scope) -> Iterator[Use]:
             return
 
 
-def _broken(statement: Broken, scope: Scope) -> Iterator[Use]:
+def _broken(statement: Broken, scope: ProgramScope) -> Iterator[Use]:
     """The names of a wrong line, by the words in it."""
     if statement.text.startswith("//"):
         return
@@ -114,7 +114,7 @@ def _broken(statement: Broken, scope: Scope) -> Iterator[Use]:
         yield from _word(name, before, after, scope, statement)
 
 
-def _word(name: Identifier, before: str, after: str, scope: Scope, statement: Broken) -> Iterator[Use]:
+def _word(name: Identifier, before: str, after: str, scope: ProgramScope, statement: Broken) -> Iterator[Use]:
     label, target = statement.label, statement.target
     if before == "@":
         yield _use(name, SymbolKind.POSITION)
@@ -130,7 +130,7 @@ def _word(name: Identifier, before: str, after: str, scope: Scope, statement: Br
         yield from _value(name, scope)
 
 
-def name_problem(text: str, scope: Scope, labels: Container[str]) -> str | None:
+def name_problem(text: str, scope: ProgramScope, labels: Container[str]) -> str | None:
     """Why a text cannot be the name of a constant, a variable or a label; None when it can."""
     key = text.upper()
     if not is_name(text):

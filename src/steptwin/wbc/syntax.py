@@ -13,7 +13,7 @@ from steptwin.wbc.foreign_words import LOOK_ALIKES
 from steptwin.wbc.lexer import BLANKS as _BLANKS
 from steptwin.wbc.lexer import STRANGE, Lexeme, tokens
 from steptwin.wbc.reader import Rejected, StatementReader
-from steptwin.wbc.tree import Broken, Comment, Identifier, ImageRecord, PositionRecord, ProgramTree, SourceLine, Statement
+from steptwin.wbc.tree import Broken, Comment, Identifier, ImageRecord, PositionRecord, ProgramTree, SourceLine, StatementNode
 
 RECORD_MARK = "//!record"
 POSITION_MARK = "//!position"
@@ -73,7 +73,7 @@ class Parser:
                 return SourceLine(start, end, record, None)
         return SourceLine(start, end, None, comment)
 
-    def _statement(self, number: int, words: list[Lexeme], code: str, start: int) -> Statement:
+    def _statement(self, number: int, words: list[Lexeme], code: str, start: int) -> StatementNode:
         found: list[Diagnostic] = []
         plain = self._without_look_alikes(words, code, start)
         reader = StatementReader(words if plain is None else tokens(plain, start) or words, self._near, found)
@@ -134,7 +134,7 @@ class Parser:
             return False
 
 
-def _record(comment: Comment, diagnostics: list[Diagnostic]) -> Statement | None:
+def _record(comment: Comment, diagnostics: list[Diagnostic]) -> StatementNode | None:
     """The raw data that decompiling leaves in comments a vendor tool skips; None for any other comment."""
     text = comment.text
     if match := _RECORD.match(text):

@@ -13,7 +13,7 @@ from steptwin.diagnostics import Span
 
 
 @dataclass(frozen=True, slots=True)
-class Node:
+class TreeNode:
     start: int = field(compare=False)
     end: int = field(compare=False)
 
@@ -23,7 +23,7 @@ class Node:
 
 
 @dataclass(frozen=True, slots=True)
-class DecimalNumber(Node):
+class DecimalNumber(TreeNode):
     """``20,5`` or ``-20.5``: the text as written, without blanks, and its value."""
 
     text: str
@@ -31,7 +31,7 @@ class DecimalNumber(Node):
 
 
 @dataclass(frozen=True, slots=True)
-class Identifier(Node):
+class Identifier(TreeNode):
     """A register, constant, variable, label, function or predefined name as written; ``key`` is it in upper case."""
 
     text: str
@@ -39,80 +39,80 @@ class Identifier(Node):
 
 
 @dataclass(frozen=True, slots=True)
-class Position(Node):
+class Position(TreeNode):
     """``@name``."""
 
     name: Identifier
 
 
-Value: TypeAlias = DecimalNumber | Identifier
+ValueNode: TypeAlias = DecimalNumber | Identifier
 
 
 @dataclass(frozen=True, slots=True)
-class Relation(Node):
-    left: Value
+class Relation(TreeNode):
+    left: ValueNode
     comparison: str
-    right: Value
+    right: ValueNode
 
 
 @dataclass(frozen=True, slots=True)
-class Binary(Node):
-    left: Value
+class Binary(TreeNode):
+    left: ValueNode
     operator: str
-    right: Value
+    right: ValueNode
 
 
 @dataclass(frozen=True, slots=True)
-class FunctionCall(Node):
+class FunctionCall(TreeNode):
     function: Identifier
-    arguments: tuple[Value, ...]
+    arguments: tuple[ValueNode, ...]
 
 
-Expression: TypeAlias = Value | Binary | FunctionCall
-Operand: TypeAlias = Value | Position | Relation
+ExpressionNode: TypeAlias = ValueNode | Binary | FunctionCall
+OperandNode: TypeAlias = ValueNode | Position | Relation
 
 
 @dataclass(frozen=True, slots=True)
-class ConstantDefinition(Node):
+class ConstantDefinition(TreeNode):
     """``#name value``."""
 
     name: Identifier
-    value: Value
+    value: ValueNode
 
 
 @dataclass(frozen=True, slots=True)
-class Label(Node):
+class Label(TreeNode):
     """``NAME:``."""
 
     name: Identifier
 
 
 @dataclass(frozen=True, slots=True)
-class Assign(Node):
+class Assign(TreeNode):
     """``SET target = value``; ``has_set``: the word SET was written."""
 
     has_set: bool
     target: Identifier
-    value: Expression
+    value: ExpressionNode
 
 
 @dataclass(frozen=True, slots=True)
-class KeywordStatement(Node):
+class KeywordStatement(TreeNode):
     """Any other statement: its keyword in upper case and its operands as the statement table lists them."""
 
     keyword: str
-    operands: tuple[Operand, ...]
+    operands: tuple[OperandNode, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class ImageRecord(Node):
+class ImageRecord(TreeNode):
     """``//!record`` and 32 hexadecimal digits: a record of a compiled image that is not a known statement."""
 
     data: bytes
 
 
 @dataclass(frozen=True, slots=True)
-class PositionRecord(Node):
+class PositionRecord(TreeNode):
     """``//!position``, an index and 36 hexadecimal digits: a row of a compiled image that a position table cannot express."""
 
     index: int
@@ -120,7 +120,7 @@ class PositionRecord(Node):
 
 
 @dataclass(frozen=True, slots=True)
-class Broken(Node):
+class Broken(TreeNode):
     """A line with an error, as written. What could be understood keeps one mistake from causing others:
     the keyword (a broken IF still opens a block), the name it would have assigned, the label it would have been."""
 
@@ -130,19 +130,19 @@ class Broken(Node):
     label: Identifier | None = None
 
 
-Statement: TypeAlias = ConstantDefinition | Label | Assign | KeywordStatement | ImageRecord | PositionRecord | Broken
+StatementNode: TypeAlias = ConstantDefinition | Label | Assign | KeywordStatement | ImageRecord | PositionRecord | Broken
 
 
 @dataclass(frozen=True, slots=True)
-class Comment(Node):
+class Comment(TreeNode):
     """From ``//`` to the end of the line, without trailing blanks."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True)
-class SourceLine(Node):
-    statement: Statement | None
+class SourceLine(TreeNode):
+    statement: StatementNode | None
     comment: Comment | None
 
 

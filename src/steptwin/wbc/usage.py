@@ -38,7 +38,7 @@ class Setup:
     most_speed_p: float = inf
 
 
-def sources(step: s.Step) -> Iterable[s.Source]:
+def sources(step: s.ProgramStep) -> Iterable[s.Source]:
     """Everything a step reads."""
     return _SOURCES[type(step)](step)
 
@@ -54,7 +54,7 @@ def _of_condition(step: s.IfStep | s.WhileStep | s.WaitStep) -> tuple[s.Source, 
     return step.condition.left, step.condition.right
 
 
-_SOURCES: Mapping[type[s.Step], Callable[[Any], tuple[s.Source, ...]]] = complete(
+_SOURCES: Mapping[type[s.ProgramStep], Callable[[Any], tuple[s.Source, ...]]] = complete(
     "step",
     s.STEPS,
     "sources",
@@ -112,7 +112,7 @@ def _is_zero(value: object) -> bool:
     return isinstance(value, s.Literal) and value.value == 0
 
 
-def _moved(step: s.Step, positions: PositionTable | None) -> tuple[int, ...]:
+def _moved(step: s.ProgramStep, positions: PositionTable | None) -> tuple[int, ...]:
     """The drives a step moves, as far as they are known."""
     match step:
         case s.MotionStep(axis=axis):
@@ -128,7 +128,7 @@ def _moved(step: s.Step, positions: PositionTable | None) -> tuple[int, ...]:
             return ()
 
 
-def homing_sides(steps: Sequence[s.Step]) -> dict[int, frozenset[int]]:
+def homing_sides(steps: Sequence[s.ProgramStep]) -> dict[int, frozenset[int]]:
     """The drives a program homes, each with the sides it goes to: -1 KL, 1 KR, 0 where the velocity is not known before."""
     sides: dict[int, frozenset[int]] = {}
     for step in steps:
@@ -137,7 +137,7 @@ def homing_sides(steps: Sequence[s.Step]) -> dict[int, frozenset[int]]:
     return sides
 
 
-def _signs(source: s.Source, steps: Sequence[s.Step]) -> frozenset[int]:
+def _signs(source: s.Source, steps: Sequence[s.ProgramStep]) -> frozenset[int]:
     """Signs a value can have; 0 where that is not known, none for the number 0."""
     if isinstance(source, s.Literal):
         return frozenset({1 if source.value > 0 else -1}) if source.value else frozenset()

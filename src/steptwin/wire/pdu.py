@@ -152,8 +152,8 @@ class ExceptionResponse:
     code: int
 
 
-Request: TypeAlias = ReadRequest | WriteCoilRequest | WriteRegisterRequest | WriteRegistersRequest
-Response: TypeAlias = (
+ModbusRequest: TypeAlias = ReadRequest | WriteCoilRequest | WriteRegisterRequest | WriteRegistersRequest
+ModbusResponse: TypeAlias = (
     BitsResponse | RegistersResponse | WriteCoilRequest | WriteRegisterRequest | WriteResponse | ExceptionResponse
 )
 
@@ -199,7 +199,7 @@ def _register_bytes(values: Sequence[int]) -> bytes:
     return struct.pack(f">{len(values)}H", *values)
 
 
-def encode_request(request: Request) -> bytes:
+def encode_request(request: ModbusRequest) -> bytes:
     """The PDU of a request; `Misuse` when a field is outside the protocol's range."""
     match request:
         case ReadRequest(function, address, count):
@@ -215,7 +215,7 @@ def encode_request(request: Request) -> bytes:
     return encode_response(request)
 
 
-def decode_request(pdu: bytes) -> Request:
+def decode_request(pdu: bytes) -> ModbusRequest:
     """The request in a PDU, or `ModbusException` with the code a slave answers: 01 for a function outside the six,
     03 for a quantity, coil value, byte count or length that is not permitted (MIC-1, MIC-7, MIC-24).
 
@@ -262,7 +262,7 @@ def _bad_length(function: int, length: int, wanted: int) -> ModbusException:
     return ModbusException(function, ILLEGAL_DATA_VALUE, f"the PDU has {length} bytes instead of {wanted}")
 
 
-def encode_response(response: Response) -> bytes:
+def encode_response(response: ModbusResponse) -> bytes:
     """The PDU of a response; `Misuse` when a field is outside the protocol's range."""
     match response:
         case BitsResponse(function, packed):
@@ -285,7 +285,7 @@ def encode_response(response: Response) -> bytes:
             return exception_pdu(_within("function", function, 1, 0x7F), _within("exception code", code, 1, 0xFF))
 
 
-def decode_response(pdu: bytes) -> Response:
+def decode_response(pdu: bytes) -> ModbusResponse:
     """The response in a PDU by its own form alone; `BadResponse` when it has none of the six functions.
 
     Use `answer` to check that it answers a given request.
@@ -323,7 +323,7 @@ def _bad_response(pdu: bytes, wanted: int) -> BadResponse:
     return BadResponse(f"response to function {function_number(pdu[0] & ~REFUSED)} has {len(pdu)} bytes instead of {wanted}")
 
 
-def answer(request: Request, pdu: bytes) -> Response:
+def answer(request: ModbusRequest, pdu: bytes) -> ModbusResponse:
     """The response in ``pdu`` if it answers ``request``.
 
     Raises `ModbusException` when the peer refused, `BadResponse` when this is the answer to something else.

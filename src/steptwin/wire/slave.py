@@ -25,7 +25,7 @@ _LENGTHS = [bytes((size + 1,)) for size in range(255)]
 """The last byte of the length in the header of an answer, by the size of its PDU."""
 
 
-class Device(Protocol):
+class SlaveDevice(Protocol):
     """What a unit does with a request."""
 
     def execute(self, pdu: bytes, now: Nanos) -> bytes:
@@ -71,7 +71,7 @@ class SlavePort(Stateful):
         """Nothing is kept that would have to be given up."""
 
 
-def check_units(devices: Mapping[int, Device]) -> None:
+def check_units(devices: Mapping[int, SlaveDevice]) -> None:
     """`Misuse` unless there are devices and their units are 1 to 247."""
     if not devices:
         raise Misuse("a slave port needs at least one unit")
@@ -80,7 +80,7 @@ def check_units(devices: Mapping[int, Device]) -> None:
             raise Misuse(f"unit {unit} is outside 1 to {rtu.MAX_UNIT}")
 
 
-def execute_frame(devices: Mapping[int, Device], frame: rtu.RtuFrame, now: Nanos) -> bytes:
+def execute_frame(devices: Mapping[int, SlaveDevice], frame: rtu.RtuFrame, now: Nanos) -> bytes:
     """Give an RTU frame to whom it is addressed; the response frame, empty where the line stays silent.
 
     Foreign units and function codes no request can have are passed over (MIC-1). A broadcast write is executed by every
@@ -99,7 +99,7 @@ def execute_frame(devices: Mapping[int, Device], frame: rtu.RtuFrame, now: Nanos
     return with_crc(raw[:1] + device.execute(raw[1:-2], now))
 
 
-def broadcast(devices: Iterable[Device], pdu: bytes, now: Nanos) -> None:
+def broadcast(devices: Iterable[SlaveDevice], pdu: bytes, now: Nanos) -> None:
     """A request to unit 0: every device executes a write, reads are ignored (MIC-2)."""
     if pdu[0] in WRITES:
         for device in devices:
@@ -142,7 +142,7 @@ class RtuSlavePort(SlavePort):
 
     def __init__(
         self,
-        devices: Mapping[int, Device],
+        devices: Mapping[int, SlaveDevice],
         *,
         gap_ns: Nanos = rtu.BURSTY_GAP_NS,
         line: SerialLine | None = None,
@@ -216,7 +216,7 @@ class TcpSlavePort(SlavePort):
     __slots__ = ("_devices", "_framer", "broken")
     FIXED = frozenset({"_devices"}) | SlavePort.FIXED
 
-    def __init__(self, devices: Mapping[int, Device], *, on_frame: FrameObserver | None = None) -> None:
+    def __init__(self, devices: Mapping[int, SlaveDevice], *, on_frame: FrameObserver | None = None) -> None:
         super().__init__(on_frame)
         check_units(devices)
         self._devices = dict(devices)

@@ -18,7 +18,7 @@ from steptwin.wire import rtu
 from steptwin.wire.crc import with_crc
 from steptwin.wire.line import CharacterClock, SerialLine
 from steptwin.wire.pdu import REFUSED, WRITES
-from steptwin.wire.slave import Device, FrameDirection, FrameObserver, PauseObserver, PauseReports, SlavePort, check_units
+from steptwin.wire.slave import FrameDirection, FrameObserver, PauseObserver, PauseReports, SlaveDevice, SlavePort, check_units
 
 # MIC-32: the highest rate the manual gives.
 FRAME_INTERVAL_NS: Nanos = 10 * MILLISECOND
@@ -53,7 +53,7 @@ class TimedUnits(Stateful):
     __slots__ = ("_busy", "_next", "devices", "timing")
     FIXED = frozenset({"devices", "timing"})
 
-    def __init__(self, devices: Mapping[int, Device], timing: LineTiming) -> None:
+    def __init__(self, devices: Mapping[int, SlaveDevice], timing: LineTiming) -> None:
         check_units(devices)
         self.devices = dict(devices)
         self.timing = timing

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Protocol
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos, Port, SendingPort
 from steptwin.state import Plain, Stateful
-from steptwin.wire.slave import Device, FrameDirection, FrameObserver, SlavePort
+from steptwin.wire.slave import FrameDirection, FrameObserver, SlaveDevice, SlavePort
 from steptwin.world.faults import Faults, FaultyPort, FaultySendingPort
 from steptwin.world.faults import LineProtocol as FaultLine
 from steptwin.world.kernel import Kernel
@@ -123,7 +123,7 @@ class Line(Stateful, ABC):
         """Sends the Modbus requests of scripts. Raises `Misuse` for a line without Modbus."""
         raise Misuse(f"line {self.name!r} carries no Modbus: requests need a line of kind modbus")
 
-    def serve_by(self, served: Callable[[Mapping[int, Device]], Mapping[int, Device]]) -> None:
+    def serve_by(self, served: Callable[[Mapping[int, SlaveDevice]], Mapping[int, SlaveDevice]]) -> None:
         """Replace the devices that execute external Modbus requests: ``served`` maps those by unit to their wrappers."""
 
     @property

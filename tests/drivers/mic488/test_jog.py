@@ -305,7 +305,7 @@ def test_the_hold_time_is_a_choice() -> None:
 MAP = register_map("1.70")
 
 
-def by_another_master(wire: Wire, request: pdu.Request) -> None:
+def by_another_master(wire: Wire, request: pdu.ModbusRequest) -> None:
     wire.twin.execute(pdu.encode_request(request), wire.now)
 
 
@@ -315,7 +315,7 @@ def jog_moves(wire: Wire) -> int:
     return sum(frame[1:].startswith(head) for _, frame in wire.sent)
 
 
-STOPS: dict[str, tuple[pdu.Request, Reason]] = {
+STOPS: dict[str, tuple[pdu.ModbusRequest, Reason]] = {
     "M1_STOP": (pdu.WriteCoilRequest(MAP.of("STOP", 1).address, True), Reason.STOPPED),
     "M_STOP": (pdu.WriteRegisterRequest(MAP.of("M_STOP").address, 1), Reason.STOPPED),
     "M1_EN": (pdu.WriteCoilRequest(MAP.of("EN", 1).address, False), Reason.DISABLED),

@@ -14,11 +14,11 @@ from steptwin.drivers.m1486.unit import ChipUnit
 from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Misuse, Refusal
 from steptwin.m1486.lines import STEP_DIRECTION, Interface
-from steptwin.m1486.syntax import Command, JumpCondition, ParsedProgram
+from steptwin.m1486.syntax import ChipCommand, JumpCondition, ParsedProgram
 from steptwin.m1486.variants import Store, Variant
 from steptwin.machine import MILLISECOND, SECOND
 
-Progress = Callable[[int, int], object]
+DownloadProgress = Callable[[int, int], object]
 """Called with the number of commands sent, and their total."""
 
 MOST_TOLD = 10
@@ -42,9 +42,9 @@ def checked_program(text: str, variant: Variant, interface: Interface, name: str
     return checked.program
 
 
-def parts(program: ParsedProgram) -> list[tuple[int | None, list[Command]]]:
+def parts(program: ParsedProgram) -> list[tuple[int | None, list[ChipCommand]]]:
     """The commands in order, split where ``X`` selects another chip; None before the first X."""
-    found: list[tuple[int | None, list[Command]]] = [(None, [])]
+    found: list[tuple[int | None, list[ChipCommand]]] = [(None, [])]
     for command in program.commands:
         if command.key == "XG":
             raise Misuse("XG is not sent: a command to several chips cannot be verified; select each chip with X")
@@ -55,7 +55,7 @@ def parts(program: ParsedProgram) -> list[tuple[int | None, list[Command]]]:
     return [(address, commands) for address, commands in found if commands]
 
 
-def probes(commands: Sequence[Command]) -> list[bool]:
+def probes(commands: Sequence[ChipCommand]) -> list[bool]:
     """Whether a query may be sent before each command. Not in a loop or behind a label that is jumped back to: the query would
     become part of the program, and each pass would upload a byte."""
     allowed = [True] * len(commands)
@@ -82,7 +82,7 @@ async def send_program(
     units: Mapping[int | None, ChipUnit],
     text: str,
     *,
-    progress: Progress | None = None,
+    progress: DownloadProgress | None = None,
     name: str = "program",
 ) -> bytes:
     """Send a program to the chips it selects; ``units[None]`` gets the commands before any ``X``. Returns the bytes that ``U``
@@ -124,7 +124,7 @@ class _Typist:
         self._typed = 0  # characters that may lie in the input buffer
         self._may_ask = True  # see `probes`
 
-    async def type(self, commands: Sequence[Command]) -> bytes:
+    async def type(self, commands: Sequence[ChipCommand]) -> bytes:
         unit = self._unit
         uploaded = b""
         index = 0
@@ -146,7 +146,7 @@ class _Typist:
                 self._report(index)
         return uploaded
 
-    async def _file(self, commands: Sequence[Command], done: int) -> None:
+    async def _file(self, commands: Sequence[ChipCommand], done: int) -> None:
         unit = self._unit
         await self._empty()
         if unit.variant.store is Store.EEPROM:
@@ -156,7 +156,7 @@ class _Typist:
         )
         self._typed = self._capacity
 
-    async def _command(self, command: Command) -> bytes:
+    async def _command(self, command: ChipCommand) -> bytes:
         unit = self._unit
         text = str(command).lower()
         if command.key == "\\":

@@ -7,7 +7,7 @@ from math import isfinite
 
 from steptwin.drivers.line import check_wait
 from steptwin.drivers.m1486.chip import LARGEST, AsyncChip
-from steptwin.drivers.m1486.download import Progress, begin, reset, send_program, type_file
+from steptwin.drivers.m1486.download import DownloadProgress, begin, reset, send_program, type_file
 from steptwin.drivers.m1486.failures import Busy, ChipMoveFailed
 from steptwin.drivers.m1486.motion import UNKNOWN_S, ChipMotion, ChipMotionCommand, ChipMoveEnd
 from steptwin.drivers.m1486.settings import COMMANDS, checked_number
@@ -260,7 +260,7 @@ class AsyncM1486(AsyncChip):
                 await unit.rest()
             await reset(unit)
 
-    async def download(self, text: str, *, progress: Progress | None = None, name: str = "program") -> bytes:
+    async def download(self, text: str, *, progress: DownloadProgress | None = None, name: str = "program") -> bytes:
         """Send a program to the chip: a file in ``[ ]``, which runs from ``]`` on and which an E type stores, or plain
         commands.
 
@@ -275,7 +275,7 @@ async def download_to(
     text: str,
     *,
     first: AsyncM1486 | None = None,
-    progress: Progress | None = None,
+    progress: DownloadProgress | None = None,
     name: str = "program",
 ) -> bytes:
     """Send a program that selects its chips with ``X`` to chips on one line, all of one type.

@@ -18,7 +18,7 @@ from steptwin.drivers.m1486.driver import AsyncM1486
 from steptwin.drivers.m1486.failures import Busy, PositionUnknown
 from steptwin.drivers.m1486.jog import AsyncM1486Jog
 from steptwin.drivers.m1486.talk import ChipRequest
-from steptwin.drivers.subject import Action, Value
+from steptwin.drivers.subject import DeviceAction, PointValue
 from steptwin.errors import Misuse, Refusal
 from steptwin.m1486.datasheet import axis, datasheet_of
 from steptwin.m1486.microsteps import FULL_STEP
@@ -64,7 +64,7 @@ class M1486Part:
 
     # ------------------------------------------------------------------ points
 
-    async def values(self, points: Sequence[str]) -> Mapping[str, Value]:
+    async def values(self, points: Sequence[str]) -> Mapping[str, PointValue]:
         """Counter, variable and uploads are known at rest. Levels of lines are unknown, because reading them would overwrite
         the internal variable, which a program may need."""
         units = {point: self.unit_of(point) for point in points}
@@ -123,7 +123,7 @@ class M1486Part:
 
     # ------------------------------------------------------------------ commands
 
-    def actions(self) -> Mapping[type, Action]:
+    def actions(self) -> Mapping[type, DeviceAction]:
         return {
             command.Move: self._move,
             command.Jog: self._jog,

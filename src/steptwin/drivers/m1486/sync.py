@@ -12,7 +12,7 @@ from typing import Self
 from steptwin.drivers.blocking import Blocking, blocking, finish
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.m1486.chip import TIMEOUT_S
-from steptwin.drivers.m1486.download import Progress
+from steptwin.drivers.m1486.download import DownloadProgress
 from steptwin.drivers.m1486.driver import AsyncM1486
 from steptwin.drivers.m1486.driver import download_to as async_download_to
 from steptwin.drivers.m1486.lines import BAUD, ThreadM1486Line
@@ -110,7 +110,7 @@ class M1486(Blocking):
         """The settings of the chip as far as drivers on this line have made them."""
         return self._driver.settings
 
-    def download(self, text: str, *, progress: Progress | None = None, name: str = "program") -> bytes:
+    def download(self, text: str, *, progress: DownloadProgress | None = None, name: str = "program") -> bytes:
         """Send a program to the chip; see `AsyncM1486.download`."""
         return finish(self._driver.download(text, progress=progress, name=name))
 
@@ -160,7 +160,12 @@ class M1486(Blocking):
 
 
 def download_to(
-    chips: Iterable[M1486], text: str, *, first: M1486 | None = None, progress: Progress | None = None, name: str = "program"
+    chips: Iterable[M1486],
+    text: str,
+    *,
+    first: M1486 | None = None,
+    progress: DownloadProgress | None = None,
+    name: str = "program",
 ) -> bytes:
     """Send a program that selects its chips with ``X`` to chips on one line; see `steptwin.drivers.m1486.driver.download_to`."""
     drivers = [chip._driver for chip in chips]

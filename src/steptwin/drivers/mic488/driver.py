@@ -27,7 +27,7 @@ from steptwin.mic488.config import ControllerConfig, read_config
 from steptwin.mic488.inifile import IniFile
 from steptwin.mic488.registermap import DataType, WriteEffect
 from steptwin.mic488.registers import AXES, DEFAULT_FIRMWARE, INPUTS, OUTPUTS, register_map
-from steptwin.mic488.values import Value, named
+from steptwin.mic488.values import RegisterValue, named
 from steptwin.wire import pdu
 
 TIMEOUT_S = 0.3
@@ -247,11 +247,11 @@ class AsyncMic488:
 
     # ------------------------------------------------------------------ registers by name and raw
 
-    async def get(self, *names: str) -> dict[str, Value]:
+    async def get(self, *names: str) -> dict[str, RegisterValue]:
         """Values by name (``M1_POS_ACT``, ``OUT3``, ``USER_REGISTER[12]:real``), in units if these are known."""
         return {name: value for name, (value, _) in (await self.get_shown(*names)).items()}
 
-    async def get_shown(self, *names: str) -> dict[str, tuple[Value, str]]:
+    async def get_shown(self, *names: str) -> dict[str, tuple[RegisterValue, str]]:
         """As `get`, each with its unit."""
         unit = self._unit
         items = {name: named(unit.registers, name) for name in names}
@@ -277,7 +277,7 @@ class AsyncMic488:
         """Raw holding registers."""
         return words(await self._unit.look(pdu.READ_HOLDING_REGISTERS, address, count))
 
-    async def request(self, request: pdu.Request) -> pdu.Response:
+    async def request(self, request: pdu.ModbusRequest) -> pdu.ModbusResponse:
         """Send any request and return its answer. A write is sent only once, unless its registers are known to permit
         repetition."""
         return pdu.answer(request, await self._unit.ask(request))

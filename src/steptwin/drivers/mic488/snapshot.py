@@ -16,7 +16,7 @@ from steptwin.drivers.mic488.motion import MOVING, status_text
 from steptwin.drivers.mic488.unit import Unit
 from steptwin.errors import Misuse
 from steptwin.mic488.registermap import DataType, Register, Type, WriteEffect
-from steptwin.mic488.values import RegisterItem, Value, View, encoded
+from steptwin.mic488.values import RegisterItem, RegisterValue, UserFormat, encoded
 
 FORMAT = "steptwin MIC488 snapshot 1"
 _COUNTERS = ("POS_ACT", "ENC_IMP", "ENC_XPOS")
@@ -29,7 +29,7 @@ class Mic488Snapshot:
 
     firmware: str
     data_type: DataType
-    values: Mapping[str, Value]
+    values: Mapping[str, RegisterValue]
     user: tuple[int, ...]
 
     def to_json(self) -> str:
@@ -69,14 +69,14 @@ class SnapshotChange(NamedTuple):
     """A change by restoring a snapshot; ``old`` is None if not comparable (another DATA_TYPE)."""
 
     item: RegisterItem
-    old: Value | None
-    new: Value
+    old: RegisterValue | None
+    new: RegisterValue
 
     def __str__(self) -> str:
         return f"{self.item.name}: {'?' if self.old is None else _text(self.old)} → {_text(self.new)}"
 
 
-def _text(value: Value) -> str:
+def _text(value: RegisterValue) -> str:
     return ("ON" if value else "OFF") if isinstance(value, bool) else f"{value:.9g}"
 
 
@@ -90,7 +90,7 @@ async def take(unit: Unit) -> Mic488Snapshot:
     items = [RegisterItem(register) for register in unit.registers if _kept(register)]
     values = await unit.read(items, data_type)
     count = unit.registers.firmware.user_registers
-    user = [int(word) for word in await unit.read_user(0, View.WORD, count)]
+    user = [int(word) for word in await unit.read_user(0, UserFormat.WORD, count)]
     while user and user[-1] == 0:
         user.pop()
     return Mic488Snapshot(unit.registers.firmware.name, data_type, {item.name: values[item] for item in items}, tuple(user))
@@ -136,16 +136,16 @@ async def put_back(unit: Unit, snapshot: Mic488Snapshot, *, counters: bool, outp
         if change.item.register.type is not Type.MEMORY:
             await unit.write(change.item, change.new, data_type=snapshot.data_type)
     for first, values in _runs([change for change in wanted if change.item.register.type is Type.MEMORY]):
-        await unit.write_user(first, View.WORD, values)
+        await unit.write_user(first, UserFormat.WORD, values)
     left = await changes(unit, snapshot, counters=counters, outputs=outputs)
     if left:
         raise NotReady(f"{unit.place}: not kept by the controller: {'; '.join(map(str, left))}")
     return wanted
 
 
-def _runs(changed: list[SnapshotChange]) -> list[tuple[int, list[Value]]]:
+def _runs(changed: list[SnapshotChange]) -> list[tuple[int, list[RegisterValue]]]:
     """Groups of consecutive user registers."""
-    runs: list[tuple[int, list[Value]]] = []
+    runs: list[tuple[int, list[RegisterValue]]] = []
     for change in changed:
         if runs and runs[-1][0] + len(runs[-1][1]) == change.item.cell:
             runs[-1][1].append(change.new)

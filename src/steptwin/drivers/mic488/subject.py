@@ -13,7 +13,7 @@ from steptwin.drivers.mic488.jog import AsyncMic488Jog
 from steptwin.drivers.mic488.motion import status_text
 from steptwin.drivers.mic488.program import ProgramState
 from steptwin.drivers.modbus import Query
-from steptwin.drivers.subject import Action, Value
+from steptwin.drivers.subject import DeviceAction, PointValue
 from steptwin.errors import Misuse
 from steptwin.mic488.datasheet import datasheet_of
 from steptwin.mic488.points import item_of
@@ -65,7 +65,7 @@ class Mic488Part:
 
     # ------------------------------------------------------------------ points
 
-    async def values(self, points: Sequence[str]) -> Mapping[str, Value]:
+    async def values(self, points: Sequence[str]) -> Mapping[str, PointValue]:
         """The values of the data sheet that a register shows; the others are unknown."""
         registers = {point: self._register(point) for point in points}
         names = tuple(dict.fromkeys(name for name in registers.values() if name is not None))
@@ -131,7 +131,7 @@ class Mic488Part:
 
     # ------------------------------------------------------------------ commands
 
-    def actions(self) -> Mapping[type, Action]:
+    def actions(self) -> Mapping[type, DeviceAction]:
         return {
             command.Enable: self._enable,
             command.Move: self._move,

@@ -22,7 +22,7 @@ from steptwin.mic488.describe import AxisScale, Wording
 from steptwin.mic488.registermap import DataType, RegisterMap, Type
 from steptwin.mic488.registers import AXES
 from steptwin.mic488.status import AxisStatus
-from steptwin.mic488.values import Block, RegisterItem, Value, View, encoded, moves, plan, repeatable, user_item
+from steptwin.mic488.values import Block, RegisterItem, RegisterValue, UserFormat, encoded, moves, plan, repeatable, user_item
 from steptwin.wire import pdu
 
 QUERIES_KEPT = 256
@@ -117,7 +117,7 @@ class Unit:
 
     async def ask(
         self,
-        request: pdu.Request,
+        request: pdu.ModbusRequest,
         *,
         urgent: bool = False,
         permission: Permission | None = None,
@@ -158,7 +158,7 @@ class Unit:
     def axis_items(self, key: str) -> list[RegisterItem]:
         return [self.item(key, axis) for axis in range(1, AXES + 1)]
 
-    async def read(self, items: Iterable[RegisterItem], data_type: DataType = DataType.REAL) -> dict[RegisterItem, Value]:
+    async def read(self, items: Iterable[RegisterItem], data_type: DataType = DataType.REAL) -> dict[RegisterItem, RegisterValue]:
         """Read values in the form of ``data_type``, in as few frames as possible."""
         wanted = tuple(items)
         blocks = self._plans.get(wanted)
@@ -166,7 +166,7 @@ class Unit:
             if len(self._plans) >= QUERIES_KEPT:
                 self._plans.clear()
             blocks = self._plans[wanted] = plan(self.registers, wanted)
-        values: dict[RegisterItem, Value] = {}
+        values: dict[RegisterItem, RegisterValue] = {}
         for block in blocks:
             request = block.request
             answer = await self.look(request.function, request.address, request.count)
@@ -180,7 +180,7 @@ class Unit:
     async def write(
         self,
         item: RegisterItem,
-        value: Value,
+        value: RegisterValue,
         *,
         data_type: DataType = DataType.REAL,
         urgent: bool = False,
@@ -193,14 +193,14 @@ class Unit:
         request = encoded(item, value, data_type, self.unit_name(axis) if axis else "u")
         await self.ask(request, urgent=urgent, permission=permission, timeout_ns=timeout_ns, most=most)
 
-    async def read_user(self, number: int, view: View, count: int) -> list[Value]:
+    async def read_user(self, number: int, view: UserFormat, count: int) -> list[RegisterValue]:
         """Read ``count`` user registers from ``number`` on, as ``view``."""
         first = user_item(self.registers, number, view, count)
         items = [first.at(number + view.size * n) for n in range(count)]
         values = await self.read(items)
         return [values[item] for item in items]
 
-    async def write_user(self, number: int, view: View, values: Sequence[Value]) -> None:
+    async def write_user(self, number: int, view: UserFormat, values: Sequence[RegisterValue]) -> None:
         first = user_item(self.registers, number, view, len(values))
         flat: list[int] = []
         for n, value in enumerate(values):
@@ -212,7 +212,7 @@ class Unit:
 
     # ------------------------------------------------------------------ units
 
-    def shown(self, item: RegisterItem, value: Value, data_type: DataType) -> tuple[Value, str]:
+    def shown(self, item: RegisterItem, value: RegisterValue, data_type: DataType) -> tuple[RegisterValue, str]:
         """A value in the form of ``data_type``, converted into units if these are known, and its unit."""
         register = item.register
         axis = register.axis or (register.index if register.type is Type.VALUE else None)

@@ -7,7 +7,7 @@ from typing import Generic, TypeVar, cast
 
 from steptwin.drivers.mic488.unit import Unit
 from steptwin.machine import MILLISECOND, Nanos
-from steptwin.mic488.values import View
+from steptwin.mic488.values import UserFormat
 
 Number = TypeVar("Number", int, float)
 
@@ -18,7 +18,7 @@ MEMORY_NS: Nanos = 3000 * MILLISECOND
 class AsyncUserView(Generic[Number]):
     """User registers as WORD (0…65535), INT (signed), DINT or REAL; DINT and REAL take two, from an even number on."""
 
-    def __init__(self, unit: Unit, view: View) -> None:
+    def __init__(self, unit: Unit, view: UserFormat) -> None:
         self._unit = unit
         self._view = view
 
@@ -43,10 +43,10 @@ class AsyncUserRegisters:
 
     def __init__(self, unit: Unit) -> None:
         self._unit = unit
-        self.words: AsyncUserView[int] = AsyncUserView(unit, View.WORD)
-        self.ints: AsyncUserView[int] = AsyncUserView(unit, View.INT)
-        self.dints: AsyncUserView[int] = AsyncUserView(unit, View.DINT)
-        self.reals: AsyncUserView[float] = AsyncUserView(unit, View.REAL)
+        self.words: AsyncUserView[int] = AsyncUserView(unit, UserFormat.WORD)
+        self.ints: AsyncUserView[int] = AsyncUserView(unit, UserFormat.INT)
+        self.dints: AsyncUserView[int] = AsyncUserView(unit, UserFormat.DINT)
+        self.reals: AsyncUserView[float] = AsyncUserView(unit, UserFormat.REAL)
 
     async def save(self) -> None:
         """Copy registers 1000–1999 to non-volatile memory. Raises `Misuse` where the firmware has none."""

@@ -19,7 +19,7 @@ from steptwin.files.export.progress import Progress
 from steptwin.files.export.recording import AxisTrack, PinTrack, Recording
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion.divisions import profile_of
-from steptwin.motion.pulses import Reals, Times, positions, velocities
+from steptwin.motion.pulses import PulseTimes, Reals, positions, velocities
 
 _ROWS = 1 << 15
 """Rows in memory at a time."""
@@ -48,7 +48,7 @@ def samples(recording: Recording, period: Nanos) -> Iterator[tuple[Nanos, Column
         at += period * rows
 
 
-def _motion(track: AxisTrack, times: Times) -> tuple[Reals, Reals]:
+def _motion(track: AxisTrack, times: PulseTimes) -> tuple[Reals, Reals]:
     first = max(bisect_right(track.times, int(times[0])) - 1, 0)
     last = bisect_right(track.times, int(times[-1]))
     cuts = np.searchsorted(times, track.times[first + 1 : last]).tolist()
@@ -63,7 +63,7 @@ def _motion(track: AxisTrack, times: Times) -> tuple[Reals, Reals]:
     return position / scale, velocity / scale
 
 
-def _levels(pin: PinTrack, times: Times) -> NDArray[Any]:
+def _levels(pin: PinTrack, times: PulseTimes) -> NDArray[Any]:
     before = pin.level(pin.times[0] - 1)
     levels = np.array([np.nan if before is None else before, *pin.levels], dtype=np.float64 if pin.analog else np.int8)
     return levels[np.searchsorted(pin.times, times, side="right")]

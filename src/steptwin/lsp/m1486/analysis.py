@@ -30,7 +30,7 @@ from steptwin.m1486.commands import find
 from steptwin.m1486.lines import Interface
 from steptwin.m1486.structure import written_label
 from steptwin.m1486.symbols import by_chip, label_key, uses
-from steptwin.m1486.syntax import Command, JumpCondition, ParsedProgram, format_program, parse
+from steptwin.m1486.syntax import ChipCommand, JumpCondition, ParsedProgram, format_program, parse
 from steptwin.m1486.variants import Variant
 from steptwin.symbols import Symbol, SymbolKind, SymbolRole, Use
 
@@ -54,7 +54,7 @@ class M1486Analysis(Analysis):
         return check(self.text, self._variant, self._interface)
 
     @cached_property
-    def _commands(self) -> Sequence[tuple[int | None, Command]]:
+    def _commands(self) -> Sequence[tuple[int | None, ChipCommand]]:
         """With the chip that listens."""
         return tuple(by_chip(self._program))
 
@@ -64,7 +64,7 @@ class M1486Analysis(Analysis):
     def _uses(self) -> Iterator[Use]:
         yield from uses(self._program)
 
-    def _command_at(self, place: int) -> tuple[int | None, Command] | None:
+    def _command_at(self, place: int) -> tuple[int | None, ChipCommand] | None:
         return next(((chip, c) for chip, c in self._commands if c.span.start <= place <= c.span.end), None)
 
     # -- questions about a place
@@ -88,7 +88,7 @@ class M1486Analysis(Analysis):
                 break
             here = chip
         found: dict[str, str] = {}
-        for (chip, command), (_, following) in pairwise((*self._commands, (None, Command("")))):
+        for (chip, command), (_, following) in pairwise((*self._commands, (None, ChipCommand("")))):
             if command.key == "@" and command.number is not None and chip == here:
                 found.setdefault(str(command.number), str(following))
         return found
@@ -123,7 +123,7 @@ class M1486Analysis(Analysis):
         ends = [self.lines.ends[max(self.lines.line_of(command.span.start) - 1, 0)] for command in marks[1:]]
         return [self._section(command, end) for command, end in zip(marks, [*ends, last], strict=False)]
 
-    def _section(self, command: Command, end: int) -> OutlineItem:
+    def _section(self, command: ChipCommand, end: int) -> OutlineItem:
         span = Span(command.span.start, max(end, command.span.end))
         if command.key == "@":
             return OutlineItem(f"@{command.number}", SymbolKind.LABEL, span, command.argument_span)

@@ -8,14 +8,14 @@ from steptwin.m1486.lines import SEEK_ENDS_LOW, SHARED_PINS, Interface
 from steptwin.m1486.microsteps import FULL_STEP
 from steptwin.m1486.registers import REGISTERS
 from steptwin.m1486.structure import stored_bits
-from steptwin.m1486.syntax import Command
+from steptwin.m1486.syntax import ChipCommand
 from steptwin.m1486.variants import Variant
 from steptwin.symbols import SymbolKind, Use
 
 STEPS = "min. microsteps"
 
 
-def spec_of(command: Command, variant: Variant) -> CommandSpec | None:
+def spec_of(command: ChipCommand, variant: Variant) -> CommandSpec | None:
     """The row of the command table that a command means, or could mean."""
     found = find(command.key, command.number, variant)
     if found is not None:
@@ -23,7 +23,7 @@ def spec_of(command: Command, variant: Variant) -> CommandSpec | None:
     return next(iter(rows(command.key)), None)
 
 
-def command_text(command: Command, variant: Variant) -> str:
+def command_text(command: ChipCommand, variant: Variant) -> str:
     """Markdown about a command as it is written."""
     spec = spec_of(command, variant)
     if spec is None:
@@ -58,7 +58,7 @@ def _full_steps(number: int) -> str:
     return f"{number / FULL_STEP:.10g} full steps"
 
 
-def steps_hint(command: Command, variant: Variant) -> str:
+def steps_hint(command: ChipCommand, variant: Variant) -> str:
     """A distance in full steps, where that is easier to read."""
     spec = find(command.key, command.number, variant)
     if spec is None or spec.unit != STEPS or command.number is None:
@@ -66,7 +66,7 @@ def steps_hint(command: Command, variant: Variant) -> str:
     return _full_steps(command.number)
 
 
-def number_text(use: Use, command: Command, interface: Interface) -> str:
+def number_text(use: Use, command: ChipCommand, interface: Interface) -> str:
     """Markdown about the line, function, flag or register that a number names."""
     symbol = use.symbol
     number = int("".join(c for c in symbol.key.rpartition(":")[2] if c.isdigit()))
@@ -84,7 +84,7 @@ def number_text(use: Use, command: Command, interface: Interface) -> str:
             return f"Flag {number}, the carry: + and - set and clear it." if number == CARRY else f"User flag {number}."
 
 
-def line_text(number: int, command: Command, interface: Interface) -> str:
+def line_text(number: int, command: ChipCommand, interface: Interface) -> str:
     text = f"Line B{number}."
     if number in SHARED_PINS:
         text += f" Its pin is also {SHARED_PINS[number]}."

@@ -14,8 +14,8 @@ from steptwin.symbols import SymbolKind, SymbolRole, Use
 from steptwin.wbc import steps as s
 from steptwin.wbc.check import CheckedProgram
 from steptwin.wbc.incremental import Edited
-from steptwin.wbc.scope import Scope
-from steptwin.wbc.tree import Assign, DecimalNumber, Identifier, KeywordStatement, Value
+from steptwin.wbc.scope import ProgramScope
+from steptwin.wbc.tree import Assign, DecimalNumber, Identifier, KeywordStatement, ValueNode
 
 _SETTINGS = ("ACCM", "DECM", "VMAXM")
 
@@ -66,12 +66,12 @@ def _times(edited: Edited, names: Names, config: ControllerConfig) -> Iterator[H
             yield Hint(edited.place(statement.end), f"{seconds:.3g} s", text)
 
 
-def _number(scope: Scope, key: str) -> int:
+def _number(scope: ProgramScope, key: str) -> int:
     register = scope.register(Identifier(0, 0, key, key))
     return 0 if register is None else register.number
 
 
-def _literal(scope: Scope, node: Value) -> float | None:
+def _literal(scope: ProgramScope, node: ValueNode) -> float | None:
     if isinstance(node, DecimalNumber):
         return node.value
     known = scope.known.get(node.key)

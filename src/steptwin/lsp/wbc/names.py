@@ -11,7 +11,7 @@ from steptwin.wbc.events import BY_LABEL, BY_REGISTER
 from steptwin.wbc.positions import PositionRow, number_text
 from steptwin.wbc.real import real_text
 from steptwin.wbc.registers import PREDEFINED, REAL, VALUE_NAMES, Domain, RegisterRow, parts
-from steptwin.wbc.scope import Scope
+from steptwin.wbc.scope import ProgramScope
 from steptwin.wbc.statements import ASSIGNMENTS, FUNCTIONS, STATEMENTS, StatementRow
 from steptwin.wbc.tree import ConstantDefinition, Label, ProgramTree
 
@@ -24,7 +24,7 @@ class Names:
     """The names of a program as it stands. ``labels`` are their names as written by key, ``values`` what constants stand for."""
 
     program: ProgramTree
-    scope: Scope
+    scope: ProgramScope
     labels: Mapping[str, str]
     values: Mapping[str, str]
     around: ProgramContext
@@ -39,7 +39,7 @@ class Names:
                 labels.setdefault(statement.name.key, statement.name.text)
             elif isinstance(statement, ConstantDefinition):
                 values.setdefault(statement.name.key, statement.value.text)
-        return cls(program, Scope(program, around.positions, around.dialect, []), labels, values, around)
+        return cls(program, ProgramScope(program, around.positions, around.dialect, []), labels, values, around)
 
     def meaning(self, key: str) -> str:
         """What a constant stands for, as it is written."""

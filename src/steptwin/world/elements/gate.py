@@ -29,7 +29,7 @@ FUNCTIONS: Mapping[str, Callable[[list[bool]], bool]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Inputs(PinOf):
+class GateInputs(PinOf):
     """Outputs that it is joined to, or how many inputs it has."""
 
     def __call__(self, value: Any) -> int | tuple[Terminal, ...]:
@@ -82,7 +82,7 @@ GATE = with_terminals(
         Key("kind", word(*FUNCTIONS), ", ".join(FUNCTIONS)),
         Key(
             "inputs",
-            Inputs(OUTPUT, MOST_INPUTS),
+            GateInputs(OUTPUT, MOST_INPUTS),
             "outputs joined to IN1, IN2 ...: MACHINE.PIN or ELEMENT.TERMINAL; or how many inputs, for wires and contacts",
         ),
     ),

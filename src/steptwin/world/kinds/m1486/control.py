@@ -11,7 +11,7 @@ from steptwin.m1486.microsteps import FULL_STEP
 from steptwin.m1486.points import UNIT
 from steptwin.m1486.present import program_words
 from steptwin.m1486.ranges import out_of_range
-from steptwin.m1486.syntax import Command
+from steptwin.m1486.syntax import ChipCommand
 from steptwin.world import script as do
 from steptwin.world.control import ControllerCommand, Jog, Move, StopAxes
 
@@ -35,7 +35,7 @@ def _number(chip: M1486Chip, letter: str, value: float, what: str) -> str:
     """A command with its number. Raises `Misuse` for one that it does not take."""
     if value != int(value):
         raise Misuse(f"{what}: a whole number is needed")
-    why = out_of_range(Command(letter, int(value)), chip.variant)
+    why = out_of_range(ChipCommand(letter, int(value)), chip.variant)
     if why is not None:
         raise Misuse(f"{what}: {why}")
     return f"{letter.lower()}{int(value)}"

@@ -12,7 +12,7 @@ from steptwin.m1486.microsteps import FULL_STEP
 from steptwin.m1486.points import UNIT
 from steptwin.m1486.present import program_words
 from steptwin.m1486.ranges import out_of_range
-from steptwin.m1486.syntax import Command
+from steptwin.m1486.syntax import ChipCommand
 from steptwin.m1486.variants import Store
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.motion.ramps import plan_distance
@@ -47,7 +47,7 @@ class M1486HeldJog:
         self._line = line
         self._direction = 1 if wanted.velocity > 0.0 else -1
         self._velocity = round(abs(wanted.velocity) / (FULL_STEP * chip.variant.clock))
-        why = out_of_range(Command("V", self._velocity), chip.variant)
+        why = out_of_range(ChipCommand("V", self._velocity), chip.variant)
         if why is not None:
             raise Misuse(f"velocity {wanted.velocity:g} {UNIT}/s, V{self._velocity}: {why}")
         self._before = chip.drive.velocity

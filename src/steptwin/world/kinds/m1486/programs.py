@@ -13,7 +13,7 @@ from steptwin.m1486.encoding import decode, encode
 from steptwin.m1486.points import live_point
 from steptwin.m1486.program import WaitReason
 from steptwin.m1486.registers import GENERAL
-from steptwin.m1486.syntax import Command, parse
+from steptwin.m1486.syntax import ChipCommand, parse
 from steptwin.m1486.unit import MASK
 from steptwin.machine import Nanos
 from steptwin.statements import StatementHook
@@ -39,7 +39,7 @@ class _Text:
 
     def __init__(self, source: SourceText | None) -> None:
         self.source = source
-        self.commands: list[Command] = []
+        self.commands: list[ChipCommand] = []
         self.offsets: list[int] = []
         """Where each command lies."""
         self.labels: dict[str, int] = {}

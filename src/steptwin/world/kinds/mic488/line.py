@@ -13,7 +13,7 @@ from steptwin.mic488.vision import Com1Port, uses_vision
 from steptwin.wire.gateway import Gateway, ScriptPort, TcpGatewayPort
 from steptwin.wire.line import SerialLine
 from steptwin.wire.rtu import BURSTY_GAP_NS, UART_GAP_NS
-from steptwin.wire.slave import Device, FrameDirection, FrameObserver, RtuSlavePort, SlavePort, TcpSlavePort
+from steptwin.wire.slave import FrameDirection, FrameObserver, RtuSlavePort, SlaveDevice, SlavePort, TcpSlavePort
 from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
 from steptwin.world.faults import Faults
 from steptwin.world.faults import LineProtocol as FaultLine
@@ -52,7 +52,7 @@ class ModbusBus(Line):
     ) -> None:
         super().__init__(kernel, name, record, faults)
         self.devices = devices
-        self._served: Mapping[int, Device] = devices
+        self._served: Mapping[int, SlaveDevice] = devices
         self._baud = baud
         self._gap = gap
         # WBC-15: a vision system belongs to one controller; without its registers in a program it costs nothing.
@@ -69,7 +69,7 @@ class ModbusBus(Line):
     def master(self) -> Master:
         return self._master
 
-    def serve_by(self, served: Callable[[Mapping[int, Device]], Mapping[int, Device]]) -> None:
+    def serve_by(self, served: Callable[[Mapping[int, SlaveDevice]], Mapping[int, SlaveDevice]]) -> None:
         """Without line timing; ports that are made from now on use it."""
         self._served = served(self.devices)
 

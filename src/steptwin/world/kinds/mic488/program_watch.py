@@ -17,7 +17,7 @@ from steptwin.mic488.registers import AXIS_STATUS_TEXTS
 from steptwin.mic488.status import AxisStatus
 from steptwin.state import Plain
 from steptwin.wbc import steps as s
-from steptwin.wbc.controller import Reader
+from steptwin.wbc.controller import RegisterReader
 from steptwin.wbc.real import real_text
 from steptwin.world.kernel import Kernel
 
@@ -110,7 +110,7 @@ class ProgramWatch:
         duration = self.device.program.interpreter.not_before - now
         self._tell(now, "delay", f"waits {real_text(duration / SECOND)} s", number)
 
-    def _sets(self, now: Nanos, number: int, name: str, read: Reader, before: float) -> None:
+    def _sets(self, now: Nanos, number: int, name: str, read: RegisterReader, before: float) -> None:
         after = read(self.device.program, now)
         if after != before:
             self._tell(now, "register", f"{name} = {real_text(after)}", number)

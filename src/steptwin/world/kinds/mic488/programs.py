@@ -14,7 +14,7 @@ from steptwin.mic488.program_registers import ACCESS
 from steptwin.statements import StatementHook
 from steptwin.wbc.dialect import Dialect
 from steptwin.wbc.flow import returning
-from steptwin.wbc.scope import Scope
+from steptwin.wbc.scope import ProgramScope
 from steptwin.wbc.steps import JumpStep, Literal, RegisterOperand, Source, Variable
 from steptwin.wbc.syntax import parse
 from steptwin.wbc.tree import Identifier, ProgramTree
@@ -118,7 +118,7 @@ class _Bank:
         spans = [*((step.start, step.end) for step in program.steps), (end, end)]
         self.statements = tuple(Statement(start, end, source.position(start)[0]) for start, end in spans)
         self.labels = program.labels
-        self._scope: Scope | None = None
+        self._scope: ProgramScope | None = None
         self._named = sorted((number, name) for name, number in self.labels.items())
 
     @cached_property
@@ -136,7 +136,7 @@ class _Bank:
             if variable.upper() == key:
                 return Variable(index, variable)
         if self._scope is None:
-            self._scope = Scope(self._tree, None, dialect, [])
+            self._scope = ProgramScope(self._tree, None, dialect, [])
         return self._scope.value(Identifier(0, 0, name, key))
 
     def comes_back(self, number: int) -> bool:

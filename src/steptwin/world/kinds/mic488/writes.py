@@ -5,13 +5,13 @@ from __future__ import annotations
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.registermap import DataType
 from steptwin.mic488.values import encoded, named
-from steptwin.wire.pdu import MAX_WRITTEN_REGISTERS, Request, WriteRegistersRequest, encode_request
+from steptwin.wire.pdu import MAX_WRITTEN_REGISTERS, ModbusRequest, WriteRegistersRequest, encode_request
 from steptwin.world.kind import Values
 
 
 def encode_write(device: Mic488Device, values: Values) -> tuple[bytes, ...]:
     """The requests that write registers by name; neighbours go together. Raises `Misuse` for what one does not take."""
-    requests: list[Request] = []
+    requests: list[ModbusRequest] = []
     for register, value in values:
         item = named(device.registers, register)
         axis = item.register.axis
