@@ -52,16 +52,20 @@ def test_a_complete_table_is_read_only() -> None:
             "steptwin.wbc.resolve",
             "step of WAIT: there is no such statement",
         ),
-        ("import steptwin.wbc.steps as t; t.STEPS += (t.Step,)", "steptwin.wbc.compile", "step Step lacks its sources"),
+        (
+            "import steptwin.wbc.steps as t; t.STEPS += (t.ProgramStep,)",
+            "steptwin.wbc.compile",
+            "step ProgramStep lacks its sources",
+        ),
         (
             "import steptwin.wbc.steps as t; t.STEPS = t.STEPS[1:]",
             "steptwin.wbc.flow",
             "successors of SetStep: there is no such step",
         ),
         (
-            "import steptwin.wbc.usage, steptwin.wbc.steps as t; t.STEPS += (t.Step,)",
+            "import steptwin.wbc.usage, steptwin.wbc.steps as t; t.STEPS += (t.ProgramStep,)",
             "steptwin.wbc.compile",
-            "step Step lacks its code",
+            "step ProgramStep lacks its code",
         ),
         (
             "import steptwin.wbc.registers as t; t.ROWS['NEW'] = t.ROWS['OUT']",

@@ -14,20 +14,20 @@ class ConfigurationKey:
     """A key of the file."""
 
     name: str
-    """As the vendor writes it: ``MotResol``."""
+    """The vendor's spelling: ``MotResol``."""
     meaning: str
     unit: str
     text: str
-    """As it is written; empty where it is not in the file."""
+    """The value as text in the file; empty where the key is missing."""
     value: float
-    """What it is; the default where it is not in the file, or wrong there."""
+    """The value; the default where the key is missing or its value is wrong."""
     default: float
     limits: Limits
     is_whole: bool
     choices: Mapping[int, str]
     """Texts of the values, where there are few of them."""
     point: str = ""
-    """The point of the data sheet that has it at run time; empty without one."""
+    """The point of the data sheet with this value at run time; empty without one."""
     source: str
 
 
@@ -42,10 +42,10 @@ class Section:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Form:
-    """A file with what is in it."""
+    """A configuration file as a form: its sections, keys and values."""
 
     source: SourceText
     sections: tuple[Section, ...]
     diagnostics: Sequence[Diagnostic]
     points: Mapping[str, float]
-    """What would be written to points, so that a running controller has the values of the file; in its present units."""
+    """The values to write to points so that a running controller has those of the file; in its present units."""

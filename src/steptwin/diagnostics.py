@@ -17,7 +17,7 @@ MOST_SHOWN = 100
 """Diagnostics of one text shown to people; JSON has all of them."""
 LONGEST_TEXT = 500
 """Characters of a message shown to people: it may quote a word of any length."""
-# C0 and C1 but tabs, and what turns the direction of writing round.
+# C0 and C1 except tabs, and characters that reverse the direction of writing.
 _CONTROL = re.compile("[\x00-\x08\x0a-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 _PICTURES = {chr(code): chr(0x2400 + code) for code in range(0x20)} | {"\x7f": "\u2421"}
 _LINE_END = re.compile(r"\r\n|\n|\r")
@@ -94,7 +94,7 @@ def split_lines(text: str) -> Iterator[tuple[str, str]]:
 
 
 def in_order(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
-    """The diagnostics as they come in the text."""
+    """The diagnostics in the order of the text."""
     return sorted(diagnostics, key=lambda d: (d.span.start, d.span.end, d.code))
 
 

@@ -8,7 +8,7 @@ class SteptwinError(Exception):
 
 
 class Misuse(SteptwinError, ValueError):
-    """The caller gave something that is not permitted; the text names value, permitted range and unit."""
+    """The caller gave a value that is not permitted; the text names the value, the permitted range and its unit."""
 
 
 class SourceErrors(Misuse):

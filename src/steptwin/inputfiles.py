@@ -11,9 +11,9 @@ from steptwin.errors import Misuse
 from steptwin.system import READ_FLAGS, reason
 
 MOST_BYTES = 1 << 20
-"""Of programs, configurations, tables and descriptions, which people write."""
+"""Limit for programs, configurations, tables and descriptions, which people write."""
 MOST_RECORDED_BYTES = 64 << 20
-"""Of sessions and recordings, which programs write."""
+"""Limit for sessions and recordings, which programs write."""
 
 _KINDS = (
     (stat.S_ISDIR, "a directory"),

@@ -14,7 +14,7 @@ T = TypeVar("T")
 
 
 class Later(Generic[T]):
-    """A result, or the error instead of it, that is there or will be."""
+    """A result, or an error instead of it, that is available now or later."""
 
     __slots__ = ("_actions", "_error", "_value", "is_done")
 
@@ -25,11 +25,11 @@ class Later(Generic[T]):
         self._actions: list[Callable[[], object]] = []
 
     def put(self, value: T) -> None:
-        """It is there. Only the first result counts."""
+        """Set the result. Only the first result counts."""
         self._end(value, None)
 
     def fail(self, error: Exception) -> None:
-        """There will be none."""
+        """Set an error instead of a result."""
         self._end(None, error)
 
     def _end(self, value: T | None, error: Exception | None) -> None:
@@ -41,13 +41,13 @@ class Later(Generic[T]):
             action()
 
     def result(self) -> T:
-        """Of one that is done. Raises its error."""
+        """The result, once it is done. Raises its error."""
         if self._error is not None:
             raise self._error
         return self._value  # type: ignore[return-value]
 
     def then(self, action: Callable[[], object]) -> None:
-        """Call ``action`` when it is done: at once where it is."""
+        """Call ``action`` when the result is done: at once if it already is."""
         if self.is_done:
             action()
         else:
@@ -60,7 +60,7 @@ class Later(Generic[T]):
 
 
 def start(work: Coroutine[Later[Any], None, T]) -> Later[T]:
-    """Run a coroutine as far as it gets now; it goes on when what it waits for is there. It may wait for `Later` only."""
+    """Run a coroutine until it waits; it continues when that result is done. It may wait for `Later` only."""
     later: Later[T] = Later()
     _go_on(work, later)
     return later

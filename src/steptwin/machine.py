@@ -20,7 +20,7 @@ SECOND: Nanos = 1_000_000_000
 
 
 Fact: TypeAlias = tuple[str, Any]
-"""A name and its plain value, such as the number of an axis: what the text of an event says, for programs."""
+"""A name and its plain value, such as the number of an axis: a part of the text of an event, for programs."""
 
 
 class PinEdge(NamedTuple):
@@ -46,7 +46,7 @@ class MachineEvent(Protocol):
     def text(self) -> str: ...
     @property
     def facts(self) -> tuple[Fact, ...]:
-        """What the text says, for programs."""
+        """The contents of the text, for programs."""
         ...
 
 
@@ -67,7 +67,7 @@ class Drive(Protocol):
 
     @property
     def plan(self) -> Plan:
-        """What gives its pulses, from now on."""
+        """The source of its pulses, from now on."""
         ...
 
     @property
@@ -87,7 +87,7 @@ class Drive(Protocol):
 
 
 class MotionController(Machine, Protocol):
-    """A machine with named pins and axes: what a kernel, mechanics, faults and snapshots ask of a controller.
+    """A machine with named pins and axes: the interface of a controller to kernel, mechanics, faults and snapshots.
 
     Inputs take timestamped changes, outputs give timestamped edges. STEP is never an edge: it stays a plan of its axis.
     """
@@ -117,7 +117,7 @@ class MotionController(Machine, Protocol):
         ...
 
     def power_cycle(self, now: Nanos) -> None:
-        """Off and on again: as after power-on; shafts, the levels at its inputs and stored memory stay as they are."""
+        """Switch off and on again, as after power-on; shafts, the levels at its inputs and stored memory stay as they are."""
         ...
 
     def snapshot(self) -> Any:
@@ -134,29 +134,29 @@ class Port(Protocol):
 
     @property
     def broken(self) -> str | None:
-        """Why the connection has to be closed, or None. It is asked after `exchange`."""
+        """The reason for which the connection has to be closed, or None. A shell reads it after `exchange`."""
         ...
 
     def exchange(self, data: bytes, now: Nanos, /) -> bytes:
-        """Take bytes that arrive at ``now``; what is sent in answer at that moment."""
+        """Receive bytes at ``now``; returns the bytes sent at that moment."""
         ...
 
     def to_send(self, now: Nanos, /) -> list[tuple[Nanos, bytes]]:
-        """What else has been sent until ``now``, with its moments. A shell asks whenever `deadline` has come."""
+        """Further bytes sent until ``now``, with their moments. A shell calls it at every `deadline`."""
         ...
 
     def deadline(self) -> Nanos | None:
-        """When there may be more to send, as far as that is known; later than the ``now`` of the last call."""
+        """The next moment at which there may be bytes to send, if it is known; later than the ``now`` of the last call."""
         ...
 
     def close(self) -> None:
-        """The other end is gone; there are no further calls."""
+        """The other end has closed; there are no further calls."""
         ...
 
 
 @runtime_checkable
 class SendingPort(Port, Protocol):
-    """A port that sends without being asked, too: it calls ``on_output`` when there is something for `to_send`."""
+    """A port that also sends without a request: it calls ``on_output`` when there are bytes for `to_send`."""
 
     @property
     def on_output(self) -> Callable[[], None] | None: ...

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 _BUDGET = 40
-"""Words looked up for one text: a text of nothing but unknown words must not take quadratic time."""
+"""Most words looked up for one text: a text of unknown words only must not take quadratic time."""
 
 
 class NearMiss:
-    """Finds what was probably meant. Spellings are compared in upper case and given back as listed."""
+    """Finds the candidate that was probably meant. Spellings are compared in upper case and returned as listed."""
 
     def __init__(self) -> None:
         self._known: dict[str, str | None] = {}
@@ -39,7 +39,7 @@ def _nearest(key: str, candidates: Iterable[str]) -> str | None:
         other = candidate.upper()
         if other == key or abs(len(other) - len(key)) > limit:
             continue
-        # A mistake brings one letter that the other has not, at most.
+        # A mistake adds at most one letter that the other word lacks.
         if len(letters.difference(other)) > limit:
             continue
         distance = _mistakes(key, other, limit)

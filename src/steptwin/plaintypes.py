@@ -25,7 +25,7 @@ def fits(value: Any, wanted: Any) -> bool:
 
 
 def fitting(name: str, value: Any, wanted: Any) -> Any:
-    """The value, if it is of the type wanted; raises `TypeError`."""
+    """The value, if it is of the type ``wanted``; else raises `TypeError`."""
     if not fits(value, wanted):
         raise TypeError(f"{name} is {shown(value)}")
     return value

@@ -11,9 +11,9 @@ from steptwin.machine import Nanos
 from steptwin.motion import Profile
 
 FARTHEST_NS: Nanos = 1 << 55
-"""What lies more than a year ahead is never."""
+"""A moment more than a year ahead counts as never."""
 MOST_TURNS = 3
-"""Of a count that begins anew, in one segment: in two of its rounds it takes every value that it ever has."""
+"""Most turns of a wrapping count in one segment: within two rounds it takes every value."""
 
 Turns: TypeAlias = Callable[[Nanos], Iterator[Nanos]]
 """Moments after one, in order, between which (and after the last of which) a value goes one way only."""
@@ -46,7 +46,7 @@ def turns_of(profile: Callable[[], Profile]) -> Turns:
 
 
 def turns_of_round(profile: Callable[[], Profile], count: Callable[[Nanos], int], size: int) -> Turns:
-    """The same for what is shown of a ``count`` that begins anew at every multiple of ``size``: there it jumps."""
+    """The same for a shown ``count`` that wraps, and jumps, at every multiple of ``size``."""
     ends = turns_of(profile)
 
     def turns(now: Nanos) -> Iterator[Nanos]:

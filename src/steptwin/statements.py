@@ -14,11 +14,11 @@ from steptwin.machine import Nanos
 
 StatementHook: TypeAlias = Callable[[Nanos, int], None]
 StatementHooks: TypeAlias = tuple[StatementHook, ...]
-"""Those of one machine, in the order in which they are called."""
+"""The hooks of one machine, in the order of their calls."""
 
 
 def joined(hooks: StatementHooks) -> StatementHook:
-    """One hook that calls all of them, which are one at least."""
+    """One hook that calls all ``hooks``, of which there is at least one."""
     if len(hooks) == 1:
         return hooks[0]
 
@@ -30,5 +30,5 @@ def joined(hooks: StatementHooks) -> StatementHook:
 
 
 def without(hooks: StatementHooks, hook: StatementHook) -> StatementHooks:
-    """The other hooks."""
+    """The hooks without ``hook``."""
     return tuple(one for one in hooks if one != hook)

@@ -9,7 +9,7 @@ from steptwin.diagnostics import Span
 
 
 class SymbolKind(enum.Enum):
-    """What a name names; the values are for people."""
+    """The kind of object that a name denotes; the values are texts for users."""
 
     CONSTANT = "constant"
     VARIABLE = "variable"
@@ -29,7 +29,7 @@ class SymbolKind(enum.Enum):
 
 
 class SymbolRole(enum.Enum):
-    """``DEFINE``: here it comes into being."""
+    """``DEFINE``: the symbol is defined here."""
 
     DEFINE = "define"
     WRITE = "write"
@@ -38,7 +38,7 @@ class SymbolRole(enum.Enum):
 
 @dataclass(frozen=True, slots=True)
 class Symbol:
-    """What a name names: two uses belong together when kind and key are equal. ``text`` is the name as written there."""
+    """The object of a name: two uses belong together when kind and key are equal. ``text`` is the name as written there."""
 
     kind: SymbolKind
     key: str

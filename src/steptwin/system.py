@@ -23,7 +23,7 @@ LOCK_FLAGS = READ_FLAGS | os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
 
 
 def reason(error: Exception) -> str:
-    """Why something failed, in words; of a system error without what libraries add to it, such as the address."""
+    """The reason of an error as text; of a system error without the additions of libraries, such as the address."""
     if not isinstance(error, OSError):
         return str(error) or type(error).__name__
     number = error.errno if error.errno in errno.errorcode else None
@@ -54,7 +54,7 @@ def sync_directory(directory: Path) -> None:
 
 def process_exists(number: int) -> bool:
     """Whether a process of this number is running."""
-    if sys.platform == "win32":  # os.kill ends the process there, whatever the signal
+    if sys.platform == "win32":  # on Windows os.kill ends the process, whatever the signal
         import ctypes
 
         synchronize = 0x00100000

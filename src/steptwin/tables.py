@@ -17,7 +17,7 @@ class IncompleteTable(Exception):
 def complete(row: str, keys: Iterable[RowKey], behaviour: str, given: Mapping[RowKey, Behaviour]) -> Mapping[RowKey, Behaviour]:
     """``given``, read-only, when it has exactly ``keys``; else `IncompleteTable`.
 
-    ``row`` and ``behaviour`` are what one row and one behaviour are called in the message: ``statement SWAP lacks its step``.
+    ``row`` and ``behaviour`` are the terms for one row and one behaviour in the message: ``statement SWAP lacks its step``.
     """
     known = list(keys)
     lacking = [key for key in known if key not in given]

@@ -20,7 +20,7 @@ _CONTROLS_PER_TEXT = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Decoded:
-    """A text and what is needed to write it back: encoding, byte order mark, and what follows the end mark of DOS."""
+    """A text, and the facts for writing it back: encoding, byte order mark, and the bytes after the end mark of DOS."""
 
     text: str
     encoding: str

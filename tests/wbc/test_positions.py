@@ -9,9 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from steptwin.diagnostics import SourceText
-from steptwin.errors import Misuse
 from steptwin.wbc.dialect import MAX_POSITIONS
-from steptwin.wbc.positions import PositionTable, number_text, parse_positions, table_of
+from steptwin.wbc.positions import number_text, parse_positions, table_of
 
 TEXT = "home;0;0;x;x\r\nTop ; 10,5; -20.25;X;\t7\r\n;1;2;3;4;\r\n\r\n"
 
@@ -37,35 +36,6 @@ def test_rows() -> None:
 
 def test_an_unchanged_table_is_written_as_it_was() -> None:
     assert parse_positions(TEXT)[0].text == TEXT
-
-
-def test_one_changed_row_leaves_the_others_alone() -> None:
-    table = parse_positions(TEXT)[0].with_row(0, "home", (1.5, None, 0.1, -70))
-    assert table.text == TEXT.replace("home;0;0;x;x", "home;1.5;x;0.1;-70")
-    assert table.rows[0].values == (1.5, None, 0.1, -70)
-
-
-def test_a_row_is_appended_with_the_line_ends_of_the_file() -> None:
-    table = parse_positions("A;1;2;3;4\r\n")[0].with_row(1, "B", (None, 2, None, None))
-    assert table.text == "A;1;2;3;4\r\nB;x;2;x;x\r\n"
-    assert PositionTable().with_row(0, "A", (1, 2, 3, 4)).text == "A;1;2;3;4\n"
-
-
-@pytest.mark.parametrize(
-    ("index", "name", "values", "message"),
-    [
-        (3, "N", (1, 2, 3, 4), "row 3 cannot be written: permitted are 0…2"),
-        (-1, "N", (1, 2, 3, 4), "row -1 cannot be written"),
-        (0, "N", (1, 2, 3), "row 0 needs 4 values, got 3"),
-        (0, "a;b", (1, 2, 3, 4), "'a;b' cannot be the name of row 0"),
-        (0, "a\nb", (1, 2, 3, 4), "cannot be the name of row 0"),
-        (0, "N", (1, 2, 3, float("inf")), "inf cannot be written as a number"),
-    ],
-)
-def test_changes_that_are_refused(index: int, name: str, values: tuple[float, ...], message: str) -> None:
-    table = parse_positions("A;1;2;3;4\nB;1;2;3;4\n")[0]
-    with pytest.raises(Misuse, match=message):
-        table.with_row(index, name, values)
 
 
 @pytest.mark.parametrize(
@@ -120,8 +90,6 @@ def test_the_table_has_227_rows() -> None:
     text = "".join(f"P{n};1;2;3;4\n" for n in range(MAX_POSITIONS + 1))
     assert MAX_POSITIONS == 227
     assert found(text) == [("W153", 228, 1)]
-    with pytest.raises(Misuse, match="permitted are 0…226"):
-        parse_positions(text)[0].with_row(227, "last", (1, 2, 3, 4))
 
 
 real = st.floats(width=32, allow_nan=False, allow_infinity=False)

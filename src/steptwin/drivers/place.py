@@ -256,7 +256,7 @@ class SerialChannel:
     def write(self, data: bytes) -> None:
         try:
             self._port.write(data, timeout=1.0)
-        except Exception as error:  # whatever a platform raises, the port is of no use any more
+        except Exception as error:  # platforms raise different errors; after any of them the port is unusable
             raise self._gone(error) from error
 
     def read(self, timeout_s: float) -> bytes:

@@ -31,7 +31,7 @@ class TaskLine(Generic[Q, A]):
         self._ended = asyncio.Event()  # set when that is no more
         self._opening: asyncio.Task[None] | None = None
         self._timer: asyncio.TimerHandle | None = None
-        self._timer_ns: Nanos  # when it comes
+        self._timer_ns: Nanos  # moment of its arrival
         self._closed = False
         self._locks: dict[Hashable, asyncio.Lock] = {}
 
@@ -159,7 +159,7 @@ class TaskLine(Generic[Q, A]):
         if transport is not None:
             transport.close()
             try:
-                # A network serial port first hears from its server that all has gone out.
+                # A network serial port closes after its server has confirmed that all characters have been sent.
                 async with asyncio.timeout(CLOSE_S):
                     await self._ended.wait()
             except TimeoutError:

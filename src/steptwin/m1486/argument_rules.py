@@ -14,7 +14,7 @@ from steptwin.m1486.syntax import ChipCommand, JumpCondition
 from steptwin.m1486.variants import VARIANTS, Variant
 
 _REFUSES_OCCUPIED = frozenset("CT!OZ()")
-#: Zero is not a distance and no position; other commands do what is meant.
+#: Zero is no distance and no position; other commands express the intention.
 _INSTEAD_OF_ZERO = {"=": "C100", "G": "H"}
 
 

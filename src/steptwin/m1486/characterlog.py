@@ -36,7 +36,7 @@ class CharacterLog:
         self.sinks: list[Callable[[FrameLine], None]] = []
 
     def upload(self, command: int, byte: int) -> None:
-        """A chip announces the byte that it sends for ``U<command>``; it comes over the line later."""
+        """Note the byte that a chip sends for ``U<command>``; it arrives on the line later."""
         self._uploads.append((byte, f"U{command} {UPLOADS.get(command, 'reserved')}"))
 
     def received(self, now: Nanos, link: str, raw: bytes) -> None:

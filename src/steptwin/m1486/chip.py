@@ -48,7 +48,7 @@ SHUTDOWN_RESET_NS: Nanos = 10 * MILLISECOND
 
 @dataclass(frozen=True, slots=True)
 class ChipSnapshot:
-    """All state of a chip at a moment, and what it belongs to. It can be pickled; motions are shared."""
+    """All state of a chip at a moment, with its type and timing. It can be pickled; motions are shared."""
 
     variant: Variant
     is_timed: bool
@@ -125,7 +125,7 @@ class M1486Chip(Stateful):
         self._edges: list[PinEdge] = []
         self._due: Nanos | None = None
         self._waveform = 1
-        """The characteristic of the phase currents, as it was reported last."""
+        """The characteristic of the phase currents that was reported last."""
         self._rst_high_since: Nanos | None = None
         self.is_shut_down = False
         self.interface = interface
@@ -149,7 +149,7 @@ class M1486Chip(Stateful):
 
     @property
     def axes(self) -> tuple[ChipDrive]:
-        """For the world: the one axis."""
+        """The one axis, as `steptwin.machine.MotionController` has it."""
         return (self.motor.drive,)
 
     # ------------------------------------------------------------------ time
@@ -301,7 +301,7 @@ class M1486Chip(Stateful):
             return data_level(line, self.drive.currents(now))
         return self.io.levels[line]
 
-    # ------------------------------------------------------------------ what commands ask of their chip
+    # ------------------------------------------------------------------ interface to commands
 
     def read(self, lines: range, now: Nanos) -> int:
         """Lines as a number, lowest line = least significant bit; inverted by function 47."""
@@ -350,10 +350,10 @@ class M1486Chip(Stateful):
         if stops:
             self.program.abandon(now)
 
-    # ------------------------------------------------------------------ what the receiver asks of its chip
+    # ------------------------------------------------------------------ interface to the receiver
 
     def wrong_data_received(self, what: str, now: Nanos) -> None:
-        """The same; a file that is arriving is not to run then."""
+        """As `wrong_data`; a file that is being received does not run then."""
         self.wrong_data(what, now)
         if self.memory.file is FileState.OPEN and not self.unit.on(CONTINUE):
             self.memory.refuse_file()
@@ -402,7 +402,7 @@ class M1486Chip(Stateful):
         self._settle()
 
     def power_cycle(self, now: Nanos) -> None:
-        """Off and on again. Pins stay tied as they are, and the motor stands where it stood."""
+        """Switch off and on again. Pins stay tied as they are, and the motor stays where it is."""
         self.advance(now)
         self._awake()
         self.event("power-on", "power-on", now)

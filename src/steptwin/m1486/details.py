@@ -18,7 +18,7 @@ from steptwin.machine import Nanos
 
 
 def next_command(chip: M1486Chip) -> ChipCommand | None:
-    """The command the program stands before, None at the end of what is stored."""
+    """The next command of the program; None at the end of the memory in use."""
     if chip.program.is_at_end or chip.program.pc == chip.memory.end:
         return None
     stored = decode(chip.memory.fetch(chip.program.pc))

@@ -61,7 +61,7 @@ def speed_curve(settings: tuple[float, float, float, float], qualification: int,
 
 
 class WrongMove(Exception):
-    """A move that cannot start; the text says why."""
+    """A move that cannot start; the text gives the reason."""
 
 
 class ChipDrive(Stateful):

@@ -24,7 +24,7 @@ _MAKERS: dict[str, Making] = flow_effects.MAKERS | motion_effects.MAKERS | io_ef
 
 
 def compile_command(chip: CommandHost, command: ChipCommand, place: int, following: int) -> CompiledCommand:
-    """The closure of a command that stands in the memory at ``place``."""
+    """The closure of a command stored in the memory at ``place``."""
     if command.from_variable:
         return CompiledCommand(_with_variable(chip, command.key, place, following), computes=False, is_linked=False)
     why = out_of_range(command, chip.variant)

@@ -139,7 +139,7 @@ class _Walk:
     def run(self) -> FlowAnalysis:
         self.arrive(0, _MAIN, self.start)
         for index, command in enumerate(self.stream.commands):
-            # A reset ends whatever was running, also what would run for ever.
+            # A reset ends the running program, also an endless one.
             if command.key == "\\" and self.stream.in_file[index] is None:
                 self.arrive(index, _MAIN, self.start)
         while self.open or self.leave_endless_calls():
@@ -215,7 +215,7 @@ class _Walk:
 
 
 def _after(command: ChipCommand, state: Settings, variant: Variant) -> Iterable[Settings]:
-    """The settings after a command that goes on to the next one."""
+    """The settings after a command that the next one follows."""
     key = command.key
     number = value(command, state)
     if key in "+-*/":

@@ -109,7 +109,7 @@ def _wait(chip: CommandHost, milliseconds: int, _place: int, following: int) -> 
 
 @MAKERS.does("Clear kill")
 def _clear_kill(_chip: CommandHost, _number: int, _place: int, following: int) -> Effect:
-    # A program that comes here is not stopped; C75 itself acts when it is received.
+    # C75 acts when it is received. A program that executes it is not stopped.
     return lambda now: following
 
 

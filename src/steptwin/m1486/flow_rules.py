@@ -112,7 +112,7 @@ def _too_fast(command: ChipCommand, state: Settings) -> _Fault | None:
 
 
 def _fine_end(command: ChipCommand, state: Settings) -> _Fault | None:
-    """M-39: what is left of a distance below one step of Q."""
+    """M-39: the rest of a distance below one step of Q."""
     m, q, distance = state.microstep, state.qualification, state.distance
     if command.key != "R" or m is None or q is None or distance is None or state.start_stop is None or state.velocity is None:
         return None

@@ -75,7 +75,7 @@ class SerialChain(Stateful):
             chip.receive(data, now)
 
     def collect(self, now: Nanos) -> None:
-        """Give the ports what has left the chips by ``now``."""
+        """Give the ports the characters that have left the chips by ``now``."""
         merged = self._merged(now)
         for port in self._ports:
             port.keep(merged)

@@ -159,7 +159,7 @@ class MotorControl(Stateful):
             self._chip.program.is_killed = True
 
     def line_changed(self, line: int, level: int, now: Nanos) -> None:
-        """A seek ends when its line says so; function 52 has it end on a multiple of four full steps."""
+        """A seek ends at the level of its line; with function 52 it ends on a multiple of four full steps."""
         chip, drive = self._chip, self.drive
         if drive.motion is MotionMode.SEEK and not drive.is_stopping and line == self._seek_line and seek_ends(line, level):
             drive.force_stop(now, SEEK_LANDING_U if chip.unit.on(FULLSTEPSS) else None)

@@ -141,7 +141,7 @@ def _turns(chip: M1486Chip, row: _PointRow) -> Turns | None:
     profile = partial(_profile, chip)
     if row.bits is None:
         return turns_of(profile)
-    # While a move goes on the counter shows its end (M-16): then there are turns at which nothing changes.
+    # During a move the counter shows its end (M-16): there are then turns at which nothing changes.
     return turns_of_round(profile, lambda now: chip.drive.true_u(now) + chip.drive.offset_u, 2**row.bits)
 
 

@@ -252,7 +252,7 @@ class Receiver(Stateful):
         self._removed(stored, now)
 
     def _removed(self, count: int, now: Nanos) -> None:
-        """Function 57: say that there is room again."""
+        """Function 57: report that there is room again."""
         if count == 0 or not self._chip.unit.on(REPORT):
             return
         if self.free - count < _LAST_BYTES <= self.free:
@@ -280,7 +280,7 @@ class Receiver(Stateful):
                 self._chip.wrong_data_received(command, now)
 
     def _is_stopped_by_motor(self) -> bool:
-        """Compression stands still while the motor runs, but not inside ``[ ]``."""
+        """Whether compression pauses because the motor runs; inside ``[ ]`` it continues."""
         return self._chip.drive.is_busy and self._chip.memory.file is FileState.CLOSED
 
     def _lacks_memory(self, command: ChipCommand) -> bool:
@@ -336,7 +336,7 @@ class Receiver(Stateful):
         self.is_deaf = True
 
     def eeprom_done(self, now: Nanos) -> None:
-        """Writing or erasing has ended: what was written may run, and what waits goes on."""
+        """Writing or erasing has ended: the stored file may run, and waiting commands are compressed."""
         self.busy_until = None
         self.is_deaf = False
         if self._chip.memory.file is FileState.CLOSED:
@@ -346,7 +346,7 @@ class Receiver(Stateful):
 
 @lru_cache(_LINES_KEPT)
 def _read(text: str, variant: Variant) -> ChipCommand | str:
-    """The command of a line, or what is wrong with the line."""
+    """The command of a line, or a description of its error."""
     line, found = parse_line(text)
     command = line.command
     if command is None:

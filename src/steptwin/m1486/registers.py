@@ -26,7 +26,7 @@ REGISTERS: tuple[ChipRegister, ...] = (
 #: The registers that share the command memory on some variants.
 GENERAL = range(1, 9)
 
-#: Bytes ``U`` can ask for; the heading of the section says 18, its table goes to 20. The others are reserved.
+#: Bytes that ``U`` can request; the heading of the section says 18, its table goes to 20. The others are reserved.
 UPLOADS: dict[int, str] = {
     1: "position, low byte",
     2: "position, middle byte",

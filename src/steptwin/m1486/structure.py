@@ -48,15 +48,15 @@ class CommandStream:
     #: ``[`` inside ``[ ]`` and ``]`` outside.
     nested_opens: list[int] = field(default_factory=list)
     lone_closes: list[int] = field(default_factory=list)
-    #: Index of E to index of its L, and what has no partner.
+    #: Index of E to index of its L; then the commands without a counterpart.
     loops: dict[int, int] = field(default_factory=dict)
     open_loops: list[int] = field(default_factory=list)
     lone_ends: list[int] = field(default_factory=list)
-    #: For each command the innermost loop it stands in, by its L; for each L the loop around it, and how deep it is itself.
+    #: For each command its innermost loop, by the L; for each L the loop around it, and its own depth.
     innermost: list[int | None] = field(default_factory=list)
     outer: dict[int, int | None] = field(default_factory=dict)
     depth: dict[int, int] = field(default_factory=dict)
-    #: For each command: the file it stands in, as an index into ``files``.
+    #: For each command its file, as an index into ``files``.
     in_file: list[int | None] = field(default_factory=list)
     #: Bits stored before each command, and after the last.
     bits_before: list[int] = field(default_factory=list)
@@ -69,7 +69,7 @@ class CommandStream:
         return self.bits_before[-1]
 
     def loops_around(self, index: int) -> list[int]:
-        """The loops the command at ``index`` stands in, by their L, from the innermost out."""
+        """The loops around the command at ``index``, by their L, from the innermost out."""
         found: list[int] = []
         loop = self.innermost[index]
         while loop is not None:

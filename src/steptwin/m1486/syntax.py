@@ -155,7 +155,7 @@ def format_program(program: ParsedProgram, end: str = "\n") -> str:
 
 
 class _BrokenLine(Exception):
-    """The rest of the line cannot be read; what is wrong has been reported."""
+    """The rest of the line cannot be read; the error has been reported."""
 
 
 class _LineReader:

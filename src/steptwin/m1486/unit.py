@@ -8,7 +8,7 @@ from steptwin.state import Stateful
 #: M-13: the internal variable and the position counter have 24 bits and begin anew after the last.
 MASK = 0xFFFFFF
 
-#: Where the operand of + - * / comes from.
+#: Source of the operand of + - * /.
 NUMBER, FROM_LINES, FROM_REGISTER = range(3)
 
 

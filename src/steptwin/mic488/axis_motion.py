@@ -26,13 +26,13 @@ MAX_SPEED_P = 64_000.0
 """Pulses/s an axis can give [1.74]; higher commanded speeds are clamped and reported."""
 
 SLOWEST_RAMP_P = 0.01
-"""Pulses/s²: 74 days to the highest speed. With less, ways of braking would outgrow what a double resolves to a pulse."""
+"""Pulses/s²: 74 days to the highest speed. With less, a double could not resolve braking distances to a pulse."""
 
 STRIDE_P = 2**32
-"""Bound of what an encoder may ask for at once: more than any position register holds, little enough to plan."""
+"""Bound of a distance required by an encoder: more than any position register holds, small enough for planning."""
 
 NEAR_P = 1e-6
-"""A braking that ends this close behind a soft limit ends on it: more than rounding errors, less than any pulse."""
+"""A braking that would end this close behind a soft limit ends on it: more than rounding errors, less than any pulse."""
 
 
 class AxisHost(Protocol):
@@ -132,7 +132,7 @@ class AxisMotion(Stateful):
         self.ramp_p = self.up_p
         """Velocity a velocity move (or a homing) goes to, and its ramp while slowing down."""
         self.on_path = False
-        """On a line, circle or arc, which it runs together with another axis."""
+        """The axis moves along a line, circle or arc together with another axis."""
         self.on_arc = False
         self.enabled = False
         """Whether the EN output is on."""
@@ -204,13 +204,13 @@ class AxisMotion(Stateful):
         self.control.arrived(self, now, corrects=not self.on_arc)
 
     def _rest(self, now: Nanos, status: AxisStatus) -> None:
-        """Stand on the counted pulse with ``status``."""
+        """Rest on the counted pulse with ``status``."""
         self._forget()
         self.profile = at_rest(now, self.profile.count(now))
         self.revision += 1
         self.status = self.arrival = status
         self._blocked_leg: tuple[Nanos, int] | None = None
-        """When and in which direction the profile will turn into an active limit switch."""
+        """Moment and direction at which the profile will turn towards an active limit switch."""
         self.control.rested(self, now)
 
     def _forget(self) -> None:
@@ -230,7 +230,7 @@ class AxisMotion(Stateful):
         self._steer(status, now)
 
     def follow(self, target_p: int, now: Nanos) -> None:
-        """Go to motor position ``target_p``, which the encoder asks for."""
+        """Move to motor position ``target_p``, as required by the encoder."""
         count = self.profile.count(now)
         self.target_p = count + min(max(target_p - count, -STRIDE_P), STRIDE_P)
         self.speed_p = self.cruise_p
@@ -238,7 +238,7 @@ class AxisMotion(Stateful):
         self._go(now)
 
     def creep(self, distance_p: int, now: Nanos) -> None:
-        """A step of the correction of the position, which knows no soft limits: its target was within them."""
+        """A step of the correction of the position. Soft limits do not apply, since its target is within them."""
         state = MotionState.of(self.profile, now)
         distance_p = min(max(distance_p, -STRIDE_P), STRIDE_P)
         profile = plan_position(state, state.count + distance_p, self.up_p, self.down_p, self.cruise_p)
@@ -246,25 +246,25 @@ class AxisMotion(Stateful):
 
     @property
     def cruise_p(self) -> float:
-        """VMAX as far as the outputs can give it."""
+        """VMAX, limited to the highest speed of the outputs."""
         return min(self.vmax_p, MAX_SPEED_P)
 
     @property
     def up_p(self) -> float:
-        """ACC as far as motions can be planned with it."""
+        """ACC, limited to the range of planning."""
         return max(self.acc_p, SLOWEST_RAMP_P)
 
     @property
     def down_p(self) -> float:
-        """DEC as far as motions can be planned with it."""
+        """DEC, limited to the range of planning."""
         return max(self.dec_p, SLOWEST_RAMP_P)
 
     def halt(self, now: Nanos) -> None:
-        """Stand on the counted pulse between two legs of a homing."""
+        """Rest on the counted pulse between two legs of a homing."""
         self.profile = at_rest(now, self.profile.count(now))
 
     def _replan(self, now: Nanos) -> None:
-        """Limits or coordinates have changed under a motion: plan it anew from where it is."""
+        """Plan a motion anew from its present state, after a change of limits or coordinates."""
         if not self.profile.moving(now) or self.homing.passes_soft_limits or self.on_path:
             return
         if self.status is AxisStatus.POSITION:
@@ -273,11 +273,11 @@ class AxisMotion(Stateful):
             self._steer(self.status, now)
 
     def _take_ramps(self) -> None:
-        """A motion keeps the ramps with which it was commanded (MIC-40)."""
+        """Keep the present ramps for the motion being commanded (MIC-40)."""
         self.rise_p, self.fall_p = self.up_p, self.down_p
 
     def _steer(self, status: AxisStatus, now: Nanos) -> None:
-        """Towards ``velocity_p``, slowing down with ``ramp_p``."""
+        """Change the velocity to ``velocity_p``, slowing down with ``ramp_p``."""
         state = self.state(now)
         ramp_p = self._braking(state, self.ramp_p)
         velocity_p = self.velocity_p
@@ -305,7 +305,7 @@ class AxisMotion(Stateful):
         self._begin(plan_position(state, target, self.rise_p, dec_p, self.speed_p), AxisStatus.POSITION, AxisStatus.REACHED)
 
     def _to_edge(self, state: MotionState, edge: int, direction: int, dec_p: float, speed_p: float) -> Profile:
-        """To rest on the soft limit ``edge``; behind it already, or too late to brake before it, come to rest there."""
+        """Come to rest on the soft limit ``edge``, or behind it if it is passed already or too near to brake before it."""
         if (_rest_p(state, dec_p) - edge) * direction > NEAR_P:
             return plan_stop(state, dec_p)
         return plan_position(state, edge, self.rise_p, dec_p, speed_p)
@@ -330,7 +330,7 @@ class AxisMotion(Stateful):
         return None if limit == none or self.homing.passes_soft_limits else limit - self.offset_p
 
     def state(self, now: Nanos) -> MotionState:
-        """Where a motion begins. A coordinate that has wrapped is the new one from here on."""
+        """The state from which a motion begins. A coordinate that has wrapped counts from its new value."""
         state = MotionState.of(self.profile, now)
         coordinate = state.count + self.offset_p
         if not DINT_MIN <= coordinate <= DINT_MAX:
@@ -374,7 +374,7 @@ class AxisMotion(Stateful):
         return self.input_active(number)
 
     def _guard_switches(self, now: Nanos) -> None:
-        """Stop now, or know when to stop, where the profile moves into an active limit switch (MIC-12)."""
+        """Stop if the profile moves into an active limit switch, or note the moment at which it will (MIC-12)."""
         self._blocked_leg = None
         blocked = [direction for direction in (-1, 1) if self._switch_blocks(direction)]
         for begin, direction in self.profile.legs(now) if blocked else ():
@@ -404,7 +404,7 @@ class AxisMotion(Stateful):
 
     @property
     def seeks_stop(self) -> bool:
-        """Whether it is on its way to a mechanical stop (HOME3)."""
+        """Whether the axis moves to a mechanical stop (HOME3)."""
         return self.homing.leg == Homing.TO_STOP
 
     def stop_reached(self, now: Nanos) -> None:

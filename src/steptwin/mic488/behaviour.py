@@ -20,9 +20,9 @@ from steptwin.tables import IncompleteTable, complete
 from steptwin.wire.pdu import DEVICE_FAILURE, WRITE_SINGLE_COIL, ModbusException
 
 BitGetter: TypeAlias = Callable[[int], Callable[[ControllerCore], bool]]
-"""Number of the axis, input or output (from 0) → what reads it."""
+"""Number of the axis, input or output (from 0) → the function that reads it."""
 Getter: TypeAlias = Callable[[Any, Nanos], float]
-"""Of the controller or of an axis, and a moment: the number that travels."""
+"""(controller or axis, moment) → the number in the response."""
 AxisAction: TypeAlias = Callable[[Axis, float, Nanos], None]
 
 
@@ -204,7 +204,7 @@ def _trigger(key: str, move: AxisAction) -> DeviceBehaviour:
 
 
 def _position_u(axis: Axis, now: Nanos) -> float:
-    # What masters poll most: `Axis.coordinate_p` written out.
+    # Masters poll this register most: a copy of `Axis.coordinate_p`.
     coordinate = axis.profile.count(now) + axis.offset_p
     if not DINT_MIN <= coordinate <= DINT_MAX:
         coordinate = wrapped_dint(coordinate)

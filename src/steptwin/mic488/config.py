@@ -69,10 +69,10 @@ class AxisConfig:
     enc_tolerance: int = 4
     """Encoder counts by which a position may be missed."""
     enc_settle_ms: int = 100
-    """How long after a move the correction begins."""
+    """Time from the end of a move to the beginning of the correction."""
     err_time_ms: int = 2000
-    """How long a drive may be blocked, or a correction make no progress."""
-    # MIC-8: nor for this.
+    """Longest time for which a drive may be blocked, or a correction make no progress."""
+    # MIC-8: the vendor's tool has no key for this.
     en_wired: int = 1
     """Whether EN controls the drive; 0: motion commands move the axis with EN off too."""
 
@@ -117,7 +117,7 @@ class PortConfig:
 
 @dataclass(frozen=True, slots=True)
 class ProgramConfig:
-    """``[WBC_PROGRAM]``: what runs at power-on."""
+    """``[WBC_PROGRAM]``: the program that starts at power-on."""
 
     activate: int = 0
     prog_bank: int = 0
@@ -126,7 +126,7 @@ class ProgramConfig:
 
 @dataclass(frozen=True, slots=True)
 class ControllerConfig:
-    """Everything that is configured of a controller. The defaults are a controller without configuration (MIC-27)."""
+    """The configuration of a controller. The defaults are those of a controller without configuration (MIC-27)."""
 
     axes: tuple[AxisConfig, ...] = (AxisConfig(),) * AXES
     inputs: tuple[InputConfig, ...] = (InputConfig(),) * INPUTS
@@ -163,7 +163,7 @@ class ConfigKey:
     choices: Mapping[int, str] = field(default_factory=dict)
     """The permitted numbers with their meaning, where they are few."""
     note: str = ""
-    """What is permitted, in words."""
+    """The permitted values as text."""
 
     def permits(self, value: float) -> bool:
         return value in self.permitted and (not self.choices or value in self.choices)
@@ -252,7 +252,7 @@ def keys_of(section: str, firmware_name: str = DEFAULT_FIRMWARE) -> tuple[Config
 
 
 def examine_config(file: IniFile, firmware_name: str = DEFAULT_FIRMWARE) -> tuple[ControllerConfig, list[Diagnostic]]:
-    """The configuration a file describes for a firmware, and everything that is wrong with it, in order of the text.
+    """The configuration in a file for a firmware, and its diagnostics in the order of the text.
 
     A value with an error is replaced by its default. Raises `Misuse` for an unknown firmware.
     """
@@ -289,7 +289,7 @@ _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d{1,3})?\Z", re.
 
 
 class _ConfigReader:
-    """Takes typed values from a file and collects what is wrong with them."""
+    """Reads typed values from a file and collects their errors."""
 
     def __init__(self, file: IniFile) -> None:
         self._file = file
@@ -371,7 +371,7 @@ def _unknown(span: Span, what: str, near: str | None) -> Diagnostic:
 
 
 def input_name(number: int) -> str:
-    """What a number of ``InKL``/``InKR`` is, for people; empty for one that is not permitted."""
+    """The name of the input with a number of ``InKL``/``InKR``; empty for a number that is not permitted."""
     if 0 <= number < _FIRST_CHANNEL:
         return f"IN{number + 1}"
     channel = encoder_channel(number)

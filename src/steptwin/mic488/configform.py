@@ -173,7 +173,7 @@ def _setting(
 
 
 def _limits(key: ConfigKey) -> Limits:
-    """Open where only the format of a REAL ends."""
+    """The permitted range; open where only the range of REAL bounds it."""
     low, high = (None if end is None or abs(end) >= REAL_MAX else end for end in (key.permitted.low, key.permitted.high))
     return Limits(low, high, key.permitted.above)
 

@@ -36,7 +36,7 @@ CoilAction: TypeAlias = "Callable[[ControllerCore, int, bool, Nanos], None]"
 """The effect of a write of a coil, called with the number of the axis or output, from 0."""
 
 _ERROR = AxisStatus.ERROR
-"""Asked for at every instant: a member found through its class costs more than all the rest of the question."""
+"""A global name: it is compared at every instant, and access through the class costs more than the comparison."""
 
 
 class Mic488Event(NamedTuple):
@@ -87,8 +87,8 @@ class ControllerCore(Stateful):
     """The controller behind its Modbus registers. Inputs are applied after everything that is due at their moment.
 
     ``memory`` are the stored user registers (two bytes each, high byte first; none stored: all 0); `Misuse` when their number
-    is wrong. ``programs`` and ``positions`` are what is in
-    the banks at power-on (`steptwin.mic488.program.load` makes programs), ``statement_time`` what one statement takes (WBC-6).
+    is wrong. ``programs`` and ``positions`` are the contents of the banks at power-on (`steptwin.mic488.program_banks.load` makes
+    programs), ``statement_time`` is the time of one statement (WBC-6).
 
     Hooks: ``store`` is called with the stored user registers when they are saved and returns when they are safe; an `OSError`
     says that they are not, bytes say what was stored instead. ``changed`` is called whenever the
@@ -385,7 +385,7 @@ class ControllerCore(Stateful):
         self._settle()
 
     def gear_encoder(self, axis: int, counts: int, pulses: int, now: Nanos) -> None:
-        """The encoder of ``axis`` (from 1) gives ``counts`` per ``pulses`` of the drive, whatever is configured."""
+        """Set ``counts`` of the encoder of ``axis`` (from 1) per ``pulses`` of the drive, instead of the configured ones."""
         if counts == 0 or pulses < 1:
             raise Misuse(f"M{axis}: {counts} encoder counts per {pulses} pulses: counts must not be 0, pulses 1 or more")
         chosen = self._axis(axis)

@@ -19,7 +19,7 @@ MOST_VALUES = 8
 
 
 class AxisScale(NamedTuple):
-    """How an axis counts: its configured unit (``mm``) and the pulses per unit (GEAR)."""
+    """The configured unit of an axis (``mm``), and its pulses per unit (GEAR)."""
 
     unit: str
     gear: float
@@ -89,7 +89,7 @@ class Wording:
     # ------------------------------------------------------------------ parts of a request
 
     def _groups(self, space: Space, address: int, count: int) -> Iterable[list[RequestPart]]:
-        """Pieces of a request, those of one row (all axes of a quantity) together; half a value stands alone."""
+        """Pieces of a request, those of one row (all axes of a quantity) together; half a value is a piece of its own."""
         pieces = self.register_map.pieces(space, address, count)
         return (list(group) for _, group in groupby(pieces, _group_key))
 
@@ -143,7 +143,7 @@ class Wording:
         return _with_units(shown, [self._unit(r) for r in registers])
 
     def _pulses(self, registers: Sequence[Register], counts: Sequence[int]) -> str:
-        """DINT values, and what they are in units where that is known."""
+        """DINT values, and their values in units where these are known."""
         text = _with_units([str(count) for count in counts], [self._unit(r) for r in registers])
         scales = [self._scale(r) for r in registers]
         if registers[0].kind is QuantityKind.ENCODER or any(s is None or s.unit == "imp" or s.gear == 0 for s in scales):

@@ -22,7 +22,7 @@ from steptwin.wire.pdu import DEVICE_FAILURE, exception_pdu
 
 @dataclass(frozen=True, slots=True)
 class ControllerSnapshot:
-    """All state of a controller at a moment, and what it belongs to. It can be pickled; profiles are shared."""
+    """All state of a controller at a moment, with configuration, firmware and banks. It can be pickled; profiles are shared."""
 
     config: ControllerConfig
     firmware: str

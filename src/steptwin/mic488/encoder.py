@@ -26,7 +26,7 @@ class Coupling(enum.Enum):
 
 
 class ShaftMotion(Protocol):
-    """Where mechanics turn the shaft; never changed."""
+    """The position of a shaft that mechanics turn; immutable."""
 
     def count(self, now: Nanos) -> int:
         """Position in pulses of the drive, in the same frame as the drive's counted position."""
@@ -52,17 +52,17 @@ class Encoder(Stateful):
         self._lost = 0
         """Pulses of the drive that did not turn the shaft while it was coupled to something else."""
         self._standing = 0
-        """Pulses at which the shaft stands while nothing turns it."""
+        """Position of the shaft (pulses) while nothing turns it."""
         self._motion: ShaftMotion | None = None
         self._zero = 0
-        """Shaft at which the counter shows 0."""
+        """Position of the shaft at which the counter shows 0."""
 
     def shaft(self, motor: int, now: Nanos) -> int:
         counts, pulses = self._built
         return self._turned + self._driven(motor, now) * counts // pulses
 
     def _driven(self, motor: int, now: Nanos) -> int:
-        """Where the shaft is without what a hand has turned, in pulses."""
+        """Position of the shaft without manual turning, in pulses."""
         if self._motion is not None:
             return self._motion.count(now)
         return motor - self._lost if self.coupling is Coupling.DRIVE else self._standing
@@ -76,7 +76,7 @@ class Encoder(Stateful):
 
     @property
     def turned_by(self) -> Coupling | None:
-        """What turns the shaft; None: mechanics."""
+        """The coupling of the shaft; None: mechanics turn it."""
         return self.coupling if self._motion is None else None
 
     def counter(self, shaft: int) -> int:
@@ -92,7 +92,7 @@ class Encoder(Stateful):
         self._turned += counts
 
     def couple(self, coupling: Coupling, motor: int, now: Nanos) -> None:
-        """Let the drive or nothing turn the shaft from here on; what happens in between is lost."""
+        """Select what turns the shaft from ``now`` on; pulses of the drive while it is not coupled are lost."""
         if coupling is not self.coupling or self._motion is not None:
             at = self._driven(motor, now)
             self._motion = None
@@ -103,13 +103,13 @@ class Encoder(Stateful):
             self.coupling = coupling
 
     def follow(self, motion: ShaftMotion | None) -> None:
-        """Let mechanics turn the shaft (play, a stop, steps lost, another axis); None is the drive, with not a pulse lost."""
+        """Let mechanics turn the shaft (play, a stop, lost steps, another axis); None: the drive, without lost pulses."""
         self._motion = motion
         self._lost = 0
         self.coupling = Coupling.DRIVE
 
     def gear(self, counts: int, pulses: int, motor: int, now: Nanos) -> None:
-        """The encoder gives ``counts`` (negative: backwards; not 0) per ``pulses`` (> 0) of the drive, whatever is configured."""
+        """Set ``counts`` (negative: backwards; not 0) per ``pulses`` (> 0) of the drive, instead of the configured ones."""
         before = self.shaft(motor, now)
         self._built = (counts, pulses)
         self._turned += before - self.shaft(motor, now)

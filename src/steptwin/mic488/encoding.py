@@ -25,7 +25,7 @@ _WORDS = struct.Struct("<HH")
 def swap_bytes(block: bytes | bytearray) -> bytes:
     """Exchange the two bytes of every 16-bit word; its own inverse. The length must be even.
 
-    A block of values packed little-endian (``<f``, ``<i``, ``<H``) becomes what lies on the wire, in one step for a whole
+    A block of values packed little-endian (``<f``, ``<i``, ``<H``) becomes the bytes on the wire, in one step for a whole
     block: swapping the bytes of each word, but not the words, leaves the low word of a 32-bit value first.
     """
     words = array("H", block)
@@ -64,12 +64,12 @@ def word_to_int(word: int) -> int:
 
 
 def wrapped_dint(value: int) -> int:
-    """What a 32-bit counter shows that has counted to ``value``."""
+    """The value that a 32-bit counter shows at ``value``."""
     return (value - DINT_MIN) % 2**32 + DINT_MIN
 
 
 def saturated_dint(value: float) -> int:
-    """The nearest DINT, at most the limits: what a register shows when its quantity has outgrown it. Ties go to even.
+    """The nearest DINT within its range, which a register shows when its quantity is beyond it. Ties go to even.
 
     Raises `Misuse` for NaN.
     """

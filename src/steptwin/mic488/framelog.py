@@ -13,11 +13,11 @@ from steptwin.wire.rtu import BROADCAST
 from steptwin.wire.slave import FrameDirection, FrameObserver
 
 ONE_DEVICE_UNITS = (0, 255)
-"""MIC-23: on TCP these address the only device too."""
+"""MIC-23: over TCP these units, too, address the only device."""
 
 
 class FrameLog:
-    """Puts frames into words and hands them to ``sinks``."""
+    """Describes frames in words and passes them to ``sinks``."""
 
     def __init__(self, devices: Mapping[int, Mic488Device]) -> None:
         self._devices = devices
@@ -40,7 +40,7 @@ class FrameLog:
         return observe
 
     def rubbish(self, now: Nanos, link: str, count: int) -> None:
-        """Bytes came that belong to no frame."""
+        """Log received bytes that belong to no frame."""
         words = "1 byte that belongs to no frame" if count == 1 else f"{count} bytes that belong to no frame"
         line = FrameLine(now, link, FrameDirection.IN, b"", words)
         for sink in self.sinks:

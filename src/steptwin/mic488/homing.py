@@ -97,7 +97,7 @@ class Homing(Stateful):
             self._next_leg(axis, Homing.TO_INDEX, -self._slow_p(), now)
 
     def _next_leg(self, axis: HomingAxis, leg: int, velocity_p: float, now: Nanos) -> None:
-        """Stop without ramp, then go on slowly (MIC-30)."""
+        """Stop without ramp, then begin the next leg slowly (MIC-30)."""
         self.leg = leg
         axis.halt(now)
         axis.run(velocity_p, AxisStatus.HOMING, now)

@@ -42,18 +42,18 @@ class Header:
 
 @dataclass(frozen=True)
 class IniFile:
-    """The text of a file and what lies where in it. Made by `parse`, written back by `to_bytes`."""
+    """The text of a file and the places of its entries. `parse` makes it, `to_bytes` writes it."""
 
     source: SourceText
     encoding: str
     headers: tuple[Header, ...]
     entries: tuple[IniEntry, ...]
     findings: tuple[Diagnostic, ...]
-    """What is wrong with the form of the file: codes C001–C004."""
+    """Diagnostics of the form of the file: codes C001–C004."""
 
     @classmethod
     def parse(cls, data: bytes, name: str = "configuration") -> IniFile:
-        """Read a file. Any bytes are accepted: what is no INI is kept and reported in ``findings``.
+        """Read a file. Any bytes are accepted: lines that are no INI are kept and reported in ``findings``.
 
         Text is UTF-8, UTF-16 with a byte order mark or, where it is neither, Windows code page 1250.
         """
@@ -119,7 +119,7 @@ class IniFile:
         return {name: entry.value for name, entry in self._by_name.items()}
 
     def _place(self, section: str) -> int:
-        """Where a new key of ``section`` goes: the line after its last entry or its header, else the end."""
+        """The place of a new key of ``section``: the line after its last entry or its header, else the end."""
         ends = [h.span.end for h in self.headers if h.section.lower() == section.lower()]
         ends += [e.value_span.end for e in self.entries if e.section.lower() == section.lower()]
         if not ends:

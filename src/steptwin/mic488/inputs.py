@@ -20,7 +20,7 @@ def index_input(axis: int) -> int:
 
 
 class InputSettings(Protocol):
-    """What is configured of one input: ``filter`` 0–4, ``level`` 0 active high, 1 active low."""
+    """The configuration of one input: ``filter`` 0–4, ``level`` 0 active high, 1 active low."""
 
     @property
     def filter(self) -> int: ...
@@ -31,7 +31,7 @@ class InputSettings(Protocol):
 class Inputs(Stateful):
     """State of the inputs. Numbers count from 0.
 
-    ``pins`` is what lies on the terminals, ``raw`` after polarity, ``filtered`` what registers show.
+    ``pins`` are the levels at the terminals, ``raw`` those after polarity, ``filtered`` those in registers.
     """
 
     __slots__ = ("_due", "_pending", "_settings", "filtered", "pins", "raw")
@@ -66,7 +66,7 @@ class Inputs(Stateful):
         return self._due
 
     def settle(self, now: Nanos) -> list[int]:
-        """Let through what has been stable for its filter time; the inputs whose filtered state changed, in order."""
+        """Apply levels that have been stable for their filter time; returns the inputs whose filtered state changed, in order."""
         changed = sorted(n for n, due in self._pending.items() if due <= now)
         for number in changed:
             del self._pending[number]

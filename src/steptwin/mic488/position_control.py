@@ -106,7 +106,7 @@ class PositionControl(Stateful):
                 self.tick_ns = _next_tick(now)
 
     def rested(self, axis: ControlledAxis, now: Nanos) -> None:
-        """The axis has come to rest by itself or by a command: ENCFOLLOW follows from here on."""
+        """The axis is at rest, from which ENCFOLLOW follows."""
         if axis.config.pos_ctrl_mode == self.ENCFOLLOW and not self._following:
             self.reference(axis, now)
 
@@ -193,7 +193,7 @@ class PositionControl(Stateful):
 
 
 def _part(missing_p: int, kp: float) -> int:
-    """The step of a correction: ``kp`` % of what is missing, at least a pulse and at most all of it."""
+    """The step of a correction: ``kp`` % of the missing distance, at least a pulse and at most all of it."""
     part = round(missing_p * min(kp, 100.0) / 100.0)
     return part or (1 if missing_p > 0 else -1)
 

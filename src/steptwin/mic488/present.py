@@ -62,7 +62,7 @@ def statement_of(device: Mic488Device) -> str | None:
 
 
 def empty_banks(name: str, device: Mic488Device) -> list[str]:
-    """A configuration that starts a program nobody gave lights ERR at power-on, as on the device: why, and what to do."""
+    """Reason and remedy for ERR at power-on, as on the device: the configuration starts a program whose bank is empty."""
     bank, table = device.config.program.prog_bank, device.config.program.pos_bank
     if not device.config.program.activate:
         return []

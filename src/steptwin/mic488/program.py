@@ -28,7 +28,7 @@ _DRIVES = {event.axis - 1: number for number, event in enumerate(EVENTS) if even
 
 
 STOPPED, RUNNING, PAUSED = ProgramState
-"""Asked for at every statement: a member found through its class costs more than all the rest of the question."""
+"""Global names: they are compared at every statement, and access through the class costs more than the comparison."""
 
 
 class ProgramError(NamedTuple):
@@ -41,7 +41,7 @@ class ProgramError(NamedTuple):
 class ProgramControl(Stateful):
     """Which program runs on a controller. Bank selections take effect at the next start (MIC-31).
 
-    To a program it is the controller: what `steptwin.wbc.controller.ProgramController` asks for.
+    To a program it is the controller (`steptwin.wbc.controller.ProgramController`).
     """
 
     __slots__ = (
@@ -81,15 +81,15 @@ class ProgramControl(Stateful):
         self.error = False
         """A program error is pending; cleared by the next start or stop (MIC-26)."""
         self.fault: ProgramError | None = None
-        """The last program error; it outlives ``error`` up to the next start."""
+        """The last program error; it is kept until the next start."""
         self._program = 0
         self._table = 0
         """Banks of the program that runs, and of its positions."""
         self._pulses: dict[int, Nanos] = {}
-        """When PULSE inverts which output (from 0)."""
+        """The moment at which PULSE inverts each output (from 0)."""
         self._statuses: tuple[int, ...] = ()
         self.together = False
-        """M1 and M2 are both on a path: neither leaves it alone."""
+        """M1 and M2 are on one path, which neither leaves alone."""
         for bank, program in programs.items():
             self.load_program(bank, program)
         for bank, table in positions.items():
@@ -120,7 +120,7 @@ class ProgramControl(Stateful):
     # ------------------------------------------------------------------ start, stop, pause
 
     def power_on(self, now: Nanos) -> None:
-        """Nothing runs but what the configuration starts."""
+        """No program runs, except one that the configuration starts."""
         configured = self.device.config.program
         self.program_bank = configured.prog_bank if configured.activate else 0
         self.position_bank = configured.pos_bank if configured.activate else 0
@@ -167,7 +167,7 @@ class ProgramControl(Stateful):
         self.device.event("program-error", text, now)
 
     def _begin(self, now: Nanos) -> None:
-        """What belongs to the program is as at its start (WBC-25)."""
+        """Reset everything that belongs to the program to its state at the start (WBC-25)."""
         self.registers.begin(self.device.config, now)
         self.registers.row_0 = self._row(0)
         self._statuses = tuple(axis.status for axis in self.device.axes)
@@ -205,16 +205,16 @@ class ProgramControl(Stateful):
     def _code(self) -> Code:
         return self.banks.programs[self._program].code
 
-    # ------------------------------------------------------------------ where it stands
+    # ------------------------------------------------------------------ present state
 
     @property
     def running(self) -> LoadedProgram | None:
-        """The program that runs or is paused, whatever bank is selected."""
+        """The program that runs or is paused; another bank may be selected."""
         return None if self.state is STOPPED else self.banks.programs[self._program]
 
     @property
     def running_bank(self) -> int:
-        """Of the program that runs or is paused, or did last."""
+        """The bank of the program that runs or is paused, or that ran last."""
         return self._program
 
     def variables(self, now: Nanos) -> dict[str, float]:
@@ -223,7 +223,7 @@ class ProgramControl(Stateful):
         return {} if running is None else dict(zip(running.variables, self.interpreter.cells_at(now), strict=False))
 
     def set_variable(self, name: str, value: float, now: Nanos) -> None:
-        """Of the running or paused program. Raises `Misuse` for another name, and for what is no REAL."""
+        """Set a variable of the running or paused program. Raises `Misuse` for another name, and outside the range of REAL."""
         names = () if self.running is None else self.running.variables
         if name not in names:
             raise Misuse(f"the program has no variable {name!r}: there are {', '.join(names) or 'none'}")
@@ -233,12 +233,12 @@ class ProgramControl(Stateful):
         self.interpreter.cells[names.index(name)] = value
 
     def rest_in_loops(self, on: bool, now: Nanos) -> None:
-        """Off, every statement of a loop is executed even where nothing can change by it; only the computing time changes."""
+        """Switch the skipping of loops without effect (WBC-18). It changes the computing time only."""
         self.interpreter.disturb(self.interpreter.after(now))
         self.interpreter.rests_in_loops = on
 
     def statement(self, now: Nanos) -> Span | None:
-        """Place, in the source, of the statement in execution at ``now`` or executed next; None when nothing runs."""
+        """Place, in the source, of the statement in execution at ``now`` or executed next; None if no program runs."""
         if self.state is STOPPED:
             return None
         return self._span(self.interpreter.place(now))
@@ -264,9 +264,9 @@ class ProgramControl(Stateful):
         return due
 
     def advance(self, now: Nanos, until: Nanos) -> Nanos | None:
-        """Run what is due at ``now``, and of the program alone what follows up to ``until``.
+        """Run everything due at ``now``, and statements up to ``until`` as long as they concern the program alone.
 
-        Returns the moment at which it acted on the rest of the controller, where it goes no further; None if it did not.
+        Returns the moment at which the program acted on the rest of the controller, where it stops; None if it did not.
         """
         interpreter = self.interpreter
         acted = now if self._pulses and self._invert(now) else None
@@ -293,7 +293,7 @@ class ProgramControl(Stateful):
         return acted
 
     def _invert(self, now: Nanos) -> bool:
-        """What PULSE has begun ends."""
+        """End the pulses of PULSE that are due; whether there were any."""
         over = sorted(number for number, at in self._pulses.items() if at <= now)
         for number in over:
             del self._pulses[number]
@@ -313,10 +313,10 @@ class ProgramControl(Stateful):
         for axis in self.device.axes:
             axis.brake(now)
 
-    # ------------------------------------------------------------------ what happens around it
+    # ------------------------------------------------------------------ events outside the program
 
     def disturbed(self, now: Nanos, *, inside: bool) -> None:
-        """Something happened at ``now`` that was not the program's doing; ``inside``: before its statement of this moment."""
+        """An event at ``now`` that the program did not cause; ``inside``: before its statement of this moment."""
         first = now if inside else self.interpreter.after(now)
         if self.state is RUNNING:
             self.interpreter.disturb(first)
@@ -365,7 +365,7 @@ class ProgramControl(Stateful):
         else:
             self._stop()
 
-    # ------------------------------------------------------------------ what the program asks for
+    # ------------------------------------------------------------------ actions of the program
 
     def motion(self, keyword: str, axis: int, value: float, now: Nanos) -> None:
         motion.move(self.device.axes[axis - 1], keyword, value, now)
@@ -412,7 +412,7 @@ class ProgramControl(Stateful):
         return True
 
     def set_switch(self, event: int, mode: int, now: Nanos) -> bool:
-        """CFGINT_… written: switched off, what waits is forgotten."""
+        """CFGINT_… written. If it is switched off, a pending interrupt is dropped."""
         if not mode:
             self.interpreter.pending &= ~(1 << event)
         return self.registers.switch(event, mode, now)

@@ -118,7 +118,7 @@ def load(checked: CheckedProgram, name: str = "program") -> LoadedProgram:
 
 
 def setup_of(config: ControllerConfig) -> Setup:
-    """What the checker of programs needs of a configuration."""
+    """The part of a configuration that the checker of programs needs."""
     return Setup(
         gears=tuple(axis.gear for axis in config.axes),
         accelerations=tuple(axis.acc for axis in config.axes),

@@ -1,4 +1,4 @@
-"""What a program asks of the controller it runs on: axes, inputs, outputs, user registers."""
+"""The controller on which a program runs, as its program needs it: axes, inputs, outputs, user registers."""
 
 from __future__ import annotations
 

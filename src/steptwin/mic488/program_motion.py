@@ -113,7 +113,7 @@ class _Pace(NamedTuple):
 
 
 class _Plane:
-    """M1 and M2, standing at ``now``: what is still in motion stops without ramp (WBC-26)."""
+    """M1 and M2 at rest at ``now``; an axis in motion stops without ramp (WBC-26)."""
 
     def __init__(self, device: ProgramDevice, lin_acc_u: float | None, now: Nanos) -> None:
         self.device = device
@@ -193,7 +193,7 @@ class _Plane:
         return len(moving) == len(self.axes)
 
     def _way_to_limits(self, courses: list[Straight] | list[Circular], way_u: float) -> tuple[float, dict[int, tuple[int, int]]]:
-        """How far the path goes, and the soft limits (motor position, direction) it then stands on, by axis."""
+        """The permitted part of the path, and the soft limits (motor position, direction) at its end, by axis."""
         end_w = way_u
         met: dict[int, tuple[int, int]] = {}
         for axis, course in zip(self.axes, courses, strict=True):

@@ -19,7 +19,7 @@ from steptwin.wire.pdu import ILLEGAL_DATA_ADDRESS, ModbusException, ReadRequest
 
 
 class RegisterSource(NamedTuple):
-    """Where a value comes from: ``place`` 0–3 is an axis, `DEVICE` the controller."""
+    """The source of a value: ``place`` 0–3 is an axis, `DEVICE` the controller."""
 
     place: int
     get: Getter

@@ -39,7 +39,7 @@ class Slave:
     def __init__(self, firmware: str, *, lenient: bool) -> None:
         self._map = register_map(firmware)
         self._lenient = lenient
-        # By DATA_TYPE: reads and coil writes by the whole PDU, register writes by what comes before their values.
+        # By DATA_TYPE: reads and coil writes by the whole PDU, register writes by the bytes before their values.
         self._whole: tuple[dict[bytes, RequestPlan], ...] = tuple({} for _ in DataType)
         self._heads: tuple[dict[bytes, WritePlan], ...] = tuple({} for _ in DataType)
 

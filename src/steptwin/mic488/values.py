@@ -27,7 +27,7 @@ FORM = "expected NAME, or USER_REGISTER[N] with :int, :dint or :real behind it i
 
 
 class UserFormat(enum.Enum):
-    """How user registers are looked at."""
+    """The format in which user registers are read and written."""
 
     WORD = "word"
     INT = "int"

@@ -19,7 +19,7 @@ from steptwin.wire.timed import TimedRtuSlavePort
 VISION = "VISION"
 """How the registers of the vision system begin."""
 LONGEST_RECORD = 80
-"""Characters; of more that comes without a line end the last ones are kept."""
+"""Most characters of a record; of a longer line the last ones are kept."""
 
 _LINE_END = re.compile(rb"[\r\n]+")
 _NUMBER = rb"\s*([+-]?\d{1,9}(?:[.,]\d{1,9})?)\s*"
@@ -36,7 +36,7 @@ class VisionRecord(NamedTuple):
 
 
 class VisionReceiver(Stateful):
-    """Cuts records out of what comes, in pieces of any size. A line that is no record is passed over."""
+    """Cuts records out of received characters, in pieces of any size. A line that is no record is ignored."""
 
     __slots__ = ("_line",)
 

@@ -25,7 +25,7 @@ from steptwin.wire.pdu import (
 )
 
 Check: TypeAlias = Callable[[ControllerCore, float], float | None]
-"""The value as it travelled → what is stored (pulses for REAL/DINT registers), None when it may not be written."""
+"""The value of the request → the stored value (pulses for REAL/DINT registers), None if it may not be written."""
 
 
 # ---------------------------------------------------------------------- function 05
@@ -148,7 +148,7 @@ class _ControlPlan:
 
 
 def _check(register: Register, data_type: DataType) -> Check:
-    """What a value must be (MIC-7), and what is stored of it."""
+    """The check of a written value (MIC-7), which returns the stored value."""
     permits = register.permits
     if register.type is not Type.VALUE:
         return lambda device, value: value if permits(value) else None
@@ -178,7 +178,7 @@ def _limit_of_real_p(pulses: float) -> int | None:
 
 
 def _velocity_p(pulses: float) -> float | None:
-    """Any finite velocity; what is too fast is clamped when it is used."""
+    """Any finite velocity; a velocity that is too high is limited when it is used."""
     return float(pulses) if -MOST <= pulses <= MOST else None
 
 

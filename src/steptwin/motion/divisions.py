@@ -1,7 +1,7 @@
 """STEP pulses on a microstep grid: one pulse every so many units of position, with a change of division in flight.
 
 Positions in units u (M1486: minimum microsteps), speeds in u/s. A profile counts every unit; the train of pulses that it
-drives counts the positions of a grid only, and stands on the last one it passed.
+drives counts only the positions of a grid; it stays on the last one that the profile has passed.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from steptwin.motion.profile import Profile, at_rest
 from steptwin.motion.ramps import SpeedCurve, plan_forced_stop
 
 _ROUNDING = 1.0 + 1e-9
-"""A speed that is above the limit by rounding only has not passed it: V may be the limit itself."""
+"""Factor of the limit: a speed that rounding alone puts above it has not passed it. V may be the limit itself."""
 
 
 class Microstepping(NamedTuple):
@@ -73,13 +73,13 @@ class StepTrain:
         return found
 
     def count(self, now: Nanos) -> int:
-        """Counted position at ``now``: where the last pulse due by ``now`` led."""
+        """Counted position at ``now``, after the last pulse due by ``now``."""
         begin, grid = self.division(now)
         way = (self.profile.count(now) - begin) * self.direction
         return begin + way // grid * grid * self.direction
 
     def pulse_time(self, position: int, after: Nanos) -> Nanos | None:
-        """First moment > ``after`` of a pulse that leads to ``position`` or, first of all, beyond it; None if never."""
+        """Moment of the first pulse later than ``after`` that reaches or passes ``position``; None if there is none."""
         for begin, end, grid in self.stretches():
             way = (position - begin) * self.direction
             reached = begin - (-way // grid) * grid * self.direction
@@ -89,11 +89,11 @@ class StepTrain:
 
 
 Plan: TypeAlias = Profile | StepTrain
-"""What gives the pulses of an axis: its profile, or the train of pulses that the profile drives."""
+"""The source of the pulses of an axis: its profile, or the train of pulses that the profile drives."""
 
 
 def profile_of(plan: Plan) -> Profile:
-    """The profile of a plan: the motion as time passes."""
+    """The profile of a plan."""
     return plan.profile if isinstance(plan, StepTrain) else plan
 
 
@@ -115,7 +115,7 @@ def step_train(profile: Profile, begin: int, microstepping: Microstepping, grid:
     if coarse == fine or not directions:
         return StepTrain(profile, microstepping, (Division(begin, fine),))
     direction = directions.pop()
-    up, down = _fast_stretch(profile, limit * _ROUNDING, already=grid == coarse)
+    up, down = _fast_stretch(profile, limit * _ROUNDING, is_fast=grid == coarse)
     if up is None and grid != coarse:
         return StepTrain(profile, microstepping, (Division(begin, fine),))
     origin = begin % fine
@@ -141,7 +141,7 @@ def step_train(profile: Profile, begin: int, microstepping: Microstepping, grid:
 
 
 def forced_stop(train: StepTrain, now: Nanos, curve: SpeedCurve, landing: int | None = None) -> StepTrain:
-    """What K, LIMIT or the end of a seek makes of ``train`` at ``now``: down the slope of ``curve`` to its start speed, then
+    """The train that replaces ``train`` at K, LIMIT or the end of a seek: down the slope of ``curve`` to its start speed, then
     to the next position of the fine grid (of the coarse one while the division cannot change before), or, with ``landing``,
     to the next multiple of it (64 u: a full step).
 
@@ -162,15 +162,15 @@ def forced_stop(train: StepTrain, now: Nanos, curve: SpeedCurve, landing: int | 
     return step_train(profile, counted, train.microstepping, grid)
 
 
-def _fast_stretch(profile: Profile, limit: float, *, already: bool) -> tuple[float | None, float | None]:
-    """Positions where the speed, which rises and then falls, passes ``limit`` and comes back to it; None where it does not.
+def _fast_stretch(profile: Profile, limit: float, *, is_fast: bool) -> tuple[float | None, float | None]:
+    """Positions at which the speed, which rises and then falls, exceeds ``limit`` and returns to it; None where it does not.
 
-    With ``already`` it passed the limit before this profile.
+    ``is_fast``: the speed exceeded the limit before this profile began.
     """
     begin_s = 0.0
     up: float | None = None
     down: float | None = None
-    fast = already
+    fast = is_fast
     for s in profile.segments:
         before = abs(s.velocity(begin_s))
         after = before if s.end_s == inf else abs(s.velocity(s.end_s))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import factorial
 
-# Taylor's series; what is left out is below 1e-18 of the result up to 1/2.
+# Taylor's series; up to 1/2 the omitted terms are below 1e-18 of the result.
 _TERMS = tuple(1.0 / factorial(n) for n in range(16))
 _MOST = 700.0
 

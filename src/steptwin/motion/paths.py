@@ -19,10 +19,10 @@ from steptwin.motion.profile import NEAR_P, Profile, Segment
 from steptwin.motion.trig import QUARTER, arcsine_below_45, cosine, direction, length, sine
 
 MOST_TURNS = 1000
-"""Turns of one arc: bounds its segments."""
+"""Most turns of one arc, which bounds the number of its segments."""
 
 BEYOND_P = 1e-6
-"""What goes this little beyond an edge (pulses) does not cross it: more than rounding errors, less than any pulse."""
+"""An axis crosses an edge when it is farther beyond it than this (pulses): more than rounding errors, less than any pulse."""
 
 
 # ---------------------------------------------------------------------- shapes in the plane
@@ -78,14 +78,14 @@ def arc_between(x0: float, y0: float, x1: float, y1: float, radius: float, *, ou
         if half - radius > slack:
             raise Misuse(f"radius = {radius:g}: must be at least {half:g}, half the distance of the ends")
         radius = half
-    # To the left of the chord, and on which side of it the origin is.
+    # The unit vector to the left of the chord decides on which side of it the origin is.
     left_x, left_y = (y0 - y1) / chord, (x1 - x0) / chord
     middle_x, middle_y = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
     clockwise = (left_x * middle_x + left_y * middle_y >= 0.0) is outward
     bulge = 1.0 if clockwise else -1.0
     rise = sqrt(max((radius - half) * (radius + half), 0.0))
     centre_x, centre_y = middle_x - bulge * left_x * rise, middle_y - bulge * left_y * rise
-    # From both legs of the triangle: its sine alone would lose half the digits of an arc of nearly half a turn.
+    # The angle follows from both legs of the triangle: its sine alone loses half the digits of an arc of nearly half a turn.
     sweep_q = 2.0 * direction(rise, half)
     return Arc(centre_x, centre_y, radius, direction(x0 - centre_x, y0 - centre_y), -bulge * sweep_q)
 
@@ -102,7 +102,7 @@ def _check(radius: float, sweep_q: float = 0.0) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Straight:
-    """One axis along a line: at ``origin_p`` where the way begins, ``slope`` pulses further per unit of it."""
+    """One axis along a line. It is at ``origin_p`` where the way begins and moves ``slope`` pulses per unit of the way."""
 
     origin_p: float
     slope: float
@@ -156,7 +156,7 @@ class Circular:
         return None
 
     def parts(self, begin_w: float, end_w: float) -> Iterator[CircularPart]:
-        """The stretches of one direction."""
+        """The stretches in which the axis moves in one direction, in order."""
         forward = self.turn_q > 0.0
         angle_q = self.angle_q + self.turn_q * begin_w
         half = floor(0.5 * angle_q)
@@ -198,7 +198,7 @@ class Circular:
             return profile
         missing = final - count - profile.counts[-1]
         if segments and missing * segments[-1].direction < 0:
-            # Just turned round, the axis stands a pulse behind: it comes at the very end.
+            # The axis has just turned round and lacks a pulse, which comes at the very end.
             segments.append(replace(segments[-1], direction=-segments[-1].direction))
         return ArcProfile(way.start, count, tuple(segments), float(final - count))
 
@@ -231,7 +231,7 @@ def _angle_q(course: Circular, half: int, position: float) -> float:
 
 @dataclass(slots=True)
 class ArcSegment:
-    """A stretch of an arc in which neither the axis turns round nor the acceleration of the way changes. Never changed.
+    """A stretch of an arc in which neither the axis turns round nor the acceleration of the way changes. Immutable.
 
     Answers as a `Segment` does.
     """
@@ -259,12 +259,12 @@ class ArcSegment:
 
 
 class ArcProfile(Profile):
-    """One axis along an arc. What `Profile` says of pulses and rounding holds here too."""
+    """One axis along an arc. Pulses and rounding are those of `Profile`."""
 
     __slots__ = ()
 
     segments: Any
-    """`ArcSegment`s, which answer as a `Segment` does."""
+    """`ArcSegment`s, which have the methods of a `Segment`."""
 
     def __init__(self, start: Nanos, base: int, segments: Any, final_p: float) -> None:
         super().__init__(start, base, segments, final_p)

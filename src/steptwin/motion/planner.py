@@ -20,7 +20,7 @@ FARTHEST_P = 2**48
 
 
 class MotionState(NamedTuple):
-    """Where a motion begins: moment, counted position (pulses), phase (real minus counted, pulses), velocity (pulses/s)."""
+    """Beginning of a motion: moment, counted position (pulses), phase (real minus counted, pulses), velocity (pulses/s)."""
 
     now: Nanos
     count: int
@@ -52,7 +52,7 @@ def plan_position(state: MotionState, target: float, acc: float, dec: float, vma
     segments: list[Segment] = []
     t = 0.0
     if v != 0.0 and (distance * v <= 0.0 or v * v > 2.0 * dec * abs(distance)):
-        # Too late to brake before the target, or it lies behind: come to rest, then go back.
+        # The target is too near to brake for, or behind: the motion comes to rest, then goes back.
         s = ramp(0.0, p, v, 0.0, dec)
         segments.append(s)
         t, p, v = s.end_s, s.c0, 0.0
@@ -69,7 +69,7 @@ def plan_position(state: MotionState, target: float, acc: float, dec: float, vma
         segments.append(s)
         t, p, peak = s.end_s, s.c0, vmax
     else:
-        # What the distance allows beyond braking from the present speed; differences of nearly equal speeds are avoided.
+        # Speed that the distance permits beyond braking from the present speed. Differences of nearly equal speeds are avoided.
         gain = 2.0 * (abs(distance) - speed * speed / (2.0 * dec)) * acc * dec / (acc + dec)
         peak = speed
         if gain > 0.0 and speed < vmax:
@@ -95,7 +95,7 @@ def plan_position(state: MotionState, target: float, acc: float, dec: float, vma
 
 
 def plan_velocity(state: MotionState, velocity: float, acc: float, dec: float) -> Profile:
-    """To a constant ``velocity`` (pulses/s), slowing with ``dec`` and speeding up with ``acc``; velocity 0 comes to rest.
+    """A motion to a constant ``velocity`` (pulses/s), slowing with ``dec`` and speeding up with ``acc``; velocity 0 is a stop.
 
     Ranges as for `plan_position`; a ``velocity`` nearer to 0 than `LEAST` is 0.
     """

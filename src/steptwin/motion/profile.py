@@ -21,7 +21,7 @@ from math import ceil, floor, inf, sqrt
 from steptwin.machine import Nanos
 
 NEAR_P = 1 / 128
-"""Closer to a whole position than this, the rounding error of a position (2^-49 of its distance from the base) could decide
+"""Within this distance of a whole position the rounding error of a position (2^-49 of its distance from the base) could decide
 the count; then the time of the pulse decides. Large enough for motions of 1e12 pulses, small enough to be rarely needed."""
 _FAR_P = 1.0 - NEAR_P
 
@@ -31,7 +31,7 @@ NEWTON_STEPS = 4
 
 @dataclass(slots=True)
 class Segment:
-    """A polynomial of time with velocity of one sign: ``c0 + c1·u + c2·u² + c3·u³``, ``u = t_s − anchor_s``. Never changed.
+    """A polynomial of time with velocity of one sign: ``c0 + c1·u + c2·u² + c3·u³``, ``u = t_s − anchor_s``. Immutable.
 
     It begins where the segment before it ends. The anchor is the slower end, so that solving for time never subtracts
     nearly equal numbers. A cubic part (only with c1 ≠ 0) lessens the acceleration away from the anchor and never reverses it.
@@ -145,7 +145,7 @@ class Profile:
     def moving(self, now: Nanos) -> bool:
         return self.end is None or now < self.end
 
-    # `position`, `velocity` and `count` are read in every request of a master: the search for the segment is written out.
+    # `position`, `velocity` and `count` are read in every request of a master: each has its own copy of the search.
 
     def position(self, now: Nanos) -> float:
         """Real commanded position at ``now`` in pulses."""
@@ -172,7 +172,7 @@ class Profile:
         return 0.0
 
     def count(self, now: Nanos) -> int:
-        """Counted position at ``now``: every pulse due by ``now`` is in it."""
+        """Counted position at ``now``, with every pulse due by ``now``."""
         n = now - self.start
         i = 0
         for end in self.ends:
@@ -191,7 +191,7 @@ class Profile:
         return self.base + self.counts[-1]
 
     def _count_near(self, index: int, p: float, n: int) -> int:
-        """Last whole position reached by ``n`` ns where ``p`` is too close to one to tell."""
+        """Last whole position reached by ``n`` ns, from the times of pulses: ``p`` is too close to a whole position to decide."""
         k = round(p)
         return k if self.pulse_ns(index, k) <= n else k - self.segments[index].direction
 

@@ -21,9 +21,9 @@ PulseTimes: TypeAlias = NDArray[np.int64]
 Reals: TypeAlias = NDArray[np.float64]
 
 _BLOCK = 4096
-"""Pulses worked on at a time: the buffers stay in the first- and second-level cache."""
+"""Pulses computed at a time: the buffers stay in the first- and second-level cache."""
 _FEW = 12
-"""Up to so many pulses single looks are faster."""
+"""Up to this number of pulses, single evaluations are faster than arrays."""
 _STEPS: Reals = np.arange(_BLOCK, dtype=np.float64)
 
 
@@ -42,7 +42,7 @@ def pulse_times(profile: Profile, after: Nanos, until: Nanos) -> PulseTimes:
 
 
 def pulse_runs(profile: Profile, after: Nanos, until: Nanos) -> list[tuple[int, PulseTimes]]:
-    """The same, one pair (direction, times) for each stretch of one direction."""
+    """Moments as in `pulse_times`, one pair (direction, times) for each stretch of one direction."""
     runs = _runs(profile, after, until)
     times = _times(profile, runs)
     stretches: list[tuple[int, PulseTimes]] = []
@@ -104,7 +104,7 @@ def _times(profile: Profile, runs: list[_Run]) -> PulseTimes:
 
 
 def _fill(profile: Profile, run: _Run, out: PulseTimes) -> None:
-    """Times of the pulses of ``run``. The first and the last, where limits may apply, come from the profile itself."""
+    """Moments of the pulses of ``run``. The profile itself gives the first and the last, to which limits may apply."""
     index, first, step, size = run
     if size <= _FEW:
         for i in range(size):
@@ -131,14 +131,14 @@ def _fill(profile: Profile, run: _Run, out: PulseTimes) -> None:
         out[i] = profile.start + profile.pulse_ns(index, first + i * step)
 
 
-# Each turns positions ``u`` into seconds, in place, with three more buffers at its disposal.
+# Each function turns positions ``u`` into seconds, in place, and uses three more buffers.
 
 
 def _along_arc(s: ArcSegment, u: Reals, buffers: Reals) -> None:
     course = s.course
     u -= course.centre_p
     u /= course.radius_p
-    # Inside a run nothing is beyond a turning point: its first and last pulses come from the profile.
+    # No pulse inside a run is beyond a turning point; the profile gives its first and last pulses.
     folded = (u < 0.0) if s.half & 1 == 0 else (u >= 0.0)
     np.abs(u, out=u)
     np.subtract(1.0, u, out=u)
@@ -159,7 +159,7 @@ def _solve(s: Segment, u: Reals, buffers: Reals) -> None:
     solve(s, u, buffers)
 
 
-# Each turns distances ``u`` from c0 into seconds.
+# Each function turns distances ``u`` from c0 into seconds.
 
 
 def _cruise(s: Segment, u: Reals, _buffers: Reals) -> None:
@@ -264,7 +264,7 @@ def _arc_velocity(s: ArcSegment, t: Reals) -> Reals:
 
 
 def _sine(angle_q: Reals, quarters: int = 0) -> Reals:
-    """Sine of ``angle_q`` and whole ``quarters`` more."""
+    """Sine of ``angle_q`` plus whole ``quarters``."""
     whole = np.floor(angle_q + 0.5)
     x = (angle_q - whole) * QUARTER
     whole = whole.astype(np.int64) + quarters

@@ -1,7 +1,7 @@
 """Start/stop motion: a jump to a start speed, a linear ramp, a parabolic one, the mirror image down again.
 
 One unit ``u`` of position throughout: u, u/s, u/s². For the M1486 it is the minimum microstep (full step/64): its speeds and
-accelerations, which are in full steps, are multiplied by 64 before they come here.
+accelerations, which are in full steps, are multiplied by 64 by the caller.
 
 Suffixes: ``_u`` positions and distances, ``_s`` seconds.
 """
@@ -17,20 +17,19 @@ from steptwin.motion.planner import FARTHEST_P, MotionState, refuse_range
 from steptwin.motion.profile import Profile, Segment, at_rest, cruise
 
 _SAME_U = 1e-3
-"""A forced stop that ends this little beyond a landing position ends on it: a stop forced in the last ramp of a move, which
-is braking already, must not go a microstep further for a rounding error. (The speed says little about the place near the
-top of a parabola.)"""
+"""A forced stop that would end this little beyond a landing position ends on it. A rounding error must not move a stop that is
+forced in the last ramp of a move a microstep further; near the top of a parabola the speed determines the position badly."""
 
 
 class SpeedCurve(NamedTuple):
-    """How a motion gains speed, and mirrored loses it."""
+    """The speed of a motion as it rises; it falls along the mirror image."""
 
     start: float
     """S: the motion begins and ends with this speed (u/s)."""
     acc: float
     """A: constant acceleration (u/s²) up to ``knee``."""
     knee: float
-    """P: from this speed (u/s) on the acceleration falls linearly in time to 0 at ``top``, M-6; not below ``top``: never."""
+    """P: from this speed (u/s) on the acceleration falls linearly in time to 0 at ``top``, M-6. Not below ``top``: unused."""
     top: float
     """V: highest speed (u/s). At or below ``start`` there is no ramp: constant ``top``, M-8."""
 
@@ -71,7 +70,7 @@ def plan_distance(now: Nanos, begin: int, target: float, curve: SpeedCurve) -> P
 
 
 def plan_endless(now: Nanos, begin: int, direction: int, curve: SpeedCurve) -> Profile:
-    """From rest at ``begin`` (u) to ``top``, until further notice. ``direction`` is +1 or −1. Errors as `plan_distance`."""
+    """From rest at ``begin`` (u) to ``top``, without an end. ``direction`` is +1 or −1. Errors as `plan_distance`."""
     _check(curve)
     parts = _parts(curve)
     segments = _rising(parts, direction)
@@ -133,7 +132,7 @@ class _Part(NamedTuple):
 
 
 def _parts(curve: SpeedCurve) -> list[_Part]:
-    """Slow to fast; none when there is no ramp (M-8)."""
+    """The parts of the curve, slow to fast; empty when there is no ramp (M-8)."""
     start, acc, knee, top = curve
     parts: list[_Part] = []
     middle = min(knee, top)

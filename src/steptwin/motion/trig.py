@@ -23,10 +23,10 @@ SINE_45 = sqrt(0.5)
 Real: TypeAlias = Any
 """A float, or an array of them."""
 
-# Taylor's series; what is left out is below 1e-17 of the result up to 45°.
+# Taylor's series; up to 45° the omitted terms are below 1e-17 of the result.
 _SINE = tuple((-1) ** n / factorial(2 * n + 1) for n in range(9))
 _COSINE = tuple((-1) ** n / factorial(2 * n) for n in range(10))
-# The same up to 45° / 8.
+# The same series up to 45° / 8.
 _ARCSINE = tuple(factorial(2 * n) / (4**n * factorial(n) ** 2 * (2 * n + 1)) for n in range(9))
 _HALVINGS = 3
 

@@ -36,7 +36,7 @@ def currents(characteristic: int, theta: int) -> tuple[int, int]:
 
 
 def _fifths(x: float, power: int) -> float:
-    """x^(power/5) for 0 <= x <= 1: the fifth root by Newton from above, where it never overshoots, times itself."""
+    """x^(power/5) for 0 <= x <= 1. Newton's iteration for the fifth root begins above it, so that it never overshoots."""
     if x == 0.0:
         return 0.0
     root, following = 2.0, 1.0

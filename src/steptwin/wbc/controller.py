@@ -11,14 +11,14 @@ from steptwin.tables import IncompleteTable, complete
 from steptwin.wbc.registers import RegisterRow
 
 RegisterReader: TypeAlias = Callable[[Any, Nanos], float]
-"""(controller, moment) → REAL. Also right for moments to come, as long as nothing happens."""
+"""(controller, moment) → REAL. It holds for later moments, too, as long as no event occurs."""
 
 RegisterWriter: TypeAlias = Callable[[Any, float, Nanos], bool]
 """(controller, REAL, moment) → whether that changed anything."""
 
 Tendency: TypeAlias = Callable[[Any, Nanos], Iterable[Nanos] | None]
-"""(controller, moment) → how a register goes on by itself, as long as nothing happens: the ends, in order, of the stretches in
-which it only rises or only falls; after the last one it stands. `FOREVER` ends a stretch that has no end. None: not known."""
+"""(controller, moment) → the course of a register as long as no event occurs: the ends, in order, of the stretches
+in which it only rises or only falls; after the last one it is constant. `FOREVER` ends a stretch without end. None: not known."""
 
 FOREVER: Nanos = 2**62
 

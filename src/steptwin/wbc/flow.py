@@ -39,7 +39,7 @@ def returning(steps: tuple[s.ProgramStep, ...]) -> list[bool]:
 
 
 def _after(number: int, step: s.ProgramStep) -> tuple[int, ...]:
-    """Where a step goes on. For JUMP: the next line, which it reaches only when its target can return."""
+    """The successors of a step. For JUMP: the next line, which is reached only if the target can return."""
     return _AFTER[type(step)](number, step)
 
 

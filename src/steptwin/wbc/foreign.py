@@ -131,7 +131,7 @@ def _colon(line: ForeignLine) -> Advice | None:
 
 
 IF_UNKNOWN = "IF?"
-"""The keyword of a line that may open or close an IF: which ENDIF closes what is not known after it."""
+"""The keyword of a line that may open or close an IF. After it, the IF that an ENDIF closes is not known."""
 LABEL = "LABEL"
 """The keyword of a line that means a label."""
 

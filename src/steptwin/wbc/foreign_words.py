@@ -62,7 +62,7 @@ OPERATOR_WORDS: Mapping[str, tuple[str | None, str]] = {
     "SHR": (">>", "shifts are written << and >>"),
     "^": (None, "multiply instead: SET X = Y * Y"),
 }
-"""By operator: what stands for it in WBC if that is certain, and what to write."""
+"""By operator: its equivalent in WBC if there is exactly one, and advice."""
 
 TIME_UNITS: Mapping[str, float] = {"s": 1, "sec": 1, "sek": 1, "ms": 0.001, "us": 0.000001, "µs": 0.000001, "min": 60, "h": 3600}
 """In seconds."""
@@ -100,4 +100,4 @@ LOOK_ALIKES: Mapping[str, tuple[str, str]] = {
     "，": ("a wide character", ","),
     "：": ("a wide character", ":"),
 }
-"""Characters that look like one of WBC: what they are, and what is meant."""
+"""Characters that look like one of WBC: their names, and the character of WBC."""

@@ -68,7 +68,7 @@ _SLOT_NUMBER = struct.Struct("<H")
 
 
 class _NotEncodable(Exception):
-    """The text names what has no documented form."""
+    """A step whose record format is not documented; the text names it."""
 
 
 def build(executable: s.Executable, positions: PositionTable, *, inferred: bool = False) -> tuple[bytes | None, list[Diagnostic]]:

@@ -47,7 +47,7 @@ class Edited:
         self._found: list[Diagnostic] = []
 
     def update(self, text: str) -> None:
-        """Read what has changed."""
+        """Read the changed lines."""
         pieces = _LINE_END.split(text)
         contents, ends = pieces[::2], pieces[1::2]
         starts = list(accumulate(map(add, map(len, contents), map(len, ends)), initial=0))

@@ -35,14 +35,14 @@ RETURNS = 16
 STATEMENTS_AT_ONCE = 1000
 STATEMENTS_OF_AN_ACTION = 20
 BREATH: Nanos = MILLISECOND
-"""With a statement time of 0: so many statements take no time (one that acts on the controller counts as several), then as long
-passes. What waits looks at this interval, and whenever something happens."""
+"""With a statement time of 0, this number of statements takes no time (one that acts on the controller counts as several); then
+this time passes. A wait is evaluated at this interval and after every event."""
 
 LONGEST_LOOP = 512
-"""Statements of a loop that can rest."""
+"""Most statements of a loop that can rest."""
 MARKS = 40
-"""So many marks may come to nothing before only every so many jumps backwards are marked: filling the return stack alone takes
-sixteen rounds."""
+"""After this number of recordings without a loop, only one of `MOST_UNMARKED` jumps backwards is recorded. Filling the return
+stack alone takes sixteen rounds."""
 MOST_UNMARKED = 256
 
 
@@ -90,14 +90,14 @@ class Interpreter(Stateful):
             raise Misuse(f"statement time = {statement_time / MILLISECOND:g} ms: permitted are {permitted}")
         self.controller = controller
         self.rests = True
-        """Off, every look is taken: what tests compare with."""
+        """If off, every condition is evaluated, for comparison in tests."""
         self.rests_in_loops = True
-        """Off, every statement of a loop is executed; WAIT alone rests."""
+        """If off, every statement of a loop is executed; only WAIT rests."""
         self._hooks: StatementHooks = ()
         self._hooked: tuple[Code, tuple[StepCode, ...]] | None = None
         """Code, and its steps with hooks."""
         self._is_repeated = False
-        """The next statement is in progress already: it looks again, and no hook is called."""
+        """The next statement is in progress already: it is evaluated again without a call of the hooks."""
         self.statement_time = statement_time
         self.cells = array("f")
         self.now: Nanos = 0
@@ -105,33 +105,33 @@ class Interpreter(Stateful):
         self.acted = False
         """A statement has acted on the controller since this was set to False."""
         self.effects = 0
-        """How often the program has changed something outside its cells since the mark."""
+        """Number of changes outside the cells since the mark."""
         self._moment: Nanos = -1
         self._spent = 0
-        """Statements executed at that moment; a program that starts itself again has no more of them."""
+        """Statements executed at that moment, also before a restart by the program itself."""
         self.stop()
         self.clear()
 
     def clear(self) -> None:
-        """As before the first statement."""
+        """Reset the state to that before the first statement."""
         self.pc = 0
         self.stack: deque[tuple[int, Nanos]] = deque(maxlen=RETURNS)
-        """Where RETURN goes on, and not before which moment (a DELAY that was interrupted, WBC-19)."""
+        """Steps to which RETURN goes, each with its earliest moment (a DELAY that was interrupted, WBC-19)."""
         self.forgotten = False
-        """A place for RETURN was pushed out since the stack was last empty (WBC-1)."""
+        """A step for RETURN was dropped since the stack was last empty (WBC-1)."""
         self.handling = False
-        """In an interrupt, which keeps others waiting (WBC-2)."""
+        """An interrupt is being handled; others wait (WBC-2)."""
         self.pending = 0
         """Events that wait, one bit each."""
         self.waiting = False
-        """The statement at ``pc`` is in progress: its last look failed."""
+        """The statement at ``pc`` is in progress: its condition was false."""
         self.not_before: Nanos = 0
         self._marks = 0
         self._unmarked = 0
         self._forget()
 
     def _forget(self) -> None:
-        """No loop is being recorded, none rests."""
+        """End the recording and the rest of loops."""
         self._trail: list[Visit] | None = None
         self._mark: Nanos = 0
         self._resting: RestingLoop | None = None
@@ -155,17 +155,17 @@ class Interpreter(Stateful):
         self.running = False
         self.paused_at: Nanos | None = None
         self.due: Nanos | None = None
-        """When the next statement is executed; None: nothing but an event will have one executed."""
+        """The moment of the next statement; None if only an event leads to one."""
         self._forget()
 
     def pause(self, now: Nanos) -> None:
-        """WBC-9: whatever is waited for is waited for later."""
+        """WBC-9: all waits are suspended."""
         self.disturb(self.after(now))
         self.running = False
         self.paused_at = now
 
     def resume(self, code: Code, now: Nanos) -> None:
-        """Go on, with every wait as much later as the pause was long."""
+        """Continue; the end of every wait moves by the length of the pause."""
         if self.paused_at is None:
             return
         begun, self.paused_at = self.paused_at, None
@@ -182,11 +182,11 @@ class Interpreter(Stateful):
     # ------------------------------------------------------------------ what happens meanwhile
 
     def after(self, now: Nanos) -> Nanos:
-        """When the next statement may be executed after everything at ``now`` has been: there is no time between them at 0."""
+        """Earliest moment of the next statement after the events at ``now``: with a statement time of 0, the same moment."""
         return now + 1 if self.statement_time else now
 
     def disturb(self, first: Nanos) -> None:
-        """Something happened: looks from ``first`` on may turn out differently."""
+        """An event: conditions evaluated from ``first`` on may have other results."""
         self._trail = None
         if self._resting is not None:
             self._settle(self._resting, first)
@@ -194,7 +194,7 @@ class Interpreter(Stateful):
             self.due = first
 
     def happen(self, code: Code, event: int, now: Nanos, first: Nanos) -> None:
-        """The interrupt of ``event`` (its number in `EVENTS`), which is enabled; one is kept of each (WBC-2).
+        """Request the interrupt of ``event`` (its number in `EVENTS`), which is enabled; one of each can be pending (WBC-2).
 
         ``first`` is the moment of the next statement that could have been executed without it.
         """
@@ -205,7 +205,7 @@ class Interpreter(Stateful):
                 self._break_in(code, now)
 
     def _break_in(self, code: Code, now: Nanos) -> None:
-        """INT_: the statement in progress is left where it is (WBC-19)."""
+        """INT_ interrupts the statement in progress (WBC-19)."""
         if not self.handling:
             event = next((e for e in self._pending_events() if not code.entries[e].hard), None)
             if event is not None:
@@ -226,7 +226,7 @@ class Interpreter(Stateful):
         self._trail = None
 
     def push(self, step: int, not_before: Nanos) -> None:
-        """Remember where RETURN goes on; of more than `RETURNS` places the oldest is forgotten (WBC-1)."""
+        """Push a step for RETURN; of more than `RETURNS` steps the oldest is dropped (WBC-1)."""
         self.forgotten = bool(self.stack) and (self.forgotten or len(self.stack) == RETURNS)
         self.stack.append((step, not_before))
 
@@ -238,7 +238,7 @@ class Interpreter(Stateful):
         return self.controller
 
     def run(self, code: Code, until: Nanos) -> None:
-        """Execute what is due, and what follows up to ``until`` as long as only the program itself is concerned.
+        """Execute statements that are due, and further ones up to ``until`` as long as they concern the program alone.
 
         A `ProgramFault` leaves ``pc`` at its statement.
         """
@@ -281,7 +281,7 @@ class Interpreter(Stateful):
         self._hooked = None
 
     def _steps(self, code: Code) -> tuple[StepCode, ...]:
-        """What is executed for each step."""
+        """The functions that are executed for the steps."""
         if not self._hooks:
             return code.steps
         self._is_repeated = self.waiting
@@ -303,7 +303,7 @@ class Interpreter(Stateful):
     # ------------------------------------------------------------------ the statements
 
     def _dash(self, code: Code, until: Nanos) -> bool:
-        """Execute until something has to be looked at. True: go on, now recording."""
+        """Execute until an event has to be checked. True: continue, with recording."""
         steps, cells, pause = self._steps(code), self.cells, self.statement_time
         pc, now, unmarked = self.pc, self.now, self._unmarked
         marks = self.rests and self.rests_in_loops
@@ -354,7 +354,7 @@ class Interpreter(Stateful):
             self._spent = executed + acted
 
     def _look_around(self, code: Code) -> None:
-        """A statement acted on the controller, waits, or lets interrupts in."""
+        """Check for waits and interrupts after a statement that returned ``~number``."""
         if not self.running:
             self.due = None
             return
@@ -371,7 +371,7 @@ class Interpreter(Stateful):
     # ------------------------------------------------------------------ rest
 
     def _wait(self, code: Code) -> None:
-        """A look failed: rest until the next one that can succeed."""
+        """A condition is false: rest until it can be true."""
         self._trail = None
         self._marks = self._unmarked = 0
         period = self.statement_time or BREATH
@@ -383,7 +383,7 @@ class Interpreter(Stateful):
         return Visit(self.pc, offset, self.not_before > 0, self.handling, tuple(self.stack), self.cells.tobytes())
 
     def _set_mark(self, now: Nanos) -> int:
-        """Begin to record at ``now``; how many jumps backwards are not marked after it."""
+        """Begin to record at ``now``. Returns the number of jumps backwards that are not marked after it."""
         self._trail = []
         self._mark = now
         self.effects = 0
@@ -431,7 +431,7 @@ class Interpreter(Stateful):
         return True
 
     def _rest(self, code: Code, loop: RestingLoop) -> bool:
-        """Execute nothing before a look of ``loop`` can turn out differently; False if that moment is not known."""
+        """Execute nothing before a condition of ``loop`` can have another result; False if that moment is not known."""
         change = loop.next_change(code, self.controller)
         if change is None:
             return False

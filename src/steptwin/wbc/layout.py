@@ -22,7 +22,7 @@ INDENT = 4
 _MOST_LEVELS = 40
 """Deeper blocks are indented no further: the text would grow with the square of its lines."""
 _TABS = (4, 8)
-"""Widths of a tab that editors use: what is aligned with one of them is aligned."""
+"""Widths of a tab in editors; cells are aligned if they are with one of these."""
 
 
 class LayoutCell(NamedTuple):
@@ -40,7 +40,7 @@ class LayoutCell(NamedTuple):
 
 
 def columns_of(text: str, place: int) -> frozenset[tuple[int, int]]:
-    """Where character ``place`` of a line stands, for each width of a tab."""
+    """The column of character ``place`` of a line, for each width of a tab."""
     return frozenset((tab, len(text[:place].expandtabs(tab))) for tab in _TABS)
 
 

@@ -1,7 +1,7 @@
 """The steps of statements that are resolved again and again while a program is edited.
 
-A step is kept as long as its statement is the same node and every name in it means what it meant. Steps that name other steps
-(of blocks and jumps) are made anew, and so are those about which something was said.
+A step is kept as long as its statement is the same node and every name in it has the same meaning. Steps that name other steps
+(of blocks and jumps) are made anew, and so are those with diagnostics.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class StepMemory:
         return [None if entry is None else entry[1] for entry in entries]
 
     def keep(self, statement: StatementNode, step: s.ProgramStep, scope: ProgramScope) -> None:
-        """Keep a step nothing was said about, if it may be kept."""
+        """Keep a step without diagnostics, if it may be kept."""
         if isinstance(statement, KeywordStatement):
             if statement.keyword in _BY_NUMBER or (self._positions is None and statement.keyword in ROW_MOTIONS):
                 return
@@ -65,7 +65,7 @@ class StepMemory:
             self._next[id(statement)] = statement, step, names
 
     def end(self) -> None:
-        """The statements that did not come again are gone."""
+        """Forget the statements that are no longer in the program."""
         self._kept = self._next
 
 

@@ -48,7 +48,7 @@ class ProgramOutline:
 def outline(
     program: ProgramTree, scope: ProgramScope, positions: PositionTable | None, dialect: Dialect, diagnostics: list[Diagnostic]
 ) -> ProgramOutline:
-    """The structure of ``program``; ``diagnostics`` gets what is wrong with labels, blocks, records and the number of steps."""
+    """The structure of ``program``; ``diagnostics`` gets the errors of labels, blocks, records and the number of steps."""
     return _Outliner(scope, positions, dialect, diagnostics).outline(program)
 
 

@@ -60,25 +60,6 @@ class PositionTable:
     def names(self) -> list[str]:
         return [row.name for row in self.rows if row.name]
 
-    def with_row(self, index: int, name: str, values: Sequence[float | None]) -> PositionTable:
-        """The table with one row changed, or appended when ``index`` is the number of rows; every other line stays as it was."""
-        if not 0 <= index <= len(self.rows) or index >= MAX_POSITIONS:
-            last = min(len(self.rows), MAX_POSITIONS - 1)
-            raise Misuse(f"row {index} cannot be written: permitted are 0…{last}")
-        if len(values) != PARAMETERS:
-            raise Misuse(f"row {index} needs {PARAMETERS} values, got {len(values)}")
-        if name and not is_name(name) and not (index < len(self.rows) and self.rows[index].name == name):
-            raise Misuse(f"{name!r} cannot be the name of row {index}: permitted are letters without accents, digits and _")
-        line = row_text(name, values)
-        if index < len(self.rows):
-            old = self.rows[index]
-            text = self.text[: old.start] + line + self.text[old.end :]
-        else:
-            line_end = "\r\n" if "\r\n" in self.text else "\n"
-            text = self.text.rstrip()
-            text = f"{text}{line_end if text else ''}{line}{line_end}"
-        return parse_positions(text)[0]
-
 
 def rows_text(count: int) -> str:
     """A number of rows in words."""
@@ -115,7 +96,7 @@ def table_of(rows: Sequence[tuple[str, Sequence[float | None]]]) -> PositionTabl
 
 
 def parse_positions(text: str) -> tuple[PositionTable, list[Diagnostic]]:
-    """The table of a text and what is wrong with it. Never raises.
+    """The table of a text and its diagnostics. Never raises.
 
     A wrong cell counts as ``x``, so that rows keep their numbers.
     """

@@ -93,7 +93,7 @@ def _comment_cell(line: SourceLine, text: str, body: str) -> LayoutCell | None:
 
 
 def _borders(lines: Sequence[SourceLine]) -> list[bool]:
-    """Empty lines and labels end what is aligned."""
+    """Whether a line ends the alignment: empty lines and labels do."""
     return [isinstance(line.statement, Label) or (line.statement is None and line.comment is None) for line in lines]
 
 

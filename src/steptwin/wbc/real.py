@@ -25,7 +25,7 @@ _EXACT = 2.0**53
 
 
 class ProgramFault(Exception):
-    """A running program did what cannot be done; the text says what. The machine turns it into a program error (WBC-5)."""
+    """An operation of a running program is impossible; the text names it. It is a program error (WBC-5)."""
 
 
 def real(value: float) -> float:

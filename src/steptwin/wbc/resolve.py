@@ -1,4 +1,4 @@
-"""Tree to steps: names, labels, blocks, positions and number ranges. What is found wrong here keeps a program from running."""
+"""Tree to steps: names, labels, blocks, positions and number ranges. A program with errors found here does not run."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Resolution:
 def resolve(
     program: ProgramTree, positions: PositionTable | None, dialect: Dialect, memory: StepMemory | None = None
 ) -> Resolution:
-    """The steps of a program and what is wrong with it beyond single lines. Without a table, positions are not checked.
+    """The steps of a program and the diagnostics beyond single lines. Without a table, positions are not checked.
 
     ``memory`` has steps of an earlier state of the program, and gets those of this one.
     """

@@ -91,7 +91,7 @@ class IfStep(ProgramStep):
 
     @property
     def otherwise(self) -> int:
-        """Where it goes on when the condition is false."""
+        """The step that follows if the condition is false."""
         return (self.close if self.middle is None else self.middle) + 1
 
 
@@ -215,7 +215,7 @@ STEPS: tuple[type[ProgramStep], ...] = tuple(
     for found in list(globals().values())
     if isinstance(found, type) and issubclass(found, ProgramStep) and found is not ProgramStep
 )
-"""Every class of step; each needs its code, what it reads, and where it goes on."""
+"""Every class of step; each needs its code, its sources and its successors."""
 
 
 @dataclass(frozen=True, slots=True)

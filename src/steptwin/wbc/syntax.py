@@ -27,7 +27,7 @@ _POSITION = re.compile(rf"{POSITION_MARK}\s+([0-9]{{1,5}})\s+([0-9a-f]{{36}})$",
 
 
 def parse(text: str) -> tuple[ProgramTree, list[Diagnostic]]:
-    """The tree of a program and what is wrong with single lines of it, in the order of the text. Never raises."""
+    """The tree of a program and the diagnostics of single lines, in the order of the text. Never raises."""
     written = list(split_lines(text))
     parser = Parser([content for content, _ in written])
     lines: list[SourceLine] = []

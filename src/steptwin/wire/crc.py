@@ -6,7 +6,7 @@ __all__ = ["crc16", "is_intact", "table_crc16", "with_crc"]
 
 
 def _remainder(value: int) -> int:
-    """Of one byte: polynomial A001 (reflected 8005)."""
+    """The remainder of one byte; polynomial A001 (8005 reflected)."""
     for _ in range(8):
         value = value >> 1 ^ 0xA001 if value & 1 else value >> 1
     return value
@@ -37,6 +37,6 @@ def with_crc(body: bytes) -> bytes:
 def is_intact(frame: bytes | bytearray) -> bool:
     """Whether the last two bytes are the CRC of those before.
 
-    The CRC over a frame and its own CRC is 0. It stays 0 when zero bytes follow: the length has to come from elsewhere.
+    The CRC over a frame and its own CRC is 0. It stays 0 when zero bytes follow, so the caller must know the length.
     """
     return crc16(frame) == 0

@@ -1,4 +1,4 @@
-"""What went over a line, for people: time, link, direction, bytes and meaning."""
+"""A frame on a line as text: time, link, direction, bytes and meaning."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from steptwin.wire.slave import FrameDirection
 
 
 class FrameLine(NamedTuple):
-    """One frame in words."""
+    """One frame; its text is a line of a log."""
 
     time: Nanos
     link: str

@@ -1,7 +1,7 @@
 """A gateway in front of a line with timing (MIC-32).
 
-All its ports share one line, on which the gateway is the only master: requests wait for their turn in the order in which they
-came, and each takes the time of its characters, of the controller and of the response. A request that finds the queue full is
+All ports share one line, on which the gateway is the only master. Requests are executed in the order in which they
+came, and each takes the time of its characters, of the controller and of the response. If the queue is full, a request is
 refused with exception 06.
 """
 
@@ -21,9 +21,9 @@ from steptwin.wire.slave import FrameDirection, FrameObserver, SlavePort, tcp_re
 from steptwin.wire.timed import TimedUnits
 
 QUEUE_REQUESTS = 16
-"""Requests of all ports of one kind that wait for the line at once."""
+"""Most requests in the queue, for all ports of one kind."""
 RTU_BYTES = 3
-"""Unit and CRC, which an RTU frame has beside its PDU."""
+"""Bytes of unit and CRC in an RTU frame."""
 
 
 class _Waiting(NamedTuple):
@@ -31,14 +31,14 @@ class _Waiting(NamedTuple):
 
     since: Nanos
     number: int
-    """Counted over all ports of the gateway."""
+    """Number of the request, counted over all ports of the gateway."""
     units: tuple[int, ...]
     raw: bytes
     pdu: bytes
 
 
 class Gateway(Stateful):
-    """The line behind any number of ports, and whose turn it is."""
+    """The line behind any number of ports, and the order of their requests."""
 
     __slots__ = ("_count", "_free", "_waiting_ports", "units")
     FIXED = frozenset({"_waiting_ports", "units"})
@@ -50,7 +50,7 @@ class Gateway(Stateful):
         self._waiting_ports: WeakSet[GatewayPort] = WeakSet()
 
     def enqueue(self, port: GatewayPort, units: tuple[int, ...], raw: bytes, pdu: bytes, now: Nanos) -> bool:
-        """Have a request of ``port`` wait for the line; False when the queue is full."""
+        """Add a request of ``port`` to the queue; False when the queue is full."""
         if sum(len(other.waiting) for other in self._waiting_ports if type(other) is type(port)) >= QUEUE_REQUESTS:
             return False
         self._count += 1
@@ -59,19 +59,19 @@ class Gateway(Stateful):
         return True
 
     def requeue(self, port: GatewayPort) -> None:
-        """The requests of ``port`` were replaced."""
+        """Take over the waiting requests of ``port`` after they were replaced."""
         if port.waiting:
             self._waiting_ports.add(port)
         else:
             self._waiting_ports.discard(port)
 
     def deadline(self) -> Nanos | None:
-        """When the next request is executed."""
+        """The moment at which the next request is executed."""
         port = self._next_port()
         return None if port is None else self._due(port.waiting[0])
 
     def run(self, now: Nanos) -> None:
-        """Execute the requests that are due until ``now``."""
+        """Execute the requests that are due by ``now``."""
         while (port := self._next_port()) is not None and (due := self._due(port.waiting[0])) <= now:
             self._serve(port, due, now)
 
@@ -115,11 +115,11 @@ class GatewayPort(SlavePort):
         self.waiting: deque[_Waiting] = deque()
 
     def _requests(self, data: bytes, now: Nanos) -> list[bytes]:
-        """The frames completed by ``data``."""
+        """The requests completed by ``data``."""
         raise NotImplementedError
 
     def _addressed(self, raw: bytes) -> tuple[tuple[int, ...], bytes]:
-        """The units a request is for, and its PDU."""
+        """The units to which a request is addressed, and its PDU."""
         raise NotImplementedError
 
     def is_broadcast(self, raw: bytes) -> bool:
@@ -130,8 +130,8 @@ class GatewayPort(SlavePort):
         """The frame that answers the request ``raw`` with ``pdu``."""
         raise NotImplementedError
 
-    def _nobody(self, raw: bytes, now: Nanos) -> None:
-        """A request is for a unit that is not served."""
+    def _refuse(self, raw: bytes, now: Nanos) -> None:
+        """Respond to a request for a unit that is not served, if the protocol has a response."""
 
     def set_state(self, plain: Plain) -> None:
         super().set_state(plain)
@@ -145,17 +145,17 @@ class GatewayPort(SlavePort):
     def exchange(self, data: bytes, now: Nanos) -> bytes:
         self._gateway.run(now)
         for raw in self._requests(data, now):
-            self._ask(raw, now)
+            self._request(raw, now)
         return b"".join([response for _, response in self.to_send(now)])
 
     def on_line(self, raw: bytes, moment: Nanos) -> None:
         """The request ``raw`` is executed at ``moment``."""
 
-    def _ask(self, raw: bytes, now: Nanos) -> None:
+    def _request(self, raw: bytes, now: Nanos) -> None:
         units, pdu = self._addressed(raw)
         if not units:
             if not self.is_broadcast(raw):
-                self._nobody(raw, now)
+                self._refuse(raw, now)
         elif not self._gateway.enqueue(self, units, raw, pdu, now) and not self.is_broadcast(raw):
             self.respond(raw, exception_pdu(pdu[0], DEVICE_BUSY), now)
 
@@ -192,7 +192,7 @@ class TcpGatewayPort(GatewayPort):
 
     @property
     def broken(self) -> str | None:
-        """Why the connection has to be closed, or None."""
+        """The reason for which the connection has to be closed, or None."""
         return self._framer.broken
 
     def _requests(self, data: bytes, now: Nanos) -> list[bytes]:
@@ -216,14 +216,14 @@ class TcpGatewayPort(GatewayPort):
     def _response(self, raw: bytes, pdu: bytes) -> bytes:
         return tcp_response(raw, pdu)
 
-    def _nobody(self, raw: bytes, now: Nanos) -> None:
+    def _refuse(self, raw: bytes, now: Nanos) -> None:
         self.respond(raw, exception_pdu(raw[7], GATEWAY_TARGET_FAILED), now)
 
 
 class ScriptPort(GatewayPort):
-    """RTU frames of the scripts of a world: their requests wait for those of Modbus TCP clients instead of getting lost.
+    """RTU frames of the scripts of a world: their requests wait for those of Modbus TCP clients and are not lost.
 
-    A request is observed when it is executed; one for a unit that is not served is not.
+    The observer is called for a request when it is executed, and not for a unit that is not served.
     """
 
     broken = None
@@ -251,7 +251,7 @@ class ScriptPort(GatewayPort):
 
     def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
         for frame in self._framer.expire(now):
-            self._ask(frame.raw, now)
+            self._request(frame.raw, now)
         return super().to_send(now)
 
     def deadline(self) -> Nanos | None:

@@ -1,4 +1,4 @@
-"""How long characters take on an asynchronous serial line."""
+"""Duration of characters on an asynchronous serial line."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ class SerialLine:
             raise Misuse(f"a character of {self.bits} bits on the wire is outside 7 to 13")
 
     def duration(self, characters: int) -> Nanos:
-        """Time of that many characters without pause, rounded up to the next nanosecond.
+        """Duration of ``characters`` without pause, rounded up to the next nanosecond.
 
-        Rounding happens once: ask for the whole run, do not add durations.
+        Durations are not to be added, since each is rounded: the duration of a run is that of all its characters.
         """
         return -(-characters * self.bits * SECOND // self.baud)
 
@@ -35,9 +35,9 @@ class SerialLine:
 
 
 class CharacterClock(Stateful):
-    """When the characters of one direction of a line end, however they were handed over.
+    """The ends of the characters in one direction of a line, independent of the pieces in which they are sent.
 
-    What is handed over while the line is busy follows without pause.
+    Characters that are sent while the line is busy follow without pause.
     """
 
     __slots__ = ("_begin", "_count", "end", "line")
@@ -45,12 +45,12 @@ class CharacterClock(Stateful):
     def __init__(self, line: SerialLine) -> None:
         self.line = line
         self.end: Nanos = 0
-        """When the last character ends."""
+        """The end of the last character."""
         self._begin: Nanos = 0
         self._count = 0
 
     def send(self, characters: int, now: Nanos) -> Nanos:
-        """Put characters on the line at ``now`` or as soon as it is free; returns when the last one ends."""
+        """Send characters from ``now`` on, or as soon as the line is free. Returns the end of the last one."""
         if now >= self.end:
             self._begin, self._count = now, 0
         self._count += characters
@@ -58,9 +58,9 @@ class CharacterClock(Stateful):
         return self.end
 
     def end_before(self, characters: int) -> Nanos:
-        """When the character ends that is followed by the last ``characters``, as far as they are one run."""
+        """The end of the character before the last ``characters``; the beginning of the run if it has no more than these."""
         return self._begin + self.line.duration(max(0, self._count - characters))
 
     def waiting(self, now: Nanos) -> int:
-        """Characters handed over and not yet at their end at ``now``."""
+        """Number of characters whose end is later than ``now``."""
         return self.line.characters(self.end - now)

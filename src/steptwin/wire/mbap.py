@@ -15,10 +15,10 @@ from steptwin.wire.pdu import MAX_PDU
 
 HEADER_BYTES = 7
 MIN_LENGTH = 2
-"""Of unit and PDU together, as the header states it."""
+"""Bytes of unit and PDU together, as stated in the header."""
 MAX_FRAME = HEADER_BYTES + MAX_PDU
 LONGEST_LENGTH = 1 + 6 + 255
-"""Of a function 16 with the largest byte count: too long for the protocol, but taken, so that a quantity above the permitted
+"""That of a function 16 with the largest byte count: too long for the protocol, but taken, so that a quantity above the permitted
 one is answered with exception 03 (MIC-24) and not with a closed connection."""
 
 _HEADER = struct.Struct(">HHHB")
@@ -62,7 +62,7 @@ class TcpFramer(Stateful):
         self.held = b""
         """The beginning of a frame whose rest has not come."""
         self.broken: str | None = None
-        """Why the connection has to be closed, once a header was wrong. Nothing is cut from then on."""
+        """Reason to close the connection, after a wrong header; no further frames are cut."""
 
     def feed(self, data: bytes) -> list[TcpFrame]:
         """The frames completed by ``data``, in order."""

@@ -59,12 +59,12 @@ _WRITE_HEAD = struct.Struct(">BHHB")
 
 
 def function_number(code: int) -> str:
-    """A function code for people, decimal with its hexadecimal form: ``22 (16h)``."""
+    """A function code as text, decimal with its hexadecimal form: ``22 (16h)``."""
     return f"{code} ({code:02X}h)"
 
 
 class ModbusException(Refusal):
-    """The peer answered with an exception; inside a slave: the request has to be answered with one (`pdu`)."""
+    """The peer answered with an exception. Inside a slave: the request must be answered with one (`pdu`)."""
 
     def __init__(self, function: int, code: int, detail: str = "") -> None:
         self.function = function
@@ -80,7 +80,7 @@ class ModbusException(Refusal):
 
 
 class BadResponse(LineFailure):
-    """What came back is no answer to what was asked."""
+    """The response does not belong to the request."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +121,7 @@ class WriteRegistersRequest:
 
 @dataclass(frozen=True, slots=True)
 class BitsResponse:
-    """Response 01 or 02. A frame carries whole bytes: ``packed`` has up to seven bits more than were asked for."""
+    """Response 01 or 02. A frame has whole bytes: ``packed`` has up to seven bits more than were requested."""
 
     function: int
     packed: bytes
@@ -219,7 +219,7 @@ def decode_request(pdu: bytes) -> ModbusRequest:
     """The request in a PDU, or `ModbusException` with the code a slave answers: 01 for a function outside the six,
     03 for a quantity, coil value, byte count or length that is not permitted (MIC-1, MIC-7, MIC-24).
 
-    Whether the addresses exist is the device's affair (02).
+    The device itself checks whether the addresses exist (02).
     """
     function = pdu[0] if pdu else 0
     if function in READS:
@@ -286,7 +286,7 @@ def encode_response(response: ModbusResponse) -> bytes:
 
 
 def decode_response(pdu: bytes) -> ModbusResponse:
-    """The response in a PDU by its own form alone; `BadResponse` when it has none of the six functions.
+    """The response in a PDU by its own form alone; `BadResponse` for other functions and forms.
 
     Use `answer` to check that it answers a given request.
     """
@@ -326,7 +326,7 @@ def _bad_response(pdu: bytes, wanted: int) -> BadResponse:
 def answer(request: ModbusRequest, pdu: bytes) -> ModbusResponse:
     """The response in ``pdu`` if it answers ``request``.
 
-    Raises `ModbusException` when the peer refused, `BadResponse` when this is the answer to something else.
+    Raises `ModbusException` when the peer refused, `BadResponse` when it answers another request.
     """
     response = decode_response(pdu)
     match request, response:

@@ -1,12 +1,12 @@
 """Modbus RTU frames in a stream of bytes.
 
 A frame is cut where its function makes it end and its CRC is right; silence does not cut frames, because pseudo
-terminals, USB adapters and networks deliver in bursts (MIC-15). The gap only brings the framer back in step after rubbish.
+terminals, USB adapters and networks deliver in bursts (MIC-15). The gap only synchronises the framer after rubbish.
 
 A line with several slaves carries requests and responses, and both have to be cut so that nothing inside them is taken for
 a frame. At the front of the held bytes the framer tries the length that the function has as a request and the one it has
-as a response. When neither can match any more, one byte is given up and the rest looked at again, so that a good frame behind
-rubbish is found at once. When the gap has passed, nothing is waited for: complete frames are taken wherever they are, and
+as a response. When neither can match any more, one byte is discarded and the rest is examined again, so that a good frame behind
+rubbish is found at once. When the gap has passed, complete frames are taken wherever they are, and
 a rest with a right CRC is a frame even where the length of its function is not known.
 """
 
@@ -16,6 +16,7 @@ import enum
 import re
 from collections import deque
 from collections.abc import Collection
+from functools import partial
 from typing import NamedTuple
 
 from steptwin.errors import Misuse
@@ -33,11 +34,11 @@ MAX_FRAME = 256
 UART_GAP_NS: Nanos = 750 * MICROSECOND
 BURSTY_GAP_NS: Nanos = 20 * MILLISECOND
 # USB adapters (16 ms latency timer), Nagle's algorithm (40 to 200 ms) and masters that write byte by byte deliver one frame in
-# pieces. The beginning of a frame is kept this long; a new frame behind it is found at once all the same.
+# pieces. The beginning of a frame is kept for this time; a new frame behind it is found at once.
 PAUSE_NS: Nanos = 2 * SECOND
 MAX_LOOKS = MAX_FRAME
-"""Places in one delivery at which no frame begins and that are examined; behind them only the last 256 bytes are kept, until
-the gap has passed. It bounds the cost of rubbish."""
+"""Most places of one delivery that are examined and at which no frame begins. Behind them only the last 256 bytes are kept,
+until the gap has passed. It bounds the cost of rubbish."""
 
 # function: (length of the frame, index of a byte to be added to it or 0). Modbus application protocol V1.1b3, section 6.
 _REQUEST_LENGTHS = {
@@ -69,12 +70,12 @@ _FRAME_START = re.compile(rb"[\x00-\xf7](?:[" + _KNOWN + rb"]|\Z)", re.DOTALL)
 
 
 class FrameRole(enum.Enum):
-    """What a frame is. A response that repeats its request (05, 06) is recognised only when the request was seen before."""
+    """A response that repeats its request (05, 06) is recognised only after its request."""
 
     REQUEST = "request"
     RESPONSE = "response"
     UNKNOWN = "unknown"
-    """Right CRC, but a function or length outside the protocol's tables."""
+    """The CRC is right, but the function or the length is not in the tables of the protocol."""
 
 
 class RtuFrame(NamedTuple):
@@ -82,9 +83,9 @@ class RtuFrame(NamedTuple):
     """The whole frame with unit and CRC."""
     role: FrameRole
     end: int
-    """How many bytes had been fed up to and with the last of this frame."""
+    """Number of bytes received up to the end of this frame."""
     begin: Nanos = 0
-    """When its first byte came."""
+    """The moment of its first byte."""
     pause: Nanos = 0
     """The longest silence inside it."""
 
@@ -98,10 +99,10 @@ class RtuFrame(NamedTuple):
 
 
 class _Piece(NamedTuple):
-    """Bytes that came without a pause between them."""
+    """Bytes of one delivery, which have no pause between them."""
 
     first: int
-    """How many bytes had been fed before."""
+    """Number of bytes received before."""
     size: int
     begin: Nanos
     end: Nanos
@@ -116,17 +117,7 @@ def encode_frame(unit: int, pdu: bytes) -> bytes:
     return with_crc(bytes((unit,)) + pdu)
 
 
-def request_length(frame: bytes | bytearray, start: int = 0) -> int:
-    """Bytes of the request frame that begins at ``start``: more than 256 while unknown, -1 when it cannot be a request."""
-    return _length(_REQUESTS, frame, start)
-
-
-def response_length(frame: bytes | bytearray, start: int = 0) -> int:
-    """Bytes of the response frame that begins at ``start``: more than 256 while unknown, -1 when it cannot be a response."""
-    return _length(_RESPONSES, frame, start)
-
-
-def _length(table: tuple[tuple[int, int] | None, ...], frame: bytes | bytearray, start: int) -> int:
+def _length(table: tuple[tuple[int, int] | None, ...], frame: bytes | bytearray, start: int = 0) -> int:
     if len(frame) < start + 2:
         return _UNKNOWN_YET
     row = table[frame[start + 1]]
@@ -140,11 +131,17 @@ def _length(table: tuple[tuple[int, int] | None, ...], frame: bytes | bytearray,
     return length if length <= MAX_FRAME else _IMPOSSIBLE
 
 
+request_length = partial(_length, _REQUESTS)
+"""Bytes of the request frame that begins at an index: more than 256 while unknown, -1 when it cannot be a request."""
+response_length = partial(_length, _RESPONSES)
+"""Bytes of the response frame that begins at an index: more than 256 while unknown, -1 when it cannot be a response."""
+
+
 class RtuFramer(Stateful):
     """Cuts the frames of one line, at most 256 bytes held between calls.
 
-    ``own`` are the units on this side: what begins with one of them, or with the broadcast address, can only be a request
-    (an adapter that echoes has to be silenced before). ``gap_ns`` is the silence after which bytes of no frame are given up,
+    ``own`` are the units on this side: a frame that begins with one of them, or with the broadcast address, can only be a request
+    (the echo of an adapter has to be removed before). ``gap_ns`` is the silence after which bytes of no frame are discarded,
     ``pause_ns`` the longest silence inside a frame (the gap, when that is longer). Call `expire` when `deadline` has come.
     """
 
@@ -157,15 +154,15 @@ class RtuFramer(Stateful):
         self.gap_ns = gap_ns
         self._pause_ns = pause_ns
         self.held = bytearray()
-        """Bytes not yet cut. Always the same object; empty means in step."""
+        """Bytes not yet cut; empty when the framer is synchronised. It is always the same object."""
         self._own = frozenset(own)
-        self._scan = 0  # index in `held`: no known frame begins before
+        self._scan = 0  # index in `held` before which no frame begins
         self._burst = 0  # index in `held` where the bytes after the last cut or gap begin
         self._last: Nanos = 0
         self._fed = 0
         self._framed = 0
         self._asked: tuple[int, int] | None = None  # unit and function of the last request, until its response
-        self._pieces: deque[_Piece] = deque()  # what `held` is made of; the first may begin before it
+        self._pieces: deque[_Piece] = deque()  # deliveries of which `held` consists; the first may begin before it
 
     @property
     def fed(self) -> int:
@@ -174,7 +171,7 @@ class RtuFramer(Stateful):
 
     @property
     def rubbish(self) -> int:
-        """Bytes received and given up so far."""
+        """Bytes received and discarded so far."""
         return self._fed - self._framed - len(self.held)
 
     def set_state(self, plain: Plain) -> None:
@@ -184,11 +181,11 @@ class RtuFramer(Stateful):
         self.held = held
 
     def deadline(self) -> Nanos | None:
-        """When the gap ends, if there is something to give up then."""
+        """The end of the gap, if there are bytes that may have to be discarded then."""
         return None if len(self.held) == self._burst else self._last + self.gap_ns
 
     def feed(self, data: bytes, now: Nanos, end: Nanos | None = None) -> list[RtuFrame]:
-        """The frames completed by ``data``, whose first byte came at ``now`` and whose last at ``end`` (default ``now``)."""
+        """The frames completed by ``data``; its first byte arrives at ``now``, its last at ``end`` (default ``now``)."""
         if self.held:
             frames = self.expire(now)
             if now - self._last > self._pause_ns and len(self.held) == self._burst:
@@ -205,7 +202,7 @@ class RtuFramer(Stateful):
         return frames
 
     def expire(self, now: Nanos) -> list[RtuFrame]:
-        """The frames found when the gap has passed at ``now``; before that, nothing."""
+        """The frames found if the gap has passed at ``now``; empty before that."""
         frames: list[RtuFrame] = []
         deadline = self.deadline()
         if deadline is None or now < deadline:
@@ -234,7 +231,7 @@ class RtuFramer(Stateful):
         return frames
 
     def _is_one_unknown(self) -> bool:
-        """Whether all that came since the last cut or gap is one frame of a function whose length is not known."""
+        """Whether all bytes since the last cut or gap are one frame of a function whose length is not known."""
         rest = self.held[self._burst :]
         return MIN_FRAME <= len(rest) <= MAX_FRAME and crc16(rest) == 0 and self._look(self._burst, waiting=False)[0] <= 0
 
@@ -246,7 +243,7 @@ class RtuFramer(Stateful):
         while start < size:
             length, role = self._look(start, waiting=True)
             if length == 0 and start < self._burst:
-                # What came before the gap may have been given up by its sender: then a frame begins after it.
+                # The sender may have abandoned the bytes before the gap: then a frame begins after it.
                 after, after_role = self._look(self._burst, waiting=True)
                 if after > 0:
                     start, length, role = self._burst, after, after_role
@@ -267,7 +264,7 @@ class RtuFramer(Stateful):
             self._drop(done)
             self._scan = start - done
         if len(held) > MAX_FRAME:
-            # Too long for one frame: what was given up already serves nothing any more.
+            # Too long for one frame: the bytes before the next possible beginning are not needed any more.
             self._drop(self._scan)
 
     def _next_start(self, start: int) -> int:
@@ -293,7 +290,7 @@ class RtuFramer(Stateful):
         frames.append(RtuFrame(raw, role, end, begin or 0, pause))
 
     def _drop(self, count: int) -> None:
-        """Forget the first ``count`` bytes; what remains is looked at from its start."""
+        """Remove the first ``count`` bytes; the rest is examined from its beginning."""
         del self.held[:count]
         self._burst = 0
         self._scan = 0
@@ -302,15 +299,18 @@ class RtuFramer(Stateful):
             pieces.popleft()
 
     def _look(self, start: int, *, waiting: bool) -> tuple[int, FrameRole]:
-        """Length and role of the frame that begins at ``start``; length 0: it may still become one, -1: it cannot."""
+        """Length and role of the frame that begins at ``start``. Length 0: a frame may still be completed there; -1: none can be.
+
+        ``waiting``: more bytes may follow.
+        """
         held = self.held
         unit = held[start]
         if unit > MAX_UNIT:
             return _IMPOSSIBLE, FrameRole.UNKNOWN
         have = len(held) - start
         mine = unit == BROADCAST or unit in self._own
-        request = _length(_REQUESTS, held, start)
-        response = _IMPOSSIBLE if mine else _length(_RESPONSES, held, start)
+        request = request_length(held, start)
+        response = _IMPOSSIBLE if mine else response_length(held, start)
         first, first_role, second, second_role = request, FrameRole.REQUEST, response, FrameRole.RESPONSE
         if not mine and have > 1 and self._asked == (unit, held[start + 1]):
             first, first_role, second, second_role = response, FrameRole.RESPONSE, request, FrameRole.REQUEST

@@ -22,14 +22,14 @@ _PLAIN = bytes(3)
 _HEADERS = {size: bytes((0, 0, 0, size - 6)) for size in range(8, 260)}
 """The third to the sixth byte of an MBAP header, by the size of the whole frame."""
 _LENGTHS = [bytes((size + 1,)) for size in range(255)]
-"""The last byte of the length in the header of an answer, by the size of its PDU."""
+"""The low byte of the length in the header of a response, by the size of its PDU."""
 
 
 class SlaveDevice(Protocol):
-    """What a unit does with a request."""
+    """A device that executes the requests for a unit."""
 
     def execute(self, pdu: bytes, now: Nanos) -> bytes:
-        """Advance to ``now``, then the response PDU to a request PDU: a refusal is an exception PDU."""
+        """Advance to ``now``, execute a request PDU and return the response PDU; a refusal is an exception PDU."""
         ...
 
 
@@ -39,14 +39,14 @@ class FrameDirection(enum.Enum):
 
 
 FrameObserver: TypeAlias = Callable[[Nanos, FrameDirection, bytes], None]
-"""Called with every whole frame as it is on the wire, foreign ones and broadcasts too."""
+"""Called with the moment, the direction and the bytes of every whole frame on the wire, also of foreign units and broadcasts."""
 
 PauseObserver: TypeAlias = Callable[[int, Nanos], None]
-"""Called with the unit of a request just served (0: broadcast) and the silence inside it, where that is longer than the
-750 µs after which the device drops a frame (MIC-15)."""
+"""Called after a request with a pause of more than 750 µs, for which the device drops a frame (MIC-15): with its unit
+(0: broadcast) and the pause, ns."""
 
 PAUSE_REPORT_NS: Nanos = SECOND
-"""One port reports pauses at most this often."""
+"""Least interval between two reports of a port."""
 
 
 class SlavePort(Stateful):
@@ -60,15 +60,15 @@ class SlavePort(Stateful):
 
     @property
     def rubbish(self) -> int:
-        """Bytes so far that belonged to no frame; 0 where such bytes end the connection."""
+        """Number of bytes received so far that belonged to no frame; 0 where such bytes end the connection."""
         return 0
 
     def is_lone_read(self, data: bytes) -> bool:
-        """Whether ``data`` is a whole read request, and nothing is held from before: once answered, the port is as it was."""
+        """Whether ``data`` is one whole read request and no bytes are held: its execution leaves the port unchanged."""
         return False
 
     def close(self) -> None:
-        """Nothing is kept that would have to be given up."""
+        """The port has nothing to release."""
 
 
 def check_units(devices: Mapping[int, SlaveDevice]) -> None:
@@ -81,9 +81,9 @@ def check_units(devices: Mapping[int, SlaveDevice]) -> None:
 
 
 def execute_frame(devices: Mapping[int, SlaveDevice], frame: rtu.RtuFrame, now: Nanos) -> bytes:
-    """Give an RTU frame to whom it is addressed; the response frame, empty where the line stays silent.
+    """Execute an RTU frame on the devices to which it is addressed; returns the response frame, empty if there is none.
 
-    Foreign units and function codes no request can have are passed over (MIC-1). A broadcast write is executed by every
+    Foreign units and function codes that no request can have are ignored (MIC-1). A broadcast write is executed by every
     device and never answered, a broadcast read ignored (MIC-2).
     """
     raw = frame.raw
@@ -100,7 +100,7 @@ def execute_frame(devices: Mapping[int, SlaveDevice], frame: rtu.RtuFrame, now: 
 
 
 def broadcast(devices: Iterable[SlaveDevice], pdu: bytes, now: Nanos) -> None:
-    """A request to unit 0: every device executes a write, reads are ignored (MIC-2)."""
+    """Execute a request to unit 0: every device executes a write; a read is ignored (MIC-2)."""
     if pdu[0] in WRITES:
         for device in devices:
             device.execute(pdu, now)
@@ -112,7 +112,7 @@ def tcp_response(request: bytes, pdu: bytes) -> bytes:
 
 
 class PauseReports(Stateful):
-    """Reports requests with a pause inside that the device would have dropped."""
+    """Reports requests that the device would have dropped because of a pause (MIC-15)."""
 
     __slots__ = ("_next", "_observer")
     FIXED = frozenset({"_observer"})
@@ -128,14 +128,14 @@ class PauseReports(Stateful):
 
 
 class RtuSlavePort(SlavePort):
-    """One RTU line without the time a wire takes (`steptwin.wire.timed` has it).
+    """One RTU line without line timing (with it: `steptwin.wire.timed`).
 
-    ``devices`` is read once. ``gap_ns`` is the silence after which rubbish is given up (MIC-15). ``line`` gives the time that the
-    characters of a delivery took; without it a delivery takes no time.
+    ``devices`` is read once. ``gap_ns`` is the silence after which rubbish is discarded (MIC-15). ``line`` gives the time of the
+    characters of a delivery; without it a delivery takes no time.
     """
 
     broken = None
-    """A line cannot be broken by what is on it; a connection can."""
+    """A serial line stays open whatever is received; only connections are closed."""
 
     __slots__ = ("_devices", "_framer", "_held", "_line", "_pauses")
     FIXED = frozenset({"_devices", "_held", "_line"}) | SlavePort.FIXED
@@ -159,7 +159,7 @@ class RtuSlavePort(SlavePort):
 
     @property
     def rubbish(self) -> int:
-        """Bytes received so far that belonged to no frame."""
+        """Number of bytes received so far that belonged to no frame."""
         return self._framer.rubbish
 
     def is_lone_read(self, data: bytes) -> bool:
@@ -167,7 +167,7 @@ class RtuSlavePort(SlavePort):
         return is_whole and data[0] in self._devices and data[1] in READS and crc16(data) == 0
 
     def exchange(self, data: bytes, now: Nanos) -> bytes:
-        # Nearly always one whole request comes alone; this is that case without a framer.
+        # Fast path without the framer: nearly always one whole request arrives alone.
         size = len(data)
         if size >= 8 and not self._held:
             device = self._devices.get(data[0])
@@ -209,7 +209,7 @@ class TcpSlavePort(SlavePort):
     """One Modbus TCP connection. ``devices`` is read once.
 
     MIC-23: a single device is addressed by 0 and 255 too. With several, 0 is a broadcast, which is not answered (MIC-2). Any
-    other unit is answered with exception 0B at once, as gateways do. When `broken` has a reason, the shell sends what it has
+    other unit is answered with exception 0B at once, as gateways do. When `broken` has a reason, the shell sends the responses
     and closes the connection.
     """
 
@@ -225,7 +225,7 @@ class TcpSlavePort(SlavePort):
             self._devices[0] = self._devices[255] = device
         self._framer = mbap.TcpFramer()
         self.broken: str | None = None
-        """Why the connection has to be closed, or None."""
+        """The reason for which the connection has to be closed, or None."""
 
     def is_lone_read(self, data: bytes) -> bool:
         framer = self._framer
@@ -233,7 +233,7 @@ class TcpSlavePort(SlavePort):
         return is_whole and data[7] in READS
 
     def exchange(self, data: bytes, now: Nanos) -> bytes:
-        # Nearly always one whole request comes alone; this is that case without a framer.
+        # Fast path without the framer: nearly always one whole request arrives alone.
         framer = self._framer
         if data[2:6] == _HEADERS.get(len(data)) and not framer.held and not framer.broken:
             device = self._devices.get(data[6])

@@ -1,8 +1,8 @@
-"""Controllers that take the time a serial line and their own firmware take (MIC-32).
+"""Controllers with the timing of a serial line and of their firmware (MIC-32).
 
-Each character takes its bit times in both directions. A request is there when its last character has arrived; a controller has
-one request at a time, on whichever of its ports it came, and executes at most 100 a second. What arrives at it meanwhile is
-lost, as on a UART without a buffer (`steptwin.wire.gateway` waits instead).
+Each character takes its bit times in both directions. A request is complete when its last character has arrived. A controller has
+one request at a time, from any of its ports, and executes at most 100 per second. Requests that arrive meanwhile are
+lost, as on a UART without a buffer (`steptwin.wire.gateway` has a queue).
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from steptwin.wire.slave import FrameDirection, FrameObserver, PauseObserver, Pa
 # MIC-32: the highest rate the manual gives.
 FRAME_INTERVAL_NS: Nanos = 10 * MILLISECOND
 LINE_CHARACTERS = 16 * rtu.MAX_FRAME
-"""More characters than this never wait for the line: a real sender would not have got rid of them yet."""
+"""Most characters that wait for the line; a real sender could not have sent more."""
 
 
 @dataclass(frozen=True, slots=True)
 class LineTiming:
-    """How fast a line and the device on it are.
+    """Timing of a line and of the device on it.
 
     ``turnaround_ns`` passes between the request and the first character of the response; it cannot be shorter than the
     gap that ends the request, which is its default. ``interval_ns`` is the least time between two requests executed.
@@ -48,7 +48,7 @@ class LineTiming:
 
 
 class TimedUnits(Stateful):
-    """Controllers behind any number of ports, and until when each is busy with a request. ``devices`` is read once."""
+    """Controllers behind any number of ports, and the time until which each is busy. ``devices`` is read once."""
 
     __slots__ = ("_busy", "_next", "devices", "timing")
     FIXED = frozenset({"devices", "timing"})
@@ -58,7 +58,7 @@ class TimedUnits(Stateful):
         self.devices = dict(devices)
         self.timing = timing
         self._busy = dict.fromkeys(devices, 0)
-        self._next = dict.fromkeys(devices, 0)  # when each may execute its next request
+        self._next = dict.fromkeys(devices, 0)  # the earliest moment of the next execution of each
 
     def addressed(self, unit: int, function: int) -> list[int]:
         """The units that a request is for; none for a foreign unit or a broadcast that is not a write (MIC-2)."""
@@ -67,22 +67,22 @@ class TimedUnits(Stateful):
         return [unit] if unit in self.devices and 0 < function < REFUSED else []
 
     def busy_until(self, units: Iterable[int]) -> Nanos:
-        """When the last of ``units`` has done with its present request."""
+        """The end of the present requests of all ``units``."""
         return max((self._busy[unit] for unit in units), default=0)
 
     def execution(self, units: Iterable[int], arrival: Nanos) -> Nanos:
-        """When a request that arrives at ``arrival`` is executed by the last of ``units``."""
+        """The moment at which the last of ``units`` executes a request that arrives at ``arrival``."""
         return max(arrival, *(self._next[unit] for unit in units))
 
     def take(self, unit: int, arrival: Nanos) -> Nanos:
-        """``unit`` has a request from ``arrival`` on, until `done`; returns when it executes it."""
+        """Begin a request of ``unit`` at ``arrival``; `done` ends it. Returns the moment of its execution."""
         start = max(arrival, self._next[unit])
-        # Should the port that took it go away: until the longest response would have been sent.
+        # If the port is closed meanwhile, the unit is free when the longest response would have been sent.
         self._busy[unit] = start + self.timing.turnaround_ns + self.timing.line.duration(rtu.MAX_FRAME)
         return start
 
     def done(self, unit: int, executed: Nanos, sent: Nanos) -> None:
-        """The request of ``unit`` was executed; its response has left at ``sent``."""
+        """End the request of ``unit``, which was executed at ``executed``; its response has left at ``sent``."""
         self._next[unit] = executed + self.timing.interval_ns
         self._busy[unit] = sent
 
@@ -91,16 +91,16 @@ class TimedRtuSlavePort(SlavePort):
     """As `steptwin.wire.slave.RtuSlavePort`, with line timing. Responses leave when their last character would have.
 
     Call `to_send` at every `deadline`: a request is executed at the moment of the call that finds it due. ``gap_ns`` is the
-    silence after which rubbish is given up; with strict timing 750 µs.
+    silence after which rubbish is discarded; with strict timing 750 µs.
     """
 
     broken = None
-    """A line cannot be broken by what is on it; a connection can."""
+    """A serial line stays open whatever is received; only connections are closed."""
 
     __slots__ = (
         "_arriving",
+        "_executing",
         "_framer",
-        "_in_hand",
         "_incoming",
         "_outgoing",
         "_pauses",
@@ -128,18 +128,18 @@ class TimedRtuSlavePort(SlavePort):
             self._framer = rtu.RtuFramer(units.devices, gap_ns)
         self._incoming = CharacterClock(timing.line)
         self._outgoing = CharacterClock(timing.line)
-        self._arriving: deque[tuple[Nanos, rtu.RtuFrame]] = deque()  # frames whose last character comes at that time
-        self._in_hand: list[tuple[Nanos, int, rtu.RtuFrame]] = []  # when which unit executes what it has taken
+        self._arriving: deque[tuple[Nanos, rtu.RtuFrame]] = deque()  # each frame with the moment of its last character
+        self._executing: list[tuple[Nanos, int, rtu.RtuFrame]] = []  # moment of execution, unit, request
         self._responses: deque[tuple[Nanos, bytes]] = deque()
         self._pauses = PauseReports(on_pause)
         self.dropped = 0
         """Requests lost because the controller was busy; a broadcast counts once for each."""
         self.overrun = 0
-        """Characters that found no room on the line."""
+        """Characters lost because `LINE_CHARACTERS` were waiting."""
 
     @property
     def rubbish(self) -> int:
-        """Bytes received so far that belonged to no frame."""
+        """Number of bytes received so far that belonged to no frame."""
         return self._framer.rubbish
 
     def exchange(self, data: bytes, now: Nanos) -> bytes:
@@ -157,7 +157,7 @@ class TimedRtuSlavePort(SlavePort):
         begin = max(now, clock.end)
         end = clock.send(len(data), now)
         for frame in self._framer.feed(data, begin, end):
-            # A frame inside rubbish may have been there before the byte that shows it.
+            # A frame inside rubbish may have ended before the byte that completes its recognition.
             self._arriving.append((max(now, clock.end_before(self._framer.fed - frame.end)), frame))
 
     def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
@@ -171,7 +171,7 @@ class TimedRtuSlavePort(SlavePort):
         return out
 
     def deadline(self) -> Nanos | None:
-        moments = [moment for moment, *_ in self._in_hand]
+        moments = [moment for moment, *_ in self._executing]
         gap = self._framer.deadline()
         if gap is not None:
             moments.append(gap)
@@ -182,14 +182,14 @@ class TimedRtuSlavePort(SlavePort):
         return min(moments, default=None)
 
     def _run(self, now: Nanos) -> None:
-        """Everything due until ``now``: arrivals and executions in the order of their moments."""
+        """Process everything due by ``now``: arrivals and executions in the order of their moments."""
         for frame in self._framer.expire(now):
             self._arriving.append((now, frame))
         while True:
-            execution = min(self._in_hand, key=_moment, default=None)
+            execution = min(self._executing, key=_moment, default=None)
             arrival = self._arriving[0][0] if self._arriving else None
             if execution is not None and execution[0] <= now and (arrival is None or execution[0] <= arrival):
-                self._in_hand.remove(execution)
+                self._executing.remove(execution)
                 self._execute(*execution, now)
             elif arrival is not None and arrival <= now:
                 self._arrive(arrival)
@@ -204,7 +204,7 @@ class TimedRtuSlavePort(SlavePort):
             if frame.begin < max(self._units.busy_until((unit,)), self._outgoing.end):
                 self.dropped += 1
             else:
-                self._in_hand.append((self._units.take(unit, moment), unit, frame))
+                self._executing.append((self._units.take(unit, moment), unit, frame))
 
     def _execute(self, moment: Nanos, unit: int, frame: rtu.RtuFrame, now: Nanos) -> None:
         response = with_crc(frame.raw[:1] + self._units.devices[unit].execute(frame.pdu, now))

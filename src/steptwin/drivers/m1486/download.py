@@ -238,7 +238,7 @@ async def begin(
 ) -> None:
     """Send a command that begins a motion, once."""
     notes = unit.notes
-    stops = notes.stops  # what is sent too late is stopped before it is noted
+    stops = notes.stops  # a command that is sent too late is stopped before it is noted
 
     def register_motion(target_u: int | None, duration_s: float | None) -> None:
         if kind is ChipMotion.BLOCK:

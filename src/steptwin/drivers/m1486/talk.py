@@ -124,9 +124,9 @@ class CharacterTalk:
         """Whether characters of an abandoned command may precede the next one."""
         self.nearly_full = False
         """Whether the last command took one of the last three places of the input buffer."""
-        self._is_stuck = False  # the spoiler found no room: it is to be said again
+        self._is_stuck = False  # the buffer had no room for the spoiler, which is sent again
         self._request: ChipRequest | None = None
-        self._lines: list[bytes] = []  # still to be said, the one being said first
+        self._lines: list[bytes] = []  # characters still to be sent; the first is being sent
         self._sent = b""
         self._echoed = b""
         self._answer: int | None = None
@@ -182,7 +182,7 @@ class CharacterTalk:
             case ChipRequestKind.LISTEN | ChipRequestKind.LETTER | ChipRequestKind.UPLOAD:
                 return self._put(b"", now)
             case ChipRequestKind.BLIND:
-                # Its first line spoils what may stand before it, and is said twice.
+                # Its first line spoils characters that may precede it, and is sent twice.
                 request.committed = True
                 self.selected = ALL
                 self.dirty = False
@@ -263,7 +263,7 @@ class CharacterTalk:
                 return self._echo(request, expected, rest, now)
             self._give_up(now)
             raise NoRoom(self._place, request)
-        # What a program uploads comes in between. A wrong echo looks the same, and is missed then: nothing is taken without it.
+        # Uploads of a program arrive between echoes. Without the right echo nothing is taken.
         if self._uploaded(byte) or byte in (EMPTY, THREE_FREE):
             return None
         raise self._garbled(request, self._echoed + bytes((byte,)) + rest, now)
@@ -373,7 +373,7 @@ class CharacterTalk:
             self._on_bytes(now, FrameDirection.OUT, data)
         for byte in data:
             if not self._uploaded(byte) and byte not in (EMPTY, THREE_FREE):
-                self.dirty = True  # the echo of something that now stands in front of the next command
+                self.dirty = True  # the echo of characters that now precede the next command
         if now < self._busy_until:
             self.free_ns = min(now + QUIET_NS, self._busy_until)
 

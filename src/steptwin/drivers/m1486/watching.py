@@ -183,7 +183,7 @@ class _Watch:
                 continue
             # Who was asked several times answers several times.
             alike = [mover for mover in waited_for if mover.owed == count] or waited_for
-            # Likeliest is who was asked just now, for it may have been at rest before; then those whose end is near.
+            # The chip of the last question is the likeliest, since it may have been at rest before; then those near their end.
             alike.sort(key=lambda m: (m is not self._asked_last, not m.is_near(at)))
             await self._search(alike, at, count)
 

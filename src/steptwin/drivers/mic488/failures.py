@@ -46,9 +46,9 @@ class MoveFailed(Refusal):
 
 
 class Unconfirmed(LineFailure):
-    """A stop, or a change of mode that ends a motion, was not confirmed by the controller. The text says what it does now."""
+    """A stop, or a change of mode that ends a motion, was not confirmed by the controller. The text names its possible state."""
 
 
 def unconfirmed(who: str, what: str, failure: LineFailure) -> Unconfirmed:
-    """The error for ``who`` that could not be ``what`` (stopped)."""
+    """The error for the axis or controller ``who``, which could not be ``what``, such as ``stopped``."""
     return Unconfirmed(f"{who} could not be {what}: the controller cannot be reached and continues its last command ({failure})")

@@ -135,7 +135,7 @@ class AsyncMic488Jog:
                     continue
                 raise self._unconfirmed("cannot be held any more", failure) from failure
             return self.end is None
-        # Whoever held the button was away: the axis must not go on by itself afterwards.
+        # The operator was away: the axis must not continue afterwards without `hold`.
         self._not_held()
         return False
 

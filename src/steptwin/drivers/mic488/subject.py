@@ -228,7 +228,7 @@ _DETAILS = {
     "program_bank": "PROG_BANK_SEL",
     "position_bank": "POS_BANK_SEL",
 }
-"""Registers that show what is in ``details`` of a state; user registers are too many."""
+"""Registers from which the ``details`` of a state are read; there are too many user registers."""
 
 
 def _axis(axis: AxisDescription, status: Mic488Status, encoder: float | None) -> StateAxis:
