@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -36,3 +38,29 @@ def test_links_into_the_repository_lead_somewhere(page: str) -> None:
     targets = [target for target in re.findall(r"\]\(([^)#]+)", (ROOT / page).read_text()) if ":" not in target]
     assert targets
     assert [target for target in targets if not (ROOT / target).exists()] == []
+
+
+def exists(reference: str) -> bool:
+    """Whether ``steptwin.package.module.Name.attribute`` is a module or leads to a name in one."""
+    module, *names = reference.split(".")
+    while names and find_spec(f"{module}.{names[0]}") is not None:
+        module = f"{module}.{names.pop(0)}"
+        if not hasattr(import_module(module), "__path__"):
+            break
+    found: object = import_module(module)
+    for name in names:
+        if name in getattr(found, "__annotations__", {}):
+            return True
+        if not hasattr(found, name):
+            return False
+        found = getattr(found, name)
+    return True
+
+
+def test_names_in_docstrings_exist() -> None:
+    sources = sorted((ROOT / "src").rglob("*.py"))
+    cited = {name: file.name for file in sources for name in re.findall(r"`(steptwin(?:\.\w+)+)`", file.read_text())}
+    assert len(cited) > 100
+    assert {name: file for name, file in cited.items() if not exists(name)} == {}
+    assert not exists("steptwin.machine.WirePort")
+    assert not exists("steptwin.room.Port")

@@ -15,7 +15,7 @@ from steptwin.machine import Nanos
 
 
 class _Nothing:
-    """Nothing to advance. See `steptwin.live.cell.Advancing`."""
+    """Nothing to advance. See `steptwin.live.cell.Advanceable`."""
 
     stale = False
 

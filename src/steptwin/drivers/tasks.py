@@ -19,7 +19,7 @@ CLOSE_S = 1.0
 
 
 class TaskLine(Generic[Q, A]):
-    """See `steptwin.drivers.line.Line`. It belongs to one event loop."""
+    """See `steptwin.drivers.line.DriverLine`. It belongs to one event loop."""
 
     def __init__(self, endpoint: Endpoint, exchanger: Exchanger[Q, A]) -> None:
         self.notes: dict[Hashable, Any] = {}
@@ -170,7 +170,7 @@ class TaskLine(Generic[Q, A]):
 
 
 class _SlicedLock:
-    """See `steptwin.drivers.line.Line.lock`. Waiting tasks keep their place in the queue."""
+    """See `steptwin.drivers.line.DriverLine.lock`. Waiting tasks keep their place in the queue."""
 
     __slots__ = ("_lock", "_waiting")
 

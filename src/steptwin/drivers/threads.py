@@ -22,7 +22,7 @@ from steptwin.machine import SECOND, Nanos
 
 
 class ThreadLine(Generic[Q, A]):
-    """See `steptwin.drivers.line.Line`. ``clock`` and ``sleeping``: real time."""
+    """See `steptwin.drivers.line.DriverLine`. ``clock`` and ``sleeping``: real time."""
 
     def __init__(
         self,
@@ -158,7 +158,7 @@ class ThreadLine(Generic[Q, A]):
 
 
 class ThreadLock:
-    """A lock for threads that is entered like one for tasks; ``waiting`` as of `steptwin.drivers.line.Line.lock`."""
+    """A lock for threads that is entered like one for tasks; ``waiting`` as of `steptwin.drivers.line.DriverLine.lock`."""
 
     __slots__ = ("_lock", "_waiting")
 

@@ -115,7 +115,7 @@ class SerialChain(Stateful):
 
 
 class LinePort:
-    """The port of one program; a `steptwin.machine.WirePort` that a link serves.
+    """The port of one program; a `steptwin.machine.SendingPort`.
 
     ``on_output`` is called for unsolicited output.
     """
