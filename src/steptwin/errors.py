@@ -31,4 +31,6 @@ class Refusal(SteptwinError):
 
 
 class LineFailure(SteptwinError, OSError):
-    """The line failed: time-out, bad CRC, disconnect."""
+    """The line failed: time-out, bad CRC, disconnect. ``uncertain``: the peer may have executed the request nevertheless."""
+
+    uncertain = False

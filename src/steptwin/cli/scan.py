@@ -155,11 +155,11 @@ def _chips(place: str, bauds: list[int], timeout: float) -> list[dict[str, Any]]
 def _let_chips_listen(place: str, bauds: list[int]) -> None:
     """Select all chips again at each rate; the most likely rate is last, because characters at other rates are rubbish at it."""
     from steptwin.drivers.blocking import finish
-    from steptwin.drivers.m1486.identify import let_all_listen
+    from steptwin.drivers.m1486.identify import select_all
 
     for baud in reversed(bauds):
         with contextlib.suppress(LineFailure), search_line(place, baud) as line:
-            finish(let_all_listen(line))
+            finish(select_all(line))
 
 
 def _controllers(place: str, bauds: list[int], units: list[int], timeout: float) -> list[dict[str, Any]]:

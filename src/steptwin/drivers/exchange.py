@@ -109,9 +109,7 @@ class NoAnswer(LineFailure):
 
 
 class LineLost(LineFailure):
-    """The port or connection was lost or could not be opened. ``uncertain`` as of `NoAnswer`."""
-
-    uncertain = False
+    """The port or connection was lost or could not be opened."""
 
 
 class Overtaken(Refusal):

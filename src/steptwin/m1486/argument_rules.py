@@ -39,7 +39,7 @@ def number_problem(command: ChipCommand, number: int, variant: Variant, interfac
 
 
 def lines_of(spec: CommandSpec, number: int) -> range:
-    """The I/O lines a command with this number reads or writes."""
+    """The I/O lines that a command with this number reads or writes."""
     if spec.kind is ArgType.LINE or (spec.kind is ArgType.CONDITION and number in LINES):
         return range(number, number + 1)
     group = line_group(number) if spec.kind is ArgType.LINES else None

@@ -15,7 +15,7 @@ from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection
 
 LONGEST_LINE = 256
-"""More characters than this without CR are shown as they are."""
+"""More characters than this without CR are logged as an incomplete line."""
 UPLOADS_WAITING = 1000
 """Bytes announced and not seen on the line: they may have been lost there."""
 
@@ -24,11 +24,11 @@ REPORTS = {
     EMPTY: "the input buffer is empty",
     THREE_FREE: "three places are free in the input buffer",
 }
-"""What chips send unasked."""
+"""Bytes that chips send without a request."""
 
 
 class CharacterLog:
-    """Puts characters into words and hands them to ``sinks``. The line to the host is shared, so its bytes come once."""
+    """Describes characters in words for ``sinks``. The line to the host is shared, so its bytes are logged once."""
 
     def __init__(self, variant: Variant) -> None:
         self._variant = variant
@@ -40,7 +40,7 @@ class CharacterLog:
         self._uploads.append((byte, f"U{command} {UPLOADS.get(command, 'reserved')}"))
 
     def received(self, now: Nanos, link: str, raw: bytes) -> None:
-        """What a host typed up to CR."""
+        """Log a line that a host has sent, up to CR."""
         self._report(FrameLine(now, link, FrameDirection.IN, raw, _typed(raw, self._variant)))
 
     def sent(self, now: Nanos, byte: int) -> None:
@@ -64,7 +64,7 @@ class CharacterLog:
 
 
 class LineSplitter:
-    """Cuts what one program sends into lines for the log."""
+    """Cuts the characters of one program into lines for the log."""
 
     def __init__(self, log: CharacterLog, link: str) -> None:
         self._log = log

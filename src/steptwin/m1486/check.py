@@ -63,7 +63,7 @@ def check(text: str, variant: Variant = DEFAULT, interface: Interface = STEP_DIR
         diagnostics += structure_rules(stream, variant)
         diagnostics += flow_rules(stream, variant, interface)
         diagnostics += position_rules(stream, variant)
-    # Commands that several chips receive are judged for each of them.
+    # Commands that several chips receive are checked for each of them.
     return CheckedChipProgram(program, in_order(dict.fromkeys(diagnostics)), [memory_of(s, variant) for s in chips])
 
 

@@ -19,7 +19,7 @@ from steptwin.m1486.variants import Variant
 
 
 class ArgType(enum.Enum):
-    """What the argument of a command is."""
+    """The kind of the argument of a command."""
 
     NONE = "none"
     NUMBER = "number"
@@ -35,7 +35,7 @@ class ArgType(enum.Enum):
 
 
 class When(enum.Enum):
-    """When a command acts."""
+    """The time at which a command acts."""
 
     #: As soon as it has been received, ahead of everything that waits (M-27).
     RECEIVED = "when received"
@@ -79,7 +79,7 @@ _BYTE = range(1, 256)
 PROFILE_RANGE = range(20, 7_001)
 _PROFILE = range(PROFILE_RANGE.start, 2**16)
 _LINE_GROUPS = tuple(n for n in _BYTE if line_group(n) is not None)
-#: What ``I`` can ask: a line or a flag.
+#: Arguments of ``I``: a line or a flag.
 CONDITIONS = (*LINES, *USER_FLAGS, CARRY)
 CLEAR_KILL = 75
 CLEAR_POSITION = 100
@@ -169,7 +169,7 @@ _ROWS: tuple[CommandSpec, ...] = (
 
 #: Sizes the manual states by themselves (chapter II, Memory): four commands take no memory; ``I`` holds line, level and label.
 _STATED_BITS = {"@": 0, "[": 0, "]": 0, "\\": 0, "I": 32}
-#: Keys whose number may not be left out: it is not a number of the numeric kind, or nothing could be known without it.
+#: Keys whose number may not be left out: it is not numeric, or the command has no meaning without it.
 _NEEDS_ARGUMENT = frozenset("@IX")
 
 #: Of all variants; it decides the size of a label in the memory of each.
@@ -193,7 +193,7 @@ def _largest(spec: CommandSpec) -> int:
 def _letter_bits(letter: str) -> int:
     if letter in _STATED_BITS:
         return _STATED_BITS[letter]
-    # M-24: the letter decides, so G+ and G- take what G takes.
+    # M-24: the letter decides, so G+ and G- take as much memory as G.
     return 8 + max(argument_bits(_largest(s)) for s in _ROWS if s.letter == letter)
 
 
@@ -258,12 +258,12 @@ def when(key: str, argument: int | None) -> When:
 
 
 def grouped(number: int) -> str:
-    """A number for people: ``16 000 000``."""
+    """A number with groups of digits: ``16 000 000``."""
     return f"{number:,}".replace(",", " ") if number >= 10_000 else str(number)
 
 
 def permitted_text(key: str, variant: Variant) -> str:
-    """What may follow ``key``, for people: ``1 to 21 (line), 40 to 63 (function), 75 (Clear kill)``."""
+    """The numbers that may follow ``key``, as text: ``1 to 21 (line), 40 to 63 (function), 75 (Clear kill)``."""
     specs = [s for s in rows(key) if s.kind is not ArgType.NONE]
     if not specs:
         return "nothing"

@@ -26,7 +26,7 @@ from steptwin.m1486.variants import Variant
 
 MOTION_SECTION = "VII.2"
 STARTS = frozenset({"R", ")", "("})
-"""Commands that start a motion; the others of their section set what the next one does."""
+"""Commands that start a motion; the others of their section set the next motion."""
 ACTIVE_LOW = frozenset({"JOG", "LIMIT", "SD", "S&D", "DUAL", "BOOST"})
 
 

@@ -52,7 +52,7 @@ BUSY = frozenset({MotionMode.MOVE, MotionMode.ENDLESS, MotionMode.SEEK})
 
 
 def speed_curve(settings: tuple[float, float, float, float], qualification: int, clock: int) -> SpeedCurve:
-    """How a move gains speed with S, A, P and V, in minimum microsteps; ``clock`` is that of the variant."""
+    """The speed curve of a move with S, A, P and V, in minimum microsteps; ``clock`` is that of the variant."""
     start_stop, acceleration, profile, velocity = settings
     # M-34: V may ask for more than Q permits.
     top = min(velocity, HIGHEST_SPEED[qualification])

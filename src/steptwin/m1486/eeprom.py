@@ -25,7 +25,7 @@ def pack(image: StoredFile) -> bytes:
 
 
 def unpack(data: bytes, variant: Variant) -> StoredFile | None:
-    """The file in ``data``, None if there is none. Raises `Misuse` if it is none of this kind or does not fit the variant."""
+    """The file in ``data``, None if it is empty. Raises `Misuse` if it has another format or does not fit the variant."""
     if not data:
         return None
     begin = _HEAD + _LABEL * data[1] if len(data) >= _HEAD else 0
@@ -48,7 +48,7 @@ def stored_commands(program: ParsedProgram) -> list[ChipCommand]:
 
 
 def image_of(program: ParsedProgram, variant: Variant) -> bytes:
-    """A program as the stored file that downloading it gives; with or without ``[ ]`` around it.
+    """The stored file after downloading a program, with or without ``[ ]`` around it.
 
     Raises `Misuse` for a program that is more than one file for one chip, or that the variant does not take.
     """

@@ -9,7 +9,7 @@ from steptwin.datasheet import EventDescription, EventSeverity, FactDescription,
 from steptwin.machine import Fact, Nanos
 
 EVENTS_KEPT = 1000
-"""The last so many events of a chip are kept."""
+"""Number of events of a chip that are kept."""
 _UNIT = "microstep"
 
 
@@ -70,7 +70,7 @@ EVENTS: Mapping[str, EventDescription] = {
 
 
 class M1486Event(NamedTuple):
-    """An event. ``code`` is stable, one of `EVENTS`; ``text`` is for people."""
+    """An event. ``code`` is stable, one of `EVENTS`; ``text`` is for users."""
 
     time: Nanos
     code: str

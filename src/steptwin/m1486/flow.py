@@ -22,7 +22,7 @@ from steptwin.m1486.variants import Variant
 
 #: Enough for a line group of five lines; more settings at one place are merged.
 MOST_STATES = 32
-#: The call a command runs under when it runs under none.
+#: The number of the call for commands outside every call.
 _MAIN = -1
 
 

@@ -7,7 +7,7 @@ from steptwin.m1486.functions import CARRY, USER_FLAGS
 from steptwin.m1486.syntax import JumpCondition
 from steptwin.machine import MILLISECOND, Nanos
 
-#: M-5: loops inside one another.
+#: M-5: most levels of nested loops.
 LOOP_LEVELS = 4
 
 MAKERS = Makers()

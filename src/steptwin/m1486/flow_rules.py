@@ -20,13 +20,13 @@ from steptwin.m1486.structure_rules import label_problem
 from steptwin.m1486.syntax import ChipCommand
 from steptwin.m1486.variants import Variant
 
-#: Acceleration per start/stop speed above which the lost table would have to be asked (M-4).
+#: Ratio of acceleration to start/stop speed above which the missing table would be needed (M-4).
 ACCELERATION_PER_START_STOP = 65
 
 _MOVES = frozenset("R)(")
 _DISTANCES = frozenset("FBG=")
 _ARITHMETIC = frozenset("+-*/")
-#: What a setting makes wrong: the finding, the message, the hint.
+#: An error because of a setting: the finding, the message, the hint.
 _Fault = tuple[ChipFinding, str, str | None]
 _Rule = Callable[[ChipCommand, Settings], _Fault | None]
 

@@ -10,7 +10,7 @@ from steptwin.m1486.lines import LINES, line_group
 from steptwin.m1486.registers import UPLOADS
 from steptwin.machine import Nanos
 
-#: M-15: what U16 sends.
+#: M-15: the byte of U16.
 PRODUCTION_SERIES = 1
 
 MAKERS = Makers()
@@ -138,7 +138,7 @@ UPLOADED: dict[int, Callable[[CommandHost, Nanos], int]] = {
     19: _function_byte(56),
     20: lambda chip, now: chip.variant.type_letter,
 }
-"""What each ``U`` sends."""
+"""The byte that each ``U`` sends."""
 
 
 @MAKERS.does("Upload")
@@ -148,7 +148,7 @@ def _upload(chip: CommandHost, number: int, place: int, following: int) -> Effec
     def run(now: Nanos) -> int:
         all_left = chip.uart.all_left()
         if all_left is not None:
-            # M-36: there is one place for a byte to send, so the program goes no faster than the line.
+            # M-36: the chip holds one byte to send, so that the program is not faster than the line.
             chip.program.wait_until(all_left)
             return place
         chip.upload(number, read(chip, now), now)

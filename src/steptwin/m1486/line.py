@@ -59,7 +59,7 @@ class SerialChain(Stateful):
 
     def port(self) -> LinePort:
         """A port of the line for one more program. Every port receives all characters of the chips from now on."""
-        if self._ports:  # the first one also receives what chips have sent at the moment at which they were made
+        if self._ports:  # the first one also receives the characters that chips sent when they were made
             self.collect(max(chip.now for chip in self.chips.values()))
         port = LinePort(self)
         self._ports.append(port)
@@ -81,7 +81,7 @@ class SerialChain(Stateful):
             port.keep(merged)
 
     def departure(self) -> Nanos | None:
-        """When the next character will have left a chip."""
+        """The end of the next character from a chip."""
         dues = (chip.uart.departure() for chip in self.chips.values())
         return min((due for due in dues if due is not None), default=None)
 
@@ -135,19 +135,19 @@ class LinePort:
         return b"".join(data for _, data in self.to_send(now))
 
     def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
-        """What the chips have sent by ``now`` and this port has not fetched, each with the moment of its end."""
+        """Characters that the chips have sent by ``now`` and this port has not fetched, each with the moment of its end."""
         self._chain.collect(now)
         pending, self.pending = self.pending, []
         return pending
 
     def keep(self, sent: list[tuple[Nanos, bytes]]) -> None:
-        """Hold characters until they are fetched."""
+        """Keep characters until they are fetched."""
         self.pending += sent
         if len(self.pending) > MOST_WAITING:
             del self.pending[:-MOST_WAITING]
 
     def deadline(self) -> Nanos | None:
-        """When there may be more to send: characters that are on their way. ``on_output`` is called for others."""
+        """The end of the next character in transmission. For others ``on_output`` is called."""
         return self._chain.departure()
 
     def wake(self) -> None:

@@ -17,7 +17,7 @@ class Interface:
 
     name: str
     title: str
-    #: What U15 sends (M-15).
+    #: The byte of U15 (M-15).
     code: int
     #: Lines whose pins the interface needs for itself.
     occupied: range
@@ -46,7 +46,7 @@ SEEK_ENDS_LOW = frozenset((1, 2, 3, 8, 9, 10, 11, 16, 17, 18, 19))
 #: Line that function 40 (Runsign) drives.
 RUNSIGN_LINE = 1
 
-#: What else uses the pin of a line, beside the driver interface.
+#: Other functions on the pin of a line, beside the driver interface.
 SHARED_PINS = {
     5: "BR0, read when RST goes high",
     6: "BR1, read when RST goes high",

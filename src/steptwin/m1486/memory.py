@@ -65,25 +65,25 @@ class CommandMemory(Stateful):
     def __init__(self, variant: Variant, reader: MemoryObserver) -> None:
         self._reader = reader
         self.size = variant.memory_bits // 8
-        #: How many places there are.
+        #: Number of places.
         self.span = 2 * self.size
         #: First byte of the registers that share the memory; None where they have a place of their own.
         self._shared = self.size - variant.shared_bits // 8 if variant.shared_bits else None
         self._clear()
 
     def reset(self) -> None:
-        """Empty it: the next command goes to the first byte."""
+        """Empty the memory: the next command goes to the first byte."""
         self._clear()
         self._reader.bytes_changed(0, self.size)
 
     def _clear(self) -> None:
         self._bytes = array("B", bytes(self.size))
         self._own = array("H", [0] * len(GENERAL))
-        #: Where the next command goes.
+        #: Place of the next command.
         self.write = 0
         #: Commands before this place may run.
         self.end = 0
-        #: Where the program that a restart runs begins (M-23); None once it is overwritten.
+        #: Beginning of the program that a restart runs (M-23); None once it is overwritten.
         self.begin: int | None = 0
         self.file = FileState.CLOSED
         self.labels: dict[int, int] = {}
@@ -92,7 +92,7 @@ class CommandMemory(Stateful):
     # ------------------------------------------------------------------ commands
 
     def age(self, place: int) -> int:
-        """How many bytes were written from ``place`` on."""
+        """Number of bytes written from ``place`` on."""
         return (self.write - place) % self.span
 
     def is_lost(self, place: int) -> bool:
@@ -154,12 +154,12 @@ class CommandMemory(Stateful):
         self.write = self.end
 
     def drop_file(self) -> None:
-        """Forget a file that is open, as if it had never begun."""
+        """Discard an open file."""
         self.file = FileState.CLOSED
         self.write = self.end
 
     def close_file(self) -> StoredFile | None:
-        """The file may run; None when it was refused."""
+        """Close the file, which may then run; None if it was refused."""
         stored = self.file is FileState.OPEN
         self.file = FileState.CLOSED
         if not stored:

@@ -9,7 +9,7 @@ from __future__ import annotations
 #: Minimum microsteps in a full step.
 FULL_STEP = 64
 
-#: What a chip is set to at power-on: the distance is that of F and B (chapter VII.2, Backward).
+#: Settings at power-on: the distance is that of F and B (chapter VII.2, Backward).
 DEFAULT_DISTANCE_U = 64_000
 DEFAULT_VELOCITY = 1_000
 DEFAULT_PROFILE = 25_000
@@ -25,7 +25,7 @@ PAIRS: dict[int, tuple[int, ...]] = {
     64: (1, 2, 4),
 }
 
-#: Highest speed with each Q; with Q1 it is what V permits.
+#: Highest speed with each Q; with Q1 the largest V.
 HIGHEST_SPEED = {1: 20_000, 2: 6_000, 4: 3_000}
 
 MICROSTEPS = tuple(PAIRS)

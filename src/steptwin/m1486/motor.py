@@ -83,7 +83,7 @@ class MotorControl(Stateful):
         return True
 
     def seek(self, line: int, direction: int, now: Nanos) -> bool:
-        """A seek; it goes nowhere if the line has its end level already. False as for `move`."""
+        """A seek; it ends at once if the line already has its end level. False as for `move`."""
         chip = self._chip
         if self._must_wait():
             return False

@@ -54,7 +54,7 @@ def _from_register(chip: CommandHost, number: int, _place: int, following: int) 
 
 
 def _indirect(chip: CommandHost, number: int, now: Nanos, *, low_byte: bool) -> int:
-    """The operand where functions 46 and 58 make its number lines or a register."""
+    """The operand if functions 46 and 58 turn its number into lines or a register."""
     if chip.unit.operand_source == FROM_LINES:
         lines = line_group(number)
         if lines is None:

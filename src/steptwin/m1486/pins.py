@@ -15,10 +15,10 @@ from steptwin.machine import Nanos
 from steptwin.state import Stateful
 
 LINE_PINS = {f"B{line}": line for line in LINES}
-#: Inputs that are nothing else.
+#: Pins that are inputs only.
 CONTROL_PINS = ("JOG", "LIMIT", "SD", "RST", "S&D", "DUAL")
 OUTPUT_PINS = ("BOOST", "DIRECTION")
-#: Second names of pins, by what shares them.
+#: Second names of pins with two functions.
 ALIASES = {
     "BR0": "B5", "BR1": "B6", "JOG DIRECTION": "B7", "JOGDIR": "B7", "SHUTDOWN": "SD",
     "ADDR0": "B18", "ADDR1": "B19", "ADDR2": "B20", "ADDR3": "B21",
@@ -42,22 +42,22 @@ class ChipPins(Stateful):
     def __init__(self, address: int, baud_code: int, interface: Interface, on_change: Callable[[str, int, Nanos], None]) -> None:
         self._on_change = on_change
         # Index 0 of these lists is not a line.
-        #: What pulls a line from outside; by default nothing does.
+        #: Levels applied from outside; by default all are open (1).
         self.external = [1] * (LINES.stop)
         for bit, line in enumerate(_ADDRESS_LINES):
             self.external[line] = address >> bit & 1
         for bit, line in enumerate(_BAUD_LINES):
             self.external[line] = baud_code >> bit & 1
-        #: What the program has put out.
+        #: Outputs of the program.
         self.latches = [1] * (LINES.stop)
-        #: What function 40 puts out on its line; None while it is OFF.
+        #: Output of function 40 on its line; None while it is OFF.
         self.runsign: int | None = None
-        #: In shutdown with function 45 OFF.
+        #: The chip is shut down with function 45 OFF.
         self.tied_low = False
         self.others = dict.fromkeys((*CONTROL_PINS, *OUTPUT_PINS), 1)
         self.others |= {"RST": 0, "DIRECTION": 0, "S&D": int(interface != STEP_DIRECTION)}
         self.others["DUAL"] = int(interface != DUAL_DAC)
-        #: What can be read on a line.
+        #: Levels that are read on the lines.
         self.levels = list(self.external)
 
     def __getitem__(self, name: str) -> int:
@@ -115,7 +115,7 @@ class ChipPins(Stateful):
         return self.levels[_BAUD_LINES[1]], self.levels[_BAUD_LINES[0]]
 
     def interface(self) -> Interface:
-        """S&D goes before DUAL."""
+        """The driver interface; S&D takes precedence over DUAL."""
         if not self.others["S&D"]:
             return STEP_DIRECTION
         return TWO_DACS if self.others["DUAL"] else DUAL_DAC

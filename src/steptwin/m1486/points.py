@@ -16,7 +16,7 @@ from steptwin.motion import Profile
 from steptwin.points import LivePoint, Turns, turns_of, turns_of_round
 
 UNIT = "microstep"
-"""The smallest one, 1/64 of a full step."""
+"""The smallest unit, 1/64 of a full step."""
 POSITION_BITS = 24
 
 
@@ -24,9 +24,9 @@ class _PointRow(NamedTuple):
     point: Point
     read: Callable[[M1486Chip, Nanos], float]
     follows: bool = False
-    """Whether it changes between events."""
+    """Whether the value changes between events."""
     bits: int | None = None
-    """Of a count that begins anew: how many of the position's low bits make it up."""
+    """Number of low bits of the position in a count that wraps."""
     has_version: bool = False
 
 

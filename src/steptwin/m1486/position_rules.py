@@ -17,7 +17,7 @@ from steptwin.m1486.structure import CommandStream
 from steptwin.m1486.syntax import ChipCommand, JumpCondition
 from steptwin.m1486.variants import Variant
 
-#: Commands that are followed along all paths together; a program is left at that.
+#: Most commands followed along all paths together; beyond it the rest of a program is not followed.
 MOST_COMMANDS = 5_000
 _COUNTER = range(2**24)
 

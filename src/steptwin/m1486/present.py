@@ -47,7 +47,7 @@ def velocity(chip: M1486Chip, now: Nanos) -> float:
 
 
 def state_of(chip: M1486Chip, now: Nanos) -> ControllerState:
-    """The position is where the pulses given so far have led, as the point ``position``; `details` have the counter."""
+    """State of a chip. The position is the sum of the pulses so far, as the point ``position``; `details` have the counter."""
     sheet = datasheet(chip)
     is_stopped = chip.is_shut_down or chip.program.is_held
     words = program_words(chip, now)

@@ -17,8 +17,8 @@ from steptwin.machine import MILLISECOND, Nanos
 from steptwin.state import Plain, Stateful
 from steptwin.statements import StatementHook, StatementHooks, joined, without
 
-#: Where commands take no time, so many of them happen at one moment; then a while passes, so that a loop without end lets
-#: time go on. The while is long enough for a chip that polls a line to cost little.
+#: If commands take no time, this number of them is executed at one moment; then this time passes, so that an endless loop does
+#: not stop time. The time is long enough for a chip that polls a line to cost little.
 BURST = 1000
 BURST_NS: Nanos = MILLISECOND
 
@@ -91,7 +91,7 @@ class ProgramExecution(Stateful):
         self._linked: set[int] = set()
         self._hooks: StatementHooks = ()
         self._hook: StatementHook | None = None
-        """Calls all of them."""
+        """One hook that calls all hooks."""
         self.statement_ns = statement_ns
         self._burst = 0
         self._burst_at: Nanos = 0
@@ -100,7 +100,7 @@ class ProgramExecution(Stateful):
     def reset(self, now: Nanos) -> None:
         """As after power-up, with an empty memory."""
         self.pc = 0
-        #: When the next command may be done; a wait that a reset cuts short is over.
+        #: The earliest moment of the next command; a reset ends a wait.
         self.ready: Nanos = now
         self.is_killed = False
         self.is_limited = False
@@ -202,7 +202,7 @@ class ProgramExecution(Stateful):
         return BURST - self._burst
 
     def _pass(self, now: Nanos, commands: int) -> None:
-        """Let the time of so many commands pass."""
+        """Let the time of a number of commands pass."""
         if self.statement_ns:
             self.ready = now + commands * self.statement_ns
             return
@@ -212,7 +212,7 @@ class ProgramExecution(Stateful):
             self.ready = now + BURST_NS
 
     def _look_at(self, place: int, now: Nanos) -> None:
-        """Do the command at ``place``."""
+        """Execute the command at ``place``."""
         if place == self._chip.memory.end:
             return
         compiled = self._compiled.get(place) or self._compile(place)

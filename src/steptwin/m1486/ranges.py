@@ -8,7 +8,7 @@ from steptwin.m1486.variants import Variant
 
 
 def out_of_range(command: ChipCommand, variant: Variant) -> str | None:
-    """Why ``variant`` does not take ``command``; None if it does. A number left out is looked at when it is known."""
+    """Why ``variant`` does not take ``command``; None if it does. A number left out is checked when it is known."""
     if not command.from_variable and find(command.key, command.number, variant) is None:
         return f"{command} is out of range: permitted is {permitted_text(command.key, variant)}"
     argument = command.argument

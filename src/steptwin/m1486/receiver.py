@@ -32,7 +32,7 @@ EMPTY = 0x7F
 _LAST_BYTES = 3
 _HEX = "0123456789ABCDEF"
 _CLEAR_KILL = f"C{CLEAR_KILL}"
-#: Characters of a line that are looked at as they arrive; the longest command that acts then has three.
+#: Characters of a line that are examined as they arrive; the longest command that acts then has three.
 _MOST_SEEN = 4
 #: Lines that are read only once.
 _LINES_KEPT = 4096
@@ -46,7 +46,7 @@ class StoredProgram(Protocol):
 
 
 class ReceiverHost(Protocol):
-    """What the receiver asks of its chip."""
+    """The interface of a chip to its receiver."""
 
     @property
     def variant(self) -> Variant: ...
@@ -102,9 +102,9 @@ class Receiver(Stateful):
         self._lines = 0
         self._begin_line()
         self.is_listening = True
-        #: Until when the EEPROM is being written or erased; nothing is compressed meanwhile.
+        #: End of the present EEPROM write or erasure; no command is compressed meanwhile.
         self.busy_until: Nanos | None = None
-        #: What arrives meanwhile is lost.
+        #: Characters that arrive meanwhile are lost.
         self.is_deaf = False
 
     @property
@@ -145,7 +145,7 @@ class Receiver(Stateful):
         if self._acts_when_received():
             self._echo(byte, now)
         elif self.is_listening and not self._skips_line and not self._store(byte, now) and not self._is_torn:
-            # What is not received is not part of the line: K may follow at once.
+            # A lost character is not part of the line: K may follow at once.
             self._seen = before
 
     def _acts_when_received(self) -> bool:
@@ -157,7 +157,7 @@ class Receiver(Stateful):
             self._chip.send(byte, now)
 
     def _store(self, byte: int, now: Nanos) -> bool:
-        """Put a character into the buffer; with the answers of a buffer that is filling up."""
+        """Put a character into the buffer, and answer as the fill level requires."""
         free = self.free
         if free == 0 or self._is_torn:
             self._refuse(byte, now)
@@ -180,7 +180,7 @@ class Receiver(Stateful):
         self._unanswered = 0
         self._has_lost = True
         if not self._lines and not self._is_torn:
-            # No command is as long as the buffer; waiting for its end would be for ever.
+            # No command is as long as the buffer; its end would never come.
             self._buffer.clear()
             self._skips_line = True
             self._chip.wrong_data_received("a line longer than the input buffer", now)
@@ -233,7 +233,7 @@ class Receiver(Stateful):
                 self._chip.wrong_data_received(f"{line}: K takes no number", now)
 
     def _select(self, argument: str, now: Nanos) -> None:
-        """X: only the chip with this address listens from now on."""
+        """X: only the chip with this address receives from now on."""
         chip = self._chip
         if argument == "G":
             self.is_listening = True

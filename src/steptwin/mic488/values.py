@@ -161,13 +161,14 @@ def encoded(item: RegisterItem, value: RegisterValue, data_type: DataType, unit:
         if value not in (0, 1):
             raise Misuse(f"{register.name} = {value}: permitted are 0 (OFF) and 1 (ON)")
         return pdu.WriteCoilRequest(register.address, bool(value))
-    words = _words(item, value, data_type, unit)
+    words = encoded_words(item, value, data_type, unit)
     if len(words) == 1:
         return pdu.WriteRegisterRequest(item.address, words[0])
     return pdu.WriteRegistersRequest(item.address, words)
 
 
-def _words(item: RegisterItem, value: RegisterValue, data_type: DataType, unit: str) -> tuple[int, ...]:
+def encoded_words(item: RegisterItem, value: RegisterValue, data_type: DataType, unit: str = "u") -> tuple[int, ...]:
+    """The words of ``value`` in a holding register, as of `encoded`. Raises `Misuse` for a value that it does not take."""
     register = item.register
     kind = _kind(item, data_type)
     shown = f"{item.name} = {value:g} {register.unit(data_type, unit)}".rstrip()

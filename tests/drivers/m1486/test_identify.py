@@ -15,9 +15,9 @@ from steptwin.drivers.m1486.identify import (
     FoundChip,
     SearchRequest,
     answer_in,
-    let_all_listen,
     scan_chips,
     searching,
+    select_all,
     type_of,
 )
 from steptwin.drivers.threads import ThreadLine
@@ -95,7 +95,7 @@ def test_a_program_survives_the_search_and_the_modbus_frames_after_it() -> None:
     assert b"\r" in FRAMES
     wire.send(FRAMES)
     wire.sleep(5.0)
-    finish(let_all_listen(line))
+    finish(select_all(line))
     count = wire.codes().count("moves")
     wire.sleep(5.0)
     assert wire.codes().count("moves") > count + 5
@@ -108,7 +108,7 @@ def test_a_mic488_takes_none_of_it_for_a_frame() -> None:
     wire = Wire()
     line = search_line(wire)
     assert finish(scan_chips(line)) == []
-    finish(let_all_listen(line))
+    finish(select_all(line))
     said = b"".join(data for _, data in wire.sent)
     assert not {1, 2, 3, 5, 6, 16}.intersection(said)
     assert wire._passed["to master"] == 0

@@ -8,7 +8,7 @@ import pytest
 
 from steptwin.drivers.exchange import SendNext
 from steptwin.drivers.m1486.failures import Garbled, NoRoom
-from steptwin.drivers.m1486.talk import NOISE_NS, QUIET_NS, WHO, CharacterTalk, ChipRequest, ChipRequestKind, chip_name
+from steptwin.drivers.m1486.talk import NOISE_NS, QUIET_NS, TYPE_QUERY, CharacterTalk, ChipRequest, ChipRequestKind, chip_name
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND
 from steptwin.wire.line import SerialLine
@@ -237,24 +237,24 @@ def test_after_a_failure_the_line_has_to_be_silent_but_not_for_ever() -> None:
 
 def test_a_chip_that_was_asked_owes_a_letter_that_may_come_at_any_time() -> None:
     line = Line()
-    line.typed(7, WHO)
+    line.typed(7, TYPE_QUERY)
     assert line.talk.owes(7) == 1
     line.typed(5, "f")  # nothing comes in between
     line.say(7, "r")
     assert line.hear(b"B") is None
-    assert (line.talk.owes(7), line.talk.came, line.talk.surplus) == (0, {7: ord("B")}, 0)
+    assert (line.talk.owes(7), line.talk.arrived, line.talk.surplus) == (0, {7: ord("B")}, 0)
     line.talk.abandon(line.now)
-    line.typed(7, WHO)
+    line.typed(7, TYPE_QUERY)
     line.talk.reset()
-    assert (line.talk.owed, line.talk.came, line.talk.selected, line.talk.echoing) == ({}, {}, None, set())
+    assert (line.talk.owed, line.talk.arrived, line.talk.selected, line.talk.echoing) == ({}, {}, None, set())
 
 
 def test_who_listens_gets_the_letter_and_nothing_else() -> None:
     line = Line()
     line.talk.uploads = bytearray()
-    line.typed(7, WHO)
-    line.typed(7, WHO)
-    assert line.say(7, WHO, sort=ChipRequestKind.LISTEN, acts=False) == b""
+    line.typed(7, TYPE_QUERY)
+    line.typed(7, TYPE_QUERY)
+    assert line.say(7, TYPE_QUERY, sort=ChipRequestKind.LISTEN, acts=False) == b""
     assert line.hear(b"\x00x") is None
     assert line.hear(b"\x01B") == b"B"
     assert line.talk.uploads == b"\x00x\x01"
@@ -279,13 +279,13 @@ def test_a_stray_character_makes_the_line_dirty_unless_it_was_to_be_expected() -
 
 def test_a_question_that_is_given_up_may_be_answered_yet() -> None:
     line = Line()
-    line.say(7, WHO)
+    line.say(7, TYPE_QUERY)
     for echo in (b"x7", b"\r", b"u20"):
         line.hear(echo)
     line.talk.abandon(line.now)
     assert line.talk.surplus == 1
     line = Line()
-    line.say(7, WHO)
+    line.say(7, TYPE_QUERY)
     line.hear(b"x7")
     line.talk.abandon(line.now)
     assert line.talk.surplus == 0, "its CR was not sent"
@@ -295,7 +295,7 @@ def test_what_a_program_uploads_is_kept_while_letters_of_chips_are_listened_for(
     talk = CharacterTalk(SerialLine(4800), "the line")
     talk.uploads, talk.letters = bytearray(), 0
     talk.owed[7] = 1
-    talk.start(ChipRequest(7, WHO, sort=ChipRequestKind.LETTER, acts=False), 0, urgent=False)
+    talk.start(ChipRequest(7, TYPE_QUERY, sort=ChipRequestKind.LETTER, acts=False), 0, urgent=False)
     assert talk.receive(b"\x02", 1) is None
     assert talk.receive(b"B\x03", 2) == b"B"
     assert (talk.letters, talk.uploads) == (1, b"\x02\x03")

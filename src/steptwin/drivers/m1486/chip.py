@@ -223,7 +223,7 @@ class AsyncChip:
     async def is_busy(self) -> bool:
         """Whether the chip moves, waits or runs its program."""
         async with self._unit.turn():
-            return await self._unit.asks_who() is None
+            return await self._unit.query_type() is None
 
     # ------------------------------------------------------------------ settings
 

@@ -9,7 +9,7 @@ from steptwin.drivers.exchange import SentLate
 from steptwin.drivers.m1486.failures import Busy, DoubtfulMove, FileGivenUp
 from steptwin.drivers.m1486.motion import UNKNOWN_S, ChipMotion, ChipMotionCommand
 from steptwin.drivers.m1486.settings import ChipSettings, after_reset
-from steptwin.drivers.m1486.talk import WHO
+from steptwin.drivers.m1486.talk import TYPE_QUERY
 from steptwin.drivers.m1486.unit import ChipUnit
 from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Misuse, Refusal
@@ -21,7 +21,7 @@ from steptwin.machine import MILLISECOND, SECOND
 DownloadProgress = Callable[[int, int], object]
 """Called with the number of commands sent, and their total."""
 
-MOST_TOLD = 10
+MOST_ERRORS = 10
 """Most errors shown for a program: a file of another kind has one in each line."""
 ERASE_MARGIN_S = 0.1
 FULL_PAUSE_NS = 50 * MILLISECOND
@@ -37,8 +37,8 @@ def checked_program(text: str, variant: Variant, interface: Interface, name: str
     checked = check(text, variant, interface)
     if not checked.is_sound:
         errors = [d for d in checked.diagnostics if d.severity is Severity.ERROR]
-        more = f"\nand {len(errors) - MOST_TOLD} more errors" if len(errors) > MOST_TOLD else ""
-        raise Misuse(f"{name} is not sent:\n{render(SourceText(name, text), errors[:MOST_TOLD])}{more}")
+        more = f"\nand {len(errors) - MOST_ERRORS} more errors" if len(errors) > MOST_ERRORS else ""
+        raise Misuse(f"{name} is not sent:\n{render(SourceText(name, text), errors[:MOST_ERRORS])}{more}")
     return checked.program
 
 
@@ -166,7 +166,7 @@ class _Typist:
         if command.key == "K":
             await unit.kill()
             return b""
-        if self._typed + len(text) + 1 + len(WHO) + 1 > self._capacity - 3:
+        if self._typed + len(text) + 1 + len(TYPE_QUERY) + 1 > self._capacity - 3:
             await self._empty()
         if text[0] in _MOVES:
             await begin(unit, text, ChipMotion.BLOCK, self._permission)
@@ -190,7 +190,7 @@ class _Typist:
         if not self._may_ask:
             await unit.line.sleep(FULL_PAUSE_NS / SECOND)
             return
-        if await unit.asks_who(round(UNKNOWN_S * SECOND), self._permission) is None:
+        if await unit.query_type(round(UNKNOWN_S * SECOND), self._permission) is None:
             raise Busy(f"{unit.place}: {unit.name} takes no more characters: it {unit.why_busy()}")
         self._typed = 0
 
@@ -256,7 +256,7 @@ async def begin(
         register_motion(None, None)
         raise
     except LineFailure as failure:
-        if not getattr(failure, "uncertain", False):
+        if not failure.uncertain:
             raise
         register_motion(None, None)
         raise DoubtfulMove(unit.name, kind.value, failure) from failure

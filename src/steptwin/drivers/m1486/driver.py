@@ -146,7 +146,7 @@ class AsyncM1486(AsyncChip):
                 await unit.act("c75", permission, stored=False, program=True)
             notes.is_killed = False
             notes.motion = None
-            if await unit.asks_who(round(timeout_s * SECOND)) is None:
+            if await unit.query_type(round(timeout_s * SECOND)) is None:
                 raise Busy(f"{self.line.place}: {unit.name} continues: function 44 is ON, LIMIT is low, or it is still braking")
 
     async def wait(self, timeout_s: float | None = None, *, check: bool = True) -> ChipMoveEnd:
@@ -240,7 +240,7 @@ class AsyncM1486(AsyncChip):
         limit = self.line.now() + round(timeout_s * SECOND)
         while len(kept) < count:
             async with unit.turn():
-                await unit.hear_upload(SLICE_NS)
+                await unit.receive_upload(SLICE_NS)
             if len(kept) < count and self.line.now() >= limit:
                 raise LineFailure(f"{self.line.place}: {unit.name} uploaded {len(kept)} of {count} bytes within {timeout_s:g} s")
         found = bytes(kept[:count])

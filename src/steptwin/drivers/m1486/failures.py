@@ -57,8 +57,6 @@ class Garbled(LineFailure):
 class NoEcho(LineFailure):
     """A chip does not echo."""
 
-    uncertain = False
-
     def __init__(self, place: str, chip: str, cause: LineFailure | None) -> None:
         super().__init__(
             f"{place}: {chip} does not echo: it is off, has another address or baud rate, or is still busy with an earlier "
@@ -68,8 +66,6 @@ class NoEcho(LineFailure):
 
 class Restarted(LineFailure):
     """A chip does not echo any more, as after power-up: its settings and position were lost."""
-
-    uncertain = False
 
     def __init__(self, place: str, chip: str) -> None:
         super().__init__(
@@ -92,8 +88,6 @@ class DoubtfulMove(LineFailure):
 
 class FileGivenUp(LineFailure):
     """A file could not be sent completely; nothing of it runs."""
-
-    uncertain = False
 
 
 def unconfirmed(chip: str, cause: LineFailure) -> Unconfirmed:

@@ -10,7 +10,7 @@ The characters that are sent, and their effect on every device on the line:
 
 A Modbus frame is wrong data to a chip, which ends a running program (M-11). So chips are searched first, and chips that may
 be present without answering are deselected before Modbus is sent: by ``X`` with an unused address (`scan_chips` leaves it so,
-`let_all_listen` ends it). Only a silent chip with this address stays selected.
+`select_all` ends it). Only a silent chip with this address stays selected.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 from steptwin.drivers.exchange import Exchanger, Job, NoAnswer
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.m1486.lines import line_endpoint
-from steptwin.drivers.m1486.talk import LETTERS, WHO
+from steptwin.drivers.m1486.talk import LETTERS, TYPE_QUERY
 from steptwin.drivers.place import Endpoint
 from steptwin.drivers.threads import ThreadLine
 from steptwin.m1486.receiver import EMPTY, NO_ROOM, THREE_FREE
@@ -141,9 +141,9 @@ async def scan_chips(
     """The chips that respond on a line. ``progress`` is called with each address before it is tried. Raises `LineLost`.
 
     If chips were found, all listen afterwards, as after power-up. Otherwise chips that may be present stay deselected until
-    `let_all_listen`.
+    `select_all`.
     """
-    query = f"xg\rxg\r{WHO}\r"  # twice: the first may meet the rest of another line
+    query = f"xg\rxg\r{TYPE_QUERY}\r"  # twice: the first may meet the rest of another line
     received = answer_in(query, await _send(line, query, timeout_ns + _WRITE_NS))
     found: dict[int, FoundChip] = {}
     if received:
@@ -165,7 +165,7 @@ async def scan_chips(
     return sorted(found.values())
 
 
-async def let_all_listen(line: DriverLine[SearchRequest, bytes]) -> None:
+async def select_all(line: DriverLine[SearchRequest, bytes]) -> None:
     """End foreign bytes on the line and select all chips again."""
     await _send(line, "\rxg\r", 0)
 
@@ -178,7 +178,7 @@ async def end_line(line: DriverLine[SearchRequest, bytes]) -> None:
 async def _asked(
     line: DriverLine[SearchRequest, bytes], before: str, address: int, baud: int | None, patience_ns: Nanos
 ) -> FoundChip | None:
-    text = f"{before}x{address:x}\r{WHO}\r"
+    text = f"{before}x{address:x}\r{TYPE_QUERY}\r"
     answer = answer_in(text, await _send(line, text, patience_ns, has_one_answer=True))
     letter = letter_in(answer)
     if letter is not None:

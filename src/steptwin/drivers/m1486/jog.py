@@ -80,7 +80,7 @@ class AsyncM1486Jog:
             return False
         permission = Permission(self._unit.line.now, BEGIN_NS, self._permission.is_stopped)
         async with self._unit.turn():
-            if await self._unit.asks_who(PATIENCE_NS, permission) is None:
+            if await self._unit.query_type(PATIENCE_NS, permission) is None:
                 self.end = f"the chip {self._unit.why_busy()}"
             elif permission.is_stopped():
                 self.end = "stopped"

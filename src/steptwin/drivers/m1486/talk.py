@@ -27,7 +27,7 @@ QUIET_NS: Nanos = 30 * MILLISECOND
 """Silence after a failed exchange before the line is used again, ns."""
 NOISE_NS: Nanos = 300 * MILLISECOND
 """Longest wait for that silence, ns."""
-WHO = "u20"
+TYPE_QUERY = "u20"
 """Requests the type letter. The chip answers in program order, so the answer means that it has executed all commands."""
 LETTERS = frozenset(variant.type_letter for variant in VARIANTS)
 ALL = None
@@ -110,7 +110,7 @@ class CharacterTalk:
         """The selected chip; None: all, as after power-up."""
         self.echoing: set[int | None] = set()
         self.owed: dict[int | None, int] = {}
-        self.came: dict[int | None, int] = {}
+        self.arrived: dict[int | None, int] = {}
         """Pending letters that arrived between exchanges."""
         self.spoilt: dict[int | None, int] = {}
         """Number of lines that each chip has dropped as wrong data, which ends its program (M-11)."""
@@ -149,7 +149,7 @@ class CharacterTalk:
         """Forget that a chip echoes, as after a reset."""
         self.echoing.discard(address)
         self.owed.pop(address, None)
-        self.came.pop(address, None)
+        self.arrived.pop(address, None)
 
     def owes(self, address: int | None) -> int:
         """The number of type letters that a chip has yet to send."""
@@ -281,7 +281,7 @@ class CharacterTalk:
             self.letters += 1
         elif self.owed:
             address = next(iter(self.owed))
-            self.came[address] = letter
+            self.arrived[address] = letter
             self.settle(address)
             self.surplus -= 1
         elif self.surplus:
@@ -312,7 +312,7 @@ class CharacterTalk:
             self.selected = request.address
         if self._lines:
             return SendNext(self._put(self._lines[0], now), may_wait=False)
-        if request.text == WHO and not request.answers:
+        if request.text == TYPE_QUERY and not request.answers:
             # Its answer may be long in coming: others may have to go first meanwhile.
             self.owed[request.address] = self.owes(request.address) + 1
         if not request.answers:
@@ -347,7 +347,7 @@ class CharacterTalk:
         request = self._request
         if request is not None and request.sort is not ChipRequestKind.BLIND:
             self.dirty = True
-            if request.text == WHO and request.committed:
+            if request.text == TYPE_QUERY and request.committed:
                 self.surplus += 1
             if self._lines and self._lines[0].startswith(b"x") and self._sent == _END:
                 self.selected = ALL  # a selection that may have been taken or not

@@ -14,7 +14,7 @@ from steptwin.drivers.m1486.failures import Busy, Garbled, NoEcho, Restarted, Wr
 from steptwin.drivers.m1486.lines import TALK
 from steptwin.drivers.m1486.motion import ChipMotionCommand
 from steptwin.drivers.m1486.settings import ChipSettings
-from steptwin.drivers.m1486.talk import SPOILER, WHO, CharacterTalk, ChipRequest, ChipRequestKind, chip_name
+from steptwin.drivers.m1486.talk import SPOILER, TYPE_QUERY, CharacterTalk, ChipRequest, ChipRequestKind, chip_name
 from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Misuse
 from steptwin.m1486.functions import FUNCTIONS, RECOVER, REPORT, RETURN, TABLE
@@ -31,14 +31,14 @@ PAUSES_NS: tuple[Nanos, ...] = (40 * MILLISECOND, 1300 * MILLISECOND)
 """Time for the execution of ``t41``, ns; the second is for chips that write commands into an EEPROM."""
 WAKE_COMMANDS = 5
 """Number of commands that `ChipUnit.wake` sends without errors, and a query."""
-EVERYBODY = "xg\rxg\r"
+SELECT_ALL = "xg\rxg\r"
 """Selects all chips. The first line may end the rest of another command."""
 PATIENCE_NS: Nanos = 10 * SECOND
 """A motion is not begun after this time without progress towards it, ns."""
 SLICE_NS: Nanos = 20 * MILLISECOND
 """Waiting for a pending answer is interrupted for stops at this interval, ns."""
 _NAMES = {variant.type_letter: variant.name for variant in reversed(VARIANTS)}
-_LOOKED_AT = (15, 17, 18, 19, 20)
+_STATUS_BYTES = (15, 17, 18, 19, 20)
 """Interface, functions 40 to 63 and type letter, by the numbers of ``U``."""
 READINGS = 4
 """Number of attempts to read the same value twice."""
@@ -160,7 +160,7 @@ class ChipUnit:
             try:
                 if self.address is not None:
                     # All chips have to echo, so that the echo verifies the selection.
-                    await self._blind(f"{rest}{EVERYBODY}t{RETURN}\r", pause)
+                    await self._blind(f"{rest}{SELECT_ALL}t{RETURN}\r", pause)
                     rest = ""
                     await self._exchange(ChipRequest(self.address, "", sort=ChipRequestKind.SELECT))
                 await self._blind_echo(rest, pause)
@@ -175,7 +175,7 @@ class ChipUnit:
             self._written()
             return
         # Nobody else is left deaf because of a chip that is not there.
-        await self._blind(rest if self.address is None else f"{rest}{EVERYBODY}", PAUSES_NS[0])
+        await self._blind(rest if self.address is None else f"{rest}{SELECT_ALL}", PAUSES_NS[0])
         raise NoEcho(self.place, self.name, failure) from failure
 
     async def _blind_echo(self, rest: str, pause: Nanos) -> None:
@@ -209,7 +209,7 @@ class ChipUnit:
     async def _still_echoes(self) -> bool:
         if self.address is not None:
             # Nobody echoes the selection where the chip selected before is off.
-            await self._blind(EVERYBODY, PAUSES_NS[0])
+            await self._blind(SELECT_ALL, PAUSES_NS[0])
         for _ in range(TRIES):
             try:
                 await self._exchange(ChipRequest(self.address, f"t{RETURN}", acts=False))
@@ -304,7 +304,7 @@ class ChipUnit:
 
     # ------------------------------------------------------------------ is it at rest, who is it
 
-    async def asks_who(self, patience_ns: Nanos = 0, permission: Permission | None = None) -> int | None:
+    async def query_type(self, patience_ns: Nanos = 0, permission: Permission | None = None) -> int | None:
         """The type letter, which the chip sends when it has executed all commands; None if not within ``patience_ns`` or a
         time-out.
 
@@ -318,17 +318,17 @@ class ChipUnit:
             await self.ask()  # the answer may have been lost
             letter = await self._listen(self._patience(True))
         if letter is not None:
-            await self._hear_rest()
+            await self._receive_rest()
             self.notes.is_killed = False
             if self.talk.uploads is self.notes.uploads:
                 self.talk.uploads = None
         return letter
 
-    async def _hear_rest(self) -> None:
+    async def _receive_rest(self) -> None:
         """Receive the second letter of a chip that was asked twice, so that it is not taken for the next answer."""
         talk = self.talk
         if talk.surplus:
-            listening = ChipRequest(self.address, WHO, sort=ChipRequestKind.LISTEN)
+            listening = ChipRequest(self.address, TYPE_QUERY, sort=ChipRequestKind.LISTEN)
             with suppress(NoAnswer):
                 while talk.surplus:
                     await self._exchange(listening, timeout_ns=self._patience(True))
@@ -336,30 +336,30 @@ class ChipUnit:
 
     async def ask(self) -> None:
         """Request the type letter, which the chip sends when it has executed all commands."""
-        self.talk.came.pop(self.address, None)
-        await self.send(WHO)
+        self.talk.arrived.pop(self.address, None)
+        await self.send(TYPE_QUERY)
 
     async def _listen(self, patience_ns: Nanos, permission: Permission | None = None) -> int | None:
         """Wait for a pending letter, in slices that stops can interrupt."""
         talk = self.talk
         limit = self.line.now() + patience_ns
-        while self.address not in talk.came:
-            listening = ChipRequest(self.address, WHO, sort=ChipRequestKind.LISTEN)
+        while self.address not in talk.arrived:
+            listening = ChipRequest(self.address, TYPE_QUERY, sort=ChipRequestKind.LISTEN)
             try:
                 return (await self._exchange(listening, timeout_ns=SLICE_NS))[0]
             except NoAnswer:
                 if permission is not None:
                     permission.extend()
                 if self.line.now() >= limit:
-                    return talk.came.pop(self.address, None)
-        return talk.came.pop(self.address)
+                    return talk.arrived.pop(self.address, None)
+        return talk.arrived.pop(self.address)
 
-    async def hear_letter(self, patience_ns: Nanos) -> None:
+    async def receive_letter(self, patience_ns: Nanos) -> None:
         """Wait for a pending letter of any chip (`CharacterTalk.letters`)."""
         with suppress(NoAnswer):
-            await self._exchange(ChipRequest(self.address, WHO, sort=ChipRequestKind.LETTER), timeout_ns=patience_ns)
+            await self._exchange(ChipRequest(self.address, TYPE_QUERY, sort=ChipRequestKind.LETTER), timeout_ns=patience_ns)
 
-    async def hear_upload(self, patience_ns: Nanos) -> None:
+    async def receive_upload(self, patience_ns: Nanos) -> None:
         """Wait for bytes that a program uploads."""
         with suppress(NoAnswer):
             await self._exchange(ChipRequest(self.address, "", sort=ChipRequestKind.UPLOAD), timeout_ns=patience_ns)
@@ -370,7 +370,7 @@ class ChipUnit:
 
     async def rest(self) -> None:
         """Check that the chip is at rest. Raises `Busy` if it is not, `WrongType` if it has another type."""
-        letter = await self.asks_who()
+        letter = await self.query_type()
         if letter is None:
             raise Busy(f"{self.place}: {self.name} {self.why_busy()}")
         notes = self.notes
@@ -412,10 +412,10 @@ class ChipUnit:
     async def look(self) -> None:
         """Read type, interface and functions of the chip, unless known."""
         await self.rest()
-        code, *functions, letter = await self.read(*_LOOKED_AT, rests=True)
+        code, *functions, letter = await self.read(*_STATUS_BYTES, rests=True)
         if letter not in _NAMES:
             await self.send(f"c{REPORT}")  # function 57 reports an empty input buffer before each answer
-            code, *functions, letter = await self.read(*_LOOKED_AT, rests=True)
+            code, *functions, letter = await self.read(*_STATUS_BYTES, rests=True)
         if letter not in _NAMES:
             raise WrongType(f"{self.place}: {self.name} reports the type letter {letter:02X}H, which no M1486 has")
         if self.notes.variant is None:

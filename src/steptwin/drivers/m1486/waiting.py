@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from steptwin.drivers.line import check_wait
 from steptwin.drivers.m1486.motion import MARGIN, MARGIN_S, UNKNOWN_S, ChipMotion, ChipMotionCommand, ChipMoveEnd, ChipReason
-from steptwin.drivers.m1486.talk import WHO
+from steptwin.drivers.m1486.talk import TYPE_QUERY
 from steptwin.drivers.m1486.unit import SLICE_NS, ChipUnit
 from steptwin.drivers.m1486.watching import early_ns, watch
 from steptwin.errors import LineFailure, Misuse
@@ -41,7 +41,7 @@ async def wait_for(
                 marked = motion if motion is not None and motion.is_marked and unit.talk.uploads is notes.uploads else None
                 if marked is not None:
                     await _end_of_block(unit, limit)
-                letter = await unit.asks_who(max(limit - unit.line.now(), SLICE_NS))
+                letter = await unit.query_type(max(limit - unit.line.now(), SLICE_NS))
                 if marked is not None and letter is not None:
                     marked.is_unfinished = not notes.uploads
                     notes.uploads = None
@@ -70,11 +70,11 @@ async def _end_of_block(unit: ChipUnit, limit: Nanos) -> None:
     that it fills the input buffer.
     """
     line, talk, notes = unit.line, unit.talk, unit.notes
-    most = unit.variant.input_bits // (8 * (len(WHO) + 1)) - 1
+    most = unit.variant.input_bits // (8 * (len(TYPE_QUERY) + 1)) - 1
     pause = ASK_AGAIN_NS
     due = line.now() + pause
-    while not notes.uploads and unit.address not in talk.came and line.now() < limit:
-        await unit.hear_upload(SLICE_NS)
+    while not notes.uploads and unit.address not in talk.arrived and line.now() < limit:
+        await unit.receive_upload(SLICE_NS)
         if line.now() >= due and talk.owes(unit.address) < most - 1:
             await unit.ask()
             pause *= 2

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from steptwin.drivers.m1486.failures import Restarted
 from steptwin.drivers.m1486.motion import EARLY, EARLY_S, ChipMotionCommand
-from steptwin.drivers.m1486.talk import WHO
+from steptwin.drivers.m1486.talk import TYPE_QUERY
 from steptwin.drivers.m1486.unit import SLICE_NS, ChipNotes, ChipUnit
 from steptwin.errors import LineFailure, Refusal
 from steptwin.machine import MILLISECOND, SECOND, Nanos
@@ -82,7 +82,7 @@ class _Mover:
     @property
     def has_room(self) -> bool:
         """Whether one more query fits into its input buffer, which is not emptied while it moves."""
-        return 8 * (self.owed + 2) * (len(WHO) + 1) <= self.unit.variant.input_bits
+        return 8 * (self.owed + 2) * (len(TYPE_QUERY) + 1) <= self.unit.variant.input_bits
 
     def is_late(self, now: Nanos) -> bool:
         return self.rest_at(now) >= end_ns(self.motion) + GRACE_NS
@@ -127,7 +127,7 @@ class _Watch:
                 if all(mover.is_late(now) for mover in self._waited_for()) or now >= limit:
                     await self._sort_out()
                     return
-                await self._own.hear_letter(SLICE_NS)
+                await self._own.receive_letter(SLICE_NS)
                 await self._attribute()
         finally:
             talk.end_watch({address: mover.owed for address, mover in self._movers.items()}, self._left)
@@ -154,7 +154,7 @@ class _Watch:
             self._given_up.add(address)
             return
         if not self._own.talk.letters:
-            await self._own.hear_letter(PEEK_NS + unit.write_ns)
+            await self._own.receive_letter(PEEK_NS + unit.write_ns)
         self._asked_last = mover
         await self._attribute()
         self._asked_last = None
@@ -192,7 +192,7 @@ class _Watch:
         talk = self._own.talk
         count = talk.letters or 0
         while count:
-            await self._own.hear_letter(BURST_NS + talk.wire_ns(2))
+            await self._own.receive_letter(BURST_NS + talk.wire_ns(2))
             if talk.letters == count:
                 break
             count = talk.letters or 0
@@ -218,7 +218,7 @@ class _Watch:
                 except (LineFailure, Refusal):
                     continue
                 if not talk.letters:
-                    await self._own.hear_letter(PEEK_NS + mover.unit.write_ns)
+                    await self._own.receive_letter(PEEK_NS + mover.unit.write_ns)
                 if talk.letters:
                     self._is_over(mover, at, count)
                     return

@@ -22,7 +22,18 @@ from steptwin.mic488.describe import AxisScale, Wording
 from steptwin.mic488.registermap import DataType, RegisterMap, Type
 from steptwin.mic488.registers import AXES
 from steptwin.mic488.status import AxisStatus
-from steptwin.mic488.values import Block, RegisterItem, RegisterValue, UserFormat, encoded, moves, plan, repeatable, user_item
+from steptwin.mic488.values import (
+    Block,
+    RegisterItem,
+    RegisterValue,
+    UserFormat,
+    encoded,
+    encoded_words,
+    moves,
+    plan,
+    repeatable,
+    user_item,
+)
 from steptwin.wire import pdu
 
 QUERIES_KEPT = 256
@@ -204,8 +215,7 @@ class Unit:
         first = user_item(self.registers, number, view, len(values))
         flat: list[int] = []
         for n, value in enumerate(values):
-            request = encoded(first.at(number + view.size * n), value, DataType.REAL)
-            flat += request.values if isinstance(request, pdu.WriteRegistersRequest) else [request.value]  # type: ignore[union-attr]
+            flat += encoded_words(first.at(number + view.size * n), value, DataType.REAL)
         most = pdu.MAX_WRITTEN_REGISTERS - pdu.MAX_WRITTEN_REGISTERS % 2
         for start in range(0, len(flat), most):
             await self.ask(pdu.WriteRegistersRequest(first.address + start, tuple(flat[start : start + most])))
