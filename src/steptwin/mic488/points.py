@@ -40,7 +40,7 @@ EFFECTS: Mapping[registermap.WriteEffect, PointEffect] = complete(
     },
 )
 SPACES: Mapping[str, Space] = {"hr": Space.HOLDING, "co": Space.COIL, "di": Space.INPUT}
-"""How addresses are written: ``hr:10020``, ``di:5006``."""
+"""Prefixes of addresses: ``hr:10020``, ``di:5006``."""
 _ADDRESS = re.compile(r"(?P<space>[a-z]+):(?P<address>\d{1,5})(?::(?P<view>\w+))?", re.IGNORECASE)
 
 
@@ -54,7 +54,7 @@ class ShortName(NamedTuple):
     key: str
     meaning: str = ""
     read: Callable[[Any, Nanos], float] | None = None
-    """Where no register can be read for it in every firmware."""
+    """The function that reads it; needed if some firmware has no readable register for it."""
     conditions: Mapping[int, Condition] = MappingProxyType({})
 
 
@@ -76,7 +76,7 @@ AXIS_SHORT_NAMES = (
 
 
 def points(registers: RegisterMap, units: Sequence[str]) -> Iterator[Point]:
-    """All of them; ``units`` are those of the axes."""
+    """All points; ``units`` are those of the axes."""
     for short in SHORT_NAMES:
         yield _short(registers, units, short, None)
     for axis in range(1, len(units) + 1):
@@ -91,7 +91,7 @@ def _short(registers: RegisterMap, units: Sequence[str], short: ShortName, axis:
     try:
         register = registers.of(short.key, axis)
     except UnknownRegister:
-        # No register of this firmware shows it: WBC programs and mechanics see it.
+        # No register of this firmware shows it, but WBC programs and mechanics do.
         return Point(
             path=path,
             meaning=short.meaning,
@@ -252,7 +252,7 @@ def _as_coordinate(axis: Axis) -> tuple[Turns, bool]:
 
 
 def _as_encoder(axis: Axis) -> tuple[Turns, bool]:
-    """What turns its shaft has no version."""
+    """The point of an encoder, without turns and version: its shaft may be turned from outside."""
     return turns_of(partial(_profile, axis)), False
 
 
@@ -263,4 +263,4 @@ _FOLLOWING: Mapping[str, Callable[[Axis], tuple[Turns, bool]]] = {
     "ENC_IMP": _as_encoder,
     "ENC_XPOS": _as_encoder,
 }
-"""What changes between events, by the key of its register."""
+"""Points that change between events, by the key of their register."""

@@ -22,7 +22,7 @@ STOP_LAG_REVOLUTIONS = 0.05
 
 
 class ControlledAxis(Protocol):
-    """What position control asks of its axis. Motor positions in pulses."""
+    """The interface of an axis to its position control. Motor positions in pulses."""
 
     @property
     def config(self) -> AxisConfig: ...
@@ -61,27 +61,27 @@ class PositionControl(Stateful):
 
     def __init__(self) -> None:
         self.tick_ns: Nanos | None = None
-        """When the loop runs next."""
+        """The next moment at which the loop runs."""
         self._ref_motor = 0
         self._ref_shaft = 0
         self._following = False
         self._shaft = 0
         self._progress_ns: Nanos = 0
-        """When the shaft stood at ``_shaft``, or the correction came as near as ``_best_p``."""
+        """The moment at which the shaft was at ``_shaft``, or the correction reached ``_best_p``."""
         self._best_p = 0.0
 
     def reference(self, axis: ControlledAxis, now: Nanos) -> None:
-        """From here drive and encoder are taken to agree."""
+        """Take the present positions of drive and encoder as equal."""
         self._ref_motor = axis.profile.count(now)
         self._ref_shaft = axis.shaft(now)
 
     def true_p(self, axis: ControlledAxis, now: Nanos) -> float:
-        """Where the drive is according to the encoder, as motor position."""
+        """The motor position according to the encoder."""
         shaft = axis.shaft(now)
         return self._ref_motor + axis.encoder.pulses(shaft - self._ref_shaft)
 
     def stop(self) -> None:
-        """A command takes over."""
+        """End the control because of a command."""
         self.tick_ns = None
         self._following = False
 
@@ -100,7 +100,7 @@ class PositionControl(Stateful):
             if axis.status is not AxisStatus.CORRECTION:
                 self.watch(axis, now)
         elif axis.can_move and (self._following or not axis.profile.moving(now)):
-            # What is turned during a commanded motion is not followed; see `rested`.
+            # Turning during a commanded motion is not followed; see `rested`.
             self._following = True
             if self.tick_ns is None:
                 self.tick_ns = _next_tick(now)

@@ -56,7 +56,7 @@ def place_of(device: Mic488Device) -> StatementPlace | None:
 
 
 def statement_of(device: Mic488Device) -> str | None:
-    """The same in words: line and text."""
+    """The statement as text: its line and its source."""
     place = place_of(device)
     return None if place is None else f"line {place.line}: {place.text}"
 
@@ -124,12 +124,12 @@ def _axis(axis: Axis, described: AxisDescription, now: Nanos) -> StateAxis:
 
 
 def controller_status(code: int) -> StateStatus:
-    """What register M_STATUS shows."""
+    """The meaning of register M_STATUS."""
     level = StatusLevel.OK if code == ControllerStatus.OK else StatusLevel.ERROR
     return StateStatus(code=int(code), text=CONTROLLER_STATUS_TEXTS.get(code, f"unknown status {code}"), level=level)
 
 
 def axis_status(code: int) -> StateStatus:
-    """What a register Mx_STATUS shows."""
+    """The meaning of a register Mx_STATUS."""
     text = AXIS_STATUS_TEXTS.get(code, f"unknown status {code}")
     return StateStatus(code=int(code), text=text, level=_LEVELS.get(code, StatusLevel.OK))

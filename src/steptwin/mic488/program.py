@@ -32,7 +32,7 @@ STOPPED, RUNNING, PAUSED = ProgramState
 
 
 class ProgramError(NamedTuple):
-    """What stopped a program (WBC-5), and the statement of its text."""
+    """The error that stopped a program (WBC-5), and its statement in the text."""
 
     span: Span
     text: str
@@ -190,7 +190,7 @@ class ProgramControl(Stateful):
             axis.disable(now)
 
     def _pause(self, now: Nanos) -> None:
-        """WBC-9. Ticks do not go on meanwhile."""
+        """WBC-9. Ticks are suspended meanwhile."""
         if self.state is RUNNING:
             self.state = PAUSED
             self.interpreter.pause(now)
@@ -327,7 +327,7 @@ class ProgramControl(Stateful):
         if self.together:
             x, y = axes[:2]
             if not (x.on_path and y.on_path):
-                # WBC-26: the rest of a path is not run by a single axis.
+                # WBC-26: a single axis does not complete a path.
                 self.together = False
                 for axis in (x, y):
                     if axis.on_path:

@@ -34,7 +34,7 @@ class LoadedProgram:
     uses_positions: bool
     """It needs a position table: for more than a row 0 that it writes itself (WBC-25)."""
     variables: tuple[str, ...] = ()
-    """Their names; their values are the first cells."""
+    """Names of the variables; their values are the first cells."""
     labels: Mapping[str, int] = field(default_factory=dict)
     """Steps at labels, by name in upper case."""
     positions: str | None = None
@@ -79,7 +79,7 @@ class ProgramBanks:
             raise Misuse(f"{kind} bank {bank}: permitted are 0…{self._count - 1}")
 
     def contents(self) -> BankContents:
-        """What is in all banks."""
+        """The contents of all banks."""
         programs = [(bank, one.source.name, one.source.text, one.positions) for bank, one in sorted(self.programs.items())]
         return BankContents(tuple(programs), tuple((bank, table.text) for bank, table in sorted(self.positions.items())))
 

@@ -64,7 +64,7 @@ _IN_MOTION = (AxisStatus.VELOCITY, AxisStatus.POSITION, AxisStatus.HOMING, AxisS
 
 
 def finished(axis: Axis, now: Nanos) -> bool:
-    """Whether WAITPOS waits for this drive no longer (WBC-8)."""
+    """Whether a drive has finished, so that WAITPOS does not wait for it (WBC-8)."""
     if axis.status in _IN_MOTION:
         return False
     return not axis.profile.moving(now)
@@ -123,7 +123,7 @@ class _Plane:
         for axis in self.axes:
             if axis.profile.moving(now):
                 axis.stop(now)
-            # A coordinate that has wrapped is the new one from here on.
+            # A coordinate that has wrapped counts from its new value.
             axis.state(now)
         self.counts = [axis.profile.count(now) for axis in self.axes]
 
@@ -205,7 +205,7 @@ class _Plane:
                 if beyond_w < end_w:
                     met.clear()
                 end_w = beyond_w
-                # Behind the limit already, the axis stays where it is.
+                # An axis that is behind the limit already stays where it is.
                 count = axis.profile.count(self.now)
                 met[axis.number] = (max(edge * direction, count * direction) * direction, direction)
         return end_w, met

@@ -39,7 +39,7 @@ VISION = ("NEW", "NO", "X", "Y", "A")
 
 
 class ProgramRegisters(Stateful):
-    """Registers that belong to the program. They begin anew with every start of a program (WBC-25)."""
+    """Registers that belong to the program. Every start of a program resets them (WBC-25)."""
 
     __slots__ = ("lin_acc_u", "row_0", "switches", "ticks", "timers", "vision")
 
@@ -94,7 +94,7 @@ class ProgramRegisters(Stateful):
 
 
 class RegisterHost(Protocol):
-    """Whose registers a program reads and writes: the controller's, and the program's own."""
+    """The owner of the registers that a program reads and writes: those of the controller, and its own."""
 
     @property
     def device(self) -> ProgramDevice: ...
@@ -159,7 +159,7 @@ def _position_stretches(axis: Axis, at: Nanos) -> list[Nanos]:
 
 
 def _velocity_stretches(axis: Axis, at: Nanos) -> list[Nanos] | None:
-    # Along an arc the velocity of an axis turns between the segments too.
+    # Along an arc the velocity of an axis also turns within segments.
     return None if axis.on_path and isinstance(axis.profile, ArcProfile) else _segments(axis, at)
 
 

@@ -44,14 +44,14 @@ FUNCTION_SPACES: Mapping[int, Space] = MappingProxyType(
 
 
 class DataType(enum.IntEnum):
-    """Value of the DATA_TYPE register: how REAL/DINT registers travel (manual 4.9 / 4.10)."""
+    """Value of the DATA_TYPE register: the format of REAL/DINT registers (manual 4.9 / 4.10)."""
 
     REAL = 0
     DINT = 1
 
 
 class Type(enum.Enum):
-    """How a value lies in its registers; 32-bit values take two, low word first."""
+    """The format of a value in its registers; 32-bit values take two, low word first."""
 
     BIT = "BIT"
     WORD = "WORD"
@@ -75,7 +75,7 @@ class Type(enum.Enum):
 
 
 class QuantityKind(enum.Enum):
-    """What quantity a value is; the unit follows from it."""
+    """The kind of quantity of a value, from which its unit follows."""
 
     SWITCH = "switch"
     POSITION = "position"
@@ -91,7 +91,7 @@ _UNIT_ENDS = {QuantityKind.POSITION: "", QuantityKind.VELOCITY: "/s", QuantityKi
 
 
 class WriteEffect(enum.Enum):
-    """What a write does, so that a master knows what repeating it would do."""
+    """The effect of a write, from which that of a repetition follows."""
 
     NONE = "read only"
     STORE = "stores"
@@ -105,7 +105,7 @@ class WriteEffect(enum.Enum):
 
 
 class Per(enum.Enum):
-    """What the copies of a row count."""
+    """The objects of which each has a copy of the row."""
 
     DEVICE = "device"
     AXIS = "axis"
@@ -194,7 +194,7 @@ class Register:
     writes: tuple[int, ...]
     """Function codes that write it, as the manual lists them."""
     accepts: tuple[int, ...]
-    """Function codes with which a write is really taken (MIC-4, MIC-5, MIC-6)."""
+    """Function codes that are accepted for a write (MIC-4, MIC-5, MIC-6)."""
     kind: QuantityKind
     effect: WriteEffect
     permitted: Range

@@ -21,7 +21,7 @@ ValueCode: TypeAlias = Callable[[Execution, Cells], float]
 
 
 def compile_program(executable: s.Executable, registers: Mapping[str, RegisterFamily]) -> Code:
-    """Code for controllers that give their registers by ``registers`` (family in upper case)."""
+    """Code for controllers with access to their registers by ``registers`` (family in upper case)."""
     return _Compiler(executable, registers).code()
 
 
@@ -177,7 +177,7 @@ def _side(left: Seen, right: Seen) -> Seen:
 
 
 def _taken(row: RegisterRow, name: str, *, calculated: bool) -> Callable[[float], float]:
-    """What a register makes of a value: rounded where it is whole; out of range the nearest (WBC-14) or a program error.
+    """The value that a register takes: rounded if it is whole; out of range the nearest (WBC-14) or a program error.
 
     ``calculated``: it is the result of an operation, and not yet a REAL.
     """
@@ -300,7 +300,7 @@ def _jump(target: int, following: int) -> StepCode:
     def step(m: Execution, cells: Cells) -> int:
         m.push(following, 0)
         if m.handling:
-            # WBC-3: from here on new interrupts are let in.
+            # WBC-3: from here on new interrupts are accepted.
             m.handling = False
             return around
         return target

@@ -46,7 +46,7 @@ IMAGE = ".wbc"
 
 
 class ImageError(Misuse):
-    """Not a compiled image, or a damaged one."""
+    """The bytes are no compiled image, or a damaged one."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,7 +32,7 @@ class Finding:
         return Severity.ERROR if self.code.startswith("W1") else Severity.WARNING
 
     def at(self, place: Spanned, message: str, hint: str | None = None, fix: str | None = None) -> Diagnostic:
-        """The message for one place; ``fix`` is the text that should stand there instead."""
+        """The message for one place; ``fix`` is the text that replaces it."""
         span = Span(place.start, place.end)
         return Diagnostic(self.code, self.severity, span, message, hint, None if fix is None else Fix(span, fix))
 

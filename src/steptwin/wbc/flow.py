@@ -34,7 +34,7 @@ def flow_of(executable: s.Executable) -> ControlFlow:
 
 
 def returning(steps: tuple[s.ProgramStep, ...]) -> list[bool]:
-    """Whether each step, and last the end, can come to a RETURN that takes back the JUMP which led to it."""
+    """Whether each step, and last the end, can reach a RETURN for the JUMP that led to it."""
     return _returns(steps, [_after(number, step) for number, step in enumerate(steps)])
 
 
@@ -70,7 +70,7 @@ _AFTER: Mapping[type[s.ProgramStep], Callable[[int, Any], tuple[int, ...]]] = co
 
 
 def _returns(steps: tuple[s.ProgramStep, ...], after: list[tuple[int, ...]]) -> list[bool]:
-    """Found backwards from every RETURN. A JUMP can return when both its target and the line after it can."""
+    """The steps that can return, found backwards from every RETURN. A JUMP can if both its target and the line after it can."""
     count = len(steps)
     before: list[list[int]] = [[] for _ in range(count + 1)]
     callers: list[list[int]] = [[] for _ in range(count + 1)]
@@ -162,7 +162,7 @@ def unreached(flow: ControlFlow, executable: s.Executable) -> list[Diagnostic]:
 
 
 def stray_returns(flow: ControlFlow) -> list[Diagnostic]:
-    """RETURNs the program can come to with no JUMP to take back."""
+    """Each RETURN that can be reached without a JUMP to return from."""
     if not flow.steps or not flow.returns[0]:
         return []
     hint = "end the program above with END or JUMP; a RETURN without JUMP is a program error"

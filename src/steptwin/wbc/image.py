@@ -72,7 +72,7 @@ class _NotEncodable(Exception):
 
 
 def build(executable: s.Executable, positions: PositionTable, *, inferred: bool = False) -> tuple[bytes | None, list[Diagnostic]]:
-    """The image of a program without errors and of its table; None and every reason when something has no documented form.
+    """The image of a program without errors and of its table; None and every reason if a statement has no documented form.
 
     ``inferred``: forms that follow from the order of the keywords, but were never seen in an image (WBC-40), are taken too.
     """

@@ -29,7 +29,7 @@ _COLUMNS = 1 << 32
 
 
 class Edited:
-    """The text as it is now, with its tree. ``program`` and everything made from it has addresses."""
+    """A text being edited, with its tree. ``program`` and everything made from it has addresses."""
 
     def __init__(self) -> None:
         self.text = ""
@@ -72,7 +72,7 @@ class Edited:
         beyond = 0
         for first in [number for number, line in enumerate(sound) if line is None]:
             number = max(first, beyond)
-            # Inside a comment of another language sound lines are none.
+            # Inside a comment of another language no line is a statement.
             while number == first or (parser.in_comment and number < len(lines)):
                 said, inside = len(parser.diagnostics), parser.in_comment
                 lines[number] = line = parser.line(number, self._bases[number])
@@ -127,7 +127,7 @@ _BLOCK = 256
 
 
 def _common(a: list[str], b: list[str]) -> int:
-    """How many items at the beginning are equal."""
+    """Number of equal items at the beginning."""
     least = min(len(a), len(b))
     for start in range(0, least, _BLOCK):
         end = min(start + _BLOCK, least)

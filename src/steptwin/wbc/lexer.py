@@ -13,11 +13,11 @@ OPERATOR = 5
 MARK = 6
 """One of ``( ) , : @ #``."""
 STRANGE = 7
-"""A character that means nothing in WBC."""
+"""A character without a meaning in WBC."""
 
 
 BLANKS = " \t\v\f"
-"""What separates words. Other white space, such as a no-break space, is a strange character."""
+"""Characters that separate words. Other white space, such as a no-break space, is a strange character."""
 
 
 class Lexeme(NamedTuple):

@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterable
 from steptwin.machine import Nanos
 
 Side = Callable[[Nanos], float]
-"""What is seen at a moment. It only rises or only falls within each stretch."""
+"""The value at a moment. Within each stretch it only rises or only falls."""
 
 
 def first_change(side: Side, begin: Nanos, period: Nanos, stretches: Iterable[Nanos], horizon: Nanos) -> Nanos | None:
-    """The first of the moments ``begin + period``, ``begin + 2 period``, … at which something else is seen than at ``begin``.
+    """The first of the moments ``begin + period``, ``begin + 2 period``, … at which the value differs from that at ``begin``.
 
     ``stretches`` are the ends of the stretches, in order; after the last one nothing changes any more. None if nothing else is
     ever seen; the first of the moments after ``horizon`` if not up to there.

@@ -38,7 +38,7 @@ _CERTAIN = frozenset(
     {"OUTPUT", "DOUT", "DO", "INPUT", "DIN", "DI", "AINPUT", "VELM", "SPEEDM", "VELOCITYM", "STATUSM", "LIMITLM", "LIMITRM"}
     | {"ACCELM", "DECELM", "POSITIONM", "ENCM"}
 )
-"""Names that are never meant for a variable. Others are reported only where the variable has no use."""
+"""Names that never denote a variable intentionally. Others are reported only if the variable is not used."""
 _NAME = re.compile(r"([A-Z_]+?)([0-9]{1,4})$")
 
 
@@ -67,7 +67,7 @@ def unused_variables(executable: s.Executable, scope: ProgramScope, dialect: Dia
 
 
 def waits_for_variables(executable: s.Executable, dialect: Dialect) -> list[Diagnostic]:
-    """WAITs whose condition nothing can change: it has variables only, and there is no interrupt that could set one."""
+    """Each WAIT with a condition that cannot change: it has variables only, and no interrupt sets one."""
     if executable.entries:
         return []
     found: list[Diagnostic] = []

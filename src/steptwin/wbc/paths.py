@@ -11,7 +11,7 @@ Parameters = tuple[float | None, ...]
 
 
 def row_problem(keyword: str, values: Parameters) -> str | None:
-    """Why a row cannot be the path of a statement; None when it can.
+    """The reason for which a row cannot be the path of a statement; None if it can.
 
     MOVEPTP takes any row. A line needs p1 or p2 (the axis left alone stays), a circle its centre and radius, DOCIRC its angle
     too, DOARC all four. p3 of a line may be left out (WBC-11).

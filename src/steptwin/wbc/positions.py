@@ -40,7 +40,7 @@ class PositionRow:
 
 @dataclass(frozen=True)
 class PositionTable:
-    """Frozen rows and the text they stand in."""
+    """Rows, and the text from which they were read; immutable."""
 
     rows: tuple[PositionRow, ...] = ()
     text: str = ""
@@ -88,7 +88,7 @@ def number_text(value: float) -> str:
 
 
 def table_of(rows: Sequence[tuple[str, Sequence[float | None]]]) -> PositionTable:
-    """A table of its own making, not from a file."""
+    """A table made from rows instead of a text."""
     table, diagnostics = parse_positions("".join(row_text(name, values) + "\n" for name, values in rows))
     if diagnostics:
         raise Misuse(diagnostics[0].message)

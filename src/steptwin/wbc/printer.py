@@ -35,7 +35,7 @@ _BEFORE_COMMENT = 2
 
 
 def format_text(text: str) -> str:
-    """A program in the one style. Every line keeps its line end; empty lines at the end are left out. Never raises."""
+    """A program in the standard style. Every line keeps its line end; empty lines at the end are left out. Never raises."""
     program, _ = parse(text)
     written = [content for content, _ in split_lines(text)]
     ends = [end for _, end in split_lines(text)]

@@ -436,7 +436,7 @@ class StatementReader:
         raise Rejected(f.WRONG_ARGUMENT.at(token, f"{mark} is expected before {token.text}", usage))
 
     def _end(self) -> _Place:
-        """The last token: where something is missing after it."""
+        """The last token, as the place of a message about missing text."""
         token = self._tokens[-1]
         return _Place(token.start, token.end)
 

@@ -46,7 +46,7 @@ def shortest(value: float) -> float:
 
 
 def real_text(value: float) -> str:
-    """A number for people: a whole one with all its digits, any other in the shortest form that reads back as the same REAL."""
+    """A number as text: a whole one with all its digits, any other in the shortest form that reads back as the same REAL."""
     if value == round(value) and abs(value) < _EXACT:
         return str(round(value))
     return f"{shortest(value):.9g}"

@@ -38,7 +38,7 @@ from steptwin.wbc.tree import (
 )
 
 _LOOKS_LIKE_MS = 100
-"""Seconds from which on a time is doubted."""
+"""From this number of seconds on a time is reported as probably milliseconds."""
 _BRANCHING = frozenset({"IF", "ELSE", IF_UNKNOWN, "WHILE", "ENDWHILE", "JUMP", "RETURN", "END", "PROGRESET"})
 
 
@@ -197,7 +197,7 @@ class _Resolver:
         opening = None if opened is None else self._lines[opened]
         if opened is None or not isinstance(opening, KeywordStatement):
             return None
-        # The names of this condition were judged at the WHILE.
+        # The names of this condition were checked at the WHILE.
         judged = len(self._diagnostics)
         condition = self._comparison(opening.operands[0])
         del self._diagnostics[judged:]
@@ -351,7 +351,7 @@ class _Resolver:
 
 
 def _alone(step: type[s.ProgramStep]) -> Callable[[_Resolver, int, KeywordStatement], s.ProgramStep]:
-    """Of a statement without operands."""
+    """The method for a statement without operands."""
     return lambda resolver, number, statement: step(statement.start, statement.end)
 
 

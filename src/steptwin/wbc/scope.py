@@ -37,7 +37,7 @@ class ProgramScope:
         """First assignment of every variable, in order."""
         self.remarked: set[str] = set()
         """Names of wrong definitions, already reported at their first use."""
-        # One text is looked at many times while it is edited: only names that come for the first time are looked at further.
+        # A text is checked many times while it is edited: only new names are examined.
         statements = [line.statement for line in program.lines]
         for statement in statements:
             if isinstance(statement, ConstantDefinition):
@@ -103,7 +103,7 @@ class ProgramScope:
         self.known[key] = Variable(index, name.text)
 
     def reserved(self, key: str) -> str | None:
-        """Why a constant or variable cannot have this name; None if it can."""
+        """The reason for which a constant or variable cannot have this name; None if it can."""
         if parts(key) is not None:
             return "a register"
         if key in KEYWORDS or key in NOT_SUPPORTED:

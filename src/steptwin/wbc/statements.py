@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 
 class OperandKind(enum.Enum):
-    """What an operand is."""
+    """The kind of an operand."""
 
     AXIS = "drive"
     OUTPUT = "output"
@@ -35,7 +35,7 @@ class StatementRow:
 
     @property
     def usage(self) -> str:
-        """How it is written: ``PABS Mx position``."""
+        """The syntax of the statement: ``PABS Mx position``."""
         names = [operand.name for operand in self.operands]
         if self.in_parentheses:
             return f"{self.keyword}({', '.join(names)})"
@@ -97,7 +97,7 @@ ASSIGNMENTS = (
     ("SET X = function(Y)", "Calculates a function."),
 )
 
-# WBC-13: known by name only in later firmware, so named and not invented.
+# WBC-13: later firmware has them, but only their names are known.
 NOT_SUPPORTED = frozenset({"SWITCH", "CASE"})
 
 KEYWORDS = frozenset(STATEMENTS) | {SET}
