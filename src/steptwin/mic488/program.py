@@ -277,7 +277,7 @@ class ProgramControl(Stateful):
         if ticks:
             for event in sorted(event for event, at in ticks.items() if at <= now):
                 ticks[event] += EVENTS[event].period
-                interpreter.happen(code, event, now, now)
+                interpreter.request_interrupt(code, event, now, now)
         if interpreter.due is None or interpreter.due > now:
             return acted
         for at in (*ticks.values(), *self._pulses.values()):
@@ -288,7 +288,7 @@ class ProgramControl(Stateful):
         except ProgramFault as fault:
             self._fail(str(fault))
         if interpreter.acted:
-            self._look_at_drives(interpreter.now, interpreter.after(interpreter.now))
+            self._check_drives(interpreter.now, interpreter.after(interpreter.now))
             return interpreter.now
         return acted
 
@@ -320,9 +320,9 @@ class ProgramControl(Stateful):
         first = now if inside else self.interpreter.after(now)
         if self.state is RUNNING:
             self.interpreter.disturb(first)
-        self._look_at_drives(now, first)
+        self._check_drives(now, first)
 
-    def _look_at_drives(self, now: Nanos, first: Nanos) -> None:
+    def _check_drives(self, now: Nanos, first: Nanos) -> None:
         axes = self.device.axes
         if self.together:
             x, y = axes[:2]
@@ -341,12 +341,12 @@ class ProgramControl(Stateful):
             before, self._statuses = self._statuses, statuses
             for index, event in _DRIVES.items():
                 if before[index] != statuses[index] and self.registers.switches[event]:
-                    self.interpreter.happen(self._code(), event, now, first)
+                    self.interpreter.request_interrupt(self._code(), event, now, first)
 
     def registers_written(self, now: Nanos) -> None:
         """A user register was written over Modbus."""
         if self.state is not STOPPED and self.registers.switches[_MODBUS]:
-            self.interpreter.happen(self._code(), _MODBUS, now, self.interpreter.after(now))
+            self.interpreter.request_interrupt(self._code(), _MODBUS, now, self.interpreter.after(now))
 
     def inputs_changed(self, numbers: list[int], now: Nanos) -> None:
         """Filtered inputs ``numbers`` (from 0) changed: inside an instant, before the program's statement."""
@@ -356,7 +356,7 @@ class ProgramControl(Stateful):
             edge = 1 if self.device.inputs.filtered[number] else 2
             # Events of inputs come first in `EVENTS`.
             if self.registers.switches[number] & edge:
-                self.interpreter.happen(self._code(), number, now, now)
+                self.interpreter.request_interrupt(self._code(), number, now, now)
 
     def interrupt_by_position_error(self, now: Nanos) -> None:
         """ERRMODE1: the program stops; firmware 1.70 pauses it [1.74]."""

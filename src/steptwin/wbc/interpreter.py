@@ -34,7 +34,7 @@ RETURNS = 16
 # WBC-24
 STATEMENTS_AT_ONCE = 1000
 STATEMENTS_OF_AN_ACTION = 20
-BREATH: Nanos = MILLISECOND
+UNTIMED_INTERVAL: Nanos = MILLISECOND
 """With a statement time of 0, this number of statements takes no time (one that acts on the controller counts as several); then
 this time passes. A wait is evaluated at this interval and after every event."""
 
@@ -177,7 +177,7 @@ class Interpreter(Stateful):
         frames = [(step, until + later if until > begun else until) for step, until in self.stack]
         self.stack = deque(frames, maxlen=RETURNS)
         self.running = True
-        self._break_in(code, now)
+        self._interrupt(code, now)
 
     # ------------------------------------------------------------------ what happens meanwhile
 
@@ -193,7 +193,7 @@ class Interpreter(Stateful):
         if self.waiting and self.statement_time == 0 and self.running:
             self.due = first
 
-    def happen(self, code: Code, event: int, now: Nanos, first: Nanos) -> None:
+    def request_interrupt(self, code: Code, event: int, now: Nanos, first: Nanos) -> None:
         """Request the interrupt of ``event`` (its number in `EVENTS`), which is enabled; one of each can be pending (WBC-2).
 
         ``first`` is the moment of the next statement that could have been executed without it.
@@ -202,9 +202,9 @@ class Interpreter(Stateful):
             self.pending |= 1 << event
             if self.running:
                 self.disturb(first)
-                self._break_in(code, now)
+                self._interrupt(code, now)
 
-    def _break_in(self, code: Code, now: Nanos) -> None:
+    def _interrupt(self, code: Code, now: Nanos) -> None:
         """INT_ interrupts the statement in progress (WBC-19)."""
         if not self.handling:
             event = next((e for e in self._pending_events() if not code.entries[e].hard), None)
@@ -260,11 +260,11 @@ class Interpreter(Stateful):
             self._moment = now
             self._spent = 0
         if self.statement_time == 0:
-            self._dash_at_once(code)
+            self._execute_untimed(code)
             return
         while True:
             if self._trail is None:
-                if not self._dash(code, until):
+                if not self._execute(code, until):
                     return
             elif not self._record(code, self._trail, until):
                 return
@@ -302,7 +302,7 @@ class Interpreter(Stateful):
 
     # ------------------------------------------------------------------ the statements
 
-    def _dash(self, code: Code, until: Nanos) -> bool:
+    def _execute(self, code: Code, until: Nanos) -> bool:
         """Execute until an event has to be checked. True: continue, with recording."""
         steps, cells, pause = self._steps(code), self.cells, self.statement_time
         pc, now, unmarked = self.pc, self.now, self._unmarked
@@ -315,7 +315,7 @@ class Interpreter(Stateful):
                 if following < 0:
                     pc = ~following
                     self.pc = pc
-                    self._look_around(code)
+                    self._check_events(code)
                     return False
                 if following <= pc and marks:
                     if unmarked == 0:
@@ -334,8 +334,8 @@ class Interpreter(Stateful):
             self.pc = pc
             self._unmarked = unmarked
 
-    def _dash_at_once(self, code: Code) -> None:
-        """`_dash` without time: up to `STATEMENTS_AT_ONCE` statements at this moment, then a breath."""
+    def _execute_untimed(self, code: Code) -> None:
+        """`_execute` without time: up to `STATEMENTS_AT_ONCE` statements at this moment, then `UNTIMED_INTERVAL` passes."""
         steps, cells = self._steps(code), self.cells
         pc, executed, acted = self.pc, self._spent, 0
         self.waiting = False
@@ -345,15 +345,15 @@ class Interpreter(Stateful):
                 pc = steps[pc](self, cells)
                 if pc < 0:
                     pc = self.pc = ~pc
-                    self._look_around(code)
+                    self._check_events(code)
                     acted = STATEMENTS_OF_AN_ACTION - 1
                     return
-            self.due = self.now + BREATH
+            self.due = self.now + UNTIMED_INTERVAL
         finally:
             self.pc = pc
             self._spent = executed + acted
 
-    def _look_around(self, code: Code) -> None:
+    def _check_events(self, code: Code) -> None:
         """Check for waits and interrupts after a statement that returned ``~number``."""
         if not self.running:
             self.due = None
@@ -362,10 +362,10 @@ class Interpreter(Stateful):
             self._wait(code)
             return
         self.due = self.now + self.statement_time
-        if self.not_before > self.due and not self._can_break_in(code):
+        if self.not_before > self.due and not self._can_interrupt(code):
             self.due = self.not_before
 
-    def _can_break_in(self, code: Code) -> bool:
+    def _can_interrupt(self, code: Code) -> bool:
         return not self.handling and any(not code.entries[e].hard for e in self._pending_events())
 
     # ------------------------------------------------------------------ rest
@@ -374,7 +374,7 @@ class Interpreter(Stateful):
         """A condition is false: rest until it can be true."""
         self._trail = None
         self._marks = self._unmarked = 0
-        period = self.statement_time or BREATH
+        period = self.statement_time or UNTIMED_INTERVAL
         self.due = self.now + period
         if self.rests:
             self._rest(code, RestingLoop((self._visit(0),), self.now, period))
@@ -390,7 +390,7 @@ class Interpreter(Stateful):
         return 0 if self._marks < MARKS else MOST_UNMARKED
 
     def _record(self, code: Code, trail: list[Visit], until: Nanos) -> bool:
-        """As `_dash`, noting every visit, until the loop is closed or turns out to be none. True: go on, not recording."""
+        """As `_execute`, noting every visit, until the loop is closed or turns out to be none. True: go on, not recording."""
         steps, cells, pause = self._steps(code), self.cells, self.statement_time
         while len(trail) < LONGEST_LOOP:
             now = self.now
@@ -407,7 +407,7 @@ class Interpreter(Stateful):
             following = steps[self.pc](self, cells)
             if following < 0:
                 self.pc = ~following
-                self._look_around(code)
+                self._check_events(code)
                 return False
             self.pc = following
             self.due = now + pause
