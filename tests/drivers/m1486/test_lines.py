@@ -6,13 +6,19 @@ import asyncio
 import socket
 import threading
 from collections.abc import Callable
+from functools import partial
+from typing import Any
 
 import pytest
-from chip_rig import ChipWire, Fault, chip_line, chip_task_line
-from line_rig import run_virtual
+from chip_rig import BAUD, ChipWire, Fault, chip_line, chip_task_line
+from line_rig import MemoryEndpoint, run_virtual
 
 from steptwin.drivers import Overtaken
+from steptwin.drivers.blocking import finish
 from steptwin.drivers.m1486 import M1486, AsyncM1486, ChipReason, M1486Line, NoEcho, PositionUnknown, Restarted
+from steptwin.drivers.m1486.identify import SearchLine, end_line, let_all_listen, searching
+from steptwin.drivers.m1486.lines import AsyncM1486Line, ThreadM1486Line, in_words
+from steptwin.drivers.threads import ThreadLine
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.machine import MILLISECOND, SECOND
 
@@ -369,3 +375,47 @@ def test_waiting_for_the_line_is_no_suspension() -> None:
 
     run_virtual(wire, main())
     assert (wire.true(0), wire.true(7)) == (640, 640)
+
+
+@pytest.mark.parametrize("make", [AsyncM1486Line, ThreadM1486Line, partial(SearchLine, baud=4800)])
+def test_a_line_has_the_place_of_its_address(make: Callable[[str], Any]) -> None:
+    assert make("tcp://127.0.0.1:5022").place == "tcp://127.0.0.1:5022"
+    with pytest.raises(Misuse, match=r"'tcp://127\.0\.0\.1' names no port: expected tcp://HOST:PORT, such as tcp://"):
+        make("tcp://127.0.0.1")
+
+
+def test_a_driver_for_tasks_is_open_inside_its_block() -> None:
+    """A line that is shared stays open."""
+    wire = ChipWire("B", (7,))
+    line = chip_task_line(wire)
+
+    async def main() -> None:
+        async with AsyncM1486(line, 7) as chip:
+            assert chip.variant.name == "B"
+            assert await chip.counter() == 0
+        assert await chip.counter() == 0
+
+    run_virtual(wire, main())
+
+
+def test_foreign_bytes_on_a_line_are_ended_without_selecting_a_chip() -> None:
+    wire = ChipWire("B", (3, 7))
+    wire.send(b"x7\rv12")
+    wire.sleep(0.1)
+    endpoint: Any = MemoryEndpoint(wire)
+    line = ThreadLine(endpoint, searching(endpoint, BAUD), clock=wire.clock, sleeping=wire.sleep)
+    finish(end_line(line))
+    wire.sleep(0.1)
+    assert (wire.chips[7].drive.velocity, wire.chips[7].receiver.waiting) == (1000, 0)  # V12 is out of range
+    assert [chip.receiver.is_listening for chip in wire.chips.values()] == [False, True]
+    finish(let_all_listen(line))
+    wire.sleep(0.1)
+    assert [chip.receiver.is_listening for chip in wire.chips.values()] == [True, True]
+
+
+@pytest.mark.parametrize(
+    ("data", "text"),
+    [(b"f12800\r", "f12800 CR"), (b"\x7f", "7FH"), (b"\x99r\r", "99H r CR"), (b"\x1f ~\x7f", "1FH  ~ 7FH"), (b"", "")],
+)
+def test_bytes_of_a_log_are_text(data: bytes, text: str) -> None:
+    assert in_words(data) == text
