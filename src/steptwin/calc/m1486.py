@@ -103,7 +103,7 @@ class M1486Model:
         if PROFILE_RANGE.stop <= knee <= top:
             found.append(f"P{knee:g}: the manual permits {PROFILE_RANGE[0]} to {PROFILE_RANGE[-1]} step/s, or more than V")
         if values[ACCELERATION] > STEEPEST * start:
-            found.append(f"A is more than {STEEPEST} × S: whether S{start:g} permits it, the manual's table says (M-4)")
+            found.append(f"A is more than {STEEPEST} × S: check the table of the manual whether S{start:g} permits it (M-4)")
         if top > (limit := low_range_limit(int(values[MICROSTEP]))):
             found.append(f"above {limit:g} step/s the microsteps are those of Q")
         if self._clock > 1:

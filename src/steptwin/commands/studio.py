@@ -226,7 +226,7 @@ class _Links:
 
 
 class _NoPrograms:
-    """Of devices: nobody knows the texts of the programs in them."""
+    """Of devices, whose program texts are not known."""
 
     def list(self) -> Sequence[Mapping[str, object]]:
         return ()
@@ -235,7 +235,7 @@ class _NoPrograms:
         return {}
 
     def text(self, machine: str, place: str) -> Mapping[str, object]:
-        raise Misuse(f"{machine} was given no text {place!r} here: it is a device")
+        raise Misuse(f"{machine} is a device: the texts of its programs are not known here")
 
 
 def _ports() -> Sequence[Mapping[str, object]]:

@@ -160,7 +160,7 @@ class SemanticToken:
 
 @dataclass(frozen=True, slots=True)
 class CodeAction:
-    """A change that mends something."""
+    """A change that fixes a finding."""
 
     title: str
     edits: Edits

@@ -1,4 +1,4 @@
-"""A device behind its driver, as the studio shows it: polled for what somebody watches, connected again when its line was lost.
+"""A device behind its driver, as the studio shows it: polled for watched values, connected again after its line was lost.
 
 Nothing that moves is repeated or kept for later: while the line is lost, and behind a stop, commands are refused.
 """
@@ -119,7 +119,7 @@ class ShownDevice:
                     await self._wanted.wait()
 
     async def _look(self) -> None:
-        """Poll for what somebody wants; one that is lost in any case."""
+        """Poll watched values; a lost device is polled in any case."""
         oldest = self._around.clock() - WATCHED_NS
         self._watched = {point: at for point, at in self._watched.items() if at > oldest}
         if self._jogs and not self._device.answers_in_motion:
@@ -229,7 +229,7 @@ class ShownDevice:
         self._wanted.set()
 
     def _report(self, error: Exception) -> None:
-        """Of a jog whose end nobody waits for."""
+        """Report an error of a jog for whose end no caller waits."""
         if isinstance(error, SteptwinError):
             self._subject.publish(StatusPayload("jog-failed", str(error)))
         else:

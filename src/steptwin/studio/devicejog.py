@@ -11,7 +11,7 @@ from steptwin.errors import Refusal
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 
 LEASE_NS: Nanos = 250 * MILLISECOND
-"""How long it goes on after it was extended, before the axis is braked."""
+"""The jog continues for this time after it was extended; then the axis brakes."""
 
 
 class DeviceHeld:
@@ -66,7 +66,7 @@ class DeviceHeld:
             ending.cancel()
             try:
                 await self._jog.__aexit__(None, None, None)
-            except Exception as error:  # noqa: BLE001  nobody waits for the end
+            except Exception as error:  # noqa: BLE001  no caller waits for the end
                 self._report(error)
 
     # ------------------------------------------------------------------ as `Held`

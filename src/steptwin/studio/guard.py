@@ -68,7 +68,7 @@ class Guard:
         else:
             try:
                 await self._sockets[scope["path"]](scope, receive, send)
-            except Exception as error:  # noqa: BLE001  nobody else sees it
+            except Exception as error:  # noqa: BLE001  it is reported here only
                 self._on_internal(error)
 
     async def _pass(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -83,7 +83,7 @@ class Guard:
 
         try:
             await self._app(scope, receive, guarded)
-        except Exception as error:  # noqa: BLE001  whoever asks is not left without an answer
+        except Exception as error:  # noqa: BLE001  every request gets an answer
             self._on_internal(error)
             if not has_begun:
                 await _refuse(send, receive, 500, error)

@@ -332,7 +332,7 @@ class Hub:
                 self._end(lease, lease.held.cut)
 
     async def stop_all(self) -> dict[str, object]:
-        """All machines at the same time. What cannot be stopped keeps no other from it."""
+        """Stop all machines at the same time; a failure of one does not affect the others."""
         names = [part.name for part in self.subject.description.machines]
         stopping = {name: start(self._stand(name)) for name in names}
         failed = {name: why for name, stopped in stopping.items() if (why := await stopped) is not None}

@@ -1,4 +1,4 @@
-"""The moment of the past that one viewer looks at, while the world goes on for the others."""
+"""The moment of the past that one viewer is shown, while the world continues for the others."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ OF_A_MOMENT = frozenset({ReadPoints, ReadPins, State, Encoders, ListFaults})
 
 
 class PastMoment(Protocol):
-    """A moment of the past, in a world that goes nowhere by itself."""
+    """A moment of the past, in a world whose time advances only on request."""
 
     @property
     def subject(self) -> PlannedSubject: ...
@@ -35,7 +35,7 @@ class PastMoment(Protocol):
         ...
 
     def go_back(self) -> None:
-        """The world itself goes back to this moment; time stands there. Raises `Refusal`."""
+        """Return the world itself to this moment, and pause it. Raises `Refusal`."""
         ...
 
     def close(self) -> None: ...
@@ -53,7 +53,7 @@ class KeptPast(Protocol):
 
 
 class Looking:
-    """Of one viewer; at the present until `go`."""
+    """The shown moment of one viewer: the present until `go`."""
 
     def __init__(self, lookback: KeptPast | None) -> None:
         self._lookback = lookback
@@ -70,7 +70,7 @@ class Looking:
         return self._look is not None
 
     async def go(self, moment: Nanos, watches: Mapping[int, Watched]) -> dict[str, object]:
-        """Look at a moment. Raises `Misuse`, and `Refusal` where nothing is kept."""
+        """Show a moment. Raises `Misuse`, and `Refusal` if no past is kept."""
         if self._lookback is None:
             raise Refusal("look: no past is kept here")
         look = self._look or self._lookback.open()
@@ -95,7 +95,7 @@ class Looking:
             self.unsent.clear()
 
     async def _there(self) -> PastMoment:
-        """When it has got to the moment that was wanted last."""
+        """The moment requested last, when it has been computed."""
         while self._going is not None and not self._going.is_done:
             try:
                 await self._going
@@ -106,7 +106,7 @@ class Looking:
         return self._look
 
     async def do(self, wanted: Command) -> Result:
-        """What one of `OF_A_MOMENT` answers."""
+        """The answer to one of `OF_A_MOMENT`."""
         look = await self._there()
         return look.subject.do(wanted)
 
@@ -114,7 +114,7 @@ class Looking:
         return (await self._there()).programs
 
     async def go_back(self) -> None:
-        """The world itself goes back to the moment. Raises `Refusal`."""
+        """Return the world itself to the moment. Raises `Refusal`."""
         (await self._there()).go_back()
         self.leave()
 
@@ -142,7 +142,7 @@ class Looking:
 
 
 def _value(look: PastMoment | None, point: str) -> float | None:
-    """Of a moment; None where nothing is known, as of a device, of which no past is kept."""
+    """The value at a moment; None if unknown, as for a device, of which no past is kept."""
     try:
         return None if look is None else look.subject.read(point)[0].value
     except Misuse:

@@ -35,7 +35,7 @@ MOST_ENTRIES = 1000
 
 @dataclass(frozen=True, slots=True)
 class Hello:
-    """The first request of a viewer: who it is."""
+    """The first request of a viewer, with its token and name."""
 
     token: str | None = None
     name: str | None = None
@@ -44,12 +44,12 @@ class Hello:
 
 @dataclass(frozen=True, slots=True)
 class Resync:
-    """The whole state again."""
+    """Requests the whole state again."""
 
 
 @dataclass(frozen=True, slots=True)
 class Watch:
-    """Be sent the values of points whenever they have changed."""
+    """Subscribes to the values of points."""
 
     points: tuple[str, ...]
     rate: float = 10.0
@@ -62,62 +62,62 @@ class Unwatch:
 
 @dataclass(frozen=True, slots=True)
 class TakeControl:
-    """Hold control; ``over`` another viewer who holds it, too."""
+    """Takes control; with ``over`` also from another viewer."""
 
     over: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class ReleaseControl:
-    """Hold control no more."""
+    """Releases control."""
 
 
 @dataclass(frozen=True, slots=True)
 class Renew:
-    """A jog goes on."""
+    """Renews the lease of a jog."""
 
     lease: int
 
 
 @dataclass(frozen=True, slots=True)
 class LetGo:
-    """A jog ends."""
+    """Ends a jog."""
 
     lease: int
 
 
 @dataclass(frozen=True, slots=True)
 class StopAll:
-    """Stop every axis, and every program that runs."""
+    """Stops every axis, and every running program."""
 
 
 @dataclass(frozen=True, slots=True)
 class LookAt:
-    """Look at a moment of the past; None: at the present."""
+    """Shows a moment of the past; None: the present."""
 
     moment: Nanos | None
 
 
 @dataclass(frozen=True, slots=True)
 class GoBack:
-    """The world itself goes back to the moment that is looked at."""
+    """Returns the world itself to the moment that is shown."""
 
 
 @dataclass(frozen=True, slots=True)
 class ReadAudit:
-    """Who did what."""
+    """Requests entries of the audit log."""
 
     most: int = 100
 
 
 @dataclass(frozen=True, slots=True)
 class ListPrograms:
-    """The texts of programs that controllers were given."""
+    """Requests the list of program texts of controllers."""
 
 
 @dataclass(frozen=True, slots=True)
 class ReadProgram:
-    """One of them."""
+    """Requests one program text."""
 
     machine: str
     place: str
@@ -130,7 +130,7 @@ class ListPorts:
 
 @dataclass(frozen=True, slots=True)
 class Connect:
-    """A device becomes a machine of the subject."""
+    """Adds a device as a machine of the subject."""
 
     address: str
     name: str | None = None
@@ -138,7 +138,7 @@ class Connect:
 
 @dataclass(frozen=True, slots=True)
 class Disconnect:
-    """A device is asked nothing any more."""
+    """Removes a device."""
 
     machine: str
 

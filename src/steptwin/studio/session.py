@@ -146,7 +146,7 @@ class ViewerSession:
             identity = id_of(message)
             found = {} if identity is None else {"id": identity}
             return {**found, **answer(await self._do(self._read(message), identity))}
-        except Exception as error:  # noqa: BLE001  whoever waits is never left without an answer
+        except Exception as error:  # noqa: BLE001  every request gets an answer
             if not isinstance(error, SteptwinError):
                 self._hub.around.on_internal(error)
             return {**found, **failure(error)}
@@ -203,7 +203,7 @@ class ViewerSession:
             raise Refusal(f"{wanted.name}: the past is looked at, which cannot be changed: look at the present first")
         takes = check(wanted.name, permit, self.viewer, hub.control) and not self.is_rest
         if takes:
-            hub.control.take(self.viewer, over=False)  # nobody else acts while a device is asked
+            hub.control.take(self.viewer, over=False)  # so that no other viewer acts while a device is asked
         try:
             result = await wanted.act(identity)
         except Exception:

@@ -57,7 +57,7 @@ class Shown:
         self.numbering = numbering
         self._followings: list[Following] = []
         self._gone: set[str] = set()
-        """Machines that were there: whoever still watches them is told that nothing is known."""
+        """Machines that were removed: values of them are unknown to viewers that still watch them."""
         self._describe()
 
     # ------------------------------------------------------------------ parts
@@ -99,7 +99,7 @@ class Shown:
         return part
 
     def _part_of(self, wanted: Command) -> ShownSubject:
-        """Raises `Misuse`, and `Refusal` where nobody can do it."""
+        """Raises `Misuse`, and `Refusal` if no part can execute it."""
         found: list[ShownSubject] = []
         for field in row_of(wanted).fields:
             value: Any = getattr(wanted, field.key)

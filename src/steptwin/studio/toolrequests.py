@@ -1,4 +1,4 @@
-"""What a viewer can ask of the tools: the motion calculator, configurations as forms. They change nothing."""
+"""Requests for the motion calculator and for configurations as forms. They change nothing."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LONGEST_FILE = 48_000
 
 @dataclass(frozen=True, slots=True)
 class ReadQuantities:
-    """What a move of an axis is made of."""
+    """Requests the quantities of a move of an axis."""
 
     machine: str
     axis: int
@@ -28,7 +28,7 @@ class ReadQuantities:
 
 @dataclass(frozen=True, slots=True)
 class Calculate:
-    """A move from its quantities."""
+    """Calculates a move from its quantities."""
 
     machine: str
     axis: int
@@ -38,7 +38,7 @@ class Calculate:
 
 @dataclass(frozen=True, slots=True)
 class ConvertGear:
-    """Pulses in units, from mechanics."""
+    """Calculates pulses in each unit from the mechanics."""
 
     motor_steps: float
     microsteps: float
@@ -48,14 +48,14 @@ class ConvertGear:
 
 @dataclass(frozen=True, slots=True)
 class ReadConfiguration:
-    """The configuration file of a controller, as a form."""
+    """Requests the configuration file of a controller as a form."""
 
     machine: str
 
 
 @dataclass(frozen=True, slots=True)
 class EditConfiguration:
-    """A text of a configuration file with other values, as a form."""
+    """Requests the form of a configuration text after changes."""
 
     machine: str
     text: str
