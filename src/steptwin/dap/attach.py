@@ -150,7 +150,7 @@ class AttachedTwin:
         """Set these and none of the others that were set here; those of other clients stay."""
         for point in [one for one in self._set if one not in points]:
             number = self._set.pop(point).number
-            if number in [one["number"] for one in self._ask(command.ListBreakpoints())]:
+            if number in [one["number"] for one in self._ask(command.ListBreakpoints())["breakpoints"]]:
                 self._ask(command.ClearBreakpoint(number))
         return [self._one(point) for point in points]
 

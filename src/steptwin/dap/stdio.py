@@ -73,11 +73,11 @@ class _Session:
             body = self._adapter.answer(command, arguments if isinstance(arguments, dict) else {})
         except SteptwinError as error:
             self._write({**response, "success": False, **_failure(str(error))})
-            return True
+            return command != "disconnect"
         except Exception as error:  # noqa: BLE001 - the editor is told, and the session goes on
             traceback.print_exc()
             self._write({**response, "success": False, **_failure(f"a mistake in steptwin: {type(error).__name__}: {error}")})
-            return True
+            return command != "disconnect"
         self._write({**response, "success": True, "body": body})
         self._adapter.after(command)
         return command != "disconnect"
