@@ -16,7 +16,7 @@ from line_rig import MemoryEndpoint, run_virtual
 from steptwin.drivers import Overtaken
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.m1486 import M1486, AsyncM1486, ChipReason, M1486Line, NoEcho, PositionUnknown, Restarted
-from steptwin.drivers.m1486.identify import SearchLine, end_line, let_all_listen, searching
+from steptwin.drivers.m1486.identify import SearchLine, end_line, searching, select_all
 from steptwin.drivers.m1486.lines import AsyncM1486Line, ThreadM1486Line, in_words
 from steptwin.drivers.threads import ThreadLine
 from steptwin.errors import Misuse, SteptwinError
@@ -408,7 +408,7 @@ def test_foreign_bytes_on_a_line_are_ended_without_selecting_a_chip() -> None:
     wire.sleep(0.1)
     assert (wire.chips[7].drive.velocity, wire.chips[7].receiver.waiting) == (1000, 0)  # V12 is out of range
     assert [chip.receiver.is_listening for chip in wire.chips.values()] == [False, True]
-    finish(let_all_listen(line))
+    finish(select_all(line))
     wire.sleep(0.1)
     assert [chip.receiver.is_listening for chip in wire.chips.values()] == [True, True]
 
