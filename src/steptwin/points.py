@@ -15,7 +15,7 @@ FARTHEST_NS: Nanos = 1 << 55
 MOST_TURNS = 3
 """Most turns of a wrapping count in one segment: within two rounds it takes every value."""
 
-Turns: TypeAlias = Callable[[Nanos], Iterator[Nanos]]
+TurningPoints: TypeAlias = Callable[[Nanos], Iterator[Nanos]]
 """Moments after one, in order, between which (and after the last of which) a value goes one way only."""
 
 
@@ -26,14 +26,14 @@ class LivePoint:
     point: Point
     read: Callable[[Nanos], float] | None
     """The value at the moment to which the controller has come; reading changes nothing. None where it can only be written."""
-    turns: Turns | None = None
+    turns: TurningPoints | None = None
     version: Callable[[], object] | None = None
     """A value that changes whenever ``turns`` may have changed; None if that is unknown."""
     is_kept: bool = False
     """Whether a write only keeps the value, which is not an event of the controller."""
 
 
-def turns_of(profile: Callable[[], Profile]) -> Turns:
+def turns_of(profile: Callable[[], Profile]) -> TurningPoints:
     """The ends of the segments of a profile."""
 
     def turns(now: Nanos) -> Iterator[Nanos]:
@@ -45,7 +45,7 @@ def turns_of(profile: Callable[[], Profile]) -> Turns:
     return turns
 
 
-def turns_of_round(profile: Callable[[], Profile], count: Callable[[Nanos], int], size: int) -> Turns:
+def turns_of_round(profile: Callable[[], Profile], count: Callable[[Nanos], int], size: int) -> TurningPoints:
     """The same for a shown ``count`` that wraps, and jumps, at every multiple of ``size``."""
     ends = turns_of(profile)
 

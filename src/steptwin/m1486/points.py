@@ -13,7 +13,7 @@ from steptwin.m1486.io_effects import UPLOADED
 from steptwin.m1486.registers import POSITION_REGISTER, REGISTERS, REMAINDER_REGISTER, UPLOADS
 from steptwin.machine import Nanos
 from steptwin.motion import Profile
-from steptwin.points import LivePoint, Turns, turns_of, turns_of_round
+from steptwin.points import LivePoint, TurningPoints, turns_of, turns_of_round
 
 UNIT = "microstep"
 """The smallest unit, 1/64 of a full step."""
@@ -135,7 +135,7 @@ def live_point(chip: M1486Chip, text: str) -> LivePoint | None:
     return LivePoint(point=row.point, read=partial(row.read, chip), turns=_turns(chip, row), version=version)
 
 
-def _turns(chip: M1486Chip, row: _PointRow) -> Turns | None:
+def _turns(chip: M1486Chip, row: _PointRow) -> TurningPoints | None:
     if not row.follows:
         return None
     profile = partial(_profile, chip)

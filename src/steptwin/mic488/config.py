@@ -20,7 +20,7 @@ from steptwin.diagnostics import Diagnostic, Fix, Severity, SourceText, Span, in
 from steptwin.errors import SourceErrors
 from steptwin.mic488.encoding import DINT_MAX, DINT_MIN, REAL_MAX
 from steptwin.mic488.inifile import IniEntry, IniFile
-from steptwin.mic488.ranges import Range
+from steptwin.mic488.ranges import ValueRange
 from steptwin.mic488.registermap import Firmware
 from steptwin.mic488.registers import AXES, DEFAULT_FIRMWARE, INPUTS, firmware
 
@@ -158,7 +158,7 @@ class ConfigKey:
 
     name: str
     attribute: str
-    permitted: Range
+    permitted: ValueRange
     whole: bool = True
     choices: Mapping[int, str] = field(default_factory=dict)
     """The permitted numbers with their meaning, where they are few."""
@@ -178,20 +178,20 @@ class ConfigKey:
 
 
 def _choice(name: str, attribute: str, *texts: str) -> ConfigKey:
-    return ConfigKey(name, attribute, Range(0, len(texts) - 1), choices=MappingProxyType(dict(enumerate(texts))))
+    return ConfigKey(name, attribute, ValueRange(0, len(texts) - 1), choices=MappingProxyType(dict(enumerate(texts))))
 
 
 def _positive(name: str, attribute: str, unit: str) -> ConfigKey:
-    return ConfigKey(name, attribute, Range(0, REAL_MAX, above=True), whole=False, note=f"a number > 0 in {unit}")
+    return ConfigKey(name, attribute, ValueRange(0, REAL_MAX, above=True), whole=False, note=f"a number > 0 in {unit}")
 
 
 def _number(name: str, attribute: str) -> ConfigKey:
-    return ConfigKey(name, attribute, Range(-REAL_MAX, REAL_MAX), whole=False, note="a number")
+    return ConfigKey(name, attribute, ValueRange(-REAL_MAX, REAL_MAX), whole=False, note="a number")
 
 
 _SWITCHES = f"0…7 (IN1…IN8), 8…19 (channels C, B, A of encoders 1…4), {NO_INPUT} (none)"
-_COUNT = Range(1, DINT_MAX)
-_DURATION_MS = Range(1, 3_600_000)
+_COUNT = ValueRange(1, DINT_MAX)
+_DURATION_MS = ValueRange(1, 3_600_000)
 
 AXIS_KEYS = (
     _choice("Unit", "unit", *UNITS),
@@ -201,15 +201,15 @@ AXIS_KEYS = (
     _positive("Vel", "vel", "units/s"),
     ConfigKey("MotResol", "mot_resol", _COUNT, note="a whole number ≥ 1 in pulses per motor revolution"),
     ConfigKey("EncResol", "enc_resol", _COUNT, note="a whole number ≥ 1 in encoder counts per drive revolution"),
-    ConfigKey("EncOffset", "enc_offset", Range(DINT_MIN, DINT_MAX)),
+    ConfigKey("EncOffset", "enc_offset", ValueRange(DINT_MIN, DINT_MAX)),
     _choice("HomeMode", "home_mode", "HOME0", "HOME1", "HOME2", "HOME3", "HOME4"),
     _choice("LimitMode", "limit_mode", "OFF", "KL", "KR", "KL+KR"),
-    ConfigKey("InKL", "in_kl", Range(0, NO_INPUT), note=_SWITCHES),
-    ConfigKey("InKR", "in_kr", Range(0, NO_INPUT), note=_SWITCHES),
+    ConfigKey("InKL", "in_kl", ValueRange(0, NO_INPUT), note=_SWITCHES),
+    ConfigKey("InKR", "in_kr", ValueRange(0, NO_INPUT), note=_SWITCHES),
     _choice("PosCtrlMode", "pos_ctrl_mode", "OFF", "ENCODER", "ENCFOLLOW"),
     _choice("ErrCtrlMode", "err_ctrl_mode", "NONE", "ERRMODE0", "ERRMODE1", "ERRMODE2"),
-    ConfigKey("Kp", "kp", Range(0, REAL_MAX), whole=False, note="a number ≥ 0"),
-    ConfigKey("EncTolerance", "enc_tolerance", Range(0, DINT_MAX), note="a whole number ≥ 0 in encoder counts"),
+    ConfigKey("Kp", "kp", ValueRange(0, REAL_MAX), whole=False, note="a number ≥ 0"),
+    ConfigKey("EncTolerance", "enc_tolerance", ValueRange(0, DINT_MAX), note="a whole number ≥ 0 in encoder counts"),
     ConfigKey("EncSettle", "enc_settle_ms", _DURATION_MS, note=f"a whole number {_DURATION_MS} in ms"),
     ConfigKey("ErrTime", "err_time_ms", _DURATION_MS, note=f"a whole number {_DURATION_MS} in ms"),
     _choice("EnWired", "en_wired", "not wired", "wired"),
@@ -220,15 +220,15 @@ INPUT_KEYS = (
     _choice("Int", "interrupt", "off", "rising", "falling", "both edges"),
 )
 ANALOG_KEYS = (_number("LoVal", "lo_val"), _number("HiVal", "hi_val"))
-BAUD_KEY = ConfigKey("Baud", "baud", Range(BAUDS[0], BAUDS[-1]), choices=MappingProxyType(dict.fromkeys(BAUDS, "")))
-ADDRESS_KEY = ConfigKey("ID", "address", Range(1, 247))
+BAUD_KEY = ConfigKey("Baud", "baud", ValueRange(BAUDS[0], BAUDS[-1]), choices=MappingProxyType(dict.fromkeys(BAUDS, "")))
+ADDRESS_KEY = ConfigKey("ID", "address", ValueRange(1, 247))
 
 
 TRIGGER_KEYS = (_choice("Keep", "trigger_keeps", "a trigger uses values up", "values are kept"),)
 
 
 def program_keys(generation: Firmware) -> tuple[ConfigKey, ...]:
-    banks = Range(0, generation.banks - 1)
+    banks = ValueRange(0, generation.banks - 1)
     return (
         _choice("Activate", "activate", "no program", "run at power-on"),
         ConfigKey("ProgBankToRun", "prog_bank", banks),

@@ -18,13 +18,13 @@ from steptwin.mic488.axis import Axis
 from steptwin.mic488.behaviour import BEHAVIOUR
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.encoding import DINT_MIN, word_to_int, words_to_dint, words_to_real
-from steptwin.mic488.ranges import Range
+from steptwin.mic488.ranges import ValueRange
 from steptwin.mic488.registermap import Register, RegisterMap, Space, Type, UnknownRegister
 from steptwin.mic488.registers import AXES
 from steptwin.mic488.status import AXIS_CONDITIONS, CONTROLLER_CONDITIONS
 from steptwin.mic488.values import RegisterItem, UserFormat, named
 from steptwin.motion import Profile
-from steptwin.points import LivePoint, Turns, turns_of, turns_of_round
+from steptwin.points import LivePoint, TurningPoints, turns_of, turns_of_round
 from steptwin.tables import complete
 
 EFFECTS: Mapping[registermap.WriteEffect, PointEffect] = complete(
@@ -136,7 +136,7 @@ def unit_of(register: Register, units: Sequence[str]) -> str:
     return register.unit(unit="u" if register.axis is None else units[register.axis - 1])
 
 
-def limits(permitted: Range) -> Limits:
+def limits(permitted: ValueRange) -> Limits:
     return Limits(permitted.low, permitted.high, permitted.above)
 
 
@@ -242,21 +242,21 @@ def _version(axis: Axis) -> object:
     return axis.revision, axis.offset_p
 
 
-def _as_profile(axis: Axis) -> tuple[Turns, bool]:
+def _as_profile(axis: Axis) -> tuple[TurningPoints, bool]:
     return turns_of(partial(_profile, axis)), True
 
 
-def _as_coordinate(axis: Axis) -> tuple[Turns, bool]:
+def _as_coordinate(axis: Axis) -> tuple[TurningPoints, bool]:
     """A DINT of pulses (MIC-42)."""
     return turns_of_round(partial(_profile, axis), lambda now: axis.profile.count(now) + axis.offset_p - DINT_MIN, 2**32), True
 
 
-def _as_encoder(axis: Axis) -> tuple[Turns, bool]:
+def _as_encoder(axis: Axis) -> tuple[TurningPoints, bool]:
     """The point of an encoder, without turns and version: its shaft may be turned from outside."""
     return turns_of(partial(_profile, axis)), False
 
 
-_FOLLOWING: Mapping[str, Callable[[Axis], tuple[Turns, bool]]] = {
+_FOLLOWING: Mapping[str, Callable[[Axis], tuple[TurningPoints, bool]]] = {
     "moving": _as_profile,
     "POS_ACT": _as_coordinate,
     "VEL_ACT": _as_profile,

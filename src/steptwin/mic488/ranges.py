@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Range:
+class ValueRange:
     """Finite numbers from ``low`` (itself excluded when ``above``) to ``high``; None is open."""
 
     low: float | None = None
@@ -37,5 +37,5 @@ def _plain(number: float) -> str:
     return str(int(number)) if number == int(number) and abs(number) < 1e15 else f"{number:.4g}"
 
 
-FINITE = Range()
-POSITIVE = Range(0, above=True)
+FINITE = ValueRange()
+POSITIVE = ValueRange(0, above=True)

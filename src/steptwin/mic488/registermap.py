@@ -16,7 +16,7 @@ from typing import NamedTuple, Self
 
 from steptwin.errors import Misuse
 from steptwin.mic488.encoding import DINT_MAX, DINT_MIN, WORD_MAX
-from steptwin.mic488.ranges import FINITE, Range
+from steptwin.mic488.ranges import FINITE, ValueRange
 from steptwin.wire import pdu
 
 LAST_ADDRESS = 0xFFFF
@@ -113,10 +113,10 @@ class Per(enum.Enum):
 
 
 _TYPE_RANGES = {
-    Type.BIT: Range(0, 1),
-    Type.WORD: Range(0, WORD_MAX),
-    Type.MEMORY: Range(0, WORD_MAX),
-    Type.DINT: Range(DINT_MIN, DINT_MAX),
+    Type.BIT: ValueRange(0, 1),
+    Type.WORD: ValueRange(0, WORD_MAX),
+    Type.MEMORY: ValueRange(0, WORD_MAX),
+    Type.DINT: ValueRange(DINT_MIN, DINT_MAX),
     Type.REAL: FINITE,
     Type.VALUE: FINITE,
 }
@@ -165,7 +165,7 @@ class MapRow:
     """Distance of the copies in addresses."""
     cells: int | Callable[[Firmware], int] = 1
     """Values behind one name; a function where the firmware gives their number (ranged rows)."""
-    permitted: Range | Mapping[str, Range] | None = None
+    permitted: ValueRange | Mapping[str, ValueRange] | None = None
     """Permitted written values; by firmware name where they differ; None: whatever the type holds."""
     values: Mapping[int, str] = field(default_factory=dict)
     """Texts of enumerated values."""
@@ -197,7 +197,7 @@ class Register:
     """Function codes that are accepted for a write (MIC-4, MIC-5, MIC-6)."""
     kind: QuantityKind
     effect: WriteEffect
-    permitted: Range
+    permitted: ValueRange
     values: Mapping[int, str]
     meaning: str
     section: str

@@ -13,7 +13,7 @@ from functools import cache, partial
 from types import MappingProxyType
 
 from steptwin.errors import Misuse
-from steptwin.mic488.ranges import POSITIVE, Range
+from steptwin.mic488.ranges import POSITIVE, ValueRange
 from steptwin.mic488.registermap import (
     DataType,
     Firmware,
@@ -87,7 +87,7 @@ def _sections(table: str, manual_1_23: str = "", manual_1_70: str = "") -> Mappi
 
 
 # All banks of the generation.
-_BANKS = {name: Range(0, firmware.banks - 1) for name, firmware in FIRMWARES.items()}
+_BANKS = {name: ValueRange(0, firmware.banks - 1) for name, firmware in FIRMWARES.items()}
 
 _bit = partial(MapRow, space=Space.COIL, type=Type.BIT, kind=QuantityKind.SWITCH)
 _axis_coil = partial(_bit, reads=(), writes=(5,), per=Per.AXIS, copies=AXES)
@@ -217,7 +217,7 @@ ROWS: tuple[MapRow, ...] = (
         name="DATA_TYPE",
         address=0,
         kind=QuantityKind.ENUMERATION,
-        permitted=Range(0, 1),
+        permitted=ValueRange(0, 1),
         values={DataType.REAL: "REAL", DataType.DINT: "DINT"},
         sections=_sections("3.2", "4.9", "4.10"),
         meaning="How REAL/DINT registers travel, as REAL in configured units or as DINT in pulses.",
@@ -248,7 +248,7 @@ ROWS: tuple[MapRow, ...] = (
         writes=(6,),
         kind=QuantityKind.ENUMERATION,
         effect=WriteEffect.ADD,
-        permitted=Range(0, 2),
+        permitted=ValueRange(0, 2),
         values={0: "STOP", 1: "START", 2: "PAUSE"},
         sections=_sections("3.2", "4.1"),
         meaning="Stops, starts or pauses the program; reads as the program's state.",
@@ -258,7 +258,7 @@ ROWS: tuple[MapRow, ...] = (
         name="AXIS_CTR_MODE",
         address=4,
         kind=QuantityKind.ENUMERATION,
-        permitted=Range(0, 1),
+        permitted=ValueRange(0, 1),
         values={0: "DIRECT", 1: "TRIGGER"},
         sections=_sections("3.2", "4.5"),
         meaning="Whether a motion register acts when written (DIRECT) or waits for its trigger register (TRIGGER).",

@@ -49,7 +49,7 @@ class DeviceSurroundings:
 
 
 class ShownDevice:
-    """See `steptwin.studio.shown.Part`. Its line is open."""
+    """See `steptwin.studio.shown.ShownSubject`. Its line is open."""
 
     def __init__(self, subject: AsyncDeviceSubject, device: DevicePart, around: DeviceSurroundings) -> None:
         self._subject = subject

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from steptwin.diagnostics import Diagnostic
 from steptwin.wbc import findings as f
-from steptwin.wbc.findings import Finding, Spanned
+from steptwin.wbc.findings import ProgramFinding, Spanned
 from steptwin.wbc.foreign import IF_UNKNOWN
 
 
@@ -22,8 +22,8 @@ class Blocks:
     open: dict[int, int] = field(default_factory=dict)
 
 
-_NOT_CLOSED: dict[str, tuple[Finding, str]] = {"IF": (f.IF_NOT_CLOSED, "ENDIF"), "WHILE": (f.WHILE_NOT_CLOSED, "ENDWHILE")}
-_NOT_OPENED: dict[str, tuple[Finding, str]] = {
+_NOT_CLOSED: dict[str, tuple[ProgramFinding, str]] = {"IF": (f.IF_NOT_CLOSED, "ENDIF"), "WHILE": (f.WHILE_NOT_CLOSED, "ENDWHILE")}
+_NOT_OPENED: dict[str, tuple[ProgramFinding, str]] = {
     "ELSE": (f.ELSE_WITHOUT_IF, "IF"),
     "ENDIF": (f.ENDIF_WITHOUT_IF, "IF"),
     "ENDWHILE": (f.ENDWHILE_WITHOUT_WHILE, "WHILE"),

@@ -21,7 +21,7 @@ class Spanned(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class ProgramFinding:
     """A kind of finding. ``title`` describes it in general; `at` makes the message for one place."""
 
     code: str
@@ -37,13 +37,13 @@ class Finding:
         return Diagnostic(self.code, self.severity, span, message, hint, None if fix is None else Fix(span, fix))
 
 
-FINDINGS: dict[str, Finding] = {}
+FINDINGS: dict[str, ProgramFinding] = {}
 
 
-def _row(code: str, title: str) -> Finding:
+def _row(code: str, title: str) -> ProgramFinding:
     if code in FINDINGS:
         raise ValueError(f"code {code} is given twice")
-    return FINDINGS.setdefault(code, Finding(code, title))
+    return FINDINGS.setdefault(code, ProgramFinding(code, title))
 
 
 TRAILING = _row("W101", "characters after the end of a command")

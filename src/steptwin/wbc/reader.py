@@ -10,7 +10,7 @@ import re
 from steptwin.diagnostics import Diagnostic
 from steptwin.nearmiss import NearMiss
 from steptwin.wbc import findings as f
-from steptwin.wbc.findings import Finding
+from steptwin.wbc.findings import ProgramFinding
 from steptwin.wbc.foreign_words import DECLARATIONS, ELSE_IF, INSTEAD
 from steptwin.wbc.lexer import COMPARISON, NUMBER, OPERATOR, STRANGE, WORD, WRONG_NUMBER, Lexeme, is_name
 from steptwin.wbc.registers import parts
@@ -378,7 +378,9 @@ class StatementReader:
             DecimalNumber(middle, only.end, right, float(right)),
         ]
 
-    def _value(self, missing: Finding, wrong: Finding, what: str, usage: str, part: str = "a number or a name") -> ValueNode:
+    def _value(
+        self, missing: ProgramFinding, wrong: ProgramFinding, what: str, usage: str, part: str = "a number or a name"
+    ) -> ValueNode:
         if self._at == self._last:
             raise Rejected(missing.at(self._end(), f"{what} lacks {part}", usage))
         token = self._tokens[self._at]

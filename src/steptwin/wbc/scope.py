@@ -13,7 +13,7 @@ from steptwin.wbc.foreign_words import VALUES
 from steptwin.wbc.positions import PositionTable
 from steptwin.wbc.registers import PREDEFINED, REAL_MAX, REGISTERS, ROWS, VALUE_NAMES, RegisterRow, parts
 from steptwin.wbc.statements import FUNCTIONS, KEYWORDS, NOT_SUPPORTED
-from steptwin.wbc.steps import Literal, RegisterOperand, Source, Target, Variable
+from steptwin.wbc.steps import AssignmentTarget, Literal, RegisterOperand, Source, Variable
 from steptwin.wbc.tree import Assign, Broken, ConstantDefinition, DecimalNumber, Identifier, ProgramTree, ValueNode
 
 _STATUS_SINCE = "1.70"
@@ -140,7 +140,7 @@ class ProgramScope:
         known = self.known.get(node.key)
         return known if known is not None else self._look_up(node, other, is_row=is_row)
 
-    def target(self, name: Identifier) -> Target | None:
+    def target(self, name: Identifier) -> AssignmentTarget | None:
         """The variable or register of an assignment; None after reporting an error."""
         found = self.known.get(name.key)
         if found is None:

@@ -42,7 +42,7 @@ class RegisterOperand:
 
 
 Source: TypeAlias = Literal | Variable | RegisterOperand
-Target: TypeAlias = Variable | RegisterOperand
+AssignmentTarget: TypeAlias = Variable | RegisterOperand
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +77,7 @@ class ProgramStep:
 
 @dataclass(frozen=True, slots=True)
 class SetStep(ProgramStep):
-    target: Target
+    target: AssignmentTarget
     value: Source | Operation | FunctionOperation
 
 
