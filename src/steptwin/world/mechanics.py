@@ -186,6 +186,7 @@ class Mechanism(Stateful):
             drive = self._drive
             if drive.revision != self._revision or self._is_switched(drive, now):
                 self._renew(drive, now)
+                self._kernel.mark(self.machine)  # switches on it look ahead
             elif self._due is not None and self._due <= now:
                 self._turn_encoders(now)
             if self._stall_due is not None and self._stall_due <= now:

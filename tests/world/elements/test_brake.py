@@ -214,6 +214,22 @@ def test_a_motor_catches_it_below_its_start_speed_only() -> None:
     assert caught == pytest.approx(0.125 + (-faster - 50.0) / slowing, abs=1e-4)
 
 
+def test_switches_look_ahead_again_when_the_motor_has_caught_it() -> None:
+    world = World.from_toml(
+        TEXT.replace("when_off", "start_speed = 600\nwhen_off").replace("below = 100.0", "above = 195.0") + BRAKE
+    )
+    device = world.mic488["a"]
+    device.write("OUT1", 1)
+    world.run(until=0.16)
+    assert world.read("a.IN1") == 0
+    device.write("M1_EN", 1)
+    device.write("M1_POS_ABS", 60.0)  # the field goes while the rotor is still too fast for it
+    device.write("OUT1", 0)
+    world.run(until="a.IN1")
+    assert world.axis["z"].position == 195.0
+    assert events(world, "fall")[-1][0] < world.now / SECOND - 0.1
+
+
 def test_a_chip_without_supply_lets_its_load_fall() -> None:
     text = """
     [[m1486]]
