@@ -17,6 +17,7 @@ from steptwin.world.elements.cylinder import CYLINDER
 from steptwin.world.elements.gate import GATE
 from steptwin.world.elements.latch import LATCH
 from steptwin.world.elements.relay import RELAY
+from steptwin.world.elements.shaft import SHAFT
 from steptwin.world.elements.source import SOURCE
 from steptwin.world.elements.timer import TIMER
 from steptwin.world.elements.transducer import TRANSDUCER
@@ -69,6 +70,7 @@ for _one in (
     CONVEYOR,
     VACUUM,
     BRAKE,
+    SHAFT,
     TRANSDUCER,
     COLLISION,
 ):

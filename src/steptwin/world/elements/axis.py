@@ -133,14 +133,15 @@ def find_axis(name: str, site: Site) -> BuiltAxis:
     return found
 
 
+def turns_of_axis(fitted: BuiltAxis, now: Nanos) -> Iterator[Nanos]:
+    """Moments after ``now`` between which its load moves one way."""
+    course = fitted.mechanism.course(now)
+    ends = set(turns_of(lambda: profile_of(course.plan))(now)) | {piece.begin for piece in course.pieces}
+    yield from sorted(moment for moment in ends if moment > now)
+
+
 def _signals(fitted: BuiltAxis) -> Mapping[str, SignalOf]:
-    mechanism = fitted.mechanism
-
-    def turning(now: Nanos) -> Iterator[Nanos]:
-        course = mechanism.course(now)
-        ends = set(turns_of(lambda: profile_of(course.plan))(now)) | {piece.begin for piece in course.pieces}
-        yield from sorted(moment for moment in ends if moment > now)
-
+    mechanism, turning = fitted.mechanism, partial(turns_of_axis, fitted)
     kernel, version = (fitted.kernel,), mechanism.version
     position = SignalOf(kernel, lambda now: fitted.units(mechanism.place(now)), turning, version, fitted.scale.unit)
     lost = SignalOf(kernel, lambda now: float(mechanism.lost(now)), turning, version)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Protocol
 
 from steptwin.machine import Nanos
 from steptwin.world.contacts import Carriage, Switch, Zone
@@ -84,7 +85,24 @@ def lane_of(axis: str, number: int) -> str:
     return f"{axis}.switch{number}"
 
 
-def put_switch(kernel: Kernel, carriage: Carriage, moved_by: str, zone: Zone, spec: SwitchSpec, lane: str, site: Site) -> None:
+class ContactSpec(Protocol):
+    """What all contacts have in their tables."""
+
+    @property
+    def target(self) -> Terminal: ...
+    @property
+    def contact(self) -> str: ...
+    @property
+    def join(self) -> str | None: ...
+    @property
+    def bounce(self) -> Nanos: ...
+    @property
+    def bounces(self) -> int: ...
+    @property
+    def path(self) -> Path: ...
+
+
+def put_switch(kernel: Kernel, carriage: Carriage, moved_by: str, zone: Zone, spec: ContactSpec, lane: str, site: Site) -> None:
     """Put a switch where a carriage, which the machine or element ``moved_by`` moves, runs over it."""
     circuit = site.circuit(kernel, spec.target, (*spec.path, "to"), spec.join)
     part = Switch(
