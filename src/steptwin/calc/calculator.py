@@ -46,7 +46,7 @@ TIMES = (
     _time(CONSTANT, "Time at constant velocity"),
     _time(FALL, "Time of deceleration"),
 )
-"""One of them may be given, and then one quantity left out."""
+"""At most one of them may be given, instead of one quantity."""
 TIME_NAMES = tuple(time.name for time in TIMES)
 PARTS_OF = {"rises": RISE, "stays": CONSTANT, "falls": FALL}
 
@@ -224,7 +224,7 @@ class Calculator:
 
 
 SHOWN = 1e-6
-"""Relative: smaller differences are not seen in numbers for people."""
+"""Relative: smaller differences are not visible in printed numbers."""
 LARGEST = 1e12
 LEAST_PART = 1e-9
 """Of a quantity whose range begins at 0, the least that is tried, relative to a pulse."""

@@ -1,4 +1,4 @@
-"""What a calculator of motions is given, and what it answers, alike for every kind of controller."""
+"""Input and results of the motion calculator, in the same form for every kind of controller."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ TIME, RISE, CONSTANT, FALL = "time", "acceleration_time", "constant_time", "dece
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MoveQuantity:
-    """A number of a move."""
+    """A quantity of a move."""
 
     name: str
     meaning: str
@@ -45,7 +45,7 @@ class MoveQuantity:
 
 
 class Formula(NamedTuple):
-    """A rule that gave the result."""
+    """A formula of the result."""
 
     name: str
     text: str
@@ -63,11 +63,11 @@ class Model(Protocol):
         ...
 
     def plan(self, values: Mapping[str, float]) -> Profile:
-        """As the controller plans it, from 0 on, in pulses; ``values`` need not be such as it takes."""
+        """As the controller plans it, from position 0, in pulses; ``values`` need not be rounded to what it accepts."""
         ...
 
     def settable(self, name: str, value: float, values: Mapping[str, float]) -> float:
-        """The nearest value that the controller takes."""
+        """The nearest value that the controller accepts."""
         ...
 
     def check(self, values: Mapping[str, float]) -> None:
@@ -93,7 +93,7 @@ class MovePart(NamedTuple):
 
 
 class RequiredSetting(NamedTuple):
-    """What has to be set for the result."""
+    """A setting that the result needs."""
 
     name: str
     code: str
@@ -104,7 +104,7 @@ class RequiredSetting(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Calculation:
-    """A move: with the values that the controller takes, and what they give."""
+    """A move: the values that the controller accepts, and the resulting times."""
 
     title: str
     found: str | None
@@ -159,7 +159,7 @@ class CurvePoint(NamedTuple):
 
 
 POINTS_IN_PART = 24
-"""More are not seen in a picture; the last of a part is the first of the next."""
+"""Enough for a picture; the last point of a part is the first of the next."""
 
 
 def curve(result: Calculation) -> list[CurvePoint]:

@@ -9,7 +9,7 @@ from math import sqrt
 MOST_STEPS = 200
 """Halving the logarithm of the widest range of REALs and then all bits of a double takes less than 80."""
 SAME = 1e-12
-"""Relative: nearer values are alike."""
+"""Relative: closer values count as equal."""
 
 
 def solve(of: Callable[[float], float], wanted: float, low: float, high: float) -> float | None:

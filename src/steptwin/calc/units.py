@@ -48,14 +48,14 @@ class DriveMechanics:
     motor_steps: float = 200.0
     """Full steps in a revolution of the motor: 200 for 1.8°."""
     microsteps: float = 1.0
-    """Pulses in a full step, as the drive is set; 64 for an M1486, which counts so."""
+    """Pulses in a full step, as the drive is set; 64 for an M1486."""
     ratio: float = 1.0
-    """Revolutions of the motor in one of what it drives."""
+    """Revolutions of the motor for one revolution of its load."""
     lead: float | None = None
-    """Travel in one revolution of what is driven [mm]: lead of a screw, teeth × pitch of a pulley. None: it turns."""
+    """Travel in one revolution of the load [mm]: lead of a screw, teeth × pitch of a pulley. None: a rotary axis."""
 
     def scale(self) -> UnitScale:
-        """Pulses in each unit. Raises `Misuse` for numbers that are no mechanics."""
+        """Pulses in each unit. Raises `Misuse` for numbers that are out of range."""
         _positive("motor steps", self.motor_steps, " step/rev")
         _positive("microsteps", self.microsteps, "/step")
         _positive("gear ratio", self.ratio, "")

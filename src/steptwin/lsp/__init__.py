@@ -14,7 +14,7 @@ class NoPygls(SteptwinError):
 
 
 def serve_stdio() -> None:
-    """Serve an editor on standard input and output until it goes away. Raises `NoPygls` with the command that installs it."""
+    """Serve an editor on standard input and output until it disconnects. Raises `NoPygls` with the command that installs it."""
     try:
         import pygls  # noqa: F401
     except ImportError as error:

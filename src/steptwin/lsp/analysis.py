@@ -1,4 +1,4 @@
-"""What can be asked of a text. Each language answers what it can; the rest is nothing."""
+"""The analysis of a text. Each language implements what it supports; the defaults are empty."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Analysis:
         return None
 
     def items(self, place: int) -> Completions:
-        """What could be typed here."""
+        """The completions at a place."""
         return Completions(())
 
     def signature(self, place: int) -> Signature | None:

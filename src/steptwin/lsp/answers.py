@@ -1,4 +1,4 @@
-"""What an analysis answers, in words of editors: spans of characters and plain texts, no protocol."""
+"""The answers of an analysis in terms of editors: spans of characters and plain texts, no protocol."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Hover:
 
 
 class CompletionKind(enum.Enum):
-    """What is offered, for its icon."""
+    """The kind of a completion, for its icon."""
 
     KEYWORD = enum.auto()
     SNIPPET = enum.auto()

@@ -1,4 +1,4 @@
-"""A configuration of a MIC488 (`.cfg`) as an editor sees it."""
+"""The analysis of a configuration of a MIC488 (`.cfg`) for editors."""
 
 from __future__ import annotations
 
@@ -135,7 +135,7 @@ class ConfigAnalysis(Analysis):
 
 
 def _meaning(key: ConfigKey, value: str) -> str:
-    """What a value stands for, where numbers stand for something."""
+    """The meaning of a value, if its numbers have meanings."""
     if not value.isascii() or not value.isdecimal() or len(value) > 9:
         return ""
     number = int(value)

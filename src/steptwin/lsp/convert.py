@@ -1,4 +1,4 @@
-"""Answers in the types of the protocol, places as lines and columns. Nothing else knows both."""
+"""Answers in the types of the protocol, places as lines and columns. The only module that uses both."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _SEVERITIES = {
     Severity.NOTE: lsp.DiagnosticSeverity.Hint,
 }
 _UNNECESSARY = frozenset({"W204", "W206", "W251", "M206", "M207"})
-"""Findings of what could be left out; editors show it pale."""
+"""Codes of findings about unnecessary code, which editors show faded."""
 _ITEM_KINDS = {
     a.CompletionKind.KEYWORD: lsp.CompletionItemKind.Keyword,
     a.CompletionKind.SNIPPET: lsp.CompletionItemKind.Snippet,

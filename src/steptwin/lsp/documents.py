@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from steptwin.lsp.positions import Encoding, LineIndex
 
 MOST_CHARACTERS = 1 << 20
-"""Of a text that is looked at, as of a file (`steptwin.inputfiles.MOST_BYTES`)."""
+"""Limit of an analysed text, as of a file (`steptwin.inputfiles.MOST_BYTES`)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,7 @@ class Document:
         return self.lines.text
 
     def changed(self, version: int, changes: Iterable[TextChange], encoding: Encoding) -> Document:
-        """The text after changes, each of which is made to what the one before gave."""
+        """The text after changes, which are applied one after the other."""
         lines = self.lines
         for change in changes:
             if change.start is None or change.end is None:

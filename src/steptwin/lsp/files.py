@@ -12,7 +12,7 @@ from steptwin.errors import Misuse
 from steptwin.inputfiles import read_bytes
 
 MOST_BESIDE = 200
-"""Files of a folder that are looked at."""
+"""Limit of the files of a folder that are read."""
 _UNQUOTED = "/:@!$&'()*+,;=~"
 
 
@@ -20,7 +20,7 @@ class Files(Protocol):
     """Where files are read that are not open. A studio in a browser has others than a disk."""
 
     def stamp(self, uri: str) -> object | None:
-        """Something that is another when the file has changed; None where there is no file."""
+        """A value that differs when the file has changed; None if there is no file."""
         ...
 
     def read(self, uri: str) -> bytes:
@@ -33,7 +33,7 @@ class Files(Protocol):
 
 
 class NoFiles:
-    """Only open texts are there."""
+    """Only open texts exist."""
 
     def stamp(self, uri: str) -> object | None:
         return None
@@ -46,7 +46,7 @@ class NoFiles:
 
 
 class GivenTexts:
-    """Texts by normal address, which do not change. Each is beside all others."""
+    """Constant texts by normal address, all in one folder."""
 
     def __init__(self, texts: Mapping[str, bytes]) -> None:
         self._texts = texts
@@ -98,7 +98,7 @@ class DiskFiles:
 
 
 def normal(uri: str) -> str:
-    """One spelling of an address, for clients differ in what they quote."""
+    """One spelling of an address, because clients quote different characters."""
     try:
         parts = urlsplit(uri)
     except ValueError:

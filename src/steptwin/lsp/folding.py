@@ -19,7 +19,7 @@ class NestedFolds:
         self._open.append((end_word, line))
 
     def end(self, end_word: str, line: int) -> None:
-        """Has no effect where no such block is open."""
+        """Has no effect if no such block is open."""
         if not any(wanted == end_word for wanted, _ in self._open):
             return
         while True:

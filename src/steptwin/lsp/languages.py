@@ -33,7 +33,7 @@ _BEGINNING = 4000
 
 
 def language_of(name: str, uri: str, text: str) -> Language | None:
-    """None for a text in no language of this product."""
+    """None for a text in an unknown language."""
     if name in _BY_NAME:
         return _BY_NAME[name]
     language = SUFFIXES.get(suffix_of(uri))
@@ -41,7 +41,7 @@ def language_of(name: str, uri: str, text: str) -> Language | None:
 
 
 def _looks_like(language: Language, text: str) -> bool:
-    """Other programs have files with some of these endings too: whether a text has what one of ours has."""
+    """Whether a text is one of these, because other programs use some of the endings too."""
     if language is Language.WORLD:
         return _WORLD.search(text) is not None
     if language is Language.CONFIG:

@@ -98,7 +98,7 @@ def rename(session: EditorSession, uri: str, place: int, text: str) -> dict[str,
 
 
 def fixes(session: EditorSession, uri: str, span: Span) -> list[CodeAction]:
-    """The changes that mend what was said about a part of a text."""
+    """Quick fixes of the findings in a part of a text."""
     analysis = session.analysis(uri)
     if analysis is None:
         return []
@@ -123,7 +123,7 @@ def _title(diagnostic: Diagnostic, old: str, new: str) -> str:
 
 
 def workspace_symbols(session: EditorSession, query: str) -> list[tuple[str, OutlineItem]]:
-    """What is called like the query (its letters in order) in the open texts and the files of their machines."""
+    """The names in the open texts and the files of their machines that contain the letters of the query in order."""
     wanted = query.lower()
     uris = dict.fromkeys(other for uri in session.open_uris for other in (uri, *session.related(uri)))
     found: list[tuple[str, OutlineItem]] = []

@@ -38,13 +38,13 @@ FIRST_DELAY_S = 0.004
 LONGEST_DELAY_S = 0.5
 """Between a change and its diagnostics."""
 OTHERS_DELAY_S = 0.3
-"""Until the other files of a machine are looked at again."""
+"""Delay before the other files of a machine are analysed again."""
 _COLLECT_AFTER = 100_000
 """Objects after which Python looks for garbage: trees of programs are many small objects, none of them in cycles."""
 
 Answer = TypeVar("Answer")
 Handling: TypeAlias = Generator[Any, Any, Any]
-"""As pygls runs handlers of its own: they yield what is to be called."""
+"""In the form of pygls' own handlers, which yield the functions to call."""
 
 
 class AtPlace(typing.Protocol):
@@ -55,7 +55,7 @@ class AtPlace(typing.Protocol):
 
 
 class Protocol(LanguageServerProtocol):
-    """Texts are kept by the session alone: pygls' own workspace would keep each twice, and reads files that are not open."""
+    """Only the session stores texts: pygls' workspace would store each a second time, and reads files that are not open."""
 
     @lsp_method(lsp.TEXT_DOCUMENT_DID_OPEN)
     def lsp_text_document__did_open(self, params: lsp.DidOpenTextDocumentParams) -> Handling:
@@ -90,14 +90,14 @@ class EditorServer(LanguageServer):
     # -- diagnostics
 
     def changed(self, uri: str) -> None:
-        """Look at a text soon, and later at the open ones of its machine."""
+        """Analyse a text soon, and later the open texts of its machine."""
         first, *others = self.session.affected(uri)
         self._later(first, self._delays.get(first, FIRST_DELAY_S))
         for other in others:
             self._later(other, OTHERS_DELAY_S)
 
     def changed_outside(self) -> None:
-        """Look at everything again."""
+        """Analyse all texts again."""
         self.session.refresh()
         for uri in self.session.open_uris:
             self._later(uri, OTHERS_DELAY_S)
@@ -110,7 +110,7 @@ class EditorServer(LanguageServer):
         self.text_document_publish_diagnostics(lsp.PublishDiagnosticsParams(uri, []))
 
     def end(self) -> None:
-        """The client has gone: nothing is looked at any more."""
+        """The client has disconnected: no text is analysed any more."""
         for timer in self._timers.values():
             timer.cancel()
         self._timers.clear()
@@ -153,7 +153,7 @@ class EditorServer(LanguageServer):
 
 
 def _of(server: EditorServer, uri: str, ask: Callable[[Analysis, Converter], Answer]) -> Answer | None:
-    """What an analysis answers; None where there is no analysis."""
+    """The answer of an analysis; None if there is no analysis."""
     found = server.analysed(uri)
     return None if found is None else ask(*found)
 
@@ -456,6 +456,6 @@ def _bound(made: EditorServer, handler: Callable[[EditorServer, Any], Any]) -> C
 
 
 def serve_stdio() -> None:
-    """Serve the client on standard input and output until it goes away."""
+    """Serve the client on standard input and output until it disconnects."""
     gc.set_threshold(_COLLECT_AFTER)
     server().start_io()

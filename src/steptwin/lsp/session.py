@@ -84,7 +84,7 @@ class EditorSession:
         self.refresh()
 
     def refresh(self) -> None:
-        """Files may have come, gone or changed: look for them again."""
+        """Files may have been added, removed or changed: search them again."""
         self._worlds = None
         self._beside.clear()
 
@@ -123,7 +123,7 @@ class EditorSession:
     # -- analyses
 
     def analysis(self, uri: str) -> Analysis | None:
-        """That of a text as it is now; None where there is no text, or none in a language of this product."""
+        """The analysis of the present text; None if there is none, or none in a known language."""
         uri = normal(uri)
         lines = self.lines(uri)
         if lines is None:

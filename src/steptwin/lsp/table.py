@@ -1,4 +1,4 @@
-"""A position table (`.csv`) as an editor sees it."""
+"""The analysis of a position table (`.csv`) for editors."""
 
 from __future__ import annotations
 

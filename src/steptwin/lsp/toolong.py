@@ -1,4 +1,4 @@
-"""A text that is too long to be looked at."""
+"""A text that is too long for analysis."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from steptwin.lsp.documents import MOST_CHARACTERS
 
 
 class TooLong(Analysis):
-    """Says so, and nothing else."""
+    """Reports only that."""
 
     def diagnostics(self) -> Sequence[Diagnostic]:
         message = f"the text has {len(self.text)} characters; only {MOST_CHARACTERS} are looked at"

@@ -27,7 +27,7 @@ KEY_S = 0.25
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """The result of the last look. ``trouble``: why there was no answer; the other values are then from before."""
+    """The result of the last reading. ``trouble``: why there was no answer; the other values are then previous ones."""
 
     status: Mic488Status | None = None
     values: Values = field(default_factory=dict)
@@ -35,7 +35,7 @@ class Picture:
 
 
 class MonitorSession:
-    """Looks at a controller. ``on_picture`` is called after every look, ``on_frame`` for every frame of the driver.
+    """Reads a controller. ``on_picture`` is called after every reading, ``on_frame`` for every frame of the driver.
 
     ``watched`` are names of registers to show besides the status. ``values`` gives both; without it the driver is polled.
     """
@@ -75,7 +75,7 @@ class MonitorSession:
     # ------------------------------------------------------------------ looking
 
     async def run(self) -> None:
-        """Look until cancelled."""
+        """Read values until cancelled."""
         try:
             while True:
                 await self._look()
@@ -159,7 +159,7 @@ class MonitorSession:
         self._ignored_until = asyncio.get_running_loop().time() + KEY_S
 
     async def do(self, action: Awaitable[object]) -> None:
-        """Execute an action, then look."""
+        """Execute an action, then read the values."""
         try:
             await action
         finally:

@@ -18,14 +18,14 @@ Values: TypeAlias = Mapping[str, tuple[RegisterValue, str]]
 
 
 class MonitorReading(NamedTuple):
-    """What is known at a moment."""
+    """The known values at a moment."""
 
     status: Mic488Status
     values: Values
 
 
 class MonitorSource(Protocol):
-    """Errors are those of drivers; the next look begins anew."""
+    """Raises the errors of drivers; the next reading starts again."""
 
     async def look(self, names: Sequence[str]) -> MonitorReading:
         """The status, and the values of registers by name."""
@@ -35,7 +35,7 @@ class MonitorSource(Protocol):
 
 
 class PolledValues:
-    """Of a device, in as few frames as may be."""
+    """Of a device, in as few frames as possible."""
 
     def __init__(self, mic: AsyncMic488) -> None:
         self._mic = mic
@@ -45,7 +45,7 @@ class PolledValues:
         return MonitorReading(status, await self._mic.get_shown(*names) if names else {})
 
     async def close(self) -> None:
-        """The driver is closed by its owner."""
+        """The owner of the driver closes it."""
 
 
 class FollowedValues:

@@ -54,9 +54,9 @@ class M1486Marker:
     link: Literal["tcp", "pty"] = "tcp"
     """What ``address`` and ``channel`` are: characters over TCP, or a pseudo terminal."""
     faults: Sequence[str] = ()
-    """Faults that are there from the beginning, as `M1486Rig.fault` takes them."""
+    """Faults that are set from the beginning, as for `M1486Rig.fault`."""
     seed: int = 0
-    """Of the faults' chance."""
+    """Random seed of faults."""
     line_timing: bool = False
     """Characters take their time on the wire."""
     baud: int | None = None
@@ -157,7 +157,7 @@ class M1486Rig(LineRig):
         self.channel.write("".join(f"{line}\r" for line in lines).encode("latin-1"))
 
     def receive(self, count: int = 1, within_s: float = 1.0) -> bytes:
-        """The next characters. The test fails where they do not come within ``within_s`` seconds of the twin."""
+        """The next characters. The test fails if they do not arrive within ``within_s`` seconds of the twin."""
         __tracebackhide__ = True
         received = bytearray()
 

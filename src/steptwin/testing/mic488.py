@@ -66,9 +66,9 @@ class Mic488Marker:
     link: Literal["tcp", "rtu", "pty"] = "tcp"
     """What ``address`` and ``driver`` speak: Modbus TCP, RTU over TCP, RTU on a pseudo terminal."""
     faults: Sequence[str] = ()
-    """Faults that are there from the beginning, as `Mic488Rig.fault` takes them."""
+    """Faults that are set from the beginning, as for `Mic488Rig.fault`."""
     seed: int = 0
-    """Of the faults' chance."""
+    """Random seed of faults."""
     lenient: bool = False
     """Holes in the register map read as 0 (MIC-3)."""
     line_timing: bool = False

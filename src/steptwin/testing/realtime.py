@@ -135,7 +135,7 @@ class RealTime:
         time.sleep(max(seconds, 0.0) / self.speed)
 
     def until(self, condition: Callable[[], object], within_s: float) -> bool:
-        """Wait until a condition holds, at most so many seconds of the twin; whether it came to that.
+        """Wait until a condition is true, at most so many seconds of the twin; whether it became true.
 
         A process that was held up holds up its twin too, so the twin's own clock is asked.
         """
@@ -171,13 +171,13 @@ class RealTime:
 
 
 async def _settle() -> None:
-    """Let connections that are just being made or aborted come to their end: asyncio takes some rounds for that."""
+    """Let connections that are being made or aborted complete, which takes asyncio a few rounds."""
     for _ in range(ROUNDS):
         await asyncio.sleep(0)
 
 
 class WallTime:
-    """The time of a device: it cannot be made to pass."""
+    """The time of a device, which cannot be controlled."""
 
     def now(self) -> Nanos:
         return time.monotonic_ns()

@@ -1,4 +1,4 @@
-"""What all rigs have in common: time and waiting, faults, the report of a failed test."""
+"""Common parts of all rigs: time and waiting, faults, the report of a failed test."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ Time: TypeAlias = VirtualTime | RealTime | WallTime
 
 
 class FaultSeen(NamedTuple):
-    """A fault that is set. ``happened``: how often it has struck."""
+    """A fault that is set. ``happened``: how often it has occurred."""
 
     name: str
     fault: str
@@ -77,11 +77,11 @@ class Rig:
         return self._time.now() / SECOND
 
     def sleep(self, seconds: float) -> None:
-        """Let time pass, in seconds of the twin: at once in virtual time, with ``speed`` in real time."""
+        """Let time advance, in seconds of the twin: immediately in virtual time, with ``speed`` in real time."""
         self._time.sleep(seconds)
 
     def until(self, condition: Callable[[], object], within_s: float = WITHIN_S, what: str = "") -> None:
-        """Let time pass until a condition holds. The test fails where it does not within ``within_s`` seconds of the twin.
+        """Wait until a condition is true. The test fails if it is not within ``within_s`` seconds of the twin.
 
         ``what`` is named in the message.
         """
@@ -90,7 +90,7 @@ class Rig:
             pytest.fail(f"after {within_s:g} s not yet: {what or getattr(condition, '__name__', 'the condition')}")
 
     def later(self, seconds: float, act: Callable[[], object]) -> None:
-        """Let something happen by itself in so many seconds of the twin, while a program waits: ``later(0.5, lambda:
+        """Call a function after so many seconds of the twin, while a program waits: ``later(0.5, lambda:
         rig.set_pin("IN5", 1))``. ``act`` acts on the twin itself and must not use drivers. The twin's."""
         __tracebackhide__ = True
         if isinstance(self._time, WallTime):
@@ -107,7 +107,7 @@ class Rig:
         pytest.skip(f"{what} exists on a twin only, and --device names {self._device}")
 
     def begin(self) -> None:
-        """Before the test: skip it where a device is not what it is for."""
+        """Skip the test before it begins if the device does not fit its marker."""
 
     def close(self) -> None:
         """After the test."""
@@ -212,7 +212,7 @@ class LineRig(Rig):
 
     @property
     def events(self) -> list[TwinEvent]:
-        """What happened in it so far. The twin's."""
+        """Its events so far. The twin's."""
         __tracebackhide__ = True
         return self._on("events", lambda _: list(self._events))
 
@@ -224,7 +224,7 @@ class LineRig(Rig):
     # ------------------------------------------------------------------ faults
 
     def fault(self, *faults: str) -> None:
-        """Let something go wrong from now on: ``"no-answer lost=request every=3"``, ``"stuck pin=IN1 value=0 name=kl"``.
+        """Set a fault: ``"no-answer lost=request every=3"``, ``"stuck pin=IN1 value=0 name=kl"``.
 
         ``steptwin fault --kinds`` lists all of them. Raises `Misuse`. The twin's.
         """
@@ -233,14 +233,14 @@ class LineRig(Rig):
             self._do("fault()", do.SetFault(fault))
 
     def clear_faults(self, *names: str) -> None:
-        """Let it be well again; without names all of it. Raises `Misuse`. The twin's."""
+        """Clear faults by name; all without names. Raises `Misuse`. The twin's."""
         __tracebackhide__ = True
         for name in names or [fault.name for fault in self.faults]:
             self._do("clear_faults()", do.ClearFault(name))
 
     @property
     def faults(self) -> list[FaultSeen]:
-        """The faults that are set, and how often each has struck. The twin's."""
+        """The faults that are set, and how often each has occurred. The twin's."""
         __tracebackhide__ = True
         return [FaultSeen(one["name"], one["fault"], one["happened"]) for one in self._do("faults", command.ListFaults())]
 

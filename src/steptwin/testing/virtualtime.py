@@ -1,4 +1,4 @@
-"""A twin in the test's own thread: time passes when the test, or a driver that waits for an answer, lets it."""
+"""A twin in the thread of the test: time advances only while the test or a driver waits."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from steptwin.mic488.config import ControllerConfig
 T = TypeVar("T")
 
 LOOK_NS: Nanos = 10 * MILLISECOND
-"""A condition is looked at this often, and whenever something happens by itself."""
+"""A condition is evaluated at this interval, and after every event."""
 
 
 class VirtualTime:
@@ -63,7 +63,7 @@ class VirtualTime:
         heappush(self._planned, (self.now() + max(round(seconds * SECOND), 0), next(self._count), act))
 
     def until(self, condition: Callable[[], object], within_s: float) -> bool:
-        """Let time pass until a condition holds; whether it came to that."""
+        """Wait until a condition is true; whether it became true."""
         end = self.now() + round(within_s * SECOND)
         while not condition():
             now = self.now()
@@ -131,7 +131,7 @@ class MemoryChannel:
 def joined_driver(
     endpoint: MemoryEndpoint, time: VirtualTime, unit: int, *, framed: bool, firmware: str, config: ControllerConfig
 ) -> Mic488:
-    """A driver whose waiting makes the twin's time pass. ``framed``: Modbus TCP rather than RTU."""
+    """A driver; while it waits, the time of the twin advances. ``framed``: Modbus TCP rather than RTU."""
     exchanger, notes = modbus_exchanger(LineAddress(endpoint, framed=framed), FRAMES_PER_SECOND, None)
     line = ThreadLine(endpoint, exchanger, clock=time.now, sleeping=time.sleep)
     line.notes.update(notes)
@@ -139,7 +139,7 @@ def joined_driver(
 
 
 def joined_chip(endpoint: MemoryEndpoint, time: VirtualTime, address: int) -> M1486:
-    """A driver of a chip whose waiting makes the twin's time pass."""
+    """A driver of a chip; while it waits, the time of the twin advances."""
     exchanger, talk = talking(endpoint, BAUD, None)
     line = ThreadLine(endpoint, exchanger, clock=time.now, sleeping=time.sleep)
     line.notes[TALK] = talk

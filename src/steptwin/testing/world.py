@@ -1,4 +1,4 @@
-"""A world in the hands of a test: controllers with wiring and mechanics."""
+"""A world for a test: controllers with wiring and mechanics."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def _controllers(spec: WorldSpec) -> list[str]:
 
 
 class WorldAxis(NamedTuple):
-    """The mechanics of an axis at one moment: where it really is."""
+    """The mechanics of an axis at one moment."""
 
     position: float
     """Of the load, in the axis' units."""
@@ -233,13 +233,13 @@ class WorldRig(Rig):
         self.do(do.Release(button))
 
     def fault(self, *faults: str) -> None:
-        """Let something go wrong from now on, as `Mic488Rig.fault`. Raises `Misuse`. The twin's."""
+        """Set a fault, as `Mic488Rig.fault`. Raises `Misuse`. The twin's."""
         __tracebackhide__ = True
         for fault in map(read, faults):
             self.do(do.SetFault(fault))
 
     def clear_faults(self, *names: str) -> None:
-        """Let it be well again; without names all of it. The twin's."""
+        """Clear faults by name; all without names. The twin's."""
         __tracebackhide__ = True
         for name in names or [fault["name"] for fault in self.do(ListFaults())]:
             self.do(do.ClearFault(name))

@@ -1,4 +1,4 @@
-"""An M1486 program as an editor sees it."""
+"""The analysis of an M1486 program for editors."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class M1486Analysis(Analysis):
         return Hover(command.span, text) if text else None
 
     def _labels(self, place: int) -> dict[str, str]:
-        """The labels of the chip that listens at a place, with what stands behind each."""
+        """The labels of the chip that is selected at a place, each with its following command."""
         here = None
         for chip, command in self._commands:
             if command.span.start > place:

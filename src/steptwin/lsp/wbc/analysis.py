@@ -1,4 +1,4 @@
-"""A WBC program as an editor sees it."""
+"""The analysis of a WBC program for editors."""
 
 from __future__ import annotations
 

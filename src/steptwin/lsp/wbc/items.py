@@ -30,7 +30,7 @@ from steptwin.wbc.statements import (
 )
 
 MOST_ITEMS = 150
-"""Offered at once; more letters bring others."""
+"""Limit of completions; further letters select others."""
 _WORD = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_$")
 _NEAR_REGISTERS = 8
 """User registers offered of a kind that the program does not use yet."""

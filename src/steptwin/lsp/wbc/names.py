@@ -21,7 +21,7 @@ _STATEMENT_OPTIONAL_WORD = ASSIGNMENTS[1][1]
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """The names of a program as it stands. ``labels`` are their names as written by key, ``values`` what constants stand for."""
+    """The names of a program in its present text. ``labels``: names as written by key; ``values``: the meanings of constants."""
 
     program: ProgramTree
     scope: ProgramScope
@@ -55,7 +55,7 @@ def statement_text(row: StatementRow) -> str:
 
 
 def keyword_text(key: str) -> str | None:
-    """Of a statement or SET."""
+    """The kind of operand of a statement or SET."""
     if key in STATEMENTS:
         return statement_text(STATEMENTS[key])
     if key == "SET":

@@ -1,4 +1,4 @@
-"""A description of a world as an editor sees it."""
+"""The analysis of a description of a world for editors."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _KINDS = {
 
 
 class Around(Protocol):
-    """What a world sees of other files."""
+    """The other files of a world."""
 
     def read(self, uri: str) -> bytes:
         """The content of a file, as it is in the editor where it is open. Raises `Misuse`."""
@@ -51,7 +51,7 @@ class Around(Protocol):
 
 
 class WorldAnalysis(Analysis):
-    """The other files are looked at when something is asked that they matter for."""
+    """The other files are read when an answer depends on them."""
 
     def __init__(self, uri: str, lines: LineIndex, around: Around) -> None:
         super().__init__(uri, lines)
@@ -105,7 +105,7 @@ class WorldAnalysis(Analysis):
         return ItemBuilder(self._outline, self._controllers, files).items(before, place, present)
 
     def _present(self, table: Table, without: int) -> Iterator[str]:
-        """The keys of a table, but for those of one line."""
+        """The keys of a table, except those of one line."""
         for number in range(table.first + 1, table.last + 1):
             found = _KEY.match(self.text, self.lines.starts[number], self.lines.ends[number])
             if found is not None and number != without:
@@ -154,7 +154,7 @@ class WorldAnalysis(Analysis):
         return [Fold(table.first, table.last) for table in self._outline.tables if table.last > table.first]
 
     def tokens(self) -> Sequence[SemanticToken]:
-        """The names that mean something here; TOML itself every editor knows."""
+        """The names of the description; editors highlight TOML itself."""
         headers = [SemanticToken(table.span, TokenKind.SECTION) for table in self._outline.tables]
         names = [
             SemanticToken(use.span, TokenKind.VARIABLE, use.role is SymbolRole.DEFINE)

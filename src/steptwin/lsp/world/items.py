@@ -30,7 +30,7 @@ _FILES = {"config": (".cfg",), "program": (".prg", ".m1486"), "programs": (".prg
 
 
 def keys_of(table: Table) -> Sequence[Key]:
-    """The keys that a table may have."""
+    """The permitted keys of a table."""
     if len(table.names) > 1 and table.names[0] in KINDS:
         kind = KINDS[table.names[0]]
         return kind.inner_keys(table.names[1]) if table.names[1] in kind.inner_tables else ()

@@ -1,4 +1,4 @@
-"""The tables and names of a description, as far as it has been typed: by its lines, and by `find_places` as far as that gets."""
+"""The tables and names of a description that may be incomplete: by its lines, and by `find_places` up to the first error."""
 
 from __future__ import annotations
 
