@@ -78,7 +78,7 @@ def test_status_of_a_firmware_without_its_register_is_a_value_all_the_same() -> 
 
 
 @pytest.mark.parametrize(
-    "name", ["M5.status", "M0.position", "X1.status", "1.status", "M1.nothing", "M1_NOTHING", "lamp", "hr10022", ""]
+    "name", ["M5.status", "M0.position", "X1.status", "1.status", "M1.nothing", "M1_NOTHING", "lamp", "hr10022"]
 )
 def test_what_is_no_point(name: str) -> None:
     assert live_point(Rig().device, name) is None
