@@ -9,7 +9,12 @@ import pytest
 from steptwin.files.world import World
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
-ENDS = {"hoist": "three floors served", "press": "the press is safe", "indexer": "two revolutions"}
+ENDS = {
+    "hoist": "three floors served",
+    "press": "the press is safe",
+    "indexer": "two revolutions",
+    "labeller": "ten products labelled",
+}
 
 
 def example(name: str) -> World:
@@ -30,6 +35,7 @@ def test_it_does_what_it_is_for(name: str) -> None:
         ("hoist", "worn-brake element=hold share=0.6"),
         ("press", "no-air element=ram from_s=2.2 until_s=2.25"),
         ("indexer", "lost-steps machine=cell at_s=5 pulses=64"),
+        ("labeller", "belt-stop element=belt from_s=4 until_s=5"),
     ],
 )
 def test_it_survives_a_fault(name: str, fault: str) -> None:
@@ -45,6 +51,7 @@ def test_it_survives_a_fault(name: str, fault: str) -> None:
     [
         ("hoist", "worn-brake element=hold share=0.2", "abs(z.position - 500) < 0.2"),
         ("press", "welded-contact element=safety", "strokes.count == 1 and danger.count == 0"),
+        ("labeller", "stuck machine=cell pin=IN2 value=0 from_s=6", "belt.delivered == 10 and labels.count == products.count"),
         ("indexer", "lost-steps machine=cell at_s=5 pulses=640", "nests.count == 16 and not cell.OUT2 and crash.count == 0"),
     ],
 )
