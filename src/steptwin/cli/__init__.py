@@ -117,7 +117,7 @@ NOT_DONE, MISUSED = 1, 2
 """Exit codes."""
 
 VALUE_NAMES = {"str": "TEXT", "list[str]": "TEXT", "int": "N", "float": "NUMBER", "path": "PATH", "list[path]": "PATH"}
-"""What help shows as the value of an option, where typer would show a Python type."""
+"""Names of option values in help, instead of Python types."""
 
 
 def _constant(text: str, ctx: Any) -> str:
@@ -191,7 +191,7 @@ def main() -> None:
 
 
 def _usage(error: TyperException) -> str:
-    """A mistake in the words of the command, and where its help is."""
+    """The message for wrong usage, with the command that shows help."""
     # typer checks choices with a validator whose name it puts into the message.
     message = error.format_message().replace("Value error, ", "").rstrip(".")
     context = getattr(error, "ctx", None)
@@ -201,7 +201,7 @@ def _usage(error: TyperException) -> str:
 
 
 def _fail(message: str, code: int, *, head: str = "steptwin: ") -> NoReturn:
-    """End with a message; one line of JSON where JSON is wanted."""
+    """End with a message; with --json as one line of JSON."""
     text = json.dumps({"error": message, "code": code}, ensure_ascii=False) if _wants_json() else f"{head}{message}"
     print(text, file=sys.stderr)  # noqa: T201
     sys.exit(code)

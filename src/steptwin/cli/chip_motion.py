@@ -28,7 +28,7 @@ LOST = "; the chip has counted the whole move, so its position is wrong: home th
 """After Kill in a move (M-16)."""
 HOLD_RANGE_S = (0.2, 2.0)
 LATE_S = 2.0
-"""A jog whose move takes this much longer than planned was suspended, or its line fails; it ends."""
+"""A jog ends if one of its moves takes this much longer than planned: it was suspended, or its line failed."""
 _SOUGHT = re.compile(r"([+-])B?(\d{1,2})", re.IGNORECASE)
 
 
@@ -141,7 +141,7 @@ def jog(
 
 
 def stop(address: DeviceAddress, *, program: bool, log_frames: bool) -> None:
-    """Send K. The chip is not asked before: it does not respond while it moves."""
+    """Send K without any preceding query: a chip does not respond while it moves."""
     chip = chip_at(address, log_frames=log_frames)
     chip.open_line()
     try:
@@ -184,7 +184,7 @@ def _wait(chip: M1486, timeout: float | None) -> ChipMoveEnd:
 
 
 def _report(end: ChipMoveEnd, *, json: bool) -> None:
-    """Print how a motion ended. Exit code 1 when it did not end as meant."""
+    """Print how a motion ended. Exit code 1 if it did not end as intended."""
     if json:
         print_json({"ok": end.ok, "reason": end.reason.value, "position": end.position, "unit": end.unit, "after_s": end.after_s})
     else:

@@ -24,7 +24,7 @@ def datasheet(
     twin: Twin = None,
     json: Json = False,
 ) -> None:
-    """Show what a controller offers: axes, pins, points with unit and range, commands, events."""
+    """Show the data sheet of a controller: axes, pins, points with unit and range, commands, events."""
     found = _of_twin(twin, variant) if kind is None else _of_kind(kind, variant, twin)
     if json:
         from json import dumps

@@ -1,4 +1,4 @@
-"""What the commands for devices have in common: which device is meant, values and names as people type and read them."""
+"""Common parts of the commands for devices: selection of the device, input and output of values and names."""
 
 from __future__ import annotations
 

@@ -97,7 +97,7 @@ def sections() -> list[PageSection]:
 
 
 def _else(parameter: Parameter) -> str:
-    """What holds where it is not given."""
+    """The value if it is not given."""
     default = parameter.default
     return parameter.otherwise or (f"{default:g}" if isinstance(default, float) else f"{default}")
 

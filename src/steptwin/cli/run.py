@@ -146,7 +146,7 @@ def run(
 
 
 def _check_targets(trace: Path | None, session: Path | None) -> None:
-    """Raises `Misuse` where nothing can be written, before anything runs."""
+    """Raises `Misuse` if a file cannot be written, before the run begins."""
     if trace is not None:
         from steptwin.files.export import check_target
 

@@ -113,7 +113,7 @@ def _found_at(place: str, kind: ScannedKind, units: list[int], bauds: list[int] 
 
 
 def _rates(place: str, bauds: list[int]) -> list[int]:
-    """The rates to try: all on serial ports, local or RFC 2217; one elsewhere, where the rate has no effect."""
+    """The rates to try: all on serial ports, local or RFC 2217; otherwise one, because the rate has no effect."""
     if place.startswith("rfc2217://") or not ("://" in place or str(Path(place).resolve()).startswith("/dev/pts/")):
         return bauds
     return bauds[:1]

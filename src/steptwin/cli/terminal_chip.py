@@ -33,7 +33,7 @@ WAIT_S = 60.0
 
 
 def chip_terminal(address: DeviceAddress, *, log_frames: bool) -> None:
-    """Lines from the standard input to the chips. A script in a pipe ends with the first thing that goes wrong."""
+    """Lines from the standard input to the chips. A script in a pipe ends at the first error."""
     from steptwin.m1486.variants import variant
 
     kind = None if address.variant is None else variant(address.variant)
@@ -95,13 +95,13 @@ class _ChipConnection:
 
     @property
     def selected(self) -> str:
-        """The chip chosen last; nothing where all listen."""
+        """The chip selected last; empty if all chips are selected."""
         if self._terminal is not None:
             return self._terminal.selected
         return "" if self._address.chip is None else f"{self._address.chip:X}"
 
     def verified(self) -> ChipTerminal:
-        """The line, with the chip selected. Raises `LineFailure` where it does not echo."""
+        """The line, with the chip selected. Raises `LineFailure` if it does not echo."""
         from steptwin.drivers.m1486.failures import NoEcho
         from steptwin.drivers.m1486.wake import wake
 
@@ -121,7 +121,7 @@ class _ChipConnection:
         return self._opened(channel)
 
     def unverified(self) -> ChipTerminal:
-        """The line for K, which cannot wait. A selection of all chips ends what may stand in front of it."""
+        """The line for K, which is sent at once. It begins by selecting all chips, which ends an incomplete command."""
         if self._terminal is None:
             terminal = self._opened(self._endpoint.open())
             chip = self._address.chip

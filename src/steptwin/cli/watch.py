@@ -62,7 +62,7 @@ def watch(
 
 @contextlib.contextmanager
 def _reading(device: str | None, names: list[str] | None, *, log_frames: bool) -> Generator[Look]:
-    """One look at what is wanted of the device meant. A twin is not polled; raw addresses are those of its line."""
+    """A function that reads the values once. A twin is not polled; raw addresses are read over its line."""
     from steptwin.live.remote import RemoteSubject
     from steptwin.live.twins import controller_of
     from steptwin.live.watching import TwinWatch

@@ -26,7 +26,7 @@ LogTraffic = Annotated[
 
 @dataclass(frozen=True, kw_only=True)
 class WorldRunOptions(OptionGroup):
-    """How a world begins, and what is kept of it."""
+    """How a world begins, and the recording of a session."""
 
     heading = "Options of worlds"
 

@@ -1,4 +1,4 @@
-"""The demo machine: what `steptwin studio` shows where no other world is named."""
+"""The demo machine, which `steptwin studio` shows by default."""
 
 from __future__ import annotations
 

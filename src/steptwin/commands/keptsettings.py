@@ -1,4 +1,4 @@
-"""Settings of devices that are kept before the first write: files in the state directory of the user."""
+"""Settings of devices, saved before the first write: files in the state directory of the user."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def state_directory() -> Path:
 
 
 def keep_settings(machine: str, text: str) -> str:
-    """Write a new file with the settings of a machine; where it is. Raises `Misuse` where that is not possible."""
+    """Write a new file with the settings of a machine; its path. Raises `Misuse` if that is not possible."""
     path = state_directory() / "settings"
     try:
         private_directory(path)

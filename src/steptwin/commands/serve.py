@@ -24,7 +24,7 @@ class ServeOptions:
 
     name: str
     links: Mapping[str, str | None] = field(default_factory=dict)
-    """Where it is reached, by keys of ``[[line]]``."""
+    """Its links, by keys of ``[[line]]``."""
     baud: int | None = None
     state: Path | None = None
     trace: str | None = None

@@ -30,7 +30,7 @@ def _axis(axis: StateAxis) -> str:
 
 
 def _pins(state: ControllerState, pins: tuple[Pin, ...]) -> Iterator[str]:
-    """Digital pins with the level that means something."""
+    """Digital pins that are active."""
     on = [pin.name for pin in pins if not (pin.is_analog or pin.is_active_low) and state.pins.get(pin.name) == 1]
     yield f"on: {', '.join(on) or 'nothing'}"
     if any(pin.is_active_low for pin in pins):

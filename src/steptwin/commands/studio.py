@@ -88,7 +88,7 @@ def studio(own: StudioOptions, options: UpOptions) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class _AccessInfo:
-    """Where the studio is, and who may come in."""
+    """The address of the studio, and its tokens."""
 
     address: Address
     tls: Tls | None

@@ -1,4 +1,4 @@
-"""`steptwin studio --device ...` without a world: what serves the page, and nothing whose time goes on."""
+"""`steptwin studio --device ...` without a world: a server for the page without virtual time."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from steptwin.machine import Nanos
 
 
 class _Nothing:
-    """Nothing to advance. See `steptwin.live.cell.Advanceable`."""
+    """A world without contents, for a cell. See `steptwin.live.cell.Advanceable`."""
 
     stale = False
 

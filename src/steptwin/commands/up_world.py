@@ -80,7 +80,7 @@ class Running:
 
 
 Addition: TypeAlias = Callable[[Running], Awaitable[None]]
-"""Serves something else of the world; what it opens it gives to the server, which closes it. Then no records are printed."""
+"""Opens further links of the world, which the server closes. With it no records are printed."""
 
 
 def up(options: UpOptions, addition: Addition | None = None) -> bool:

@@ -123,7 +123,7 @@ class StateDirectory:
         return self.path / f"{name}.image"
 
     def _content(self, path: Path) -> bytes | None:
-        """What the file holds; None where there is none."""
+        """The content of the file; None if there is none."""
         try:
             return read_bytes(path)
         except Misuse as error:

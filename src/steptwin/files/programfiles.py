@@ -63,7 +63,7 @@ def _beside(program: Path, suffix: str) -> Path | None:
 def read_program(
     program: Path, positions: Path | None = None, config: Path | None = None, dialect: Dialect = DEFAULT
 ) -> ProgramFiles:
-    """Read and check a program with the files it goes with. Raises `Misuse` for files that cannot be read."""
+    """Read and check a program with its companion files. Raises `Misuse` for files that cannot be read."""
     return check_source(read_text(program).source, positions, config, dialect)
 
 

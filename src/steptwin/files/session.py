@@ -30,7 +30,7 @@ from steptwin.world.plant import RecordedInput
 
 FORMAT = 1
 LONGEST_NUMBER = 100
-"""Digits of a whole number; what is permitted has far fewer."""
+"""Limit of the digits of a whole number; permitted values have far fewer."""
 
 _STEPS = {kind.__name__: kind for kind in ACTIONS}
 

@@ -37,7 +37,7 @@ from steptwin.world.views import LineView, MechanicsView, Views
 LONGEST_RUN_NS: Nanos = 3600 * SECOND
 """Default limit of a run with a condition, ns: an hour."""
 SLICES = 200
-"""In so many parts a run is done at least, where its progress is shown."""
+"""Least number of parts of a run whose progress is shown."""
 LONGEST_SLICE_NS: Nanos = 10 * SECOND
 """So that it can be interrupted in time."""
 
@@ -134,7 +134,7 @@ class World(Plant):
         return cls._with_memory(spec, files, where, keep_trace=keep_trace, keep_inputs=keep_inputs)
 
     def _save(self, machine: str, data: bytes, now: Nanos) -> None:
-        """Raises `StateFailure` where it is not safe."""
+        """Raises `StateFailure` if it could not be stored."""
         try:
             if (now, machine) in self._failing:
                 raise StateFailure(self._failing[now, machine])
@@ -260,7 +260,7 @@ class World(Plant):
         return self.start(name, partial(do.run_when, _steps(reaction), condition, once=once), is_external=True)
 
     def script(self, operator: Callable[[], do.Steps], name: str | None = None) -> Script:
-        """Let an operator work from now on: a function that yields steps (`steptwin.world.script`) and is sent what they give.
+        """Start a script: a function that yields steps (`steptwin.world.script`) and is sent their results.
 
         It touches the world by its steps only; so it can be brought back to any moment.
         """
@@ -293,7 +293,7 @@ class World(Plant):
         self.failed_saves = [failed for failed in self.failed_saves if failed.time <= snapshot.now]
 
     def branch(self, snapshot: PlantSnapshot | None = None) -> Self:
-        """Another world in the state of this one, now or at a snapshot, which goes its own way.
+        """Another world in the state of this one, now or at a snapshot; both continue independently.
 
         Scripts go along. Functions given to `at` and `when` do what they did: those that name this world act on this one.
         """

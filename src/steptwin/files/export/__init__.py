@@ -55,7 +55,7 @@ class _Options(NamedTuple):
     period: Nanos
     progress: Progress
     window: bool
-    """Whether it was asked for to show everything up to the end."""
+    """Whether everything up to the end is shown."""
     texts: bool
     """Whether signals may be texts."""
 

@@ -200,7 +200,7 @@ def _motion(above: Axes, below: Axes, track: AxisTrack, recording: Recording) ->
 
 
 def _true(panel: Axes, track: AxisTrack, load: AxisTrack, recording: Recording) -> None:
-    """Where the load is, over where the pulses would have it."""
+    """The position of the load, in front of the commanded one."""
     view = load.view
     mechanics = track.view.mechanics
     zero_p = 0 if mechanics is None else mechanics.zero_p
@@ -250,7 +250,7 @@ def _lanes(panel: Axes, rows: list[_PlotRow], recording: Recording) -> None:
 
 
 def _levels(pin: PinTrack, recording: Recording) -> tuple[Reals, Reals, str]:
-    """The corners of the course of a pin, scaled to 0…1, and what 1 means where that is not plain."""
+    """The corners of the curve of a pin, scaled to 0…1, and the value of 1 if it is analog."""
     level = pin.level(recording.begin)
     times, levels = [recording.begin], [np.nan if level is None else level]
     for time, value in pin.changes(recording.begin, recording.until):

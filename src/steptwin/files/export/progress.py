@@ -13,7 +13,7 @@ Progress: TypeAlias = Callable[[Nanos], None]
 """Called with the moment (ns) that an export has reached."""
 
 Watch: TypeAlias = Callable[[str, Nanos, Nanos], AbstractContextManager[Progress]]
-"""Called with what is done, from when and until when; gives the function to call while it lasts."""
+"""Called with a title, begin and end of the work; gives the function that reports progress."""
 
 
 def silent(_: Nanos) -> None:
@@ -27,7 +27,7 @@ def unwatched(_what: str, _begin: Nanos, _until: Nanos) -> Generator[Progress]:
 
 @contextmanager
 def bar(what: str, begin: Nanos, until: Nanos) -> Generator[Progress]:
-    """A bar on standard error, where that is a terminal."""
+    """A bar on standard error, if that is a terminal."""
     if not sys.stderr.isatty():
         yield silent
         return

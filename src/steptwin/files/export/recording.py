@@ -254,7 +254,7 @@ class _Sorting:
 
 
 def _stand_before(track: AxisTrack, begin: Nanos) -> None:
-    """Before its first plan an axis stood where that begins; without any, where it was switched on."""
+    """Adds rest before the first plan: at the position where that begins, or at 0 if there is none."""
     if not track.times:
         track.times.append(begin)
         track.plans.append(at_rest(begin, 0))

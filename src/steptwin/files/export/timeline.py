@@ -54,7 +54,7 @@ def _part(name: str) -> str:
 
 
 def _axis(track: AxisTrack, recording: Recording, progress: Progress, number: int) -> dict[str, object]:
-    """The coordinate; under ``counted`` the count since power-on and under ``true`` where the load is, if that can be another."""
+    """The coordinate; if they can differ, ``counted`` is the count since power-on, and ``true`` the position of the load."""
     progress(recording.begin + (recording.until - recording.begin) * (number + 1) // (len(recording.axes) + 1))
     coordinate, load = track.coordinate(), track.true()
     counted = {} if coordinate is None else {"counted": _motion(track, recording)}

@@ -26,7 +26,7 @@ class Ring:
         trace.watchers.append(self._records.append)
 
     def clear(self) -> None:
-        """Hold nothing of what was before."""
+        """Drop all earlier records."""
         self._records.clear()
 
     def trace(self) -> Trace:

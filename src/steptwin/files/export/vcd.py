@@ -1,4 +1,4 @@
-"""Value change dumps (IEEE 1364): what a logic analyser at the terminals would have seen, for GTKWave and its kin.
+"""Value change dumps (IEEE 1364): the signals at the terminals, for waveform viewers such as GTKWave.
 
 STEP and DIR, or the two phase currents, of every axis; all pins; position and velocity, and the true position of mechanics that
 can be elsewhere, as real numbers; program lines, frames, events and faults as text. One unit of time is a nanosecond. Whole
@@ -31,7 +31,7 @@ from steptwin.world.lanes import PhaseOutputs, StepOutputs
 _WINDOW_CHANGES = 1 << 20
 """About how many changes are in memory at a time."""
 _TEXT_NS = 1 * MILLISECOND
-"""A text (frame, event) goes away after this time, so that the next one shows even if it is the same."""
+"""A text (frame, event) ends after this time, so that a following equal text is visible."""
 
 _Quiet: TypeAlias = list[tuple[Nanos, bytes]]
 """Single changes: moments and tokens."""
@@ -64,7 +64,7 @@ def _windows(recording: Recording) -> Iterator[tuple[Nanos, Nanos]]:
 
 
 class _Dump:
-    """All variables of a dump, and where their changes come from."""
+    """All variables of a dump, and the sources of their changes."""
 
     def __init__(self, recording: Recording) -> None:
         self._begin = recording.begin
@@ -338,7 +338,7 @@ def _escaped(text: bytes) -> bytes:
 
 
 def _drawn_to(times: list[Nanos], tokens: list[bytes]) -> _Quiet:
-    """Where a value jumps, the old one a nanosecond before: viewers draw lines from change to change."""
+    """At a jump the previous value is written a nanosecond before, because viewers draw lines between changes."""
     quiet: _Quiet = []
     for i, (time, token) in enumerate(zip(times, tokens, strict=True)):
         jumps = i + 1 < len(times) and times[i + 1] == time
