@@ -135,8 +135,7 @@ class SocketChannel:
 
     def write(self, data: bytes) -> None:
         try:
-            sent = self._socket.send(data, socket.MSG_DONTWAIT)
-            if sent < len(data):
+            if self._send(data) < len(data):
                 raise BlockingIOError(errno.EAGAIN, "")
         except BlockingIOError:
             raise LineLost(f"{self._place}: the other end takes nothing any more") from None
@@ -144,15 +143,8 @@ class SocketChannel:
             raise LineLost(f"{self._place}: {reason(error)}") from error
 
     def read(self, timeout_s: float) -> bytes:
-        timeout_us = int(timeout_s * 1e6)
-        flags = 0
-        if timeout_us <= 0:
-            flags = socket.MSG_DONTWAIT
-        elif timeout_us != self._timeout_us:
-            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, struct.pack("ll", *divmod(timeout_us, 1_000_000)))
-            self._timeout_us = timeout_us
         try:
-            data = self._socket.recv(READ_BYTES, flags)
+            data = self._receive(timeout_s)
         except BlockingIOError:
             return b""
         except OSError as error:
@@ -164,32 +156,35 @@ class SocketChannel:
     def close(self) -> None:
         self._socket.close()
 
+    def _send(self, data: bytes) -> int:
+        """Send without waiting; returns the number of bytes sent. Raises `BlockingIOError` if none can be."""
+        return self._socket.send(data, socket.MSG_DONTWAIT)
+
+    def _receive(self, timeout_s: float) -> bytes:
+        """Received bytes. Raises `BlockingIOError` if there are none within ``timeout_s``."""
+        timeout_us = int(timeout_s * 1e6)
+        flags = 0
+        if timeout_us <= 0:
+            flags = socket.MSG_DONTWAIT
+        elif timeout_us != self._timeout_us:
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, struct.pack("ll", *divmod(timeout_us, 1_000_000)))
+            self._timeout_us = timeout_us
+        return self._socket.recv(READ_BYTES, flags)
+
 
 class TimedSocketChannel(SocketChannel):
     """The same for systems without non-blocking single calls (Windows)."""
 
-    def write(self, data: bytes) -> None:
+    def _send(self, data: bytes) -> int:
         self._socket.settimeout(0.0)
-        try:
-            sent = self._socket.send(data)
-            if sent < len(data):
-                raise BlockingIOError(errno.EAGAIN, "")
-        except BlockingIOError:
-            raise LineLost(f"{self._place}: the other end takes nothing any more") from None
-        except OSError as error:
-            raise LineLost(f"{self._place}: {reason(error)}") from error
+        return self._socket.send(data)
 
-    def read(self, timeout_s: float) -> bytes:
+    def _receive(self, timeout_s: float) -> bytes:
         self._socket.settimeout(max(timeout_s, 0.0))
         try:
-            data = self._socket.recv(READ_BYTES)
-        except (BlockingIOError, TimeoutError):
-            return b""
-        except OSError as error:
-            raise LineLost(f"{self._place}: {reason(error)}") from error
-        if not data:
-            raise LineLost(f"{self._place}: the other end closed the connection")
-        return data
+            return self._socket.recv(READ_BYTES)
+        except TimeoutError:
+            raise BlockingIOError(errno.EAGAIN, "") from None
 
 
 CHANNEL = SocketChannel if hasattr(socket, "MSG_DONTWAIT") else TimedSocketChannel

@@ -5,7 +5,8 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Hashable
 from contextlib import AbstractAsyncContextManager
-from typing import Any, Generic, cast
+from types import TracebackType
+from typing import Any, Generic, Self, cast
 
 from steptwin.drivers.exchange import A, Exchanger, Job, LineLost, Q
 from steptwin.drivers.line import LOCK_SLICE_S
@@ -19,7 +20,7 @@ CLOSE_S = 1.0
 
 
 class TaskLine(Generic[Q, A]):
-    """See `steptwin.drivers.line.DriverLine`. It belongs to one event loop."""
+    """See `steptwin.drivers.line.DriverLine`. It belongs to one event loop; ``async with`` opens and closes it."""
 
     def __init__(self, endpoint: Endpoint, exchanger: Exchanger[Q, A]) -> None:
         self.notes: dict[Hashable, Any] = {}
@@ -48,6 +49,13 @@ class TaskLine(Generic[Q, A]):
         return self._loop
 
     # ------------------------------------------------------------------ opening
+
+    async def __aenter__(self) -> Self:
+        await self.open()
+        return self
+
+    async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        await self.close()
 
     async def open(self) -> None:
         self._closed = False

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from types import TracebackType
-from typing import Self
 
 from steptwin.drivers.exchange import Exchanger
 from steptwin.drivers.m1486.talk import CharacterTalk, ChipRequest
@@ -55,13 +53,6 @@ class AsyncM1486Line(TaskLine[ChipRequest, bytes]):
         exchanger, talk = talking(endpoint, baud, log)
         super().__init__(endpoint, exchanger)
         self.notes[TALK] = talk
-
-    async def __aenter__(self) -> Self:
-        await self.open()
-        return self
-
-    async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        await self.close()
 
 
 class ThreadM1486Line(ThreadLine[ChipRequest, bytes]):

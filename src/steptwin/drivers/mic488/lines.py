@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from types import TracebackType
-from typing import Self
 
 from steptwin.drivers.exchange import Exchanger
 from steptwin.drivers.mic488.frames import FrameWords
@@ -53,13 +51,6 @@ class AsyncModbusLine(TaskLine[Query, bytes]):
         exchanger, notes = modbus_exchanger(place, frames_per_second, log)
         super().__init__(place.endpoint, exchanger)
         self.notes.update(notes)
-
-    async def __aenter__(self) -> Self:
-        await self.open()
-        return self
-
-    async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        await self.close()
 
 
 class ThreadModbusLine(ThreadLine[Query, bytes]):
