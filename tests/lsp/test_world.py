@@ -126,7 +126,12 @@ def test_completions() -> None:
     assert items(WORLD + '\n[[wire]]\nfrom = "')[0] == "table.OUT1"
     assert items(WORLD + '\n[[mic488]]\nprogram = "') == ["a.prg"]
     assert items(WORLD + '\n[[script]]\nsteps = [\n{ press = "') == ["start"]
-    assert "until" in items(WORLD + "\n[[script]]\nsteps = [\n{ ")
+    assert {"until", "move", "wait_for"} <= set(items(WORLD + "\n[[script]]\nsteps = [\n{ "))
+    assert items(WORLD + '\n[[script]]\nsteps = [\n{ move = "')[:2] == ["table.M1", "table.M2"]
+    assert items(WORLD + '\n[[brake]]\naxis = "') == ["x"]
+    assert items(WORLD + '\n[[collision]]\neffect = "') == ["report", "jam"]
+    assert items(WORLD + '\n[[transducer]]\nto = "') == ["table.AIN1", "table.AIN2"]
+    assert {"from", "until", "to", "bounce"} <= set(items(WORLD + "\n[[shaft.cam]]\n"))
     assert items("# [[axis]]\n[[mic488]]\n# ") == []
 
 
@@ -154,6 +159,18 @@ def test_a_rename_changes_names_and_conditions_but_no_notes() -> None:
     for name, message in (("x", "taken already"), ("1x", "is not a name"), ("idle", "is a signal"), ("TIME", "is a signal")):
         with pytest.raises(Misuse, match=message):
             navigation.rename(made, URI, WORLD.index('name = "table"') + 9, name)
+
+
+def test_a_rename_reaches_what_elements_and_steps_name() -> None:
+    text = WORLD + (
+        '[[transducer]]\nname = "gap"\nof = "x.position"\nto = "table.AIN1"\npoints = [[0, 0.0], [9, 9.0]]\n'
+        '[[collision]]\nname = "far"\nwhen = "x.position > 90"\n[[shaft]]\nname = "cams"\naxis = "x"\nratio = 0.1\n'
+        '[[script]]\nname = "s"\nsteps = [{ home = "table.M1", velocity = -5 }, { move = "table.M1", to = 3 }]\n'
+    )
+    made = session(text)
+    assert of(made).diagnostics() == []
+    assert len(navigation.references(made, URI, text.index('name = "x"') + 8)) == 5
+    assert len(navigation.references(made, URI, text.index('"table.IN1"') + 2)) == 9
 
 
 def test_files_are_links_and_programs_look_at_the_files_of_their_world() -> None:

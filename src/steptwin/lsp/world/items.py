@@ -26,6 +26,7 @@ _STEP_NAMES = {
     "send": SymbolKind.LINE,
     "power_cycle": SymbolKind.CONTROLLER,
 }
+_STEP_AXES = ("move", "home", "wait_for", "turn", "couple")
 _FILES = {"config": (".cfg",), "program": (".prg", ".m1486"), "programs": (".prg",), "positions": (".csv",)}
 
 
@@ -68,6 +69,8 @@ class ItemBuilder:
         if found is not None:
             return _actions(Span(place - len(found[1]), place))
         found = _STEP_VALUE.search(before)
+        if found is not None and found[1] in _STEP_AXES:
+            return self._axes(Span(place - len(found[3]), place), "")
         if found is None or found[1] not in _STEP_NAMES:
             return None
         return self._names(_STEP_NAMES[found[1]], Span(place - len(found[3]), place), "")
@@ -86,9 +89,7 @@ class ItemBuilder:
         elif name == "follows":
             yield from self._names(SymbolKind.AXIS, span, mark)
         elif name == "drive":
-            for controller, kind in self._controllers.items():
-                axes = [table for table in kind.inner_tables if table.startswith("M")] or ["M1"]
-                yield from (_text(f"{controller}.{axis}", span, mark, kind.title) for axis in axes)
+            yield from self._axes(span, mark)
         elif isinstance(key.read, PinOf):
             yield from self._pins(key.read.kind, span, mark)
         elif isinstance(key.read, NameOf):
@@ -96,6 +97,11 @@ class ItemBuilder:
         elif name in _FILES:
             endings = _FILES[name]
             yield from (_text(file, span, mark, "file") for file in self._files if file.lower().endswith(endings))
+
+    def _axes(self, span: Span, mark: str) -> Iterator[Completion]:
+        for controller, kind in self._controllers.items():
+            axes = [table for table in kind.inner_tables if table.startswith("M")] or ["M1"]
+            yield from (_text(f"{controller}.{axis}", span, mark, kind.title) for axis in axes)
 
     def _names(self, kind: SymbolKind, span: Span, mark: str) -> Iterator[Completion]:
         for use in self._outline.definitions.values():

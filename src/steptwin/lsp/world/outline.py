@@ -24,7 +24,7 @@ _NAMED = {"line": SymbolKind.LINE, "axis": SymbolKind.AXIS, "button": SymbolKind
 _SCRIPTS = ("script", "event")
 NAMING = frozenset(
     {"line", "drive", "to", "from", "follows", "when", "until", "expect", "set", "press", "release", "write", "send"}
-    | {"power_cycle", "turn", "couple", "machine", "element"}
+    | {"power_cycle", "turn", "couple", "machine", "element", "of", "move", "home", "wait_for"}
     | {key.name for rows in tables().values() for key in rows.keys if isinstance(key.read, PinOf | NameOf)}
 )
 """Keys whose values name controllers, lines and elements."""
