@@ -19,9 +19,9 @@ class PointEffect(enum.Enum):
     PARAMETER = "parameter"
     """Keeps a value that later actions use."""
     ACTS = "acts"
-    """Does something at once, or starts what may be started once; no motion."""
+    """Does something at once; no motion."""
     MOVES = "moves"
-    """Gives an axis a motion, or prepares one."""
+    """Gives an axis a motion, prepares one, or starts what may give one, such as a program."""
 
 
 class Condition(enum.Enum):

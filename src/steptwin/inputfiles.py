@@ -10,10 +10,14 @@ from typing import IO
 from steptwin.errors import Misuse
 from steptwin.system import READ_FLAGS, reason
 
-MOST_BYTES = 1 << 20
-"""Limit for programs, configurations, tables and descriptions, which people write."""
-MOST_RECORDED_BYTES = 64 << 20
+MOST_BYTES = 256 << 10
+"""Limit for programs, configurations and tables, which people write for a controller; it holds far less."""
+MOST_DESCRIPTION_BYTES = 1 << 20
+"""Limit for descriptions of worlds."""
+MOST_RECORDED_BYTES = 48 << 20
 """Limit for sessions and recordings, which programs write."""
+MOST_RECORDED_VALUES = 1_500_000
+"""Limit for the lists, objects and their items in such a file: an empty list takes 3 bytes on disk and 64 in memory."""
 
 _KINDS = (
     (stat.S_ISDIR, "a directory"),
@@ -34,6 +38,19 @@ def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
     if len(data) > most:  # it grew, or its file system reports no sizes
         raise _too_large(path, len(data), most)
     return data
+
+
+def read_recorded(path: Path) -> str:
+    """The text of a session or recording (JSON in UTF-8), which may be parsed: its size and its number of values are bounded.
+    Raises `Misuse`."""
+    data = read_bytes(path, MOST_RECORDED_BYTES)
+    values = sum(map(data.count, (b",", b"[", b"{")))
+    if values > MOST_RECORDED_VALUES:
+        raise Misuse(f"cannot read {path}: it has about {values} values; permitted are at most {MOST_RECORDED_VALUES}")
+    try:
+        return data.decode()
+    except UnicodeDecodeError as error:
+        raise Misuse(f"cannot read {path}: it is no UTF-8 text") from error
 
 
 def open_regular(path: Path, most: int | None = None) -> IO[bytes]:

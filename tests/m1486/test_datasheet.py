@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from sheets import line, sheet_lines
+from sheets import line, missing, sheet_lines
 
 from steptwin.m1486 import findings, functions, lines, registers, variants
 from steptwin.m1486.chip import M1486Chip
@@ -16,7 +16,7 @@ from steptwin.m1486.datasheet import datasheet, datasheet_of
 from steptwin.m1486.variants import DEFAULT, VARIANTS, variant
 
 GOLDEN = Path(__file__).parent / "golden" / "tables.txt"
-OTHERS = [v for v in VARIANTS if v.clock == 1 and v is not DEFAULT]
+OTHERS = [v for v in VARIANTS if v is not DEFAULT]
 
 
 def everything() -> dict[str, list[str]]:
@@ -30,6 +30,7 @@ def everything() -> dict[str, list[str]]:
         "findings": [f"{row.code} {row.severity.value}, {row.title}: {row.meaning}" for row in findings.TABLE],
         f"data sheet of {DEFAULT.name}": default,
         **{f"other lines of {v.name}": [row for row in sheet_lines(datasheet_of(v)) if row not in default] for v in OTHERS},
+        **{f"not in {v.name}": missing(datasheet_of(DEFAULT), datasheet_of(v)) for v in OTHERS},
     }
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from sheets import sheet_lines
+from sheets import missing, sheet_lines
 
 from steptwin.datasheet import Condition, EventSeverity
 from steptwin.mic488.config import UNITS, AxisConfig, ControllerConfig
@@ -28,10 +28,11 @@ def lines(firmware: str) -> list[str]:
 
 
 def everything() -> dict[str, list[str]]:
-    latest = lines(LATEST)
+    latest, sheet = lines(LATEST), datasheet_of(LATEST)
     return {
         f"data sheet of {LATEST}": latest,
         **{f"other lines of {name}": [line for line in lines(name) if line not in latest] for name in OLDER},
+        **{f"not in {name}": missing(sheet, datasheet_of(name)) for name in OLDER},
     }
 
 

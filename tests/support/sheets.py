@@ -27,3 +27,19 @@ def sheet_lines(sheet: Datasheet) -> list[str]:
         rows = value if isinstance(value, tuple) else (value,)
         found += [f"{field.name}: {line(row)}" for row in rows]
     return found
+
+
+def missing(sheet: Datasheet, other: Datasheet) -> list[str]:
+    """What ``sheet`` has and ``other`` has not: points, commands, pins and so on, by their names."""
+    return [
+        f"{field.name}: {name}"
+        for field in fields(sheet)
+        if isinstance(getattr(sheet, field.name), tuple)
+        for name in dict.fromkeys(map(_name, getattr(sheet, field.name)))
+        if name not in map(_name, getattr(other, field.name))
+    ]
+
+
+def _name(row: Any) -> str:
+    given = plain(row)
+    return str(given.get("path") or given.get("name") or given["code"])

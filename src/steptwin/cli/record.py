@@ -79,12 +79,9 @@ def _data(step: int, line: str, what: str, one: Any, two: Any) -> dict[str, Any]
 
 
 def _read(path: Path) -> str:
-    from steptwin.inputfiles import MOST_RECORDED_BYTES, read_bytes
+    from steptwin.inputfiles import read_recorded
 
-    try:
-        return read_bytes(path, MOST_RECORDED_BYTES).decode()
-    except UnicodeDecodeError as error:
-        raise Misuse(f"cannot read {path}: it is no UTF-8 text") from error
+    return read_recorded(path)
 
 
 def _write(path: Path, lines: list[str]) -> None:

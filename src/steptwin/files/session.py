@@ -17,7 +17,7 @@ from steptwin.durations import LONGEST_NS
 from steptwin.errors import Misuse
 from steptwin.files.textfiles import write_bytes
 from steptwin.files.world import FailedSave, World
-from steptwin.inputfiles import MOST_RECORDED_BYTES, read_bytes
+from steptwin.inputfiles import read_recorded
 from steptwin.machine import SECOND, Nanos
 from steptwin.plaintypes import fitting
 from steptwin.world import script as do
@@ -144,7 +144,7 @@ def save(session: Session, path: Path | str) -> None:
 
 def load(path: Path | str) -> Session:
     """Read a session. Raises `Misuse` for a file that cannot be read or is not a session."""
-    content = read_bytes(Path(path), MOST_RECORDED_BYTES)
+    content = read_recorded(Path(path))
     try:
         data = json.loads(content, parse_int=_whole, parse_constant=_finite)
         if data["steptwin_session"] != FORMAT:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
-from steptwin.inputfiles import read_bytes, shown
+from steptwin.inputfiles import MOST_BYTES, read_bytes, shown
 from steptwin.system import reason
 from steptwin.textcodec import Decoded, decode
 
@@ -61,10 +61,10 @@ def write_bytes(path: Path, data: bytes) -> None:
         raise Misuse(f"cannot write {path}: {reason(error)}") from error
 
 
-def read_text(path: Path) -> TextFile:
-    """A text file in UTF-8, UTF-16 with its byte order mark, or the code page of Polish Windows.
+def read_text(path: Path, most: int = MOST_BYTES) -> TextFile:
+    """A text file of at most ``most`` bytes in UTF-8, UTF-16 with its byte order mark, or the code page of Polish Windows.
 
     Raises `Misuse` when it cannot be read or is not text.
     """
-    decoded = decode(read_bytes(path), str(path))
+    decoded = decode(read_bytes(path, most), str(path))
     return TextFile(SourceText(str(path), decoded.text), decoded)

@@ -19,7 +19,7 @@ from steptwin.errors import Misuse
 from steptwin.files.export.progress import Progress, silent
 from steptwin.files.memory import StateDirectory, StateFailure
 from steptwin.files.textfiles import read_text
-from steptwin.inputfiles import read_bytes, shown
+from steptwin.inputfiles import MOST_DESCRIPTION_BYTES, read_bytes, shown
 from steptwin.machine import SECOND, Nanos
 from steptwin.world import script as do
 from steptwin.world.build import memory_file
@@ -118,7 +118,7 @@ class World(Plant):
         owns that directory until `close`, and raises `StateInUse` or `StateFailure` if it cannot be used.
         """
         place = Path(path)
-        spec = describe(str(path), read_text(place).source.text, seed, overrides)
+        spec = describe(str(path), read_text(place, MOST_DESCRIPTION_BYTES).source.text, seed, overrides)
         files: dict[str, bytes] = {}
         for name, key in spec.files():
             try:

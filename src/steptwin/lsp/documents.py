@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from steptwin.lsp.positions import Encoding, LineIndex
 
 MOST_CHARACTERS = 1 << 20
-"""Limit of an analysed text, as of a file (`steptwin.inputfiles.MOST_BYTES`)."""
+"""Limit of an analysed text, as of a file (`steptwin.inputfiles.MOST_DESCRIPTION_BYTES`)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from typing import Protocol
 from urllib.parse import quote_from_bytes, unquote_to_bytes, urlsplit, urlunsplit
 
 from steptwin.errors import Misuse
-from steptwin.inputfiles import read_bytes
+from steptwin.inputfiles import MOST_DESCRIPTION_BYTES, read_bytes
 
 MOST_BESIDE = 200
 """Limit of the files of a folder that are read."""
@@ -78,7 +78,7 @@ class DiskFiles:
         path = _path(uri)
         if path is None:
             raise Misuse(f"{uri} is not a file")
-        return read_bytes(path)
+        return read_bytes(path, MOST_DESCRIPTION_BYTES)
 
     def beside(self, uri: str, suffix: str) -> list[str]:
         path = _path(uri)

@@ -25,8 +25,8 @@ from steptwin.m1486.points import POINTS, UNIT
 from steptwin.m1486.variants import Variant
 
 MOTION_SECTION = "VII.2"
-STARTS = frozenset({"R", ")", "("})
-"""Commands that start a motion; the others of their section set the next motion."""
+STARTS = frozenset({"R", ")", "(", "]"})
+"""Commands that start a motion, or the file that may; the others of the section on motions set the next motion."""
 ACTIVE_LOW = frozenset({"JOG", "LIMIT", "SD", "S&D", "DUAL", "BOOST"})
 
 
@@ -91,9 +91,9 @@ def _command(spec: CommandSpec, variant: Variant) -> CommandDescription:
                 values=() if is_range else tuple(permitted),
             ),
         )
-    effect = PointEffect.ACTS
-    if spec.section == MOTION_SECTION:
-        effect = PointEffect.MOVES if spec.key in STARTS else PointEffect.PARAMETER
+    effect = PointEffect.PARAMETER if spec.section == MOTION_SECTION else PointEffect.ACTS
+    if spec.key in STARTS:
+        effect = PointEffect.MOVES
     return CommandDescription(
         name=spec.name,
         code=spec.key,

@@ -34,11 +34,11 @@ def _sentence(text: str) -> str:
     return f"{text[0].upper()}{text[1:]}."
 
 
-def _value(path: str, meaning: str, unit: str = "", source: str = "") -> Point:
+def _value(path: str, meaning: str, unit: str = "", source: str = "", kind: str = "number") -> Point:
     return Point(
         path=path,
         meaning=meaning,
-        type="number",
+        type=kind,
         unit=unit,
         values={},
         access=Access.READ,
@@ -72,8 +72,11 @@ def _values() -> Iterator[_PointRow]:
         follows=True,
         bits=POSITION_BITS,
     )
-    yield _PointRow(_value("moving", "Whether a motion is being made."), lambda chip, now: chip.drive.is_busy)
-    yield _PointRow(_value("room", "Whether a host may send the next line: chips not addressed take any."), _has_room)
+    yield _PointRow(_value("moving", "Whether a motion is being made.", kind="switch"), lambda chip, now: chip.drive.is_busy)
+    yield _PointRow(
+        _value("room", "Whether a host may send the next line: chips not addressed take any.", kind="switch"),
+        _has_room,
+    )
     yield _PointRow(_value("variable", "Internal variable, 24 bits.", "", "VII.7"), lambda chip, now: chip.unit.variable)
 
 

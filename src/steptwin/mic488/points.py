@@ -19,8 +19,8 @@ from steptwin.mic488.behaviour import BEHAVIOUR
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.encoding import DINT_MIN, word_to_int, words_to_dint, words_to_real
 from steptwin.mic488.ranges import ValueRange
-from steptwin.mic488.registermap import Register, RegisterMap, Space, Type, UnknownRegister
-from steptwin.mic488.registers import AXES
+from steptwin.mic488.registermap import QuantityKind, Register, RegisterMap, Space, Type, UnknownRegister
+from steptwin.mic488.registers import AXES, CONTROLLER_STATUS_TEXTS
 from steptwin.mic488.status import AXIS_CONDITIONS, CONTROLLER_CONDITIONS
 from steptwin.mic488.values import RegisterItem, UserFormat, named
 from steptwin.motion import Profile
@@ -36,7 +36,7 @@ EFFECTS: Mapping[registermap.WriteEffect, PointEffect] = complete(
         registermap.WriteEffect.STORE: PointEffect.PARAMETER,
         registermap.WriteEffect.ACT: PointEffect.ACTS,
         registermap.WriteEffect.MOVE: PointEffect.MOVES,
-        registermap.WriteEffect.ADD: PointEffect.ACTS,
+        registermap.WriteEffect.ADD: PointEffect.MOVES,
     },
 )
 SPACES: Mapping[str, Space] = {"hr": Space.HOLDING, "co": Space.COIL, "di": Space.INPUT}
@@ -56,16 +56,34 @@ class ShortName(NamedTuple):
     read: Callable[[Any, Nanos], float] | None = None
     """The function that reads it; needed if some firmware has no readable register for it."""
     conditions: Mapping[int, Condition] = MappingProxyType({})
+    kind: QuantityKind = QuantityKind.NUMBER
+    """Of a value that no register of the firmware shows."""
+    values: Mapping[int, str] = MappingProxyType({})
+    """Its texts."""
 
 
 SHORT_NAMES = (
-    ShortName("status", "M_STATUS", "Status of the controller.", lambda device, now: device.status(), CONTROLLER_CONDITIONS),
+    ShortName(
+        "status",
+        "M_STATUS",
+        "Status of the controller.",
+        lambda device, now: device.status(),
+        CONTROLLER_CONDITIONS,
+        QuantityKind.ENUMERATION,
+        CONTROLLER_STATUS_TEXTS,
+    ),
     ShortName("program", "PROGRAM_CTRL", "State of the program."),
 )
 AXIS_SHORT_NAMES = (
     ShortName("status", "STATUS", conditions=AXIS_CONDITIONS),
     ShortName("enabled", "EN", "Whether the drive is switched on.", lambda axis, now: axis.enabled),
-    ShortName("moving", "", "Whether a motion is being made.", lambda axis, now: axis.profile.moving(now)),
+    ShortName(
+        "moving",
+        "",
+        "Whether a motion is being made.",
+        lambda axis, now: axis.profile.moving(now),
+        kind=QuantityKind.SWITCH,
+    ),
     ShortName("position", "POS_ACT", "Counted position."),
     ShortName("velocity", "VEL_ACT"),
     ShortName("encoder", "ENC_IMP"),
@@ -95,8 +113,8 @@ def _short(registers: RegisterMap, units: Sequence[str], short: ShortName, axis:
         return Point(
             path=path,
             meaning=short.meaning,
-            type="number",
-            values={},
+            type=short.kind.value,
+            values=short.values,
             conditions=short.conditions,
             access=Access.READ,
             effect=PointEffect.NONE,

@@ -15,6 +15,7 @@ from steptwin.durations import duration
 from steptwin.errors import Misuse
 from steptwin.files.textfiles import read_text
 from steptwin.files.world import World
+from steptwin.inputfiles import MOST_DESCRIPTION_BYTES
 from steptwin.live.world import LiveWorld, PlacePort
 from steptwin.machine import Nanos
 from steptwin.subject.commands import Command, ListFaults
@@ -52,7 +53,7 @@ class WorldOptions:
 
 def controllers_in(file: Path) -> list[str]:
     """Names of the controllers in the world that a file describes. Raises `Misuse`."""
-    return _controllers(read_world(str(file), read_text(file).source.text))
+    return _controllers(read_world(str(file), read_text(file, MOST_DESCRIPTION_BYTES).source.text))
 
 
 def _controllers(spec: WorldSpec) -> list[str]:
