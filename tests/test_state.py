@@ -177,6 +177,20 @@ counts_per_rev = 400
 torque = [[0, 1.0], [600, 0.5]]
 inertia = 1e-5
 friction = 0.05
+when_off = "free"
+[[brake]]
+name = "hold"
+axis = "x"
+torque = 0.6
+release = "seen.out"
+[[transducer]]
+name = "gap"
+of = "x.position"
+to = "table.AIN2"
+points = [[-50, 1.0], [302, 9.0]]
+[[collision]]
+name = "bump"
+when = "x.position > 10 and clamp.position > 1"
 [[axis]]
 name = "turret"
 drive = "drum.M1"
