@@ -9,6 +9,7 @@ import pytest
 from fault_rig import ANSWER, READ, FaultRig, rtu
 
 from steptwin.errors import Misuse
+from steptwin.files.world import World
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.encoding import encode
 from steptwin.m1486.syntax import parse as parse_m1486
@@ -17,6 +18,7 @@ from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.status import AxisStatus
+from steptwin.world import script as do
 from steptwin.world.contacts import PositionSwitch, place
 from steptwin.world.faults import Faults, read, rig
 from steptwin.world.kernel import Kernel, PinName
@@ -505,3 +507,15 @@ def test_a_machine_with_faults_is_switched_off_and_on() -> None:
 def test_a_pin_of_a_fault_is_named_without_its_machine() -> None:
     with pytest.raises(Misuse, match=r"fault stuck: pin = '1\.IN4': name the machine as machine=NAME, and the pin alone"):
         FaultRig("stuck pin=1.IN4 value=1")
+
+
+@pytest.mark.parametrize(
+    ("kind", "line", "pin", "held", "free"), [("mic488", "modbus", "IN5", 1, 0), ("m1486", "m1486", "B3", 0, 1)]
+)
+def test_an_edge_that_a_fault_makes_is_recorded_once(kind: str, line: str, pin: str, held: int, free: int) -> None:
+    """A chip reports the edges of its lines itself, too."""
+    world = World.from_toml(f'[[line]]\nname = "l"\nkind = "{line}"\n[[{kind}]]\nname = "a"\nline = "l"\n')
+    world.apply_input(do.SetFault(read(f"stuck machine=a pin={pin} value={held} from_s=0.5 until_s=1")))
+    world.run(for_=2.0)
+    edges = [(record.time, record.value) for record in world.trace.edges("a") if record.subject == pin]
+    assert edges == [(SECOND // 2, held), (SECOND, free)]
