@@ -1,6 +1,7 @@
 """Scheduling of waiting scripts: at fixed moments, and when a kernel changes on which their condition depends.
 
-A script with a condition is evaluated only at its due moment or when one of its kernels has changed. The cost of a world
+A script with a condition is evaluated only at its due moment or when one of its kernels has changed; watched kernels are advanced
+event by event. The cost of a world
 therefore grows with the number of its events, not with the number of its scripts.
 """
 
@@ -13,6 +14,7 @@ from itertools import count
 from steptwin.machine import Nanos
 from steptwin.world.kernel import Kernel
 from steptwin.world.running import Script
+from steptwin.world.turns import Dues
 
 _FEW = 64
 """Number of outdated entries that a queue tolerates before it removes them."""
@@ -99,9 +101,9 @@ class Agenda:
 
 
 class Watchers:
-    """Which scripts depend on which kernels, and which kernels have changed since the last `take`."""
+    """Which scripts depend on which kernels, when these are due, and which have changed since the last `take`."""
 
-    __slots__ = ("_again", "_changed", "_scripts", "_watch")
+    __slots__ = ("_again", "_changed", "_dues", "_kernels", "_numbers", "_scripts", "_watch")
 
     def __init__(self) -> None:
         self._watch: Callable[[Kernel], None] | None = None
@@ -109,6 +111,11 @@ class Watchers:
         self._scripts: dict[Kernel, dict[int, Script]] = {}
         self._changed: dict[Kernel, None] = {}
         self._again: dict[int, Script] = {}
+        self._kernels: list[Kernel] = []
+        """All that were watched ever, by number."""
+        self._numbers: dict[Kernel, int] = {}
+        self._dues = Dues()
+        """Of kernels on which a script depends."""
 
     def set(self, script: Script, kernels: tuple[Kernel, ...]) -> None:
         """Replace the kernels on which a script depends."""
@@ -119,11 +126,30 @@ class Watchers:
             del scripts[script.number]
             if not scripts:
                 del self._scripts[kernel]
+                self._dues.put(self._numbers[kernel], None)
                 kernel.on_change = self._watch
         script.kernels = kernels
         for kernel in kernels:
-            self._scripts.setdefault(kernel, {})[script.number] = script
-            kernel.on_change = self.change
+            if kernel not in self._scripts:
+                self._begin(kernel)
+            self._scripts[kernel][script.number] = script
+
+    def _begin(self, kernel: Kernel) -> None:
+        if kernel not in self._numbers:
+            self._numbers[kernel] = len(self._kernels)
+            self._kernels.append(kernel)
+        self._scripts[kernel] = {}
+        self._dues.put(self._numbers[kernel], kernel.deadline())
+        kernel.on_change = self.change
+
+    def due(self) -> Nanos | None:
+        """When a kernel on which a script depends is due, as far as `take` has nothing to give."""
+        return self._dues.first()
+
+    def advance(self, now: Nanos) -> None:
+        """Advance the kernels that are due by ``now``."""
+        for number in self._dues.take(now):
+            self._kernels[number].advance(now)
 
     def change(self, kernel: Kernel) -> None:
         """Register a change of ``kernel``: the scripts that depend on it have to be evaluated."""
@@ -147,7 +173,10 @@ class Watchers:
         if not self._changed and not self._again:
             return []
         found, self._again = self._again, {}
-        for kernel in self._changed:
-            found.update(self._scripts.get(kernel, {}))
-        self._changed.clear()
+        while self._changed:
+            kernel, _ = self._changed.popitem()
+            scripts = self._scripts.get(kernel)
+            if scripts is not None:
+                found.update(scripts)
+                self._dues.put(self._numbers[kernel], kernel.deadline())  # signals may settle: it has changed again then
         return [found[n] for n in sorted(found)]

@@ -303,8 +303,10 @@ class Kernel:
             self.now = self._due
             for number in self._machine_dues.take(self.now):
                 name = self._names[number]
+                self.stale = False
                 self.machines[name].advance(self.now)
-                self.mark(name)
+                if not self.stale:  # the machine has not called its hook
+                    self.mark(name)
             for number in self._part_dues.take(self.now):
                 self._part_turns.add(number)
             if self._flights:

@@ -360,15 +360,17 @@ class Plant:
             raise TimeReversal(self.now, now)
         rounds, at = 0, -1
         while True:
-            own, guests = self._scripts.first()
-            due = _first(own, guests)
+            kernels, own, guests = self._scripts.first()
+            due = _first(kernels, own, guests)
             if due is None or due > (now if self.stopped is None else self.now):
                 break
             self.now = max(due, self.now)
             rounds, at = (rounds + 1, at) if self.now == at else (0, self.now)
             if rounds > MOST_STEPS_PER_INSTANT:
                 raise Runaway(f"scripts loop without end at {self.now} ns")
-            if own is not None and own <= self.now:
+            if kernels is not None and kernels <= self.now:
+                self._scripts.advance_kernels()
+            elif own is not None and own <= self.now:
                 self._scripts.run_described()
             else:
                 self.is_settled = True
@@ -470,5 +472,5 @@ class Plant:
         }
 
 
-def _first(one: Nanos | None, other: Nanos | None) -> Nanos | None:
-    return other if one is None else one if other is None else min(one, other)
+def _first(*dues: Nanos | None) -> Nanos | None:
+    return min((due for due in dues if due is not None), default=None)

@@ -79,10 +79,14 @@ class Scripts:
 
     # ------------------------------------------------------------------ scheduling
 
-    def first(self) -> tuple[Nanos | None, Nanos | None]:
-        """The earliest due moments of the scripts of the description and of the external ones."""
+    def first(self) -> tuple[Nanos | None, Nanos | None, Nanos | None]:
+        """The earliest due moments: of kernels that scripts wait for, of scripts of the description, of external scripts."""
         self._renew()
-        return self._described.first(), self._external.first()
+        return self._watchers.due(), self._described.first(), self._external.first()
+
+    def advance_kernels(self) -> None:
+        """Advance the kernels that are due now; scripts that wait for what happens there become due."""
+        self._watchers.advance(self._plant.now)
 
     def _renew(self) -> None:
         """Update the due moments of scripts whose kernels have changed."""
@@ -111,7 +115,6 @@ class Scripts:
             condition = plant.condition(waiting.condition)
             kernels = condition.bring(plant.now)
             dues.append(condition.due(plant.now))
-        dues += [kernel.deadline() for kernel in kernels]
         self._watchers.set(script, kernels)
         self._agenda_of(script).watch(script, min((due for due in dues if due is not None), default=None))
 
