@@ -89,6 +89,16 @@ def test_rates_and_timing() -> None:
     assert there.lines["bus"].units == (1, 2)
 
 
+def test_the_rate_of_a_line_is_that_of_com1() -> None:
+    """Unless the line has one of its own; [AIN0] and [AIN1] of a configuration have those of COM1 and COM2."""
+    text = '[[line]]\nname = "bus"\nkind = "modbus"\n{}\n[[mic488]]\nname = "a"\nline = "bus"\nconfig = "a.cfg"\n'
+    files = {"a.cfg": b"[AIN0]\nBaud=9600\n[AIN1]\nBaud=115200\n"}
+    assert World.from_toml(text.format(""), files).lines["bus"].baud == 9600
+    assert World.from_toml(text.format("baud = 19200"), files).lines["bus"].baud == 19200
+    with pytest.raises(Misuse, match="baud = 9601: a MIC488 has 9600, 19200, 38400, 57600, 115200 bit/s"):
+        World.from_toml(text.format("baud = 9601"), files)
+
+
 @pytest.mark.parametrize("kind", ["rtu", "tcp"])
 def test_answers_of_a_line_with_timing_come_later(kind: str) -> None:
     """8 characters of 1.04 ms at 9600 bit/s, the pause that ends the request, and 7 characters back."""

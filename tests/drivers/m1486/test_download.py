@@ -26,9 +26,10 @@ from steptwin.machine import SECOND
 def test_a_block_that_is_one_command_too_large() -> None:
     """2032 bits, of which eight are the end of the file and eight are kept free."""
     chip = chip_driver(ChipWire("B"))
-    most = (2032 - 8 - 8 - memory_bits("U")) // memory_bits("R")
+    most = (2032 - 8 - 8 - memory_bits("U")) // memory_bits("D")
     with pytest.raises(Misuse, match="the block is larger than the command memory"):
-        chip.run_block(["r"] * (most + 1))
+        chip.run_block(["d"] * (most + 1))
+    assert chip.run_block(["d"] * most).ok
 
 
 def test_a_program_whose_chip_was_recovered_is_not_held_any_more() -> None:
