@@ -133,7 +133,7 @@ def test_it_can_be_restored_anywhere(moment_s: float, tmp_path: object) -> None:
     [
         ('{ move = "a.M1" }', "t.toml:32.*step 2: move: give either to"),
         ('{ move = "a.M1", to = 1.0, by = 2.0 }', "move: give either to"),
-        ('{ move = "a.M7", to = 1.0 }', "t.toml:32.*a.M7: a has M1, M2, M3, M4"),
+        ('{ move = "a.M7", to = 1.0 }', "t.toml:32.*step 2: a.M7: a has M1, M2, M3, M4"),
         ('{ move = "b.M1", to = 1.0 }', "no machine is called 'b'"),
         ('{ mov = "a.M1", to = 1.0 }', r"has 'mov', 'to' \(did you mean 'move'\?\)"),
         ('{ home = "a.M1" }', "velocity is missing"),
@@ -142,8 +142,9 @@ def test_it_can_be_restored_anywhere(moment_s: float, tmp_path: object) -> None:
     ],
 )
 def test_mistakes_have_their_places(step: str, text: str) -> None:
-    with pytest.raises(WorldError, match=f"(?s){text}"):
+    with pytest.raises(WorldError, match=f"(?s){text}") as raised:
         world(step)
+    assert len(raised.value.findings) == 1
 
 
 def test_a_chip_has_no_status_of_motions() -> None:

@@ -61,7 +61,7 @@ def _all(steps: Iterable[do.Step]) -> Iterator[do.Step]:
 def _check(plant: Plant, steps: Iterable[do.Step], path: Path, set_somewhere: Sequence[Fault]) -> None:
     text = plant.spec.text
     for n, step in enumerate(steps):
-        if isinstance(step, do.Repeat):
+        if isinstance(step, do.Repeat) and not step.is_one:
             _check(plant, step.steps, (*path, n, STEPS.name), set_somewhere)
             continue
         if isinstance(step, do.ClearFault) and (
@@ -79,6 +79,8 @@ def _check(plant: Plant, steps: Iterable[do.Step], path: Path, set_somewhere: Se
 
 def _parts(step: do.Step) -> Sequence[do.Step]:
     """A step split into parts that are checked separately."""
+    if isinstance(step, do.Repeat):
+        return step.steps[:1]
     if isinstance(step, do.Set):
         return [replace(step, levels=(level,)) for level in step.levels]
     if isinstance(step, do.Write):

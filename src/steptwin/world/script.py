@@ -214,8 +214,11 @@ class ExpectReached:
 
 @dataclass(frozen=True, slots=True)
 class Repeat:
+    """``is_one``: a description has the steps as one, the first of which has all names."""
+
     times: int
     steps: tuple[Step, ...]
+    is_one: bool = False
 
 
 Step: TypeAlias = (
@@ -383,7 +386,7 @@ def _turn(axis: tuple[str, int], counts: int) -> Turn:
 def _motion(command: Move | Home, within: Nanos | None) -> Repeat:
     """The motion that is commanded, to its end: a status from before does not count."""
     place = command.machine, command.axis
-    return Repeat(1, (Order(command), UntilOver(*place, within), ExpectReached(*place)))
+    return Repeat(1, (Order(command), UntilOver(*place, within), ExpectReached(*place)), is_one=True)
 
 
 def _move(axis: tuple[str, int], to: float | None, by: float | None, within: Nanos | None) -> Repeat:
@@ -395,7 +398,7 @@ def _home(axis: tuple[str, int], velocity: float, within: Nanos | None) -> Repea
 
 
 def _wait_for(axis: tuple[str, int], within: Nanos | None) -> Repeat:
-    return Repeat(1, (UntilOver(*axis, within), ExpectReached(*axis)))
+    return Repeat(1, (UntilOver(*axis, within), ExpectReached(*axis)), is_one=True)
 
 
 def _couple(axis: tuple[str, int], coupling: str) -> Couple:
