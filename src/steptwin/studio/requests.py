@@ -48,7 +48,7 @@ class Resync:
 
 
 @dataclass(frozen=True, slots=True)
-class Watch:
+class WatchPoints:
     """Subscribes to the values of points."""
 
     points: tuple[str, ...]
@@ -92,7 +92,7 @@ class StopAll:
 
 
 @dataclass(frozen=True, slots=True)
-class LookAt:
+class ShowMoment:
     """Shows a moment of the past; None: the present."""
 
     moment: Nanos | None
@@ -146,14 +146,14 @@ class Disconnect:
 StudioRequest: TypeAlias = (
     Hello
     | Resync
-    | Watch
+    | WatchPoints
     | Unwatch
     | TakeControl
     | ReleaseControl
     | Renew
     | LetGo
     | StopAll
-    | LookAt
+    | ShowMoment
     | GoBack
     | ReadAudit
     | ListPrograms
@@ -215,7 +215,7 @@ _ROWS = (
     RequestRow("resync", Resync, LOOK, "The whole state once more, with seq 0.", NOTHING, is_of_connection=True),
     RequestRow(
         "watch",
-        Watch,
+        WatchPoints,
         LOOK,
         "Values of points, sent whenever they have changed.",
         members(
@@ -268,7 +268,7 @@ _ROWS = (
     ),
     RequestRow(
         "look",
-        LookAt,
+        ShowMoment,
         LOOK,
         "Look at a moment of the past while the world goes on. The message past and values of all watches follow. Until the "
         "present is looked at again, state, read, pins, encoders, faults and programs are of that moment, and nothing can be "

@@ -101,7 +101,7 @@ class ViewerSession:
         hub = self._hub
         return {
             ask.StopAll: lambda _: hub.stop_all(),
-            ask.LookAt: self._look_at,
+            ask.ShowMoment: self._look_at,
             ask.GoBack: self._go_back,
             ask.ListPrograms: self._list_programs,
             ask.ReadProgram: self._read_program,
@@ -116,7 +116,7 @@ class ViewerSession:
         actions: Mapping[object, Callable[[Any], object]] = {
             ask.Hello: self._hello,
             ask.Resync: self._resync,
-            ask.Watch: self._watch,
+            ask.WatchPoints: self._watch,
             ask.Unwatch: self._unwatch,
             ask.TakeControl: lambda wanted: hub.take_control(self.viewer, over=wanted.over),
             ask.ReleaseControl: lambda _: hub.release_control(self.viewer),
@@ -254,7 +254,7 @@ class ViewerSession:
 
     # ------------------------------------------------------------------ the past
 
-    async def _look_at(self, wanted: ask.LookAt) -> object:
+    async def _look_at(self, wanted: ask.ShowMoment) -> object:
         if wanted.moment is not None:
             return await self._looking.go(wanted.moment, self._watches)
         if self._looking.is_back:
@@ -282,7 +282,7 @@ class ViewerSession:
 
     # ------------------------------------------------------------------ what it is sent
 
-    def _watch(self, wanted: ask.Watch) -> object:
+    def _watch(self, wanted: ask.WatchPoints) -> object:
         if len(self._watches) >= MOST_WATCHES:
             raise Misuse(f"watch: there are {MOST_WATCHES} already, which is the most")
         if sum(len(one.values.points) for one in self._watches.values()) + len(wanted.points) > MOST_WATCHED:

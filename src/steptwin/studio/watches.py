@@ -16,7 +16,7 @@ from steptwin.subject.contract import Reading
 Points: TypeAlias = tuple[str, ...]
 
 
-class Values:
+class SharedValues:
     """The present values of a list of points. ``version`` counts the readings in which something has changed."""
 
     __slots__ = ("_changed", "_texts", "points", "users", "values", "version")
@@ -54,7 +54,7 @@ class Watched:
 
     __slots__ = ("_due", "_sent", "interval_ns", "number", "values")
 
-    def __init__(self, number: int, values: Values, rate: float) -> None:
+    def __init__(self, number: int, values: SharedValues, rate: float) -> None:
         self.number = number
         self.values = values
         self.interval_ns: Nanos = round(SECOND / rate)
@@ -81,7 +81,7 @@ class Watches:
     """The watches of all viewers."""
 
     def __init__(self) -> None:
-        self._values: dict[Points, Values] = {}
+        self._values: dict[Points, SharedValues] = {}
         self._watched: set[Watched] = set()
         self._due: Nanos = 0
 
@@ -90,7 +90,7 @@ class Watches:
         points = tuple(reading.point for reading in readings)
         values = self._values.get(points)
         if values is None:
-            values = self._values[points] = Values(points)
+            values = self._values[points] = SharedValues(points)
         values.users += 1
         values.put({reading.point: reading.value for reading in readings})
         watched = Watched(number, values, rate)
