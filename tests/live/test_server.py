@@ -48,12 +48,8 @@ def test_the_ready_file_names_every_end_point_and_is_gone_at_the_end(run: Run, m
     path = tmp_path / "new" / "ready.json"
 
     async def play(server: Server, told: list[str]) -> Any:
-        await server.open_control(
-            "twin",
-            WorldSubject(World.from_toml("[[mic488]]\nname = 'a'\n")),
-            lambda: [{"name": "table"}],
-            tmp_path / "machine.toml",
-        )
+        server.introduce("twin", lambda: [{"name": "table"}], tmp_path / "machine.toml")
+        await server.open_control(WorldSubject(World.from_toml("[[mic488]]\nname = 'a'\n")))
         await server.open(TRANSPORTS["pty"], str(tmp_path / "line"), "Modbus RTU", port, line="bus")
         await server.open(TRANSPORTS["tcp"], "127.0.0.1:0", "Modbus TCP", port)
         server.write_ready_file(path)

@@ -25,8 +25,11 @@ from tests.support.studio_rig import check_answer, check_message
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection
 
+from steptwin.files.session import save, session_of
+from steptwin.files.world import World
 from steptwin.machine import MILLISECOND
 from steptwin.subject.dispatch import LONGEST_REQUEST
+from steptwin.world.script import Set
 
 Start = Callable[..., Process]
 
@@ -246,6 +249,9 @@ def test_others_reach_it_only_where_that_is_permitted_and_with_a_token(start_stu
         (("--remote",), "--remote permits an --http address that others can reach, but 127.0.0.1:8488 is none"),
         (("--certificate", "c.pem"), "--certificate and --key go together"),
         (("--tokens", "/nowhere/tokens"), "/nowhere/tokens"),
+        (("--view",), "--view shows one session (.json)"),
+        (("--view", "machine.toml"), "machine.toml: --view shows a session (.json)"),
+        (("--view", "s.json", "--speed", "2"), "--speed is not for a session that is only looked at"),
     ],
 )
 def test_options_that_do_not_go_together_are_named(options: tuple[str, ...], message: str) -> None:
@@ -402,3 +408,22 @@ def test_the_demo_machine_is_shown_without_a_file(start_studio: Start) -> None:
     assert "Modbus TCP, bus    127.0.0.1:5020" in studio.output
     assert f"studio             {studio.url}/" in studio.output
     until(lambda: httpx.get(f"{studio.url}/api/points?names=table.M3.moving").json()["ok"][0]["value"] == 1.0, "it works")
+
+
+def test_a_recorded_session_is_shown_and_nobody_changes_it(start_studio: Start, tmp_path: Path) -> None:
+    world = World.from_toml('[[mic488]]\nname = "table"\nline = "bus"\n[[line]]\nname = "bus"\nkind = "modbus"\ntcp = "127.0.0.1:0"\n')
+    world.run(for_="2s")
+    world.apply_input(Set((("table", "IN3", 1.0),)))
+    world.run(for_="3s")
+    save(session_of(world), tmp_path / "s.json")
+    tokens = tmp_path / "tokens"
+    tokens.write_text("engineer anna anna-0123456789abcdef\n")
+    studio = start_studio("--itself", str(tmp_path / "s.json"), "--view", "--tokens", str(tokens))
+    assert list(studio.end_points) == ["http"]
+    seen = page(studio, token="anna-0123456789abcdef")
+    assert seen.answer["ok"]["role"] == "viewer"
+    assert [one["value"] for one in seen.ok("read", points=["time", "table.IN3"])] == [5.0, 1.0]
+    assert seen.ok("look", to_ns="1000000000") == {"time_ns": "1000000000", "from_ns": "0"}
+    assert [one["value"] for one in seen.ok("read", points=["time", "table.IN3"])] == [1.0, 0.0]
+    seen.ok("look")
+    assert seen.ask("resume")["error"]["message"] == "resume is for the role operator; anna has the role viewer"

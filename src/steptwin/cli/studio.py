@@ -48,6 +48,9 @@ class PageOptions(OptionGroup):
             autocompletion=completion.devices,
         ),
     ] = None
+    view: Annotated[
+        bool, typer.Option("--view", help="Show a session as it was: time stands at its end, and nothing can be changed.")
+    ] = False
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page where there is a desktop.")] = True
 
 
@@ -78,6 +81,9 @@ def studio(
     if page.device and world is None:
         for group in (live, options):
             group.refuse("devices without a world: give a MACHINE.toml too")
+    if page.view:
+        for group in (live, options):
+            group.refuse("a session that is only looked at")
     own = StudioOptions(
         http=page.http,
         remote=page.remote,
@@ -87,6 +93,7 @@ def studio(
         audit=page.audit,
         browser=page.browser,
         devices=tuple(page.device or ()),
+        view=page.view,
     )
     if not run_studio(own, up_options(world, ready_file, live, options)):
         raise typer.Exit(1)

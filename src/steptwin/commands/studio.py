@@ -13,8 +13,9 @@ import time
 import webbrowser
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from functools import partial
 from math import inf
 from pathlib import Path
 
@@ -26,6 +27,7 @@ from steptwin.access.tokens import AccessGate, Token, read_tokens
 from steptwin.commands.auditfile import AuditFile
 from steptwin.commands.demo import demo_world
 from steptwin.commands.keptsettings import keep_settings
+from steptwin.commands.recorded import recorded
 from steptwin.commands.studio_devices import serve_without_world
 from steptwin.commands.up_world import Running, UpOptions, up, up_with
 from steptwin.diagnostics import SourceText
@@ -45,6 +47,7 @@ from steptwin.studio.shownworld import ShownWorld
 from steptwin.subject.events import Numbering
 from steptwin.textcodec import decode
 from steptwin.world.addresses import Address, is_loopback, parse_address
+from steptwin.world.history import History
 from steptwin.world.programtexts import WorldPrograms, configuration_text
 
 DEFAULT = Address("127.0.0.1", 8488)
@@ -65,6 +68,13 @@ class StudioOptions:
     browser: bool = True
     devices: Sequence[str] = ()
     """Addresses of devices. With them there is no demo machine."""
+    view: bool = False
+    """Whether a session is shown as it was, and everybody has the role viewer."""
+
+    @property
+    def highest(self) -> Role:
+        """No viewer has a higher role."""
+        return Role.VIEWER if self.view else Role.ENGINEER
 
 
 def studio(own: StudioOptions, options: UpOptions) -> bool:
@@ -77,6 +87,12 @@ def studio(own: StudioOptions, options: UpOptions) -> bool:
         audit = Audit(_now) if own.audit is None else Audit(_now, stack.enter_context(AuditFile(own.audit)).add)
         listening = stack.enter_context(listen(entrance.address, is_fixed=own.http is not None))
         page = _Page(own, entrance, listening, audit)
+        if own.view:
+            if options.world is None or own.devices:
+                raise Misuse("--view shows one session (.json), and no device: name its file")
+            world, history = recorded(options.world, lambda text: sys.stderr.write(f"{text}\n"))
+            stack.enter_context(world)
+            return up_with(world, replace(options, speed="0", is_closed=True), partial(page.open, history=history))
         if options.world is not None:
             return up(options, page.open)
         if own.devices:
@@ -93,10 +109,13 @@ class _AccessInfo:
     address: Address
     tls: Tls | None
     tokens: tuple[Token, ...]
+    highest: Role
 
     @property
     def gate(self) -> AccessGate:
-        return AccessGate(self.tokens) if self.tokens else AccessGate(open_to=Role.ENGINEER)
+        if not self.tokens:
+            return AccessGate(open_to=self.highest)
+        return AccessGate(replace(token, role=min(token.role, self.highest)) for token in self.tokens)
 
 
 def _entrance(own: StudioOptions) -> _AccessInfo:
@@ -114,9 +133,11 @@ def _entrance(own: StudioOptions) -> _AccessInfo:
     if own.remote and is_local:
         raise Misuse(f"--remote permits an --http address that others can reach, but {address} is none; such as 0.0.0.0:8488")
     if own.tokens is not None:
-        return _AccessInfo(address, tls, read_tokens(decode(read_bytes(own.tokens), str(own.tokens)).text, str(own.tokens)))
-    fresh = () if is_local else tuple(Token(role, role.title, secrets.token_urlsafe(24)) for role in reversed(Role))
-    return _AccessInfo(address, tls, fresh)
+        tokens = read_tokens(decode(read_bytes(own.tokens), str(own.tokens)).text, str(own.tokens))
+    else:
+        roles = [] if is_local else [role for role in reversed(Role) if role <= own.highest]
+        tokens = tuple(Token(role, role.title, secrets.token_urlsafe(24)) for role in roles)
+    return _AccessInfo(address, tls, tokens, own.highest)
 
 
 def _now() -> str:
@@ -132,8 +153,8 @@ class _Page:
         self._listening = listening
         self._audit = audit
 
-    async def open(self, running: Running) -> None:
-        """Serve it in the event loop of the world."""
+    async def open(self, running: Running, history: History | None = None) -> None:
+        """Serve it in the event loop of the world, with the past of a world that has one already."""
         live, pace, server = running.live, running.pace, running.server
 
         def moment() -> Moment:
@@ -149,7 +170,7 @@ class _Page:
         def configuration(machine: str) -> SourceText | None:
             return configuration_text(live.world, machine) if machine in live.world.machines else None
 
-        lookback = Lookback(live, server.cell, pace)
+        lookback = Lookback(live, server.cell, pace, history)
         server.join(lookback)
         await self._serve(server, shown, moment, WorldPrograms(live.world), configuration, lookback)
 

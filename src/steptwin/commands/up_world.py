@@ -67,6 +67,8 @@ class UpOptions:
     log_frames: bool = False
     allow_outside: bool = False
     """Files of the description may lie anywhere."""
+    is_closed: bool = False
+    """Whether nothing is open for other programs: neither lines nor the control endpoint."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +111,8 @@ def up_with(world: World, options: UpOptions, addition: Addition | None = None) 
     """As `up`, with an existing world."""
     name = options.name or (world.spec.name if options.world is None else options.world.stem)
     speed = read_speed(options.speed, least=0)
-    _send_away(world)
+    if not options.is_closed:
+        _send_away(world)
     past = [] if world.now else [record for record in world.trace if is_shown(record)]
     kept = read_kept(options.trace or world.spec.trace or "off")
     if kept is None:
@@ -236,17 +239,23 @@ def _write_trace(recorder: TraceFile, where: Path, ended: Nanos) -> list[Path]:
 async def _open(server: Server, live: LiveWorld, pace: Pace, options: UpOptions, addition: Addition | None) -> None:
     name = options.name or live.world.spec.name
     control = WorldControl(server.cell, live, pace, server.announcement)
+    server.introduce(name, partial(announced, live.world), options.world)
+    if not options.is_closed:
+        await _open_for_others(server, live, control, options)
+    if addition is not None:
+        await addition(Running(server, live, pace, control))
+    if options.ready_file is not None:
+        server.write_ready_file(options.ready_file)
+
+
+async def _open_for_others(server: Server, live: LiveWorld, control: WorldControl, options: UpOptions) -> None:
     address = None if options.control is None else parse_address(options.control, listen_any=False)
-    await server.open_control(name, control, partial(announced, live.world), options.world, address)
+    await server.open_control(control, address)
     for line in live.world.spec.lines:
         await _open_line(server, live, line, options)
     for controller, where in live.world.spec.vision_addresses():
         make_port = partial(VisionPort, live, controller)
         await server.open(VISION, where, f"vision records, {controller}", make_port, listen_any=options.listen_any)
-    if addition is not None:
-        await addition(Running(server, live, pace, control))
-    if options.ready_file is not None:
-        server.write_ready_file(options.ready_file)
 
 
 async def _open_line(server: Server, live: LiveWorld, line: LineSpec, options: UpOptions) -> None:

@@ -28,14 +28,14 @@ MOST_LOOKS = 8
 
 
 class Lookback:
-    """Of ``live``, from now on. A `Link` of its server."""
+    """Of ``live``, from now on, or with ``history`` from its beginning. A `Link` of its server."""
 
-    def __init__(self, live: LiveWorld, cell: Cell, pace: Pace) -> None:
+    def __init__(self, live: LiveWorld, cell: Cell, pace: Pace, history: History | None = None) -> None:
         self._live = live
         self._cell = cell
         self._pace = pace
         self._looks = 0
-        self._history = live.history = History(live.world)
+        self._history = live.history = history or History(live.world)
         self._timer = asyncio.get_running_loop().call_later(STATE_S, self._keep)
 
     def _keep(self) -> None:

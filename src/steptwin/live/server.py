@@ -112,17 +112,13 @@ class Server:
         self._links.append(opened.link)
         self.end_points.append(EndPoint(transport.kind, opened.place, protocol, opened.details, line))
 
-    async def open_control(
-        self,
-        name: str,
-        subject: Controlled,
-        controllers: Controllers = tuple,
-        file: Path | None = None,
-        address: Address | None = None,
-    ) -> None:
-        """Open the control endpoint of ``subject``, made from ``file``; also over TCP if there is an ``address``."""
+    def introduce(self, name: str, controllers: Controllers = tuple, file: Path | None = None) -> None:
+        """Name the twin, made from ``file``, in its announcement."""
         self._name, self._controllers, self._file = name, controllers, file
-        endpoint = ControlEndpoint(name, subject, address)
+
+    async def open_control(self, subject: Controlled, address: Address | None = None) -> None:
+        """Open the control endpoint of ``subject``; also over TCP if there is an ``address``."""
+        endpoint = ControlEndpoint(self._name, subject, address)
         await endpoint.open()
         self._links.append(endpoint)
         if endpoint.listening is not None:
