@@ -5,13 +5,17 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 from tests.conftest import until
 from tests.studio.conftest import Process
-from tests.studio.test_page_panels import AXE, PICTURES, Studio, browser, button
+from tests.studio.test_page_panels import AXE, PICTURES, WAIT_MS, Studio, browser, button, show
 from tests.studio.test_page_program import choose, text_of
+
+from steptwin.files.session import save, session_of
+from steptwin.files.world import World
 
 __all__ = ["browser"]
 
@@ -268,3 +272,27 @@ def test_the_picture_of_the_documentation_and_what_axe_finds(studio: Studio) -> 
     assert not serious, json.dumps(serious, indent=1)[:3000]
     PICTURES.mkdir(parents=True, exist_ok=True)
     page.screenshot(path=PICTURES / "debugger.png")
+
+
+def test_a_recording_is_looked_through(start_studio: Callable[..., Process], browser: Browser, tmp_path: Path) -> None:
+    world = World.from_toml('[[mic488]]\nname = "table"\nprogram = "cell.prg"\nstart = true\n', {"cell.prg": PROGRAM.encode()})
+    world.run(for_="20s")
+    save(session_of(world), tmp_path / "s.json")
+    context = browser.new_context(viewport={"width": 1280, "height": 720}, locale="en-US")
+    page = context.new_page()
+    page.set_default_timeout(WAIT_MS)
+    page.goto(start_studio("--itself", str(tmp_path / "s.json"), "--view").url)
+    show(page, "Program")
+    last = variable(page, "n")
+    expect(last).to_have_text(re.compile("^[0-9]+$"))
+    n = int(last.inner_text())
+    expect(page.get_by_role("group", name="Debugger").get_by_role("button")).to_have_count(0)
+    page.locator("body").press(",")
+    past = page.get_by_role("group", name="The past")
+    past.get_by_role("slider").fill("1000")
+    expect(past).to_contain_text("10.0")
+    expect(last).to_have_text(re.compile(f"^({n // 2 - 1}|{n // 2}|{n // 2 + 1})$"))
+    expect(past.get_by_role("button", name="Take the machine back to here…")).to_have_count(0)
+    past.get_by_role("button", name="To the present").click()
+    expect(last).to_have_text(str(n))
+    context.close()

@@ -198,12 +198,12 @@ export class Studio {
       if (this.may("look")) this.lookback.step(-1);
     } else if (how === "on") {
       if (isBack) this.lookback.step(1);
-      else void this.act("step", {});
+      else if (this.may("step")) void this.act("step", {});
     } else if (how === "live" && isBack) {
       this.lookback.live();
     } else if (how === "pause" && this.pace.running) {
-      void this.act("pause", {});
-    } else if (!this.pace.running) {
+      if (this.may("pause")) void this.act("pause", {});
+    } else if (!this.pace.running && this.may("resume")) {
       void this.act("resume", {});
     }
   }
