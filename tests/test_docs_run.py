@@ -26,6 +26,7 @@ NOT_RUN = {
     "docs/studio.md": [
         "it goes on until Ctrl-C",
         "needs devices",
+        "it goes on until Ctrl-C",
         "needs a running studio; tests/studio/test_examples.py does it",
     ],
     "docs/testing.md": ["needs devices"],

@@ -411,7 +411,8 @@ def test_the_demo_machine_is_shown_without_a_file(start_studio: Start) -> None:
 
 
 def test_a_recorded_session_is_shown_and_nobody_changes_it(start_studio: Start, tmp_path: Path) -> None:
-    world = World.from_toml('[[mic488]]\nname = "table"\nline = "bus"\n[[line]]\nname = "bus"\nkind = "modbus"\ntcp = "127.0.0.1:0"\n')
+    text = '[[mic488]]\nname = "table"\nline = "bus"\n[[line]]\nname = "bus"\nkind = "modbus"\ntcp = "127.0.0.1:0"\n'
+    world = World.from_toml(text)
     world.run(for_="2s")
     world.apply_input(Set((("table", "IN3", 1.0),)))
     world.run(for_="3s")
