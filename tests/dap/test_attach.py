@@ -118,10 +118,10 @@ def test_logs_labels_and_texts_without_files(twin: Path, client: DapClient) -> N
     source = named["m, m.prg"]
     assert client.ask("source", sourceReference=source["sourceReference"])["content"] == WBC
     client.ask("setBreakpoints", source=source, breakpoints=[{"line": 9, "logMessage": "n is {n}"}])
-    (label, wrong) = client.ask("setFunctionBreakpoints", breakpoints=[{"name": "@2"}, {"name": "CUONT"}])["breakpoints"]
-    assert (label["verified"], wrong["verified"]) == (True, False)
     client.ask("configurationDone")
     client.event("output", lambda body: "n is" in body["output"])
+    (label, wrong) = client.ask("setFunctionBreakpoints", breakpoints=[{"name": "@2"}, {"name": "CUONT"}])["breakpoints"]
+    assert (label["verified"], wrong["verified"]) == (True, False)
     stopped = client.event("stopped")
     assert (stopped["reason"], stopped["threadId"]) == ("function breakpoint", 2)
 
