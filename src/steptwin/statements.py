@@ -7,28 +7,41 @@ skips while a program rests is not executed.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TypeAlias
+from collections.abc import Callable, Collection
+from typing import NamedTuple, TypeAlias
 
 from steptwin.machine import Nanos
 
 StatementHook: TypeAlias = Callable[[Nanos, int], None]
-StatementHooks: TypeAlias = tuple[StatementHook, ...]
-"""The hooks of one machine, in the order of their calls."""
 
 
-def joined(hooks: StatementHooks) -> StatementHook:
-    """One hook that calls all ``hooks``, of which there is at least one."""
-    if len(hooks) == 1:
-        return hooks[0]
+class HookedStatements(NamedTuple):
+    """A hook and the numbers of the statements before which it is called; None: before all. The others run at full speed."""
+
+    hook: StatementHook
+    numbers: Collection[int] | None = None
+
+    def has(self, number: int) -> bool:
+        return self.numbers is None or number in self.numbers
+
+
+StatementHooks: TypeAlias = tuple[HookedStatements, ...]
+"""The hooks of one machine, in the order in which they are called."""
+
+
+def hook_before(hooks: StatementHooks, number: int) -> StatementHook | None:
+    """One hook that calls all hooks of a statement; None without any."""
+    found = tuple(one.hook for one in hooks if one.has(number))
+    if len(found) <= 1:
+        return found[0] if found else None
 
     def call(now: Nanos, number: int) -> None:
-        for hook in hooks:
+        for hook in found:
             hook(now, number)
 
     return call
 
 
 def without(hooks: StatementHooks, hook: StatementHook) -> StatementHooks:
-    """The hooks without ``hook``."""
-    return tuple(one for one in hooks if one != hook)
+    """The hooks except ``hook``."""
+    return tuple(one for one in hooks if one.hook != hook)

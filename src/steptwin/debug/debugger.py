@@ -8,7 +8,7 @@ is only run, as ever. The scout is also what is looked at in the past, to which 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from typing import TypeAlias, TypeVar
 
 from steptwin.debug import scopes
@@ -28,9 +28,12 @@ from steptwin.world.programs import Place, Programs
 
 T = TypeVar("T")
 
-LONGEST_SLICE_NS: Nanos = SECOND // 4
+LONGEST_SLICE_NS: Nanos = 10 * SECOND
 STATEMENTS_AT_ONCE = 256
-"""A slice, which is executed without interruption, has at most so many statements of one program."""
+MOST_STATEMENTS_AT_ONCE = 1 << 15
+MOST_OBSERVED_AT_ONCE = 1 << 12
+"""A slice, which is executed without interruption, has so many statements of one program at first. It becomes twice as long where
+nothing is found, up to the second number, or to the third while every statement is observed."""
 
 Travel: TypeAlias = Generator[None, None, Stop]
 """A run in parts: after each of them something else can be done, or the run be ended by `close`."""
@@ -61,8 +64,7 @@ class Debugger:
             if programs.statement_time == 0:
                 raise Misuse(f"{name}: statement_time = 0: a debugger stops between statements, which must take 1 µs at least")
         self._world = world
-        shortest = min(programs.statement_time for programs in debugged.values())
-        self._slice = min(LONGEST_SLICE_NS, STATEMENTS_AT_ONCE * shortest)
+        self._statement = min(programs.statement_time for programs in debugged.values())
         self._points = Points(world.programs)
         self._apply_input = apply_input or world.apply_input
         self._go_back = go_back or self._take_back
@@ -189,6 +191,7 @@ class Debugger:
 
     def set_breakpoints(self, points: Sequence[AnyPoint]) -> Sequence[SetPoint]:
         """Set these breakpoints and no others; what became of each."""
+        self._scout.release()
         return self._points.set(points)
 
     def set_events(self, events: Iterable[Events]) -> None:
@@ -256,9 +259,10 @@ class Debugger:
         if not self._is_past:
             self._history.take()
         yield from self._scout.look_at(start)
+        slices = self._slices(goal)
         while until is None or self._scout.now < until:
             begin = self._scout.now
-            end = self._slice_end(begin, until)
+            end = self._slice_end(begin, begin + next(slices), until)
             if end is None:
                 yield from self._stand_at(begin)
                 return Stop(StopReason.IDLE, self.now, text=self._why_idle())
@@ -272,9 +276,16 @@ class Debugger:
         yield from self._stand_at(self._scout.now)
         return Stop(StopReason.LIMIT, self.now)
 
-    def _slice_end(self, begin: Nanos, until: Nanos | None) -> Nanos | None:
+    def _slices(self, goal: Goal) -> Iterator[Nanos]:
+        """The lengths of slices, one after the other."""
+        most = MOST_OBSERVED_AT_ONCE if goal.machines else MOST_STATEMENTS_AT_ONCE
+        count = STATEMENTS_AT_ONCE
+        while True:
+            yield min(LONGEST_SLICE_NS, count * self._statement)
+            count = min(2 * count, most)
+
+    def _slice_end(self, begin: Nanos, end: Nanos, until: Nanos | None) -> Nanos | None:
         """Up to where the scout goes next; None where nothing will happen any more."""
-        end = begin + self._slice
         if begin < self.present:
             end = min(end, self.present)
         elif (due := next_due(self._scout.world)) is not None:
@@ -294,9 +305,9 @@ class Debugger:
         self._is_past = False
         if not scout.looks_for(goal):
             return None
-        stop = _finished(scout.catch_up(goal))
+        stop, slices = _finished(scout.catch_up(goal)), self._slices(goal)
         while stop is None and scout.now < until:
-            stop = _finished(scout.find(min(scout.now + self._slice, until), goal, after))
+            stop = _finished(scout.find(min(scout.now + next(slices), until), goal, after))
         if stop is not None:
             scout.stopped()
         return stop
@@ -340,8 +351,9 @@ class Debugger:
         before = upper = self.now
         if not self._is_past:
             self._history.take()
+        slices = self._slices(goal)
         while upper > self.begin:
-            lower = max(self._history.state_at(upper - 1)[0].now, upper - self._slice)
+            lower = max(self._history.state_at(upper - 1)[0].now, upper - next(slices))
             stop = yield from self._scout.find_back(lower, upper, goal, self.begin, before)
             if stop is not None:
                 yield from self._stand_at(stop.time)

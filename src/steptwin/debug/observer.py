@@ -65,14 +65,38 @@ class Observer:
         self.begun: list[Begun] = []
         self.logged: list[Logged] = []
         self.happened: list[ObservedEvent] = []
-        for machine, programs in world.programs.items():
-            programs.hook(self._hook(machine, programs))
+        self._hooks = {machine: self._hook(machine, programs) for machine, programs in world.programs.items()}
+        self._hooked: dict[str, frozenset[Place] | None] = {}
+        """The places before which hooks are called, by controller; None: all."""
         world.trace.watchers.append(self._recorded)
 
     def clear(self) -> None:
         self.begun.clear()
         self.logged.clear()
         self.happened.clear()
+
+    def observe(self, stepping: Collection[str]) -> None:
+        """Have hooks at all statements of controllers in ``stepping``, of others at the breakpoints that are set now.
+
+        Between those programs run at full speed.
+        """
+        self.stepping = stepping
+        for machine, programs in self.world.programs.items():
+            places = None if machine in stepping else frozenset(self.points.at.get(machine, ()))
+            if places == self._hooked.get(machine, frozenset()):
+                continue
+            if machine in self._hooked:
+                programs.unhook(self._hooks[machine])
+                del self._hooked[machine]
+            if places != frozenset():
+                programs.hook(self._hooks[machine], places)
+                self._hooked[machine] = places
+
+    def release(self) -> None:
+        """Have no hooks: breakpoints or texts may be others by the next `observe`."""
+        for machine in self._hooked:
+            self.world.programs[machine].unhook(self._hooks[machine])
+        self._hooked.clear()
 
     def _hook(self, machine: str, programs: Programs) -> StatementHook:
         def hook(now: Nanos, number: int) -> None:

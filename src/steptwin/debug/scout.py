@@ -71,6 +71,10 @@ class Scout:
         """At events with these codes and no others."""
         self._observer.codes = frozenset(codes)
 
+    def release(self) -> None:
+        """Breakpoints may be others from now on."""
+        self._observer.release()
+
     def looks_for(self, goal: Goal) -> bool:
         """Whether there is anything at which it would stop."""
         return bool(goal.machines or self._points.at or self._points.watches or self._observer.codes)
@@ -88,6 +92,7 @@ class Scout:
     def look_at(self, moment: Nanos) -> Parts:
         """Bring it to a moment that has been, or ahead of the world; what happens meanwhile is not observed."""
         self._watched = None
+        self._observer.release()
         if moment <= self.present:
             yield from self._past.go(moment)
             return
@@ -100,7 +105,7 @@ class Scout:
 
     def find(self, end: Nanos, goal: Goal, after: Nanos) -> Finding:
         """Go on to a moment; the first reason to stop after another one. Where there is none, it is at ``end`` then."""
-        self._observer.stepping = goal.machines
+        self._observer.observe(goal.machines)
         self._observer.clear()
         found = yield from self._go_ahead(end)
         stop = yield from self._first_stop([one for one in self._candidates(goal) if one.stop.time > after])
@@ -111,8 +116,8 @@ class Scout:
 
     def find_back(self, lower: Nanos, upper: Nanos, goal: Goal, begin: Nanos, before: Nanos) -> Finding:
         """The last reason to stop between two moments, from ``begin`` on and before another moment."""
-        self._observer.stepping = goal.machines
         yield from self.look_at(lower)
+        self._observer.observe(goal.machines)
         self._observer.clear()
         found: Stop | None = None
         while (hit := (yield from self._go_ahead(upper))) is not None and hit.time < before:
@@ -129,12 +134,13 @@ class Scout:
             yield from self.look_at(present)
         if not self._past.lacks_inputs:
             return None
-        self._observer.stepping = goal.machines
+        self._observer.observe(goal.machines)
         self._observer.clear()
         found = yield from self._go_ahead(present)
         for logged in self._observer.logged:
             self.on_log(logged)
         stop = (yield from self._first_stop(self._candidates(goal))) or found
+        self._observer.release()
         return None if stop is None else replace(stop, time=present)
 
     def _go_ahead(self, end: Nanos) -> Finding:

@@ -2,12 +2,13 @@
 
 Each command is compiled, when it is first met, into a closure that does it and returns the place of the next one. Those that
 only compute run in a bare loop; a closure that is not there yet or does more raises `_Look`, and the command is done with the
-chip's clock set to its moment. With a hook on statements every one is looked at.
+chip's clock set to its moment. Commands with a hook are looked at, too.
 """
 
 from __future__ import annotations
 
 import enum
+from collections.abc import Collection
 from typing import ClassVar, NamedTuple, NoReturn, Protocol
 
 from steptwin.m1486.effects import CommandHost, Effect, WrongData
@@ -15,7 +16,7 @@ from steptwin.m1486.encoding import LONGEST, decode
 from steptwin.m1486.execute import compile_command
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.state import Plain, Stateful
-from steptwin.statements import StatementHook, StatementHooks, joined, without
+from steptwin.statements import HookedStatements, StatementHook, StatementHooks, hook_before, without
 
 #: If commands take no time, this number of them is executed at one moment; then this time passes, so that an endless loop does
 #: not stop time. The time is long enough for a chip that polls a line to cost little.
@@ -66,7 +67,6 @@ class ProgramExecution(Stateful):
         "_chip",
         "_code",
         "_compiled",
-        "_hook",
         "_hooks",
         "_linked",
         "back",
@@ -81,7 +81,7 @@ class ProgramExecution(Stateful):
         "statement_ns",
         "waiting",
     )
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_chip", "_code", "_compiled", "_hook", "_hooks", "_linked", "statement_ns"})
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_chip", "_code", "_compiled", "_hooks", "_linked", "statement_ns"})
 
     def __init__(self, chip: ProgramHost, places: int, statement_ns: Nanos) -> None:
         self._chip = chip
@@ -90,8 +90,6 @@ class ProgramExecution(Stateful):
         #: Places of commands whose closures know where labels are.
         self._linked: set[int] = set()
         self._hooks: StatementHooks = ()
-        self._hook: StatementHook | None = None
-        """One hook that calls all hooks."""
         self.statement_ns = statement_ns
         self._burst = 0
         self._burst_at: Nanos = 0
@@ -216,8 +214,8 @@ class ProgramExecution(Stateful):
         if place == self._chip.memory.end:
             return
         compiled = self._compiled.get(place) or self._compile(place)
-        if self._hook is not None:
-            self._hook(now, place)
+        if self._hooks and (hook := hook_before(self._hooks, place)) is not None:
+            hook(now, place)
         self._pass(now, 1)
         self.pc = compiled.following
         try:
@@ -235,7 +233,7 @@ class ProgramExecution(Stateful):
             following = self._after(place, size)
             code = compile_command(chip, command, place, following)
             compiled = _Compiled(code.effect, following)
-            if code.computes and self._hook is None:
+            if code.computes and not any(one.has(place) for one in self._hooks):
                 self._code[place] = code.effect
             if code.is_linked:
                 self._linked.add(place)
@@ -280,16 +278,15 @@ class ProgramExecution(Stateful):
 
     # ------------------------------------------------------------------ hooks
 
-    def hook(self, hook: StatementHook) -> None:
-        """Call ``hook`` before each command from now on."""
-        self._set_hooks((*self._hooks, hook))
+    def hook(self, hook: StatementHook, places: Collection[int] | None = None) -> None:
+        """Call ``hook`` before each command at these places from now on; None: before all."""
+        self._set_hooks((*self._hooks, HookedStatements(hook, places)))
 
     def unhook(self, hook: StatementHook) -> None:
         self._set_hooks(without(self._hooks, hook))
 
     def _set_hooks(self, hooks: StatementHooks) -> None:
         self._hooks = hooks
-        self._hook = joined(hooks) if hooks else None
         self._forget_code()
 
 

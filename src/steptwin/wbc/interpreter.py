@@ -13,12 +13,12 @@ from __future__ import annotations
 
 from array import array
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 from steptwin.errors import Misuse
 from steptwin.machine import MICROSECOND, MILLISECOND, SECOND, Nanos
 from steptwin.state import Stateful
-from steptwin.statements import StatementHook, StatementHooks, joined, without
+from steptwin.statements import HookedStatements, StatementHook, StatementHooks, hook_before, without
 from steptwin.wbc.code import Cells, Code, Execution, StepCode
 from steptwin.wbc.controller import ProgramController
 from steptwin.wbc.resting import NEVER, RestingLoop, Visit
@@ -55,10 +55,10 @@ class Interpreter(Stateful):
     __slots__ = (
         "_hooked",
         "_hooks",
-        "_is_repeated",
         "_mark",
         "_marks",
         "_moment",
+        "_repeated",
         "_resting",
         "_spent",
         "_trail",
@@ -82,7 +82,7 @@ class Interpreter(Stateful):
         "statement_time",
         "waiting",
     )
-    FIXED = frozenset({"_hooked", "_hooks", "_is_repeated", "controller", "rests", "rests_in_loops", "statement_time"})
+    FIXED = frozenset({"_hooked", "_hooks", "_repeated", "controller", "rests", "rests_in_loops", "statement_time"})
 
     def __init__(self, controller: ProgramController, statement_time: Nanos = STATEMENT_TIME) -> None:
         if statement_time and not SHORTEST_STATEMENT_TIME <= statement_time <= LONGEST_STATEMENT_TIME:
@@ -96,8 +96,8 @@ class Interpreter(Stateful):
         self._hooks: StatementHooks = ()
         self._hooked: tuple[Code, tuple[StepCode, ...]] | None = None
         """Code, and its steps with hooks."""
-        self._is_repeated = False
-        """The next statement is in progress already: it is evaluated again without a call of the hooks."""
+        self._repeated = -1
+        """The step that is in progress already: it is evaluated again without a call of its hooks."""
         self.statement_time = statement_time
         self.cells = array("f")
         self.now: Nanos = 0
@@ -271,9 +271,9 @@ class Interpreter(Stateful):
 
     # ------------------------------------------------------------------ hooks
 
-    def hook(self, hook: StatementHook) -> None:
-        """Call ``hook`` before each statement from now on."""
-        self._hooks = (*self._hooks, hook)
+    def hook(self, hook: StatementHook, numbers: Collection[int] | None = None) -> None:
+        """Call ``hook`` before each of these statements from now on; None: before all."""
+        self._hooks = (*self._hooks, HookedStatements(hook, numbers))
         self._hooked = None
 
     def unhook(self, hook: StatementHook) -> None:
@@ -284,16 +284,19 @@ class Interpreter(Stateful):
         """The functions that are executed for the steps."""
         if not self._hooks:
             return code.steps
-        self._is_repeated = self.waiting
+        self._repeated = self.pc if self.waiting else -1
         if self._hooked is None or self._hooked[0] is not code:
-            call = joined(self._hooks)
-            self._hooked = code, tuple(self._with_hook(call, number, step) for number, step in enumerate(code.steps))
+            self._hooked = code, tuple(self._with_hook(number, step) for number, step in enumerate(code.steps))
         return self._hooked[1]
 
-    def _with_hook(self, hook: StatementHook, number: int, code: StepCode) -> StepCode:
+    def _with_hook(self, number: int, code: StepCode) -> StepCode:
+        hook = hook_before(self._hooks, number)
+        if hook is None:
+            return code
+
         def step(machine: Execution, cells: Cells) -> int:
-            if self._is_repeated:
-                self._is_repeated = False
+            if self._repeated == number:
+                self._repeated = -1
             else:
                 hook(machine.now, number)
             return code(machine, cells)

@@ -6,7 +6,7 @@ named as in `steptwin.world.programtexts`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
@@ -63,8 +63,8 @@ class Programs(Protocol):
         """Numbers of the statements at labels and interrupts, by name."""
         ...
 
-    def hook(self, hook: StatementHook) -> None:
-        """Call ``hook`` before each statement (`steptwin.statements`)."""
+    def hook(self, hook: StatementHook, places: Collection[Place] | None = None) -> None:
+        """Call ``hook`` before each statement (`steptwin.statements`), or before those at places, and at others by chance."""
         ...
 
     def unhook(self, hook: StatementHook) -> None: ...

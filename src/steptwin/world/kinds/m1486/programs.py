@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
@@ -101,8 +101,10 @@ class ChipPrograms:
     def labels(self, text: str) -> Mapping[str, int]:
         return self._text.labels
 
-    def hook(self, hook: StatementHook) -> None:
-        self._chip.program.hook(hook)
+    def hook(self, hook: StatementHook, places: Collection[Place] | None = None) -> None:
+        offsets = self._text.offsets
+        numbers = None if places is None else frozenset(offsets[place.number] for place in places if place.number < len(offsets))
+        self._chip.program.hook(hook, numbers)
 
     def unhook(self, hook: StatementHook) -> None:
         self._chip.program.unhook(hook)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import cached_property
 
 from steptwin.diagnostics import SourceText
@@ -61,8 +61,9 @@ class WbcPrograms:
     def labels(self, text: str) -> Mapping[str, int]:
         return self._bank(text).labels
 
-    def hook(self, hook: StatementHook) -> None:
-        self._device.program.interpreter.hook(hook)
+    def hook(self, hook: StatementHook, places: Collection[Place] | None = None) -> None:
+        numbers = None if places is None else frozenset(place.number for place in places)
+        self._device.program.interpreter.hook(hook, numbers)
 
     def unhook(self, hook: StatementHook) -> None:
         self._device.program.interpreter.unhook(hook)
