@@ -15,7 +15,6 @@ from steptwin.world.kernel import Kernel, PinName
 from steptwin.world.kind import lacks
 from steptwin.world.lines import SCRIPTS
 from steptwin.world.master import ANSWER_NS
-from steptwin.world.motions import motion_ends
 from steptwin.world.programtexts import Destination, name_of_text
 from steptwin.world.trace import TraceRecord
 
@@ -77,7 +76,9 @@ def size_of(what: ExternalInput) -> int:
     return len(what.data) if isinstance(what, Bytes) else 0
 
 
-FOR_SCRIPTS = frozenset({do.Wait, do.At, do.Until, do.Stop, do.Read, do.Call, do.Order, do.UntilOver, do.Repeat})
+FOR_SCRIPTS = frozenset(
+    {do.Wait, do.At, do.Until, do.Stop, do.Read, do.Call, do.Order, do.UntilOver, do.ExpectReached, do.Repeat}
+)
 """Steps that only scripts can execute; all others have their action here."""
 
 
@@ -238,10 +239,6 @@ def _expect(plant: Plant, step: do.Expect) -> None:
     plant.expect(step.condition)
 
 
-def _expect_reached(plant: Plant, step: do.ExpectReached) -> None:
-    plant.expect(motion_ends(plant, step.machine, step.axis).reached)
-
-
 def _note(plant: Plant, step: do.Note) -> None:
     if plant.trace.watchers:
         plant.settle_all()  # earlier events are shown first
@@ -266,7 +263,6 @@ ACTIONS: Mapping[type, Callable[[Plant, Any], None]] = complete(
         do.SetFault: _set_fault,
         do.ClearFault: _clear_fault,
         do.Expect: _expect,
-        do.ExpectReached: _expect_reached,
         do.Note: _note,
         Bytes: _bytes,
         See: _see,

@@ -237,6 +237,10 @@ class Scripts:
         over = motion_ends(self._plant, step.machine, step.axis).over
         return ScriptWait(None if step.within is None else self._plant.now + step.within, over), None
 
+    def _expect_reached(self, step: do.ExpectReached, script: Script) -> StepResult:
+        self._plant.expect(motion_ends(self._plant, step.machine, step.axis).reached)
+        return None, None
+
     def _stop(self, step: do.Stop, script: Script) -> StepResult:
         plant = self._plant
         plant.stopped = step.reason if plant.stopped is None else plant.stopped
@@ -303,6 +307,7 @@ _TAKING: Mapping[type, Callable[[Scripts, Any, Script], StepResult]] = complete(
         do.Write: Scripts._write,
         do.Order: Scripts._order,
         do.UntilOver: Scripts._wait_for_end,
+        do.ExpectReached: Scripts._expect_reached,
     },
 )
 """The execution of steps that wait or have a result (`steptwin.world.script.Walk` resolves `Repeat`)."""
