@@ -1,4 +1,4 @@
-"""The past of a live world, kept from its beginning on, and moments of it for whoever looks back while the world goes on."""
+"""The past of a live world, recorded from its start; viewers look at moments of it while the world continues."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ class Look:
         self._go_back(self._past.world.snapshot())
 
     def close(self) -> None:
-        """Nobody looks at it any more."""
+        """End looking back."""
         if self._going is not None:
             self._going.fail(Refusal("nobody looks back any more"))
         self._closed()

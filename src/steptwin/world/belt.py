@@ -1,4 +1,4 @@
-"""Belts: what carries workpieces, and where they are on it, in whole places of the belt."""
+"""Belts of conveyors: their drives and the workpieces on them. Positions are whole places: the resolution of a drive."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from steptwin.state import Stateful
 
 
 class BeltDrive(Protocol):
-    """What moves a belt: a `steptwin.world.contacts.Carriage`."""
+    """The drive of a belt: a `steptwin.world.contacts.Carriage`."""
 
     def version(self) -> object: ...
     def place(self, now: Nanos) -> int: ...
@@ -18,8 +18,8 @@ class BeltDrive(Protocol):
 
 
 class ConstantDrive(Stateful):
-    """Moves forward at a constant speed while it runs, and stands at once when it does not. Places are picometres, so that a
-    millimetre per second is a place per nanosecond."""
+    """A drive with a constant forward speed while it is switched on, without ramps. A place is 1 pm, so that 1 mm/s is one place
+    per nanosecond."""
 
     __slots__ = ("_base", "_begin", "_changes", "_divisor", "_speed", "runs")
     FIXED: ClassVar[frozenset[str]] = frozenset({"_divisor", "_speed"})
@@ -52,10 +52,10 @@ class ConstantDrive(Stateful):
 
 
 class Workpiece(NamedTuple):
-    """One on a belt. ``origin`` is the place of the belt with the front of the workpiece at its beginning."""
+    """A workpiece on a belt. ``origin``: position of the belt at which the workpiece has its front at the beginning."""
 
     name: str
-    """Of the conveyor that was fed with it, and its number there, from 1."""
+    """Name of the conveyor that was fed with it, and its number there, from 1."""
     origin: int
     length: int
 
@@ -70,7 +70,7 @@ class Load(Stateful):
         self._changes = 0
 
     def version(self) -> int:
-        """Another value whenever there are others."""
+        """A value that changes with every change of the workpieces."""
         return self._changes
 
     def put(self, piece: Workpiece) -> None:
@@ -82,11 +82,11 @@ class Load(Stateful):
         self._changes += 1
 
     def covering(self, position: int, belt: int) -> Workpiece | None:
-        """The workpiece over ``position`` while the belt is at ``belt``; the first that was put there."""
+        """The workpiece over ``position`` while the belt is at ``belt``; the one put there first if there are several."""
         return next((one for one in self.pieces if 0 <= belt - one.origin - position <= one.length), None)
 
     def edges(self, position: int, belt: int) -> tuple[int | None, int | None]:
-        """Places of the belt next below and above ``belt`` at which ``position`` may be covered otherwise."""
+        """The next positions of the belt below and above ``belt`` at which the workpiece over ``position`` may change."""
         below: int | None = None
         above: int | None = None
         for one in self.pieces:
@@ -100,7 +100,7 @@ class Load(Stateful):
 
 
 def next_change(drive: BeltDrive, below: int | None, above: int | None, now: Nanos) -> Nanos | None:
-    """When the belt comes to one of two places, below and above where it is."""
+    """The moment, ns, at which the belt reaches one of two positions, below and above its present one; None if never."""
     down = None if below is None else drive.reaches(below, now, -1)
     up = None if above is None else drive.reaches(above, now, 1)
     return up if down is None else down if up is None else min(up, down)

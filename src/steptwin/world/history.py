@@ -1,8 +1,8 @@
-"""The past of a world that runs: its state from time to time and what came from outside since, so that it can be brought back to
-any moment since the oldest state.
+"""The past of a running world: snapshots at intervals and the external inputs since, from which the world at any moment since the
+oldest snapshot is computed again.
 
-Memory is bounded. Where there are too many states, those go first whose neighbours are close for their age, so that the distance
-between two states grows with their age. With the oldest state goes what came from outside before the next one.
+Memory is bounded. If there are too many snapshots, those whose neighbours are close for their age are removed first, so that the
+distance between two snapshots grows with their age. With the oldest snapshot, the inputs before the next one are removed.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ from steptwin.world.plant import Plant, PlantSnapshot, RecordedInput
 
 MOST_STATES = 256
 MOST_CONTROLLER_STATES = 4096
-"""States of controllers in all: a world of more than 16 controllers keeps fewer states."""
+"""Limit of the states of controllers in all snapshots: a world of more than 16 controllers keeps fewer snapshots."""
 LEAST_STATES = 16
 MOST_NEAR = 128
 MOST_INPUTS = 100_000
 MOST_INPUT_BYTES = 16 << 20
 SLICE_NS: Nanos = SECOND // 4
-"""Looking back can be interrupted at least so often. [virtual time]"""
+"""Interval of virtual time after which a replay can be interrupted, ns."""
 
 
 def replay(world: Plant, inputs: Iterable[RecordedInput], end: Nanos, slice_ns: Nanos | None = None) -> Iterator[bool]:
-    """Bring a world to ``end`` with the inputs that come by then, past moments at which it was stopped.
+    """Advance a world to ``end``, ns, and apply the inputs until then; stops of scripts do not end it.
 
-    Gives whether an input was given, after each of them and each slice of time: the caller may do something else then. Raises
-    `Misuse` for an input that does not fit the world.
+    Yields after each input (True) and after each slice of time (False), so that the caller can interrupt it. Raises `Misuse` for
+    an input that does not fit the world.
     """
     for time, what, settled in inputs:
         if time > end:
@@ -62,43 +62,43 @@ def _bring(world: Plant, moment: Nanos, slice_ns: Nanos | None) -> Iterator[None
 class _State(NamedTuple):
     snapshot: PlantSnapshot
     inputs: int
-    """How many there had been."""
+    """Number of inputs before it."""
 
 
 class History:
-    """Of ``world``, from now on. What comes from outside is recorded by itself, a state with `take`.
+    """The past of ``world`` from the present on. Inputs are recorded automatically, snapshots by `take`.
 
-    Each state has the records of a trace that is kept: let them go (`Trace.let_go`) where a world runs for long.
+    Each snapshot has all records of a trace that is kept: for a long run, drop them before (`Trace.let_go`).
     """
 
     def __init__(self, world: Plant) -> None:
         self.world = world
         self.branch = 0
-        """Counts how often the world has gone back: what was later is another past then."""
+        """Counts how often the world has gone back; each time, the past after that moment is replaced."""
         self._most = max(LEAST_STATES, min(MOST_STATES, MOST_CONTROLLER_STATES // max(1, len(world.machines))))
         self._states: list[_State] = []
         self._inputs: deque[RecordedInput] = deque()
         self._bytes = 0
         self._dropped = 0
-        """Inputs before those that are kept."""
+        """Number of inputs that were removed."""
         world.input_watchers.append(self._noted)
         self.take()
 
     def close(self) -> None:
-        """Record nothing more."""
+        """End the recording."""
         self.world.input_watchers.remove(self._noted)
 
     def __len__(self) -> int:
-        """How many states are kept."""
+        """The number of snapshots."""
         return len(self._states)
 
     @property
     def begin(self) -> Nanos:
-        """The oldest moment to which a world can be brought; the present where nothing is kept."""
+        """The oldest moment that can be restored, ns; the present if there is no snapshot."""
         return self._states[0].snapshot.now if self._states else self.world.now
 
     def take(self) -> None:
-        """Keep the present state, unless one of this moment is there."""
+        """Take a snapshot, unless there is one of this moment."""
         if self._states and self._states[-1].snapshot.now == self.world.now:
             return
         self._states.append(_State(self.world.snapshot(with_inputs=False), self.inputs_so_far))
@@ -106,7 +106,7 @@ class History:
             del self._states[self._least_missed()]
 
     def _least_missed(self) -> int:
-        """The state whose neighbours are closest for their age; never the oldest or the newest."""
+        """Index of the snapshot whose neighbours are closest for their age; never the oldest or the newest."""
         times = [state.snapshot.now for state in self._states]
         now = times[-1]
         return min(range(1, len(times) - 1), key=lambda i: (times[i + 1] - times[i - 1]) / (now - times[i]))
@@ -126,7 +126,7 @@ class History:
             self._dropped += 1
 
     def gone_back(self) -> None:
-        """The world has gone back to its present moment: what came later, or at this moment, has not happened."""
+        """Must be called after the world has gone back: snapshots and inputs of its present moment and later are removed."""
         now = self.world.now
         while self._states and self._states[-1].snapshot.now >= now:
             self._states.pop()
@@ -136,7 +136,7 @@ class History:
         self.take()
 
     def state_at(self, moment: Nanos) -> tuple[PlantSnapshot, int]:
-        """The newest state at or before a moment, and how many inputs there had been. Raises `Misuse` where there is none."""
+        """The newest snapshot at or before a moment, and the number of inputs before it. Raises `Misuse` if there is none."""
         index = bisect_right(self._states, moment, key=lambda state: state.snapshot.now)
         if not index:
             raise Misuse(f"to_ns = {moment}: the past is kept from {self.begin} to {self.world.now} ns")
@@ -152,7 +152,7 @@ class History:
         return number >= self._dropped
 
     def inputs_from(self, number: int) -> list[RecordedInput]:
-        """The inputs after the first ``number``. Raises `Misuse` where they are no longer kept."""
+        """The inputs after the first ``number``. Raises `Misuse` if they are no longer kept."""
         if not self.keeps_inputs_from(number):
             raise Misuse(f"the past is kept from {self.begin} to {self.world.now} ns")
         newest = list(islice(reversed(self._inputs), self.inputs_so_far - number))
@@ -161,7 +161,7 @@ class History:
 
 
 class Past:
-    """A world without ports, in which a moment of another one's past can be looked at. It costs the memory of another world."""
+    """A second world without ports, which shows a moment of the past of the first. It takes as much memory as the first."""
 
     def __init__(self, history: History) -> None:
         self._history = history
@@ -171,12 +171,12 @@ class Past:
             self.world.stop_recording()
         self._branch = -1
         self._inputs = 0
-        """How many it has had."""
+        """Number of inputs applied to it."""
         self._near: deque[_State] = deque(maxlen=MOST_NEAR)
-        """States on the way to where it was last: those of the history may be far from there."""
+        """Snapshots on the way to the last moment, because those of the history may be far apart."""
 
     def forget(self) -> None:
-        """Have the next `go` begin with a state: the world has been used for something else."""
+        """Let the next `go` begin with a snapshot, because the world was used for something else."""
         self._branch = -1
 
     @property
@@ -191,8 +191,10 @@ class Past:
         return self._inputs != self._history.inputs_so_far
 
     def go(self, moment: Nanos) -> Iterator[None]:
-        """Bring it to a moment, in parts between which something else can be done. Raises `Misuse` for a moment that is not kept,
-        and for one after the present."""
+        """Go to a moment, in parts: it yields after each.
+
+        Raises `Misuse` for a moment before the oldest snapshot or after the present.
+        """
         history = self._history
         if moment > history.world.now:
             raise Misuse(f"to_ns = {moment}: the past is kept from {history.begin} to {history.world.now} ns")
@@ -214,13 +216,13 @@ class Past:
             yield
 
     def go_on(self, moment: Nanos) -> Iterator[None]:
-        """Bring it from where it is to a later moment; nothing that happens meanwhile is left out."""
+        """Go on from its present moment to a later one, without using snapshots."""
         for is_input in replay(self.world, self._history.inputs_from(self._inputs), moment, SLICE_NS):
             self._inputs += is_input
             yield
 
     def _state_at(self, moment: Nanos) -> _State:
-        """The newest state at or before a moment whose inputs are kept. Raises `Misuse` where there is none."""
+        """The newest snapshot at or before a moment whose inputs are kept. Raises `Misuse` if there is none."""
         kept = _State(*self._history.state_at(moment))
         near = [
             state

@@ -123,9 +123,8 @@ class Kernel:
         """The plans of each machine that were recorded last."""
         self._names: list[str] = []
         """The names of the machines, by number."""
-        self._numbers: dict[str, int] = {}
-        self._watching: dict[str, list[int]] = {}
-        """The numbers of the parts that watch a name."""
+        self._concerned: dict[str, list[tuple[Callable[[int], None], int]]] = {}
+        """What has to be looked at when something with this name has changed: the machine, and parts that watch it."""
         self._watching_all: list[int] = []
         self._machine_turns, self._part_turns = Turns(), Turns()
         """What has to be looked at when the signals settle."""
@@ -143,7 +142,7 @@ class Kernel:
             raise Misuse(f"there is a machine {name!r} already")
         machine.advance(self.now)
         self.machines[name] = machine
-        self._numbers[name] = len(self._names)
+        self._concerned.setdefault(name, []).append((self._machine_turns.add, len(self._names)))
         self._names.append(name)
         self._plans.append(_Plans(name, machine))
         machine.changed = partial(self.mark, name)
@@ -170,11 +169,13 @@ class Kernel:
         number = len(self.parts)
         self.parts.append(part)
         for name in () if watches is None else dict.fromkeys(watches):
-            self._watching.setdefault(name, []).append(number)
+            self._concerned.setdefault(name, []).append((self._part_turns.add, number))
         if watches is None:
             self._watching_all.append(number)
         self._part_turns.add(number)
-        self._changed()
+        self.stale = True
+        if self.on_change is not None:
+            self.on_change(self)
 
     def connect(self, wire: Wire) -> None:
         """Add a wire. The target takes the present level of the source at once, without the delay."""
@@ -212,14 +213,8 @@ class Kernel:
             for number in range(len(self.parts)):
                 self._part_turns.add(number)
         else:
-            number = self._numbers.get(name, -1)
-            if number >= 0:
-                self._machine_turns.add(number)
-            for number in self._watching.get(name, ()):
-                self._part_turns.add(number)
-        self._changed()
-
-    def _changed(self) -> None:
+            for add, number in self._concerned.get(name, ()):
+                add(number)
         self.stale = True
         if self.on_change is not None:
             self.on_change(self)
@@ -378,8 +373,11 @@ class Kernel:
             self._part_dues.put(number, self.parts[number].deadline())
         self._machines_looked_at.clear()
         self._parts_looked_at.clear()
-        dues = (self._machine_dues.first(), self._part_dues.first(), min(self._flights).arrival if self._flights else None)
-        self._due = min((due for due in dues if due is not None), default=None)
+        due, of_parts = self._machine_dues.first(), self._part_dues.first()
+        if due is None or (of_parts is not None and of_parts < due):
+            due = of_parts
+        arrival = min(self._flights).arrival if self._flights else None
+        self._due = arrival if due is None or (arrival is not None and arrival < due) else due
 
     def _edge(self, name: str, edge: PinEdge) -> None:
         pin = PinName(name, edge.pin)

@@ -472,5 +472,6 @@ class Plant:
         }
 
 
-def _first(*dues: Nanos | None) -> Nanos | None:
-    return min((due for due in dues if due is not None), default=None)
+def _first(one: Nanos | None, other: Nanos | None, third: Nanos | None) -> Nanos | None:
+    due = other if one is None or (other is not None and other < one) else one
+    return third if due is None or (third is not None and third < due) else due

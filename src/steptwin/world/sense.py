@@ -1,4 +1,4 @@
-"""The rows of a table of a description, with keys that mean nothing where they stand, beside or without others."""
+"""The keys of a table of a description, and which of them need or exclude each other."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from steptwin.world.reader import Key, Path, TomlText
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TableRows:
-    """A table of a description. `IncompleteTable` where what is said of a key is of none that it has."""
+    """The keys of a table. Raises `IncompleteTable` if a rule names a key that the table does not have."""
 
     written: str
     """How it is written: ``[[axis.switch]]``."""
@@ -27,20 +27,20 @@ class TableRows:
 
     def __post_init__(self) -> None:
         known = {key.name for key in self.keys}
-        spoken_of = {*self.need, *self.need.values(), *self.only, *(key for pair in self.exclude for key in pair)}
-        if strange := sorted(spoken_of - known):
+        named = {*self.need, *self.need.values(), *self.only, *(key for pair in self.exclude for key in pair)}
+        if strange := sorted(named - known):
             raise IncompleteTable(f"{self.written} has no key {', '.join(strange)}")
         if len(known) < len(self.keys):
             raise Misuse(f"{self.written}: two keys have one name")
 
     @property
     def attributes(self) -> tuple[str, ...]:
-        """What the keys become."""
+        """The attributes of the specification that the keys are read into."""
         return tuple(key.attribute or key.name for key in self.keys)
 
     @property
     def usual(self) -> object:
-        """The kind of a table that does not give one."""
+        """The default of the key ``kind``."""
         return next((key.default for key in self.keys if key.name == "kind" and not key.is_required), None)
 
 

@@ -1,4 +1,4 @@
-"""What moves between two ends at a constant speed each way, such as a pneumatic cylinder: exact, in whole numbers."""
+"""Motion between two ends with a constant speed in each direction, such as of a pneumatic cylinder, exact in whole numbers."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from steptwin.state import Stateful
 
 
 class Travel(Stateful):
-    """A place from 0 to `full`, at either end or on its way; it carries switches (`steptwin.world.contacts.Carriage`).
+    """A position from 0 to `full`, which can actuate switches (`steptwin.world.contacts.Carriage`).
 
-    The way takes ``forth`` to the upper end and ``back`` to the lower one. So that both speeds are whole numbers, the way has
-    forth × back places.
+    The full travel takes ``forth`` ns to the upper end and ``back`` ns to the lower one. It has forth × back places, so
+    that both speeds are whole numbers of places per nanosecond.
     """
 
     __slots__ = ("_back", "_begin", "_changes", "_direction", "_forth", "_place", "full")
@@ -31,7 +31,7 @@ class Travel(Stateful):
 
     @property
     def direction(self) -> int:
-        """+1, −1, or 0: where it was sent last."""
+        """The direction that was commanded last: +1, −1, or 0 (stopped)."""
         return self._direction
 
     def send(self, direction: int, now: Nanos) -> None:
@@ -64,7 +64,7 @@ class Travel(Stateful):
         return self._begin - (-way // self._speed(direction))
 
     def turns(self, now: Nanos) -> Iterator[Nanos]:
-        """When it has left the end where it stands, and when it comes to the other one."""
+        """The moments, ns, at which it has left the end where it stands and at which it arrives at the other end."""
         if self._direction == 0:
             return
         near, far = (0, self.full) if self._direction > 0 else (self.full, 0)
