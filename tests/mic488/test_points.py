@@ -144,3 +144,12 @@ def test_a_value_goes_one_way_between_its_turns() -> None:
         assert turns[:3] == pytest.approx([up, up + even, up + even + down], abs=1e-8)
     assert point(rig, "IN4").turns is None
     assert point(rig, "M2_ACC").turns is None
+
+
+@pytest.mark.parametrize(
+    ("name", "is_kept"),
+    [("M2_ACC", True), ("M1_DEC", True), ("M4_VMAX", True), ("DATA_TYPE", True), ("M2_POSLIM_L", False), ("PROGRAM_CTRL", False)],
+)
+def test_mic_40_a_write_that_acts_on_the_next_command_is_no_event(name: str, is_kept: bool) -> None:
+    """ACC, DEC and VMAX act on the next command, soft limits at once."""
+    assert point(Rig(CONFIG), name).is_kept is is_kept
