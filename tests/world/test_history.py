@@ -200,3 +200,20 @@ def test_nothing_is_recorded_after_the_end() -> None:
     assert not world.notes_inputs
     world.apply_input(Set((("m", "IN3", 1.0),)))
     assert history.inputs_from(0) == []
+
+
+def test_a_past_that_was_used_for_something_else_begins_with_a_state_again() -> None:
+    """Whatever came before it: a world that went back to a snapshot goes on as another branch."""
+    world = make()
+    history = History(world)
+    kept = world.snapshot(with_inputs=False)
+    past = Past(history)
+    for branch in range(3):
+        world.run(for_=2)
+        before = shown(go(past, SECOND))
+        past.world.apply_input(Set((("m", "IN3", 1.0),)))
+        assert shown(past.world) != before
+        past.forget()
+        assert shown(go(past, SECOND)) == before, branch
+        world.restore(kept)
+        history.gone_back()
