@@ -30,7 +30,7 @@ def run(pytester: pytest.Pytester) -> Callable[..., pytest.RunResult]:
 
     def run_(text: str, *options: str) -> pytest.RunResult:
         pytester.makepyfile(test_it=dedent(text))
-        return pytester.runpytest_inprocess("-W", "error", "-p", "no:cacheprovider", *options)
+        return pytester.runpytest_inprocess("-W", "error", "-p", "no:cacheprovider", "-p", "no:rerunfailures", *options)
 
     return run_
 
