@@ -12,7 +12,7 @@ import pytest
 
 from steptwin.errors import Misuse
 from steptwin.world.reader import Key
-from steptwin.world.script import ACTIONS, REPEAT, STEPS
+from steptwin.world.steptable import ACTIONS, REPEAT, STEPS
 from steptwin.world.tables import all_keys
 
 GOLDEN = Path(__file__).parent / "golden" / "tables.txt"

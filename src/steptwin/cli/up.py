@@ -50,7 +50,7 @@ def up(
 
 def sections() -> list[PageSection]:
     """The tables of a description, for people."""
-    from steptwin.world.script import ACTIONS, REPEAT, STEPS
+    from steptwin.world.steptable import ACTIONS, REPEAT, STEPS
     from steptwin.world.tables import all_keys, written
 
     found = [

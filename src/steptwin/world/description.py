@@ -16,9 +16,9 @@ from steptwin.world.links import LINK_KEYS
 from steptwin.world.names import check_names
 from steptwin.world.overrides import NO_OVERRIDES, Overrides, override
 from steptwin.world.reader import TomlText, read_table
-from steptwin.world.script import STEPS, read_steps
 from steptwin.world.sense import check_sense
 from steptwin.world.spec import LineSpec, ScriptSpec, WorldSpec
+from steptwin.world.steptable import STEPS, read_steps
 from steptwin.world.tables import KEYS, SEED, tables
 
 

@@ -179,14 +179,16 @@ class Absolute:
 # ---------------------------------------------------------------------- when it changes
 
 
-class Course(Protocol):
+class MovingSignal(Protocol):
     """A signal that moves, as `steptwin.world.expression.Signal`."""
 
     def value(self, now: Nanos) -> float: ...
     def turns(self, now: Nanos) -> Iterator[Nanos]: ...
 
 
-def next_change(quantity: Quantity, moving: Mapping[str, Course], at_rest: Callable[[str], float], now: Nanos) -> Nanos | None:
+def next_change(
+    quantity: Quantity, moving: Mapping[str, MovingSignal], at_rest: Callable[[str], float], now: Nanos
+) -> Nanos | None:
     """First whole nanosecond after ``now`` at which a quantity is on another side of 0 (below, at, above); None if never.
 
     Between their turns signals are monotonic, so that the ranges of an interval follow from its ends; it is halved until
@@ -200,7 +202,7 @@ def next_change(quantity: Quantity, moving: Mapping[str, Course], at_rest: Calla
 class _Search:
     __slots__ = ("_at_rest", "_looks", "_moving", "_quantity")
 
-    def __init__(self, quantity: Quantity, moving: Mapping[str, Course], at_rest: Callable[[str], float]) -> None:
+    def __init__(self, quantity: Quantity, moving: Mapping[str, MovingSignal], at_rest: Callable[[str], float]) -> None:
         self._quantity = quantity
         self._moving = moving
         self._at_rest = at_rest

@@ -12,8 +12,8 @@ from steptwin.world import script as do
 from steptwin.world.actions import Bytes, Download, ExternalInput, Leave, See, SetVariable
 from steptwin.world.faults import Fault
 from steptwin.world.motions import motion_ends, ordered
-from steptwin.world.script import STEPS
 from steptwin.world.spec import ScriptSpec
+from steptwin.world.steptable import STEPS
 from steptwin.world.tomlplaces import Path
 
 if TYPE_CHECKING:

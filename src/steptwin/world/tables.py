@@ -17,8 +17,8 @@ from steptwin.world.elements import ELEMENTS
 from steptwin.world.kinds import KINDS, line_kinds
 from steptwin.world.links import LINK_KEYS
 from steptwin.world.reader import Key, optional
-from steptwin.world.script import STEPS
 from steptwin.world.sense import TableRows, of_lines
+from steptwin.world.steptable import STEPS
 from steptwin.world.values import (
     flag,
     name_value,

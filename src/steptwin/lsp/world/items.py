@@ -12,7 +12,7 @@ from steptwin.symbols import SymbolKind
 from steptwin.world.kind import AnyKind
 from steptwin.world.kinds import KINDS
 from steptwin.world.reader import Key
-from steptwin.world.script import ACTIONS
+from steptwin.world.steptable import ACTIONS
 from steptwin.world.tables import all_keys, written
 from steptwin.world.values import ANALOG_INPUT, DIGITAL_INPUT, OUTPUT, NameOf, PinOf, Word, flag
 

@@ -62,7 +62,7 @@ class ShaftSpec(NamedSpec):
 
 
 @dataclass(frozen=True, slots=True)
-class Shaft:
+class GearedShaft:
     spec: ShaftSpec
     axis: BuiltAxis
 
@@ -111,19 +111,19 @@ def _refers(spec: ShaftSpec, world: WorldSpec) -> Iterator[Reference]:
         yield Reference(machine, cam.target[0], (*cam.path, "to"))
 
 
-def _build(spec: ShaftSpec, site: Site) -> Shaft:
-    shaft = Shaft(spec, find_axis(spec.axis, site))
+def _build(spec: ShaftSpec, site: Site) -> GearedShaft:
+    shaft = GearedShaft(spec, find_axis(spec.axis, site))
     for n, cam in enumerate(spec.cams, start=1):
         site.unless_wrong(cam.path, partial(_put_cam, shaft, cam, lane_of(spec.name, n), site))
     return shaft
 
 
-def _put_cam(shaft: Shaft, cam: CamSpec, lane: str, site: Site) -> None:
+def _put_cam(shaft: GearedShaft, cam: CamSpec, lane: str, site: Site) -> None:
     mechanism = shaft.axis.mechanism
     put_switch(shaft.axis.kernel, mechanism, mechanism.machine, shaft.zone(cam), cam, lane, site)
 
 
-def _signals(shaft: Shaft) -> Mapping[str, SignalOf]:
+def _signals(shaft: GearedShaft) -> Mapping[str, SignalOf]:
     turning = partial(turns_of_axis, shaft.axis)
     return {"angle": SignalOf((shaft.axis.kernel,), shaft.angle, turning, shaft.axis.mechanism.version, "degree")}
 
@@ -135,7 +135,7 @@ def _ratio(value: Any) -> float:
     return found
 
 
-SHAFT: Element[ShaftSpec, Shaft] = Element(
+SHAFT: Element[ShaftSpec, GearedShaft] = Element(
     name="shaft",
     spec=ShaftSpec,
     rows=TableRows(
