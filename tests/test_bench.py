@@ -21,7 +21,7 @@ def test_an_unknown_name_is_refused_before_anything_is_measured(
 ) -> None:
     assert run(monkeypatch, "motion", "peers") == 2
     written = capsys.readouterr()
-    assert "nothing is called peers: there are tcp, pty, fleet, drivers, " in written.err
+    assert "nothing is called peers: there are tcp, pty, fleet, " in written.err
     assert written.out == ""
 
 

@@ -248,3 +248,28 @@ def test_a_chip_without_a_text() -> None:
         [],
         0,
     )
+
+
+@pytest.mark.parametrize("machine", ["m", "c"])
+def test_a_hook_at_places_is_called_there_as_one_at_all_statements(machine: str) -> None:
+    found: dict[bool, list[tuple[int, Place | None]]] = {True: [], False: []}
+    for at_all, mine in found.items():
+        world = two()
+        programs = world.programs[machine]
+        (text,) = programs.texts
+        place = Place(text, list(programs.labels(text).values())[-1])
+        wanted = {Place(text, number) for number in range(3)} | {place}
+
+        def note(now: int, number: int, mine: list[tuple[int, Place | None]] = mine, programs: Programs = programs) -> None:
+            mine.append((now, programs.place(number)))
+
+        programs.hook(note, None if at_all else wanted)
+        world.run_to(SECOND)
+        count = len(mine)
+        programs.unhook(note)
+        world.run_to(2 * SECOND)
+        assert len(mine) == count
+        if at_all:
+            mine[:] = [one for one in mine if one[1] in wanted]
+    assert len(found[True]) >= 3
+    assert found[True] == found[False]
