@@ -60,6 +60,8 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 STEPTWIN = str(Path(sys.executable).with_name("steptwin"))
 
 PEER_FIXTURES = {"require_peer", "require_library"}
+PROCESS_FIXTURES = {*PEER_FIXTURES, "serve", "start_studio"}
+"""Processes, which run in wall time, on a machine that may have other work."""
 SOAK_TESTS = Path(__file__).with_name("soak")
 
 
@@ -69,11 +71,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     except ValueError as error:
         raise pytest.UsageError(str(error)) from error
     for item in items:
-        if PEER_FIXTURES.intersection(getattr(item, "fixturenames", ())):
+        fixtures = set(getattr(item, "fixturenames", ()))
+        if fixtures & PEER_FIXTURES:
             item.add_marker(pytest.mark.peers)
-            if os.environ.get("STEPTWIN_REQUIRE_PEERS") == "1":
-                # Browsers and other programs run in wall time, on a machine that may have other work.
-                item.add_marker(pytest.mark.flaky(reruns=1))
+        if fixtures & PROCESS_FIXTURES and os.environ.get("STEPTWIN_REQUIRE_PEERS") == "1":
+            item.add_marker(pytest.mark.flaky(reruns=1))
         if item.path.is_relative_to(SOAK_TESTS):
             item.add_marker(pytest.mark.soak)
             item.add_marker(pytest.mark.timeout(soak_limit))
