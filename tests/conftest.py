@@ -60,9 +60,10 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 STEPTWIN = str(Path(sys.executable).with_name("steptwin"))
 
 PEER_FIXTURES = {"require_peer", "require_library"}
-PROCESS_FIXTURES = {*PEER_FIXTURES, "serve", "start_studio"}
-"""Processes, which run in wall time, on a machine that may have other work."""
-SOAK_TESTS = Path(__file__).with_name("soak")
+IN_WALL_TIME = ("cli", "dap", "live", "monitor", "peers", "studio", "test_docs_run.py", "test_other_systems.py")
+"""Tests with processes of their own, on a machine that may have other work."""
+TESTS = Path(__file__).parent
+SOAK_TESTS = TESTS / "soak"
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -71,10 +72,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     except ValueError as error:
         raise pytest.UsageError(str(error)) from error
     for item in items:
-        fixtures = set(getattr(item, "fixturenames", ()))
-        if fixtures & PEER_FIXTURES:
+        has_peer = bool(PEER_FIXTURES.intersection(getattr(item, "fixturenames", ())))
+        if has_peer:
             item.add_marker(pytest.mark.peers)
-        if fixtures & PROCESS_FIXTURES and os.environ.get("STEPTWIN_REQUIRE_PEERS") == "1":
+        is_in_wall_time = any(item.path.is_relative_to(TESTS / part) for part in IN_WALL_TIME)
+        if os.environ.get("STEPTWIN_REQUIRE_PEERS") == "1" and (has_peer or is_in_wall_time):
             item.add_marker(pytest.mark.flaky(reruns=1))
         if item.path.is_relative_to(SOAK_TESTS):
             item.add_marker(pytest.mark.soak)
