@@ -16,6 +16,7 @@ from tests.conftest import until
 
 from steptwin.live.remote import ask
 from steptwin.subject.commands import Pause, ReadPoints, Resume, Time
+from steptwin.subject.debugcommands import ListBreakpoints
 
 
 @pytest.fixture
@@ -95,6 +96,18 @@ def test_who_detaches_leaves_the_twin_as_it_was_found(twin: Path, client: DapCli
     assert paused()
     client.ask("disconnect")
     until(lambda: not paused(), "it goes on")
+
+
+def test_an_editor_that_ends_leaves_the_twin_as_it_was_found(twin: Path) -> None:
+    client = DapClient()
+    attach(client, twin="two")
+    client.ask("setBreakpoints", source={"path": str(twin / "m.prg")}, breakpoints=[{"line": 7}])
+    client.ask("setExceptionBreakpoints", filters=["limit"])
+    client.ask("configurationDone")
+    client.event("stopped")
+    assert client.end() == 0
+    assert not paused()
+    assert ask("two", ListBreakpoints()) == {"breakpoints": [], "stop_on": [], "stop": None}
 
 
 def test_what_others_do_is_seen(twin: Path, client: DapClient) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from dap_client import DapClient, Refused
+from dap_client import LONG_S, DapClient, Refused
 from debug_rig import BOTH, CHIP, WBC
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -218,3 +218,25 @@ def test_requests_that_make_no_sense_are_refused_and_the_session_goes_on(client:
         with pytest.raises(Refused, match=problem):
             client.ask(command, **arguments)
     assert where(client) == ("program", 1)
+
+
+def test_a_breakpoint_of_another_type_is_refused_and_the_next_is_set(client: DapClient, program: str) -> None:
+    client.launch(program=program)
+    for wrong in ({"line": 3, "condition": {"n": 3}}, {"line": 3, "logMessage": 5}, {"line": "3"}, {}):
+        with pytest.raises(Refused, match="expected a text|an argument is missing or of another type"):
+            client.ask("setBreakpoints", source={"path": program}, breakpoints=[wrong])
+    (label,) = client.ask("setFunctionBreakpoints", breakpoints=[{"name": "COUNT"}])["breakpoints"]
+    assert label["verified"]
+    with pytest.raises(Refused, match="is no such|expected|found"):
+        client.ask("evaluate", expression="\ud800", frameId=1000)
+
+
+def test_what_is_no_message_ends_the_session() -> None:
+    client = DapClient()
+    stream = client.process.stdin
+    assert stream is not None
+    data = b"[" * 200_000
+    stream.write(b"Content-Length: %d\r\n\r\n" % len(data) + data)
+    stream.flush()
+    assert client.process.wait(LONG_S) == 0
+    client.end()

@@ -47,6 +47,12 @@ def test_no_text_does_anything_else_than_give_a_number_or_a_reason(text: str) ->
         assert isinstance(Expression(text).value(lambda name: 1.0), float)
 
 
+@pytest.mark.parametrize("text", ["1e999", "9e300 * 9e300", "1e308 + 1e308 - 1e308", "1 / 4e-324 % 3", "-1e308 - 1e308"])
+def test_numbers_stay_finite(text: str) -> None:
+    with pytest.raises(Misuse, match=r"too large: permitted are numbers up to 1\.8e\+308"):
+        Expression(text).value(NAMES.__getitem__)
+
+
 def test_logs_and_hit_counts() -> None:
     assert LogText("n is {n}, then {n + 0.5}").shown(NAMES.__getitem__) == "n is 7, then 7.5"
     assert [hit for hit in range(1, 8) if HitCount("% 3").counts(hit)] == [3, 6]

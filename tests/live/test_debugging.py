@@ -21,6 +21,7 @@ from steptwin.machine import MILLISECOND, SECOND
 from steptwin.subject.commands import read_command
 from steptwin.subject.events import Event
 from steptwin.subject.following import filter_of
+from steptwin.world import history
 
 Run = Callable[..., Any]
 
@@ -92,7 +93,7 @@ def scene(run: Run, play: Callable[[Rig], Awaitable[None]]) -> None:
         rig = Rig()
         await play(rig)
         rig.following.close()
-        assert rig.live.gate is None
+        assert rig.live.run_control is None
         rig.pace.close()
         rig.cell.close()
         session = session_of(rig.world)
@@ -305,3 +306,64 @@ def test_what_cannot_be_is_refused(run: Run) -> None:
             rig.do("branch")
 
     scene(run, play)
+
+
+def test_a_condition_without_a_finite_value_stops_and_the_world_goes_on(run: Run) -> None:
+    async def play(rig: Rig) -> None:
+        rig.line(line=3, condition="9e307 * 9e307 % 2 = 1")
+        assert await rig.stop() == ("breakpoint", 3)
+        for do, fields in (("evaluate", {}), ("set_value", {"name": "n"})):
+            with pytest.raises(Misuse, match="too large"):
+                rig.do(do, machine="table", expression="1e400", **fields)
+        rig.do("clear_breakpoint", breakpoint=1)
+        rig.do("resume")
+        now = rig.world.now
+        await asyncio.sleep(1)
+        rig.do("pause")
+        assert rig.world.now >= now + SECOND
+
+    scene(run, play)
+
+
+def test_another_speed_does_not_pass_over_a_breakpoint(run: Run) -> None:
+    async def play(rig: Rig) -> None:
+        rig.line(line=3)
+        await rig.stop()
+        rig.do("resume")
+        rig.cell.close()  # as in an event loop that is late
+        await asyncio.sleep(0.3)
+        assert rig.do("resume", speed=2.0)["paused"]
+        assert await rig.stop() == ("breakpoint", 3)
+        assert rig.value("n") == 1
+
+    scene(run, play)
+
+
+def test_more_inputs_than_are_kept_while_time_stands(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def play(rig: Rig) -> None:
+        rig.line(line=3)
+        await rig.stop()
+        rig.do("resume")
+        await rig.stop()
+        monkeypatch.setattr(history, "MOST_INPUTS", 50)
+        for number in range(200):
+            rig.do("set", levels={"table.IN5": number % 2})
+        rig.do("resume")
+        assert await rig.stop() == ("breakpoint", 3)
+        assert rig.value("n") == 2
+
+    scene(run, play)
+
+
+def test_a_world_without_programs_does_not_keep_its_past(run: Run) -> None:
+    async def play() -> None:
+        rig = Rig('[[mic488]]\nname = "table"\n')
+        for _ in range(3):
+            with pytest.raises(Misuse, match="no controller has a program"):
+                rig.do("debug")
+        assert rig.live.history is None
+        assert not rig.world.input_watchers
+        rig.pace.close()
+        rig.cell.close()
+
+    run(play())

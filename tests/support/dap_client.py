@@ -78,6 +78,10 @@ class DapClient:
 
     def close(self) -> int:
         self.send("disconnect")
+        return self.end()
+
+    def end(self) -> int:
+        """As an editor that ends without a word; the exit code."""
         assert self.process.stdin is not None
         self.process.stdin.close()
         code = self.process.wait(LONG_S)

@@ -11,13 +11,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from steptwin.dap.arguments import data_point, label_point, line_points
 from steptwin.dap.attach import AttachedTwin
 from steptwin.dap.launch import Launch, open_world, read_launch
 from steptwin.dap.sources import Sources, texts_of
 from steptwin.dap.target import Target
+from steptwin.debug.breakpoints import AnyPoint
 from steptwin.debug.debugger import Debugger, Travel
-from steptwin.debug.points import AnyPoint
-from steptwin.debug.values import DataPoint, Events, LabelPoint, LinePoint, Location, SetPoint, Stop, StopReason, Value
+from steptwin.debug.values import Events, Location, SetPoint, Stop, StopReason, Value
 from steptwin.durations import duration
 from steptwin.errors import LineFailure, Misuse, SteptwinError
 from steptwin.files.world import World
@@ -200,19 +201,14 @@ class Adapter:
         if not texts:
             reason = f"{path.name} is no program of this session: there are {self._sources.known}"
             return {"breakpoints": [{"verified": False, "message": reason} for _ in wanted]}
-        points: list[AnyPoint] = []
-        for one in wanted:
-            more = {ours: one[theirs] for ours, theirs in _OF_POINTS.items() if one.get(theirs)}
-            line = one["line"] - self._first_line + 1
-            points += [LinePoint(machine=text.machine, text=text.text, line=line, **more) for text in texts]
+        points: list[AnyPoint] = [point for one in wanted for point in line_points(one, self._first_line, texts)]
         self._lines[path] = points
         # One breakpoint of the editor is one in each controller that executes the file.
         found = self._set_all(points)[:: len(texts)]
         return {"breakpoints": [self._point(one, arguments["source"]) for one in found]}
 
     def _set_labels(self, arguments: Arguments) -> Body:
-        more = [{ours: one[theirs] for ours, theirs in _OF_LABELS.items() if one.get(theirs)} for one in arguments["breakpoints"]]
-        self._labels = [LabelPoint(label=one["name"], **its) for one, its in zip(arguments["breakpoints"], more, strict=True)]
+        self._labels = [label_point(one) for one in arguments["breakpoints"]]
         return {"breakpoints": [self._point(one) for one in self._set_all(self._labels)]}
 
     def _data_info(self, arguments: Arguments) -> Body:
@@ -227,12 +223,8 @@ class Adapter:
         return {"dataId": f"{machine}/{name}", "description": f"{name} of {machine}", "accessTypes": ["write"]}
 
     def _set_data(self, arguments: Arguments) -> Body:
-        points: list[AnyPoint] = []
-        for one in arguments["breakpoints"]:
-            machine, _, name = one["dataId"].partition("/")
-            points.append(DataPoint(machine=machine, name=name, condition=one.get("condition") or None))
-        self._data = points
-        return {"breakpoints": [self._point(one) for one in self._set_all(points)]}
+        self._data = [data_point(one) for one in arguments["breakpoints"]]
+        return {"breakpoints": [self._point(one) for one in self._set_all(self._data)]}
 
     def _set_all(self, wanted: Sequence[AnyPoint]) -> Sequence[SetPoint]:
         """Set all breakpoints; what became of some of them."""
@@ -449,8 +441,6 @@ class Adapter:
         self._log(time, text, Location(machine, program, "", line, 1, line, 1))
 
 
-_OF_POINTS = {"condition": "condition", "hits": "hitCondition", "log": "logMessage"}
-_OF_LABELS = {"condition": "condition", "hits": "hitCondition"}
 _RUNNING = ("continue", "reverseContinue", "next", "stepIn", "stepOut", "stepBack")
 _HANDLERS: Mapping[str, Callable[[Adapter, Arguments], Body]] = {
     "initialize": Adapter._initialize,

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from steptwin.debug.breakpoints import AnyPoint
 from steptwin.debug.debugger import Travel
-from steptwin.debug.points import AnyPoint
 from steptwin.debug.values import (
     DataPoint,
     Events,
@@ -51,9 +51,11 @@ class AttachedTwin:
         self._subject = RemoteSubject(name)
         self._log = log
         self._set: dict[AnyPoint, SetPoint] = {}
+        self._has_set_events = False
         try:
             self._following = self._subject.follow(filter_of(["stopped", "log", "pace"]), MOST_EVENTS)
             self._found = self._ask(command.Debug())
+            self._events_before: list[str] = self._ask(command.ListBreakpoints())["stop_on"]
             self._texts = {one["name"]: self._sources(one) for one in self._found["machines"]}
             file = self._ask(EndPoints()).get("file")
         except BaseException:
@@ -71,9 +73,11 @@ class AttachedTwin:
         return {one["program"]: SourceText(one["source"], one["text"]) for one in found}
 
     def close(self) -> None:
-        """Debug no more; a twin that went on when this began goes on."""
+        """Debug no more; a twin that went on when this began goes on, and stops at the events at which it did."""
         try:
             self.set_breakpoints(())
+            if self._has_set_events:
+                self._ask(command.StopOn(tuple(self._events_before)))
             if self._was_going and self._ask(Time())["paused"]:
                 self._ask(Resume())
         finally:
@@ -165,6 +169,7 @@ class AttachedTwin:
 
     def set_events(self, events: Iterable[Events]) -> None:
         self._ask(command.StopOn(tuple(event.code for event in events)))
+        self._has_set_events = True
 
     # ------------------------------------------------------------------ time
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import traceback
 from collections.abc import Mapping
+from contextlib import suppress
 from itertools import count
 from queue import Empty, SimpleQueue
 from threading import Thread
@@ -33,9 +34,22 @@ class _Session:
         self._numbers = count(1)
         self._waiting: SimpleQueue[dict[str, Any] | Misuse | None] = SimpleQueue()
         self._adapter = Adapter(self._event)
+        self._is_over = False
+        """Nobody reads what is written."""
 
     def run(self) -> None:
+        """Serve until the editor disconnects or is gone; in both cases a twin is left as it was found."""
         Thread(target=self._read, daemon=True).start()
+        try:
+            self._serve()
+        except BrokenPipeError:
+            sys.stderr.write("steptwin dap: the editor is gone\n")
+        finally:
+            self._is_over = True
+            with suppress(SteptwinError):
+                self._adapter.answer("disconnect", {})
+
+    def _serve(self) -> None:
         while True:
             try:
                 patience_s = self._adapter.patience_s
@@ -86,6 +100,8 @@ class _Session:
         self._write({"type": "event", "event": name, "body": body})
 
     def _write(self, message: Mapping[str, object]) -> None:
+        if self._is_over:
+            return
         self._target.write(message_bytes({"seq": next(self._numbers), **message}))
         self._target.flush()
 

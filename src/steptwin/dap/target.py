@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Protocol
 
+from steptwin.debug.breakpoints import AnyPoint
 from steptwin.debug.debugger import Travel
-from steptwin.debug.points import AnyPoint
 from steptwin.debug.values import Events, Scope, SetPoint, StackFrame, Stop, Value
 from steptwin.diagnostics import SourceText
 from steptwin.machine import Nanos

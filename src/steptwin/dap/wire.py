@@ -36,7 +36,7 @@ def read_message(stream: BinaryIO) -> dict[str, Any] | None:
         return None
     try:
         message = json.loads(data)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise Misuse(f"this is no JSON: {error}") from None
     if not isinstance(message, dict):
         raise Misuse("a message is an object of JSON")
@@ -44,5 +44,5 @@ def read_message(stream: BinaryIO) -> dict[str, Any] | None:
 
 
 def message_bytes(message: Mapping[str, object]) -> bytes:
-    data = json.dumps(message, ensure_ascii=False, separators=(",", ":")).encode()
+    data = json.dumps(message, ensure_ascii=False, separators=(",", ":")).encode(errors="replace")
     return b"Content-Length: %d\r\n\r\n" % len(data) + data

@@ -12,9 +12,9 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Se
 from typing import TypeAlias, TypeVar
 
 from steptwin.debug import scopes
+from steptwin.debug.breakpoints import AnyPoint, Breakpoints
 from steptwin.debug.expression import number_text
 from steptwin.debug.observer import Logged
-from steptwin.debug.points import AnyPoint, Points
 from steptwin.debug.scout import Goal, Parts, Scout
 from steptwin.debug.values import Events, Location, Scope, SetPoint, StackFrame, Stop, StopReason, Value
 from steptwin.diagnostics import SourceText
@@ -44,7 +44,7 @@ class Debugger:
     programs whose statements take no time.
 
     Methods that go forwards or backwards (``step_in``) give the `Stop`; those of the other form (``stepping_in``) do the same in
-    parts (`Travel`). They need a world whose time nobody else advances. One that goes on by itself asks `ahead` before it does.
+    parts (`Travel`). They need a world whose time nobody else advances. One that goes on by itself calls `look_ahead` before.
 
     ``history``: the past of the world, where it is kept already. ``apply_input`` and ``go_back`` act on a world that others use,
     too.
@@ -65,7 +65,7 @@ class Debugger:
                 raise Misuse(f"{name}: statement_time = 0: a debugger stops between statements, which must take 1 µs at least")
         self._world = world
         self._statement = min(programs.statement_time for programs in debugged.values())
-        self._points = Points(world.programs)
+        self._points = Breakpoints(world.programs)
         self._apply_input = apply_input or world.apply_input
         self._go_back = go_back or self._take_back
         world.settle_all()
@@ -298,7 +298,7 @@ class Debugger:
 
     # ------------------------------------------------------------------ a world that goes on by itself
 
-    def ahead(self, until: Nanos, goal: Goal, after: Nanos) -> Stop | None:
+    def look_ahead(self, until: Nanos, goal: Goal, after: Nanos) -> Stop | None:
         """The first reason to stop between the present and ``until``, after another moment; the world is brought to it, or to
         ``until``, before the next call."""
         scout = self._scout

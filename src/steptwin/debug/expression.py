@@ -15,8 +15,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from math import fmod
+from math import fmod, isfinite
 from operator import add, eq, ge, gt, le, lt, mul, ne, sub
+from sys import float_info
 from typing import TypeAlias
 
 from steptwin.errors import Misuse
@@ -56,7 +57,7 @@ class Expression:
         return not any("." in name for name in self.names)
 
     def value(self, names: Names) -> float:
-        """Raises `Misuse` for a name that means nothing, and a division by zero."""
+        """Raises `Misuse` for a name that means nothing, a division by zero, and a result that is too large."""
         return float(self._node(names))
 
 
@@ -192,7 +193,7 @@ class _Parser:
         kind, text, _ = self._tokens[self._at] if self._at < len(self._tokens) else ("", "", 0)
         if kind == "number":
             self._at += 1
-            number = float(text)
+            number = _finite(float(text), text)
             return lambda names: number
         if kind == "name" and text.lower() not in ("and", "or", "not"):
             self._at += 1
@@ -202,7 +203,14 @@ class _Parser:
 
 
 def _applied(operation: Callable[[float, float], float], left: _Node, right: _Node) -> _Node:
-    return lambda names: float(operation(left(names), right(names)))
+    return lambda names: _finite(float(operation(left(names), right(names))), "a result")
+
+
+def _finite(value: float, what: str) -> float:
+    """Raises `Misuse` for infinity, with which nothing can be calculated, set or sent."""
+    if not isfinite(value):
+        raise Misuse(f"{what} is too large: permitted are numbers up to {float_info.max:.3g}")
+    return value
 
 
 def _either(left: _Node, right: _Node) -> _Node:

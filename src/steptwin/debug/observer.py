@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 from typing import NamedTuple
 
-from steptwin.debug.points import Point, Points
+from steptwin.debug.breakpoints import Breakpoint, Breakpoints
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.statements import StatementHook
@@ -24,8 +24,8 @@ class Begun(NamedTuple):
     machine: str
     place: Place
     depth: int
-    hit: tuple[Point, ...]
-    undecided: tuple[Point, ...]
+    hit: tuple[Breakpoint, ...]
+    undecided: tuple[Breakpoint, ...]
 
     @property
     def stand(self) -> Nanos:
@@ -55,7 +55,7 @@ class Observer:
     Of controllers in ``stepping`` every statement is noted; of others those at breakpoints. It notes only while ``is_on``.
     """
 
-    def __init__(self, world: Plant, points: Points) -> None:
+    def __init__(self, world: Plant, points: Breakpoints) -> None:
         self.world = world
         self.points = points
         self.is_on = False
@@ -111,9 +111,9 @@ class Observer:
 
         return hook
 
-    def _begins(self, now: Nanos, machine: str, programs: Programs, place: Place, points: Collection[Point]) -> None:
-        hit: list[Point] = []
-        undecided: list[Point] = []
+    def _begins(self, now: Nanos, machine: str, programs: Programs, place: Place, points: Collection[Breakpoint]) -> None:
+        hit: list[Breakpoint] = []
+        undecided: list[Breakpoint] = []
         for point in points:
             if point.condition is not None and not point.condition.is_local:
                 undecided.append(point)
@@ -125,7 +125,7 @@ class Observer:
         if hit or undecided or machine in self.stepping:
             self.begun.append(Begun(now, machine, place, programs.depth(), tuple(hit), tuple(undecided)))
 
-    def _log(self, now: Nanos, machine: str, place: Place, point: Point, names: Callable[[str], float]) -> None:
+    def _log(self, now: Nanos, machine: str, place: Place, point: Breakpoint, names: Callable[[str], float]) -> None:
         if point.log is not None:
             try:
                 text = point.log.shown(names)

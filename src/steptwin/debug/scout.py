@@ -10,8 +10,8 @@ from dataclasses import replace
 from typing import NamedTuple, TypeAlias
 
 from steptwin.debug import scopes
+from steptwin.debug.breakpoints import Breakpoints, Watch
 from steptwin.debug.observer import Begun, Logged, Observer
-from steptwin.debug.points import Points, Watch
 from steptwin.debug.values import LabelPoint, Stop, StopReason
 from steptwin.machine import Nanos
 from steptwin.subject.time import next_due
@@ -44,7 +44,7 @@ class Candidate(NamedTuple):
 class Scout:
     """Of the world of ``history``."""
 
-    def __init__(self, history: History, points: Points) -> None:
+    def __init__(self, history: History, points: Breakpoints) -> None:
         self._history = history
         self._points = points
         self._past = Past(history)
@@ -130,7 +130,9 @@ class Scout:
         """Be at the present. What has come from outside since it was there, and what that has led to at once, is observed: it has
         happened, so a stop is at the present, too."""
         present = self.present
-        if not self._past.is_in_step:
+        if not self._past.is_in_step or not self._past.can_go_on:
+            if not len(self._history):  # more came in than is kept
+                self._history.take()
             yield from self.look_at(present)
         if not self._past.lacks_inputs:
             return None

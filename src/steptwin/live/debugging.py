@@ -1,8 +1,8 @@
 """The debugger of a world that runs in real time (`steptwin.subject.debugcommands`).
 
-It is there while somebody follows its events. Before the world goes on, the debugger goes ahead (`Debugger.ahead`) and says up to
-where it may; so time stops at a breakpoint, and `Pause` and `Resume` do what they always do. While time stands it can look at the
-past, as far as that is kept.
+It exists while its events are followed. Before the world goes on, the debugger looks ahead (`Debugger.look_ahead`) and limits
+it; so time stops at a breakpoint, and `Pause` and `Resume` do what they always do. While time stands it can look at the past, as
+far as that is kept.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from dataclasses import asdict, replace
 from time import perf_counter
 from typing import NamedTuple
 
+from steptwin.debug.breakpoints import AnyPoint
 from steptwin.debug.debugger import Debugger, Travel
 from steptwin.debug.observer import Logged
-from steptwin.debug.points import AnyPoint
 from steptwin.debug.scout import Goal
 from steptwin.debug.values import DataPoint, Events, LabelPoint, LinePoint, SetPoint, Stop, StopReason, Value
 from steptwin.errors import Misuse, Refusal, SteptwinError
@@ -34,7 +34,7 @@ from steptwin.world.plant import WORLD, PlantSnapshot, RecordedInput
 _EVENTS = complete("event", command.EVENTS, "codes", {event.code: event for event in Events})
 
 
-class _Breakpoint(NamedTuple):
+class _Requested(NamedTuple):
     wanted: command.SetBreakpoint
     point: AnyPoint
 
@@ -46,7 +46,7 @@ class Debugging:
         self._live = live
         self._cell = cell
         self._pace = pace
-        self._breakpoints: dict[int, _Breakpoint] = {}
+        self._breakpoints: dict[int, _Requested] = {}
         """They stay while nobody follows, and time does not stop at them then."""
         self._set: dict[int, SetPoint] = {}
         """What became of them."""
@@ -90,7 +90,7 @@ class Debugging:
         if same is not None:
             return self._plain(same)
         number, self._next = self._next, self._next + 1
-        self._breakpoints[number] = _Breakpoint(wanted, _point(wanted))
+        self._breakpoints[number] = _Requested(wanted, _point(wanted))
         self._set_all()
         if problem := self._set[number].problem:
             self._remove(number)
@@ -167,7 +167,7 @@ class Debugging:
 
 
 class _OpenDebugger:
-    """A debugger at work: the gate of its world.
+    """A debugger at work: the run control of its world.
 
     ``on_new_text`` is called when a controller has another program; ``numbers`` gives those of breakpoints.
     """
@@ -186,7 +186,11 @@ class _OpenDebugger:
         self._on_new_text = on_new_text
         self._numbers = numbers
         self._lookback = Lookback(live, cell, pace) if live.history is None else None
-        self.debugger = Debugger(live.world, live.history, live.apply_input, self._take_back)
+        try:
+            self.debugger = Debugger(live.world, live.history, live.apply_input, self._take_back)
+        except SteptwinError:
+            self._end_lookback()
+            raise
         self.debugger.on_log = self._log
         self._goal = Goal()
         self._after = live.now
@@ -203,39 +207,42 @@ class _OpenDebugger:
         self._then: Goal | None = None
         """What to look for when it has come to the present."""
         live.world.input_watchers.append(self._given)
-        live.gate = self
+        live.run_control = self
         if pace.is_paused:
             self.debugger.stand()
         else:
-            self.goes()
+            self.resumed()
 
     def close(self) -> None:
         self._end_travel()
         self._cell.enter()
-        self._live.gate = None
+        self._live.run_control = None
         self._live.world.input_watchers.remove(self._given)
         self.debugger.close()
-        if self._lookback is not None:
-            self._lookback.end()
+        self._end_lookback()
         self._live.stale = True
         self._cell.leave()
+
+    def _end_lookback(self) -> None:
+        if self._lookback is not None:
+            self._lookback.end()
 
     def _given(self, given: RecordedInput) -> None:
         if isinstance(given.what, Download):
             self._on_new_text()
 
-    # ------------------------------------------------------------------ the gate
+    # ------------------------------------------------------------------ run control
 
-    def ahead(self, until: Nanos) -> tuple[Nanos, bool]:
+    def look_ahead(self, until: Nanos) -> tuple[Nanos, bool]:
         if not self._goes:
             return until, False
-        stop = self.debugger.ahead(until, self._goal, self._after)
+        stop = self.debugger.look_ahead(until, self._goal, self._after)
         if stop is None or stop.reason is StopReason.WORLD:  # a script that stops the world does so by itself
             return until, False
         self._stop = stop
         return stop.time, True
 
-    def goes(self) -> None:
+    def resumed(self) -> None:
         self._end_travel()
         self.stopped = None
         if not self._goes:
@@ -243,7 +250,7 @@ class _OpenDebugger:
             self._after = self._live.now if self._begin is None else self._begin
             self._stop = self._begin = None
 
-    def stands(self) -> None:
+    def paused(self) -> None:
         if self._travel is not None:
             self._end_travel()
             self._say(self.debugger.pause())
@@ -253,7 +260,7 @@ class _OpenDebugger:
             self.debugger.stand()
             self._say(self._stop or Stop(StopReason.PAUSE, self._live.now))
 
-    def gone_back(self) -> None:
+    def restored(self) -> None:
         self._end_travel()
         self.debugger.gone_back()
         self.debugger.stand()

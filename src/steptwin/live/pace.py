@@ -68,9 +68,9 @@ class Pace:
         self._has_clients = has_clients
         self._turn: asyncio.Handle | None = None
         self._is_held = False
-        """Whether the gate of the world has ended a step."""
+        """Whether the debugger has ended a step."""
         cell.clock.stop(live.now)
-        live.on_gate = self._hold
+        live.on_break = self._hold
 
     def begin(self, speed: float) -> None:
         """Start time at ``speed``; 0: paused."""
@@ -86,14 +86,14 @@ class Pace:
         self._halt()
         if not self.is_paused:
             self._stand()
-        self._gate_stands()
+        self._report_pause()
 
     def _stand(self) -> None:
         self.is_paused = True
         self._say(_STANDS)
 
     def _hold(self) -> None:
-        """The gate of the world has stopped it."""
+        """The debugger has stopped it."""
         self._is_held = True
         self.close()
         self._cell.close()
@@ -101,9 +101,9 @@ class Pace:
         if not self.is_paused:
             self._stand()
 
-    def _gate_stands(self) -> None:
-        if self._live.gate is not None:
-            self._live.gate.stands()
+    def _report_pause(self) -> None:
+        if self._live.run_control is not None:
+            self._live.run_control.paused()
 
     def resume(self, speed: float | None = None) -> None:
         """Continue, at ``speed`` if given; while time runs, only the speed changes. Raises `Misuse`."""
@@ -113,7 +113,10 @@ class Pace:
         if speed is not None:
             self.speed = speed
         if changes:
+            was_paused = self.is_paused
             self._halt()
+            if self.is_paused and not was_paused:
+                return  # a debugger has stopped it on the way to the present
             self._say(self._goes())
             self.is_paused = False
             self._go()
@@ -133,8 +136,8 @@ class Pace:
         self._cell.clock.stop(self._live.now)
 
     def _go(self) -> None:
-        if self._live.gate is not None:
-            self._live.gate.goes()
+        if self._live.run_control is not None:
+            self._live.run_control.resumed()
         if self.speed == inf:
             self._turn = asyncio.get_running_loop().call_soon(self._run_freely)
             return
@@ -146,7 +149,7 @@ class Pace:
         """Run without a clock, in slices."""
         world, end = self._live.world, self._live.now + SLICE_NS
         self._turn = None
-        if self._live.gate is None:
+        if self._live.run_control is None:
             world.run(for_=SLICE_NS / SECOND)
             end = world.now
         self._live.advance(end)
@@ -181,8 +184,8 @@ class Pace:
         world = live.world
         until = perf_counter() + PART_S
         moves = self._is_held = False
-        if live.gate is not None:
-            live.gate.goes()
+        if live.run_control is not None:
+            live.run_control.resumed()
         try:
             while True:
                 if condition is not None and world.holds(condition):
@@ -237,7 +240,7 @@ class Pace:
         finally:
             following.close()
         if came is not None:
-            self._gate_stands()
+            self._report_pause()
         rest = {} if came is not None else {"to_ns": str(end)}
         return {
             **self.where(),

@@ -43,22 +43,22 @@ class Companion(Protocol):
     def advance(self, now: Nanos) -> None: ...
 
 
-class Gate(Protocol):
-    """Is asked before a world goes on, so that it stops where somebody debugs it."""
+class RunControl(Protocol):
+    """Of a debugger: decides up to where a world may go."""
 
-    def ahead(self, until: Nanos) -> tuple[Nanos, bool]:
+    def look_ahead(self, until: Nanos) -> tuple[Nanos, bool]:
         """The world is at the present; up to where it may go, at most to ``until``, and whether it is to stop there."""
         ...
 
-    def goes(self) -> None:
+    def resumed(self) -> None:
         """Time goes on from now."""
         ...
 
-    def stands(self) -> None:
-        """Time stands at the present, because of what `ahead` gave or otherwise."""
+    def paused(self) -> None:
+        """Time stands at the present, because of what `look_ahead` gave or otherwise."""
         ...
 
-    def gone_back(self) -> None:
+    def restored(self) -> None:
         """The world has gone back to the present moment; what was later has not happened."""
         ...
 
@@ -91,9 +91,9 @@ class LiveWorld:
         """``stale`` is to be set when its deadline has changed."""
         self.on_stop: Callable[[], None] | None = None
         """Called when a script has stopped the world."""
-        self.gate: Gate | None = None
-        self.on_gate: Callable[[], None] = lambda: None
-        """Called where the gate has stopped the world."""
+        self.run_control: RunControl | None = None
+        self.on_break: Callable[[], None] = lambda: None
+        """Called where the run control has stopped the world."""
 
     @property
     def now(self) -> Nanos:
@@ -158,8 +158,8 @@ class LiveWorld:
             port.join()
         if self.history is not None:
             self.history.gone_back()
-        if self.gate is not None:
-            self.gate.gone_back()
+        if self.run_control is not None:
+            self.run_control.restored()
         self.stale = True
 
     def session(self) -> sessions.Session:
@@ -178,23 +178,23 @@ class LiveWorld:
 
     def advance(self, now: Nanos) -> None:
         world = self.world
-        if self.gate is not None:
-            self._advance_gated(self.gate, now)
+        if self.run_control is not None:
+            self._advance_controlled(self.run_control, now)
         elif not self.stale and (self._next is None or now < self._next) and world.stopped is None and now >= world.now:
             world.now, world.is_settled = now, True  # as `Plant.advance` where nothing is due
         else:
             self._advance(now)
 
-    def _advance_gated(self, gate: Gate, now: Nanos) -> None:
-        """Advance in parts, between which the companion acts: the gate cannot foresee that."""
+    def _advance_controlled(self, control: RunControl, now: Nanos) -> None:
+        """Advance in parts, between which the companion acts: the run control cannot foresee that."""
         while True:
             acts = None if self.companion is None else self.companion.deadline()
             part = now if acts is None else min(now, max(acts, self.now + 1))
-            free, stops = gate.ahead(part)
+            free, stops = control.look_ahead(part)
             self._advance(free)
             if stops:
-                self.on_gate()
-                gate.stands()
+                self.on_break()
+                control.paused()
                 return
             if part == now or self.world.stopped is not None:
                 return

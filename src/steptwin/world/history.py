@@ -190,6 +190,11 @@ class Past:
         """Whether inputs have come since."""
         return self._inputs != self._history.inputs_so_far
 
+    @property
+    def can_go_on(self) -> bool:
+        """Whether the inputs since are still kept."""
+        return self._history.keeps_inputs_from(self._inputs)
+
     def go(self, moment: Nanos) -> Iterator[None]:
         """Go to a moment, in parts: it yields after each.
 
@@ -201,11 +206,7 @@ class Past:
         if self._branch != history.branch:
             self._near.clear()
         state = self._state_at(moment)
-        if (
-            not history.keeps_inputs_from(self._inputs)
-            or self._branch != history.branch
-            or not state.snapshot.now <= self.world.now <= moment
-        ):
+        if not self.can_go_on or self._branch != history.branch or not state.snapshot.now <= self.world.now <= moment:
             self.world.restore(state.snapshot)
             self._branch, self._inputs = history.branch, state.inputs
         kept = state.snapshot.now

@@ -14,10 +14,13 @@ from steptwin.machine import Nanos
 from steptwin.nearmiss import NearMiss
 from steptwin.world.programs import Place, Programs
 
+MOST_HITS = 1 << 16
+"""Hits of one breakpoint that can be found again in the past; older ones are only counted."""
+
 AnyPoint: TypeAlias = LinePoint | LabelPoint | DataPoint
 
 
-class Point:
+class Breakpoint:
     """A breakpoint at statements. Raises `Misuse` for a condition, hit count or log text that is none."""
 
     def __init__(self, number: int, asked: LinePoint | LabelPoint, places: Mapping[str, Sequence[Place]]) -> None:
@@ -32,7 +35,9 @@ class Point:
         if self.log is not None and any("." in name for name in self.log.names):
             raise Misuse(f"log {log!r}: only names of the program can be in it")
         self._times: array[int] = array("q")
-        """When the condition held, as far as hits are counted."""
+        """When the condition held, as far as hits are counted: the latest of them."""
+        self._dropped = 0
+        """Number of hits before those."""
 
     def holds(self, names: Names) -> bool:
         """Whether the condition holds. One that cannot be calculated does: it must not be overlooked."""
@@ -48,16 +53,19 @@ class Point:
         times = self._times
         if not times or time > times[-1]:
             times.append(time)
+            if len(times) > MOST_HITS:
+                self._dropped += MOST_HITS // 2
+                del times[: MOST_HITS // 2]
         at = bisect_left(times, time)
-        return times[at] == time and self._counts.counts(at + 1)
+        return times[at] == time and self._counts.counts(self._dropped + at + 1)
 
     def forget_after(self, time: Nanos) -> None:
         """What comes later will be different."""
         del self._times[bisect_left(self._times, time + 1) :]
 
-    def take_hits(self, other: Point) -> None:
+    def take_hits(self, other: Breakpoint) -> None:
         """Those of the same point, set before."""
-        self._times = other._times
+        self._times, self._dropped = other._times, other._dropped
 
 
 class Watch:
@@ -123,24 +131,24 @@ def _labels(programs: Mapping[str, Programs]) -> Iterator[tuple[str, str, str, i
                 yield machine, text, name, number
 
 
-class Points:
+class Breakpoints:
     """All breakpoints that are set."""
 
     def __init__(self, programs: Mapping[str, Programs]) -> None:
         self._programs = programs
-        self._all: list[Point] = []
+        self._all: list[Breakpoint] = []
         self.watches: list[Watch] = []
-        self.at: dict[str, dict[Place, list[Point]]] = {}
+        self.at: dict[str, dict[Place, list[Breakpoint]]] = {}
         """By controller and statement."""
         self._next = 1
 
     def set(self, asked: Sequence[AnyPoint]) -> list[SetPoint]:
         """Set these and no others. Those that were set before keep their number and their hits."""
-        known: dict[AnyPoint, Point] = {point.asked: point for point in self._all}
+        known: dict[AnyPoint, Breakpoint] = {point.asked: point for point in self._all}
         self._all, self.watches, self.at = [], [], {}
         return [self._set(one, known) for one in asked]
 
-    def _set(self, asked: AnyPoint, known: Mapping[AnyPoint, Point]) -> SetPoint:
+    def _set(self, asked: AnyPoint, known: Mapping[AnyPoint, Breakpoint]) -> SetPoint:
         before = known.get(asked)
         number = self._next if before is None else before.number
         self._next += before is None
@@ -154,7 +162,7 @@ class Points:
             else:
                 place, line = places_of_line(self._programs, asked)
                 places = {asked.machine: [place]}
-            point = Point(number, asked, places)
+            point = Breakpoint(number, asked, places)
         except Misuse as error:
             return SetPoint(number, problem=str(error))
         if before is not None:
