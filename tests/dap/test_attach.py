@@ -98,14 +98,17 @@ def test_who_detaches_leaves_the_twin_as_it_was_found(twin: Path, client: DapCli
     until(lambda: not paused(), "it goes on")
 
 
-def test_an_editor_that_ends_leaves_the_twin_as_it_was_found(twin: Path) -> None:
+@pytest.mark.parametrize("is_terminated", [False, True])
+def test_an_editor_that_ends_leaves_the_twin_as_it_was_found(twin: Path, is_terminated: bool) -> None:
     client = DapClient()
     attach(client, twin="two")
     client.ask("setBreakpoints", source={"path": str(twin / "m.prg")}, breakpoints=[{"line": 7}])
     client.ask("setExceptionBreakpoints", filters=["limit"])
     client.ask("configurationDone")
     client.event("stopped")
-    assert client.end() == 0
+    if is_terminated:
+        client.process.terminate()
+    client.end()
     assert not paused()
     assert ask("two", ListBreakpoints()) == {"breakpoints": [], "stop_on": [], "stop": None}
 

@@ -223,11 +223,11 @@ def test_requests_that_make_no_sense_are_refused_and_the_session_goes_on(client:
 def test_a_breakpoint_of_another_type_is_refused_and_the_next_is_set(client: DapClient, program: str) -> None:
     client.launch(program=program)
     for wrong in ({"line": 3, "condition": {"n": 3}}, {"line": 3, "logMessage": 5}, {"line": "3"}, {}):
-        with pytest.raises(Refused, match="expected a text|an argument is missing or of another type"):
+        with pytest.raises(Refused, match=r"expected a text|of another type"):
             client.ask("setBreakpoints", source={"path": program}, breakpoints=[wrong])
     (label,) = client.ask("setFunctionBreakpoints", breakpoints=[{"name": "COUNT"}])["breakpoints"]
     assert label["verified"]
-    with pytest.raises(Refused, match="is no such|expected|found"):
+    with pytest.raises(Refused, match="column 1: found"):
         client.ask("evaluate", expression="\ud800", frameId=1000)
 
 
