@@ -376,6 +376,8 @@ class AxisMotion(Stateful):
     def _guard_switches(self, now: Nanos) -> None:
         """Stop if the profile moves into an active limit switch, or note the moment at which it will (MIC-12)."""
         self._blocked_leg = None
+        if not self.config.limit_mode:  # each motion comes here
+            return
         blocked = [direction for direction in (-1, 1) if self._switch_blocks(direction)]
         for begin, direction in self.profile.legs(now) if blocked else ():
             if direction in blocked:
