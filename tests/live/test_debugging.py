@@ -58,7 +58,8 @@ class Rig:
     def __init__(self, text: str = TEXT, program: bytes = PROGRAM) -> None:
         loop = asyncio.get_running_loop()
         self.world = World.from_toml(text, {"count.prg": program})
-        self.live = LiveWorld(self.world)
+        self.notices: list[str] = []
+        self.live = LiveWorld(self.world, self.notices.append)
         self.cell = Cell(self.live, Clock(wall_ns=lambda: round(loop.time() * SECOND)))
         self.pace = Pace(self.live, self.cell, lambda _: None, has_clients=True)
         self.control = WorldControl(self.cell, self.live, self.pace, lambda: ["here"])
@@ -271,6 +272,7 @@ def test_whoever_does_not_follow_is_not_stopped_for(run: Run) -> None:
         number = rig.line(line=3)["number"]
         await rig.stop()
         rig.following.close()
+        assert rig.notices == ["the debugger is gone and time stands: 'steptwin resume' has it go on"]
         rig.do("resume")
         await asyncio.sleep(3)
         assert not rig.pace.is_paused
@@ -290,6 +292,9 @@ def test_what_cannot_be_is_refused(run: Run) -> None:
             ({"line": 3, "label": "MAIN"}, "one of line, label and value"),
             ({"line": 3, "machine": "table"}, "line needs program"),
             ({"label": "MAIN", "log": "x"}, "label takes no log"),
+            ({"value": "n", "machine": "nobody"}, "'nobody' has no program: table has one"),
+            ({"value": "table.OUT99", "machine": "table"}, "no signal 'table.OUT99'"),
+            ({"value": "nobody.x", "machine": "table"}, "'nobody.x' means nothing"),
             ({"label": "NOWHERE"}, "no label is called 'NOWHERE'"),
             ({"line": 99, "machine": "table", "program": "program 0"}, "no statement is in line 99"),
             ({"line": 3, "machine": "table", "program": "program 7"}, "no text 'program 7'"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from array import array
 from bisect import bisect_left
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TypeAlias
 
 from steptwin.debug.expression import Expression, HitCount, LogText, Names
@@ -98,11 +98,15 @@ def with_left_side(name: str, condition: str) -> str:
     return f"{name} {condition}" if condition.lstrip()[:1] in "<>=!" else condition
 
 
+def _programs_of(programs: Mapping[str, Programs], machine: str) -> Programs:
+    if machine not in programs:
+        raise Misuse(f"{machine!r} has no program: {', '.join(programs) or 'no controller'} has one")
+    return programs[machine]
+
+
 def places_of_line(programs: Mapping[str, Programs], asked: LinePoint) -> tuple[Place, int]:
     """The first statement in a line or after it, and its line. Raises `Misuse`."""
-    if asked.machine not in programs:
-        raise Misuse(f"{asked.machine!r} has no program: {', '.join(programs) or 'no controller'} has one")
-    own = programs[asked.machine]
+    own = _programs_of(programs, asked.machine)
     if asked.text not in own.texts:
         raise Misuse(f"{asked.machine} has no text {asked.text!r}: texts are {', '.join(own.texts)}")
     for number, statement in enumerate(own.statements(asked.text)):
@@ -132,10 +136,11 @@ def _labels(programs: Mapping[str, Programs]) -> Iterator[tuple[str, str, str, i
 
 
 class Breakpoints:
-    """All breakpoints that are set."""
+    """All breakpoints that are set. ``read``: what a name means to a controller; it raises `Misuse`."""
 
-    def __init__(self, programs: Mapping[str, Programs]) -> None:
+    def __init__(self, programs: Mapping[str, Programs], read: Callable[[str, str], float]) -> None:
         self._programs = programs
+        self._read = read
         self._all: list[Breakpoint] = []
         self.watches: list[Watch] = []
         self.at: dict[str, dict[Place, list[Breakpoint]]] = {}
@@ -154,7 +159,7 @@ class Breakpoints:
         self._next += before is None
         try:
             if isinstance(asked, DataPoint):
-                self.watches.append(Watch(number, asked))
+                self.watches.append(self._watch(Watch(number, asked)))
                 return SetPoint(number)
             line: int | None = None
             if isinstance(asked, LabelPoint):
@@ -172,6 +177,14 @@ class Breakpoints:
             for place in its_places:
                 self.at.setdefault(machine, {}).setdefault(place, []).append(point)
         return SetPoint(number, [place for its in places.values() for place in its], line)
+
+    def _watch(self, watch: Watch) -> Watch:
+        """Raises `Misuse` where it can never be hit; a name of the program may get its meaning later."""
+        _programs_of(self._programs, watch.machine)
+        for name in watch.expression.names:
+            if "." in name:
+                self._read(watch.machine, name)
+        return watch
 
     def forget_after(self, time: Nanos) -> None:
         for point in self._all:

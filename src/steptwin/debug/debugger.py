@@ -65,7 +65,7 @@ class Debugger:
                 raise Misuse(f"{name}: statement_time = 0: a debugger stops between statements, which must take 1 µs at least")
         self._world = world
         self._statement = min(programs.statement_time for programs in debugged.values())
-        self._points = Breakpoints(world.programs)
+        self._points = Breakpoints(world.programs, lambda machine, name: scopes.read(world, machine, name))
         self._apply_input = apply_input or world.apply_input
         self._go_back = go_back or self._take_back
         world.settle_all()

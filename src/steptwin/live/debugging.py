@@ -57,8 +57,11 @@ class Debugging:
 
     def _followed(self) -> None:
         if self._open is not None and not self._is_followed:
+            is_at_stop = self._open.is_at_stop
             self._open.close()
             self._open = None
+            if is_at_stop:
+                self._live.show("the debugger is gone and time stands: 'steptwin resume' has it go on")
 
     @property
     def _is_followed(self) -> bool:
@@ -212,6 +215,11 @@ class _OpenDebugger:
             self.debugger.stand()
         else:
             self.resumed()
+
+    @property
+    def is_at_stop(self) -> bool:
+        """Whether time stands because of the debugger, not of a pause."""
+        return self.stopped is not None and self.stopped["reason"] != StopReason.PAUSE.value
 
     def close(self) -> None:
         self._end_travel()
