@@ -22,10 +22,12 @@ from typing import Any, NamedTuple, Protocol, TypeAlias
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.points import FARTHEST_NS
-from steptwin.world.quantities import UNIT_NAMES, Absolute, NumberLiteral, Product, Quantity, SignalName, Sum, next_change
+from steptwin.world.quantities import LARGEST, UNIT_NAMES, Absolute, NumberLiteral, Product, Quantity, SignalName, Sum, next_change
 
 MOST_NESTED = 64
 """Limit of nesting, because the parser is recursive."""
+MOST_OPERATIONS = 200
+"""Limit of the signs + - * / of a condition, because they are evaluated recursively."""
 
 _COMPARE: dict[str, Callable[[float, float], bool]] = {"==": eq, "!=": ne, "<=": le, ">=": ge, "<": lt, ">": gt}
 _WORDS = ("and", "or", "not")
@@ -105,6 +107,8 @@ class _Parser:
     def __init__(self, text: str) -> None:
         self._text = text
         self._tokens = [(m.lastgroup or "", m[m.lastgroup or 0], m.start(m.lastgroup or 0)) for m in _TOKEN.finditer(text)]
+        if sum(token in ("+", "-", "*", "/") for _, token, _ in self._tokens) > MOST_OPERATIONS:
+            raise Misuse(f"condition {text[:40]!r}...: there are more than {MOST_OPERATIONS} of + - * /")
         self._at = 0
         self._depth = 0
 
@@ -217,6 +221,8 @@ class _Parser:
             raise self._wrong("a signal or a number")
         kind, text, _ = self._tokens[self._at]
         if kind == "number":
+            if float(text) > LARGEST:
+                raise self._wrong(f"a number up to {LARGEST:g}")
             self._at += 1
             return NumberLiteral(float(text), self._unit())
         if kind != "name" or text.lower() in _WORDS:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from heapq import merge
 from itertools import chain
-from math import inf, nan
+from math import inf, isnan, nan
 from typing import Protocol, TypeAlias
 
 from steptwin.errors import Misuse
@@ -25,11 +25,16 @@ VOLTS: Mapping[str, Fraction] = {"mV": Fraction(1, 1000), "V": Fraction(1)}
 UNITS: tuple[Mapping[str, Fraction], ...] = (LENGTHS, TURNS, TIMES, VOLTS)
 """Units that convert into each other."""
 UNIT_NAMES = frozenset(unit for kin in UNITS for unit in kin)
-MOST_LOOKS = 100_000
-"""Intervals that are looked at in one search; then it is continued later."""
+LARGEST = 1e200
+"""Largest number in a condition: no unit converts it to one that overflows."""
+MOST_LOOKS = 20_000
+"""Intervals that are looked at to the nanosecond in one search. Beyond it the resolution halves with each `LOOKS_MORE`."""
+LOOKS_MORE = 1000
 
 Range: TypeAlias = tuple[float, float]
 """Lowest and highest value."""
+_NO_NUMBER = 2
+"""The side of 0 of what is no number, besides -1, 0 and 1."""
 
 
 class Quantity(Protocol):
@@ -41,7 +46,7 @@ class Quantity(Protocol):
 
     def value(self, values: Callable[[str], float]) -> float: ...
     def range(self, ranges: Callable[[str], Range]) -> Range:
-        """All values that it can have while signals are within their ranges, or more."""
+        """All values that it can have while signals are within their ranges, or more; NaN if it may have no value."""
         ...
 
     def negative(self) -> Quantity: ...
@@ -144,9 +149,11 @@ class Product:
     def range(self, ranges: Callable[[str], Range]) -> Range:
         (a, b), (c, d) = self.left.range(ranges), self.right.range(ranges)
         if self.divides and c <= 0.0 <= d:
-            return -inf, inf
+            if a <= 0.0 <= b:
+                return nan, nan
+            return (-inf, inf) if c < d else (inf, inf) if a > 0.0 else (-inf, -inf)
         ends = [x / y if self.divides else x * y for x in (a, b) for y in (c, d)]
-        return min(ends), max(ends)
+        return (nan, nan) if any(map(isnan, ends)) else (min(ends), max(ends))
 
     def negative(self) -> Quantity:
         return Product(NumberLiteral(-1.0), self)
@@ -189,12 +196,12 @@ class MovingSignal(Protocol):
 def next_change(
     quantity: Quantity, moving: Mapping[str, MovingSignal], at_rest: Callable[[str], float], now: Nanos
 ) -> Nanos | None:
-    """First whole nanosecond after ``now`` at which a quantity is on another side of 0 (below, at, above); None if never.
+    """First whole nanosecond after ``now`` at which a quantity is on another side of 0 (below, at, above, no number); None if
+    never.
 
     Between their turns signals are monotonic, so that the ranges of an interval follow from its ends; it is halved until
-    its range is on one side, or it is a nanosecond long.
-
-    After `MOST_LOOKS` intervals the result is a moment before which nothing changes.
+    its range is on one side, or it is a nanosecond long. Where signals stay equal, as of two cylinders on one valve, that
+    has no end: after `MOST_LOOKS` intervals, changes of less than a growing time may be overlooked.
     """
     return _Search(quantity, moving, at_rest).first(now)
 
@@ -221,12 +228,17 @@ class _Search:
                 begin, values = end, there
         return None
 
+    @property
+    def _finest(self) -> Nanos:
+        """The length of intervals that are not halved any more while the ends are on the same side."""
+        return 1 << max(0, -((MOST_LOOKS - self._looks) // LOOKS_MORE))
+
     def _values(self, now: Nanos) -> Mapping[str, float]:
         return {name: signal.value(now) for name, signal in self._moving.items()}
 
     def _side(self, values: Mapping[str, float]) -> int:
         value = self._quantity.value(lambda name: values[name] if name in values else self._at_rest(name))
-        return (value > 0.0) - (value < 0.0)
+        return _NO_NUMBER if isnan(value) else (value > 0.0) - (value < 0.0)
 
     def _sides(self, ends: Iterable[Mapping[str, float]]) -> set[int]:
         """The sides of 0 that the range between the ends touches."""
@@ -239,16 +251,18 @@ class _Search:
             return min(one[name], other[name]), max(one[name], other[name])
 
         low, high = self._quantity.range(between)
+        if isnan(low) or isnan(high):
+            return {-1, 0, 1, _NO_NUMBER}
         return {side for side, touches in ((-1, low < 0.0), (0, low <= 0.0 <= high), (1, high > 0.0)) if touches}
 
     def _within(self, begin: Nanos, first: Mapping[str, float], end: Nanos, last: Mapping[str, float], side: int) -> Nanos | None:
-        if self._sides((first, last)) == {side}:
+        if first == last or self._sides((first, last)) == {side}:
             return None
         self._looks += 1
+        if end - begin <= self._finest and self._side(last) == side:
+            return None
         if end - begin == 1:
-            return None if self._side(last) == side else end
-        if self._looks > MOST_LOOKS:
-            return begin + 1
+            return end
         middle = (begin + end) // 2
         values = self._values(middle)
         found = self._within(begin, first, middle, values, side)
