@@ -22,7 +22,17 @@ from typing import Any, NamedTuple, Protocol, TypeAlias
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.points import FARTHEST_NS
-from steptwin.world.quantities import LARGEST, UNIT_NAMES, Absolute, NumberLiteral, Product, Quantity, SignalName, Sum, next_change
+from steptwin.world.quantities import (
+    LARGEST,
+    UNIT_NAMES,
+    Absolute,
+    NumberLiteral,
+    Product,
+    Quantity,
+    SignalName,
+    Sum,
+    next_change,
+)
 
 MOST_NESTED = 64
 """Limit of nesting, because the parser is recursive."""

@@ -21,6 +21,8 @@ from typing import Any, TypeAlias
 from steptwin.errors import Misuse
 from steptwin.motion import Segment
 
+FASTEST = 1e15
+"""Limit of accelerations without current, pulses/s², far above all that is built, so that no product overflows."""
 LOOK_S = 0.001
 """Motions along arcs are no polynomials: they are sampled at this interval, s."""
 _NEAR_S = 1e-5
@@ -52,6 +54,12 @@ class StepperMotor:
             raise Misuse("a torque curve begins at speed 0, and each speed is higher than the one before")
         if any(torque < 0.0 for _, torque in self.curve) or self.inertia < 0.0 or self.friction < 0.0:
             raise Misuse("torques of a curve, inertia and friction must not be negative")
+
+    def check_free(self, brake: float = 0.0) -> None:
+        """Raises `Misuse` if the torques are too high for the inertia while no current holds the rotor. ``brake`` in N·m."""
+        torque = abs(self.load) + self.friction + brake
+        if torque > FASTEST * self.inertia:
+            raise Misuse(f"{torque:g} N·m on so small an inertia accelerates by more than {FASTEST:g} imp/s² without current")
 
     @property
     def catch_p(self) -> float:

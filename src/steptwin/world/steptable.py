@@ -36,7 +36,7 @@ from steptwin.world.script import (
     Wait,
     Write,
 )
-from steptwin.world.values import name_value, number, pin_name, text_value, time_value, whole
+from steptwin.world.values import axis_number, name_value, number, pin_name, text_value, time_value, whole
 
 
 def _condition(value: Any) -> str:
@@ -58,9 +58,17 @@ def _fault(value: Any) -> Fault:
 
 def _turned(value: Any) -> tuple[str, int]:
     machine, axis = pin_name(value)
-    if not axis.startswith("M") or not axis[1:].isdecimal():
+    number = axis_number(axis)
+    if not number:
         raise Misuse(f"{value!r}: expected MACHINE.M1 to M4")
-    return machine, int(axis[1:])
+    return machine, number
+
+
+def _home_velocity(value: Any) -> float:
+    found = number()(value)
+    if found == 0.0:
+        raise Misuse(f"{value!r}: its sign chooses the switch, so it must not be 0")
+    return found
 
 
 def _characters(value: Any) -> bytes:
@@ -136,7 +144,7 @@ ACTIONS: Mapping[str, StepKind] = dict(
         _action(
             Key("home", _turned, "MACHINE.M1 to M4: homes it, waits for the end and expects it there"),
             _home,
-            Key("velocity", number(), "its sign chooses the switch"),
+            Key("velocity", _home_velocity, "its sign chooses the switch"),
             _WITHIN,
         ),
         _action(

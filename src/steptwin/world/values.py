@@ -133,6 +133,15 @@ def pin_name(value: Any) -> tuple[str, str]:
     return machine, pin.upper()
 
 
+_AXIS = re.compile(r"M([1-9][0-9]{0,3})\Z")
+
+
+def axis_number(name: str) -> int:
+    """The number of the axis ``M1``, ``M2`` and so on; 0 if this is no name of an axis."""
+    found = _AXIS.match(name)
+    return int(found[1]) if found is not None else 0
+
+
 @dataclass(frozen=True, slots=True)
 class PinOf:
     """``MACHINE.PIN`` or ``ELEMENT.TERMINAL``, a terminal of a kind; a list of them where there may be several."""

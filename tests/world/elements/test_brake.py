@@ -321,6 +321,9 @@ def test_the_trace_has_the_fall() -> None:
     ("old", "new", "text"),
     [
         ("torque = 0.5", "torque = 0", "t.toml:34.*permitted are numbers above 0"),
+        ("torque = 0.5", "torque = 1e300", r"1e\+300 N·m on so small an inertia accelerates by more than 1e\+15 imp/s² without"),
+        ("force = 245.0", "force = 1e300", "N·m on so small an inertia accelerates"),
+        ("inertia = 0.00003\nmass = 25.0", "inertia = 1e-300", "N·m on so small an inertia accelerates"),
         ("torque = 0.5", "torqe = 0.5", r"\[brake\] has no 'torqe' \(did you mean 'torque'\?\)"),
         ("torque = 0.5\n", "", "torque is missing"),
         ('axis = "z"', 'axis = "y"', "nothing is called 'y'"),

@@ -219,6 +219,15 @@ def test_snapshots_have_it(moment_s: float) -> None:
     assert other.trace.digest() == world.trace.digest()
 
 
+def test_a_belt_is_longer_than_a_step_of_its_drive() -> None:
+    text = TEXT.replace("length = 400.0", "length = 1e-10").replace("at = 300.0", "at = 0.0")
+    with pytest.raises(WorldError, match="length = 1e-10 mm: the belt is shorter than one step of its drive, 1e-09 mm"):
+        World.from_toml(text)
+    world = World.from_toml(TEXT.replace("length = 400.0", "length = 1e300").replace("workpiece = 40.0", "workpiece = 1e-300"))
+    world.run(until=1.0)
+    assert isnan(world.read("belt.place24"))
+
+
 @pytest.mark.parametrize(
     ("old", "new", "text"),
     [

@@ -113,6 +113,17 @@ def test_its_faults() -> None:
         assert world.read("a.AIN1") == pytest.approx(expected)
 
 
+def test_a_register_without_a_number_leaves_it_where_it_is() -> None:
+    text = TEXT.replace('of = "x.position"', 'of = "a.USER_REGISTER[12]:real"')
+    world = World.from_toml(text)
+    shown = []
+    for value in (20.0, float("nan"), float("inf"), 20.0, float("-inf"), 1e38):
+        world.mic488["a"].write("USER_REGISTER[12]:real", value)
+        world.run(for_=0.1)
+        shown.append(world.read("a.AIN1"))
+    assert shown == [5.0, 5.0, 0.0, 5.0, 1.0, 0.0]
+
+
 @pytest.mark.parametrize("moment_s", [0.0, 0.3, 0.7, 1.9])
 def test_snapshots_and_sessions_have_it(moment_s: float, tmp_path: object) -> None:
     text = TEXT + (

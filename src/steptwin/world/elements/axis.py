@@ -24,7 +24,7 @@ from steptwin.world.sense import TableRows
 from steptwin.world.signals import SignalOf
 from steptwin.world.site import Site, Terminal
 from steptwin.world.spec import WorldSpec
-from steptwin.world.values import flag, name_value, number, pair, pin_name, text_value, whole, word
+from steptwin.world.values import axis_number, flag, name_value, number, pair, pin_name, text_value, whole, word
 
 MECHANICS = ("position", "lost", "stalled")
 """What there is of the mechanics of an axis."""
@@ -87,7 +87,7 @@ def _refers(spec: AxisSpec, world: WorldSpec) -> Iterator[Reference]:
 
 def _build(spec: AxisSpec, site: Site) -> BuiltAxis:
     machine, drive = spec.drive
-    number = int(drive[1:]) if drive.startswith("M") and drive[1:].isdecimal() else 0
+    number = axis_number(drive)
     axes = len(site.machine(machine).axes)
     if not 1 <= number <= axes:
         raise Misuse(f"drive = '{machine}.{drive}': {machine} has {', '.join(f'M{n}' for n in range(1, axes + 1))}")
@@ -107,6 +107,8 @@ def _build(spec: AxisSpec, site: Site) -> BuiltAxis:
         motor=None if spec.motor is None else motor_of(spec.motor, spec.kind, scale),
         is_free=spec.motor is not None and spec.motor.when_off == "free",
     )
+    if build.is_free and build.motor is not None:
+        build.motor.check_free()
     mechanism = Mechanism(kernel, machine, number, build, spec.name)
     kernel.add_part(mechanism, (machine,))
     fitted = BuiltAxis(spec, kernel, mechanism, scale)

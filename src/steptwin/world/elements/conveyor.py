@@ -317,10 +317,16 @@ def _make(spec: ConveyorSpec, site: Site) -> Conveyor:
     board = site.board(spec.name)
     if spec.axis is None:
         own = ConstantDrive(Fraction(str(spec.speed)), board.kernel.now)
-        return Conveyor(board, spec, own, Fraction(PICOMETRES), own)
-    axis = find_axis(spec.axis, site)
-    per_mm = axis.scale.pulses_per_unit / Fraction(str(spec.mm_per_unit))
-    return Conveyor(board, spec, axis.mechanism, per_mm, None, (axis.mechanism.machine,))
+        conveyor = Conveyor(board, spec, own, Fraction(PICOMETRES), own)
+    else:
+        axis = find_axis(spec.axis, site)
+        per_mm = axis.scale.pulses_per_unit / Fraction(str(spec.mm_per_unit))
+        conveyor = Conveyor(board, spec, axis.mechanism, per_mm, None, (axis.mechanism.machine,))
+    if conveyor.places(spec.length) < 1:
+        raise Misuse(
+            f"length = {spec.length:g} mm: the belt is shorter than one step of its drive, {float(1 / conveyor.per_mm):g} mm"
+        )
+    return conveyor
 
 
 def _connect(spec: ConveyorSpec, conveyor: Conveyor, site: Site) -> None:
@@ -370,7 +376,7 @@ def _put_sensor(conveyor: Conveyor, spec: SensorSpec, lane: str, site: Site) -> 
 
 def _place_names(spec: ConveyorSpec) -> tuple[str, ...]:
     """Signals with the places of as many workpieces as there is room for."""
-    return tuple(f"place{n + 1}" for n in range(min(MOST_PLACES, ceil(spec.length / spec.workpiece) + 1)))
+    return tuple(f"place{n + 1}" for n in range(ceil(min(MOST_PLACES - 1, spec.length / spec.workpiece)) + 1))
 
 
 def _drawing(conveyor: Conveyor) -> Drawing:

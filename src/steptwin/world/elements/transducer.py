@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
-from math import floor
+from math import floor, isnan
 from typing import ClassVar
 
 from steptwin.errors import Misuse
@@ -24,7 +24,7 @@ from steptwin.world.signals import SignalOf, find_signal
 from steptwin.world.site import Site, Terminal
 from steptwin.world.sources import HIGHEST_V, LOWEST_V
 from steptwin.world.spec import WorldSpec
-from steptwin.world.values import ANALOG_INPUT, PinOf, name_value, points, text_value
+from steptwin.world.values import ANALOG_INPUT, MOST, PinOf, name_value, points, text_value
 from steptwin.world.values import number as number_value
 
 
@@ -113,8 +113,11 @@ class Transducer(Stateful):
         if version is None or version != self._version or (self._due is not None and self._due <= now):
             self._version = version
             value = self._signal.value(now)
-            self._level = self._curve.level(value)
-            self._due = self._next(value, now)
+            self._due = None
+            if not isnan(value):  # it stays where it is: a register can have a value that is no number
+                value = min(max(value, -MOST), MOST)
+                self._level = self._curve.level(value)
+                self._due = self._next(value, now)
         self._kernel.drive(PinName(*self._spec.target), self.volts(now))
 
     def _next(self, value: float, now: Nanos) -> Nanos | None:
