@@ -1,15 +1,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from fractions import Fraction
+from math import inf, nextafter
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion import MotionState, plan_position
-from steptwin.world.expression import SignalCondition, crossing, names, parse
+from steptwin.world.expression import Border, SignalCondition, crossing, names, parse
 
 
 class Level:
@@ -312,3 +314,19 @@ def test_a_condition_depends_on_what_its_signals_depend_on_each_once() -> None:
         SIGNALS["b"],
         SIGNALS["x.position"],
     )
+
+
+@given(
+    st.one_of(st.fractions(), st.floats(allow_nan=False, allow_infinity=False).map(Fraction)),
+    st.one_of(st.just(None), st.floats(allow_nan=False)),
+    st.integers(-2, 2),
+)
+@example(Fraction(1, 10), None, 0)
+@example(Fraction(10) ** 400, inf, 0)
+@example(-(Fraction(10) ** 400), -inf, 0)
+def test_a_number_is_on_the_side_of_the_exact_level(level: Fraction, value: float | None, steps: int) -> None:
+    if value is None:  # one beside the level
+        value = float(level) if abs(level) < 10**300 else 0.0
+        for _ in range(abs(steps)):
+            value = nextafter(value, inf if steps > 0 else -inf)
+    assert Border.of(level).side(value) == (value > level) - (value < level)

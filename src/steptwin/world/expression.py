@@ -12,10 +12,12 @@ such as ``table.M1.position``, ``table.hr:10020`` and ``table.USER_REGISTER[12]:
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
+from math import inf, nextafter
 from operator import eq, ge, gt, le, lt, ne
 from typing import Any, NamedTuple, Protocol, TypeAlias
 
@@ -384,27 +386,48 @@ class _Comparison:
 
 def crossing(signal: Signal, level: float | Fraction, now: Nanos) -> Nanos | None:
     """First whole nanosecond after ``now`` at which the signal is on another side of ``level`` (below, at, above)."""
+    border = Border.of(level)
     begin = now
     for turn in signal.turns(now):
-        found = _first_other(signal, level, begin, turn)
+        found = _first_other(signal, border, begin, turn)
         if found is not None:
             return found
         begin = turn
-    return _first_other(signal, level, begin, now + FARTHEST_NS)
+    return _first_other(signal, border, begin, now + FARTHEST_NS)
 
 
-def _side(value: float, level: float | Fraction) -> int:
-    return (value > level) - (value < level)
+GREATEST = sys.float_info.max
 
 
-def _first_other(signal: Signal, level: float | Fraction, begin: Nanos, end: Nanos) -> Nanos | None:
-    side = _side(signal.value(begin), level)
-    if _side(signal.value(end), level) == side:
+class Border(NamedTuple):
+    """An exact level between floating-point numbers: greater than ``below`` is above the level, less than ``above`` is below it."""
+
+    below: float
+    above: float
+
+    @staticmethod
+    def of(level: float | Fraction) -> Border:
+        try:
+            nearest = float(level)
+        except OverflowError:
+            return Border(GREATEST, inf) if level > 0 else Border(-inf, -GREATEST)
+        if nearest == level:
+            return Border(nearest, nearest)
+        return Border(nearest, nextafter(nearest, inf)) if nearest < level else Border(nextafter(nearest, -inf), nearest)
+
+    def side(self, value: float) -> int:
+        """-1 below, 0 at, 1 above."""
+        return (value > self.below) - (value < self.above)
+
+
+def _first_other(signal: Signal, border: Border, begin: Nanos, end: Nanos) -> Nanos | None:
+    side = border.side(signal.value(begin))
+    if border.side(signal.value(end)) == side:
         return None
     low, high = begin, end
     while high - low > 1:
         middle = (low + high) // 2
-        if _side(signal.value(middle), level) == side:
+        if border.side(signal.value(middle)) == side:
             low = middle
         else:
             high = middle
