@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from steptwin.errors import Misuse
+from steptwin.mic488.axis import Axis
 from steptwin.mic488.device import Mic488Device
+from steptwin.mic488.encoding import DINT_MAX, DINT_MIN
 from steptwin.mic488.registers import AXES
 from steptwin.mic488.status import AxisStatus
 from steptwin.world import script as do
@@ -33,7 +36,16 @@ def _enable(device: Mic488Device, line: str | None, command: Enable) -> do.Write
 
 
 def _move(device: Mic488Device, line: str | None, command: Move) -> do.Write:
+    if 1 <= command.axis <= AXES:
+        _check_position(device.axes[command.axis - 1], command.by or 0.0 if command.to is None else command.to)
     return _write(command, "POS_REL", command.by or 0.0) if command.to is None else _write(command, "POS_ABS", command.to)
+
+
+def _check_position(axis: Axis, value: float) -> None:
+    """Raises `Misuse` for a position or distance that the controller ignores, because its pulses do not fit a DINT."""
+    if not DINT_MIN <= value * axis.gear <= DINT_MAX:
+        limits = f"{DINT_MIN / axis.gear:.12g}…{DINT_MAX / axis.gear:.12g} {axis.config.unit_name}"
+        raise Misuse(f"move: {value:g} {axis.config.unit_name}: permitted are {limits}")
 
 
 def _home(device: Mic488Device, line: str | None, command: Home) -> do.Write:
