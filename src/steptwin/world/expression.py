@@ -400,7 +400,7 @@ GREATEST = sys.float_info.max
 
 
 class Border(NamedTuple):
-    """An exact level between floating-point numbers: greater than ``below`` is above the level, less than ``above`` is below it."""
+    """An exact level between floating-point numbers: more than ``below`` is above the level, less than ``above`` is below it."""
 
     below: float
     above: float
