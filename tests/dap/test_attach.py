@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from dap_client import DapClient, Refused
-from debug_rig import BOTH, CHIP, WBC
+from debug_rig import WBC, running_twin
 from tests.conftest import until
 
 from steptwin.live.remote import ask
@@ -22,20 +19,8 @@ from steptwin.subject.debugcommands import ListBreakpoints
 @pytest.fixture
 def twin(tmp_path: Path) -> Iterator[Path]:
     """The folder of a running twin called ``two``."""
-    (tmp_path / "m.prg").write_text(WBC)
-    (tmp_path / "c.m1486").write_text(CHIP)
-    (tmp_path / "two.toml").write_text(BOTH)
-    ready = tmp_path / "ready.json"
-    with (tmp_path / "out").open("w") as out:
-        command = [sys.executable, "-m", "steptwin", "up", "two.toml", "--ready-file", "ready.json"]
-        process = subprocess.Popen(command, cwd=tmp_path, stdout=out, stderr=out, env={**os.environ, "TERM": "dumb"})
-    try:
-        until(lambda: ready.exists() or process.poll() is not None, "the twin is ready")
-        assert process.poll() is None, (tmp_path / "out").read_text()
+    with running_twin(tmp_path):
         yield tmp_path
-    finally:
-        process.terminate()
-        process.wait()
 
 
 @pytest.fixture

@@ -2,6 +2,15 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path
+
+from tests.conftest import until
+
 from steptwin.files.world import World
 
 WBC = """\
@@ -41,3 +50,22 @@ ONE = '[world]\nname = "one"\n[[mic488]]\nname = "m"\nprogram = "m.prg"\nstart =
 def make(text: str = WBC, world: str = ONE) -> World:
     files = {"m.prg": text.encode(), "c.m1486": CHIP.encode()}
     return World.from_toml(world, files, keep_trace=False, keep_inputs=False)
+
+
+@contextmanager
+def running_twin(folder: Path) -> Generator[None]:
+    """`BOTH` in a process of its own, called ``two``; its files are in a folder."""
+    (folder / "m.prg").write_text(WBC)
+    (folder / "c.m1486").write_text(CHIP)
+    (folder / "two.toml").write_text(BOTH)
+    ready = folder / "ready.json"
+    with (folder / "out").open("w") as out:
+        command = [sys.executable, "-m", "steptwin", "up", "two.toml", "--ready-file", "ready.json"]
+        process = subprocess.Popen(command, cwd=folder, stdout=out, stderr=out, env={**os.environ, "TERM": "dumb"})
+    try:
+        until(lambda: ready.exists() or process.poll() is not None, "the twin is ready")
+        assert process.poll() is None, (folder / "out").read_text()
+        yield
+    finally:
+        process.terminate()
+        process.wait()
