@@ -345,6 +345,7 @@ class _OpenDebugger:
             return
         until = perf_counter() + PART_S
         try:
+            next(travel)
             while perf_counter() < until:
                 next(travel)
         except StopIteration as end:
