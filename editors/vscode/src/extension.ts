@@ -21,13 +21,12 @@ export function activate(context: vscode.ExtensionContext): void {
     vscode.commands.registerCommand("steptwin.debugProgram", debugProgram),
     vscode.commands.registerCommand("steptwin.setValue", (row) => axesAndPins.setValue(row)),
     vscode.commands.registerCommand("steptwin.restartServer", () => started.restart()),
+    vscode.workspace.onDidGrantWorkspaceTrust(() => started.start()),
     vscode.workspace.onDidChangeConfiguration((change) => {
-      if (change.affectsConfiguration("steptwin.command") && vscode.workspace.isTrusted) void started.restart();
+      if (change.affectsConfiguration("steptwin.command")) void started.restart();
     }),
   );
-  // A folder that is not trusted may bring a command of its own.
-  if (vscode.workspace.isTrusted) void started.start();
-  else context.subscriptions.push(vscode.workspace.onDidGrantWorkspaceTrust(() => void started.start()));
+  void started.start();
 }
 
 export async function deactivate(): Promise<void> {

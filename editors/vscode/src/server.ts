@@ -1,5 +1,6 @@
 // The client of the language server `steptwin lsp`.
 
+import { workspace } from "vscode";
 import { LanguageClient, type LanguageClientOptions } from "vscode-languageclient/node";
 import { command, showFailure } from "./command";
 
@@ -16,26 +17,46 @@ const OPTIONS: LanguageClientOptions = {
 
 export class Server {
   private client: LanguageClient | undefined;
+  /** Starts and stops, one after the other: a client that is starting cannot be stopped. */
+  private work: Promise<void> = Promise.resolve();
 
-  async start(): Promise<void> {
+  start(): Promise<void> {
+    return this.next(() => this.startNow());
+  }
+
+  stop(): Promise<void> {
+    return this.next(() => this.stopNow());
+  }
+
+  restart(): Promise<void> {
+    void this.stop();
+    return this.start();
+  }
+
+  private next(step: () => Promise<void>): Promise<void> {
+    this.work = this.work.then(step);
+    return this.work;
+  }
+
+  private async startNow(): Promise<void> {
+    if (!workspace.isTrusted) return; // a folder may bring a command of its own
     const run = { command: command(), args: ["lsp"] };
-    this.client = new LanguageClient("steptwin", "steptwin", run, OPTIONS);
+    const client = new LanguageClient("steptwin", "steptwin", run, OPTIONS);
     try {
-      await this.client.start();
+      await client.start();
+      this.client = client;
     } catch (error) {
-      await showFailure("The language server", error);
+      void showFailure("The language server", error);
     }
   }
 
-  async stop(): Promise<void> {
+  private async stopNow(): Promise<void> {
     const client = this.client;
     this.client = undefined;
-    if (client?.isRunning()) await client.stop();
-    await client?.dispose();
-  }
-
-  async restart(): Promise<void> {
-    await this.stop();
-    await this.start();
+    try {
+      await client?.dispose();
+    } catch {
+      // Its process has ended already.
+    }
   }
 }
