@@ -102,6 +102,7 @@ def failed(arguments: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest
         ["run", "missing.json"],
         ["up", "missing.toml"],
         ["replay", "missing.json"],
+        ["why", "missing.json", "table.OUT3"],
         ["export", "missing.jsonl", "--to", "csv"],
         ["serve", "mic488", "--config", "missing.cfg"],
         ["serve", "m1486", "--program", "missing.m1486"],

@@ -50,6 +50,7 @@ from steptwin.cli import (
     twins,
     up,
     watch,
+    why,
 )
 from steptwin.cli.optiongroups import GroupedCommand
 from steptwin.errors import Misuse, SourceErrors, SteptwinError
@@ -76,6 +77,7 @@ COMMANDS: Mapping[str, Mapping[str, Callable[..., None]]] = {
         "decompile": decompile.decompile,
         "run": run.run,
         "replay": replay.replay,
+        "why": why.why,
         "export": export.export,
         "lsp": lsp.lsp,
         "dap": dap.dap,

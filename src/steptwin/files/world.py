@@ -21,6 +21,8 @@ from steptwin.files.memory import StateDirectory, StateFailure
 from steptwin.files.textfiles import read_text
 from steptwin.inputfiles import MOST_DESCRIPTION_BYTES, read_bytes, shown
 from steptwin.machine import SECOND, Nanos
+from steptwin.why.answer import Answer
+from steptwin.why.question import Why
 from steptwin.world import script as do
 from steptwin.world.build import memory_file
 from steptwin.world.description import describe, read_world
@@ -284,6 +286,24 @@ class World(Plant):
     def clear_fault(self, name: str) -> None:
         """Remove a fault. Raises `Misuse` with the names there are."""
         self.apply_input(do.ClearFault(name))
+
+    # ------------------------------------------------------------------ causes
+
+    @property
+    def past(self) -> Why:
+        """The past until now, for questions (`Why.ask`). Raises `Misuse` for a world that does not keep its inputs."""
+        if not self.keeps_inputs:
+            raise Misuse("this world does not keep its inputs, so its past is not known: make it with keep_inputs=True")
+        self.advance(self.now)
+        self.settle_all()
+        return Why(lambda: type(self)(self.spec, self.files, failing=self.failed_saves), self.inputs, self.now)
+
+    def why(self, question: str, at: Duration | None = None) -> Answer:
+        """Why a signal has its value, a condition its truth, or a controller's program waits; now or at a moment.
+
+        Each call runs the past again; for several questions about one past, use `past`. Raises `Misuse` for what is no question.
+        """
+        return self.past.ask(question, None if at is None else duration(at))
 
     # ------------------------------------------------------------------ branches
 

@@ -185,6 +185,10 @@ class Kernel:
         self._wires.setdefault(wire.source, []).append(wire)
         self.mark(wire.target.machine)
 
+    def wire_to(self, target: PinName) -> Wire | None:
+        """The wire that drives an input, if one does."""
+        return next((wire for wires in self._wires.values() for wire in wires if wire.target == target), None)
+
     def check(self, name: PinName) -> None:
         """Raises `Misuse` if the machine or its pin does not exist."""
         if name.machine not in self.machines and name.machine not in self.boards:

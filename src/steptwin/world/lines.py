@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import partial
 from typing import Any, ClassVar, Protocol
 
@@ -45,6 +45,10 @@ class LineWords(FrameFollower, Protocol):
 
     def recorded(self, record: TraceRecord) -> None:
         """Take a trace record of a controller on the line."""
+        ...
+
+    def changes(self, place: str, data: bytes) -> Collection[int]:
+        """The addresses of the controllers that a request or characters of a program may change."""
         ...
 
 

@@ -7,17 +7,18 @@ from dataclasses import dataclass, field
 from typing import Any, cast
 
 from steptwin.machine import MotionController
-from steptwin.world.contacts import Button
+from steptwin.world.contacts import Button, Circuit
 from steptwin.world.element import B, Element, S
 from steptwin.world.elements import ELEMENTS
 from steptwin.world.elements.axis import AXIS, BuiltAxis
 from steptwin.world.elements.button import BUTTON
 from steptwin.world.faults import Faults
-from steptwin.world.kernel import Kernel
+from steptwin.world.kernel import Kernel, PinName
 from steptwin.world.kind import AnyKind, Terminals
 from steptwin.world.lines import Line
 from steptwin.world.signals import SignalOf
 from steptwin.world.spec import WorldSpec
+from steptwin.world.tomlplaces import Path
 from steptwin.world.trace import Recorder
 
 
@@ -39,6 +40,10 @@ class WorldParts:
     """Line and unit (or address) of each machine."""
     terminals: dict[str, Terminals] = field(default_factory=dict)
     """Of elements that have some."""
+    driven: dict[PinName, Path] = field(default_factory=dict)
+    """Where the description says what drives an input."""
+    circuits: dict[PinName, Circuit] = field(default_factory=dict)
+    """The contacts of the inputs that have some."""
     elements: dict[str, dict[str, Any]] = field(default_factory=dict)
     """Built elements with names: by the name of the kind, then by their own."""
     warnings: list[str] = field(default_factory=list)

@@ -108,6 +108,8 @@ class Plant:
         """All external inputs so far, if they are kept."""
         self.input_watchers: list[Callable[[RecordedInput], None]] = []
         """Called with everything from outside as it comes."""
+        self.act_watchers: list[Callable[[str, ExternalInput], None]] = []
+        """Called before each action at the present moment, with the script that does it; empty: what comes from outside."""
         self.is_settled = False
         """Whether the scripts of the description have run since the last external input."""
         self._encoded: dict[object, tuple[bytes, ...]] = {}
@@ -256,8 +258,10 @@ class Plant:
                 watcher(given)
         self.is_settled = False
 
-    def perform(self, what: ExternalInput) -> None:
-        """Execute an action at the present moment. Raises `Misuse` for names that do not exist."""
+    def perform(self, what: ExternalInput, by: str = "") -> None:
+        """Execute an action at the present moment; ``by``: its script. Raises `Misuse` for names that do not exist."""
+        for watcher in self.act_watchers:
+            watcher(by, what)
         act(self, what)
 
     def machine(self, name: str) -> MotionController:

@@ -6,6 +6,7 @@ named as in `steptwin.world.programtexts`.
 
 from __future__ import annotations
 
+import enum
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple, Protocol
@@ -40,6 +41,36 @@ class Frame(NamedTuple):
 
     name: str
     place: Place
+
+
+class OperandKind(enum.Enum):
+    """What a statement reads or changes."""
+
+    PIN = "pin"
+    AXIS = "axis"
+    """By its number; empty: any axis."""
+    VALUE = "value"
+    """A variable or register of the program."""
+
+
+class Operand(NamedTuple):
+    kind: OperandKind
+    name: str
+
+
+class StatementUse(NamedTuple):
+    """What a statement reads and changes, and which statements depend on it."""
+
+    reads: tuple[Operand, ...] = ()
+    writes: tuple[Operand, ...] = ()
+    waits: bool = False
+    """Whether the program goes on only when what it reads permits it, or, if it reads nothing, after a time."""
+    governs: range = range(0)
+    """Numbers of the statements of which it decides whether they are executed."""
+    is_loop: bool = False
+    """Whether it also decides when those after them are executed."""
+    jumps: int | None = None
+    """Where the program goes on, if that depends on nothing."""
 
 
 class Programs(Protocol):
@@ -80,6 +111,8 @@ class Programs(Protocol):
     def comes_back(self, place: Place) -> bool:
         """Whether what the statement calls returns to the one after it; True for what calls nothing."""
         ...
+
+    def use(self, place: Place) -> StatementUse: ...
 
     def stack(self, now: Nanos) -> Sequence[Frame]:
         """The statement that is executed, or comes next, then those to which it returns; empty where no program runs."""

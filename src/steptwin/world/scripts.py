@@ -274,7 +274,7 @@ class Scripts:
         if script.is_external:
             self._plant.apply_input(what)
         else:
-            self._plant.perform(what)
+            self._plant.perform(what, script.name)
 
     # ------------------------------------------------------------------ snapshots
 

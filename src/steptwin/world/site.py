@@ -31,10 +31,8 @@ class Site:
     def __init__(self, spec: WorldSpec, parts: WorldParts) -> None:
         self.spec = spec
         self.parts = parts
-        self._driven: dict[PinName, Path] = {}
-        """The description's path of what drives each input."""
-        self._circuits: dict[PinName, tuple[Circuit, str | None]] = {}
-        """The contact circuit of each input, and its ``join``."""
+        self._joins: dict[PinName, str | None] = {}
+        """``join`` of each input with contacts."""
 
     def unless_wrong(self, path: Path, action: Callable[[], None]) -> None:
         """Execute ``action`` for the table at ``path``, unless that has an error already; errors are reported at the path."""
@@ -105,22 +103,22 @@ class Site:
     def input(self, name: Terminal, path: Path, kind: str = DIGITAL_INPUT) -> PinName:
         """An input, reserved for one driver."""
         target = PinName(*name)
-        if target in self._driven:
-            raise Misuse(f"{target} is driven already, from line {self.spec.text.line(self._driven[target])}")
+        if target in self.parts.driven:
+            raise Misuse(f"{target} is driven already, from line {self.spec.text.line(self.parts.driven[target])}")
         self.terminal(name, kind)
-        self._driven[target] = path
+        self.parts.driven[target] = path
         return target
 
     def circuit(self, kernel: Kernel, name: Terminal, path: Path, join: str | None) -> Circuit:
         """The circuit of a contact: an input of its own, or one shared with contacts that have the same ``join``."""
         target = PinName(*name)
-        there, their_join = self._circuits.get(target, (None, None))
+        there = self.parts.circuits.get(target)
         if there is None:
             circuit = Circuit(kernel, self.input(name, path), in_series=join == "series")
-            self._circuits[target] = circuit, join
+            self.parts.circuits[target], self._joins[target] = circuit, join
             return circuit
-        if join is None or join != their_join:
-            line = self.spec.text.line(self._driven[target])
+        if join is None or join != self._joins[target]:
+            line = self.spec.text.line(self.parts.driven[target])
             raise Misuse(
                 f"{target} is driven already, from line {line}: contacts that share an input all have join = 'parallel', "
                 "or all join = 'series'"
@@ -134,5 +132,5 @@ class Site:
 
     def close_circuits(self) -> None:
         """Drive all inputs with contacts to their initial levels."""
-        for circuit, _ in self._circuits.values():
+        for circuit in self.parts.circuits.values():
             circuit.close()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Collection, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -58,6 +58,7 @@ class ToyWords:
     def __init__(self, line: ToyLine, prefix: str, sink: Callable[[FrameLine], None]) -> None:
         self._prefix = prefix
         self._sink = sink
+        self._units = line.units
 
     def frame(self, now: Nanos, place: str, direction: Way, data: bytes) -> None:
         text = f"{chr(data[0])} {int.from_bytes(data[1:], signed=True)}"
@@ -68,6 +69,9 @@ class ToyWords:
 
     def recorded(self, record: TraceRecord) -> None:
         """Frames alone say what goes over the line."""
+
+    def changes(self, place: str, data: bytes) -> Collection[int]:
+        return self._units
 
 
 def _make_line(spec: LineSpec, members: Sequence[Member], kernel: Kernel, record: Recorder, faults: Faults) -> ToyLine:

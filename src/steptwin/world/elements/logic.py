@@ -71,6 +71,11 @@ class BoardPart(Stateful, ABC):
         """The machines and elements whose changes concern it; None: all."""
         return (self.board.name,)
 
+    @property
+    def delays(self) -> tuple[Nanos, ...]:
+        """How much later than an input an output may change."""
+        return ()
+
     @abstractmethod
     def update(self, now: Nanos) -> None:
         """As `KernelPart.update`."""

@@ -55,6 +55,10 @@ class Relay(BoardPart):
         self.is_welded = False
         """Fault: the contact NO stays closed once it is."""
 
+    @property
+    def delays(self) -> tuple[Nanos, ...]:
+        return self._pull_in, self._drop_out
+
     def update(self, now: Nanos) -> None:
         self._move(now)  # before the coil changes: an input at a moment comes after what is due then
         is_on = self.board.is_on(COIL) and not self.is_open

@@ -49,6 +49,10 @@ class Timer(BoardPart):
         self._due: Nanos | None = None
         """When the time has passed, while it runs."""
 
+    @property
+    def delays(self) -> tuple[Nanos, ...]:
+        return (self._time,)
+
     def update(self, now: Nanos) -> None:
         is_on = self.board.is_on(IN)
         if self._due is not None and self._due <= now:

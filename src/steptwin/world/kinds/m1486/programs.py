@@ -20,8 +20,9 @@ from steptwin.statements import StatementHook
 from steptwin.world.kind import TextContext
 from steptwin.world.kinds.m1486.memory import PLACE as TEXT
 from steptwin.world.kinds.m1486.memory import given_text
+from steptwin.world.kinds.m1486.statement_use import use_of
 from steptwin.world.kinds.m1486.table import M1486Spec
-from steptwin.world.programs import Frame, Place, Statement
+from steptwin.world.programs import Frame, Place, Statement, StatementUse
 
 BEGIN = "program"
 """The name of what is executed before the first label."""
@@ -122,6 +123,9 @@ class ChipPrograms:
 
     def comes_back(self, place: Place) -> bool:
         return True
+
+    def use(self, place: Place) -> StatementUse:
+        return use_of(self._text.commands[place.number])
 
     def stack(self, now: Nanos) -> Sequence[Frame]:
         program = self._chip.program

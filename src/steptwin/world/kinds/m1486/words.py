@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 from steptwin.m1486.characterlog import CharacterLog, LineSplitter
 from steptwin.machine import Nanos
@@ -35,6 +35,9 @@ class ChipLineWords:
 
     def rubbish(self, now: Nanos, place: str, count: int) -> None:
         """Every character is one of the line."""
+
+    def changes(self, place: str, data: bytes) -> Collection[int]:
+        return self._line.units
 
     def recorded(self, record: TraceRecord) -> None:
         """A chip announces the byte that it sends."""

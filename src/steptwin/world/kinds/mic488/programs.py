@@ -19,8 +19,9 @@ from steptwin.wbc.steps import JumpStep, Literal, RegisterOperand, Source, Varia
 from steptwin.wbc.syntax import parse
 from steptwin.wbc.tree import Identifier, ProgramTree
 from steptwin.world.kind import TextContext
+from steptwin.world.kinds.mic488.statement_use import use_of
 from steptwin.world.kinds.mic488.table import Mic488Spec
-from steptwin.world.programs import Frame, Place, Statement
+from steptwin.world.programs import Frame, Place, Statement, StatementUse
 from steptwin.world.programtexts import bank_text
 
 BEGIN = "program"
@@ -77,6 +78,9 @@ class WbcPrograms:
 
     def comes_back(self, place: Place) -> bool:
         return self._bank(place.text).comes_back(place.number)
+
+    def use(self, place: Place) -> StatementUse:
+        return use_of(self._bank(place.text).program.steps, place.number)
 
     def stack(self, now: Nanos) -> Sequence[Frame]:
         control = self._device.program

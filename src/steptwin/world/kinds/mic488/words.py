@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 from steptwin.machine import Nanos
 from steptwin.mic488.framelog import FrameLog
 from steptwin.wire.frameline import FrameLine
+from steptwin.wire.pdu import WRITES
 from steptwin.wire.slave import FrameDirection, FrameObserver
 from steptwin.world.kinds.mic488.line import ModbusBus
 from steptwin.world.trace import TraceRecord
@@ -27,10 +28,18 @@ class ModbusWords:
         if observer is None:
             for gone in [name for name in self._observers if name not in self._line.places]:
                 del self._observers[gone]
-            there = self._line.places.get(place)
-            tcp = there is not None and there.kind == "tcp"
-            observer = self._observers[place] = self._log.observer(self._prefix + place, tcp=tcp)
+            observer = self._observers[place] = self._log.observer(self._prefix + place, tcp=self._is_tcp(place))
         observer(now, direction, data)
+
+    def _is_tcp(self, place: str) -> bool:
+        there = self._line.places.get(place)
+        return there is not None and there.kind == "tcp"
+
+    def changes(self, place: str, data: bytes) -> Collection[int]:
+        unit, function = (data[6], data[7]) if self._is_tcp(place) else (data[0], data[1])
+        if function not in WRITES:
+            return ()
+        return (unit,) if unit in self._line.units else self._line.units
 
     def rubbish(self, now: Nanos, place: str, count: int) -> None:
         self._log.rubbish(now, self._prefix + place, count)

@@ -1,0 +1,406 @@
+"""The causes of a change, one before the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Sequence
+from functools import partial
+from typing import NamedTuple, TypeAlias
+
+from steptwin.machine import SECOND, Nanos
+from steptwin.motion.divisions import profile_of
+from steptwin.why.answer import Link
+from steptwin.why.log import Act, CauseLog, Change
+from steptwin.why.sentences import Frames, statement, words_of
+from steptwin.world import script as do
+from steptwin.world.actions import Download, See, SetVariable
+from steptwin.world.elements import ELEMENTS
+from steptwin.world.elements.logic import BoardPart
+from steptwin.world.kernel import PinName
+from steptwin.world.lines import SCRIPTS
+from steptwin.world.programs import Operand, OperandKind, StatementUse
+from steptwin.world.trace import TraceRecord
+
+MOST_LOOKED_BACK = 20_000
+"""Limit of the statements among which the one that decided is looked for."""
+
+
+class Cause(NamedTuple):
+    """A link, and what finds the cause of it."""
+
+    link: Link
+    before: Callable[[], Cause | None]
+
+
+Found: TypeAlias = "Cause | None"
+
+
+def nothing() -> Found:
+    """The end of a chain: what comes from outside or holds from the beginning."""
+    return None
+
+
+class Causes:
+    """Finds the causes of changes in what was noted."""
+
+    def __init__(self, log: CauseLog) -> None:
+        self._log = log
+        self._world = log.world
+        self._frames = Frames(log.world)
+        built = log.world.parts.elements
+        self._parts: dict[str, BoardPart] = {
+            name: part for kind, parts in built.items() if ELEMENTS[kind].terminals is not None for name, part in parts.items()
+        }
+
+    # ------------------------------------------------------------------ signals
+
+    def change(self, signal: str, change: Change, how: str = "") -> Cause:
+        """A signal took its value."""
+        owner = signal.partition(".")[0]
+        if self._log.is_first(signal, change):
+            return Cause(Link(change.time, owner, f"{signal} is {change.value:g} from the beginning{how}"), nothing)
+        text = f"{signal} became {change.value:g}{how}"
+        return Cause(Link(change.time, owner, text), partial(self._of_change, signal, change))
+
+    def last(self, signals: Sequence[str], until: Nanos, how: str = "") -> Found:
+        """The last change among signals by a moment."""
+        found = [(change, signal) for signal in signals if (change := self._log.last_change(signal, until))]
+        if not found:
+            return None
+        change, signal = max(found, key=lambda one: (one[0].time, one[0].position))
+        return self.change(signal, change, how)
+
+    def _of_change(self, signal: str, change: Change) -> Found:
+        owner, _, terminal = signal.partition(".")
+        fault = self._fault(owner, change.time, None if owner in self._parts else terminal)
+        if fault is not None:
+            return fault
+        if owner in self._parts:
+            return self._of_element(owner, change)
+        if owner in self._world.machines:
+            return self._of_pin(PinName(owner, terminal), change)
+        if owner in self._world.axes:
+            drive = self._world.axes[owner].spec.drive
+            return self.motion(drive[0], drive[1].removeprefix("M"), change.time, owner)
+        return self._operated(owner, change)
+
+    def _fault(self, owner: str, time: Nanos, named: str | None = None) -> Found:
+        """A fault that began or ended at a moment at a controller or element; one that names a terminal, if that is given."""
+        for group in (self._log.group(owner), -1):
+            for _, record in self._log.at(group, time):
+                if record.kind == "fault" and record.machine == owner and (named is None or named in str(record.value).split()):
+                    link = Link(record.time, record.machine, f"fault {record.subject}: {record.value}")
+                    return Cause(link, partial(self._of_fault, record))
+        return None
+
+    def _of_fault(self, record: TraceRecord) -> Found:
+        for act in self._log.acts_at(record.time):
+            match act.what:
+                case do.SetFault(fault) if record.subject.startswith(fault.name or fault.kind.name):
+                    return _acted(act)
+                case do.ClearFault(name) if name == record.subject:
+                    return _acted(act)
+        return None
+
+    def _of_element(self, name: str, change: Change) -> Found:
+        """What changed an output of an element: an input at the same moment, or one before, as much earlier as it delays."""
+        part = self._parts[name]
+        sources = [source for terminal in _inputs(part) for source in self._sources(PinName(name, terminal))]
+        last = [found for source in sources if (found := self._before(source, change, change.time))]
+        for delay in (0, *part.delays):
+            exact = [found for found in last if found[0].time == change.time - delay]
+            exact += [
+                found
+                for source in sources
+                if (found := self._before(source, change, change.time - delay)) and found[0].time == change.time - delay
+            ]
+            if exact:
+                latest, source = max(exact, key=lambda found: found[0].position)
+                return self.change(source, latest, f", {name} follows after {delay / SECOND * 1000:g} ms" if delay else "")
+        if not last:
+            return None
+        latest, source = max(last, key=lambda found: (found[0].time, found[0].position))
+        return self.change(source, latest, f", on which {name} has acted since")
+
+    def _before(self, signal: str, change: Change, until: Nanos) -> tuple[Change, str] | None:
+        """The last change of a signal by a moment and before ``change``."""
+        found = self._log.last_change(signal, until, None if until < change.time else change.position)
+        return None if found is None else (found, signal)
+
+    def _sources(self, target: PinName) -> Iterator[str]:
+        """The signals that drive an input: an output at the other end of a wire, or contacts."""
+        circuit = self._world.parts.circuits.get(target)
+        if circuit is not None:
+            yield from (contact.lane for contact in circuit.contacts if contact.lane)
+        for kernel in (self._world.parts.kernel_of[target.machine],):
+            wire = kernel.wire_to(target)
+            if wire is not None:
+                yield self._name(wire.source)
+
+    def _name(self, pin: PinName) -> str:
+        """The signal of a pin or terminal."""
+        return str(pin) if pin.machine in self._world.machines else f"{pin.machine}.{pin.pin.lower()}"
+
+    def _of_pin(self, pin: PinName, change: Change) -> Found:
+        wire = self._world.parts.kernel_of[pin.machine].wire_to(pin)
+        if wire is not None:
+            found = self._before(self._name(wire.source), change, change.time - wire.delay)
+            if found is not None and found[0].time == change.time - wire.delay:
+                return self.change(found[1], found[0], f", which is wired to {pin}")
+        lanes = [found for lane in self._sources(pin) if (found := self._before(lane, change, change.time))]
+        at_once = [found for found in lanes if found[0].time == change.time]
+        if at_once:
+            latest, lane = max(at_once, key=lambda found: found[0].position)
+            return self.change(lane, latest, f", a contact of {pin}")
+        act = next((act for act in self._log.acts_at(change.time) if _sets(act, pin)), None)
+        if act is not None:
+            return _acted(act)
+        path = self._world.parts.driven.get(pin)
+        if path is not None:
+            line = self._world.spec.text.line(path)
+            return Cause(Link(change.time, pin.machine, f"[[{path[0]}]] in line {line} of the description drives {pin}"), nothing)
+        return self.in_machine(pin.machine, change, Operand(OperandKind.PIN, pin.pin))
+
+    def _operated(self, name: str, change: Change) -> Found:
+        """Who pressed a button."""
+        for act in self._log.acts_at(change.time):
+            match act.what:
+                case do.Press(button) | do.Release(button) if button == name:
+                    return _acted(act)
+        earlier = self._log.last_change(name, change.time - 1)
+        if earlier is not None and change.time - earlier.time < SECOND:
+            return self.change(name, earlier, ", and the contact bounced")
+        return None
+
+    def drivers(self, signal: str) -> list[str]:
+        """The signals that a signal follows: those that drive an input, or the inputs of an element."""
+        owner, _, terminal = signal.partition(".")
+        part = self._parts.get(owner)
+        if part is not None:
+            return [source for name in _inputs(part) for source in self._sources(PinName(owner, name))]
+        return list(self._sources(PinName(owner, terminal))) if owner in self._world.machines else []
+
+    # ------------------------------------------------------------------ controllers
+
+    def at_moment(self, machine: str, time: Nanos, wanted: Operand | None) -> Found:
+        """What changed something of a controller that no record shows."""
+        group = self._log.group(machine)
+        found = self.in_machine(machine, Change(time, 0.0, group, len(self._log.records[group])), wanted)
+        if found is None and wanted is not None:
+            return self.motion(machine, wanted.name, time)
+        return found
+
+    def in_machine(self, machine: str, change: Change, wanted: Operand | None) -> Found:
+        """What changed something of a controller at a moment; ``wanted``: what, if that is known."""
+        index = self._statement_at(machine, change, wanted)
+        since = -1 if index is None else self._log.executed[machine][index].position
+        outside = self._from_outside(machine, change, since)
+        if outside is not None:
+            return outside
+        if index is not None:
+            return self.statement(machine, index)
+        act = next((act for act in self._log.acts_at(change.time) if _changes(act, machine)), None)
+        if act is not None:
+            return _acted(act)
+        return self._asked_before(machine, change) or self._inside(machine, change, wanted)
+
+    def _statement_at(self, machine: str, change: Change, wanted: Operand | None) -> int | None:
+        """The number of the statement that was executed at the moment of a change, before it, and changes what is wanted."""
+        executed = self._log.executed.get(machine, [])
+        for index in range(self._log.last_executed(machine, change.time), -1, -1):
+            if executed[index].time < change.time:
+                break
+            if executed[index].position <= change.position:
+                return index if _matches(self._use(machine, index).writes, wanted) else None
+        return None
+
+    def _from_outside(self, machine: str, change: Change, since: int) -> Found:
+        """A request or another action that reached a controller at the moment of a change, after the position ``since``."""
+        on = self._world.parts.line_of.get(machine)
+        for position, record in self._log.at(change.group, change.time):
+            if position < since:
+                break
+            if position >= change.position:
+                continue
+            if on is not None and record.kind == "frame" and record.machine == on[0].name and self._frames.reaches(record, on[1]):
+                return self._frame(record)
+            if record.machine == machine and record.kind == "input":
+                return self._input(record)
+        return None
+
+    def _inside(self, machine: str, change: Change, wanted: Operand | None) -> Found:
+        """What the controller did by itself: because of an input, or because what an earlier statement began has ended."""
+        after: Callable[[], Found] = partial(self._earlier, machine, change.time, wanted)
+        event: TraceRecord | None = None
+        for position, record in self._log.at(change.group, change.time):
+            if position >= change.position or record.machine != machine:
+                continue
+            if record.kind == "edge" and self._is_input(PinName(machine, record.subject)):
+                edge = next(one for one in self._log.changes[f"{machine}.{record.subject}"] if one.position == position)
+                after = partial(self.change, f"{machine}.{record.subject}", edge)
+            elif record.kind == "event":
+                event = record
+        if event is not None:
+            return Cause(Link(change.time, machine, str(event.value)), after)
+        return self._fault(machine, change.time) or after()
+
+    def _asked_before(self, machine: str, change: Change) -> Found:
+        """A request on a line with timing, which is answered later than it came."""
+        on = self._world.parts.line_of.get(machine)
+        if on is None or not on[0].is_timed:
+            return None
+        records = self._log.records[change.group]
+        for position in range(change.position - 1, max(-1, change.position - MOST_LOOKED_BACK), -1):
+            record = records[position]
+            if record.kind == "frame" and record.machine == on[0].name:
+                return self._frame(record) if self._frames.reaches(record, on[1]) else None
+        return None
+
+    def _earlier(self, machine: str, time: Nanos, wanted: Operand | None) -> Found:
+        """The last statement before a moment that changes something: what it began has ended."""
+        if wanted is None:
+            return None
+        executed = self._log.executed.get(machine, [])
+        last = self._log.last_executed(machine, time)
+        for index in range(last, max(-1, last - MOST_LOOKED_BACK), -1):
+            if executed[index].time < time and _matches(self._use(machine, index).writes, wanted):
+                return self.statement(machine, index)
+        return None
+
+    def _is_input(self, pin: PinName) -> bool:
+        return pin in self._world.parts.driven or pin in self._world.parts.circuits
+
+    def _frame(self, record: TraceRecord) -> Cause:
+        place = record.subject.rpartition("/")[0]
+        sender, before = f"client {place}", nothing
+        if place == SCRIPTS:
+            sender, before = "request", partial(self._requested, record)
+        return Cause(Link(record.time, record.machine, f"{sender}: {self._frames.meaning(record)}"), before)
+
+    def _requested(self, record: TraceRecord) -> Found:
+        """The step that made a request, which a line with timing carries later."""
+        members = {name for name, (line, _) in self._world.parts.line_of.items() if line.name == record.machine}
+        for act in self._log.acts_before(record.time, MOST_LOOKED_BACK):
+            if _requests(act, record.machine, members):
+                return _acted(act)
+        return None
+
+    def _input(self, record: TraceRecord) -> Cause:
+        act = next(self._log.acts_at(record.time), None)
+        if act is not None:
+            return _acted(act)
+        return Cause(Link(record.time, record.machine, f"from outside: {record.subject} {record.value}"), nothing)
+
+    # ------------------------------------------------------------------ motions
+
+    def motion(self, machine: str, axis: str, until: Nanos, mechanics: str = "") -> Found:
+        """The motion of an axis at a moment."""
+        plan = self._log.last_plan(machine, axis, until)
+        if plan is None:
+            return None
+        record = self._log.record(plan)
+        profile = profile_of(record.value)  # type: ignore[arg-type]
+        name = f"{machine}.M{record.subject}"
+        shown = f"{mechanics} ({name})" if mechanics else name
+        if not profile.segments:
+            link = Link(plan.time, machine, f"{shown} stopped")
+        elif profile.end is not None and profile.end <= until:
+            link = Link(profile.end, machine, f"the motion of {shown} ended, which began at {plan.time / SECOND:.6f} s")
+        else:
+            link = Link(plan.time, machine, f"{shown} began to move")
+        return Cause(link, partial(self.in_machine, machine, plan, Operand(OperandKind.AXIS, record.subject)))
+
+    # ------------------------------------------------------------------ programs
+
+    def _use(self, machine: str, index: int) -> StatementUse:
+        return self._world.programs[machine].use(self._log.executed[machine][index].place)
+
+    def statement(self, machine: str, index: int) -> Cause:
+        """A statement was executed."""
+        executed = self._log.executed[machine][index]
+        link = Link(executed.time, machine, f"{statement(self._world, machine, executed.place)} was executed")
+        return Cause(link, partial(self._of_statement, machine, index))
+
+    def _of_statement(self, machine: str, index: int) -> Found:
+        """The wait or condition that let a statement be executed."""
+        executed = self._log.executed[machine]
+        number = executed[index].place.number
+        for earlier in range(index - 1, max(-1, index - MOST_LOOKED_BACK), -1):
+            use = self._use(machine, earlier)
+            if use.jumps is not None and use.jumps == number:
+                number = executed[earlier].place.number
+            ended = executed[earlier + 1].time
+            if use.waits and ended - executed[earlier].time > self._world.programs[machine].statement_time:
+                return self._decided(machine, earlier, ended, "ended")
+            if number in use.governs or (use.is_loop and executed[earlier + 1].place.number >= use.governs.stop):
+                return self._decided(machine, earlier, executed[earlier].time, "decided")
+        return self._started(machine)
+
+    def _decided(self, machine: str, index: int, time: Nanos, how: str) -> Cause:
+        executed = self._log.executed[machine][index]
+        link = Link(time, machine, f"{statement(self._world, machine, executed.place)} {how}")
+        return Cause(link, partial(self._of_decision, machine, index, time))
+
+    def _of_decision(self, machine: str, index: int, time: Nanos) -> Found:
+        found = [cause for operand in self._use(machine, index).reads if (cause := self.operand(machine, operand, time, index))]
+        return max(found, key=lambda cause: cause.link.time) if found else self._of_statement(machine, index)
+
+    def operand(self, machine: str, operand: Operand, time: Nanos, index: int) -> Found:
+        """The last change of what a statement reads."""
+        match operand.kind:
+            case OperandKind.PIN:
+                every = [name for name in self._log.changes if name.startswith(f"{machine}.")]
+                return self.last([f"{machine}.{operand.name}"] if operand.name else every, time)
+            case OperandKind.AXIS:
+                return self.motion(machine, operand.name, time)
+            case OperandKind.VALUE:
+                for earlier in range(index - 1, max(-1, index - MOST_LOOKED_BACK), -1):
+                    if operand in self._use(machine, earlier).writes:
+                        return self.statement(machine, earlier)
+        return None
+
+    def _started(self, machine: str) -> Found:
+        """The statement that was executed first."""
+        executed = self._log.executed[machine]
+        return Cause(Link(executed[0].time, machine, "the program started"), nothing)
+
+
+def _inputs(part: BoardPart) -> list[str]:
+    return [terminal for terminal in part.board.levels if terminal not in part.board.outputs]
+
+
+def _matches(writes: Sequence[Operand], wanted: Operand | None) -> bool:
+    """Whether a statement changes what is wanted. An empty name is any of its kind."""
+    if wanted is None:
+        return bool(writes)
+    return any(one.kind is wanted.kind and (one.name in ("", wanted.name) or not wanted.name) for one in writes)
+
+
+def _acted(act: Act) -> Cause:
+    by = f"script {act.script}" if act.script else "from outside"
+    return Cause(Link(act.time, act.script or "outside", f"{by}: {words_of(act.what)}"), nothing)
+
+
+def _sets(act: Act, pin: PinName) -> bool:
+    match act.what:
+        case do.Set(levels):
+            return any(machine == pin.machine and name.upper() == pin.pin for machine, name, _ in levels)
+    return False
+
+
+def _requests(act: Act, line: str, members: Collection[str]) -> bool:
+    """Whether an action sends something over a line."""
+    match act.what:
+        case do.Write(values):
+            return any(machine in members for machine, *_ in values)
+        case do.Request() | do.Send() as what:
+            return what.line == line
+    return False
+
+
+def _changes(act: Act, machine: str) -> bool:
+    match act.what:
+        case do.PowerCycle() | do.Turn() | SetVariable() | Download() | See() as what:
+            return what.machine == machine
+        case do.Write(values):
+            return any(name == machine for name, *_ in values)
+    return False

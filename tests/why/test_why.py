@@ -1,0 +1,242 @@
+"""The chain of causes for each kind of cause. Sentences and moments are those of the worlds in `why_worlds`, followed by hand."""
+
+from __future__ import annotations
+
+import pytest
+from why_worlds import CHIP, CHIP_PROGRAM, LINE, PROGRAM, WAITS
+
+from steptwin.errors import Misuse
+from steptwin.files.world import World
+from steptwin.wire.rtu import encode_frame
+from steptwin.world import script as do
+from steptwin.world.actions import Bytes
+from steptwin.world.kinds.mic488.writes import encode_write
+
+
+def waits() -> World:
+    world = World.from_toml(WAITS, {"p.prg": PROGRAM.encode()})
+    world.run(5.0)
+    return world
+
+
+def line(timing: str = "off") -> World:
+    return World.from_toml(LINE.replace("TIMING", f'timing = "{timing}"'))
+
+
+def shown(world: World, question: str, at: float | None = None) -> list[str]:
+    """The answer, each run of blanks as one."""
+    return [" ".join(text.split()) for text in world.why(question, at).text().splitlines()]
+
+
+def test_statement_wait_contact_and_script() -> None:
+    assert shown(waits(), "cell.OUT1") == [
+        "cell.OUT1 is 1, since 1.011000 s (at 5 s)",
+        "1.011000 s cell cell.OUT1 became 1",
+        "1.011000 s cell line 4 `lamp = ON` was executed",
+        "1.011000 s cell line 3 `WAIT start = ON` ended",
+        "1.000000 s cell cell.IN1 became 1",
+        "1.000000 s go go became 1, a contact of cell.IN1",
+        "1.000000 s operator script operator: presses go",
+    ]
+
+
+def test_a_relay_follows_its_coil_after_its_time() -> None:
+    assert shown(waits(), "guard.no")[:3] == [
+        "guard.no is 1, since 1.021000 s (at 5 s)",
+        "1.021000 s guard guard.no became 1",
+        "1.011000 s cell cell.OUT1 became 1, guard follows after 10 ms",
+    ]
+
+
+def test_a_wait_for_ever_shows_what_it_depends_on() -> None:
+    assert shown(waits(), "cell")[:7] == [
+        "cell waits at line 5 `WAIT IN2 = ON`, since 1.012000 s (at 5 s)",
+        "5.000000 s cell cell.IN2 is 0 from the beginning, driven by both.out",
+        "5.000000 s both both.out is 0 from the beginning, driven by guard.no and cell.OUT3",
+        "5.000000 s guard guard.no is 1 since 1.021000 s, driven by cell.OUT1",
+        "5.000000 s cell cell.OUT3 is 0 from the beginning",
+        "5.000000 s cell cell.OUT1 is 1 since 1.011000 s",
+        "1.012000 s cell line 5 `WAIT IN2 = ON` was executed",
+    ]
+
+
+def test_the_moment_decides() -> None:
+    world = waits()
+    assert shown(world, "OUT1 = 0", 0.5) == ["cell.OUT1 == 0 is true, from the beginning (at 0.5 s)"]
+    assert shown(world, "why cell", 0.5)[0] == "cell waits at line 3 `WAIT start = ON`, since 0.001000 s (at 0.5 s)"
+
+
+def test_a_gate_shows_which_input_and_the_end_of_a_pulse_what_began_it() -> None:
+    world = waits()
+    world.mic488["cell"].write("OUT3", 1)
+    world.run(7.0)
+    assert shown(world, "IN2") == [
+        "cell.IN2 is 1, since 5.000000 s (at 7 s)",
+        "5.000000 s cell cell.IN2 became 1",
+        "5.000000 s both both.out became 1, which is wired to cell.IN2",
+        "5.000000 s cell cell.OUT3 became 1",
+        "5.000000 s outside from outside: writes cell.OUT3 = 1",
+    ]
+    assert shown(world, "OUT2")[1:4] == [
+        "5.511000 s cell cell.OUT2 became 1",
+        "5.011000 s cell line 6 `PULSE(OUT2, 0,5)` was executed",
+        "5.011000 s cell line 5 `WAIT IN2 = ON` ended",
+    ]
+
+
+@pytest.mark.parametrize("timing", ["off", "strict"])
+def test_a_write_of_a_client(timing: str) -> None:
+    world = line(timing)
+    world.run(1.0)
+    (pdu,) = encode_write(world.mic488["other"].device, (("OUT3", 1.0),))
+    world.apply_input(Bytes("bus", "hmi", "rtu", encode_frame(2, pdu)))
+    world.run(2.0)
+    effect, cause = world.why("other.OUT3").links
+    assert effect.text == "other.OUT3 became 1"
+    assert (cause.subject, cause.text) == ("bus", "client hmi: unit 2: write OUT3 = ON")
+    assert 1_000_000_000 <= cause.time <= effect.time
+
+
+def test_a_read_or_a_write_to_another_controller_is_no_cause() -> None:
+    world = line()
+    world.run(1.0)
+    (to_other,) = encode_write(world.mic488["other"].device, (("OUT3", 1.0),))
+    (to_table,) = encode_write(world.mic488["table"].device, (("OUT3", 1.0),))
+    read = bytes.fromhex("03 00 00 00 01")
+    for unit, pdu in ((2, to_other), (1, to_table), (2, read)):
+        world.apply_input(Bytes("bus", "hmi", "rtu", encode_frame(unit, pdu)))
+    world.run(2.0)
+    assert world.why("other.OUT3").links[1].text == "client hmi: unit 2: write OUT3 = ON"
+    assert world.why("table.OUT3").links[1].text == "client hmi: unit 1: write OUT3 = ON"
+
+
+def test_a_switch_at_a_place_of_an_axis_that_was_commanded_to_move() -> None:
+    world = line()
+    world.mic488["table"].write("M1_EN", 1)
+    world.run(0.5)
+    world.mic488["table"].write("M1_POS_ABS", 20_000.0)
+    world.run(60.0)
+    chain = shown(world, "other.IN3")
+    assert chain[2:] == [
+        f"{world.why('other.IN3').links[1].time / 1e9:.6f} s x x.switch1 became 1, a contact of other.IN3",
+        "0.500000 s table x (table.M1) began to move",
+        "0.500000 s bus request: unit 1: write M1_POS_ABS = 20000 imp",
+        "0.500000 s outside from outside: writes table.M1_POS_ABS = 20000",
+    ]
+    reached = world.why("table.M1.status == 4")
+    assert reached.links[0].text == "the motion of table.M1 ended, which began at 0.500000 s"
+    assert reached.links[0].time == reached.since
+    assert world.why("x.position", 1.0).links[0].text == "x (table.M1) began to move"
+    assert world.why("table.hr:10020").since == reached.since
+
+
+def test_a_fault_is_a_cause_of_what_it_names_only() -> None:
+    world = line()
+    world.run(1.0)
+    world.mic488["other"].write("OUT3", 1)
+    world.fault("stuck machine=other pin=IN4 value=1")
+    world.run(2.0)
+    assert [link.text for link in world.why("other.IN4").links] == [
+        "other.IN4 became 1",
+        "fault stuck: IN4 is stuck at 1",
+        "from outside: sets the fault stuck",
+    ]
+    assert world.why("other.OUT3").links[1].text == "request: unit 2: write OUT3 = ON"
+
+
+def test_a_stuck_output_of_an_element() -> None:
+    world = waits()
+    world.fault("stuck-output element=both output=out level=1")
+    world.run(6.0)
+    assert [link.text for link in world.why("both.out").links] == [
+        "both.out became 1",
+        "fault stuck-output: both.out is stuck at 1",
+        "from outside: sets the fault stuck-output",
+    ]
+
+
+def test_commands_of_an_m1486() -> None:
+    world = World.from_toml(CHIP, {"p.m1486": CHIP_PROGRAM.encode()})
+    world.run(1.0)
+    assert shown(world, "chip")[:2] == [
+        "chip waits at line 4 `Z2`, since 0.101000 s (at 1 s)",
+        "1.000000 s chip chip.B2 is 1 from the beginning",
+    ]
+    world.apply_input(do.Set((("chip", "B2", 0.0),)))
+    world.run(20.0)
+    chain = shown(world, "B1")
+    assert chain[1:] == [
+        f"{chain[1].partition(' ')[0]} s chip chip.B1 became 0",
+        f"{chain[1].partition(' ')[0]} s chip line 7 `C1` was executed",
+        f"{chain[3].partition(' ')[0]} s chip line 6 `R` ended",
+        f"{chain[3].partition(' ')[0]} s chip the motion of chip.M1 ended, which began at 1.001000 s",
+        "1.001000 s chip line 6 `R` was executed",
+        "1.000000 s chip line 4 `Z2` ended",
+        "1.000000 s chip chip.B2 became 0",
+        "1.000000 s outside from outside: sets chip.B2 = 0",
+    ]
+
+
+def test_a_condition_that_was_false_once_more() -> None:
+    world = waits()
+    world.release("go")
+    world.run(6.0)
+    world.press("go")
+    world.run(7.0)
+    assert world.why("cell.IN1 == 1 and cell.OUT1 == 1").since == 6_000_000_000
+    assert world.why("cell.IN1 == 1 or cell.OUT1 == 1").since == 1_000_000_000
+
+
+def test_contacts_are_signals_too() -> None:
+    assert waits().why("go").links[1].text == "script operator: presses go"
+    assert waits().why("go == 1 and cell.OUT1").since == 1_011_000_000
+    assert waits().why("go.pressed").links[0].text == "go became 1"
+
+
+def test_levels_in_volts() -> None:
+    world = line()
+    world.run(1.0)
+    world.apply_input(do.Set((("table", "AIN1", 5.0),)))
+    world.run(2.0)
+    assert world.why("table.AIN1 > 3 V").links[1].text == "from outside: sets table.AIN1 = 5"
+
+
+def test_plain_answers() -> None:
+    answer = waits().why("guard.no").plain()
+    assert answer["since_ns"] == 1_021_000_000
+    assert answer["complete"] is True
+    assert answer["links"][0] == {"time_ns": 1_021_000_000, "subject": "guard", "text": "guard.no became 1"}
+
+
+def test_a_question_changes_nothing() -> None:
+    asked, other = waits(), waits()
+    asked.why("cell")
+    asked.run(6.0)
+    other.run(6.0)
+    assert asked.trace.digest() == other.trace.digest()
+
+
+@pytest.mark.parametrize(
+    ("question", "at", "message"),
+    [
+        ("", None, "a question is a signal"),
+        ("cell.OUT99", None, "no signal"),
+        ("nothing.x == 1", None, "nothing is called 'nothing'"),
+        ("cell", 6.0, "the past is known from 0 to 5 s"),
+        ("cell.OUT1 ==", None, "ends too early"),
+    ],
+)
+def test_what_is_no_question(question: str, at: float | None, message: str) -> None:
+    with pytest.raises(Misuse, match=message):
+        waits().why(question, at)
+
+
+def test_a_name_that_several_controllers_have() -> None:
+    with pytest.raises(Misuse, match=r"OUT3 is of table and other: ask with the controller, such as table\.OUT3"):
+        line().why("OUT3")
+
+
+def test_a_world_without_its_inputs() -> None:
+    world = World.from_toml(WAITS, {"p.prg": PROGRAM.encode()}, keep_inputs=False)
+    with pytest.raises(Misuse, match="does not keep its inputs"):
+        world.why("cell")
