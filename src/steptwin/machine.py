@@ -108,6 +108,10 @@ class MotionController(Machine, Protocol):
         """Present value of every pin, inputs and outputs."""
         ...
 
+    def pin(self, name: str) -> float:
+        """Present value of one of `pins`."""
+        ...
+
     def take_edges(self) -> list[PinEdge]:
         """Output edges since the last call, in order."""
         ...

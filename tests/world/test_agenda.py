@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
+from tests.support.toy.machine import Bare
 
+from steptwin.errors import Misuse
 from steptwin.world.agenda import Agenda, Watchers
 from steptwin.world.kernel import Kernel
 
@@ -19,7 +22,7 @@ class Waiter:
 
     number: int
     entry: int = 0
-    kernels: tuple[Any, ...] = field(default=())
+    sources: tuple[Any, ...] = field(default=())
 
 
 class Book(RuleBasedStateMachine):
@@ -89,35 +92,56 @@ def test_outdated_entries_are_cleared_away(moments: list[tuple[int, int]]) -> No
     assert agenda.take_timed(1000) is None
 
 
-def test_watchers_are_those_of_kernels_that_have_changed() -> None:
+def joined(*names: str) -> Kernel:
+    """A kernel with a machine of each name."""
+    kernel = Kernel()
+    for name in names:
+        kernel.add(name, Bare())
+    kernel.settle()
+    return kernel
+
+
+def test_scripts_are_evaluated_when_what_they_depend_on_has_changed() -> None:
     watchers: Any = Watchers()
-    kernels = [Kernel() for _ in range(3)]
+    one, other, third = joined("a", "b"), joined("c"), joined("d")
+    a, b, c = one.source("a"), one.source("b"), other.source("c")
     scripts = [Waiter(number) for number in range(3)]
     assert watchers.take() == []
-    watchers.set(scripts[2], (kernels[0], kernels[1]))
-    watchers.set(scripts[0], (kernels[1],))
+    watchers.set(scripts[2], (a, c))
+    watchers.set(scripts[0], (b, c))
     watchers.set(scripts[1], ())
+    one.mark()
+    assert watchers.take() == [scripts[0], scripts[2]]
     assert watchers.take() == []
-    kernels[0].mark()
+    one.mark("a")
     assert watchers.take() == [scripts[2]]
     assert watchers.take() == []
-    kernels[1].mark()
-    kernels[0].mark()
-    kernels[2].mark()
+    other.mark("c")
+    one.mark("b")
+    third.mark("d")
     assert watchers.take() == [scripts[0], scripts[2]], "each once, in the order of their numbers"
     watchers.again(scripts[1])
-    kernels[1].mark()
+    other.mark()
     assert watchers.take() == scripts
     assert watchers.take() == []
-    watchers.set(scripts[2], (kernels[0],))
-    kernels[1].mark()
+    watchers.set(scripts[2], (a,))
+    other.mark("c")
+    one.mark("b")
     assert watchers.take() == [scripts[0]]
     watchers.set(scripts[0], ())
-    assert (kernels[1].on_change, scripts[0].kernels) == (None, ())
-    kernels[1].mark()
+    assert (other.on_change, scripts[0].sources) == (None, ())
+    other.mark("c")
+    one.mark("b")
     assert watchers.take() == []
-    assert kernels[0].on_change is not None
-    watchers.set(scripts[1], (kernels[0],))
+    assert one.on_change is not None
+    watchers.set(scripts[1], (a,))
     watchers.set(scripts[2], ())
-    kernels[0].mark()
+    one.mark("a")
     assert watchers.take() == [scripts[1]]
+    watchers.set(scripts[1], ())
+    assert one.on_change is None
+
+
+def test_only_what_computes_signals_is_a_source() -> None:
+    with pytest.raises(Misuse, match="nothing computes signals of 'x': there are a, b"):
+        joined("a", "b").source("x")

@@ -70,6 +70,9 @@ class Relay(Bare):
     def pins(self) -> Mapping[str, float]:
         return dict(self.levels)
 
+    def pin(self, name: str) -> float:
+        return self.levels[name]
+
     def follow(self, profile: Profile) -> None:
         self.axis.follow(profile)
         self.changed()

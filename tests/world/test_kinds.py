@@ -47,6 +47,7 @@ def test_every_pin_and_every_point_of_a_data_sheet_can_be_named(name: str) -> No
     machine = WORLD.machines[name]
     assert sheet.kind == kind.name
     assert {pin.name for pin in sheet.pins} == set(machine.pins())
+    assert {pin: machine.pin(pin) for pin in machine.pins()} == machine.pins()
     assert len(sheet.axes) == len(machine.axes)
     paths = [point.path for point in sheet.points]
     assert len({path.upper() for path in paths}) == len(paths)

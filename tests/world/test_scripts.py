@@ -171,6 +171,11 @@ def test_steps_take_whole_nanoseconds(step: Any, values: list[Any]) -> None:
         step(*values)
 
 
+JOINED = """
+    [[wire]]
+    from = "c{n}.OUT1"
+    to = "c{next}.IN7"
+"""
 LOOKED_AT = """
     [[mic488]]
     name = "c{n}"
@@ -191,8 +196,12 @@ LOOKED_AT = """
 """
 
 
+@pytest.mark.parametrize("wired", ["", JOINED])
 @pytest.mark.parametrize("until", [None, "idle and time > 30"])
-def test_scripts_that_watch_are_looked_at_for_what_they_watch_alone(until: str | None, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_scripts_that_watch_are_looked_at_for_what_they_watch_alone(
+    until: str | None, wired: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where wires join all machines."""
     counted: dict[str, int] = {}
 
     def counting(owner: type, name: str) -> None:
@@ -209,7 +218,9 @@ def test_scripts_that_watch_are_looked_at_for_what_they_watch_alone(until: str |
     counting(Kernel, "advance")
     found = []
     for controllers in (5, 20):
-        world = World.from_toml("".join(dedent(LOOKED_AT).format(n=n) for n in range(1, controllers + 1)))
+        world = World.from_toml(
+            "".join(dedent(LOOKED_AT + wired).format(n=n, next=n % controllers + 1) for n in range(1, controllers + 1))
+        )
         counted.clear()
         world.run(for_=20, until=until)
         ended = [script for script in world.scripts if not script.ended]

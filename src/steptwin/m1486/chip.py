@@ -29,7 +29,7 @@ from steptwin.m1486.eeprom import pack, unpack
 from steptwin.m1486.effects import WrongData
 from steptwin.m1486.events import EVENTS_KEPT, M1486Event
 from steptwin.m1486.functions import COMPLEMENT, CONTINUE, EDGE, LIMITOFF, OUTPUTS, RECOVER, RUNSIGN
-from steptwin.m1486.lines import LINES, STEP_DIRECTION, Interface
+from steptwin.m1486.lines import STEP_DIRECTION, Interface
 from steptwin.m1486.memory import CommandMemory, FileState
 from steptwin.m1486.motor import MotorControl
 from steptwin.m1486.pins import LINE_PINS, OPEN_ADDRESS, WAVEFORM, ChipPins, baud_pins, settable_pin
@@ -283,9 +283,13 @@ class M1486Chip(Stateful):
             self.motor.line_changed(line, level, now)
 
     def pins(self) -> Mapping[str, float]:
-        shown = {f"B{line}": float(self.level(line, self.now)) for line in LINES}
-        shown |= {name: float(level) for name, level in self.io.others.items()}
-        return {**shown, WAVEFORM: float(self.drive.characteristic)}
+        return {name: self.pin(name) for name in (*LINE_PINS, *self.io.others, WAVEFORM)}
+
+    def pin(self, name: str) -> float:
+        line = LINE_PINS.get(name)
+        if line is not None:
+            return float(self.level(line, self.now))
+        return float(self.drive.characteristic if name == WAVEFORM else self.io.others[name])
 
     def take_edges(self) -> list[PinEdge]:
         waveform = self.motor.drive.characteristic

@@ -56,7 +56,6 @@ INPUT_PINS = {f"IN{n + 1}": n for n in range(INPUTS)}
 ANALOG_PINS = {f"AIN{n + 1}": n for n in range(ANALOG_INPUTS)}
 OUTPUT_PINS = tuple(f"OUT{n + 1}" for n in range(OUTPUTS))
 ENABLE_PINS = tuple(f"M{n + 1}_EN" for n in range(AXES))
-PINS = (*INPUT_PINS, *ANALOG_PINS, *OUTPUT_PINS, *ENABLE_PINS, "ERR")
 
 
 def check_pin(pin: str, value: float) -> None:
@@ -330,9 +329,11 @@ class ControllerCore(Stateful):
                 axis.input_changed(number, active, now)
 
     def pins(self) -> Mapping[str, float]:
-        enables = [axis.enabled for axis in self.axes]
-        levels = (*self.inputs.pins, *self.analog_v, *self.outputs, *enables, self.error_led)
-        return dict(zip(PINS, map(float, levels), strict=True))
+        return {name: float(read(self, number)) for name, (read, number) in _PIN_READERS.items()}
+
+    def pin(self, name: str) -> float:
+        read, number = _PIN_READERS[name]
+        return float(read(self, number))
 
     def take_edges(self) -> list[PinEdge]:
         edges, self._edges = self._edges, []
@@ -472,3 +473,13 @@ class ControllerCore(Stateful):
         """USER_REG_ZERO: the registers, not their stored copy."""
         stored = self._stored()
         self.user[stored] = array("H", bytes(2 * (stored.stop - stored.start)))
+
+
+_PIN_READERS: Mapping[str, tuple[Callable[[ControllerCore, int], float], int]] = {
+    **{name: (lambda core, n: core.inputs.pins[n], n) for name, n in INPUT_PINS.items()},
+    **{name: (lambda core, n: core.analog_v[n], n) for name, n in ANALOG_PINS.items()},
+    **{name: (lambda core, n: core.outputs[n], n) for n, name in enumerate(OUTPUT_PINS)},
+    **{name: (lambda core, n: core.axes[n].enabled, n) for n, name in enumerate(ENABLE_PINS)},
+    "ERR": (lambda core, n: core.error_led, 0),
+}
+"""How the level of each pin is read, and its number (from 0)."""

@@ -1,8 +1,8 @@
-"""Scheduling of waiting scripts: at fixed moments, and when a kernel changes on which their condition depends.
+"""Scheduling of waiting scripts: at fixed moments, and when a machine, a line or an element changes on which their condition
+depends.
 
-A script with a condition is evaluated only at its due moment or when one of its kernels has changed; watched kernels are advanced
-event by event. The cost of a world
-therefore grows with the number of its events, not with the number of its scripts.
+A script with a condition is evaluated only at its due moment or when one of these may have changed; watched kernels are advanced
+event by event. The cost of a world therefore grows with the number of its events, not with the number of its scripts.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from heapq import heapify, heappop, heappush
 from itertools import count
 
 from steptwin.machine import Nanos
-from steptwin.world.kernel import Kernel
+from steptwin.world.kernel import Kernel, Source
 from steptwin.world.running import Script
 from steptwin.world.turns import Dues
 
@@ -74,7 +74,7 @@ class Agenda:
         self._timed.put(script, until)
 
     def watch(self, script: Script, due: Nanos | None) -> None:
-        """Let a script be evaluated at ``due``; None: only when a kernel has changed."""
+        """Let a script be evaluated at ``due``; None: only when something has changed on which it depends."""
         script.entry = 0
         if due is not None:
             self._watching.put(script, due)
@@ -101,14 +101,16 @@ class Agenda:
 
 
 class Watchers:
-    """Which scripts depend on which kernels, when these are due, and which have changed since the last `take`."""
+    """Which scripts depend on which machines, lines and elements, when their kernels are due, and what has changed since the last
+    `take`."""
 
     __slots__ = ("_again", "_changed", "_dues", "_kernels", "_numbers", "_scripts", "_watch")
 
     def __init__(self) -> None:
         self._watch: Callable[[Kernel], None] | None = None
         """Called with every changed kernel, including those on which no script depends."""
-        self._scripts: dict[Kernel, dict[int, Script]] = {}
+        self._scripts: dict[Kernel, dict[str, dict[int, Script]]] = {}
+        """By kernel, name of the source, and number."""
         self._changed: dict[Kernel, None] = {}
         self._again: dict[int, Script] = {}
         self._kernels: list[Kernel] = []
@@ -117,22 +119,30 @@ class Watchers:
         self._dues = Dues()
         """Of kernels on which a script depends."""
 
-    def set(self, script: Script, kernels: tuple[Kernel, ...]) -> None:
-        """Replace the kernels on which a script depends."""
-        if kernels == script.kernels:
+    def set(self, script: Script, sources: tuple[Source, ...]) -> None:
+        """Replace what a script depends on."""
+        if sources == script.sources:
             return
-        for kernel in script.kernels:
-            scripts = self._scripts[kernel]
-            del scripts[script.number]
-            if not scripts:
-                del self._scripts[kernel]
-                self._dues.put(self._numbers[kernel], None)
-                kernel.on_change = self._watch
-        script.kernels = kernels
-        for kernel in kernels:
+        for source in script.sources:
+            self._leave(source, script)
+        script.sources = sources
+        for kernel, name in sources:
             if kernel not in self._scripts:
                 self._begin(kernel)
-            self._scripts[kernel][script.number] = script
+            self._scripts[kernel].setdefault(name, {})[script.number] = script
+
+    def _leave(self, source: Source, script: Script) -> None:
+        kernel, name = source
+        named = self._scripts[kernel]
+        scripts = named[name]
+        del scripts[script.number]
+        if scripts:
+            return
+        del named[name]
+        if not named:
+            del self._scripts[kernel]
+            self._dues.put(self._numbers[kernel], None)
+            kernel.on_change = self._watch
 
     def _begin(self, kernel: Kernel) -> None:
         if kernel not in self._numbers:
@@ -152,7 +162,7 @@ class Watchers:
             self._kernels[number].advance(now)
 
     def change(self, kernel: Kernel) -> None:
-        """Register a change of ``kernel``: the scripts that depend on it have to be evaluated."""
+        """Register a change of ``kernel``: the scripts that depend on what has changed there have to be evaluated."""
         self._changed[kernel] = None
         if self._watch is not None:
             self._watch(kernel)
@@ -175,8 +185,9 @@ class Watchers:
         found, self._again = self._again, {}
         while self._changed:
             kernel, _ = self._changed.popitem()
-            scripts = self._scripts.get(kernel)
-            if scripts is not None:
-                found.update(scripts)
-                self._dues.put(self._numbers[kernel], kernel.deadline())  # signals may settle: it has changed again then
+            named = self._scripts.get(kernel)
+            if named is not None:
+                self._dues.put(self._numbers[kernel], kernel.deadline())  # signals settle
+                for name in kernel.take_changed():
+                    found.update(named.get(name, ()))
         return [found[n] for n in sorted(found)]

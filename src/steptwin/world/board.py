@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, ClassVar
 
 from steptwin.machine import Nanos
 from steptwin.state import Stateful
 
 if TYPE_CHECKING:
-    from steptwin.world.kernel import Kernel
+    from steptwin.world.kernel import Kernel, Source
 
 
 class Board(Stateful):
@@ -33,8 +33,10 @@ class Board(Stateful):
         self._recorded: tuple[str, ...] = ()
         """Outputs whose first level has been recorded."""
 
-    def pins(self) -> Mapping[str, float]:
-        return self.levels
+    @property
+    def source(self) -> Source:
+        """What its levels, and the signals of its element, depend on."""
+        return self.kernel.source(self.name)
 
     def set_pin(self, pin: str, level: float, now: Nanos) -> None:
         """Drive an input. The element sees it when signals settle."""

@@ -189,7 +189,7 @@ class _Builder:
             raise Misuse("nothing is on this line")
         kernel = self.site.kernel(spec.name)
         line = kind.make(spec, members, kernel, parts.record, parts.faults)
-        kernel.add_part(line, (spec.name, *(member.spec.name for member in members)))
+        kernel.add_part(line, (spec.name, *(member.spec.name for member in members)), spec.name)
         parts.lines[spec.name] = line
         for member in members:
             parts.line_of[member.spec.name] = line, member.address

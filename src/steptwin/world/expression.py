@@ -267,39 +267,50 @@ class _Crossing(NamedTuple):
 class SignalCondition:
     """A condition with its signals."""
 
-    __slots__ = ("_comparisons", "_crossings", "_node", "_signals", "text")
+    __slots__ = ("_brought", "_comparisons", "_crossings", "_signals", "_test", "text")
 
     def __init__(self, text: str, signals: Signals) -> None:
         """Raises `Misuse` for invalid text, for unknown signals, and for a number in a unit that its signals do not have."""
         self.text = text
         node = parse(text)
         self._signals = {name: signals(name) for name in names(node)}
-        self._node = self._converted(node)
-        self._comparisons = list(self._moving(self._node))
+        self._brought = tuple(self._signals.values())
+        node = self._converted(node)
+        self._test = self._compiled(node)
+        self._comparisons = list(self._moving(node))
         self._crossings: list[_Crossing | None] = [None] * len(self._comparisons)
         """The crossings computed last."""
 
     def bring(self, now: Nanos) -> tuple[Any, ...]:
         """As `Signal.bring`, for all its signals. Must be called before `holds` and `due`."""
+        if len(self._brought) == 1:
+            return self._brought[0].bring(now)
         found: dict[Any, None] = {}
-        for signal in self._signals.values():
+        for signal in self._brought:
             found.update(dict.fromkeys(signal.bring(now)))
         return tuple(found)
 
     def holds(self, now: Nanos) -> bool:
-        return self._holds(self._node, now)
+        return self._test(now)
 
-    def _holds(self, node: Node, now: Nanos) -> bool:
+    def _compiled(self, node: Node) -> Callable[[Nanos], bool]:
+        """Conditions are evaluated far more often than made."""
         if isinstance(node, SignalComparison):
-            return _COMPARE[node.sign](self._value(node.left, now), self._value(node.right, now))
+            compare, left, right = _COMPARE[node.sign], self._read(node.left), self._read(node.right)
+            return lambda now: compare(left(now), right(now))
         if isinstance(node, Not):
-            return not self._holds(node.inner, now)
+            inner = self._compiled(node.inner)
+            return lambda now: not inner(now)
+        parts = tuple(map(self._compiled, node.parts))
         if isinstance(node, And):
-            return all(self._holds(part, now) for part in node.parts)
-        return any(self._holds(part, now) for part in node.parts)
+            return lambda now: all(part(now) for part in parts)
+        return lambda now: any(part(now) for part in parts)
 
-    def _value(self, side: Quantity, now: Nanos) -> float:
-        return side.value(lambda name: self._signals[name].value(now))
+    def _read(self, side: Quantity) -> Callable[[Nanos], float]:
+        signals = self._signals
+        if isinstance(side, SignalName):
+            return signals[side.text].value
+        return lambda now: side.value(lambda name: signals[name].value(now))
 
     def _converted(self, node: Node) -> Node:
         """With all numbers in the units of the signals that they are compared with."""

@@ -13,10 +13,9 @@ from typing import Any, NamedTuple, Protocol
 
 from steptwin.errors import Misuse, Runaway, TimeReversal
 from steptwin.machine import Drive, Fact, MotionController, Nanos, PinEdge
-from steptwin.motion import Profile
-from steptwin.motion.divisions import profile_of
 from steptwin.state import Plain
 from steptwin.world.board import Board
+from steptwin.world.recordedplans import RecordedPlans
 from steptwin.world.trace import Recorder, TraceRecord
 from steptwin.world.turns import Dues, Turns
 
@@ -48,6 +47,13 @@ class PinName(NamedTuple):
 
     def __str__(self) -> str:
         return f"{self.machine}.{self.pin}"
+
+
+class Source(NamedTuple):
+    """A machine, a line or an element of a kernel, on which a value depends."""
+
+    kernel: Kernel
+    name: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,6 +118,8 @@ class Kernel:
         """Whether a condition depends on values that a request may change without an event; then every request counts as one."""
         self.on_change: Callable[[Kernel], None] | None = None
         """Called with the kernel after each of its events and after each change from outside."""
+        self._changed: set[str] = set()
+        """The machines, lines and elements that were looked at since the last `take_changed`."""
         self._record = record
         self._wires: dict[PinName, list[Wire]] = {}
         self._levels: dict[PinName, float] = {}
@@ -119,12 +127,16 @@ class Kernel:
         self._recorded: dict[PinName, tuple[Nanos, float]] = {}
         """The last recorded edge of each driven input."""
         self._flights: list[DelayedLevel] = []
-        self._plans: list[_Plans] = []
+        self._plans: list[RecordedPlans] = []
         """The plans of each machine that were recorded last."""
         self._names: list[str] = []
         """The names of the machines, by number."""
         self._concerned: dict[str, list[tuple[Callable[[int], None], int]]] = {}
         """What has to be looked at when something with this name has changed: the machine, and parts that watch it."""
+        self._sources: dict[str, Source] = {}
+        """The machines, and the lines and elements with a part that computes their signals."""
+        self._part_names: list[str | None] = []
+        """The line or element whose signals each part computes."""
         self._watching_all: list[int] = []
         self._machine_turns, self._part_turns = Turns(), Turns()
         """What has to be looked at when the signals settle."""
@@ -133,6 +145,8 @@ class Kernel:
         self._parts_looked_at: set[int] = set()
         """Those whose deadlines may have changed since the signals last settled."""
         self._due: Nanos | None = None
+        self._alone: tuple[str, RecordedPlans] | None = None
+        """The only machine of a kernel without parts and wires, for which nothing has to be scheduled."""
 
     # ------------------------------------------------------------------ what is in it
 
@@ -144,9 +158,19 @@ class Kernel:
         self.machines[name] = machine
         self._concerned.setdefault(name, []).append((self._machine_turns.add, len(self._names)))
         self._names.append(name)
-        self._plans.append(_Plans(name, machine))
+        self._sources[name] = Source(self, name)
+        self._plans.append(RecordedPlans(name, machine))
         machine.changed = partial(self.mark, name)
+        self._join()
+        if len(self._names) == 1 and not self.parts and not self._wires:
+            self._alone = name, self._plans[0]
         self.mark(name)
+
+    def _join(self) -> None:
+        """Something joins the machines: from now on it is scheduled what has to be looked at."""
+        if self._alone is not None:
+            self._alone = None
+            self.mark()
 
     def replace(self, name: str, machine: MotionController) -> None:
         """Replace the machine ``name`` by a wrapper with the same pins and axes."""
@@ -160,16 +184,21 @@ class Kernel:
         """Add the terminals of an element, whose part has their state."""
         self.boards[board.name] = board
 
-    def add_part(self, part: KernelPart, watches: Iterable[str] | None = None) -> None:
+    def add_part(self, part: KernelPart, watches: Iterable[str] | None = None, name: str | None = None) -> None:
         """Add a part; it is first updated when the signals settle next, then whenever it is due or something that it watches has
         changed.
 
-        ``watches``: names of machines, lines and elements; None: every change.
+        ``watches``: names of machines, lines and elements; None: every change. ``name``: the line or element whose signals it
+        computes; they may change with each of its updates, and only then.
         """
+        self._join()
         number = len(self.parts)
         self.parts.append(part)
-        for name in () if watches is None else dict.fromkeys(watches):
-            self._concerned.setdefault(name, []).append((self._part_turns.add, number))
+        self._part_names.append(name)
+        if name is not None:
+            self._sources[name] = Source(self, name)
+        for watched in () if watches is None else dict.fromkeys(watches):
+            self._concerned.setdefault(watched, []).append((self._part_turns.add, number))
         if watches is None:
             self._watching_all.append(number)
         self._part_turns.add(number)
@@ -177,11 +206,19 @@ class Kernel:
         if self.on_change is not None:
             self.on_change(self)
 
+    def source(self, name: str) -> Source:
+        """The machine, line or element ``name`` as what a value depends on."""
+        found = self._sources.get(name)
+        if found is None:
+            raise Misuse(f"nothing computes signals of {name!r}: there are {', '.join(self._sources) or 'none'}")
+        return found
+
     def connect(self, wire: Wire) -> None:
         """Add a wire. The target takes the present level of the source at once, without the delay."""
         self.check(wire.source)
         self.check(wire.target)
-        self.drive(wire.target, wire.transmitted(self._pins_of(wire.source.machine)[wire.source.pin]))
+        self._join()
+        self.drive(wire.target, wire.transmitted(self._level(wire.source)))
         self._wires.setdefault(wire.source, []).append(wire)
         self.mark(wire.target.machine)
 
@@ -199,7 +236,11 @@ class Kernel:
 
     def _pins_of(self, name: str) -> Mapping[str, float]:
         board = self.boards.get(name)
-        return self.machines[name].pins() if board is None else board.pins()
+        return self.machines[name].pins() if board is None else board.levels
+
+    def _level(self, name: PinName) -> float:
+        board = self.boards.get(name.machine)
+        return self.machines[name.machine].pin(name.pin) if board is None else board.levels[name.pin]
 
     def drive_of(self, machine: str, axis: int) -> Drive:
         """The drive of ``axis`` (from 1). Raises `Misuse` if it does not exist."""
@@ -209,9 +250,16 @@ class Kernel:
             raise Misuse(f"no axis {axis} of {machine!r}, which has {len(axes)} axes")
         return axes[axis - 1]
 
+    def take_changed(self) -> set[str]:
+        """The machines, lines and elements whose signals may have changed since the last call, as far as signals have settled."""
+        changed, self._changed = self._changed, set()
+        return changed
+
     def mark(self, name: str | None = None) -> None:
         """Register a change of a machine, a line or an element, or of anything: the signals have to settle."""
-        if name is None:
+        if self._alone is not None:
+            pass  # it is looked at whenever the kernel settles
+        elif name is None:
             for number in range(len(self._names)):
                 self._machine_turns.add(number)
             for number in range(len(self.parts)):
@@ -248,9 +296,9 @@ class Kernel:
             machine.set_pin(pin, level, self.now)
             return
         known = self._recorded.get(target)
-        before = machine.pins()[pin] if known is None else known[1]
+        before = machine.pin(pin) if known is None else known[1]
         machine.set_pin(pin, level, self.now)
-        after = machine.pins()[pin]
+        after = machine.pin(pin)
         if is_first or after != before:
             self.mark_recorded(target, self.now, after)
             self._record(TraceRecord(self.now, target.machine, "edge", pin, after))
@@ -296,8 +344,11 @@ class Kernel:
 
     def _run(self, now: Nanos) -> None:
         """Process all events due by ``now``, in order."""
-        if len(self.machines) == 1 and not self.parts and not self._wires:
-            self._advance_alone(now)
+        if self._alone is not None:
+            self._advance_alone(*self._alone, now)
+            if self.on_change is not None:
+                self.on_change(self)
+            return
         while self._due is not None and self._due <= now:
             self.now = self._due
             for number in self._machine_dues.take(self.now):
@@ -312,26 +363,24 @@ class Kernel:
                 self._arrive()
             self.settle()
 
-    def _advance_alone(self, now: Nanos) -> None:
-        """As `advance` and `settle`, for a single machine without parts and wires."""
-        ((name, machine),) = self.machines.items()
-        (plans,) = self._plans
-        due = self._due
-        if due is None or due > now:
-            return
+    def _advance_alone(self, name: str, plans: RecordedPlans, now: Nanos) -> None:
+        machine, due = self.machines[name], self._due
         while due is not None and due <= now:
             self.now = due
             machine.advance(due)
-            for edge in machine.take_edges():
-                self._edge(name, edge)
-            if self._record is not None:
-                plans.report(self._record, due)
-            due = machine.deadline()
-        self._machine_dues.put(0, due)
-        self._due = due
+            self._settle_alone(name, plans)
+            due = self._due
+
+    def _settle_alone(self, name: str, plans: RecordedPlans) -> None:
+        """As `settle`, for a single machine without parts and wires."""
+        machine = self.machines[name]
+        for edge in machine.take_edges():
+            self._edge(name, edge)
+        if self._record is not None:
+            plans.report(self._record, self.now)
+        self._due = machine.deadline()
+        self._changed.add(name)
         self.stale = False
-        if self.on_change is not None:
-            self.on_change(self)
 
     def deadline(self) -> Nanos | None:
         """The time of the next event; None if there is none."""
@@ -341,6 +390,14 @@ class Kernel:
 
     def settle(self) -> None:
         """Propagate edges along wires and update parts until nothing changes; then find the next deadline."""
+        if self._alone is not None:
+            self._settle_alone(*self._alone)
+        else:
+            self._settle_joined()
+        if self.on_change is not None:
+            self.on_change(self)
+
+    def _settle_joined(self) -> None:
         for _ in range(MAX_ROUNDS_PER_INSTANT):
             self.stale = False
             for number in self._watching_all:
@@ -352,8 +409,6 @@ class Kernel:
         else:
             raise Runaway(f"signals did not settle after {MAX_ROUNDS_PER_INSTANT} rounds at {self.now} ns: a loop of wires")
         self._find_deadlines()
-        if self.on_change is not None:
-            self.on_change(self)
 
     def _update_parts(self) -> None:
         while (number := self._part_turns.take()) is not None:
@@ -372,8 +427,13 @@ class Kernel:
         for number in sorted(self._machines_looked_at):
             if self._record is not None:
                 self._plans[number].report(self._record, self.now)
-            self._machine_dues.put(number, self.machines[self._names[number]].deadline())
+            name = self._names[number]
+            self._changed.add(name)
+            self._machine_dues.put(number, self.machines[name].deadline())
         for number in self._parts_looked_at:
+            of = self._part_names[number]
+            if of is not None:
+                self._changed.add(of)
             self._part_dues.put(number, self.parts[number].deadline())
         self._machines_looked_at.clear()
         self._parts_looked_at.clear()
@@ -429,43 +489,3 @@ class Kernel:
             plans.mark_reported()
         self.mark()
         self.settle()
-
-
-class _Plans:
-    """The plans and coordinate offsets of a machine's axes that were recorded last."""
-
-    __slots__ = ("_drives", "_name", "_origins", "_profiles", "_revisions")
-
-    def __init__(self, name: str, machine: MotionController) -> None:
-        self._name = name
-        self._drives = [(i, str(i + 1), drive) for i, drive in enumerate(machine.axes)]
-        self._revisions = [-1] * len(self._drives)
-        self._profiles: list[Profile | None] = [None] * len(self._drives)
-        self._origins = [0] * len(self._drives)
-
-    def report(self, record: Recorder, now: Nanos) -> None:
-        """Record new plans and changes of coordinates. A plan that only continues the rest at the same position is not new."""
-        for i, number, drive in self._drives:
-            origin = drive.offset_p
-            if origin != self._origins[i]:
-                self._origins[i] = origin
-                record(TraceRecord(now, self._name, "coordinate", number, origin))
-            if self._revisions[i] == drive.revision:
-                continue
-            plan = drive.plan
-            before, profile = self._profiles[i], profile_of(plan)
-            self._revisions[i], self._profiles[i] = drive.revision, profile
-            if before is None or not _only_rests(before, profile):
-                record(TraceRecord(now, self._name, "plan", number, plan))
-
-    def mark_reported(self) -> None:
-        for i, _, drive in self._drives:
-            self._revisions[i], self._profiles[i] = drive.revision, profile_of(drive.plan)
-            self._origins[i] = drive.offset_p
-
-
-def _only_rests(before: Profile, after: Profile) -> bool:
-    """Whether ``after`` is rest at the end position of ``before``."""
-    if after.segments or before.end is None or before.end > after.start:
-        return False
-    return before.base + before.counts[-1] == after.base

@@ -105,7 +105,7 @@ class ScriptState(NamedTuple):
 class Script:
     """A script in progress. Scripts are numbered in the order of their start."""
 
-    __slots__ = ("_sent", "_steps", "ended", "entry", "is_external", "kernels", "make", "name", "number", "waiting")
+    __slots__ = ("_sent", "_steps", "ended", "entry", "is_external", "make", "name", "number", "sources", "waiting")
 
     def __init__(self, number: int, name: str, make: Callable[[], do.Steps | do.Walk], *, is_external: bool) -> None:
         self.number = number
@@ -118,8 +118,8 @@ class Script:
         self.waiting: ScriptWait | None = None
         self.entry = 0
         """The number of its valid entry in an agenda."""
-        self.kernels: tuple[Any, ...] = ()
-        """The kernels on which its wait depends."""
+        self.sources: tuple[Any, ...] = ()
+        """The machines, lines and elements on which its wait depends (`steptwin.world.kernel.Source`)."""
         self.ended = False
 
     def send(self, value: Any) -> do.Step | None:

@@ -89,7 +89,7 @@ class Scripts:
         self._watchers.advance(self._plant.now)
 
     def _renew(self) -> None:
-        """Update the due moments of scripts whose kernels have changed."""
+        """Update the due moments of scripts when something has changed on which they depend."""
         while changed := self._watchers.take():
             for script in changed:
                 self._plan(script)
@@ -100,7 +100,7 @@ class Scripts:
             self._watchers.set(script, ())
             self._agenda_of(script).wait(script, waiting.until)
         else:
-            self._plan(script)
+            self._watchers.again(script)  # once, with what its last step has changed
 
     def _plan(self, script: Script) -> None:
         """Schedule the evaluation of a script that waits for a condition or answers."""
@@ -109,13 +109,13 @@ class Scripts:
             return
         dues = [waiting.until]
         if waiting.condition is None:
-            kernels = tuple(plant.touch(asked.line) for asked in waiting.asked)
+            sources = tuple(plant.touch(asked.line).source(asked.line) for asked in waiting.asked)
             dues.append(plant.now if self._are_answered(waiting) else None)
         else:
             condition = plant.condition(waiting.condition)
-            kernels = condition.bring(plant.now)
+            sources = condition.bring(plant.now)
             dues.append(condition.due(plant.now))
-        self._watchers.set(script, kernels)
+        self._watchers.set(script, sources)
         self._agenda_of(script).watch(script, min((due for due in dues if due is not None), default=None))
 
     def _are_answered(self, waiting: ScriptWait) -> bool:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TypeVar
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, MotionController, Nanos
 from steptwin.nearmiss import NearMiss
-from steptwin.world.kernel import Kernel
+from steptwin.world.kernel import Source
 from steptwin.world.names import Unknown
 
 if TYPE_CHECKING:
@@ -27,9 +27,9 @@ MOST_NAMED = 8
 
 @dataclass(frozen=True, slots=True)
 class SignalOf:
-    """A signal, and the kernels that must be advanced before it is read."""
+    """A signal, and the machines, lines and elements that compute it: their kernels must be advanced before it is read."""
 
-    kernels: tuple[Kernel, ...]
+    sources: tuple[Source, ...]
     read: Callable[[Nanos], float] | None
     """None if it is write-only."""
     turning: Callable[[Nanos], Iterable[Nanos]] | None = None
@@ -50,12 +50,12 @@ class SignalOf:
     def continuous(self) -> bool:
         return self.turning is not None
 
-    def bring(self, now: Nanos) -> tuple[Kernel, ...]:
-        """Advance the kernels on which the value depends to ``now`` and return them. Until one of them changes, the value is
-        constant or follows its course."""
-        for kernel in self.kernels:
-            kernel.advance(now)
-        return self.kernels
+    def bring(self, now: Nanos) -> tuple[Source, ...]:
+        """Advance what the value depends on to ``now`` and return it. Until one of these changes, the value is constant or
+        follows its course."""
+        for source in self.sources:
+            source.kernel.advance(now)
+        return self.sources
 
     def value(self, now: Nanos) -> float:
         """The value, after `bring`. Raises `Misuse` for a write-only signal."""
@@ -69,8 +69,8 @@ class SignalOf:
             raise Misuse(f"{name} can only be written")
         self.check()
         if self.is_kept:
-            for kernel in self.kernels:
-                kernel.is_attentive = True
+            for source in self.sources:
+                source.kernel.is_attentive = True
 
     def turns(self, now: Nanos) -> Iterator[Nanos]:
         yield from () if self.turning is None else self.turning(now)
@@ -87,24 +87,25 @@ class Idle:
     unit = ""
 
     def __init__(self, plan: WorldParts) -> None:
-        self._kernels = tuple(plan.kernels)
-        self._things: list[tuple[Kernel, Callable[[Nanos], bool]]] = [
-            *((plan.kernel_of[name], partial(plan.kind_of[name].is_idle, machine)) for name, machine in plan.machines.items()),
-            *((plan.kernel_of[name], partial(_is_quiet, line)) for name, line in plan.lines.items()),
-        ]
+        at_rest: dict[str, Callable[[Nanos], bool]] = {
+            **{name: partial(plan.kind_of[name].is_idle, machine) for name, machine in plan.machines.items()},
+            **{name: partial(_is_quiet, line) for name, line in plan.lines.items()},
+        }
+        self._things = [(plan.kernel_of[name].source(name), is_at_rest) for name, is_at_rest in at_rest.items()]
+        self._sources = tuple(source for source, _ in self._things)
         self._busy: int | None = None
         """Index of the machine or line that was busy last."""
 
-    def bring(self, now: Nanos) -> tuple[Kernel, ...]:
-        """As `SignalOf.bring`: the kernel of a busy machine or line, or all kernels if none is busy."""
+    def bring(self, now: Nanos) -> tuple[Source, ...]:
+        """As `SignalOf.bring`: a busy machine or line, or all if none is busy."""
         for n in (*(() if self._busy is None else (self._busy,)), *range(len(self._things))):
-            kernel, is_at_rest = self._things[n]
-            kernel.advance(now)
+            source, is_at_rest = self._things[n]
+            source.kernel.advance(now)
             if not is_at_rest(now):
                 self._busy = n
-                return (kernel,)
+                return (source,)
         self._busy = None
-        return self._kernels
+        return self._sources
 
     def watch(self, name: str) -> None:
         """Conditions can always use it."""
@@ -135,21 +136,19 @@ def find_signal(plan: WorldParts, name: str) -> SignalOf | Idle:
         known = [*plan.machines, *plan.element_names, "time", "idle"]
         hint = NearMiss().hint(owner, known)
         raise Unknown(owner, f"no signal {name!r}: nothing is called {owner!r}{hint}; there are {', '.join(known)}")
-    return _of_machine(plan.kind_of[owner], machine, plan.kernel_of[owner], rest, name)
+    return _of_machine(plan.kind_of[owner], machine, plan.kernel_of[owner].source(owner), rest, name)
 
 
-def _of_machine(kind: AnyKind, machine: MotionController, kernel: Kernel, rest: str, name: str) -> SignalOf:
+def _of_machine(kind: AnyKind, machine: MotionController, source: Source, rest: str, name: str) -> SignalOf:
     """The signal of a pin, otherwise of a point of the data sheet."""
     pin = rest.upper()
     if pin in machine.pins():
         found = next(found for found in kind.datasheet(machine).pins if found.name == pin)
-        return SignalOf(
-            (kernel,), lambda now: machine.pins()[pin], unit=found.unit, check=partial(kind.refuse_taken, machine, pin)
-        )
+        return SignalOf((source,), lambda now: machine.pin(pin), unit=found.unit, check=partial(kind.refuse_taken, machine, pin))
     point = kind.point(machine, rest)
     if point is None:
         raise _unknown([point.path for point in kind.datasheet(machine).points], rest, name, ", and pins")
-    return SignalOf((kernel,), point.read, point.turns, point.version, point.point.unit, is_kept=point.is_kept)
+    return SignalOf((source,), point.read, point.turns, point.version, point.point.unit, is_kept=point.is_kept)
 
 
 def _is_quiet(line: Line, now: Nanos) -> bool:

@@ -45,7 +45,7 @@ class Lamp(Stateful):
         self.lit = False
 
     def update(self, now: Nanos) -> None:
-        level = self.kernel.machines[self.source.machine].pins()[self.source.pin]
+        level = self.kernel.machines[self.source.machine].pin(self.source.pin)
         is_on = bool(level) is not self._spec.inverted
         if is_on is not self._is_on:
             self._is_on = is_on
@@ -53,6 +53,10 @@ class Lamp(Stateful):
         if self._due is not None and self._due <= now:
             self._due = None
         self._show(is_on and self._due is None and not self.burnt)
+
+    @property
+    def name(self) -> str:
+        return self._spec.name
 
     def _show(self, lit: bool) -> None:
         if lit is not self.lit:
@@ -73,12 +77,12 @@ def _refers(spec: LampSpec, world: WorldSpec) -> Iterator[Reference]:
 
 def _build(spec: LampSpec, site: Site) -> Lamp:
     lamp = Lamp(spec, site.kernel(spec.source[0]), site.terminal(spec.source, OUTPUT))
-    lamp.kernel.add_part(lamp)
+    lamp.kernel.add_part(lamp, name=spec.name)
     return lamp
 
 
 def _signals(lamp: Lamp) -> Mapping[str, SignalOf]:
-    return {"lit": SignalOf((lamp.kernel,), lambda now: float(lamp.lit))}
+    return {"lit": SignalOf((lamp.kernel.source(lamp.name),), lambda now: float(lamp.lit))}
 
 
 def _burn(active: ActiveFault, lamp: Lamp, begins: bool, now: Nanos) -> str:

@@ -49,6 +49,9 @@ class Bare(Stateful):
     def pins(self) -> Mapping[str, float]:
         return {}
 
+    def pin(self, name: str) -> float:
+        return self.pins()[name]
+
     def take_edges(self) -> list[PinEdge]:
         edges, self.edges = self.edges, []
         return edges
@@ -140,7 +143,10 @@ class Toy(Bare):
         self.changed()
 
     def pins(self) -> Mapping[str, float]:
-        return {"STOP": float(self.stop), "BUSY": float(self.is_busy)}
+        return {name: self.pin(name) for name in ("STOP", "BUSY")}
+
+    def pin(self, name: str) -> float:
+        return float(self.stop if name == "STOP" else self.is_busy)
 
     def _show(self, is_busy: bool) -> None:
         if is_busy is not self.is_busy:

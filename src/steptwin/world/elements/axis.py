@@ -15,7 +15,7 @@ from steptwin.world.element import Element, NamedSpec, Reference, Row, Table
 from steptwin.world.elements.encoder import ENCODER, EncoderSpec, fit_encoder, read_encoder
 from steptwin.world.elements.motor import MOTOR, MotorSpec, read_motor
 from steptwin.world.elements.switch import SWITCH, SwitchSpec, lane_of, put_switch, read_switches, zone_of
-from steptwin.world.kernel import Kernel
+from steptwin.world.kernel import Kernel, Source
 from steptwin.world.mechanics import Mechanism
 from steptwin.world.names import Unknown
 from steptwin.world.reader import Key, TomlText, optional
@@ -55,6 +55,10 @@ class BuiltAxis:
     kernel: Kernel
     mechanism: Mechanism
     scale: Scale
+
+    @property
+    def source(self) -> Source:
+        return self.kernel.source(self.spec.name)
 
     def units(self, pulses: int) -> float:
         scale = self.scale.pulses_per_unit
@@ -110,7 +114,7 @@ def _build(spec: AxisSpec, site: Site) -> BuiltAxis:
     if build.is_free and build.motor is not None:
         build.motor.check_free()
     mechanism = Mechanism(kernel, machine, number, build, spec.name)
-    kernel.add_part(mechanism, (machine,))
+    kernel.add_part(mechanism, (machine,), spec.name)
     fitted = BuiltAxis(spec, kernel, mechanism, scale)
     for n, switch in enumerate(spec.switches, start=1):
         site.unless_wrong(switch.path, partial(_put_switch, fitted, switch, lane_of(spec.name, n), site))
@@ -144,10 +148,10 @@ def turns_of_axis(fitted: BuiltAxis, now: Nanos) -> Iterator[Nanos]:
 
 def _signals(fitted: BuiltAxis) -> Mapping[str, SignalOf]:
     mechanism, turning = fitted.mechanism, partial(turns_of_axis, fitted)
-    kernel, version = (fitted.kernel,), mechanism.version
-    position = SignalOf(kernel, lambda now: fitted.units(mechanism.place(now)), turning, version, fitted.scale.unit)
-    lost = SignalOf(kernel, lambda now: float(mechanism.lost(now)), turning, version)
-    stalled = SignalOf(kernel, lambda now: float(mechanism.at(now).stalled), turning, version)
+    source, version = (fitted.source,), mechanism.version
+    position = SignalOf(source, lambda now: fitted.units(mechanism.place(now)), turning, version, fitted.scale.unit)
+    lost = SignalOf(source, lambda now: float(mechanism.lost(now)), turning, version)
+    stalled = SignalOf(source, lambda now: float(mechanism.at(now).stalled), turning, version)
     return dict(zip(MECHANICS, (position, lost, stalled), strict=True))
 
 

@@ -47,13 +47,13 @@ def _build(spec: ButtonSpec, site: Site) -> tuple[Button, Kernel]:
         lane=spec.name,
     )
     button.rest_at(spec.contact == "NC")
-    kernel.add_part(button, (circuit.target.machine,))
+    kernel.add_part(button, (circuit.target.machine,), spec.name)
     return button, kernel
 
 
 def _signals(built: tuple[Button, Kernel]) -> Mapping[str, SignalOf]:
     button, kernel = built
-    return {"pressed": SignalOf((kernel,), lambda now: float(button.pressed))}
+    return {"pressed": SignalOf((kernel.source(button.lane),), lambda now: float(button.pressed))}
 
 
 BUTTON: Element[ButtonSpec, tuple[Button, Kernel]] = Element(

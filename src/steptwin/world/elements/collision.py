@@ -121,7 +121,7 @@ def _make(spec: CollisionSpec, site: Site) -> Collision:
 
     def signal(name: str) -> SignalOf | Idle:
         found = find_signal(site.parts, name)
-        if any(kernel is not board.kernel for kernel in found.bring(board.kernel.now)):
+        if any(source.kernel is not board.kernel for source in found.bring(board.kernel.now)):
             raise Misuse(f"when: {name!r} is no quantity of a machine or an element")
         found.watch(name)
         return found
@@ -140,6 +140,6 @@ COLLISION = with_terminals(
         optional(OUTPUT_PIN, "reset", "output joined to RESET, which frees jammed axes"),
     ),
     make=_make,
-    signals=lambda collision: {"count": SignalOf((collision.board.kernel,), lambda now: float(collision.count))},
+    signals=lambda collision: {"count": SignalOf((collision.board.source,), lambda now: float(collision.count))},
     faults=(STUCK_OUTPUT,),
 )

@@ -390,16 +390,16 @@ def _refuse_place() -> None:
 
 
 def _signals(conveyor: Conveyor) -> Mapping[str, SignalOf]:
-    kernel = (conveyor.board.kernel,)
+    source = (conveyor.board.source,)
     places = {
-        name: SignalOf(kernel, partial(conveyor.front, n), unit="mm", bounds=(0.0, conveyor.spec.length), check=_refuse_place)
+        name: SignalOf(source, partial(conveyor.front, n), unit="mm", bounds=(0.0, conveyor.spec.length), check=_refuse_place)
         for n, name in enumerate(_place_names(conveyor.spec))
     }
     return {
         **places,
-        "count": SignalOf(kernel, lambda now: float(len(conveyor.load.pieces))),
-        "fed": SignalOf(kernel, lambda now: float(conveyor.fed)),
-        "delivered": SignalOf(kernel, lambda now: float(conveyor.delivered)),
+        "count": SignalOf(source, lambda now: float(len(conveyor.load.pieces))),
+        "fed": SignalOf(source, lambda now: float(conveyor.fed)),
+        "delivered": SignalOf(source, lambda now: float(conveyor.delivered)),
     }
 
 

@@ -57,7 +57,7 @@ class Counter(BoardPart):
 
 
 def _signals(counter: Counter) -> Mapping[str, SignalOf]:
-    return {"count": SignalOf((counter.board.kernel,), lambda now: float(counter.count))}
+    return {"count": SignalOf((counter.board.source,), lambda now: float(counter.count))}
 
 
 COUNTER = with_terminals(

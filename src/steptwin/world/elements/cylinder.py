@@ -173,9 +173,9 @@ def _put_switch(cylinder: Cylinder, spec: SwitchSpec, lane: str, site: Site) -> 
 
 
 def _signals(cylinder: Cylinder) -> Mapping[str, SignalOf]:
-    kernel, travel = cylinder.board.kernel, cylinder.travel
+    source, travel = cylinder.board.source, cylinder.travel
     bounds = (0.0, cylinder.stroke)
-    return {"position": SignalOf((kernel,), cylinder.position, travel.turns, travel.version, unit="mm", bounds=bounds)}
+    return {"position": SignalOf((source,), cylinder.position, travel.turns, travel.version, unit="mm", bounds=bounds)}
 
 
 CYLINDER = with_terminals(

@@ -171,7 +171,7 @@ def with_terminals(
 
     def build(found: S, site: Site) -> P:
         part = make(found, site)
-        part.board.kernel.add_part(part, part.watches)
+        part.board.kernel.add_part(part, part.watches, found.name)
         for joint in found.joints:
             site.join(joint.source, (found.name, joint.input), (*found.path, joint.key))
         if inner is not None:
@@ -206,7 +206,7 @@ def with_terminals(
 
 
 def level_signal(board: Board, terminal: str) -> SignalOf:
-    return SignalOf((board.kernel,), partial(_level, board, terminal))
+    return SignalOf((board.source,), partial(_level, board, terminal))
 
 
 def _level(board: Board, terminal: str, now: Nanos) -> float:

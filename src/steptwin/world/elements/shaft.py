@@ -125,7 +125,7 @@ def _put_cam(shaft: GearedShaft, cam: CamSpec, lane: str, site: Site) -> None:
 
 def _signals(shaft: GearedShaft) -> Mapping[str, SignalOf]:
     turning = partial(turns_of_axis, shaft.axis)
-    return {"angle": SignalOf((shaft.axis.kernel,), shaft.angle, turning, shaft.axis.mechanism.version, "degree")}
+    return {"angle": SignalOf((shaft.axis.source,), shaft.angle, turning, shaft.axis.mechanism.version, "degree")}
 
 
 def _ratio(value: Any) -> float:

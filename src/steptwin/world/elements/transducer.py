@@ -17,7 +17,7 @@ from steptwin.world.element import Element, NamedSpec, Reference, Row, Table
 from steptwin.world.expression import Signal, crossing
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.table import ElementEffect, number
-from steptwin.world.kernel import Kernel, PinName
+from steptwin.world.kernel import Kernel, PinName, Source
 from steptwin.world.reader import Key, TomlText, optional
 from steptwin.world.sense import TableRows
 from steptwin.world.signals import SignalOf, find_signal
@@ -99,8 +99,8 @@ class Transducer(Stateful):
         return self._spec.name
 
     @property
-    def kernel(self) -> Kernel:
-        return self._kernel
+    def source(self) -> Source:
+        return self._kernel.source(self.name)
 
     def volts(self, now: Nanos) -> float:
         """The voltage that it gives."""
@@ -160,10 +160,10 @@ def _build(spec: TransducerSpec, site: Site) -> Transducer:
     site.input(spec.target, (*spec.path, "to"), ANALOG_INPUT)
     found = find_signal(site.parts, spec.of)
     found.watch(spec.of)
-    if kernel not in found.bring(kernel.now):
+    if all(source.kernel is not kernel for source in found.bring(kernel.now)):
         raise Misuse(f"of = {spec.of!r} is no quantity of what {spec.target[0]!r} is joined to")
     transducer = Transducer(kernel, spec, found)
-    kernel.add_part(transducer)
+    kernel.add_part(transducer, name=spec.name)
     return transducer
 
 
@@ -183,7 +183,7 @@ TRANSDUCER: Element[TransducerSpec, Transducer] = Element(
     read=_read,
     refers=_refers,
     build=_build,
-    signals=lambda built: {"volts": SignalOf((built.kernel,), built.volts, unit="V", bounds=(LOWEST_V, HIGHEST_V))},
+    signals=lambda built: {"volts": SignalOf((built.source,), built.volts, unit="V", bounds=(LOWEST_V, HIGHEST_V))},
     lanes=lambda spec: (),
     faults=(
         FaultKind(

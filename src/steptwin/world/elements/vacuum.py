@@ -219,15 +219,15 @@ def _make(spec: VacuumSpec, site: Site) -> Vacuum:
 
 
 def _signals(vacuum: Vacuum) -> Mapping[str, SignalOf]:
-    kernel = (vacuum.board.kernel,)
+    source = (vacuum.board.source,)
 
     def turning(now: Nanos) -> Iterator[Nanos]:
         yield from ()
 
     bounds = (0.0, vacuum.spec.vacuum)
     return {
-        "pressure": SignalOf(kernel, vacuum.pressure, turning, lambda: vacuum.version, unit="kPa", bounds=bounds),
-        "dropped": SignalOf(kernel, lambda now: float(vacuum.dropped)),
+        "pressure": SignalOf(source, vacuum.pressure, turning, lambda: vacuum.version, unit="kPa", bounds=bounds),
+        "dropped": SignalOf(source, lambda now: float(vacuum.dropped)),
     }
 
 

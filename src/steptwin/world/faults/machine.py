@@ -134,6 +134,9 @@ class FaultyMachine(Stateful):
         """Levels at the machine, with the faults."""
         return self.inner.pins()
 
+    def pin(self, name: str) -> float:
+        return self.inner.pin(name)
+
     def power_off(self, now: Nanos) -> None:
         self.inner.power_off(now)
 
@@ -251,7 +254,7 @@ class FaultyMachine(Stateful):
         """A fault of this machine was set."""
         if active.fault.kind.parameter("pin") is not None:
             pin = self.pin_of(active.fault)
-            self._outer.setdefault(pin, self.inner.pins()[pin])
+            self._outer.setdefault(pin, self.inner.pin(pin))
         if active.fault.kind.occasion is Occasion.ALWAYS:
             active.due = active.begin
         self.changed()
@@ -282,9 +285,9 @@ class FaultyMachine(Stateful):
 
     def _put(self, pin: str, level: float, now: Nanos) -> None:
         """A fault gives an input a level; what that changes is recorded."""
-        before = self.inner.pins()[pin]
+        before = self.inner.pin(pin)
         self.inner.set_pin(pin, level, now)
-        after = self.inner.pins()[pin]
+        after = self.inner.pin(pin)
         if after != before:
             self._on_edge(pin, now, after)
             self._faults.record(TraceRecord(now, self.name, "edge", pin, after))
@@ -318,7 +321,7 @@ class FaultyMachine(Stateful):
         pin = self.pin_of(active.fault)
         if self._stuck.get(pin) != active.name:
             wanted = active.fault.get("value")
-            level = wanted if isinstance(wanted, float) else self.inner.pins()[pin]
+            level = wanted if isinstance(wanted, float) else self.inner.pin(pin)
             self._bounces = [b for b in self._bounces if b[1] != pin]
             self._stuck[pin] = active.name
             self._put(pin, level, now)

@@ -1,0 +1,48 @@
+"""Plans of axes in traces: each new plan and each change of coordinates is recorded once."""
+
+from __future__ import annotations
+
+from steptwin.machine import MotionController, Nanos
+from steptwin.motion import Profile
+from steptwin.motion.divisions import profile_of
+from steptwin.world.trace import Recorder, TraceRecord
+
+
+class RecordedPlans:
+    """The plans and coordinate offsets of a machine's axes that were recorded last."""
+
+    __slots__ = ("_drives", "_name", "_origins", "_profiles", "_revisions")
+
+    def __init__(self, name: str, machine: MotionController) -> None:
+        self._name = name
+        self._drives = [(i, str(i + 1), drive) for i, drive in enumerate(machine.axes)]
+        self._revisions = [-1] * len(self._drives)
+        self._profiles: list[Profile | None] = [None] * len(self._drives)
+        self._origins = [0] * len(self._drives)
+
+    def report(self, record: Recorder, now: Nanos) -> None:
+        """Record new plans and changes of coordinates. A plan that only continues the rest at the same position is not new."""
+        for i, number, drive in self._drives:
+            origin = drive.offset_p
+            if origin != self._origins[i]:
+                self._origins[i] = origin
+                record(TraceRecord(now, self._name, "coordinate", number, origin))
+            if self._revisions[i] == drive.revision:
+                continue
+            plan = drive.plan
+            before, profile = self._profiles[i], profile_of(plan)
+            self._revisions[i], self._profiles[i] = drive.revision, profile
+            if before is None or not _only_rests(before, profile):
+                record(TraceRecord(now, self._name, "plan", number, plan))
+
+    def mark_reported(self) -> None:
+        for i, _, drive in self._drives:
+            self._revisions[i], self._profiles[i] = drive.revision, profile_of(drive.plan)
+            self._origins[i] = drive.offset_p
+
+
+def _only_rests(before: Profile, after: Profile) -> bool:
+    """Whether ``after`` is rest at the end position of ``before``."""
+    if after.segments or before.end is None or before.end > after.start:
+        return False
+    return before.base + before.counts[-1] == after.base
