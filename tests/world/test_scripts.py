@@ -196,7 +196,7 @@ LOOKED_AT = """
 """
 
 
-@pytest.mark.parametrize("wired", ["", JOINED])
+@pytest.mark.parametrize("wired", ["", JOINED], ids=["separate", "joined"])
 @pytest.mark.parametrize("until", [None, "idle and time > 30"])
 def test_scripts_that_watch_are_looked_at_for_what_they_watch_alone(
     until: str | None, wired: str, monkeypatch: pytest.MonkeyPatch
