@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
@@ -42,8 +43,9 @@ def run_node(node: Path) -> Script:
 
     def run(module: str, text: str = "", *options: str, **variables: str) -> str:
         environment: Mapping[str, str] = {**os.environ, **variables}
-        program = node / ("node.exe" if os.name == "nt" else "node")
-        command = [str(program), *options, str(EXTENSION / module)]
+        program = shutil.which("node", path=os.pathsep.join([str(node), os.environ.get("PATH", "")]))
+        assert program is not None
+        command = [program, *options, str(EXTENSION / module)]
         ran = subprocess.run(command, input=text, capture_output=True, encoding="utf-8", env=environment, check=False)
         assert ran.returncode == 0, ran.stdout + ran.stderr
         return ran.stdout
