@@ -1,4 +1,4 @@
-"""The pytest plugin: fixtures ``mic488``, ``m1486`` and ``steptwin_world``, and the option ``--device``.
+"""The pytest plugin: fixtures for twins and worlds, ``--device``, ``--steptwin-coverage``.
 
 pytest loads it wherever steptwin is installed, so it brings nothing along until a test asks for a fixture.
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Generator, Iterator
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -15,10 +16,12 @@ import pytest
 from steptwin.errors import Misuse, SteptwinError
 
 if TYPE_CHECKING:
+    from steptwin.files.coverage import CoverageReports
     from steptwin.testing.m1486 import M1486Rig
     from steptwin.testing.mic488 import Mic488Rig
     from steptwin.testing.rig import Rig
     from steptwin.testing.world import WorldRig
+    from steptwin.world.plant import Plant
 
 T = TypeVar("T")
 
@@ -31,8 +34,11 @@ FIXTURES = {
 }
 """Fixtures and markers, which have the same names."""
 TIME = "steptwin_time"
+WORKER_COVERAGE = "steptwin_coverage"
+"""The key under which processes of xdist give their coverage."""
 
 _devices: pytest.StashKey[dict[str, str]] = pytest.StashKey()
+_coverage: pytest.StashKey[CoverageReports] = pytest.StashKey()
 _rigs: pytest.StashKey[dict[str, Rig]] = pytest.StashKey()
 
 
@@ -47,12 +53,21 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "rtu-tcp://HOST:PORT or rfc2217://HOST:PORT, with ,unit=N ,baud=N ,config=FILE behind it. IT MOVES. NAME= before it "
         "selects the device if tests need several: mic488=, m1486=, or a controller of a world",
     )
+    group.addoption(
+        "--steptwin-coverage",
+        action="append",
+        default=[],
+        metavar="PATH",
+        help="report which statements of motion programs the twins of all tests have executed, and which ways branches went: "
+        ".info (lcov), .html, .json; '-' prints a table. Repeatable",
+    )
     parser.addini(TIME, "real or virtual: time of twins, unless their marker sets it", default="real")
 
 
 def pytest_configure(config: pytest.Config) -> None:
     for text in FIXTURES.values():
         config.addinivalue_line("markers", text)
+    _configure_coverage(config)
     given = config.getoption("--device")
     config.stash[_devices] = {}
     if not given:
@@ -65,6 +80,45 @@ def pytest_configure(config: pytest.Config) -> None:
         raise pytest.UsageError(str(misuse)) from None
     if getattr(config.option, "numprocesses", None) or hasattr(config, "workerinput"):
         raise pytest.UsageError("--device: several processes (-n) cannot share a device: run without -n")
+
+
+def _configure_coverage(config: pytest.Config) -> None:
+    targets = config.getoption("--steptwin-coverage")
+    if targets:
+        from steptwin.files.coverage import CoverageReports
+
+        try:
+            config.stash[_coverage] = CoverageReports(targets)
+        except Misuse as misuse:
+            raise pytest.UsageError(str(misuse)) from None
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """A process of xdist gives its coverage to the one that reports."""
+    config = session.config
+    if _coverage in config.stash and hasattr(config, "workeroutput"):
+        config.workeroutput[WORKER_COVERAGE] = config.stash[_coverage].coverage.plain()
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node: Any) -> None:
+    """A process of xdist has ended; one that crashed gives nothing."""
+    given = getattr(node, "workeroutput", {}).get(WORKER_COVERAGE)
+    if given is not None:
+        from steptwin.coverage.counts import Coverage
+
+        for text in Coverage.of_plain(given):
+            node.config.stash[_coverage].coverage.add(text)
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    if _coverage in config.stash:
+        terminalreporter.section("coverage of motion programs")
+        try:
+            for path in config.stash[_coverage].write(terminalreporter.write_line):
+                terminalreporter.write_line(f"wrote {path}")
+        except Misuse as misuse:
+            terminalreporter.write_line(f"ERROR: {misuse}", red=True)
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -136,6 +190,14 @@ def _rig(request: pytest.FixtureRequest, name: str, make: Callable[[], Rig]) -> 
         yield rig
     finally:
         _without_traceback(f"{name}, after the test", rig.close)
+        if _coverage in request.config.stash:
+            request.config.stash[_coverage].close()
+
+
+def _observe(request: pytest.FixtureRequest, world: Plant, folder: Path) -> None:
+    """Count what programs of a world execute, if that is to be reported."""
+    if _coverage in request.config.stash:
+        request.config.stash[_coverage].observe(world, folder)
 
 
 def _without_traceback(name: str, do: Callable[[], T]) -> T:
@@ -160,7 +222,7 @@ def mic488(request: pytest.FixtureRequest, tmp_path: Any) -> Iterator[Mic488Rig]
     def make() -> Rig:
         options = options_of("mic488", Mic488Marker, *_options(request, "mic488"))
         device = device_for(request.config.stash[_devices], "mic488")
-        return Mic488Rig(options, device, tmp_path, request.path.parent)
+        return Mic488Rig(options, device, tmp_path, request.path.parent, partial(_observe, request))
 
     yield from _rig(request, "mic488", make)
 
@@ -178,7 +240,7 @@ def m1486(request: pytest.FixtureRequest, tmp_path: Any) -> Iterator[M1486Rig]:
     def make() -> Rig:
         options = options_of("m1486", M1486Marker, *_options(request, "m1486"))
         device = device_for(request.config.stash[_devices], "m1486")
-        return M1486Rig(options, device, tmp_path, request.path.parent)
+        return M1486Rig(options, device, tmp_path, request.path.parent, partial(_observe, request))
 
     yield from _rig(request, "m1486", make)
 
@@ -195,6 +257,17 @@ def steptwin_world(request: pytest.FixtureRequest) -> Iterator[WorldRig]:
     def make() -> Rig:
         arguments, given = _options(request, "steptwin_world")
         options = options_of("steptwin_world", WorldOptions, arguments, given)
-        return WorldRig(options, request.config.stash[_devices], request.path.parent)
+        return WorldRig(options, request.config.stash[_devices], request.path.parent, partial(_observe, request))
 
     yield from _rig(request, "steptwin_world", make)
+
+
+@pytest.fixture
+def steptwin_coverage(request: pytest.FixtureRequest) -> Iterator[Callable[[Plant], None]]:
+    """Call it with a world that the test has made, so that ``--steptwin-coverage`` counts what that executes until the test ends.
+
+    Names of its files are relative to the folder of the test.
+    """
+    yield lambda world: _observe(request, world, request.path.parent)
+    if _coverage in request.config.stash:
+        request.config.stash[_coverage].close()

@@ -250,3 +250,17 @@ def test_what_a_chip_does_at_power_on_is_shown_and_on_its_line(tmp_path: Path) -
     assert sent == [record["time_ns"] for record in records if record["subject"] == "upload"]
     assert sent[0] == 0
     assert len(sent) == 2
+
+
+def test_coverage_is_an_option_of_all_that_runs(tmp_path: Path) -> None:
+    program = tmp_path / "p.prg"
+    program.write_text("OUT1 = ON\nEND\n")
+    world = tmp_path / "w.toml"
+    world.write_text('[world]\nname = "w"\n[[mic488]]\nname = "m"\nprogram = "p.prg"\nstart = true\n')
+    for file in (program, world):
+        assert "p.prg           2       0         0       0  100.0 %" in invoke(
+            "run", str(file), "--for", "1s", "--coverage", "-"
+        )
+    refused = runner.invoke(app, ["run", str(world), "--coverage", "-", "--json"])
+    assert isinstance(refused.exception, Misuse)
+    assert str(refused.exception).startswith("--coverage - and --json both print on standard output")

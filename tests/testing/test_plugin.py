@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import threading
 from collections.abc import Callable
@@ -368,6 +369,59 @@ def test_it_works_in_processes_of_xdist(run: Run) -> None:
         """,
         "-n1",
     ).assert_outcomes(passed=1)
+
+
+# ---------------------------------------------------------------------- coverage
+
+COVERED = """
+    import pytest
+    from steptwin.files.world import World
+
+    pytestmark = [pytest.mark.mic488(program="p.prg", time="virtual"), pytest.mark.steptwin_world("w.toml", time="virtual")]
+
+    def test_a_controller(mic488):
+        mic488.driver.program.start()
+        mic488.sleep(1.0)
+
+    def test_a_world(steptwin_world):
+        steptwin_world.set_pin("m.IN1", 1)
+        steptwin_world.sleep(1.0)
+
+    def test_a_world_of_its_own(steptwin_coverage):
+        world = World.load("w.toml")
+        steptwin_coverage(world)
+        world.run_to(1_000_000_000)
+"""
+"""Three runs of a program; in the second IN1 is high."""
+
+
+@pytest.fixture
+def covered(run: Run, pytester: pytest.Pytester) -> Run:
+    (pytester.path / "p.prg").write_text("IF IN1 = 1\nOUT1 = ON\nELSE\nDELAY 0.1\nENDIF\nDELAY 0.05\nIF IN1 = 1\nEND\nENDIF\n")
+    world = '[world]\nname = "w"\n[[mic488]]\nname = "m"\nprogram = "p.prg"\nstart = true\n'
+    (pytester.path / "w.toml").write_text(world)
+    return run
+
+
+@pytest.mark.parametrize("processes", [(), ("-n2",)])
+def test_coverage_adds_up_over_all_tests(covered: Run, pytester: pytest.Pytester, processes: tuple[str, ...]) -> None:
+    """The input is seen after the first condition, so its other way is never gone."""
+    done = covered(COVERED, "--steptwin-coverage=-", "--steptwin-coverage=c.json", *processes)
+    done.assert_outcomes(passed=3)
+    done.stdout.fnmatch_lines(["*coverage of motion programs*", "p.prg *6 *1 *4 *1 *80.0 % *2, 1->2", "wrote c.json"])
+    (file,) = json.loads((pytester.path / "c.json").read_text())["files"]
+    assert {one["line"]: one["count"] for one in file["statements"]} == {1: 3, 2: 0, 4: 3, 6: 3, 7: 3, 8: 1}
+
+
+def test_without_the_option_nothing_is_reported(covered: Run) -> None:
+    done = covered(COVERED)
+    done.assert_outcomes(passed=3)
+    assert "coverage of motion programs" not in done.stdout.str()
+
+
+def test_a_coverage_file_that_cannot_be_written_is_refused_before_the_tests(covered: Run) -> None:
+    done = covered(COVERED, "--steptwin-coverage=c.xml")
+    done.stderr.fnmatch_lines(["*coverage in c.xml: the name must end with .info, .html, .json; - prints a table"])
 
 
 # ---------------------------------------------------------------------- devices

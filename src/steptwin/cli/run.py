@@ -15,7 +15,7 @@ import typer
 from steptwin.cli import completion
 from steptwin.cli.device import Json, complain
 from steptwin.cli.optiongroups import OptionGroup, grouped
-from steptwin.cli.worldoptions import WorldRunOptions
+from steptwin.cli.worldoptions import Coverage, WorldRunOptions
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
@@ -92,6 +92,7 @@ class _Run:
     until: str | None
     inputs: tuple[TimedInput, ...]
     trace: Path | None
+    coverage: tuple[str, ...]
     as_json: bool
     program: ProgramOptions
     wbc: WbcOptions
@@ -112,6 +113,7 @@ def run(
     until: Until = None,
     inputs: Inputs = None,
     trace: Trace = None,
+    coverage: Coverage = None,
     json: Json = False,
     *,
     program: ProgramOptions,
@@ -129,12 +131,15 @@ def run(
     if limit == 0:
         raise Misuse(f"--for {duration}: must be more than 0")
     _check_targets(trace, world.session)
+    if json and "-" in (coverage or ()):
+        raise Misuse("--coverage - and --json both print on standard output: give a file, such as --coverage coverage.json")
     changes = parse_inputs(",".join(inputs or []))
     wanted = _Run(
         limit=limit,
         until=until,
         inputs=tuple(changes),
         trace=trace,
+        coverage=tuple(coverage or ()),
         as_json=json,
         program=program,
         wbc=wbc,
@@ -173,6 +178,7 @@ def _run_m1486(file: Path, given: _Run) -> bool:
         until_idle=given.until_idle(),
         inputs=given.inputs,
         trace=given.trace,
+        coverage=given.coverage,
         as_json=given.as_json,
         print_world=given.program.print_world,
     )
@@ -199,6 +205,7 @@ def _run_wbc(file: Path, given: _Run) -> bool:
         until_idle=given.until_idle(),
         inputs=given.inputs,
         trace=given.trace,
+        coverage=given.coverage,
         as_json=given.as_json,
         print_world=given.program.print_world,
     )
@@ -221,6 +228,7 @@ def _run_world(file: Path, given: _Run) -> bool:
         inputs=given.inputs,
         faults=tuple(given.world.fault or ()),
         trace=given.trace,
+        coverage=given.coverage,
         session=given.world.session,
         allow_outside=given.world.allow_outside,
         strict=given.world.strict,

@@ -5,6 +5,7 @@ From Python: `steptwin.files.world.World`, which runs in virtual time.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,7 +13,7 @@ import typer
 
 from steptwin.cli.commands import PageFormat, PageSection, show
 from steptwin.cli.optiongroups import grouped
-from steptwin.cli.worldoptions import LiveOptions, ReadyFile, WorldRunOptions, up_options
+from steptwin.cli.worldoptions import Coverage, LiveOptions, ReadyFile, WorldRunOptions, up_options
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND
 
@@ -27,6 +28,7 @@ def up(
         typer.Argument(metavar="MACHINE.toml", help="The description of the world, or a session (.json) to continue."),
     ] = None,
     *,
+    coverage: Coverage = None,
     ready_file: ReadyFile = None,
     keys: Annotated[bool, typer.Option("--keys", help="Show all keys of a description.")] = False,
     form: Annotated[PageFormat, typer.Option("--format", help="How to print the keys.")] = PageFormat.TEXT,
@@ -44,7 +46,8 @@ def up(
         raise Misuse("a world is missing: give its description (.toml) or a session (.json)")
     from steptwin.commands.up_world import up as run_up
 
-    if not run_up(up_options(world, ready_file, live, options)):
+    wanted = replace(up_options(world, ready_file, live, options), coverage=tuple(coverage or ()))
+    if not run_up(wanted):
         raise typer.Exit(1)
 
 

@@ -19,6 +19,14 @@ Faults = Annotated[
     typer.Option(help="Fault active from the start, such as 'crc nth=3'; repeatable. See steptwin fault --kinds."),
 ]
 ReadyFile = Annotated[Path | None, typer.Option(help="JSON file with the end points, written when all of them are open.")]
+Coverage = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="PATH",
+        help="Report which statements of programs were executed, and which ways branches went: .info (lcov), .html, .json; "
+        "'-' prints a table. Repeatable.",
+    ),
+]
 LogTraffic = Annotated[
     bool, typer.Option("--log-frames", help="Print the traffic of every line with time, direction, bytes and meaning.")
 ]

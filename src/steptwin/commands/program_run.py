@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
+from steptwin.files.coverage import CoverageReports
 from steptwin.files.export import axis_views, bar, write_trace
 from steptwin.files.timedinputs import TimedInput
 from steptwin.files.world import World
@@ -37,6 +38,8 @@ class ProgramRun:
     """Whether the run also ends when only an input could cause anything further."""
     inputs: Sequence[TimedInput] = ()
     trace: Path | None = None
+    coverage: Sequence[str] = ()
+    """Files for coverage of the program; ``-`` for a table."""
     as_json: bool = False
     print_world: bool = False
 
@@ -107,3 +110,8 @@ def run_on(
 def write(world: World, where: Path | None, title: str, ended: Nanos) -> None:
     if where is not None:
         write_trace(world.trace, where, views=axis_views(world), title=title, ended=ended, watch=bar)
+
+
+def report_coverage(reports: CoverageReports, out: Print) -> None:
+    """Write coverage, and print its table if that was asked for."""
+    reports.write(lambda table: out(f"\n{table}"))

@@ -17,9 +17,10 @@ from typing import NamedTuple
 
 from steptwin.commands.chips import Chain, check_chain, parse_wire, placed_wires
 from steptwin.commands.descriptions import print_world
-from steptwin.commands.program_run import NOTE, Ending, Outcome, Print, ProgramRun, run_on, world_of, write
+from steptwin.commands.program_run import NOTE, Ending, Outcome, Print, ProgramRun, report_coverage, run_on, world_of, write
 from steptwin.diagnostics import Severity, SourceText, render
 from steptwin.errors import Misuse
+from steptwin.files.coverage import CoverageReports
 from steptwin.files.textfiles import read_text
 from steptwin.files.timedinputs import TimedInput
 from steptwin.files.world import World
@@ -35,6 +36,7 @@ from steptwin.m1486.present import program_words, velocity
 from steptwin.m1486.variants import DEFAULT, Store, Variant, variant
 from steptwin.machine import SECOND, Nanos
 from steptwin.wire.slave import FrameDirection
+from steptwin.world.kinds.m1486.memory import PLACE
 from steptwin.world.kinds.m1486.small import chip_name, m1486_world
 from steptwin.world.lines import SCRIPTS
 from steptwin.world.programs import StatementFollower
@@ -75,6 +77,7 @@ def run(options: M1486Run, out: Print, warn: Print) -> bool:
 
     Raises `Misuse` for a program or option that cannot be run.
     """
+    reports = CoverageReports(options.coverage)
     source = read_text(options.program).source
     kind, driver = variant(options.variant), interface(options.interface)
     checked = check(source.text, kind, driver)
@@ -92,6 +95,10 @@ def run(options: M1486Run, out: Print, warn: Print) -> bool:
 
     files = {str(options.program): read_bytes(options.program)} if is_stored else {}
     with world_of(text, files, options.program, keep_trace=options.trace is not None) as world:
+        if not is_stored:
+            for name in world.m1486:
+                world.downloaded[name, PLACE] = source  # what the host is about to type
+        reports.observe(world, Path())
         if options.trace is not None:
             StatementFollower(world, world.trace.add)
         chips = Chips(world, len(typed))
@@ -104,6 +111,7 @@ def run(options: M1486Run, out: Print, warn: Print) -> bool:
         else:
             _print_lines(chips, outcome, out)
         write(world, options.trace, options.program.name, outcome.ending.at)
+        report_coverage(reports, out)
     return not chips.went_wrong
 
 

@@ -12,12 +12,24 @@ from pathlib import Path
 from typing import NamedTuple
 
 from steptwin.commands.descriptions import Named, print_world
-from steptwin.commands.program_run import NOTE, Ending, Outcome, Print, ProgramRun, changes_of, run_on, world_of, write
+from steptwin.commands.program_run import (
+    NOTE,
+    Ending,
+    Outcome,
+    Print,
+    ProgramRun,
+    changes_of,
+    report_coverage,
+    run_on,
+    world_of,
+    write,
+)
 from steptwin.commands.travels import PlacedSwitches, SwitchTravel, place_switches
 from steptwin.datasheet import plain
 from steptwin.diagnostics import Severity, render, visible
 from steptwin.durations import duration_text
 from steptwin.errors import Misuse
+from steptwin.files.coverage import CoverageReports
 from steptwin.files.programbanks import Findings, read_banks
 from steptwin.files.programfiles import CompanionFiles
 from steptwin.files.world import World
@@ -69,6 +81,7 @@ def run(options: WbcRun, out: Print, warn: Print) -> bool:
 
     Raises `Misuse` for options or files that cannot be run, `ProgramErrors` for a program with errors.
     """
+    reports = CoverageReports(options.coverage)
     given = prepare(options, warn)
     if options.print_world:
         print_world(given.describe(str), f"run {options.program}")
@@ -80,6 +93,7 @@ def run(options: WbcRun, out: Print, warn: Print) -> bool:
     keep_trace = options.trace is not None
     with world_of(given.describe(str), files, options.program, keep_trace=keep_trace, overrides=late) as world:
         watch = RunWatch(world)
+        reports.observe(world, Path())
         if keep_trace:
             StatementFollower(world, world.trace.add)
         if is_late:
@@ -99,6 +113,7 @@ def run(options: WbcRun, out: Print, warn: Print) -> bool:
                 out(str(given.companions))
             _print_lines(ran, out)
         write(world, options.trace, options.program.name, outcome.ending.at)
+        report_coverage(reports, out)
     return not wrong
 
 

@@ -16,6 +16,7 @@ from steptwin.datasheet import plain
 from steptwin.errors import Misuse
 from steptwin.files import session as sessions
 from steptwin.files.beginning import begin_world, set_faults
+from steptwin.files.coverage import CoverageReports
 from steptwin.files.export import axis_views, bar, write_trace
 from steptwin.files.export.progress import Progress
 from steptwin.files.timedinputs import TimedInput
@@ -54,6 +55,8 @@ class WorldRun:
     inputs: Sequence[TimedInput] = ()
     faults: Sequence[str] = ()
     trace: Path | None = None
+    coverage: Sequence[str] = ()
+    """Files for coverage of programs; ``-`` for a table."""
     session: Path | None = None
     allow_outside: bool = False
     """Files of the description may lie anywhere."""
@@ -68,6 +71,7 @@ def run(options: WorldRun, out: Print, warn: Print) -> bool:
     Raises `Misuse` for a file or option that cannot be run. After Ctrl-C everything is written, then `KeyboardInterrupt`
     raised.
     """
+    reports = CoverageReports(options.coverage)
     keep_trace = options.trace is not None or not options.as_json
     with begin_world(
         options.world,
@@ -78,10 +82,11 @@ def run(options: WorldRun, out: Print, warn: Print) -> bool:
         allow_outside=options.allow_outside,
         state=options.state,
     ) as world:
-        return _run_and_report(world, options, out)
+        reports.observe(world, options.world.parent)
+        return _run_and_report(world, options, reports, out)
 
 
-def _run_and_report(world: World, options: WorldRun, out: Print) -> bool:
+def _run_and_report(world: World, options: WorldRun, reports: CoverageReports, out: Print) -> bool:
     began = world.now
     before = filter(is_shown, world.trace) if began else ()  # what happens at power-on is part of the run
     known = Counter(record.machine for record in before)
@@ -98,6 +103,8 @@ def _run_and_report(world: World, options: WorldRun, out: Print) -> bool:
     if options.session is not None:
         sessions.save(session, options.session)
         written.append(options.session)
+    tables: list[str] = []
+    written += reports.write(tables.append)
     in_vain = options.until if reason is None else None
     outcome = WorldRunResult(began, known, reason, in_vain, wall_s, session.digest, written)
     if options.as_json:
@@ -105,6 +112,8 @@ def _run_and_report(world: World, options: WorldRun, out: Print) -> bool:
     else:
         _print_happened(world, outcome, watches, out)
         _print_end(world, outcome, out)
+    for text in tables:
+        out(f"\n{text}")
     if reason is INTERRUPTED:
         raise KeyboardInterrupt
     in_time = not world.overdue and in_vain is None

@@ -16,6 +16,7 @@ from typing import TypeAlias
 from steptwin.errors import Misuse
 from steptwin.files import session as sessions
 from steptwin.files.beginning import begin_world, check_session_target, is_session, set_faults
+from steptwin.files.coverage import CoverageReports
 from steptwin.files.export import axis_views, check_target, growing_file, read_trace, write_trace
 from steptwin.files.export.tracefile import Kept, Ring, TraceFile, read_kept
 from steptwin.files.world import World
@@ -57,6 +58,8 @@ class UpOptions:
     session: Path | None = None
     trace: str | None = None
     """A file or directory, ``ring N`` or ``off``; None: the setting of the description."""
+    coverage: Sequence[str] = ()
+    """Files for coverage of programs; ``-`` for a table."""
     faults: Sequence[str] = ()
     ready_file: Path | None = None
     control: str | None = None
@@ -120,6 +123,8 @@ def up_with(world: World, options: UpOptions, addition: Addition | None = None) 
         if options.session is None:
             world.stop_recording()
     set_faults(world, options.faults)
+    reports = CoverageReports(options.coverage)
+    reports.observe(world, Path() if options.world is None else options.world.parent)
     outside = [line for line in world.spec.lines if line.is_open]
     if speed == inf and outside:
         raise Misuse(f"--speed max: line {outside[0].name!r} has external clients, which need real time; use 'steptwin run'")
@@ -131,7 +136,7 @@ def up_with(world: World, options: UpOptions, addition: Addition | None = None) 
         check_session_target(options.session)
     if options.ready_file is not None:
         clear_ready_file(options.ready_file)
-    asyncio.run(_serve(replace(options, name=name), world, past, kept, addition))
+    asyncio.run(_serve(replace(options, name=name), world, past, kept, reports, addition))
     return not world.failures and not (options.strict and world.overdue)
 
 
@@ -142,7 +147,14 @@ def _send_away(world: World) -> None:
             world.apply_input(Leave(line.name, place))
 
 
-async def _serve(options: UpOptions, world: World, past: Sequence[TraceRecord], kept: Kept, addition: Addition | None) -> None:
+async def _serve(
+    options: UpOptions,
+    world: World,
+    past: Sequence[TraceRecord],
+    kept: Kept,
+    reports: CoverageReports,
+    addition: Addition | None,
+) -> None:
     with ExitStack() as stack:
         output = Output(sys.stdout)
         stack.callback(output.close)
@@ -168,7 +180,7 @@ async def _serve(options: UpOptions, world: World, past: Sequence[TraceRecord], 
             pace.close()
             await server.close()
             if begun:
-                _keep(options, live, output, recorder, kept)
+                _keep(options, live, output, recorder, kept, reports)
 
 
 def _face(live: LiveWorld, cell: Cell, output: Output, log_frames: bool) -> Face:
@@ -192,8 +204,10 @@ def _recorder(live: LiveWorld, kept: Kept) -> TraceFile | None:
     return recorder
 
 
-def _keep(options: UpOptions, live: LiveWorld, output: Output, recorder: TraceFile | None, kept: Kept) -> None:
-    """Write session and trace at the end: the session first, because a trace can be made from it. Raises `Misuse`."""
+def _keep(
+    options: UpOptions, live: LiveWorld, output: Output, recorder: TraceFile | None, kept: Kept, reports: CoverageReports
+) -> None:
+    """Write session, trace and coverage at the end: the session first, because a trace can be made from it. Raises `Misuse`."""
     world = live.world
     world.advance(world.now)
     world.settle_all()
@@ -202,6 +216,7 @@ def _keep(options: UpOptions, live: LiveWorld, output: Output, recorder: TraceFi
     writing: list[Callable[[], list[Path]]] = [] if session is None else [partial(_write_session, session, live)]
     if recorder is not None and isinstance(kept, Path):
         writing.append(partial(_write_trace, recorder, kept, world.now))
+    writing.append(partial(reports.write, output.line))
     for write in writing:
         try:
             for path in write():

@@ -23,7 +23,7 @@ from steptwin.m1486.pins import OPEN_ADDRESS
 from steptwin.m1486.variants import DEFAULT
 from steptwin.machine import Nanos, Port
 from steptwin.testing.realtime import RealTime, WallTime
-from steptwin.testing.rig import LineRig, check_time, check_word
+from steptwin.testing.rig import LineRig, Observe, check_time, check_word
 from steptwin.testing.virtualtime import MemoryEndpoint, VirtualTime, joined_chip
 from steptwin.world.kinds.m1486.small import chip_name, m1486_world
 from steptwin.world.small import Whole
@@ -72,7 +72,7 @@ class M1486Rig(LineRig):
     port and a pty are for one of them at a time. What is marked as *the twin's* skips the test on a device.
     """
 
-    def __init__(self, options: M1486Marker, device: str | None, directory: Path, base: Path) -> None:
+    def __init__(self, options: M1486Marker, device: str | None, directory: Path, base: Path, observe: Observe) -> None:
         check_time(MARKER, options.time)
         check_word(MARKER, "link", options.link, ("tcp", "pty"))
         self.options = options
@@ -81,7 +81,9 @@ class M1486Rig(LineRig):
         self._name_there = chip_name(options.address)
         live, time = None, None
         if device is None:
-            live = LiveWorld(self._make(base))
+            world = self._make(base)
+            observe(world, base)
+            live = LiveWorld(world)
             time = VirtualTime(live) if options.time == "virtual" else RealTime(live, options.speed, "the M1486")
         super().__init__(
             MARKER,

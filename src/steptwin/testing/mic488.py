@@ -27,7 +27,7 @@ from steptwin.mic488.registers import firmware as known_firmware
 from steptwin.mic488.status import AxisStatus
 from steptwin.testing.devices import driver_of
 from steptwin.testing.realtime import RealTime, WallTime
-from steptwin.testing.rig import LineRig, check_time, check_word
+from steptwin.testing.rig import LineRig, Observe, check_time, check_word
 from steptwin.testing.virtualtime import MemoryEndpoint, VirtualTime, joined_driver
 from steptwin.world import script as do
 from steptwin.world.kinds.mic488.small import mic488_world
@@ -102,7 +102,7 @@ class Mic488Rig(LineRig):
     is marked as *the twin's* skips the test on a device.
     """
 
-    def __init__(self, options: Mic488Marker, device: str | None, directory: Path, base: Path) -> None:
+    def __init__(self, options: Mic488Marker, device: str | None, directory: Path, base: Path, observe: Observe) -> None:
         check_time(MARKER, options.time)
         check_word(MARKER, "link", options.link, tuple(LINKS))
         if not 1 <= options.unit <= 247:
@@ -112,7 +112,9 @@ class Mic488Rig(LineRig):
         self._config = _config(options, base)
         live, time = None, None
         if device is None:
-            live = LiveWorld(self._make(base))
+            world = self._make(base)
+            observe(world, base)
+            live = LiveWorld(world)
             time = VirtualTime(live) if options.time == "virtual" else RealTime(live, options.speed, "the MIC488")
         super().__init__(
             "mic488",

@@ -42,6 +42,10 @@ WITHIN_S = 10.0
 Time: TypeAlias = VirtualTime | RealTime | WallTime
 
 
+Observe: TypeAlias = Callable[[World, Path], object]
+"""Called with the world of a twin before anything happens in it, and with the folder to which names of its files are relative."""
+
+
 class FaultSeen(NamedTuple):
     """A fault that is set. ``happened``: how often it has occurred."""
 

@@ -21,7 +21,7 @@ from steptwin.machine import Nanos
 from steptwin.subject.commands import Command, ListFaults
 from steptwin.testing.devices import ANY, driver_of
 from steptwin.testing.realtime import RealTime, WallTime
-from steptwin.testing.rig import Rig, check_time
+from steptwin.testing.rig import Observe, Rig, check_time
 from steptwin.testing.virtualtime import MemoryEndpoint, VirtualTime, joined_driver
 from steptwin.world import script as do
 from steptwin.world.description import read_world
@@ -78,7 +78,7 @@ class WorldRig(Rig):
     to be *the twin's* skips the test then.
     """
 
-    def __init__(self, options: WorldOptions, devices: Mapping[str, str], base: Path) -> None:
+    def __init__(self, options: WorldOptions, devices: Mapping[str, str], base: Path, observe: Observe) -> None:
         check_time(MARKER, options.time)
         if options.file is None:
             raise Misuse(f'no world is given: @pytest.mark.{MARKER}("machine.toml")')
@@ -97,6 +97,7 @@ class WorldRig(Rig):
         if self._given:
             super().__init__(MARKER, WallTime(), ", ".join(self._given.values()), base)
             return
+        observe(world, (base / options.file).parent)
         self._live = live = LiveWorld(world)
         super().__init__(
             MARKER,

@@ -29,13 +29,18 @@ class ControlFlow:
 
 def flow_of(executable: s.Executable) -> ControlFlow:
     steps = executable.steps
-    after = [_after(number, step) for number, step in enumerate(steps)]
+    after = successors(steps)
     return ControlFlow(steps, after, _returns(steps, after))
+
+
+def successors(steps: tuple[s.ProgramStep, ...]) -> list[tuple[int, ...]]:
+    """Where each step goes on within its level, as `ControlFlow.after`; a branch has several."""
+    return [_after(number, step) for number, step in enumerate(steps)]
 
 
 def returning(steps: tuple[s.ProgramStep, ...]) -> list[bool]:
     """Whether each step, and last the end, can reach a RETURN for the JUMP that led to it."""
-    return _returns(steps, [_after(number, step) for number, step in enumerate(steps)])
+    return _returns(steps, successors(steps))
 
 
 def _after(number: int, step: s.ProgramStep) -> tuple[int, ...]:

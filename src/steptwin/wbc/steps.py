@@ -218,6 +218,10 @@ STEPS: tuple[type[ProgramStep], ...] = tuple(
 """Every class of step; each needs its code, its sources and its successors."""
 
 
+BLOCK_MARKS = (ElseStep, EndIfStep, EndWhileStep)
+"""Steps that only mark where blocks end: a block that is left by a jump never comes to them."""
+
+
 @dataclass(frozen=True, slots=True)
 class Executable:
     """``variables`` in the order of their indices; ``labels`` by name in upper case; ``entries`` steps of interrupt labels;

@@ -90,6 +90,12 @@ class Programs(Protocol):
         """All statements of a text, in its order."""
         ...
 
+    def after(self, text: str) -> Mapping[int, Sequence[int]]:
+        """The statements that do something, by number, with the numbers of those that can come next in the text, of which a
+        branch has several; the number after the last statement is the end. What calls come to does not count, nor do words that
+        only close a block."""
+        ...
+
     def labels(self, text: str) -> Mapping[str, int]:
         """Numbers of the statements at labels and interrupts, by name."""
         ...
@@ -99,6 +105,11 @@ class Programs(Protocol):
         ...
 
     def unhook(self, hook: StatementHook) -> None: ...
+
+    def begun(self, now: Nanos) -> Sequence[int]:
+        """The numbers of statements that were executed at power-on, before there could be a hook; empty after 0 s, and where
+        statements take no time."""
+        ...
 
     def place(self, number: int) -> Place | None:
         """Of a statement that a hook was called for, at that moment; None where it comes from no text."""

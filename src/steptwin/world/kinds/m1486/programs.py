@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Collection, Mapping, Sequence
 
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.m1486.chip import M1486Chip
-from steptwin.m1486.eeprom import stored_commands
+from steptwin.m1486.commands import When, when
 from steptwin.m1486.encoding import decode, encode
 from steptwin.m1486.points import live_point
 from steptwin.m1486.program import WaitReason
 from steptwin.m1486.registers import GENERAL
+from steptwin.m1486.structure import CommandStream, streams
+from steptwin.m1486.successors import successors
 from steptwin.m1486.syntax import ChipCommand, parse
 from steptwin.m1486.unit import MASK
 from steptwin.machine import Nanos
@@ -27,6 +29,7 @@ from steptwin.world.programs import Frame, Place, Statement, StatementUse
 BEGIN = "program"
 """The name of what is executed before the first label."""
 REGISTER_MAX = 0xFFFF
+RESET = "\\"
 
 
 def programs(spec: M1486Spec, chip: M1486Chip, context: TextContext) -> ChipPrograms:
@@ -36,10 +39,14 @@ def programs(spec: M1486Spec, chip: M1486Chip, context: TextContext) -> ChipProg
 
 
 class _Text:
-    """A program with what is known of its text."""
+    """A program with what is known of its text: the commands of one chip of a chain."""
 
-    def __init__(self, source: SourceText | None) -> None:
+    def __init__(self, source: SourceText | None, chip: M1486Chip) -> None:
         self.source = source
+        self._chip = chip
+        self._stream: CommandStream | None = None
+        self._indices: list[int] = []
+        """Of the stream, where each command stands."""
         self.commands: list[ChipCommand] = []
         self.offsets: list[int] = []
         """Where each command lies."""
@@ -48,20 +55,39 @@ class _Text:
         self.statements: tuple[Statement, ...] = ()
         if source is not None:
             self._read(source)
-        self.numbers = {place: number for number, place in enumerate(self.offsets)}
+        self.numbers: dict[int, list[int]] = {}
+        """Of the commands that come to lie at a place, one after the other where a reset empties the memory."""
+        for number, place in enumerate(self.offsets):
+            self.numbers.setdefault(place, []).append(number)
         self._named = sorted((number, name) for name, number in self.labels.items())
 
     def _read(self, source: SourceText) -> None:
-        for command in stored_commands(parse(source.text).program):
+        found = streams(parse(source.text).program)
+        self._stream = stream = next((one for one in found if one.address in (None, self._chip.address)), None)
+        if stream is None:
+            return
+        for index, command in enumerate(stream.commands):
             if command.key == "@":
                 self.labels[f"label {command.number}"] = len(self.commands)
-            else:
+            elif command.key == RESET and stream.in_file[index] is None:
+                self.end = 0
+            elif when(command.key, command.number) is When.QUEUED:
+                self._indices.append(index)
                 self.commands.append(command)
                 self.offsets.append(self.end)
-                self.end += len(encode(command))
+                self.end = (self.end + len(encode(command))) % self._chip.memory.span
         self.statements = tuple(
             Statement(command.span.start, command.span.end, source.position(command.span.start)[0]) for command in self.commands
         )
+
+    def after(self) -> Mapping[int, Sequence[int]]:
+        if self._stream is None:
+            return {}
+        following = successors(self._stream, self._chip.variant, self._chip.interface)
+        return {
+            number: tuple(bisect_left(self._indices, target) for target in following[index])
+            for number, index in enumerate(self._indices)
+        }
 
     def name(self, number: int) -> str:
         """Of the label at or before a statement."""
@@ -78,13 +104,13 @@ class ChipPrograms:
     def __init__(self, chip: M1486Chip, source: Callable[[], SourceText | None]) -> None:
         self._chip = chip
         self._source = source
-        self._known = _Text(None)
+        self._known = _Text(None, chip)
 
     @property
     def _text(self) -> _Text:
         source = self._source()
         if source is not self._known.source:
-            self._known = _Text(source)
+            self._known = _Text(source, self._chip)
         return self._known
 
     @property
@@ -98,6 +124,9 @@ class ChipPrograms:
 
     def statements(self, text: str) -> Sequence[Statement]:
         return self._text.statements
+
+    def after(self, text: str) -> Mapping[int, Sequence[int]]:
+        return self._text.after()
 
     def labels(self, text: str) -> Mapping[str, int]:
         return self._text.labels
@@ -113,10 +142,17 @@ class ChipPrograms:
     def place(self, number: int) -> Place | None:
         text = self._text
         found = text.numbers.get(number)
-        if found is None:
+        stored = None if found is None else decode(self._chip.memory.fetch(number))
+        if found is None or stored is None:
             return None
-        stored = decode(self._chip.memory.fetch(number))
-        return Place(TEXT, found) if stored is not None and stored.command == text.commands[found] else None
+        there = (Place(TEXT, one) for one in found if text.commands[one] == stored.command)
+        return next(there, None)
+
+    def begun(self, now: Nanos) -> Sequence[int]:
+        program = self._chip.program
+        has_begun = now == 0 and program.statement_ns > 0 and (program.ready > 0 or program.waiting is not WaitReason.NOTHING)
+        begin = self._chip.memory.begin
+        return (begin,) if has_begun and begin is not None and self._chip.memory.end != begin else ()
 
     def depth(self) -> int:
         return 0 if self._chip.program.back is None else 1

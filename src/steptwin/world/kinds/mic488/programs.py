@@ -13,9 +13,9 @@ from steptwin.mic488.program_banks import LoadedProgram
 from steptwin.mic488.program_registers import ACCESS
 from steptwin.statements import StatementHook
 from steptwin.wbc.dialect import Dialect
-from steptwin.wbc.flow import returning
+from steptwin.wbc.flow import returning, successors
 from steptwin.wbc.scope import ProgramScope
-from steptwin.wbc.steps import JumpStep, Literal, RegisterOperand, Source, Variable
+from steptwin.wbc.steps import BLOCK_MARKS, JumpStep, Literal, RegisterOperand, Source, Variable
 from steptwin.wbc.syntax import parse
 from steptwin.wbc.tree import Identifier, ProgramTree
 from steptwin.world.kind import TextContext
@@ -59,6 +59,9 @@ class WbcPrograms:
     def statements(self, text: str) -> Sequence[Statement]:
         return self._bank(text).statements
 
+    def after(self, text: str) -> Mapping[int, Sequence[int]]:
+        return self._bank(text).after
+
     def labels(self, text: str) -> Mapping[str, int]:
         return self._bank(text).labels
 
@@ -68,6 +71,9 @@ class WbcPrograms:
 
     def unhook(self, hook: StatementHook) -> None:
         self._device.program.interpreter.unhook(hook)
+
+    def begun(self, now: Nanos) -> Sequence[int]:
+        return ()  # the first statement is executed one statement time after power-on
 
     def place(self, number: int) -> Place | None:
         control = self._device.program
@@ -125,6 +131,11 @@ class _Bank:
         self.labels = program.labels
         self._scope: ProgramScope | None = None
         self._named = sorted((number, name) for name, number in self.labels.items())
+
+    @cached_property
+    def after(self) -> Mapping[int, Sequence[int]]:
+        following = successors(self.program.steps)
+        return {number: following[number] for number, step in enumerate(self.program.steps) if not isinstance(step, BLOCK_MARKS)}
 
     @cached_property
     def _returns(self) -> list[bool]:
