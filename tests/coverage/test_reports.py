@@ -24,7 +24,7 @@ def text(path: str = "p.prg", hits: tuple[int, ...] = (5, 5, 0, 0), to_3: int = 
     """Line 1 goes to line 3 or to the end, line 4 to line 6 or to the end."""
     starts = list(STARTS.values())
     statements = {start: Statement(start, start + 1, line) for line, start in STARTS.items()}
-    after = {0: (14, END), 14: (16,), 16: (23, END), 23: (END,)}
+    after: dict[int, tuple[int, ...]] = {0: (14, END), 14: (16,), 16: (23, END), 23: (END,)}
     counts = Counter({start: count for start, count in zip(starts, hits, strict=True) if count})
     return TextCoverage(path, SourceText(path, TEXT), statements, after, counts, Counter({Way(0, 14): to_3}))
 
