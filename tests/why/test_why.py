@@ -9,7 +9,7 @@ from steptwin.errors import Misuse
 from steptwin.files.world import World
 from steptwin.wire.rtu import encode_frame
 from steptwin.world import script as do
-from steptwin.world.actions import Bytes
+from steptwin.world.actions import Bytes, Download
 from steptwin.world.kinds.mic488.writes import encode_write
 
 
@@ -185,6 +185,58 @@ def test_a_condition_that_was_false_once_more() -> None:
     world.run(7.0)
     assert world.why("cell.IN1 == 1 and cell.OUT1 == 1").since == 6_000_000_000
     assert world.why("cell.IN1 == 1 or cell.OUT1 == 1").since == 1_000_000_000
+
+
+FLOW = """\
+SET n = 0
+CFGINT_IN2 = RIS
+MAIN:
+IF IN1 = ON
+    JUMP PART
+ELSE
+    n = 2
+ENDIF
+OUT3 = ON
+JUMP MAIN
+PART:
+n = 1
+OUT1 = ON
+WAIT IN4 = ON
+RETURN
+INT_IN2:
+OUT2 = ON
+RETURN
+"""
+
+
+def test_a_jump_and_an_interrupt_lead_to_what_they_depend_on() -> None:
+    world = World.from_toml('[[mic488]]\nname = "cell"\nprogram = "p.prg"\nstart = true\n', {"p.prg": FLOW.encode()})
+    for time, pin in ((1, "IN1"), (2, "IN2")):
+        world.run(float(time))
+        world.apply_input(do.Set((("cell", pin, 1.0),)))
+    world.run(3.0)
+    assert [link.text for link in world.why("OUT1").links[1:]] == [
+        "line 13 `OUT1 = ON` was executed",
+        "line 4 `IF IN1 = ON` decided",
+        "cell.IN1 became 1",
+        "from outside: sets cell.IN1 = 1",
+    ]
+    assert [link.text for link in world.why("OUT2").links[1:]] == [
+        "line 17 `OUT2 = ON` was executed",
+        "line 16 `INT_IN2:` decided",
+        "cell.IN2 became 1",
+        "from outside: sets cell.IN2 = 1",
+    ]
+    assert [link.text for link in world.why("OUT3").links[1:]] == ["line 9 `OUT3 = ON` was executed", "the program started"]
+
+
+def test_a_program_that_was_replaced() -> None:
+    world = waits()
+    world.mic488["cell"].write("PROGRAM_CTRL", 0)
+    world.apply_input(Download("cell", "program 0", "OUT4 = ON\n"))
+    world.run(6.0)
+    assert world.why("OUT1", 2.0).links[0].text == "cell.OUT1 became 1"
+    assert shown(world, "cell", 2.0)[0].startswith("cell does not wait: a statement of a program that was replaced since")
 
 
 def test_contacts_are_signals_too() -> None:

@@ -17,7 +17,7 @@ from steptwin.world.elements import ELEMENTS
 from steptwin.world.elements.logic import BoardPart
 from steptwin.world.kernel import PinName
 from steptwin.world.lines import SCRIPTS
-from steptwin.world.programs import Operand, OperandKind, StatementUse
+from steptwin.world.programs import Operand, OperandKind, Place, StatementUse
 from steptwin.world.trace import TraceRecord
 
 MOST_LOOKED_BACK = 20_000
@@ -46,6 +46,7 @@ class Causes:
         self._log = log
         self._world = log.world
         self._frames = Frames(log.world)
+        self._uses: dict[tuple[str, Place], StatementUse] = {}
         built = log.world.parts.elements
         self._parts: dict[str, BoardPart] = {
             name: part for kind, parts in built.items() if ELEMENTS[kind].terminals is not None for name, part in parts.items()
@@ -210,7 +211,7 @@ class Causes:
             if executed[index].time < change.time:
                 break
             if executed[index].position <= change.position:
-                return index if _matches(self._use(machine, index).writes, wanted) else None
+                return index if _matches(self.use(machine, index).writes, wanted) else None
         return None
 
     def _from_outside(self, machine: str, change: Change, since: int) -> Found:
@@ -262,7 +263,7 @@ class Causes:
         executed = self._log.executed.get(machine, [])
         last = self._log.last_executed(machine, time)
         for index in range(last, max(-1, last - MOST_LOOKED_BACK), -1):
-            if executed[index].time < time and _matches(self._use(machine, index).writes, wanted):
+            if executed[index].time < time and _matches(self.use(machine, index).writes, wanted):
                 return self.statement(machine, index)
         return None
 
@@ -311,13 +312,21 @@ class Causes:
 
     # ------------------------------------------------------------------ programs
 
-    def _use(self, machine: str, index: int) -> StatementUse:
-        return self._world.programs[machine].use(self._log.executed[machine][index].place)
+    def use(self, machine: str, index: int) -> StatementUse:
+        """What an executed statement reads and changes; nothing, if its text was replaced since."""
+        executed = self._log.executed[machine][index]
+        if not self._log.is_of_present_text(executed):
+            return StatementUse()
+        key = machine, executed.place
+        found = self._uses.get(key)
+        if found is None:
+            found = self._uses[key] = self._world.programs[machine].use(key[1])
+        return found
 
     def statement(self, machine: str, index: int) -> Cause:
         """A statement was executed."""
         executed = self._log.executed[machine][index]
-        link = Link(executed.time, machine, f"{statement(self._world, machine, executed.place)} was executed")
+        link = Link(executed.time, machine, f"{statement(self._log, executed)} was executed")
         return Cause(link, partial(self._of_statement, machine, index))
 
     def _of_statement(self, machine: str, index: int) -> Found:
@@ -325,8 +334,8 @@ class Causes:
         executed = self._log.executed[machine]
         number = executed[index].place.number
         for earlier in range(index - 1, max(-1, index - MOST_LOOKED_BACK), -1):
-            use = self._use(machine, earlier)
-            if use.jumps is not None and use.jumps == number:
+            use = self.use(machine, earlier)
+            if use.jumps is not None and executed[earlier + 1].place.number == use.jumps <= number:
                 number = executed[earlier].place.number
             ended = executed[earlier + 1].time
             if use.waits and ended - executed[earlier].time > self._world.programs[machine].statement_time:
@@ -337,11 +346,11 @@ class Causes:
 
     def _decided(self, machine: str, index: int, time: Nanos, how: str) -> Cause:
         executed = self._log.executed[machine][index]
-        link = Link(time, machine, f"{statement(self._world, machine, executed.place)} {how}")
+        link = Link(time, machine, f"{statement(self._log, executed)} {how}")
         return Cause(link, partial(self._of_decision, machine, index, time))
 
     def _of_decision(self, machine: str, index: int, time: Nanos) -> Found:
-        found = [cause for operand in self._use(machine, index).reads if (cause := self.operand(machine, operand, time, index))]
+        found = [cause for operand in self.use(machine, index).reads if (cause := self.operand(machine, operand, time, index))]
         return max(found, key=lambda cause: cause.link.time) if found else self._of_statement(machine, index)
 
     def operand(self, machine: str, operand: Operand, time: Nanos, index: int) -> Found:
@@ -354,7 +363,7 @@ class Causes:
                 return self.motion(machine, operand.name, time)
             case OperandKind.VALUE:
                 for earlier in range(index - 1, max(-1, index - MOST_LOOKED_BACK), -1):
-                    if operand in self._use(machine, earlier).writes:
+                    if operand in self.use(machine, earlier).writes:
                         return self.statement(machine, earlier)
         return None
 

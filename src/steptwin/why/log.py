@@ -14,7 +14,7 @@ from typing import NamedTuple
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.statements import StatementHook
-from steptwin.world.actions import ExternalInput
+from steptwin.world.actions import Download, ExternalInput
 from steptwin.world.history import replay
 from steptwin.world.plant import Plant, RecordedInput
 from steptwin.world.programs import Place, Programs
@@ -72,6 +72,8 @@ class CauseLog:
         self.plans: dict[tuple[str, str], list[Change]] = defaultdict(list)
         """Moments and positions of the plans of an axis, by controller and number."""
         self.acts: list[Act] = []
+        self._replaced: dict[str, Nanos] = {}
+        """When the program of a controller was last replaced by a download."""
         self._noted = 0
         for record in world.trace:
             self._take(record)
@@ -107,6 +109,9 @@ class CauseLog:
         self._count()
         self.world.settle_all()
         self.acts.append(Act(self.world.now, script, what))
+        match what:
+            case Download(machine=machine):
+                self._replaced[machine] = self.world.now
 
     def _hook(self, name: str, programs: Programs) -> StatementHook:
         executed, records = self.executed[name], self.records[self._group_of[name]]
@@ -187,6 +192,11 @@ class CauseLog:
         """What scripts did by a moment, and what came from outside, the last one first; ``most`` of them."""
         last = bisect_right(self.acts, until, key=lambda act: act.time) - 1
         return (self.acts[index] for index in range(last, max(-1, last - most), -1))
+
+    def is_of_present_text(self, executed: Executed) -> bool:
+        """Whether the text of a statement is still in its controller."""
+        programs = self.world.programs[executed.machine]
+        return executed.time > self._replaced.get(executed.machine, -1) and executed.place.text in programs.texts
 
     def last_executed(self, machine: str, until: Nanos) -> int:
         """The number of the last statement of a controller by a moment; -1 if there is none."""

@@ -212,8 +212,8 @@ class Why:
             raise Misuse(f"{machine} has executed no statement until {at / SECOND:g} s: ask about one of its signals")
         executed = log.executed[machine]
         here = executed[index]
-        use = log.world.programs[machine].use(here.place)
-        text = statement(log.world, machine, here.place)
+        use = self.causes.use(machine, index)
+        text = statement(log, here)
         if not use.waits or at - here.time <= log.world.programs[machine].statement_time:
             return self._answer(machine, at, f"{machine} does not wait: {text}", here.time, self.causes.statement(machine, index))
         links = [link for operand in use.reads for link in self._awaited(machine, operand, at)]

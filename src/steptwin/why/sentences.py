@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from steptwin.diagnostics import visible
+from steptwin.why.log import CauseLog, Executed
 from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection
 from steptwin.world import script as do
@@ -13,7 +14,6 @@ from steptwin.world.actions import Bytes, Download, ExternalInput, SetVariable
 from steptwin.world.kinds import line_kinds
 from steptwin.world.lines import LineWords
 from steptwin.world.plant import Plant
-from steptwin.world.programs import Place
 from steptwin.world.trace import TraceRecord
 
 _WORDS: Mapping[type, Callable[[Any], str]] = {
@@ -37,9 +37,11 @@ def words_of(what: ExternalInput) -> str:
     return type(what).__name__ if words is None else words(what)
 
 
-def statement(world: Plant, machine: str, place: Place) -> str:
+def statement(log: CauseLog, executed: Executed) -> str:
     """A statement with its line: "line 12 `OUT3 = OFF`"."""
-    programs = world.programs[machine]
+    if not log.is_of_present_text(executed):
+        return "a statement of a program that was replaced since"
+    programs, place = log.world.programs[executed.machine], executed.place
     found, source = programs.statements(place.text)[place.number], programs.texts[place.text]
     text = visible(source.text[found.start : found.end].strip())
     return f"line {found.line} `{text}`" if text else "the end of the program"

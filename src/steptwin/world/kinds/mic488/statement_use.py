@@ -22,7 +22,14 @@ def use_of(steps: Sequence[s.ProgramStep], number: int) -> StatementUse:
         return StatementUse()
     step = steps[number]
     use = _USES[type(step)](step, number)
+    if type(step) is s.InterruptStep:
+        use = use._replace(governs=range(number + 1, _return_after(steps, number) + 1))
     return use._replace(reads=(*use.reads, *_operands(sources(step))))
+
+
+def _return_after(steps: Sequence[s.ProgramStep], number: int) -> int:
+    """The step that ends an interrupt, or the last one."""
+    return next((later for later in range(number, len(steps)) if type(steps[later]) is s.ReturnStep), len(steps))
 
 
 def _interrupt(step: s.InterruptStep, number: int) -> StatementUse:
@@ -55,7 +62,6 @@ _USES: Mapping[type[s.ProgramStep], Callable[[Any, int], StatementUse]] = comple
         **dict.fromkeys((s.MotionStep, s.HaltStep), _of_axis),
         s.RowMotionStep: lambda step, number: StatementUse(writes=(_ANY_AXIS,)),
         s.IfStep: lambda step, number: StatementUse(governs=range(number + 1, step.close)),
-        s.ElseStep: lambda step, number: StatementUse(jumps=step.close),
         s.WhileStep: lambda step, number: StatementUse(governs=range(number + 1, step.close), is_loop=True),
         s.EndWhileStep: _end_of_while,
         **dict.fromkeys((s.WaitStep, s.DelayStep), lambda step, number: StatementUse(waits=True)),
@@ -63,7 +69,7 @@ _USES: Mapping[type[s.ProgramStep], Callable[[Any, int], StatementUse]] = comple
         s.InterruptStep: _interrupt,
         s.JumpStep: lambda step, number: StatementUse(jumps=step.target),
         **dict.fromkeys((s.EndStep, s.ProgResetStep), lambda step, number: StatementUse(writes=(_ANY_AXIS, _ANY_PIN))),
-        **dict.fromkeys((s.EndIfStep, s.ReturnStep, s.IllegalStep), _nothing),
+        **dict.fromkeys((s.ElseStep, s.EndIfStep, s.ReturnStep, s.IllegalStep), _nothing),
     },
 )
 
