@@ -16,7 +16,7 @@ from steptwin.machine import Nanos
 
 M = TypeVar("M")
 DetailValue: TypeAlias = bool | int | float | str | tuple[int, ...] | Mapping[str, int] | None
-"""As the type of its `Detail` says."""
+"""Of the type that its `Detail` has."""
 
 
 class StatusLevel(enum.Enum):

@@ -25,7 +25,7 @@ class PointEffect(enum.Enum):
 
 
 class Condition(enum.Enum):
-    """What a value of a status means, for whoever sees it at a glance."""
+    """The meaning of a value of a status, at a glance."""
 
     OFF = "off"
     REST = "rest"

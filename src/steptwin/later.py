@@ -71,7 +71,7 @@ def _go_on(work: Coroutine[Later[Any], None, T], later: Later[T]) -> None:
         waited_for = work.send(None)
     except StopIteration as end:
         later.put(end.value)
-    except Exception as error:  # noqa: BLE001  it is that of whoever waits for the result
+    except Exception as error:  # noqa: BLE001  the caller that waits for the result gets it
         later.fail(error)
     else:
         waited_for.then(partial(_go_on, work, later))

@@ -136,7 +136,7 @@ def _chips(place: str, bauds: list[int], timeout: float) -> list[dict[str, Any]]
             except LineLost:
                 if "://" not in place:
                     raise
-                return []  # a server of Modbus TCP closes the connection when it hears characters
+                return []  # a server of Modbus TCP closes the connection when it receives characters
         if found:
             return [
                 _row(

@@ -216,7 +216,7 @@ def _change(change: TimedInput, chain: Chain) -> InputChange:
     return InputChange(change.time, placed, change.value, f"{placed} {'high' if change.value else 'low'}")
 
 
-# ---------------------------------------------------------------------- what is said
+# ---------------------------------------------------------------------- output
 
 
 def _print_lines(chips: Chips, outcome: Outcome, out: Print) -> None:

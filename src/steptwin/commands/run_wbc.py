@@ -247,7 +247,7 @@ class WbcRunResult(NamedTuple):
         return missing_switches(self.watch.device, self.given.placed.pins)
 
 
-# ---------------------------------------------------------------------- what is said
+# ---------------------------------------------------------------------- output
 
 
 def _print_lines(ran: WbcRunResult, out: Print) -> None:

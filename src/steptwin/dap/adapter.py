@@ -31,7 +31,7 @@ Send: TypeAlias = Callable[[str, Body], None]
 Arguments: TypeAlias = Mapping[str, Any]
 
 LOOK_S = 0.1
-"""While an attached twin stands, it is looked so often whether somebody else has it go on."""
+"""Period of the check whether another client lets an attached twin continue."""
 FRAMES = 1000
 """Frames of a thread, at most: a frame has the number of its thread times this, and its depth."""
 _STOPS_USUALLY = (Events.PROGRAM_ERROR, Events.WRONG_DATA)

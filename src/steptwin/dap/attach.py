@@ -214,7 +214,7 @@ class AttachedTwin:
         return Stop(StopReason.PAUSE, self._drop())
 
     def _drop(self) -> Nanos:
-        """Where the debugger stands; what was said of it so far is known then."""
+        """The place of the debugger, after all events up to now."""
         now = self.now
         for _ in self._stops(0.0):
             pass
@@ -236,7 +236,7 @@ class AttachedTwin:
         return stop
 
     def unasked(self) -> Travel | None:
-        """What somebody else has begun meanwhile; None where nothing was."""
+        """What another client has begun meanwhile; None for nothing."""
         for event in self._events(0.0):
             if isinstance(event.payload, StoppedPayload):
                 return self._at_once(self._stop(event, event.payload))

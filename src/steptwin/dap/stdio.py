@@ -88,7 +88,7 @@ class _Session:
         except SteptwinError as error:
             self._write({**response, "success": False, **_failure(str(error))})
             return command != "disconnect"
-        except Exception as error:  # noqa: BLE001 - the editor is told, and the session goes on
+        except Exception as error:  # noqa: BLE001 - the editor gets the error, and the session goes on
             traceback.print_exc()
             self._write({**response, "success": False, **_failure(f"a mistake in steptwin: {type(error).__name__}: {error}")})
             return command != "disconnect"

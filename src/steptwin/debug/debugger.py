@@ -44,7 +44,7 @@ class Debugger:
     programs whose statements take no time.
 
     Methods that go forwards or backwards (``step_in``) give the `Stop`; those of the other form (``stepping_in``) do the same in
-    parts (`Travel`). They need a world whose time nobody else advances. One that goes on by itself calls `look_ahead` before.
+    parts (`Travel`). They need a world whose time only the debugger advances. A world in real time calls `look_ahead` before.
 
     ``history``: the past of the world, where it is kept already. ``apply_input`` and ``go_back`` act on a world that others use,
     too.

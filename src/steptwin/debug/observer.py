@@ -50,7 +50,7 @@ class ObservedEvent(NamedTuple):
 
 
 class Observer:
-    """Observes the world ``world``, which nobody else uses.
+    """Observes the world ``world``, which has no other user.
 
     Of controllers in ``stepping`` every statement is noted; of others those at breakpoints. It notes only while ``is_on``.
     """

@@ -254,7 +254,7 @@ class Exchanger(Generic[Q, A]):
         """The time of the next call of `step`, ns, if no job or byte arrives before; None: none."""
         return self._deadline if self._current is not None else self._due
 
-    # ------------------------------------------------------------------ those who wait
+    # ------------------------------------------------------------------ waiting callers
 
     def submit(self, job: Job[Q, A]) -> None:
         (self._urgent if job.urgent else self._waiting).append(job)

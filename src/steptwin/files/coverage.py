@@ -1,4 +1,4 @@
-"""Coverage of programs to files, in the format that the ending of each says, and as a table."""
+"""Coverage of programs to files, in the format of the ending of each, and as a table."""
 
 from __future__ import annotations
 

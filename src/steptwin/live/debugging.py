@@ -47,7 +47,7 @@ class Debugging:
         self._cell = cell
         self._pace = pace
         self._breakpoints: dict[int, _Requested] = {}
-        """They stay while nobody follows, and time does not stop at them then."""
+        """They stay without a follower; time does not stop at them then."""
         self._set: dict[int, SetPoint] = {}
         """What became of them."""
         self._next = 1
@@ -68,7 +68,7 @@ class Debugging:
         return StoppedPayload.kind in self._live.subject.followers.kinds
 
     def _opened(self) -> _OpenDebugger:
-        """Raises `Refusal` where nobody would learn of a stop, and `Misuse` for a world that cannot be debugged."""
+        """Raises `Refusal` without a follower of stops, and `Misuse` for a world that cannot be debugged."""
         if self._open is None:
             if not self._is_followed:
                 raise Refusal(f"nobody would learn where time stops: follow events of kind {StoppedPayload.kind!r} first")
@@ -206,7 +206,7 @@ class _OpenDebugger:
         self._travel: Travel | None = None
         """A way through the past."""
         self.stopped: dict[str, object] | None = None
-        """What was said of the present stop; None while time goes on."""
+        """The payload of the present stop; None while time goes on."""
         self._then: Goal | None = None
         """What to look for when it has come to the present."""
         live.world.input_watchers.append(self._given)
@@ -364,7 +364,7 @@ class _OpenDebugger:
             self._begin = None
             self._say(stop)
 
-    # ------------------------------------------------------------------ what is said
+    # ------------------------------------------------------------------ answers and events
 
     def place(self) -> dict[str, object]:
         debugger = self.debugger

@@ -36,7 +36,7 @@ class Descriptors:
         self._epoll = select.epoll()
         self._serve: dict[int, Serve] = {}
         # Lingering that was in vain is not repeated for so many turns, and then longer still: slow masters cost nothing,
-        # and where there is one processor only nobody could ask meanwhile.
+        # and where there is one processor only no other task would run meanwhile.
         self._skipped = 0
         self._to_skip = 0
         loop.add_reader(self._epoll.fileno(), self._turn)

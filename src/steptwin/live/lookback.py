@@ -60,7 +60,7 @@ class Lookback:
         return self._history.begin
 
     def open(self) -> Look:
-        """For one more who looks back. Raises `Refusal` where there are too many."""
+        """For another viewer of the past. Raises `Refusal` where there are too many."""
         if self._looks >= MOST_LOOKS:
             raise Refusal(f"{MOST_LOOKS} viewers look back already, which is the most")
         self._looks += 1

@@ -125,7 +125,7 @@ class Server:
             self.end_points.append(EndPoint("control", str(endpoint.listening), "control", {"file": str(endpoint.announcement)}))
 
     def join(self, link: Link, end_point: EndPoint | None = None) -> None:
-        """A link that is open already; it is closed with the others. Without an end point nobody reaches it from outside."""
+        """A link that is open already; it is closed with the others. Without an end point it cannot be reached from outside."""
         self._links.append(link)
         if end_point is not None:
             self.end_points.append(end_point)

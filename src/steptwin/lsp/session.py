@@ -304,7 +304,7 @@ class EditorSession:
         return list(found)
 
     def affected(self, uri: str) -> list[str]:
-        """The open texts about which something else may be said when this one changes; itself first."""
+        """The open texts whose diagnostics may change with this one; itself first."""
         uri = normal(uri)
         return [uri, *(other for other in self.related(uri) if other in self._documents)]
 

@@ -171,7 +171,7 @@ class Hub:
         self.description = ""
         """Of the subject, as JSON."""
         self.descriptions = 0
-        """How many there were: viewers who have another one are sent the whole state."""
+        """Number of descriptions so far: a viewer with another one is sent the whole state."""
         self._described: Description | None = None
         self._describe()
         sheets = Sheets(lambda: subject.description)
@@ -202,7 +202,7 @@ class Hub:
     def is_virtual(self) -> bool:
         return not any(part.is_real for part in self.subject.description.machines)
 
-    # ------------------------------------------------------------------ who there is
+    # ------------------------------------------------------------------ viewers
 
     def number(self) -> int:
         return next(self._numbers)

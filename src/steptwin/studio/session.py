@@ -221,7 +221,7 @@ class ViewerSession:
         around = self._hub.around
         around.audit.add(self.viewer, around.moment().time, wanted.name, wanted.fields, outcome)
 
-    # ------------------------------------------------------------------ who it is
+    # ------------------------------------------------------------------ identity of the viewer
 
     def _hello(self, wanted: ask.Hello) -> object:
         if self.has_entered:

@@ -12,7 +12,7 @@ from steptwin.subject.payloads import KINDS
 
 USUAL = frozenset(KINDS) - {"frame", "statement", "stopped", "log"}
 """What is followed where no kinds are named: frames are as frequent as requests, statements as milliseconds; a debugger is there
-for those who name its events."""
+for followers that name its events."""
 
 
 @dataclass(frozen=True, slots=True)

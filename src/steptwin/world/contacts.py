@@ -133,11 +133,11 @@ class Circuit:
 
     @property
     def machine(self) -> str:
-        """Under which its contacts are recorded."""
+        """The subject of the records of its contacts."""
         return self._kernel.owner(self.target.machine)
 
     def close(self) -> None:
-        """The input takes what its contacts give it now."""
+        """Set the input to the present state of its contacts."""
         levels = [contact.level for contact in self.contacts]
         self._kernel.drive(self.target, float(all(levels) if self.in_series else any(levels)))
 
@@ -146,7 +146,7 @@ class Circuit:
         self._kernel.mark(self.target.machine)
 
     def report(self, lane: str, level: float) -> None:
-        """The level of one of the contacts, whatever the input has of it."""
+        """The level of one contact, apart from the others of the input."""
         self._kernel.report(self.machine, "edge", lane, level)
 
 
@@ -193,11 +193,11 @@ class Contact(Stateful):
 
     @property
     def machine(self) -> str:
-        """Under which it is recorded."""
+        """The subject of its records."""
         return self._circuit.machine
 
     def rest_at(self, closed: bool) -> None:
-        """Set its initial state; the input takes it with `Circuit.close`."""
+        """Set its initial state; `Circuit.close` sets the input."""
         self.closed = self.level = closed
         self._report()
 

@@ -1,8 +1,5 @@
-"""What a world asks of a kind of controller, and of a kind of line: one value of each, and no question which one it is.
-
-A piece that is missing is a `TypeError` at import. What only some controllers have is None in others: a step that needs it is
-refused with a text.
-"""
+"""The interface between a world and a kind of controller or line: one value for each kind. A missing field is a `TypeError` at
+import. A field that only some controllers have is None in the others, and a step that needs it is refused with a message."""
 
 from __future__ import annotations
 
@@ -47,16 +44,16 @@ Row: TypeAlias = dict[str, Any]
 """The values of a table that were read by its keys, by attribute, with ``path``."""
 
 Values: TypeAlias = tuple[tuple[str, float], ...]
-"""Registers by name, and what they are to take."""
+"""Registers by name, and the values to write."""
 
 
 class BuildContext(Protocol):
-    """What the description of a controller refers to, while it is built."""
+    """The files and machines that a description refers to, while a controller is built."""
 
     spec: WorldSpec
 
     def data(self, name: str) -> bytes:
-        """The content of a file the description names. Raises `Misuse` where it is not given."""
+        """The content of a file that the description names. Raises `Misuse` if it is not given."""
         ...
 
     def accept(self, source: SourceText, findings: Iterable[Diagnostic]) -> None:
@@ -65,7 +62,7 @@ class BuildContext(Protocol):
 
 
 class TextContext(BuildContext, Protocol):
-    """What is known of the texts of programs besides."""
+    """Further facts about the texts of programs."""
 
     def downloaded(self, machine: str, place: str) -> SourceText | None:
         """The text that has been put there since the beginning; None where there is none."""
@@ -100,7 +97,7 @@ class MotionEnds(NamedTuple):
     over: str
     """No motion to a target is in progress."""
     reached: str
-    """The last one has come to its target."""
+    """The last motion has reached its target."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,7 +117,7 @@ class LineUnit(NamedTuple):
     """Where a controller is served."""
 
     unit: int = 1
-    """Under which faults know it."""
+    """Its name in faults."""
     line: str = ""
     """Empty without one."""
 
@@ -130,7 +127,7 @@ class EncoderInputs(Generic[M]):
     """The encoder inputs of a controller. Axes count from 1."""
 
     reader: Callable[[M], EncoderReader]
-    """What takes the counts."""
+    """The receiver of the counts."""
     counts_per_pulse: Callable[[M, int], Fraction]
     """As the controller is configured for an axis."""
     index_input: Callable[[int], str]
@@ -163,7 +160,7 @@ class Vision(Generic[S, M]):
     """HOST:PORT where a running world takes records."""
     see: Callable[[M, tuple[float, float, float, float], Nanos], None]
     records: Callable[[], Callable[[bytes], Sequence[tuple[float, float, float, float]]]]
-    """For each connection: what cuts records out of the bytes that come."""
+    """For each connection: splits received bytes into records."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -171,7 +168,7 @@ class ControllerKind(Generic[S, M, V]):
     """A kind of controller: its spec, its machine, and what Python programs see of it."""
 
     name: str
-    """Of its table in a description: ``[[name]]``."""
+    """The name of its table in a description: ``[[name]]``."""
     title: str
     """With its article, for messages: ``a MIC488``."""
     keys: tuple[Key, ...]
@@ -179,27 +176,26 @@ class ControllerKind(Generic[S, M, V]):
     inner_tables: tuple[str, ...] = ()
     """Tables in its table, which ``read`` reads."""
     inner_keys: Callable[[str], tuple[Key, ...]] = lambda table: ()
-    """The keys of one of these."""
+    """The keys of a nested table."""
     exclusive: tuple[tuple[str, str], ...] = ()
-    """Pairs of keys of which a table has one at most."""
+    """Pairs of keys that exclude each other."""
     read: Callable[[TomlText, Row, Mapping[str, Any]], S]
     """The spec of a table; what is wrong is reported to the text. The mapping is the table itself."""
     files: Callable[[S], Iterable[tuple[str, str]]]
     """Names of the files that a spec refers to, and the keys that do."""
     build: Callable[[S, bytes | None, BuildContext], M]
-    """The machine at time 0, with what its non-volatile memory has kept, if anything. Raises `Misuse`."""
+    """The machine at time 0, with the saved content of its non-volatile memory, if any. Raises `Misuse`."""
     watch_events: Callable[[M, Callable[[MachineEvent], None]], None]
-    """Have a function called with everything that happens in the machine."""
+    """Call a function with every event of the machine from now on."""
     keep_memory: Callable[[M, bytes | None, Callable[[bytes], None]], None]
-    """Have a function called with its non-volatile memory whenever that has changed; at once, where it differs from what is kept
-    already."""
+    """Call a function with its non-volatile memory after each change, and at once if it differs from the saved content."""
     announced: Callable[[M, int], dict[str, object]]
     """How drivers reach it at present: ``kind``, and what ``selection`` names. The number is its address on the line, as it was
     built."""
     selection: Selection | None = None
-    """None where there are no drivers for it."""
+    """None without drivers for it."""
     line: LineKind
-    """What it is connected to."""
+    """The connection of its line."""
     address: Callable[[S, M], int]
     """Unit or address on its line."""
     terminals: Terminals
@@ -230,11 +226,11 @@ class ControllerKind(Generic[S, M, V]):
     statement: Callable[[M], str | None] = lambda machine: None
     """The statement that its program is at, while one runs or is paused, as text."""
     view: Callable[[Plant, str, M], V]
-    """What Python programs see of it in a running world."""
+    """Its view for Python programs in a running world."""
     lanes: Callable[[M], Mapping[str, AxisLane]]
     """How its axes are shown in a trace, by the subject of their plans."""
     body: Callable[[M, LineUnit, Mapping[int, AxisLoad]], Body]
-    """What can fail of it; shafts are those of the mechanics of its axes, by number."""
+    """Its parts that faults act on; shafts are those of the mechanics of its axes, by number."""
     keeps_memory: Callable[[M], bool]
     """Whether it has non-volatile memory."""
     watch_program: Callable[[M, Kernel, str], ProgramReport | None] = lambda machine, kernel, name: None
@@ -249,14 +245,14 @@ class ControllerKind(Generic[S, M, V]):
     configuration: Callable[[S, M, BuildContext], SourceText | None] = lambda spec, machine, context: None
     """Its configuration file: as it was given, else made of its settings; None for a kind that has none."""
     remarks: Callable[[str, M], Sequence[str]] = lambda name, machine: ()
-    """What a person who starts it, under a name, should know."""
+    """Notices for the user who starts it, under a name."""
     encoders: EncoderInputs[M] | None = None
     registers: NamedRegisters[M] | None = None
     vision: Vision[S, M] | None = None
 
 
 class ProgramAct(Protocol):
-    """Something that a program did."""
+    """An action of a program."""
 
     @property
     def time(self) -> Nanos: ...
@@ -264,12 +260,12 @@ class ProgramAct(Protocol):
     def text(self) -> str: ...
     @property
     def place(self) -> str:
-        """Line and text of the statement; empty where none did it."""
+        """Line and text of the statement; empty without one."""
         ...
 
 
 class ProgramReport(Protocol):
-    """What programs have done since they were watched, in order of time."""
+    """Actions of programs since they are watched, in order of time."""
 
     @property
     def happened(self) -> Sequence[ProgramAct]: ...
@@ -299,7 +295,7 @@ class LineKind:
     keys: frozenset[str] = frozenset()
     """Other keys of ``[[line]]`` that not all kinds have."""
     make: Callable[[LineSpec, Sequence[Member], Kernel, Recorder, Faults], Line]
-    """The line with its members, which are one at least. Raises `Misuse` where they do not go together."""
+    """The line with its members, at least one. Raises `Misuse` if they do not fit together."""
     words: Callable[[Any, str, Callable[[FrameLine], None]], LineWords]
     """What goes over a line that was made, in words for a function; the text is put before the name of a place."""
 
@@ -311,11 +307,11 @@ class LinkKind:
     place_kind: str
     """The kind of its places on the line, one of `steptwin.world.lines.Line.kinds`."""
     place: str
-    """What its places are called; links that any number of programs may use number them."""
+    """The name of its places; numbered on links for any number of programs."""
     protocol: str
     """For people: ``Modbus RTU``."""
 
 
 def lacks(name: str, kind: AnyKind, what: str) -> Misuse:
-    """Of something that only other controllers have."""
+    """Refuses what only other controllers have."""
     return Misuse(f"{name!r} is {kind.title}, which has no {what}")

@@ -42,6 +42,6 @@ def check_names(spec: WorldSpec, elements: Iterable[NamedSpec]) -> None:
         owner = f"[[{kind}]] {one.name!r}"
         if key in RESERVED:
             text.wrong(path, "D006", f"{one.name!r} is {RESERVED[key]}: choose another name")
-        elif key in taken and taken[key] != owner:  # the very same is told already
+        elif key in taken and taken[key] != owner:  # this one is reported already
             text.wrong(path, "D006", f"{one.name!r} is taken by {taken[key]}", "upper and lower case are the same here")
         taken.setdefault(key, owner)

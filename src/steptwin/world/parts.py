@@ -41,7 +41,7 @@ class WorldParts:
     terminals: dict[str, Terminals] = field(default_factory=dict)
     """Of elements that have some."""
     driven: dict[PinName, Path] = field(default_factory=dict)
-    """Where the description says what drives an input."""
+    """Place in the description of what drives an input."""
     circuits: dict[PinName, Circuit] = field(default_factory=dict)
     """The contacts of the inputs that have some."""
     elements: dict[str, dict[str, Any]] = field(default_factory=dict)

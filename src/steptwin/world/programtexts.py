@@ -141,7 +141,7 @@ class WorldPrograms:
         return {**_plain(machine, text), "text": text.source.text, "diagnostics": findings}
 
     def files(self) -> Mapping[str, bytes]:
-        """What an editor server needs by address: texts, configurations, and a description that says what belongs together."""
+        """What an editor server needs by address: texts, configurations, and a description of their controllers."""
         plant = self._plant
         data: Any = tomllib.loads(plant.spec.text.source.text)
         found: dict[str, bytes] = {}

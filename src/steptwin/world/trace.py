@@ -34,7 +34,7 @@ DIGEST_BYTES = 16
 
 
 class TraceRecord(NamedTuple):
-    """Something that happened."""
+    """A record of a trace."""
 
     time: Nanos
     machine: str
@@ -46,7 +46,7 @@ class TraceRecord(NamedTuple):
 
 
 Recorder: TypeAlias = Callable[[TraceRecord], None]
-"""Takes each record as it happens: a `Trace`'s `add`, or anything else that wants to know."""
+"""Receives each record as it happens: the `add` of a `Trace`, or another receiver."""
 
 
 class Trace:
@@ -61,7 +61,7 @@ class Trace:
         """Whether there is a digest."""
         self._streams: dict[str, _Stream] = {name: _Stream() for name in machines}
         self.watchers: list[Recorder] = []
-        """Called with every record as it is taken."""
+        """Called with every record."""
 
     @property
     def machines(self) -> list[str]:
@@ -87,7 +87,7 @@ class Trace:
             watcher(record)
 
     def __len__(self) -> int:
-        """How many records were taken, kept or not."""
+        """Number of records so far, kept or not."""
         return sum(stream.count for stream in self._streams.values())
 
     def __iter__(self) -> Iterator[TraceRecord]:
@@ -130,19 +130,19 @@ class Trace:
         return self.of("fault", machine=machine)
 
     def stop(self) -> None:
-        """Have no records and no digest from now on; only `watchers` are called."""
+        """Keep no records and no digest from now on; only `watchers` are called."""
         self.is_kept = self.is_recorded = False
         for stream in self._streams.values():
             stream.records.clear()
 
     def let_go(self) -> None:
-        """Keep the digest alone, of what was kept so far too."""
+        """Keep only the digest, including that of the records so far."""
         self.is_kept = False
         for stream in self._streams.values():
             stream.let_go()
 
     def mark(self) -> Mark:
-        """The past, for `rewind`."""
+        """The present place, for `rewind`."""
         return Mark(tuple((name, stream.mark()) for name, stream in self._streams.items()))
 
     def rewind(self, mark: Mark) -> None:
@@ -154,10 +154,8 @@ class Trace:
             stream.rewind(known.get(name) or _Stream().mark())
 
     def digest(self) -> str:
-        """What two runs of the same world share, on any machine and Python version: 32 hexadecimal digits.
-
-        A digest of the machines' digests: their merged order follows from their times. Raises `Misuse` where nothing is recorded.
-        """
+        """Equal for two runs of the same world, on any machine and Python version: 32 hexadecimal digits. A digest of the digests
+        of the machines: their merged order follows from their times. Raises `Misuse` if nothing is recorded."""
         if not self.is_recorded:
             raise Misuse("nothing is recorded of this world: it has no digest")
         whole = blake2b(digest_size=DIGEST_BYTES)

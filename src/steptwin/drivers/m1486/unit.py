@@ -302,7 +302,7 @@ class ChipUnit:
             raise Misuse(why)
         return str(command).lower()
 
-    # ------------------------------------------------------------------ is it at rest, who is it
+    # ------------------------------------------------------------------ state and identity
 
     async def query_type(self, patience_ns: Nanos = 0, permission: Permission | None = None) -> int | None:
         """The type letter, which the chip sends when it has executed all commands; None if not within ``patience_ns`` or a

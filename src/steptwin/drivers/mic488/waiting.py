@@ -22,7 +22,7 @@ UNKNOWN_S = 60.0
 """Time-out of a motion whose duration cannot be computed, s: homing, or a motion begun by another program."""
 CORRECTION_S = 5.0
 """Time for a correction of the position after a motion. The controller itself gives up sooner: 2 s without progress (ERR_TIME),
-unless its configuration says otherwise."""
+unless its configuration differs."""
 
 
 class AxisWait:

@@ -74,7 +74,7 @@ def _head_of(trace: Trace, views: AxisViews, title: str) -> dict[str, object]:
 def read_records(file: IO[bytes], name: str) -> SavedTrace:
     """Read a file of `write_records`. Raises `Misuse` with ``name`` and the line of an error."""
     saved: SavedTrace | None = None
-    is_open, latest = False, 0  # whether the end of the run is still to be said
+    is_open, latest = False, 0  # whether the end of the run is still to be written
     for number, line in enumerate(_lines(file), 1):
         try:
             if len(line) > LONGEST_LINE:

@@ -127,7 +127,7 @@ class ActiveFault(Stateful):
 
 
 def addresses(pdu: bytes) -> range | None:
-    """What a request touches; None where it names no addresses."""
+    """The addresses of a request; None if it names none."""
     if len(pdu) < 5 or not (0 < pdu[0] <= _LAST_ADDRESSED or pdu[0] == _MULTIPLE):
         return None
     first = pdu[1] << 8 | pdu[2]
@@ -171,7 +171,7 @@ class Faults(Stateful):
         return active
 
     def check(self, fault: Fault) -> FaultyMachine | FaultyElement | None:
-        """The machine or element that goes wrong, if any. `Misuse` for a machine, pin, axis or element that is not there."""
+        """The machine or element of the fault, if any. `Misuse` for a machine, pin, axis or element that does not exist."""
         failing = self._failing(fault)
         if failing is not None:
             failing.check(fault)
@@ -247,7 +247,7 @@ class Faults(Stateful):
         ]
 
     def refusing(self) -> list[ActiveFault]:
-        """The faults that keep a request from being carried out."""
+        """The faults that refuse a request."""
         return [active for active in self.active if active.fault.refuses]
 
     def _changed(self) -> None:

@@ -40,7 +40,7 @@ def must_not_be_sent(line: LineProtocol, raw: bytes) -> bool:
 
 
 class AlteredAnswer(NamedTuple):
-    """What is left of an answer: ``before`` it the request's echo, then ``answer`` after ``delay``, or kept for ``later``."""
+    """The remains of an answer: the echo of the request (``before``), then ``answer`` after ``delay``, or held for ``later``."""
 
     delay: Nanos
     before: bytes

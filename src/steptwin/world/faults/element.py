@@ -1,4 +1,4 @@
-"""Elements of a world that can go wrong: each of their faults lasts from a moment to another."""
+"""Faults of elements of a world: each lasts from one moment to another."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class FaultyElement(Stateful):
-    """Stands beside an element in its kernel, as a part of it, and gives what was built of it to the effects of its faults."""
+    """A part of the kernel beside an element, which applies the effects of its faults to the built object."""
 
     __slots__ = ("_faults", "_kernel", "_kinds", "_lasting", "_part", "name")
     FIXED: ClassVar[frozenset[str]] = frozenset({"_faults", "_kernel", "_kinds", "_part", "name"})

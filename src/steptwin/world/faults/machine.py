@@ -37,7 +37,7 @@ class Body(Protocol):
     """The parts of a machine that can fail, besides its pins."""
 
     shafts: list[AxisLoad]
-    """By axis. Mechanics put themselves in the place of what is there."""
+    """By axis. Mechanics replace the loads of their axes."""
 
     def lacks(self, kind: FaultKind) -> str | None:
         """The reason why faults of a kind are impossible, as the end of a message after its name; None if they are possible."""
@@ -48,11 +48,11 @@ class Body(Protocol):
         ...
 
     def watch(self, owner: FaultyMachine) -> None:
-        """Have ``owner`` asked before requests are served (`FaultyMachine.refusal`) and memory is kept (`FaultyMachine.kept`)."""
+        """Call ``owner`` before requests are served (`FaultyMachine.refusal`) and memory is saved (`FaultyMachine.kept`)."""
         ...
 
     def pin_name(self, pin: str) -> str:
-        """The one name of a pin, whatever it is called."""
+        """The one name of a pin with several names."""
         ...
 
     def check_pin(self, pin: str, level: float) -> None:
@@ -114,7 +114,7 @@ class FaultyMachine(Stateful):
         """The moment at which each fault releases its axis."""
         self._off_until: Nanos | None = None
         self._cut: Nanos | None = None
-        """When the supply has failed in the middle of something that must come to its end first."""
+        """The moment of a supply failure during an action that ends first; None without one."""
         self._fresh = self.copy_state()
         body.watch(self)
 
@@ -211,7 +211,7 @@ class FaultyMachine(Stateful):
         self._off_until = max(until, self._off_until or 0)
 
     def cut_supply(self, now: Nanos, until: Nanos) -> None:
-        """As `drop_supply`, as soon as what is being done has come to its end."""
+        """As `drop_supply`, at the end of the present action."""
         self._cut, self._off_until = now, until
         self.changed()
 
@@ -293,7 +293,7 @@ class FaultyMachine(Stateful):
             self._faults.record(TraceRecord(now, self.name, "edge", pin, after))
 
     def set_pin(self, pin: str, value: float, now: Nanos) -> None:
-        """What lies before the faults changes; an input that is held takes it when it is let go."""
+        """Change the level before the faults; a held input takes it when it is released."""
         name = self.body.pin_name(pin)
         before = self._outer.get(name)
         if before is None:
@@ -350,7 +350,7 @@ class FaultyMachine(Stateful):
     # ------------------------------------------------------------------ what the body asks
 
     def refusal(self, unit: int, line: str, pdu: bytes, now: Nanos) -> bytes | None:
-        """The answer to a request on ``line`` that is not to be carried out; None lets it through."""
+        """The answer to a request on ``line`` that a fault refuses; None if it is executed."""
         function = pdu[0] if pdu else 0
         if self._off_until is not None:
             return exception_pdu(function, NEVER_SENT)
@@ -362,7 +362,7 @@ class FaultyMachine(Stateful):
         return None
 
     def kept(self, old: bytes, new: bytes, now: Nanos) -> bytes:
-        """What the memory holds when ``new`` was to be saved over ``old`` of the same length."""
+        """The content of the memory after ``new`` was saved over ``old`` of the same length."""
         kept = bytearray(new)
         saves = [active for active in self._mine() if isinstance(active.fault.kind.effect, SaveEffect)]
         for active in saves:
@@ -381,7 +381,7 @@ class FaultyMachine(Stateful):
 
 
 def rig(kernel: Kernel, name: str, faults: Faults, body: Body) -> FaultyMachine:
-    """Let faults of physics and protocol happen to the machine ``name`` of a kernel."""
+    """Apply faults of physics and protocol to the machine ``name`` of a kernel."""
     there = faults.machines.get(name)
     if there is None:
 

@@ -12,18 +12,18 @@ from steptwin.world.faults.table import Layer, LineProtocol
 
 
 class RequestRoute(NamedTuple):
-    """Something that requests come along. ``name`` with its verb is for people: ``"line 'bus' carries"``."""
+    """A link or line that carries requests. ``name`` with its verb is for messages: ``"line 'bus' carries"``."""
 
     name: str
     line: LineProtocol | None
-    """None: none at all, so that nothing but being refused can happen to a request."""
+    """None: it carries no bytes, so that the only fault of a request is its refusal."""
     link: str = ""
-    """What a fault calls it: this, or this with a number (``tcp``: tcp-1…). Empty: not known."""
+    """Its name in faults, alone or with a number (``tcp``: tcp-1…). Empty: not known."""
     units: tuple[int, ...] = ()
     is_usual: bool = True
-    """Whether a fault that names no link is meant for it."""
+    """Whether a fault without a link applies to it."""
     on: str = ""
-    """What a fault calls the line of a world that it is on."""
+    """The name of its line in faults."""
 
     def lets_happen(self, fault: Fault) -> bool:
         if self.line is None:
@@ -36,7 +36,7 @@ class RequestRoute(NamedTuple):
 
     @property
     def offers(self) -> str:
-        """What can happen here."""
+        """The faults that are possible here."""
         if self.line is None:
             return self.name
         kinds = (kind.name for kind in KINDS.values() if self.line in kind.lines)

@@ -117,7 +117,7 @@ class FaultyPort(Stateful):
     # ------------------------------------------------------------------ which way calls go
 
     def choose(self) -> None:
-        """Which way calls go from now on."""
+        """Select the path of calls from now on."""
         if self._faults.active or self._arriving or self._leaving:
             self._be_faulty()
         else:
@@ -180,7 +180,7 @@ class FaultyPort(Stateful):
             self._take([(now, answer)] if answer else [], now)
 
     def _take(self, sent: list[tuple[Nanos, bytes]], now: Nanos) -> None:
-        """What the inner port sends: bytes as they are, or the frames it reported."""
+        """The output of the inner port: bytes, or the frames that it reported."""
         if self._framed is None:
             fresh = [(moment, 0, data) for moment, data in sent]
         else:
@@ -192,7 +192,7 @@ class FaultyPort(Stateful):
                 self._leaving.append((max(at, self._leaving[-1][0]) if self._leaving else at, piece))
 
     def watch(self, observer: FrameObserver | None) -> None:
-        """Have ``observer`` called with the frames of the port from now on; None: nothing is called."""
+        """Call ``observer`` with the frames of the port from now on; None ends that."""
         framed = self._framed
         if framed is not None and framed.on_frame == self._observe:
             self._before = observer
@@ -239,7 +239,7 @@ class FaultyPort(Stateful):
         return None
 
     def _key(self, raw: bytes) -> tuple[bytes, int]:
-        """What a request and its answer have in common: the unit (on TCP after the transaction) and the function."""
+        """The common part of a request and its answer: the unit (on TCP after the transaction) and the function."""
         head = raw[:1] if self._line is LineProtocol.RTU else raw[:2] + raw[6:7]
         return head, pdu_of(self._line, raw)[0] & 0x7F
 
@@ -262,10 +262,8 @@ class FaultyPort(Stateful):
 
 
 class FaultySendingPort(FaultyPort):
-    """Before a port that has something to send without having been asked.
-
-    ``is_read``: a program reads what the port sends; otherwise its output gives no occasion for faults.
-    """
+    """As `FaultyPort`, for a port that also sends without a request. ``is_read``: a program reads the output of the port;
+    otherwise its output is no occasion for faults."""
 
     __slots__ = ("_is_read", "_sending")
     FIXED: ClassVar[frozenset[str]] = FaultyPort.FIXED | {"_is_read", "_sending"}

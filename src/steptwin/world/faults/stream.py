@@ -1,4 +1,4 @@
-"""Faults of bytes: what becomes of a run of bytes on its way."""
+"""Faults of bytes on the line."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from steptwin.world.faults.table import ByteEffect, FaultReporter, InsertEffect,
 
 
 class Run:
-    """What arrives: pieces, each with how much later than it would have."""
+    """The received pieces, each with its additional delay."""
 
     def __init__(self) -> None:
         self.pieces: list[tuple[Nanos, bytearray]] = [(0, bytearray())]

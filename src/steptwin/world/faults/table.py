@@ -111,7 +111,7 @@ class Parameter:
         return f"{what} {bounds}".rstrip()
 
     def plain(self) -> dict[str, object]:
-        """As JSON. ``default`` is the text of the value that holds without one, or says what does."""
+        """As JSON. ``default`` is the text of the value that holds without one, or names its source."""
         return {
             "name": self.name,
             "meaning": self.meaning,

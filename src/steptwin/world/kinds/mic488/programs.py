@@ -39,7 +39,7 @@ class WbcPrograms:
     def __init__(self, device: Mic488Device) -> None:
         self._device = device
         self._banks: dict[str, _Bank] = {}
-        """What was in them when somebody asked last."""
+        """Their content at the last request."""
 
     @property
     def statement_time(self) -> Nanos:
