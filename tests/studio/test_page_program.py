@@ -112,8 +112,17 @@ def test_a_name_is_completed_explained_and_renamed_in_both_texts(studio: Studio)
     option.click()
     page.keyboard.press("Enter")
     expect(text_of(page)).to_contain_text("MOVEPTP @PICK")
-    text_of(page).get_by_text("MOVEPTP").hover()
-    expect(page.locator(".cm-lsp-hover-tooltip")).to_contain_text("MOVEPTP")
+    tip = page.locator(".cm-lsp-hover-tooltip")
+
+    def is_explained() -> bool:
+        """An explanation is asked for when the mouse moves; a change of the text, as by findings, ends that."""
+        page.mouse.move(5, 5)
+        text_of(page).get_by_text("MOVEPTP").hover()
+        page.wait_for_timeout(1000)
+        return tip.count() > 0
+
+    until(is_explained, "the statement is explained")
+    expect(tip).to_contain_text("MOVEPTP")
     page.keyboard.press("Control+Home")
     for _ in range(11):
         page.keyboard.press("ArrowRight")
