@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from collections.abc import Callable
 from typing import NamedTuple
 
 import pytest
@@ -14,7 +15,7 @@ from steptwin.errors import TimeReversal
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.events import EVENTS, M1486Event
 from steptwin.m1486.variants import variant
-from steptwin.machine import MILLISECOND, PinEdge
+from steptwin.machine import MILLISECOND, SECOND, Nanos, PinEdge
 
 PROGRAM = (b":3\r", b"[\r@1\rl3\r+5\ri1l2\re\rc2\rf1280\rr\rt2\ru4\rw20\r@2\rz3\ro3\r(2\rj1\r]\r", b"k\r", b"u1\ru4\r", b"c75\r")
 
@@ -136,6 +137,27 @@ def test_time_does_not_go_back() -> None:
     bench.run(1.0)
     with pytest.raises(TimeReversal):
         bench.chip.receive(b"u20\r", 1)
+
+
+CALLS: dict[str, Callable[[M1486Chip, Nanos], object]] = {
+    "advance": lambda chip, now: chip.advance(now),
+    "characters": lambda chip, now: chip.receive(b"u1\r", now),
+    "what was sent": lambda chip, now: chip.to_send(now),
+    "pin": lambda chip, now: chip.set_pin("B3", 0, now),
+    "power off": lambda chip, now: chip.power_off(now),
+    "power cycle": lambda chip, now: chip.power_cycle(now),
+}
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_whatever_is_done_at_a_moment_finds_the_chip_there(name: str) -> None:
+    """What was due before has been done before: W50 waits for 50 ms, T2 takes 1 ms."""
+    bench = Bench()
+    bench.send("c2", "w50", "t2")
+    CALLS[name](bench.chip, SECOND)
+    assert bench.now == SECOND
+    assert [(edge.time, edge.value) for edge in bench.edges if edge.pin == "B2"] == [(0, 0.0), (51 * MILLISECOND, 1.0)]
+    bench.run(1.0)
 
 
 def test_every_event_has_a_known_code() -> None:

@@ -343,6 +343,15 @@ def test_utf_16_is_read_and_written_back(mark: bytes, encoding: str) -> None:
     assert file.with_value("Axis0", "Gear", "25").to_bytes() == data.replace("1".encode(encoding), "25".encode(encoding))
 
 
+def test_a_key_without_a_value_gets_one_where_it_belongs() -> None:
+    for line in ("Gear=", "Gear =  ", "Gear= ; none yet"):
+        file = parse(f"[Axis0]\n{line}\nAcc=1\n")
+        entry = file.find("axis0", "gear")
+        assert entry is not None
+        assert (entry.value, file.source.text[entry.value_span.start - 1]) == ("", "=")
+        assert file.with_value("Axis0", "Gear", "25").source.text == f"[Axis0]\n{line.replace('=', '=25', 1)}\nAcc=1\n"
+
+
 @pytest.mark.parametrize(
     "data", [bytes(range(256)), b"[Axis0]\r\nGear=\0\r\n", b"\xff\xfe[\0\0\xd8"], ids=["all bytes", "NUL", "half a pair"]
 )

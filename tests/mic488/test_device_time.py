@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from collections.abc import Callable
 from itertools import pairwise
 
 import pytest
@@ -19,6 +20,7 @@ from mic488_rig import (
     Rig,
     coil_pdu,
     controller,
+    programmed,
     read_pdu,
     word_pdu,
 )
@@ -29,6 +31,7 @@ from steptwin.mic488.config import AxisConfig, ControllerConfig, InputConfig
 from steptwin.mic488.device import ControllerSnapshot, Mic488Device
 from steptwin.mic488.encoder import Coupling
 from steptwin.mic488.program import ProgramControl
+from steptwin.mic488.vision import VisionRecord
 from steptwin.state import Stateful
 
 BUSY = ControllerConfig(
@@ -61,6 +64,35 @@ def test_time_cannot_go_back() -> None:
             call()
     assert rig.device.now == SECOND
     assert rig.pins()["IN1"] == 0.0
+
+
+CALLS: dict[str, Callable[[Mic488Device, Nanos], object]] = {
+    "advance": lambda device, now: device.advance(now),
+    "request": lambda device, now: device.execute(read_pdu(3, 0, 1), now),
+    "command": lambda device, now: device.command(lambda _: None, now),
+    "pin": lambda device, now: device.set_pin("IN1", 1, now),
+    "record": lambda device, now: device.see(VisionRecord(1, 2, 3, 4), now),
+    "turn": lambda device, now: device.turn_encoder(1, 5, now),
+    "couple": lambda device, now: device.couple_encoder(1, Coupling.FREE, now),
+    "follow": lambda device, now: device.follow_shaft(1, None, now),
+    "gear": lambda device, now: device.gear_encoder(1, 5, 3, now),
+    "master error": lambda device, now: device.set_master_error(True, now),
+    "power off": lambda device, now: device.power_off(now),
+    "power cycle": lambda device, now: device.power_cycle(now),
+}
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_whatever_is_done_at_a_moment_finds_the_controller_there(name: str) -> None:
+    """What was due before has been done before."""
+    rig = programmed("DELAY 0.5\nOUT1 = ON\n$I0 = Status\n$I1 = VisionNo\n$I2 = ENC1\nWAIT 1 = 2\n")
+    rig.start()
+    device = rig.device
+    CALLS[name](device, SECOND)
+    assert device.now == SECOND
+    edges = [edge for edge in device.take_edges() if edge.pin == "OUT1"]
+    assert edges[0].time == 501 * MILLISECOND
+    assert list(device.user[:3]) == [0, 0, 0]
 
 
 def test_a_command_at_a_moment_comes_after_what_is_due_then() -> None:

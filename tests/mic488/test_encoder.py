@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import pytest
 from mic488_rig import Rig, controller
 
+from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.config import AxisConfig
 from steptwin.mic488.encoder import Coupling, Encoder
@@ -51,6 +53,27 @@ def test_an_encoder_that_is_not_built_as_configured_does_not_agree() -> None:
     assert encoder.shaft(1600, 0) == 200
     assert encoder.shaft(1608, 0) == 199
     assert encoder.pulses(400) == 3200.0
+
+
+def test_another_gear_leaves_the_counter_where_it_is_and_only_real_ones_are_taken() -> None:
+    """400 counts in 3200 pulses are configured: 800 pulses are 100 counts. Then 10 pulses are one count."""
+    rig = Rig(controller(AxisConfig()))
+    rig.enable(1)
+    rig.set("POS_ABS", 800.0)
+    rig.wait(10)
+    rig.device.gear_encoder(1, 1, 10, rig.now)
+    assert rig.get("ENC_IMP") == 100
+    rig.set("POS_ABS", 700.0)
+    rig.wait(10)
+    assert rig.get("ENC_IMP") == 90
+    for counts, pulses in ((0, 1), (1, 0), (1, -1)):
+        text = f"^M1: {counts} encoder counts per {pulses} pulses: counts must not be 0, pulses 1 or more$"
+        with pytest.raises(Misuse, match=text):
+            rig.device.gear_encoder(1, counts, pulses, rig.now)
+    rig.device.gear_encoder(1, -1, 1, rig.now)
+    rig.set("POS_ABS", 701.0)
+    rig.wait(10)
+    assert rig.get("ENC_IMP") == 89
 
 
 def test_a_wrong_resolution_in_the_configuration_is_a_position_error() -> None:

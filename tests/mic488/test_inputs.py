@@ -10,6 +10,7 @@ from mic488_rig import OUT, Rig, controller
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, PinEdge
 from steptwin.mic488.config import AnalogConfig, ControllerConfig, InputConfig
+from steptwin.mic488.inputs import Inputs
 
 
 def with_input(number: int, **settings: int) -> Rig:
@@ -49,6 +50,16 @@ def test_what_is_shorter_than_the_filter_time_does_not_show() -> None:
     rig.wait(1.0)
     assert shown(rig, 1) == 0
     assert rig.kernel.deadline() is None
+
+
+def test_a_level_that_goes_back_is_nothing_that_is_due() -> None:
+    inputs = Inputs([InputConfig(), InputConfig(filter=1)])
+    assert inputs.set_pin(0, True, 0)
+    assert inputs.set_pin(1, True, 0)
+    assert inputs.set_pin(0, False, MILLISECOND)
+    assert inputs.deadline() == 50 * MILLISECOND
+    assert inputs.settle(50 * MILLISECOND) == [1]
+    assert (inputs.filtered, inputs.deadline()) == ([False, True], None)
 
 
 def test_bouncing_starts_the_filter_time_anew() -> None:

@@ -222,6 +222,36 @@ def test_power_off_ends_a_program_that_nothing_starts_again() -> None:
     assert (rig.state, rig.out(1), rig.out(2), rig.device.deadline()) == (STOPPED, False, False, None)
 
 
+def test_after_power_off_a_program_does_nothing_more() -> None:
+    rig = programmed("OUT1 = ON\nPULSE(OUT2, 1)\nDELAY 1\nOUT3 = ON\nWAIT 1 = 2\n")
+    rig.start()
+    rig.wait(0.5)
+    rig.device.power_off(rig.now)
+    assert rig.device.program.state == STOPPED
+    rig.wait(5)
+    assert (rig.device.deadline(), rig.device.outputs) == (None, [False] * 8)
+
+
+def test_variables_are_seen_and_set_by_name() -> None:
+    rig = programmed("x = 2\ny = 3\nWAIT IN1 = ON\n$R0 = x\n$R2 = y\nWAIT 1 = 2\n")
+    control = rig.device.program
+    assert control.variables(0) == {}
+    with pytest.raises(Misuse, match=r"^the program has no variable 'x': there are none$"):
+        control.set_variable("x", 1.0, 0)
+    rig.start()
+    rig.wait(0.1)
+    assert control.variables(rig.now) == {"x": 2.0, "y": 3.0}
+    control.set_variable("y", -7.5, rig.now)
+    with pytest.raises(Misuse, match=r"^the program has no variable 'z': there are x, y$"):
+        control.set_variable("z", 1.0, rig.now)
+    for value in (3.5e38, -3.5e38):
+        with pytest.raises(Misuse, match=r"^x = -?3\.5e\+38: permitted are -3\.40282e\+38…3\.40282e\+38$"):
+            control.set_variable("x", value, rig.now)
+    rig.pin("IN1", 1)
+    rig.wait(0.1)
+    assert (rig.r(0), rig.r(2)) == (2.0, -7.5)
+
+
 # ---------------------------------------------------------------------- snapshots, sharing, wires
 
 BUSY = "M1 = ON\nL:\nPREL M1 30\nWAITPOS\nDELAY 0.1\nn = n + 1\n$R0 = n\nWHILE TIMA1 < 50\nENDWHILE\nTIMA1 = 0\nJUMP L\n"
@@ -408,3 +438,4 @@ def test_a_program_says_when_it_acted_on_the_rest_of_the_controller() -> None:
     due = control.deadline()
     assert due is not None
     assert control.advance(due, due + 10 * MILLISECOND) == 3 * MILLISECOND  # WBC-6: each statement takes 1 ms
+    assert control.advance(4 * MILLISECOND, 4 * MILLISECOND) is None

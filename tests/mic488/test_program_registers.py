@@ -156,6 +156,41 @@ def test_a_wait_notices_that_an_encoder_wraps(counts: int, pulses: int, first: i
     assert rig.pin_until("OUT1", 1.0) == pytest.approx(seconds + 0.5, abs=0.02)
 
 
+@pytest.mark.parametrize("direction", [1, -1])
+def test_a_wait_notices_that_a_position_wraps(direction: int) -> None:
+    """1280 pulses before the end of the counter, at 1000 pulses/s. A ramp of 1 s is half a second longer than none."""
+    first = 2**31 - 1280 if direction > 0 else -(2**31) + 1279
+    sign = "<" if direction > 0 else ">"
+    rig = programmed(f"M1 = ON\nVABS M1 {1000 * direction}\nWAIT PosM1 {sign} 0\nOUT1 = ON\nWAIT 1 = 2\n")
+    rig.device.axes[0].set_coordinate(first, 0)
+    rig.start()
+    assert rig.pin_until("OUT1", 1.0) == pytest.approx(1.28 + 0.5, abs=0.005)
+    assert rig.position(1) == pytest.approx(-direction * 2**31, abs=200)
+
+
+@pytest.mark.parametrize("first", [2**31 - 10, -(2**31) + 9])
+def test_a_wait_for_an_encoder_near_its_end_looks_at_every_statement_time(first: int) -> None:
+    """The counter wraps within the foreseen time, while the axis turns it by 80 counts."""
+    speed, sign = (640, "<") if first > 0 else (-640, ">")
+    rig = programmed(f"M1 = ON\nVABS M1 {speed}\nWAIT ENC1 {sign} 0\nOUT1 = ON\nWAIT 1 = 2\n")
+    rig.set("ENC_IMP", first)
+    rig.start()
+    # 8 pulses are a count: 80 pulses at 1000 pulses/s².
+    assert rig.pin_until("OUT1", 1.0) == pytest.approx(0.4, abs=0.02)
+
+
+def test_a_wait_for_the_end_of_a_motion_ends_at_its_next_look() -> None:
+    """VMAX and ACC are 1000: 1000 pulses take 2 s."""
+    rig = programmed("M1 = ON\nPABS M1 1000\nWAIT M1 = 0\nOUT1 = ON\nVABS M1 10\nWAIT M1 = 0\nOUT2 = ON\nWAIT 1 = 2\n")
+    rig.start()
+    assert rig.pin_until("OUT1", 1.0) == pytest.approx(2.003, abs=0.0015)
+    rig.wait(5)
+    assert (rig.out(2), rig.device.deadline()) == (False, None)
+    rig.stop(1)
+    rig.wait(0.1)
+    assert rig.out(2)
+
+
 # ---------------------------------------------------------------------- motion statements
 
 ROWS = "here;10;x;x;x\nboth;30;20;x;x\nline;40;0;25;x\ncircle;50;0;10;360\narc;20;40;10;0\nnothing;x;x;x;x\n"

@@ -96,3 +96,23 @@ def test_wbc_15_modbus_and_records_on_one_port() -> None:
     assert answers == [1] * 5
     assert frames.count(FrameDirection.IN) == 5
     assert (rig.r(0), rig.r(8)) == (3, 1)
+
+
+def test_wbc_15_a_frame_that_came_in_pieces_leaves_nothing_of_a_record() -> None:
+    """Its first piece looks like the beginning of one; what comes after the frame is not the end of it."""
+    rig = programmed(PROGRAM)
+    rig.start()
+    rig.wait(0.1)
+    port = Com1Port(rig.device, RtuSlavePort({1: rig.device}))
+    text = b"\rN9 X9 Y9 \0"
+    write = encode_frame(1, bytes((16, 0, 100, 0, len(text) // 2, len(text))) + text)
+    cut = write.index(b"Y9 ") + 3
+    assert port.exchange(write[:cut], rig.now) == b""
+    assert port.exchange(write[cut:], rig.now) != b""
+    port.exchange(b"A7\r", rig.now)
+    rig.wait(0.1)
+    assert rig.r(8) == 0
+    port.exchange(b"N4 X1 Y2 A3\r", rig.now)
+    rig.kernel.deadline()
+    rig.wait(0.1)
+    assert (rig.r(0), rig.r(8)) == (4, 1)

@@ -152,6 +152,23 @@ def test_wbc_24_what_acts_counts_as_twenty() -> None:
     assert {edge.time for edge in rig.edges} == {0}
 
 
+def test_wbc_24_without_statement_time_a_long_calculation_goes_on_where_it_was() -> None:
+    """5000 rounds of three statements, the look that ends them, and $R0 as the second of the next thousand: 15 ms."""
+    rig = programmed("WHILE n < 5000\nn = n + 1\nENDWHILE\n$R0 = n\nOUT1 = ON\nWAIT 1 = 2\n", statement_time=0)
+    rig.start()
+    rig.wait(0.1)
+    assert (rig.r(0), rig.changes("OUT1")) == (5000, [(0.015, 1.0)])
+
+
+def test_without_statement_time_too_a_program_error_names_its_line() -> None:
+    rig = programmed("x = 1\nz = 0\ny = 1 / z\nEND\n", statement_time=0)
+    rig.start()
+    rig.wait(0.1)
+    (event,) = rig.events("program-error")
+    assert event.text.startswith("line 3: ")
+    assert rig.state == STOPPED
+
+
 def test_branches() -> None:
     rig = run(
         """
@@ -191,9 +208,17 @@ def test_jump_and_return_nest() -> None:
     assert rig.i(0) == 123
 
 
-def test_wbc_1_the_stack_keeps_sixteen_and_forgets_the_oldest() -> None:
+@pytest.mark.parametrize("between", ["", "DELAY 0.05", "WAIT TIMA1 >= n", "WHILE TIMA1 < n\nENDWHILE"])
+def test_wbc_1_the_stack_keeps_sixteen_and_forgets_the_oldest(between: str) -> None:
     # Twenty JUMPs deep, only the sixteen innermost can return; then the stack is empty.
-    rig = run("L:\nn = n + 1\nIF n < 21\nJUMP L\nENDIF\n$I0 = m\nm = m + 1\nRETURN\n")
+    # Neither what is waited for in between nor a pause makes it longer.
+    rig = programmed(f"L:\nn = n + 1\n{between}\nIF n < 21\nJUMP L\nENDIF\n$I0 = m\nm = m + 1\nRETURN\n")
+    rig.start()
+    rig.wait(0.0205)
+    rig.pause()
+    rig.wait(0.1)
+    rig.start()
+    rig.wait(3)
     assert rig.i(0) == 16
     assert rig.device.program.fault is not None
     assert rig.device.program.fault.text == (
