@@ -520,6 +520,27 @@ def test_the_program_shows_the_line_it_is_at(start_studio: Callable[..., Process
     assert studio.complaints == []
 
 
+def test_the_wiring_is_shown_with_its_levels(start_studio: Callable[..., Process], browser: Browser) -> None:
+    studio = Studio(start_studio("--demo"), browser)
+    page = studio.page(panel="I/O")
+    button(page, "Wiring").click()
+    table = page.get_by_role("region", name="Wiring of table")
+    expect(table).to_contain_text("x.switch1")
+    lamp = table.get_by_role("img", name="table.IN9 level").get_by_role("img")
+    expect(lamp).to_have_accessible_name("off")
+    button(page, "Press part").hover()
+    page.mouse.down()
+    expect(lamp).to_have_accessible_name("on")
+    page.mouse.up()
+    table.get_by_role("button", name="cup.held").click()
+    expect(page.get_by_role("region", name="Wiring of cup").locator(".row.marked")).to_contain_text("held")
+    button(page, "Levels").click()
+    expect(page.get_by_label("Force IN4")).to_be_visible()
+    expect(page.get_by_text("↔ cup.held")).to_be_visible()
+    studio.close()
+    assert studio.complaints == []
+
+
 def test_the_machine_is_drawn_and_its_button_pressed(start_studio: Callable[..., Process], browser: Browser) -> None:
     studio = Studio(start_studio("--demo"), browser)
     page = studio.page(panel="Machine")

@@ -20,7 +20,7 @@ from steptwin.motion.divisions import profile_of
 from steptwin.motion.plain import read_plan
 from steptwin.subject import commands as command
 from steptwin.subject.commands import COMMANDS
-from steptwin.subject.contract import DrawingPart, ElementPart, SignalPart, SwitchPart, read_description
+from steptwin.subject.contract import ConnectionPart, DrawingPart, ElementPart, SignalPart, SwitchPart, read_description
 from steptwin.subject.describe import describe
 from steptwin.subject.dispatch import respond
 from steptwin.subject.events import Event
@@ -94,6 +94,12 @@ def test_what_each_command_of_a_controller_writes() -> None:
 def test_a_description_survives_json_and_names_points_that_can_be_read() -> None:
     subject = of(feeder())
     description = subject.description
+    assert description.connections == (
+        ConnectionPart("clamp.extended", "both.in1", inverted=False, delay_ns=0, join=None),
+        ConnectionPart("a.OUT1", "clamp.extend", inverted=False, delay_ns=0, join=None),
+        ConnectionPart("clamp.switch1", "a.IN3", inverted=False, delay_ns=0, join=None),
+        ConnectionPart("b", "both.in2", inverted=False, delay_ns=0, join=None),
+    )
     assert read_description(json.loads(json.dumps(description.plain()))) == description
     assert {part.name: part.controls for part in description.machines} == {
         "table": ("enable", "move", "home", "jog", "stop", "program"),

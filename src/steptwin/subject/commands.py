@@ -236,7 +236,7 @@ _ROWS = (
         "describe",
         Describe,
         "What there is.",
-        "version, name, machines with the numbers of their datasheets, axes, buttons, elements, lines, commands",
+        "version, name, machines with the numbers of their datasheets, axes, buttons, elements, connections, lines, commands",
     ),
     CommandRow(
         "read",

@@ -134,6 +134,22 @@ class ElementPart:
 
 
 @dataclass(frozen=True, slots=True)
+class ConnectionPart:
+    """One of the sources of an input."""
+
+    source: str
+    """An output or terminal (``table.OUT1``, ``cup.held``), a switch of an axis or an element (``x.switch1``), a button, another
+    element."""
+    target: str
+    """An input of a controller or an element: ``table.IN3``, ``cup.ejector``."""
+    inverted: bool
+    """Whether the input is 0 while the source is 1: an inverted wire, a contact that is normally closed."""
+    delay_ns: int
+    join: str | None
+    """``parallel`` or ``series`` where several contacts share the input."""
+
+
+@dataclass(frozen=True, slots=True)
 class LinePart:
     """A line with controllers on it."""
 
@@ -152,6 +168,7 @@ class Description:
     axes: tuple[MechanicsPart, ...] = ()
     buttons: tuple[str, ...] = ()
     elements: tuple[ElementPart, ...] = ()
+    connections: tuple[ConnectionPart, ...] = ()
     lines: tuple[LinePart, ...] = ()
     commands: tuple[str, ...] = ()
     """Names of the supported commands."""
@@ -178,6 +195,7 @@ class Description:
             "machines": machines,
             "axes": [asdict(part) for part in self.axes],
             "elements": [asdict(part) for part in self.elements],
+            "connections": [asdict(part) for part in self.connections],
             "lines": [asdict(part) for part in self.lines],
             "datasheets": [plain(sheet) for sheet in sheets.values()],
         }
@@ -222,9 +240,10 @@ def read_description(data: Mapping[str, Any]) -> Description:
         )
         for one in data["elements"]
     )
+    connections = tuple(ConnectionPart(**one) for one in data["connections"])
     lines = tuple(LinePart(**one) for one in data["lines"])
-    commands = tuple(data["commands"])
-    return Description(data["name"], machines, axes, tuple(data["buttons"]), elements, lines, commands, version=data["version"])
+    buttons, commands = tuple(data["buttons"]), tuple(data["commands"])
+    return Description(data["name"], machines, axes, buttons, elements, connections, lines, commands, version=data["version"])
 
 
 def _read_drawing(data: Mapping[str, Any]) -> DrawingPart:

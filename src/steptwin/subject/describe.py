@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from steptwin.subject.commands import COMMANDS
 from steptwin.subject.contract import (
+    ConnectionPart,
     Description,
     DrawingPart,
     ElementPart,
@@ -22,6 +23,7 @@ from steptwin.world.elements.axis import AXIS, MECHANICS
 from steptwin.world.elements.button import BUTTON
 from steptwin.world.kind import Terminals
 from steptwin.world.plant import Plant
+from steptwin.world.wiring import connections, terminal_name
 
 
 def describe(world: Plant) -> Description:
@@ -32,6 +34,7 @@ def describe(world: Plant) -> Description:
         tuple(_mechanics(world, name) for name in world.axes),
         tuple(world.parts.buttons),
         tuple(_elements(world)),
+        tuple(_connections(world)),
         tuple(LinePart(line.name, line.kind, world.lines[line.name].baud) for line in world.spec.lines),
         tuple(COMMANDS),
     )
@@ -71,6 +74,12 @@ def _element(world: Plant, kind: str, name: str) -> ElementPart:
     others = {signal: of for signal, of in signals.items() if signal not in (*inputs, *outputs)}
     parts = tuple(SignalPart(signal, of.unit, *(of.bounds or (None, None))) for signal, of in others.items())
     return ElementPart(name, kind, inputs, outputs, parts, drawing)
+
+
+def _connections(world: Plant) -> Iterator[ConnectionPart]:
+    for one in connections(world.parts):
+        target = terminal_name(world.parts, one.target)
+        yield ConnectionPart(one.source, target, one.inverted, one.delay, one.join)
 
 
 def _drawing(drawing: Drawing) -> DrawingPart:

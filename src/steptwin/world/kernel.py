@@ -6,9 +6,10 @@ advanced only when an event concerns it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 from typing import Any, NamedTuple, Protocol
 
 from steptwin.errors import Misuse, Runaway, TimeReversal
@@ -222,9 +223,13 @@ class Kernel:
         self._wires.setdefault(wire.source, []).append(wire)
         self.mark(wire.target.machine)
 
+    def wires(self) -> Iterator[Wire]:
+        """All wires."""
+        return chain.from_iterable(self._wires.values())
+
     def wire_to(self, target: PinName) -> Wire | None:
         """The wire that drives an input, if one does."""
-        return next((wire for wires in self._wires.values() for wire in wires if wire.target == target), None)
+        return next((wire for wire in self.wires() if wire.target == target), None)
 
     def check(self, name: PinName) -> None:
         """Raises `Misuse` if the machine or its pin does not exist."""

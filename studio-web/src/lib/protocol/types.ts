@@ -346,6 +346,13 @@ export type Description = {
       })[];
     } | null;
   })[];
+  connections: ({
+    source: string;
+    target: string;
+    inverted: boolean;
+    delay_ns: number;
+    join: string | null;
+  })[];
   lines: ({
     name: string;
     kind: string;
@@ -520,7 +527,7 @@ export type State = {
   details: Record<string, boolean | number | string | number[] | Record<string, number> | null>;
 };
 
-/** What there is. Answer: version, name, machines with the numbers of their datasheets, axes, buttons, elements, lines, commands. */
+/** What there is. Answer: version, name, machines with the numbers of their datasheets, axes, buttons, elements, connections, lines, commands. */
 export type DescribeRequest = {
   do: "describe";
   /** Comes back with the answer. */

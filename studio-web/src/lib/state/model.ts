@@ -11,6 +11,8 @@ export type Line = Description["lines"][number];
 export type Mechanics = Description["axes"][number];
 /** What is around the controllers and is no axis and no button, such as a cylinder. */
 export type Element = Description["elements"][number];
+/** What drives an input. */
+export type Connection = Description["connections"][number];
 export type Control = "enable" | "move" | "home" | "jog" | "stop" | "program";
 
 /** An axis of a controller, with the points of its data sheet that are about it. */
@@ -65,6 +67,7 @@ export interface Model {
   mechanics: readonly Mechanics[];
   buttons: readonly string[];
   elements: readonly Element[];
+  connections: readonly Connection[];
   commands: ReadonlySet<string>;
 }
 
@@ -143,6 +146,7 @@ export function modelOf(description: Description): Model {
     mechanics: description.axes,
     buttons: description.buttons,
     elements: description.elements,
+    connections: description.connections,
     commands: new Set(description.commands),
   };
 }

@@ -28,6 +28,7 @@ const EMPTY: Model = {
   mechanics: [],
   buttons: [],
   elements: [],
+  connections: [],
   commands: new Set(),
 };
 /** Frames and statements are as frequent as requests: a panel that shows them follows them itself. */
