@@ -49,6 +49,7 @@ from steptwin.cli import (
     twin,
     twins,
     up,
+    verify,
     watch,
     why,
 )
@@ -100,6 +101,7 @@ COMMANDS: Mapping[str, Mapping[str, Callable[..., None]]] = {
         "terminal": terminal.terminal,
         "monitor": monitor.monitor,
         "sniff": sniff.sniff,
+        "verify": verify.verify,
         "record": record.record,
         "diff": record.diff,
     },

@@ -1,0 +1,80 @@
+"""``steptwin verify``: whether a controller behaves as the interpretations say.
+
+From Python: `steptwin.verify.run.verify`.
+"""
+
+from __future__ import annotations
+
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from steptwin.cli.device import Device, axis_of, complain, find, number_of
+from steptwin.errors import LineFailure, Misuse
+
+
+def verify(
+    device: Device = None,
+    write: Annotated[bool, typer.Option("--write", help="Permit checks that write settings and put them back.")] = False,
+    move: Annotated[
+        str | None,
+        typer.Option(
+            metavar="AXIS=DISTANCE",
+            help="Permit checks that move this axis of a MIC488, by at most this distance in its units, and return it.",
+        ),
+    ] = None,
+    json: Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Also write the report as JSON.")] = None,
+) -> None:
+    """Check whether a controller behaves as the numbered interpretations say. By default nothing moves and no setting changes.
+
+    The checks read, send requests that a controller is to refuse, and wrong frames. They take half a minute on a serial line,
+    and other masters must leave it alone meanwhile. Wrong data end a program of an M1486; a chip that runs one does not
+    respond, and is not checked.
+
+    Exit code 1 when an interpretation is refuted. The report can be sent to the project.
+    """
+    from steptwin import __version__
+    from steptwin.live.interrupts import FirstInterrupt
+    from steptwin.verify.check import Outcome
+    from steptwin.verify.run import verify as check
+
+    address = find(device)
+    with FirstInterrupt() as interrupt:
+        report = check(
+            address,
+            datetime.now(UTC).isoformat(timespec="seconds"),
+            __version__,
+            write=write,
+            move=None if move is None else _move(move),
+            progress=_progress,
+            is_cancelled=lambda: interrupt.came,
+        )
+    if json is not None:
+        _write(json, report.to_json())
+    typer.echo(report.to_text())
+    if report.of(Outcome.REFUTED) or not report.is_complete:
+        raise typer.Exit(1)
+
+
+def _move(text: str) -> tuple[int, float]:
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise Misuse(f"--move {text}: expected AXIS=DISTANCE, such as 1=0.5")
+    return axis_of(name), number_of(value, text)
+
+
+def _progress(id_: str, number: int, count: int) -> None:
+    if sys.stderr.isatty():
+        complain(f"{number + 1}/{count} {id_}")
+
+
+def _write(path: Path, text: str) -> None:
+    from steptwin.system import reason
+
+    try:
+        path.write_text(text, "utf-8")
+    except OSError as error:
+        raise LineFailure(f"cannot write {path}: {reason(error)}") from error

@@ -1,0 +1,80 @@
+"""All checks of one controller, one after the other, without I/O; and the report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Protocol, TypeVar
+
+from steptwin.verify.check import Check, Need, NotRestored, Outcome, Probes, Result, Steps, Undecided
+from steptwin.verify.m1486 import CHECKS as OF_M1486
+from steptwin.verify.mic488 import CHECKS as OF_MIC488
+from steptwin.verify.unchecked import UNCHECKED
+
+FAMILIES: Mapping[str, tuple[str, ...]] = {"mic488": ("MIC-", "WBC-"), "m1486": ("M-",)}
+"""Ids of the interpretations of each kind of controller, by how they begin."""
+TABLES: Mapping[str, Sequence[Check]] = {"mic488": OF_MIC488, "m1486": OF_M1486}
+_NEEDED = {
+    Need.WRITE: "writes settings and puts them back: permit it with --write",
+    Need.MOVE: "moves an axis: permit it with --move",
+}
+
+
+class Talk(Protocol):
+    """With a controller: the comparisons of the present check."""
+
+    probes: Probes
+
+    def hello(self) -> Steps[None]: ...
+
+
+T = TypeVar("T", bound=Talk)
+Progress = Callable[[str, int, int], object]
+"""Called before each check with its id, its number from 0 and the number of checks."""
+
+
+def check_all(
+    talk: T,
+    checks: Sequence[Check[T]],
+    permitted: frozenset[Need],
+    *,
+    progress: Progress = lambda id_, number, count: None,
+    is_cancelled: Callable[[], bool] = lambda: False,
+) -> Steps[list[Result]]:
+    """The results of the checks that are permitted. Cancelled, it ends between two checks.
+
+    Raises `LineFailure`; a message names what could not be put back.
+    """
+    yield from talk.hello()
+    results = []
+    for number, check in enumerate(checks):
+        if is_cancelled():
+            break
+        progress(check.id, number, len(checks))
+        results.append((yield from _checked(talk, check, permitted)))
+    return results
+
+
+def _checked(talk: T, check: Check[T], permitted: frozenset[Need]) -> Steps[Result]:
+    why = _NEEDED[check.need] if check.need not in permitted else check.unless(talk)
+    if why is not None:
+        return Result(check.id, Outcome.NOT_CHECKED, check.what, why=why)
+    probes = talk.probes = Probes()
+    try:
+        yield from check.steps(talk)
+    except Undecided as reason:
+        if probes.unrestored:
+            raise NotRestored(f"{check.id}: not put back: {'; '.join(probes.unrestored.values())} ({reason})") from None
+        return Result(check.id, Outcome.NOT_CHECKED, check.what, tuple(probes.found), str(reason))
+    outcome = Outcome.CONFIRMED if all(probe.holds for probe in probes.found) else Outcome.REFUTED
+    return Result(check.id, outcome, check.what, tuple(probes.found))
+
+
+def complete(kind: str, results: Sequence[Result]) -> list[Result]:
+    """The results with those that no check decides, in the order of the ids."""
+    of_kind = [Result(id_, Outcome.NOT_CHECKED, "", why=why) for id_, why in UNCHECKED.items() if id_.startswith(FAMILIES[kind])]
+    return sorted([*results, *of_kind], key=lambda result: _order(result.id))
+
+
+def _order(id_: str) -> tuple[str, int]:
+    family, _, number = id_.partition("-")
+    return family, int(number)
