@@ -30,6 +30,7 @@ NOT_RUN = {
         "needs a running studio; tests/studio/test_examples.py does it",
     ],
     "docs/testing.md": ["needs devices"],
+    "docs/why.md": ["it goes on until Ctrl-C"],
 }
 """Blocks that are not run here, with the reason that stands before them in the source."""
 

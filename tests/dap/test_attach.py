@@ -72,6 +72,8 @@ def test_breakpoints_steps_and_the_past_of_a_running_twin(twin: Path, client: Da
     assert ask("two", ReadPoints(("time",)))[0]["quality"] == "good"
     go(client, "continue")
     assert client.ask("evaluate", expression="n", frameId=1000)["result"] == "1001"
+    why = client.ask("evaluate", expression="why m.program", context="repl")["result"]
+    assert why.startswith("m.program is 1, ")
 
 
 def test_who_detaches_leaves_the_twin_as_it_was_found(twin: Path, client: DapClient) -> None:

@@ -60,6 +60,8 @@ def test_a_session_forwards_and_backwards(client: DapClient, program: str) -> No
     stack = client.ask("stackTrace", threadId=1)["stackFrames"]
     assert [(frame["name"], frame["line"]) for frame in stack][:2] == [("COUNT", 8), ("MAIN", 5)]
     assert stack[0]["source"]["path"] == program
+    why = client.ask("evaluate", expression="why", frameId=1000, context="repl")["result"]
+    assert why.startswith("mic488 does not wait: line ")
     go(client, "stepOut")
     assert where(client)[1] == 5
 

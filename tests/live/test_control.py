@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 
 from steptwin.errors import LineFailure, Misuse, Refusal
+from steptwin.later import Later
 from steptwin.live import control, remote
 from steptwin.live.control import ControlEndpoint
 from steptwin.live.remote import START, ask, running
@@ -39,9 +40,10 @@ def own_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 class Desk:
-    """A subject that is only asked: notes come back, some are refused, one breaks it."""
+    """A subject that is only asked: notes come back, one of them later, some are refused, one breaks it."""
 
     def __init__(self) -> None:
+        self.later = Later[None]()
         self.followers = Followers()
         self.done = 0
 
@@ -59,6 +61,12 @@ class Desk:
             case command.Pause():
                 return Result("x" * 1_000_000, 5, self.done)
         return Result(None, 5, self.done)
+
+    async def answer(self, wanted: command.Command) -> Result:
+        if wanted == do.Note("later"):
+            self.later = Later[None]()
+            await self.later
+        return self.do(wanted)
 
     def follow(self, what: Filter, bound: int) -> Following:
         return self.followers.follow(what, bound)
@@ -508,3 +516,30 @@ def test_a_twin_that_hangs(own_directory: Path, monkeypatch: pytest.MonkeyPatch)
         hanging.listen()
         with pytest.raises(LineFailure, match="the twin 'twin' does not answer: timed out"):
             ask(None, do.Note("a"), timeout_s=0.02)
+
+
+def test_an_answer_that_comes_later_keeps_its_place() -> None:
+    async def play(endpoint: ControlEndpoint, desk: Desk) -> None:
+        reader, writer = await asyncio.open_unix_connection(str(endpoint.path))
+        writer.write(b'{"do": "note", "text": "later"}\n{"do": "note", "text": "next"}\n')
+        writer.write_eof()
+        other = await answer_to(endpoint, b'{"do": "note", "text": "other"}\n')
+        assert other == ok("other")
+        desk.later.put(None)
+        assert [json.loads(line) for line in (await reader.read()).splitlines()] == [ok("later", 2), ok("next", 3)]
+        writer.close()
+
+    served(play)
+
+
+def test_a_client_that_leaves_before_its_answer_gets_none() -> None:
+    async def play(endpoint: ControlEndpoint, desk: Desk) -> None:
+        _, writer = await asyncio.open_unix_connection(str(endpoint.path))
+        writer.write(b'{"do": "note", "text": "later"}\n')
+        await turns()
+        writer.transport.abort()
+        await turns()
+        desk.later.put(None)
+        assert await answer_to(endpoint, b'{"do": "note", "text": "a"}\n') == ok("a", 2)
+
+    served(play)

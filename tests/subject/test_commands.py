@@ -99,6 +99,8 @@ EXAMPLES: list[tuple[dict[str, Any], command.Command]] = [
     ({"do": "evaluate", "machine": "a", "expression": "n + 1"}, debug.Evaluate("a", "n + 1")),
     ({"do": "set_value", "machine": "a", "name": "n", "expression": "7"}, debug.SetValue("a", "n", "7")),
     ({"do": "program_source", "machine": "a", "program": "program"}, debug.ProgramSource("a", "program")),
+    ({"do": "why"}, debug.Why()),
+    ({"do": "why", "question": "OUT3 == 0", "at_ns": "5"}, debug.Why("OUT3 == 0", 5)),
 ]
 
 

@@ -15,6 +15,7 @@ from steptwin.datasheet import Limits
 from steptwin.errors import Misuse, Refusal
 from steptwin.files.session import session_of
 from steptwin.files.world import World
+from steptwin.later import start
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.motion.divisions import profile_of
 from steptwin.motion.plain import read_plan
@@ -51,7 +52,9 @@ def said(subject: WorldSubject, **message: object) -> dict[str, Any]:
     def fail(error: Exception) -> None:
         raise error
 
-    return json.loads(json.dumps(respond(lambda wanted, _: subject.do(wanted), json.dumps(message).encode(), fail)))
+    return json.loads(
+        json.dumps(start(respond(lambda wanted, _: subject.answer(wanted), json.dumps(message).encode(), fail)).result())
+    )
 
 
 def test_a_command_moves_an_axis_and_its_answer_says_when() -> None:
@@ -338,7 +341,7 @@ def test_every_line_has_an_answer(line: bytes) -> None:
     def fail(error: Exception) -> None:
         raise error
 
-    assert respond(lambda wanted, _: subject.do(wanted), line, fail)["error"]
+    assert start(respond(lambda wanted, _: subject.answer(wanted), line, fail)).result()["error"]
 
 
 TEXTS = ("$R0 = 5\nDELAY 100\n", "A;1;2;3;4\n", "f640\nr\n", "[\nw100\n]\n", "x1\n")

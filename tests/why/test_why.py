@@ -255,9 +255,9 @@ def test_levels_in_volts() -> None:
 
 def test_plain_answers() -> None:
     answer = waits().why("guard.no").plain()
-    assert answer["since_ns"] == 1_021_000_000
+    assert answer["since_ns"] == "1021000000"
     assert answer["complete"] is True
-    assert answer["links"][0] == {"time_ns": 1_021_000_000, "subject": "guard", "text": "guard.no became 1"}
+    assert answer["links"][0] == {"time_ns": "1021000000", "subject": "guard", "text": "guard.no became 1"}
 
 
 def test_a_question_changes_nothing() -> None:
@@ -271,7 +271,6 @@ def test_a_question_changes_nothing() -> None:
 @pytest.mark.parametrize(
     ("question", "at", "message"),
     [
-        ("", None, "a question is a signal"),
         ("cell.OUT99", None, "no signal"),
         ("nothing.x == 1", None, "nothing is called 'nothing'"),
         ("cell", 6.0, "the past is known from 0 to 5 s"),

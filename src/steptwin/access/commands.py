@@ -59,6 +59,7 @@ PERMITS: Mapping[str, Permit] = complete(
         "values": LOOK,
         "evaluate": LOOK,
         "program_source": LOOK,
+        "why": LOOK,
         "breakpoint": ACT,
         "clear_breakpoint": ACT,
         "stop_on": ACT,

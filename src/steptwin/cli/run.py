@@ -37,6 +37,10 @@ Inputs = Annotated[
     list[str] | None,
     typer.Option("--input", metavar="PIN=VALUE@TIME,...", help="Changes of inputs: B3=0@1.5s,B3=1@2s. 7.B3 selects the chip."),
 ]
+Questions = Annotated[
+    list[str] | None,
+    typer.Option(metavar="QUESTION", help="Ask why something is as it is at the end, as 'steptwin why' does; repeatable."),
+]
 Trace = Annotated[Path | None, typer.Option(help="Write a trace to a file (.jsonl, .html, .vcd, .csv, ...) or into a directory.")]
 
 
@@ -93,6 +97,7 @@ class _Run:
     inputs: tuple[TimedInput, ...]
     trace: Path | None
     coverage: tuple[str, ...]
+    questions: tuple[str, ...]
     as_json: bool
     program: ProgramOptions
     wbc: WbcOptions
@@ -114,6 +119,7 @@ def run(
     inputs: Inputs = None,
     trace: Trace = None,
     coverage: Coverage = None,
+    why: Questions = None,
     json: Json = False,
     *,
     program: ProgramOptions,
@@ -133,6 +139,8 @@ def run(
     _check_targets(trace, world.session)
     if json and "-" in (coverage or ()):
         raise Misuse("--coverage - and --json both print on standard output: give a file, such as --coverage coverage.json")
+    if json and why:
+        raise Misuse("--why and --json both print on standard output: ask 'steptwin why' about a --session instead")
     changes = parse_inputs(",".join(inputs or []))
     wanted = _Run(
         limit=limit,
@@ -140,6 +148,7 @@ def run(
         inputs=tuple(changes),
         trace=trace,
         coverage=tuple(coverage or ()),
+        questions=tuple(why or ()),
         as_json=json,
         program=program,
         wbc=wbc,
@@ -179,6 +188,7 @@ def _run_m1486(file: Path, given: _Run) -> bool:
         inputs=given.inputs,
         trace=given.trace,
         coverage=given.coverage,
+        questions=given.questions,
         as_json=given.as_json,
         print_world=given.program.print_world,
     )
@@ -206,6 +216,7 @@ def _run_wbc(file: Path, given: _Run) -> bool:
         inputs=given.inputs,
         trace=given.trace,
         coverage=given.coverage,
+        questions=given.questions,
         as_json=given.as_json,
         print_world=given.program.print_world,
     )
@@ -229,6 +240,7 @@ def _run_world(file: Path, given: _Run) -> bool:
         faults=tuple(given.world.fault or ()),
         trace=given.trace,
         coverage=given.coverage,
+        questions=given.questions,
         session=given.world.session,
         allow_outside=given.world.allow_outside,
         strict=given.world.strict,

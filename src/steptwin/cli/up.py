@@ -28,6 +28,7 @@ def up(
         typer.Argument(metavar="MACHINE.toml", help="The description of the world, or a session (.json) to continue."),
     ] = None,
     *,
+    past: Annotated[bool, typer.Option("--past", help="Keep the past, as far as memory permits, for 'steptwin why'.")] = False,
     coverage: Coverage = None,
     ready_file: ReadyFile = None,
     keys: Annotated[bool, typer.Option("--keys", help="Show all keys of a description.")] = False,
@@ -46,7 +47,7 @@ def up(
         raise Misuse("a world is missing: give its description (.toml) or a session (.json)")
     from steptwin.commands.up_world import up as run_up
 
-    wanted = replace(up_options(world, ready_file, live, options), coverage=tuple(coverage or ()))
+    wanted = replace(up_options(world, ready_file, live, options), past=past, coverage=tuple(coverage or ()))
     if not run_up(wanted):
         raise typer.Exit(1)
 

@@ -40,6 +40,8 @@ class ProgramRun:
     trace: Path | None = None
     coverage: Sequence[str] = ()
     """Files for coverage of the program; ``-`` for a table."""
+    questions: Sequence[str] = ()
+    """What is asked at the end (`steptwin.why`)."""
     as_json: bool = False
     print_world: bool = False
 
@@ -84,10 +86,10 @@ def changes_of(inputs: Sequence[TimedInput], controller: str) -> Iterator[InputC
 
 @contextmanager
 def world_of(
-    text: str, files: Mapping[str, bytes], program: Path, *, keep_trace: bool, overrides: Overrides = NO_OVERRIDES
+    text: str, files: Mapping[str, bytes], options: ProgramRun, *, keep_trace: bool, overrides: Overrides = NO_OVERRIDES
 ) -> Generator[World]:
-    name = f"run {program.name}"
-    with World.from_toml(text, files, name=name, overrides=overrides, keep_trace=keep_trace, keep_inputs=False) as world:
+    name, asks = f"run {options.program.name}", bool(options.questions)
+    with World.from_toml(text, files, name=name, overrides=overrides, keep_trace=keep_trace, keep_inputs=asks) as world:
         yield world
 
 
@@ -110,6 +112,14 @@ def run_on(
 def write(world: World, where: Path | None, title: str, ended: Nanos) -> None:
     if where is not None:
         write_trace(world.trace, where, views=axis_views(world), title=title, ended=ended, watch=bar)
+
+
+def report_causes(world: World, questions: Sequence[str], out: Print) -> None:
+    """Print the answers to questions about the end of a run. Raises `Misuse` for what is no question there."""
+    if questions:
+        past = world.past
+        for question in questions:
+            out(f"\n{past.ask(question).text()}")
 
 
 def report_coverage(reports: CoverageReports, out: Print) -> None:

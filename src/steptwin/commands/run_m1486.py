@@ -17,7 +17,18 @@ from typing import NamedTuple
 
 from steptwin.commands.chips import Chain, check_chain, parse_wire, placed_wires
 from steptwin.commands.descriptions import print_world
-from steptwin.commands.program_run import NOTE, Ending, Outcome, Print, ProgramRun, report_coverage, run_on, world_of, write
+from steptwin.commands.program_run import (
+    NOTE,
+    Ending,
+    Outcome,
+    Print,
+    ProgramRun,
+    report_causes,
+    report_coverage,
+    run_on,
+    world_of,
+    write,
+)
 from steptwin.diagnostics import Severity, SourceText, render
 from steptwin.errors import Misuse
 from steptwin.files.coverage import CoverageReports
@@ -94,7 +105,7 @@ def run(options: M1486Run, out: Print, warn: Print) -> bool:
     _warn_of_errors(checked, source, kind, warn)
 
     files = {str(options.program): read_bytes(options.program)} if is_stored else {}
-    with world_of(text, files, options.program, keep_trace=options.trace is not None) as world:
+    with world_of(text, files, options, keep_trace=options.trace is not None) as world:
         if not is_stored:
             for name in world.m1486:
                 world.downloaded[name, PLACE] = source  # what the host is about to type
@@ -112,6 +123,7 @@ def run(options: M1486Run, out: Print, warn: Print) -> bool:
             _print_lines(chips, outcome, out)
         write(world, options.trace, options.program.name, outcome.ending.at)
         report_coverage(reports, out)
+        report_causes(world, options.questions, out)
     return not chips.went_wrong
 
 

@@ -19,6 +19,7 @@ from steptwin.commands.program_run import (
     Print,
     ProgramRun,
     changes_of,
+    report_causes,
     report_coverage,
     run_on,
     world_of,
@@ -91,7 +92,7 @@ def run(options: WbcRun, out: Print, warn: Print) -> bool:
     """Whether the program is started by this command after power-on, so that its first statements are observed, too."""
     late = {f"mic488.{NAME}.start": False} if is_late else NO_OVERRIDES
     keep_trace = options.trace is not None
-    with world_of(given.describe(str), files, options.program, keep_trace=keep_trace, overrides=late) as world:
+    with world_of(given.describe(str), files, options, keep_trace=keep_trace, overrides=late) as world:
         watch = RunWatch(world)
         reports.observe(world, Path())
         if keep_trace:
@@ -114,6 +115,7 @@ def run(options: WbcRun, out: Print, warn: Print) -> bool:
             _print_lines(ran, out)
         write(world, options.trace, options.program.name, outcome.ending.at)
         report_coverage(reports, out)
+        report_causes(world, options.questions, out)
     return not wrong
 
 

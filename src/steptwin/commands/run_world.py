@@ -11,6 +11,7 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from steptwin.commands.program_run import report_causes
 from steptwin.controllerstate import ControllerState
 from steptwin.datasheet import plain
 from steptwin.errors import Misuse
@@ -57,6 +58,8 @@ class WorldRun:
     trace: Path | None = None
     coverage: Sequence[str] = ()
     """Files for coverage of programs; ``-`` for a table."""
+    questions: Sequence[str] = ()
+    """What is asked at the end (`steptwin.why`)."""
     session: Path | None = None
     allow_outside: bool = False
     """Files of the description may lie anywhere."""
@@ -114,6 +117,7 @@ def _run_and_report(world: World, options: WorldRun, reports: CoverageReports, o
         _print_end(world, outcome, out)
     for text in tables:
         out(f"\n{text}")
+    report_causes(world, options.questions, out)
     if reason is INTERRUPTED:
         raise KeyboardInterrupt
     in_time = not world.overdue and in_vain is None

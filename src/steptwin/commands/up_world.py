@@ -23,6 +23,7 @@ from steptwin.files.world import World
 from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
 from steptwin.live.faces import Face, Lines, Notices, banner, remarks_on
+from steptwin.live.lookback import Lookback
 from steptwin.live.output import Output
 from steptwin.live.pace import Pace, read_speed
 from steptwin.live.rfc2217 import TwinLine
@@ -58,6 +59,8 @@ class UpOptions:
     session: Path | None = None
     trace: str | None = None
     """A file or directory, ``ring N`` or ``off``; None: the setting of the description."""
+    past: bool = False
+    """Whether the past is kept, for questions about it."""
     coverage: Sequence[str] = ()
     """Files for coverage of programs; ``-`` for a table."""
     faults: Sequence[str] = ()
@@ -257,6 +260,8 @@ async def _open(server: Server, live: LiveWorld, pace: Pace, options: UpOptions,
     server.introduce(name, partial(announced, live.world), options.world)
     if not options.is_closed:
         await _open_for_others(server, live, control, options)
+    if options.past:
+        server.join(Lookback(live, server.cell, pace))
     if addition is not None:
         await addition(Running(server, live, pace, control))
     if options.ready_file is not None:

@@ -65,7 +65,8 @@ _REASONS: Mapping[StopReason, str] = {
 """The others are pauses, for editors."""
 _HELP = (
     "an expression such as n + 1 or IN3 = ON shows a value; 'go 1.5 s' goes to a moment of the past; 'branch' has the world go on"
-    " from there, so that values can be changed"
+    " from there, so that values can be changed; 'why OUT3 == 0' shows the chain of causes of a condition or a signal, 'why'"
+    " alone what the program waits for"
 )
 
 
@@ -410,6 +411,9 @@ class Adapter:
         debugger, text = self._stopped(), arguments["expression"].strip()
         if arguments.get("context") == "repl":
             word, _, rest = text.partition(" ")
+            if word == "why":
+                machine = self._machine_of_frame(arguments.get("frameId"))
+                return {"result": debugger.why(rest or machine).text(), "variablesReference": 0}
             if word == "help":
                 return {"result": _HELP, "variablesReference": 0}
             if word == "branch" and not rest:

@@ -31,6 +31,7 @@ from steptwin.subject.commands import Command, EndPoints, Pause, Resume, Time
 from steptwin.subject.events import Event
 from steptwin.subject.following import filter_of
 from steptwin.subject.payloads import LogPayload, PacePayload, StoppedPayload
+from steptwin.why.answer import Answer, read_answer
 
 PART_S = 0.05
 """So long is waited for the twin before the editor is served again."""
@@ -147,6 +148,9 @@ class AttachedTwin:
 
     def set_value(self, machine: str, name: str, text: str) -> Value:
         return _value(self._ask(command.SetValue(machine, name, text)))
+
+    def why(self, question: str) -> Answer:
+        return read_answer(self._ask(command.Why(question, self.now)))
 
     # ------------------------------------------------------------------ breakpoints
 

@@ -21,6 +21,8 @@ from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.subject.time import next_due
+from steptwin.why.answer import Answer
+from steptwin.why.kept import KeptPast
 from steptwin.world.actions import ExternalInput
 from steptwin.world.history import History
 from steptwin.world.plant import Plant, PlantSnapshot
@@ -74,6 +76,7 @@ class Debugger:
         self._is_own_history = history is None
         self._history = History(world) if history is None else history
         self._history.take()
+        self._why = KeptPast(self._history)
         self._scout = Scout(self._history, self._points)
         self._is_past = False
 
@@ -153,6 +156,10 @@ class Debugger:
         return Location(machine, place.text, source.name, line, column, end_line, end_column)
 
     # ------------------------------------------------------------------ values
+
+    def why(self, question: str) -> Answer:
+        """Why something is as it is where the debugger stands (`steptwin.why`). Raises `Misuse`."""
+        return _finished(self._why.asking(question, self.now))
 
     def scope(self, machine: str, name: str) -> Scope:
         """A group of values, one of `steptwin.debug.scopes.SCOPES`. Raises `Misuse`."""

@@ -18,6 +18,7 @@ from typing import Protocol, cast
 
 from steptwin.errors import LineFailure, Misuse
 from steptwin.files.ownership import InUse, Ownership
+from steptwin.later import start
 from steptwin.live.directory import private_directory, runtime_directory
 from steptwin.subject.commands import Command, Follow, Time, Unfollow
 from steptwin.subject.contract import Result
@@ -46,6 +47,7 @@ class Controlled(Protocol):
     """The subject behind an endpoint."""
 
     def do(self, wanted: Command) -> Result: ...
+    async def answer(self, wanted: Command) -> Result: ...
     def follow(self, what: Filter, bound: int) -> Following: ...
     def plans(self, what: Filter) -> list[Event]: ...
 
@@ -133,6 +135,8 @@ class _Conversation(asyncio.Protocol):
         """Whether the client has closed its sending side."""
         self._is_full = False
         """Whether writing waits for the client to read."""
+        self._is_asked = False
+        """Whether the answer to a request is still to come; the next one is read after it."""
         self._following: dict[object, Following] = {}
         self._timer: asyncio.TimerHandle | None = None
         self._is_due = False
@@ -184,7 +188,7 @@ class _Conversation(asyncio.Protocol):
         self._unfollow_all()
         if self._received and not self._is_full:
             self._end(failure(Misuse(f"the request has no end of line: {FORM}")))
-        return self._is_full
+        return self._is_full or self._is_asked
 
     def pause_writing(self) -> None:
         self._is_full = True
@@ -194,7 +198,7 @@ class _Conversation(asyncio.Protocol):
     def resume_writing(self) -> None:
         self._is_full = False
         self._calm()
-        if not self._has_ended:
+        if not self._has_ended and not self._is_asked:
             self._transport.resume_reading()
         self._take_lines()
         self._send_events()
@@ -208,7 +212,7 @@ class _Conversation(asyncio.Protocol):
         self._take_lines()
 
     def _take_lines(self) -> None:
-        while not self._is_full and not self._transport.is_closing():
+        while not self._is_full and not self._is_asked and not self._transport.is_closing():
             line, newline, rest = self._received.partition(b"\n")
             if not newline:
                 break
@@ -218,7 +222,7 @@ class _Conversation(asyncio.Protocol):
             self._received = rest
             self._has_asked = True
             self._take(line)
-        if self._transport.is_closing() or self._is_full:
+        if self._transport.is_closing() or self._is_full or self._is_asked:
             return
         if len(self._received) > LONGEST_REQUEST:
             self._end(_too_long())
@@ -231,7 +235,25 @@ class _Conversation(asyncio.Protocol):
         if self._token:
             self._check_token(line)
         else:
-            self._write(respond(self._do, line, _report))
+            self._is_asked = True
+            answer = start(respond(self._do, line, _report))
+            is_late = not answer.is_done
+            if is_late:
+                self._calm()
+                self._transport.pause_reading()
+            answer.then(lambda: self._answered(answer.result(), is_late=is_late))
+
+    def _answered(self, message: Message, *, is_late: bool) -> None:
+        self._is_asked = False
+        if self._transport.is_closing():
+            return
+        self._write(message)
+        if is_late:
+            if not self._has_ended and not self._is_full:
+                self._transport.resume_reading()
+            self._take_lines()
+            if self._has_ended and not self._is_full and not self._is_asked:
+                self._transport.close()
 
     def _check_token(self, line: bytes) -> None:
         try:
@@ -244,7 +266,7 @@ class _Conversation(asyncio.Protocol):
         self._token = ""
         self._write({"ok": None})
 
-    def _do(self, wanted: Command, identity: object) -> Result:
+    async def _do(self, wanted: Command, identity: object) -> Result:
         if isinstance(wanted, Follow):
             return self._subject.do(Time())._replace(value=self._follow(wanted, identity))
         if isinstance(wanted, Unfollow):
@@ -253,7 +275,7 @@ class _Conversation(asyncio.Protocol):
                 raise Misuse(f"no subscription has the id {wanted.id!r}")
             following.close()
             return self._subject.do(Time())._replace(value=None)
-        return self._subject.do(wanted)
+        return await self._subject.answer(wanted)
 
     def _follow(self, wanted: Follow, identity: object) -> object:
         if identity is None:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from steptwin.live.cell import Cell
 from steptwin.live.debugging import Debugging
 from steptwin.live.pace import Pace
+from steptwin.live.why import LiveWhy
 from steptwin.live.world import LiveWorld
 from steptwin.subject import commands as command
+from steptwin.subject import debugcommands
 from steptwin.subject.contract import Description, Reading, Result
 from steptwin.subject.events import Event
 from steptwin.subject.following import Filter, Following
@@ -29,6 +31,7 @@ class WorldControl:
             {
                 **self._of_pace,
                 **Debugging(live, cell, pace).actions(),
+                debugcommands.Why: LiveWhy(live).ask,
                 command.Time: lambda _: pace.where(),
                 command.EndPoints: lambda _: end_points(),
             }
@@ -45,6 +48,13 @@ class WorldControl:
         if type(wanted) in self._of_pace:  # they bring the world to the present themselves
             return self.subject.do(wanted)
         return self._at_present(lambda: self.subject.do(wanted))
+
+    async def answer(self, wanted: command.Command) -> Result:
+        """As `do`, also for commands that are answered later. Awaits only `steptwin.later.Later`."""
+        result: Any = self.do(wanted)
+        if type(wanted) is debugcommands.Why:
+            return result._replace(value=await result.value)
+        return result
 
     def follow(self, what: Filter, bound: int) -> Following:
         return self.subject.follow(what, bound)

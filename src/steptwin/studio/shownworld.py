@@ -19,6 +19,7 @@ class PlannedSubject(Protocol):
     def description(self) -> Description: ...
     def read(self, *points: str) -> tuple[Reading, ...]: ...
     def do(self, wanted: Command, /) -> Result: ...
+    async def answer(self, wanted: Command, /) -> Result: ...
     def plans(self, what: Filter) -> list[Event]: ...
 
 
@@ -46,7 +47,7 @@ class ShownWorld:
         return self._world.read(*points)
 
     async def do(self, wanted: Command, /) -> Result:
-        return self._world.do(wanted)
+        return await self._world.answer(wanted)
 
     def result_of(self, value: object) -> Result:
         """The result of what the world knows nothing of, at its present moment."""

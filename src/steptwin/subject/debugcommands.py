@@ -1,4 +1,5 @@
-"""Commands of the debugger of a running world (`steptwin.live.debugging`): breakpoints, steps, stack, values, the past.
+"""Commands of the debugger of a running world (`steptwin.live.debugging`): breakpoints, steps, stack, values, the past; and the
+question why something is as it is (`steptwin.live.why`).
 
 Time goes on with `Resume` and stands with `Pause`, as without a debugger; where it stops, followers receive ``stopped``.
 """
@@ -146,6 +147,14 @@ class ProgramSource:
     program: str
 
 
+@dataclass(frozen=True, slots=True)
+class Why:
+    """Why a signal has its value, a condition its truth, or a program waits."""
+
+    question: str = ""
+    at: Nanos | None = None
+
+
 DebugCommand: TypeAlias = (
     Debug
     | SetBreakpoint
@@ -161,6 +170,7 @@ DebugCommand: TypeAlias = (
     | Evaluate
     | SetValue
     | ProgramSource
+    | Why
 )
 
 _PLACE = "time_ns, present_ns, begin_ns (the oldest moment that can be gone to), past, going (whether time goes on)"
@@ -272,5 +282,17 @@ ROWS = (
         "The text of a program.",
         "program, source (the name of its file), text",
         (MACHINE, Field("program", TEXT, "Which, such as program 0.")),
+    ),
+    CommandRow(
+        "why",
+        Why,
+        "The chain of causes of a value, of a condition or of a wait, from the past that is kept.",
+        "question, at_ns, state (what is true), since_ns (null: it has not changed), links: a list of time_ns, subject and text,"
+        " from the effect to its causes; complete, known_from_ns, cut (whether the"
+        " chain ends there), text (all of it in lines)",
+        (
+            Field("question", TEXT, "A signal, a condition, or the name of a controller: what its program waits for.", ""),
+            Field("at_ns", TIME, "At which moment; now without.", None, "ns", "at"),
+        ),
     ),
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from typing import Any, TypeAlias
 
 from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
@@ -107,14 +107,16 @@ def raised(error: Mapping[str, Any]) -> SteptwinError:
     return kinds.get(error["code"], SteptwinError)(error["message"])
 
 
-def respond(do: Callable[[Command, object], Result], line: bytes, on_internal: Callable[[Exception], object]) -> Message:
+async def respond(
+    do: Callable[[Command, object], Awaitable[Result]], line: bytes, on_internal: Callable[[Exception], object]
+) -> Message:
     """The answer to any message. ``do`` takes its command and its id; ``on_internal`` is called with unexpected exceptions."""
     found: dict[str, object] = {}
     try:
         message = read_message(line)
         identity = id_of(message)
         found = {} if identity is None else {"id": identity}
-        return {**found, **answer(do(command_of(message), identity))}
+        return {**found, **answer(await do(command_of(message), identity))}
     except Exception as error:  # noqa: BLE001  every request must be answered
         if not isinstance(error, SteptwinError):
             on_internal(error)

@@ -96,6 +96,9 @@ class WorldSubject:
     def do(self, wanted: command.Command) -> Result:
         return self.dispatcher.do(wanted)
 
+    async def answer(self, wanted: command.Command) -> Result:
+        return self.do(wanted)
+
     def follow(self, what: Filter, bound: int) -> Following:
         return self.followers.follow(what, bound)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from steptwin.machine import SECOND, Nanos
@@ -27,23 +28,47 @@ class Answer(NamedTuple):
     links: tuple[Link, ...]
     is_complete: bool
     """Whether the chain has been followed to its end."""
+    known_from: Nanos = 0
+    """The moment from which on the past was looked at."""
+    is_cut: bool = False
+    """Whether the chain ends there, because of something before that moment."""
 
     def text(self) -> str:
         """The answer in lines."""
-        begin = "from the beginning" if self.since is None else f"since {self.since / SECOND:.6f} s"
+        begin = since_before(self.known_from) if self.since is None else f"since {self.since / SECOND:.6f} s"
         lines = [f"{self.state}, {begin} (at {self.at / SECOND:g} s)"]
         lines += [f"{link.time / SECOND:12.6f} s  {link.subject:<10} {link.text}" for link in self.links]
-        if not self.is_complete:
+        if self.is_cut:
+            lines.append(f"{'':12}    (what was before {self.known_from / SECOND:.6f} s is not known)")
+        elif not self.is_complete:
             lines.append(f"{'':12}    (earlier causes are not shown)")
         return "\n".join(lines)
 
     def plain(self) -> dict[str, Any]:
-        """The answer as plain data, for JSON; moments in ns."""
+        """The answer as plain data, for JSON; moments in ns, as text."""
         return {
             "question": self.question,
-            "at_ns": self.at,
+            "at_ns": str(self.at),
             "state": self.state,
-            "since_ns": self.since,
-            "links": [{"time_ns": link.time, "subject": link.subject, "text": link.text} for link in self.links],
+            "since_ns": None if self.since is None else str(self.since),
+            "links": [{"time_ns": str(link.time), "subject": link.subject, "text": link.text} for link in self.links],
             "complete": self.is_complete,
+            "known_from_ns": str(self.known_from),
+            "cut": self.is_cut,
+            "text": self.text(),
         }
+
+
+def read_answer(plain: Mapping[str, Any]) -> Answer:
+    """An answer from its plain data."""
+    links = tuple(Link(int(link["time_ns"]), link["subject"], link["text"]) for link in plain["links"])
+    since = None if plain["since_ns"] is None else int(plain["since_ns"])
+    known_from = int(plain["known_from_ns"])
+    return Answer(
+        plain["question"], int(plain["at_ns"]), plain["state"], since, links, plain["complete"], known_from, plain["cut"]
+    )
+
+
+def since_before(begin: Nanos) -> str:
+    """Of what has not changed in a past that is known from a moment on."""
+    return f"since before {begin / SECOND:.6f} s" if begin else "from the beginning"

@@ -8,7 +8,7 @@ from typing import NamedTuple, TypeAlias
 
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion.divisions import profile_of
-from steptwin.why.answer import Link
+from steptwin.why.answer import Link, since_before
 from steptwin.why.log import Act, CauseLog, Change
 from steptwin.why.sentences import Frames, statement, words_of
 from steptwin.world import script as do
@@ -39,6 +39,11 @@ def nothing() -> Found:
     return None
 
 
+def unknown() -> Found:
+    """The end of a chain whose cause was before the log."""
+    return None
+
+
 class Causes:
     """Finds the causes of changes in what was noted."""
 
@@ -48,6 +53,7 @@ class Causes:
         self._frames = Frames(log.world)
         self._uses: dict[tuple[str, Place], StatementUse] = {}
         built = log.world.parts.elements
+        self._at_begin = nothing if log.is_whole else unknown
         self._parts: dict[str, BoardPart] = {
             name: part for kind, parts in built.items() if ELEMENTS[kind].terminals is not None for name, part in parts.items()
         }
@@ -58,7 +64,8 @@ class Causes:
         """A signal took its value."""
         owner = signal.partition(".")[0]
         if self._log.is_first(signal, change):
-            return Cause(Link(change.time, owner, f"{signal} is {change.value:g} from the beginning{how}"), nothing)
+            text = f"{signal} is {change.value:g} {since_before(self._log.begin)}{how}"
+            return Cause(Link(change.time, owner, text), self._at_begin)
         text = f"{signal} became {change.value:g}{how}"
         return Cause(Link(change.time, owner, text), partial(self._of_change, signal, change))
 
@@ -302,6 +309,11 @@ class Causes:
         profile = profile_of(record.value)  # type: ignore[arg-type]
         name = f"{machine}.M{record.subject}"
         shown = f"{mechanics} ({name})" if mechanics else name
+        is_before = not self._log.is_whole and plan.time == self._log.begin
+        if is_before and profile.start < plan.time and profile.segments:
+            return Cause(Link(profile.start, machine, f"{shown} began to move"), unknown)
+        if is_before and not profile.segments:
+            return None
         if not profile.segments:
             link = Link(plan.time, machine, f"{shown} stopped")
         elif profile.end is not None and profile.end <= until:
@@ -326,8 +338,10 @@ class Causes:
     def statement(self, machine: str, index: int) -> Cause:
         """A statement was executed."""
         executed = self._log.executed[machine][index]
-        link = Link(executed.time, machine, f"{statement(self._log, executed)} was executed")
-        return Cause(link, partial(self._of_statement, machine, index))
+        text = statement(self._log, executed)
+        if self._log.is_in_progress(executed):
+            return Cause(Link(executed.time, machine, f"{text} was in execution before"), unknown)
+        return Cause(Link(executed.time, machine, f"{text} was executed"), partial(self._of_statement, machine, index))
 
     def _of_statement(self, machine: str, index: int) -> Found:
         """The wait or condition that let a statement be executed."""
@@ -345,7 +359,9 @@ class Causes:
         return self._started(machine)
 
     def _decided(self, machine: str, index: int, time: Nanos, how: str) -> Cause:
-        executed = self._log.executed[machine][index]
+        executed, use = self._log.executed[machine][index], self.use(machine, index)
+        if use.is_loop:  # its condition is written where it begins
+            executed = executed._replace(place=executed.place._replace(number=use.governs.start - 1))
         link = Link(time, machine, f"{statement(self._log, executed)} {how}")
         return Cause(link, partial(self._of_decision, machine, index, time))
 
@@ -369,6 +385,8 @@ class Causes:
 
     def _started(self, machine: str) -> Found:
         """The statement that was executed first."""
+        if not self._log.is_whole:
+            return None
         executed = self._log.executed[machine]
         return Cause(Link(executed[0].time, machine, "the program started"), nothing)
 

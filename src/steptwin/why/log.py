@@ -1,27 +1,30 @@
 """What happened in a world, with all that can be a cause: its trace, the statements of its programs, the steps of its scripts.
 
-A running world does not note this. Its past is run again, from its beginning, with the inputs that it kept.
+A running world does not note this. Its past is run again with the inputs that it kept: from its beginning, or from a state of it.
 """
 
 from __future__ import annotations
 
 from bisect import bisect_right
 from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from itertools import takewhile
 from typing import NamedTuple
 
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
+from steptwin.machine import SECOND, Nanos
 from steptwin.statements import StatementHook
 from steptwin.world.actions import Download, ExternalInput
-from steptwin.world.history import replay
+from steptwin.world.elements import ELEMENTS
+from steptwin.world.history import SLICE_NS, replay
 from steptwin.world.plant import Plant, RecordedInput
 from steptwin.world.programs import Place, Programs
 from steptwin.world.trace import TraceRecord
 
 MOST_NOTED = 20_000_000
 """Limit of what is noted, because it is kept in memory."""
+STATEMENTS_AT_ONCE = 2000
+"""Most statements of one program between two parts of a run."""
 
 
 class Executed(NamedTuple):
@@ -51,21 +54,21 @@ class Change(NamedTuple):
 
 
 class CauseLog:
-    """Notes what happens in ``world``, which is at its beginning, while that runs.
+    """Notes what happens in ``world`` from now on while that runs.
 
-    Records are in groups: what is joined is in one group, whose records come in the order of their causes.
+    Records are in groups: what is joined is in one group, whose records come in the order of their causes. Of a world that is not
+    at its beginning, the statements in execution and the plans in force are noted first, as if they had begun now.
     """
 
-    def __init__(self, world: Plant) -> None:
+    def __init__(self, world: Plant, most: int = MOST_NOTED) -> None:
         self.world = world
+        self.begin = world.now
+        self._most = most
         parts = world.parts
         numbers = {id(kernel): number for number, kernel in enumerate(world.kernels)}
         self._group_of = {name: numbers[id(kernel)] for name, kernel in parts.kernel_of.items()}
         self._pins = {name: frozenset(machine.pins()) for name, machine in world.machines.items()}
-        self.begin = world.now
-        self.first_levels = {
-            f"{name}.{pin}": level for name, machine in world.machines.items() for pin, level in machine.pins().items()
-        }
+        self.first_levels = _levels(world)
         self.records: dict[int, list[TraceRecord]] = defaultdict(list)
         self.changes: dict[str, list[Change]] = defaultdict(list)
         self.executed: dict[str, list[Executed]] = defaultdict(list)
@@ -74,24 +77,35 @@ class CauseLog:
         self.acts: list[Act] = []
         self._replaced: dict[str, Nanos] = {}
         """When the program of a controller was last replaced by a download."""
-        self._noted = 0
-        for record in world.trace:
+        self.noted = 0
+        self._inputs = 0
+        """Number of inputs that were applied."""
+        for record in world.trace if self.is_whole else _plans(world):
             self._take(record)
         self._built = {group: len(records) for group, records in self.records.items()}
         world.trace.watchers.append(self._take)
         world.act_watchers.append(self._act)
         for name, programs in world.programs.items():
+            if not self.is_whole:
+                self.executed[name] += [Executed(self.begin, name, frame.place, 0) for frame in programs.stack(self.begin)[:1]]
             programs.hook(self._hook(name, programs))
 
-    def run(self, inputs: Iterable[RecordedInput], end: Nanos) -> None:
-        """Run to the moment ``end`` with these inputs. Raises `Misuse` for inputs that do not fit."""
-        for _ in replay(self.world, inputs, end):
-            pass
+    @property
+    def is_whole(self) -> bool:
+        """Whether it has everything since the beginning of the world."""
+        return self.begin == 0
+
+    def run(self, inputs: Sequence[RecordedInput], end: Nanos) -> Iterator[None]:
+        """Go on to the moment ``end``, in parts, with all inputs since the beginning of the log. Raises `Misuse` for inputs that
+        do not fit."""
+        for is_input in in_parts(self.world, inputs[self._inputs :], end):
+            self._inputs += is_input
+            yield
 
     def _count(self) -> None:
-        self._noted += 1
-        if self._noted > MOST_NOTED:
-            raise Misuse(f"more than {MOST_NOTED} records and statements: ask about a shorter time")
+        self.noted += 1
+        if self.noted > self._most:
+            raise Misuse(f"more than {self._most} records and statements since {self.begin / SECOND:g} s: too many to look at")
 
     def _take(self, record: TraceRecord) -> None:
         self._count()
@@ -134,7 +148,11 @@ class CauseLog:
     def is_recorded(self, signal: str) -> bool:
         """Whether every change of a signal is noted."""
         owner, _, pin = signal.partition(".")
-        return pin in self._pins.get(owner, ()) or signal in self.changes
+        return pin in self._pins.get(owner, ()) or self.has(signal)
+
+    def has(self, signal: str) -> bool:
+        """Whether it is the name of something with edges."""
+        return signal in self.first_levels or signal in self.changes
 
     def level(self, signal: str, now: Nanos) -> float:
         """The level of a signal at a moment."""
@@ -153,6 +171,10 @@ class CauseLog:
         """Whether a signal has a level because the world began with it."""
         is_same = change is self.changes[signal][0] and change.value == self.first_levels.get(signal, 0.0)
         return is_same or change.position < self._built.get(change.group, 0)
+
+    def is_in_progress(self, executed: Executed) -> bool:
+        """Whether a statement was in execution when the log began, after the beginning of the world."""
+        return not self.is_whole and executed is self.executed[executed.machine][0]
 
     def since(self, signal: str, until: Nanos) -> Nanos | None:
         """Since when a signal has the level of a moment; None: from the beginning."""
@@ -201,3 +223,27 @@ class CauseLog:
     def last_executed(self, machine: str, until: Nanos) -> int:
         """The number of the last statement of a controller by a moment; -1 if there is none."""
         return bisect_right(self.executed.get(machine, []), until, key=lambda executed: executed.time) - 1
+
+
+def in_parts(world: Plant, inputs: Sequence[RecordedInput], end: Nanos) -> Iterator[bool]:
+    """`replay` in parts that are short for the programs of the world, too."""
+    times = [programs.statement_time for programs in world.programs.values() if programs.statement_time]
+    return replay(world, inputs, end, min(SLICE_NS, STATEMENTS_AT_ONCE * min(times, default=SLICE_NS)))
+
+
+def _levels(world: Plant) -> dict[str, float]:
+    """The present levels of all that has edges: pins, outputs of elements, contacts."""
+    found = {f"{name}.{pin}": level for name, machine in world.machines.items() for pin, level in machine.pins().items()}
+    for kind, parts in world.parts.elements.items():
+        if ELEMENTS[kind].terminals is not None:
+            for name, part in parts.items():
+                found |= {f"{name}.{output.lower()}": part.board.levels[output] for output in part.board.outputs}
+    contacts = [contact for circuit in world.parts.circuits.values() for contact in circuit.contacts if contact.lane]
+    return found | {contact.lane: float(contact.level) for contact in contacts}
+
+
+def _plans(world: Plant) -> Iterator[TraceRecord]:
+    """The plans in force."""
+    for name, machine in world.machines.items():
+        for number, drive in enumerate(machine.axes, start=1):
+            yield TraceRecord(world.now, name, "plan", str(number), drive.plan)

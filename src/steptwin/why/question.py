@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
+from typing import TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
-from steptwin.why.answer import MOST_LINKS, Answer, Link
-from steptwin.why.causes import Cause, Causes
-from steptwin.why.log import CauseLog
+from steptwin.why.answer import MOST_LINKS, Answer, Link, since_before
+from steptwin.why.causes import Cause, Causes, nothing
+from steptwin.why.log import MOST_NOTED, CauseLog, in_parts
 from steptwin.why.sentences import statement
 from steptwin.world import script as do
 from steptwin.world.expression import SignalCondition, names, parse
-from steptwin.world.history import replay
 from steptwin.world.plant import Plant, RecordedInput
 from steptwin.world.programs import Operand, OperandKind
 
@@ -24,6 +24,10 @@ MOST_STATES = 5
 """Limit of the signals whose present levels are shown of what a program waits for."""
 
 _AXIS = re.compile(r"M(\d+)[._]", re.IGNORECASE)
+
+Asking: TypeAlias = Generator[None, None, Answer]
+"""In parts: after each of them something else can be done, or the question be given up by `close`."""
+Found: TypeAlias = Generator[None, None, tuple[float, Nanos | None]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,54 +55,69 @@ class _Level:
 class Why:
     """Answers questions about the past of a world.
 
-    ``make`` gives the world at its beginning, ``inputs`` are what came from outside, ``end`` is the present, in ns. The past is
-    run again when the first question is asked, and once more for a question about what is in no trace, such as a register.
+    ``make`` gives the world at its beginning, or where its past is known from; ``inputs`` are what came from outside since then,
+    ``end`` is the present, in ns. The past is run again when the first question is asked, and once more for a question about what
+    is in no trace, such as a register. ``most``: limit of what is noted of it.
     """
 
-    def __init__(self, make: Callable[[], Plant], inputs: Iterable[RecordedInput], end: Nanos) -> None:
+    def __init__(self, make: Callable[[], Plant], inputs: Iterable[RecordedInput], end: Nanos, most: int = MOST_NOTED) -> None:
         self._make = make
-        self._inputs = tuple(inputs)
+        self._inputs = list(inputs)
         self.end = end
+        self.log = CauseLog(make(), most)
+        self._causes = Causes(self.log)
 
-    @cached_property
-    def log(self) -> CauseLog:
-        log = CauseLog(self._make())
-        log.run(self._inputs, self.end)
-        return log
-
-    @cached_property
-    def causes(self) -> Causes:
-        return Causes(self.log)
+    def go_on(self, inputs: Iterable[RecordedInput], end: Nanos) -> None:
+        """The present is a later one: what came from outside since."""
+        self._inputs += inputs
+        self.end = end
 
     def ask(self, question: str, at: Nanos | None = None) -> Answer:
         """The answer for a moment (ns), the end by default. Raises `Misuse` for what is no question here."""
-        moment = self.end if at is None else at
-        if not 0 <= moment <= self.end:
-            raise Misuse(f"at {moment / SECOND:g} s: the past is known from 0 to {self.end / SECOND:g} s")
+        asking = self.asking(question, at)
+        while True:
+            try:
+                next(asking)
+            except StopIteration as end:
+                return end.value
+
+    def asking(self, question: str, at: Nanos | None = None) -> Asking:
+        """As `ask`, in parts."""
+        moment, begin = self.end if at is None else at, self.log.begin
+        if not begin <= moment <= self.end:
+            raise Misuse(f"at {moment / SECOND:g} s: the past is known from {begin / SECOND:g} to {self.end / SECOND:g} s")
         text = question.strip().removeprefix("why ").strip()
-        if not text:
-            raise Misuse("a question is a signal, a condition, or a controller: table.OUT3, 'table.OUT3 == 0', table")
+        text = text or self._only_program()
+        yield from self.log.run(self._inputs, self.end)
+        self._causes = Causes(self.log)  # programs may be others by now
         if text in self.log.world.machines:
-            return self._wait(text, moment)
-        return self._condition(text, moment)
+            return (yield from self._wait(text, moment))
+        return (yield from self._condition(text, moment))
+
+    def _only_program(self) -> str:
+        """The controller that is meant without a question."""
+        machines = [name for name, programs in self.log.world.programs.items() if programs.texts]
+        if len(machines) != 1:
+            raise Misuse("a question is a signal, a condition, or a controller: table.OUT3, 'table.OUT3 == 0', table")
+        return machines[0]
 
     # ------------------------------------------------------------------ signals and conditions
 
-    def _condition(self, text: str, at: Nanos) -> Answer:
+    def _condition(self, text: str, at: Nanos) -> Asking:
         asked = self._named(_SINGLE_EQUALS.sub("==", text))
         node = parse(asked)
         found = tuple(dict.fromkeys(names(node)))
         is_bare = asked == found[0] if len(found) == 1 else False
-        if is_bare and found[0] not in self.log.changes and self.log.world.signal(found[0]).continuous:
-            return self._moving(found[0], at)
+        if is_bare and not self.log.has(found[0]) and self.log.world.signal(found[0]).continuous:
+            return (yield from self._moving(found[0], at))
         canonical = {name: self._canonical(name) for name in found}
         if all(self.log.is_recorded(name) for name in canonical.values()):
             value, since = self._from_log(asked, canonical, at, is_bare=is_bare)
         else:
-            value, since = self._from_run(asked, at, is_bare=is_bare)
+            value, since = yield from self._from_run(asked, at, is_bare=is_bare)
         state = f"{asked} is {value:g}" if is_bare else f"{asked} is {'true' if value else 'false'}"
         first = None if since is None else self._changed(tuple(canonical.values()), since)
-        return self._answer(text, at, state, since, first)
+        return (yield from self._answer(text, at, state, since, first))
 
     def _named(self, text: str) -> str:
         """The condition with names that leave out their controller in full, where there is only one that has it."""
@@ -116,7 +135,7 @@ class Why:
 
     def _has(self, name: str) -> bool:
         """Whether there is a signal with this name, or a contact."""
-        return name in self.log.changes or self._is_signal(name)
+        return self.log.has(name) or self._is_signal(name)
 
     def _is_signal(self, name: str) -> bool:
         try:
@@ -130,7 +149,7 @@ class Why:
         return self.log.world.signal(name).unit if self._is_signal(name) else ""
 
     def _canonical(self, name: str) -> str:
-        if name in self.log.changes:
+        if self.log.has(name):
             return name
         owner, _, rest = name.partition(".")
         world = self.log.world
@@ -158,13 +177,13 @@ class Why:
                 return float(value), time
         return float(value), None
 
-    def _from_run(self, text: str, at: Nanos, *, is_bare: bool) -> tuple[float, Nanos | None]:
+    def _from_run(self, text: str, at: Nanos, *, is_bare: bool) -> Found:
         """As `_from_log`, from another run in which the signals are watched."""
         world, turns = self._make(), list[tuple[Nanos, float]]()
         watch = _values if is_bare else _truths
         world.start("why", partial(watch, world, text, turns), is_external=True)
-        for _ in replay(world, self._inputs, at):
-            pass
+        for _ in in_parts(world, self._inputs, at):
+            yield
         if not turns:
             raise Misuse(f"{text}: nothing is known of it at {at / SECOND:g} s")
         time, value = turns[-1]
@@ -172,7 +191,7 @@ class Why:
 
     def _changed(self, signals: Sequence[str], time: Nanos) -> Cause | None:
         """What made one of these signals change at a moment."""
-        log, causes = self.log, self.causes
+        log, causes = self.log, self._causes
         last = causes.last([name for name in signals if (change := log.last_change(name, time)) and change.time == time], time)
         if last is not None:
             return last
@@ -181,7 +200,7 @@ class Why:
 
     def _of_unrecorded(self, signal: str, time: Nanos) -> Cause | None:
         owner, _, rest = signal.partition(".")
-        world, causes = self.log.world, self.causes
+        world, causes = self.log.world, self._causes
         if owner in world.axes:
             drive = world.axes[owner].spec.drive
             return causes.motion(drive[0], drive[1].removeprefix("M"), time, owner)
@@ -192,37 +211,38 @@ class Why:
         wanted = None if axis is None else Operand(OperandKind.AXIS, axis[1])
         return causes.at_moment(owner, time, wanted)
 
-    def _moving(self, signal: str, at: Nanos) -> Answer:
+    def _moving(self, signal: str, at: Nanos) -> Asking:
         """Of a quantity that changes all the time."""
         world = self.log.world
         other = self._make()
-        for _ in replay(other, self._inputs, at):
-            pass
+        for _ in in_parts(other, self._inputs, at):
+            yield
         state = f"{signal} is {other.read(signal):.6g} {world.signal(signal).unit}".rstrip()
         first = self._of_unrecorded(self._canonical(signal), at)
-        return self._answer(signal, at, state, None if first is None else first.link.time, first)
+        return (yield from self._answer(signal, at, state, None if first is None else first.link.time, first))
 
     # ------------------------------------------------------------------ programs
 
-    def _wait(self, machine: str, at: Nanos) -> Answer:
+    def _wait(self, machine: str, at: Nanos) -> Asking:
         """What the program of a controller waits for."""
-        log = self.log
+        log, causes = self.log, self._causes
         index = log.last_executed(machine, at)
         if index < 0:
             raise Misuse(f"{machine} has executed no statement until {at / SECOND:g} s: ask about one of its signals")
         executed = log.executed[machine]
         here = executed[index]
-        use = self.causes.use(machine, index)
-        text = statement(log, here)
+        use = causes.use(machine, index)
+        text, since = statement(log, here), None if log.is_in_progress(here) else here.time
         if not use.waits or at - here.time <= log.world.programs[machine].statement_time:
-            return self._answer(machine, at, f"{machine} does not wait: {text}", here.time, self.causes.statement(machine, index))
+            state = f"{machine} does not wait: {text}"
+            return (yield from self._answer(machine, at, state, since, causes.statement(machine, index)))
         links = [link for operand in use.reads for link in self._awaited(machine, operand, at)]
         if not use.reads:
             links.append(Link(here.time, machine, "it waits for a time only"))
-        found = [cause for operand in use.reads if (cause := self.causes.operand(machine, operand, at, index))]
+        found = [cause for operand in use.reads if (cause := causes.operand(machine, operand, at, index))]
         changed = [cause for cause in found if cause.link.time > here.time]
-        first = max(changed, key=lambda cause: cause.link.time, default=None) or self.causes.statement(machine, index)
-        answer = self._answer(machine, at, f"{machine} waits at {text}", here.time, first)
+        first = max(changed, key=lambda cause: cause.link.time, default=None) or causes.statement(machine, index)
+        answer = yield from self._answer(machine, at, f"{machine} waits at {text}", since, first)
         return answer._replace(links=(*links, *answer.links)[:MOST_LINKS])
 
     def _awaited(self, machine: str, operand: Operand, at: Nanos) -> Iterator[Link]:
@@ -230,7 +250,7 @@ class Why:
         if operand.kind is OperandKind.PIN and operand.name:
             yield from self._states(f"{machine}.{operand.name}", at)
         elif operand.kind is OperandKind.AXIS:
-            motion = self.causes.motion(machine, operand.name, at)
+            motion = self._causes.motion(machine, operand.name, at)
             yield Link(at, machine, f"no axis has moved until {at / SECOND:g} s") if motion is None else motion.link
         else:
             yield Link(at, machine, f"it depends on {operand.name or 'any pin'}")
@@ -244,25 +264,24 @@ class Why:
                 continue
             seen.add(name)
             since = self.log.since(name, at)
-            drivers = self.causes.drivers(name)
+            drivers = self._causes.drivers(name)
             waiting += drivers
-            when = "from the beginning" if since is None else f"since {since / SECOND:.6f} s"
+            when = since_before(self.log.begin) if since is None else f"since {since / SECOND:.6f} s"
             driven = f", driven by {' and '.join(drivers)}" if drivers else ""
             yield Link(at, name.partition(".")[0], f"{name} is {self.log.level(name, at):g} {when}{driven}")
 
     # ------------------------------------------------------------------ the chain
 
-    @staticmethod
-    def _answer(question: str, at: Nanos, state: str, since: Nanos | None, first: Cause | None) -> Answer:
+    def _answer(self, question: str, at: Nanos, state: str, since: Nanos | None, first: Cause | None) -> Asking:
         links: list[Link] = []
-        cause = first
-        while cause is not None and len(links) < MOST_LINKS:
-            if cause.link in links:
-                cause = None
-                break
+        cause, last = first, None
+        while cause is not None and len(links) < MOST_LINKS and cause.link not in links:
             links.append(cause.link)
-            cause = cause.before()
-        return Answer(question, at, state, since, tuple(links), cause is None)
+            cause, last = cause.before(), cause
+            yield
+        is_followed = cause is None or cause.link in links
+        is_cut = is_followed and not self.log.is_whole and (last is None or last.before is not nothing)
+        return Answer(question, at, state, since, tuple(links), is_followed and not is_cut, self.log.begin, is_cut)
 
 
 def _truths(world: Plant, text: str, turns: list[tuple[Nanos, float]]) -> do.Steps:

@@ -1,6 +1,6 @@
 // Made from docs/studio.schema.json by `npm run protocol`; not to be changed by hand.
 
-export type Request = DescribeRequest | ReadRequest | PinsRequest | StateRequest | EncodersRequest | FaultsRequest | FaultKindsRequest | TimeRequest | EndPointsRequest | FollowRequest | UnfollowRequest | SetRequest | PressRequest | ReleaseRequest | WriteRequest | SendRequest | RequestRequest | PowerCycleRequest | TurnRequest | CoupleRequest | FaultRequest | ClearFaultRequest | ExpectRequest | NoteRequest | SeeRequest | EnableRequest | MoveRequest | HomeRequest | JogRequest | StopRequest | ProgramRequest | DownloadRequest | PauseRequest | ResumeRequest | StepRequest | SnapshotRequest | SnapshotsRequest | RestoreRequest | DropSnapshotRequest | SaveRequest | DebugRequest | BreakpointRequest | ClearBreakpointRequest | BreakpointsRequest | StopOnRequest | StepProgramRequest | RunRequest | LookAtRequest | BranchRequest | StackRequest | ValuesRequest | EvaluateRequest | SetValueRequest | ProgramSourceRequest | HelloRequest | ResyncRequest | WatchRequest | UnwatchRequest | TakeControlRequest | ReleaseControlRequest | RenewRequest | LetGoRequest | StopAllRequest | LookRequest | GoBackRequest | ProgramsRequest | ProgramTextRequest | PortsRequest | ConnectRequest | DisconnectRequest | AuditRequest | CalculatorRequest | CalculateRequest | GearRequest | ConfigurationRequest | EditConfigurationRequest;
+export type Request = DescribeRequest | ReadRequest | PinsRequest | StateRequest | EncodersRequest | FaultsRequest | FaultKindsRequest | TimeRequest | EndPointsRequest | FollowRequest | UnfollowRequest | SetRequest | PressRequest | ReleaseRequest | WriteRequest | SendRequest | RequestRequest | PowerCycleRequest | TurnRequest | CoupleRequest | FaultRequest | ClearFaultRequest | ExpectRequest | NoteRequest | SeeRequest | EnableRequest | MoveRequest | HomeRequest | JogRequest | StopRequest | ProgramRequest | DownloadRequest | PauseRequest | ResumeRequest | StepRequest | SnapshotRequest | SnapshotsRequest | RestoreRequest | DropSnapshotRequest | SaveRequest | DebugRequest | BreakpointRequest | ClearBreakpointRequest | BreakpointsRequest | StopOnRequest | StepProgramRequest | RunRequest | LookAtRequest | BranchRequest | StackRequest | ValuesRequest | EvaluateRequest | SetValueRequest | ProgramSourceRequest | WhyRequest | HelloRequest | ResyncRequest | WatchRequest | UnwatchRequest | TakeControlRequest | ReleaseControlRequest | RenewRequest | LetGoRequest | StopAllRequest | LookRequest | GoBackRequest | ProgramsRequest | ProgramTextRequest | PortsRequest | ConnectRequest | DisconnectRequest | AuditRequest | CalculatorRequest | CalculateRequest | GearRequest | ConfigurationRequest | EditConfigurationRequest;
 
 /** Every request has exactly one. */
 export type Answer = {
@@ -1135,6 +1135,18 @@ export type ProgramSourceRequest = {
   program: string;
 };
 
+/** The chain of causes of a value, of a condition or of a wait, from the past that is kept. Answer: question, at_ns, state (what is true), since_ns (null: it has not changed), links: a list of time_ns, subject and text, from the effect to its causes; complete, known_from_ns, cut (whether the chain ends there), text (all of it in lines). */
+export type WhyRequest = {
+  do: "why";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** A signal, a condition, or the name of a controller: what its program waits for. */
+  question?: string | null;
+  /** At which moment; now without. [ns] */
+  at_ns?: string | number | null;
+};
+
 /** The first request of a connection. Its answer is followed by the whole state. */
 export type HelloRequest = {
   do: "hello";
@@ -1854,6 +1866,7 @@ export interface Requests {
   evaluate: { request: EvaluateRequest; answer: unknown };
   set_value: { request: SetValueRequest; answer: unknown };
   program_source: { request: ProgramSourceRequest; answer: unknown };
+  why: { request: WhyRequest; answer: unknown };
   hello: { request: HelloRequest; answer: HelloAnswer };
   resync: { request: ResyncRequest; answer: ResyncAnswer };
   watch: { request: WatchRequest; answer: WatchAnswer };

@@ -1,0 +1,85 @@
+"""Questions about a world that goes on in real time (`steptwin.why.kept`)."""
+
+from __future__ import annotations
+
+import asyncio
+from functools import partial
+from time import perf_counter
+
+from steptwin.errors import Refusal, SteptwinError
+from steptwin.later import Later
+from steptwin.live.lookback import PART_S
+from steptwin.live.world import LiveWorld
+from steptwin.subject.debugcommands import Why as Wanted
+from steptwin.why.kept import KeptPast
+from steptwin.why.question import Asking
+from steptwin.world.history import History
+
+MOST_QUESTIONS = 16
+"""Questions that wait."""
+KEPT_S = 60.0
+"""After so long without a question what was noted is dropped, s."""
+NO_PAST = "no past is kept here: start the twin with 'steptwin up --past' or in the studio"
+
+
+class LiveWhy:
+    """Answers questions about the past of ``live``, one after the other, in parts between which the world is served."""
+
+    def __init__(self, live: LiveWorld) -> None:
+        self._live = live
+        self._waiting: list[tuple[Wanted, Later[object]]] = []
+        self._asking: Asking | None = None
+        self._past: tuple[History, KeptPast] | None = None
+        self._timer: asyncio.TimerHandle | None = None
+
+    def ask(self, wanted: Wanted) -> Later[object]:
+        """The answer as plain data. Raises `Refusal` where no past is kept, and for too many questions at once."""
+        if self._live.history is None:
+            raise Refusal(NO_PAST)
+        if len(self._waiting) >= MOST_QUESTIONS:
+            raise Refusal(f"{MOST_QUESTIONS} questions wait for their answers, which is the most")
+        later = Later[object]()
+        self._waiting.append((wanted, later))
+        if len(self._waiting) == 1:
+            self._part()
+        return later
+
+    def _part(self) -> None:
+        wanted, later = self._waiting[0]
+        until = perf_counter() + PART_S
+        try:
+            if self._asking is None:
+                self._asking = self._kept_past().asking(wanted.question, wanted.at)
+            next(self._asking)
+            while perf_counter() < until:
+                next(self._asking)
+        except StopIteration as end:
+            self._end(partial(later.put, end.value.plain()))
+        except SteptwinError as error:
+            self._end(partial(later.fail, error))
+        else:
+            asyncio.get_running_loop().call_later(PART_S, self._part)
+
+    def _end(self, answered: partial[None]) -> None:
+        self._asking = None
+        del self._waiting[0]
+        loop = asyncio.get_running_loop()
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer = loop.call_later(KEPT_S, self._forget)
+        if self._waiting:
+            loop.call_soon(self._part)
+        answered()
+
+    def _forget(self) -> None:
+        if self._asking is None:
+            self._past = None
+
+    def _kept_past(self) -> KeptPast:
+        """Raises `Refusal` where no past is kept any more."""
+        history = self._live.history
+        if history is None:
+            raise Refusal(NO_PAST)
+        if self._past is None or self._past[0] is not history:
+            self._past = history, KeptPast(history)
+        return self._past[1]

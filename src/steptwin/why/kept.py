@@ -1,0 +1,88 @@
+"""Questions about the past of a world, as far as that is kept (`steptwin.world.history`).
+
+What may be a cause is noted in a second world, which runs through the past: from the newest state that is old enough, and from
+older ones where the causes are older. It stays for further questions, which only need what happened since.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+from steptwin.errors import Misuse
+from steptwin.machine import SECOND, Nanos
+from steptwin.why.question import Asking, Why
+from steptwin.world.history import History
+from steptwin.world.plant import Plant, PlantSnapshot
+
+FIRST_SPAN_NS: Nanos = 5 * SECOND
+"""So much of the past is looked at first, and `FURTHER` times as much where the causes are older."""
+FURTHER = 8
+MOST_NOTED = 500_000
+"""Limit of the records and statements that are noted: some 100 MB."""
+
+
+class KeptPast:
+    """Answers questions about the past in ``history``."""
+
+    def __init__(self, history: History) -> None:
+        self._history = history
+        self._known: _Known | None = None
+
+    def asking(self, question: str, at: Nanos | None = None) -> Asking:
+        """The answer for a moment, by default the present. Raises `Misuse` for what is no question here."""
+        history = self._history
+        now = history.world.now
+        at = now if at is None else at
+        if not history.begin <= at <= now:
+            raise Misuse(f"at_ns = {at}: the past is kept from {history.begin} to {now} ns")
+        known, span = self._known, FIRST_SPAN_NS
+        if known is None or not known.fits(at, now - span):
+            known = self._known = _Known(history, max(history.begin, at - span))
+        answer = yield from known.asking(question, at)
+        while answer.is_cut and (older := known.older(at)) is not None:
+            yield
+            try:
+                known = _Known(history, older)
+                answer = yield from known.asking(question, at)
+            except Misuse:
+                break
+            self._known = known
+        return answer
+
+
+class _Known:
+    """What is known of the past from a state of it on. ``moment``: from the newest state at or before it."""
+
+    def __init__(self, history: History, moment: Nanos) -> None:
+        snapshot, self._taken = history.state_at(moment)
+        self._history = history
+        self._branch = history.branch
+        self._why = Why(partial(_second_world, history.world, snapshot), (), snapshot.now, MOST_NOTED)
+
+    def fits(self, at: Nanos, not_before: Nanos) -> bool:
+        """Whether a question about a moment can be answered from it. ``not_before``: up to when it must have come."""
+        history, log = self._history, self._why.log
+        is_same = history.branch == self._branch and history.keeps_inputs_from(self._taken)
+        return is_same and log.begin <= at and not_before <= self._why.end and log.noted < MOST_NOTED // 2
+
+    def asking(self, question: str, at: Nanos) -> Asking:
+        inputs = self._history.inputs_from(self._taken)
+        self._taken += len(inputs)
+        self._why.go_on(inputs, max(at, self._why.end))
+        return (yield from self._why.asking(question, at))
+
+    def older(self, at: Nanos) -> Nanos | None:
+        """From where to look at the past instead; None if nothing older is kept, or too much has happened since."""
+        history, log, end = self._history, self._why.log, self._why.end
+        span = FURTHER * max(at - log.begin, FIRST_SPAN_NS)
+        if log.noted:
+            span = min(span, MOST_NOTED * (end - log.begin) // (2 * log.noted) - (end - at))
+        moment = max(history.begin, at - span)
+        return moment if moment < log.begin and history.state_at(moment)[0].now < log.begin else None
+
+
+def _second_world(world: Plant, snapshot: PlantSnapshot) -> Plant:
+    second = Plant(world.spec, world.files, keep_trace=False, keep_inputs=False)
+    second.restore(snapshot)
+    second.trace.stop()
+    return second
