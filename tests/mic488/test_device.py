@@ -203,6 +203,7 @@ def test_an_unexpected_failure_of_a_request_is_answered_and_told() -> None:
     assert rig.ask(coil_pdu(USER_REG_SAVE, True)) == b"\x85\x04"
     (event,) = rig.events("internal-error")
     assert event.text.startswith("request 05 08 35 ff 00 failed, please report it: ZeroDivisionError: of the store (")
+    assert event.text.endswith(f"test_device.py:{fail.__code__.co_firstlineno + 1})")
     assert rig.exception(read_pdu(3, rig.base, 1)) == 0
 
 

@@ -428,6 +428,15 @@ def test_rows_that_cannot_be_a_path_are_program_errors(lines: str, rows: str, te
     assert text in failed(rig)
 
 
+@pytest.mark.parametrize(("radius", "permitted"), [(4.995, True), (4.99, True), (4.985, False)])
+def test_a_radius_may_be_a_pulse_smaller_than_half_the_distance(radius: float, *, permitted: bool) -> None:
+    """10 units apart, at 100 pulses per unit."""
+    rig = ready(f"{ON}DOARC @A\n{DONE}", f"A;10;0;{radius};0\n")
+    rig.wait(5)
+    assert rig.state == (RUNNING if permitted else STOPPED)
+    assert rig.position(1) == (10 if permitted else 0)
+
+
 def test_an_angle_of_0_moves_nothing_and_goes_on() -> None:
     rig = ready(
         f"{ON}MOVETOCIRC @A\nWAITPOS\nDOCIRC @A\nWAITPOS\nMOVELIN @B\n{DONE}",

@@ -1,0 +1,114 @@
+"""The drivers for threads take the arguments of those for asyncio, and leave none out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from host_rig import Wire
+from line_rig import MemoryEndpoint
+
+from steptwin.drivers.m1486.driver import AsyncM1486
+from steptwin.drivers.m1486.lines import TALK, AsyncM1486Line, ThreadM1486Line
+from steptwin.drivers.m1486.sync import M1486, M1486Line
+from steptwin.drivers.mic488.driver import AsyncMic488
+from steptwin.drivers.mic488.lines import AsyncModbusLine, ThreadModbusLine
+from steptwin.drivers.mic488.sync import Mic488, ModbusLine
+from steptwin.errors import Misuse
+from steptwin.machine import MILLISECOND, SECOND
+from steptwin.mic488.config import ControllerConfig
+
+NOWHERE = "tcp://127.0.0.1:1"
+RTU = "rtu-tcp://127.0.0.1:1"
+
+
+def given(monkeypatch: pytest.MonkeyPatch, kind: type[Any]) -> list[tuple[tuple[Any, ...], dict[str, Any]]]:
+    """The arguments with which objects of a class are made from now on."""
+    seen: list[tuple[tuple[Any, ...], dict[str, Any]]] = []
+    made = kind.__init__
+
+    def note(self: object, *arguments: Any, **named: Any) -> None:
+        seen.append((arguments, named))
+        made(self, *arguments, **named)
+
+    monkeypatch.setattr(kind, "__init__", note)
+    return seen
+
+
+def test_a_chip_for_threads_takes_all_that_one_for_asyncio_takes(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen, lines = given(monkeypatch, AsyncM1486), given(monkeypatch, ThreadM1486Line)
+    log: list[str] = []
+    options: dict[str, Any] = {
+        "baud": 9600, "variant": "C", "steps_per_unit": 12.5, "unit": "mm", "origin_u": 640, "timeout_s": 0.7, "log": log.append,
+    }  # fmt: skip
+    chip = M1486(NOWHERE, 11, **options)
+    assert seen == [((NOWHERE, 11), options)]
+    assert lines == [((NOWHERE,), {"baud": 9600, "log": options["log"]})]
+    assert (chip.place, chip.address, chip.unit) == (NOWHERE, 11, "mm")
+    shared = M1486Line(NOWHERE, baud=2400, log=log.append)
+    assert lines[1] == ((NOWHERE,), {"baud": 2400, "log": options["log"]})
+    M1486(shared, 3)
+    assert seen[1][0] == (shared.line, 3)
+    assert shared.place == NOWHERE
+
+
+def test_a_controller_for_threads_takes_all_that_one_for_asyncio_takes(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen, lines = given(monkeypatch, AsyncMic488), given(monkeypatch, ThreadModbusLine)
+    log: list[str] = []
+    options: dict[str, Any] = {
+        "baud": 9600, "firmware": "1.40", "config": ControllerConfig(), "timeout_s": 0.7, "observe": True, "log": log.append,
+    }  # fmt: skip
+    mic = Mic488(RTU, 11, **options)
+    assert seen == [((RTU, 11), options)]
+    assert lines == [((RTU,), {"baud": 9600, "log": options["log"]})]
+    assert (mic.place, mic.unit, mic.firmware, mic.config) == (RTU, 11, "1.40", ControllerConfig())
+    shared = ModbusLine(RTU, baud=19200, frames_per_second=20.0, log=log.append)
+    assert lines[1] == ((RTU,), {"baud": 19200, "frames_per_second": 20.0, "log": options["log"]})
+    Mic488(shared, 3)
+    assert seen[1][0] == (shared.line, 3)
+    assert (shared.place, [mic.axis(number).number for number in (1, 2, 3, 4)]) == (RTU, [1, 2, 3, 4])
+    with pytest.raises(Misuse, match="axis 5"):
+        mic.axis(5)
+
+
+@pytest.mark.parametrize("kind", [ThreadM1486Line, AsyncM1486Line])
+def test_a_line_of_chips_has_its_rate_and_tells_its_characters(kind: type[ThreadM1486Line | AsyncM1486Line]) -> None:
+    """Ten bits a character."""
+    log: list[str] = []
+    line = kind(NOWHERE, baud=1200, log=log.append)
+    talk: Any = line.notes[TALK]
+    assert talk.wire_ns(12) == pytest.approx(SECOND / 10, abs=20)
+    talk.stray(b"\x13u", 0)
+    assert [text.split(maxsplit=2)[2] for text in log] == ["← 13 75                     13H u"]
+
+
+@pytest.mark.parametrize("kind", [ThreadModbusLine, AsyncModbusLine])
+def test_a_modbus_line_has_its_pace_and_tells_its_frames(kind: type[ThreadModbusLine | AsyncModbusLine]) -> None:
+    log: list[str] = []
+    line = kind(RTU, baud=9600, frames_per_second=20.0, log=log.append)
+    assert line._engine._interval_ns == 50 * MILLISECOND
+    assert (line.notes["tcp"], kind(NOWHERE, frames_per_second=None)._engine._interval_ns) == (False, 0)
+    with pytest.raises(Misuse, match=r"^0 frames per second: must be above 0$"):
+        kind(NOWHERE, frames_per_second=0.0)
+    frames: Any = line.notes["frames"]
+    frames.rubbish(0, b"\x01\x02")
+    assert len(log) == 1
+
+
+@pytest.mark.parametrize("line", [ModbusLine(NOWHERE), M1486Line(NOWHERE)], ids=["modbus", "chips"])
+def test_with_opens_a_line_and_closes_it(line: ModbusLine | M1486Line) -> None:
+    wire = Wire()
+    line.line._endpoint = endpoint = MemoryEndpoint(wire)
+    closed: list[bool] = []
+    opens = endpoint.open
+
+    def opened() -> Any:
+        channel = opens()
+        channel.close = lambda: closed.append(True)
+        return channel
+
+    endpoint.open = opened  # type: ignore[method-assign]
+    with line as same:
+        assert same is line
+        assert (wire.opened, closed) == (1, [])
+    assert closed == [True]
