@@ -56,6 +56,16 @@ def test_a_stored_command_is_read_back(case: ChipCommand) -> None:
         assert stored == (case, len(raw))
 
 
+def test_m_29_a_byte_that_begins_no_command_is_none() -> None:
+    """A number that is left out sets the highest bit."""
+    for first in range(256):
+        letter = chr(first & 0x7F)
+        if letter not in SIZES:
+            assert decode(bytes((first, 1, ord("H"), 1, 0, 0))[:LONGEST]) is None, first
+    assert decode(bytes((ord("I"), 1, ord("H"), 2, 0, 0))[:LONGEST]) == (ChipCommand("I", JumpCondition(1, True, 2)), 4)
+    assert decode(bytes((ord("I"), 1, ord("X"), 2, 0, 0))[:LONGEST]) is None
+
+
 def test_m_24_g_plus_and_minus_take_as_much_as_g() -> None:
     assert len(encode(ChipCommand("G+"))) == len(encode(ChipCommand("G-"))) == len(encode(ChipCommand("G", 1)))
 

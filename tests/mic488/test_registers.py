@@ -337,7 +337,9 @@ def test_names_in_either_case_and_aliases() -> None:
 
 
 def test_a_wrong_name_gets_near_misses() -> None:
-    with pytest.raises(UnknownRegister, match=r"no register named 'M1_POSACT'; did you mean M1_POS_ACT, M2_POS_ACT, M3_POS_ACT\?$"):
+    with pytest.raises(
+        UnknownRegister, match=r"no register named 'M1_POSACT'; did you mean M1_POS_ACT, M2_POS_ACT, M3_POS_ACT\?$"
+    ):
         register_map().named("M1_POSACT")
     with pytest.raises(UnknownRegister, match=r"firmware 1\.70 has no register named 'qqq'$"):
         register_map().named("qqq")

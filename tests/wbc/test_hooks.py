@@ -88,6 +88,7 @@ def test_several_hooks_are_called_in_order_until_each_is_taken_away() -> None:
         order.append(f"second {number}")
 
     interpreter = rig.device.program.interpreter
+    interpreter.rests_in_loops = False
     interpreter.hook(first)
     interpreter.hook(second)
     rig.start()
@@ -99,6 +100,13 @@ def test_several_hooks_are_called_in_order_until_each_is_taken_away() -> None:
     interpreter.unhook(second)
     rig.wait(1)
     assert len(order) == 4
+    interpreter.hook(second)
+    rig.wait(0.0115)
+    alone = order[4:]
+    assert set(alone) == {"second 0", "second 1"}
+    interpreter.hook(first)
+    rig.wait(0.0115)
+    assert order[4 + len(alone) :] == ["second 1", "first 1", "second 0", "first 0"]
 
 
 def test_a_hook_that_comes_while_a_statement_is_in_progress_is_told_of_the_next() -> None:
