@@ -10,6 +10,7 @@ from debug_rig import BOTH, ONE, make
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from steptwin.debug.breakpoints import Breakpoint
 from steptwin.debug.debugger import Debugger
 from steptwin.debug.values import DataPoint, Events, LabelPoint, LinePoint, Stop, StopReason
 from steptwin.errors import Misuse
@@ -227,6 +228,43 @@ def test_a_condition_on_another_controller() -> None:
     assert debugger.evaluate("m", "c.variable").number > 30.0  # type: ignore[operator]
 
 
+AXIS = '[[axis]]\nname = "x"\ndrive = "m.M1"\npulses_per_unit = 100\nunit = "mm"\n'
+
+
+@pytest.mark.parametrize("condition", ["n = 3 and x.position < 1 cm", "n = 3 and c.variable >= 0", "m.OUT1 = 0 and n = 3"])
+def test_a_condition_with_signals_is_decided_while_the_world_runs(condition: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    debugger = started(world=BOTH + AXIS)
+    assert [one.is_set for one in debugger.set_breakpoints([at(8, condition=condition)])] == [True]
+    looked: list[int] = []
+    monkeypatch.setattr(Breakpoint, "holds", lambda point, machine, now: looked.append(now))
+    assert debugger.run().reason is StopReason.BREAKPOINT
+    assert (line(debugger), debugger.evaluate("m", "n").number) == (8, 3.0)
+    assert looked == []
+
+
+def test_conditions_of_two_controllers_on_each_other() -> None:
+    """One of them has gone ahead where the other one executes a statement: there the world is looked at once more."""
+    debugger = started(world=BOTH)
+    points = [at(8, condition="c.variable >= 0"), LinePoint(machine="c", text="program", line=8, condition="m.OUT2 = 0")]
+    assert [one.is_set for one in debugger.set_breakpoints(points)] == [True, True]
+    stops = [debugger.run() for _ in range(4)]
+    assert {stop.machine for stop in stops} == {"m", "c"}
+    for stop in reversed(stops[:-1]):
+        assert debugger.run_back().time == stop.time
+    alone = started(world=BOTH)
+    alone.set_breakpoints(points[1:])
+    assert next(stop for stop in stops if stop.machine == "c").time == alone.run().time
+
+
+def test_a_log_with_a_condition_on_a_signal_does_not_stop() -> None:
+    debugger = started(world=BOTH)
+    logged: list[str] = []
+    debugger.on_log = lambda one: logged.append(one.text)
+    debugger.set_breakpoints([at(8, log="n is {n}", condition="c.variable >= 0")])
+    assert debugger.run(200 * MILLISECOND).reason is StopReason.LIMIT
+    assert logged[:3] == ["n is 1", "n is 2", "n is 3"]
+
+
 def test_a_label_and_an_interrupt() -> None:
     debugger = started()
     (label, interrupt) = debugger.set_breakpoints([LabelPoint(label="count"), LabelPoint(label="INT_IN3")])
@@ -258,6 +296,7 @@ def test_a_program_error_is_an_event_to_stop_at() -> None:
     ("point", "problem"),
     [
         (at(99), "no statement is in line 99 of m.prg or after it"),
+        (at(1, condition="y.position > 3"), "'y.position' means nothing to m: its variables are n"),
         (at(1, condition="n >"), "expression 'n >' ends too early: expected a name or a number"),
         (at(1, condition="n = = 2"), "expression 'n = = 2', column 5: found '=', expected a name or a number"),
         (at(1, hits="0"), "hit count '0': expected a number from 1 on, after nothing, or one of = < <= > >= %"),

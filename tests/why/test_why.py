@@ -62,7 +62,7 @@ def test_a_wait_for_ever_shows_what_it_depends_on() -> None:
 
 def test_the_moment_decides() -> None:
     world = waits()
-    assert shown(world, "OUT1 = 0", 0.5) == ["cell.OUT1 == 0 is true, from the beginning (at 0.5 s)"]
+    assert shown(world, "OUT1 = 0", 0.5) == ["cell.OUT1 = 0 is true, from the beginning (at 0.5 s)"]
     assert shown(world, "why cell", 0.5)[0] == "cell waits at line 3 `WAIT start = ON`, since 0.001000 s (at 0.5 s)"
 
 

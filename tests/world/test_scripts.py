@@ -12,7 +12,7 @@ from steptwin.errors import Misuse, Runaway
 from steptwin.files.world import World
 from steptwin.machine import SECOND
 from steptwin.world import script as do
-from steptwin.world.expression import SignalCondition
+from steptwin.world.condition import SignalCondition
 from steptwin.world.kernel import Kernel
 from steptwin.world.script import Steps
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from array import array
 from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import TypeAlias
 
-from steptwin.debug.expression import Expression, HitCount, LogText, Names
+from steptwin.debug.calculation import Calculation, HitCount, LogText
 from steptwin.debug.values import DataPoint, LabelPoint, LinePoint, SetPoint
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
@@ -18,33 +19,51 @@ MOST_HITS = 1 << 16
 """Hits of one breakpoint that can be found again in the past; older ones are only counted."""
 
 AnyPoint: TypeAlias = LinePoint | LabelPoint | DataPoint
+Calculate: TypeAlias = Callable[[str, str], Calculation]
+"""The calculation for a controller of an expression. Raises `Misuse`."""
 
 
 class Breakpoint:
     """A breakpoint at statements. Raises `Misuse` for a condition, hit count or log text that is none."""
 
-    def __init__(self, number: int, asked: LinePoint | LabelPoint, places: Mapping[str, Sequence[Place]]) -> None:
+    def __init__(
+        self, number: int, asked: LinePoint | LabelPoint, places: Mapping[str, Sequence[Place]], calculate: Calculate
+    ) -> None:
         self.number = number
         self.asked = asked
         self.places = places
         """By controller."""
-        self.condition = None if asked.condition is None else Expression(asked.condition)
+        condition = asked.condition
+        self._conditions = {} if condition is None else {machine: calculate(machine, condition) for machine in places}
         self._counts = None if asked.hits is None else HitCount(asked.hits)
-        log = asked.log if isinstance(asked, LinePoint) else None
-        self.log = None if log is None else LogText(log)
-        if self.log is not None and any("." in name for name in self.log.names):
-            raise Misuse(f"log {log!r}: only names of the program can be in it")
+        self.log: LogText | None = None
+        if isinstance(asked, LinePoint) and asked.log is not None:
+            self.log = LogText(asked.log, partial(calculate, asked.machine))
         self._times: array[int] = array("q")
         """When the condition held, as far as hits are counted: the latest of them."""
         self._dropped = 0
         """Number of hits before those."""
 
-    def holds(self, names: Names) -> bool:
-        """Whether the condition holds. One that cannot be calculated does: it must not be overlooked."""
-        try:
-            return self.condition is None or self.condition.value(names) != 0.0
-        except Misuse:
-            return True
+    def reads_others(self, machine: str) -> bool:
+        """Whether the condition depends on what has no connection to the controller."""
+        condition = self._conditions.get(machine)
+        return condition is not None and condition.reads_others
+
+    def is_known(self, machine: str, now: Nanos) -> bool:
+        """Whether `holds_at_statement` can be asked."""
+        condition = self._conditions.get(machine)
+        return condition is None or condition.is_known_before_statement(now)
+
+    def holds_at_statement(self, machine: str, now: Nanos) -> bool:
+        """Whether the condition holds for a statement of a controller that is about to be executed. One that cannot be calculated
+        does: it must not be overlooked."""
+        condition = self._conditions.get(machine)
+        return condition is None or _holds(condition.value_at_statement, now)
+
+    def holds(self, machine: str, now: Nanos) -> bool:
+        """The same for the world as it stands at ``now``."""
+        condition = self._conditions.get(machine)
+        return condition is None or _holds(condition.value, now)
 
     def counts(self, time: Nanos) -> bool:
         """Whether this hit, at which the condition holds, is one that is asked for."""
@@ -71,18 +90,19 @@ class Breakpoint:
 class Watch:
     """A data breakpoint: what it looks at, and whether it is hit. Raises `Misuse` for a condition that is none."""
 
-    def __init__(self, number: int, asked: DataPoint) -> None:
+    def __init__(self, number: int, asked: DataPoint, calculate: Calculate) -> None:
         self.number = number
         self.machine = asked.machine
         self.name = asked.name
         text = asked.name if asked.condition is None else with_left_side(asked.name, asked.condition)
         self.has_condition = asked.condition is not None
-        self.expression = Expression(text)
+        self._calculation = calculate(asked.machine, text)
+        self.text = text
 
-    def value(self, names: Names) -> float | None:
+    def value(self, now: Nanos) -> float | None:
         """None where it is not known now, as a variable of a program that does not run."""
         try:
-            return self.expression.value(names)
+            return self._calculation.value(now)
         except Misuse:
             return None
 
@@ -91,6 +111,13 @@ class Watch:
         if self.has_condition:
             return bool(after) and not before
         return before is not None and after is not None and before != after
+
+
+def _holds(value: Callable[[Nanos], float], now: Nanos) -> bool:
+    try:
+        return value(now) != 0.0
+    except Misuse:
+        return True
 
 
 def with_left_side(name: str, condition: str) -> str:
@@ -136,11 +163,11 @@ def _labels(programs: Mapping[str, Programs]) -> Iterator[tuple[str, str, str, i
 
 
 class Breakpoints:
-    """All breakpoints that are set. ``read``: what a name means to a controller; it raises `Misuse`."""
+    """All breakpoints that are set. ``calculate`` is of the world in which they are looked for."""
 
-    def __init__(self, programs: Mapping[str, Programs], read: Callable[[str, str], float]) -> None:
+    def __init__(self, programs: Mapping[str, Programs], calculate: Calculate) -> None:
         self._programs = programs
-        self._read = read
+        self._calculate = calculate
         self._all: list[Breakpoint] = []
         self.watches: list[Watch] = []
         self.at: dict[str, dict[Place, list[Breakpoint]]] = {}
@@ -159,7 +186,8 @@ class Breakpoints:
         self._next += before is None
         try:
             if isinstance(asked, DataPoint):
-                self.watches.append(self._watch(Watch(number, asked)))
+                _programs_of(self._programs, asked.machine)
+                self.watches.append(Watch(number, asked, self._calculate))
                 return SetPoint(number)
             line: int | None = None
             if isinstance(asked, LabelPoint):
@@ -167,7 +195,7 @@ class Breakpoints:
             else:
                 place, line = places_of_line(self._programs, asked)
                 places = {asked.machine: [place]}
-            point = Breakpoint(number, asked, places)
+            point = Breakpoint(number, asked, places, self._calculate)
         except Misuse as error:
             return SetPoint(number, problem=str(error))
         if before is not None:
@@ -178,13 +206,9 @@ class Breakpoints:
                 self.at.setdefault(machine, {}).setdefault(place, []).append(point)
         return SetPoint(number, [place for its in places.values() for place in its], line)
 
-    def _watch(self, watch: Watch) -> Watch:
-        """Raises `Misuse` where it can never be hit; a name of the program may get its meaning later."""
-        _programs_of(self._programs, watch.machine)
-        for name in watch.expression.names:
-            if "." in name:
-                self._read(watch.machine, name)
-        return watch
+    def reading_others(self) -> list[str]:
+        """The controllers with conditions that depend on what has no connection to them."""
+        return [machine for machine in self.at if any(point.reads_others(machine) for point in self._all)]
 
     def forget_after(self, time: Nanos) -> None:
         for point in self._all:

@@ -12,8 +12,8 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Se
 from typing import TypeAlias, TypeVar
 
 from steptwin.debug import scopes
-from steptwin.debug.breakpoints import AnyPoint, Breakpoints
-from steptwin.debug.expression import number_text
+from steptwin.debug.breakpoints import AnyPoint
+from steptwin.debug.calculation import number_text
 from steptwin.debug.observer import Logged
 from steptwin.debug.scout import Goal, Parts, Scout
 from steptwin.debug.values import Events, Location, Scope, SetPoint, StackFrame, Stop, StopReason, Value
@@ -67,7 +67,6 @@ class Debugger:
                 raise Misuse(f"{name}: statement_time = 0: a debugger stops between statements, which must take 1 µs at least")
         self._world = world
         self._statement = min(programs.statement_time for programs in debugged.values())
-        self._points = Breakpoints(world.programs, lambda machine, name: scopes.read(world, machine, name))
         self._apply_input = apply_input or world.apply_input
         self._go_back = go_back or self._take_back
         world.settle_all()
@@ -77,7 +76,7 @@ class Debugger:
         self._history = History(world) if history is None else history
         self._history.take()
         self._why = KeptPast(self._history)
-        self._scout = Scout(self._history, self._points)
+        self._scout = Scout(self._history)
         self._is_past = False
 
     def close(self) -> None:
@@ -166,7 +165,7 @@ class Debugger:
         return scopes.scope(self.view, machine, name)
 
     def evaluate(self, machine: str, text: str) -> Value:
-        """An expression (`steptwin.debug.expression`). Raises `Misuse`."""
+        """An expression (`steptwin.debug.calculation`). Raises `Misuse`."""
         return scopes.evaluate(self.view, machine, text)
 
     def set_value(self, machine: str, name: str, text: str) -> Value:
@@ -199,7 +198,7 @@ class Debugger:
     def set_breakpoints(self, points: Sequence[AnyPoint]) -> Sequence[SetPoint]:
         """Set these breakpoints and no others; what became of each."""
         self._scout.release()
-        return self._points.set(points)
+        return self._scout.points.set(points)
 
     def set_events(self, events: Iterable[Events]) -> None:
         """Stop at these events and no others."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from typing import NamedTuple
 
 from steptwin.debug.breakpoints import Breakpoint, Breakpoints
@@ -91,6 +91,8 @@ class Observer:
             if places != frozenset():
                 programs.hook(self._hooks[machine], places)
                 self._hooked[machine] = places
+        kernel_of = self.world.parts.kernel_of
+        self.world.settled_first = [kernel_of[machine] for machine in self.points.reading_others()]
 
     def release(self) -> None:
         """Have no hooks: breakpoints or texts may be others by the next `observe`."""
@@ -115,34 +117,24 @@ class Observer:
         hit: list[Breakpoint] = []
         undecided: list[Breakpoint] = []
         for point in points:
-            if point.condition is not None and not point.condition.is_local:
+            if not point.is_known(machine, now):
                 undecided.append(point)
-            elif point.holds(names := _local(programs, now)) and point.counts(now):
-                if point.log is None:
-                    hit.append(point)
-                else:
-                    self._log(now, machine, place, point, names)
+            elif point.holds_at_statement(machine, now) and point.counts(now) and not self.log(now, machine, place, point):
+                hit.append(point)
         if hit or undecided or machine in self.stepping:
             self.begun.append(Begun(now, machine, place, programs.depth(), tuple(hit), tuple(undecided)))
 
-    def _log(self, now: Nanos, machine: str, place: Place, point: Breakpoint, names: Callable[[str], float]) -> None:
-        if point.log is not None:
-            try:
-                text = point.log.shown(names)
-            except Misuse as error:
-                text = f"log: {error}"
-            self.logged.append(Logged(now, machine, place, text))
+    def log(self, now: Nanos, machine: str, place: Place, point: Breakpoint) -> bool:
+        """Log what a breakpoint that is hit has to log. False where it has nothing: then it stops."""
+        if point.log is None:
+            return False
+        try:
+            text = point.log.shown(now)
+        except Misuse as error:
+            text = f"log: {error}"
+        self.logged.append(Logged(now, machine, place, text))
+        return True
 
     def _recorded(self, record: TraceRecord) -> None:
         if self.is_on and record.kind == "event" and record.subject in self.codes:
             self.happened.append(ObservedEvent(record.time, record.machine, record.subject, str(record.value)))
-
-
-def _local(programs: Programs, now: Nanos) -> Callable[[str], float]:
-    def read(name: str) -> float:
-        value = programs.read(name, now)
-        if value is None:
-            raise Misuse(f"{name!r} means nothing here")
-        return value
-
-    return read

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from steptwin.controllerstate import StateAxis, StateStatus, detail_text
 from steptwin.datasheet import Access
-from steptwin.debug.expression import Expression, number_text
+from steptwin.debug.calculation import Calculation, number_text
 from steptwin.debug.values import Scope, Value
 from steptwin.errors import Misuse
 from steptwin.machine import MotionController
@@ -100,26 +100,11 @@ _VALUES = {
 }  # fmt: skip
 
 
-def read(world: Plant, machine: str, name: str) -> float:
-    """What a name means to the program of a controller, or else in the world. Raises `Misuse`."""
-    world.touch(machine)
-    value = world.programs_of(machine).read(name, world.now)
-    if value is not None:
-        return value
-    owner = name.partition(".")[0]
-    if "." in name and (owner in world.machines or owner in world.parts.element_names):
-        return world.read(name)
-    try:
-        return world.read(f"{machine}.{name}")
-    except Misuse:
-        known = ", ".join(world.programs_of(machine).variables(world.now)) or "none"
-        raise Misuse(f"{name!r} means nothing to {machine}: its variables are {known}") from None
-
-
 def evaluate(world: Plant, machine: str, text: str) -> Value:
     """The value of an expression. Raises `Misuse`."""
+    world.touch(machine)
     name = text.strip()
-    number = Expression(name).value(lambda name: read(world, machine, name))
+    number = Calculation(world, machine, name).value(world.now)
     return Value(name, number_text(number), number, is_settable=False)
 
 

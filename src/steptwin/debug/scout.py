@@ -7,16 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Generator
 from dataclasses import replace
+from functools import partial
+from operator import attrgetter
 from typing import NamedTuple, TypeAlias
 
-from steptwin.debug import scopes
-from steptwin.debug.breakpoints import Breakpoints, Watch
+from steptwin.debug.breakpoints import Breakpoints
+from steptwin.debug.calculation import Calculation
 from steptwin.debug.observer import Begun, Logged, Observer
 from steptwin.debug.values import LabelPoint, Stop, StopReason
 from steptwin.machine import Nanos
 from steptwin.subject.time import next_due
 from steptwin.world.history import History, Past
-from steptwin.world.plant import Plant
 
 Parts: TypeAlias = Generator[None, None, None]
 """Of what can be interrupted."""
@@ -44,14 +45,14 @@ class Candidate(NamedTuple):
 class Scout:
     """Of the world of ``history``."""
 
-    def __init__(self, history: History, points: Breakpoints) -> None:
+    def __init__(self, history: History) -> None:
         self._history = history
-        self._points = points
         self._past = Past(history)
         self.world = self._past.world
+        self.points = Breakpoints(history.world.programs, partial(Calculation, self.world))
         for programs in self.world.programs.values():
             programs.execute_all(True, self.world.now)
-        self._observer = Observer(self.world, points)
+        self._observer = Observer(self.world, self.points)
         self._watched: list[float | None] | None = None
         """The values of data breakpoints at the moment up to which was observed; None where it was moved since."""
         self.on_log: Callable[[Logged], None] = lambda logged: None
@@ -77,7 +78,7 @@ class Scout:
 
     def looks_for(self, goal: Goal) -> bool:
         """Whether there is anything at which it would stop."""
-        return bool(goal.machines or self._points.at or self._points.watches or self._observer.codes)
+        return bool(goal.machines or self.points.at or self.points.watches or self._observer.codes)
 
     def stopped(self) -> None:
         """The world stops before it: there is no use any more for where it has gone ahead."""
@@ -85,7 +86,7 @@ class Scout:
 
     def changed(self, moment: Nanos) -> None:
         """What comes after a moment will be different from what it was."""
-        self._points.forget_after(moment)
+        self.points.forget_after(moment)
         self._logged = min(self._logged, moment)
         self._past.forget()
 
@@ -154,10 +155,10 @@ class Scout:
             self._observer.is_on = False
 
     def _observe(self, end: Nanos) -> Finding:
-        watches = self._points.watches
+        watches = self.points.watches
         before = self._watched
         if before is None or len(before) != len(watches):
-            before = [self._value(watch) for watch in watches]
+            before = [watch.value(self.now) for watch in watches]
         if self.now == self.present and self._past.lacks_inputs:
             yield from self._past.go_on(self.present)
             if (hit := self._hit(before)) is not None:
@@ -180,16 +181,13 @@ class Scout:
 
     def _hit(self, before: list[float | None]) -> Stop | None:
         """The first data breakpoint that is hit now, by values that were others before."""
-        watches = self._points.watches
-        self._watched = after = [self._value(watch) for watch in watches]
+        watches = self.points.watches
+        self._watched = after = [watch.value(self.now) for watch in watches]
         for watch, old, new in zip(watches, before, after, strict=True):
             if watch.is_hit(old, new):
-                text = watch.expression.text if watch.has_condition else f"{watch.name}: {old:.9g} → {new:.9g}"
+                text = watch.text if watch.has_condition else f"{watch.name}: {old:.9g} → {new:.9g}"
                 return Stop(StopReason.DATA, self.now, watch.machine, text, (watch.number,))
         return None
-
-    def _value(self, watch: Watch) -> float | None:
-        return watch.value(lambda name: scopes.read(self.world, watch.machine, name))
 
     # ------------------------------------------------------------------ reasons to stop
 
@@ -223,15 +221,15 @@ class Scout:
             return candidate.stop
         was, watched = self.now, self._watched
         yield from self.look_at(begun.stand)
-        names = _names(self.world, begun.machine)
-        hit = tuple(point for point in begun.undecided if point.holds(names) and point.counts(begun.time))
+        held = [point for point in begun.undecided if point.holds(begun.machine, begun.stand) and point.counts(begun.time)]
+        hit = tuple(point for point in held if not self._observer.log(begun.time, begun.machine, begun.place, point))
         yield from self.look_at(was)
         self._watched = watched
         return None if not hit else _stop_at(begun._replace(hit=hit))
 
     def _pass_logs(self, until: Nanos) -> None:
         """Log what was passed for the first time."""
-        for logged in self._observer.logged:
+        for logged in sorted(self._observer.logged, key=attrgetter("time")):
             if self._logged < logged.time <= until:
                 self.on_log(logged)
         self._logged = max(self._logged, until)
@@ -242,7 +240,3 @@ def _stop_at(begun: Begun) -> Stop:
     is_label = all(isinstance(point.asked, LabelPoint) for point in points)
     reason = StopReason.FUNCTION if is_label else StopReason.BREAKPOINT
     return Stop(reason, begun.stand, begun.machine, points=tuple(point.number for point in begun.hit))
-
-
-def _names(world: Plant, machine: str) -> Callable[[str], float]:
-    return lambda name: scopes.read(world, machine, name)

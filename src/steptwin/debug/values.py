@@ -46,7 +46,7 @@ class Stop:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinePoint:
-    """A breakpoint in a line of a text of a controller. ``condition`` and ``log`` as in `steptwin.debug.expression`.
+    """A breakpoint in a line of a text of a controller. ``condition`` and ``log`` as in `steptwin.debug.calculation`.
 
     ``hits``: at which of the times that the condition holds: ``5``, ``>= 5``, ``% 5``. With ``log`` it does not stop, but writes
     the text with the values of what is in braces.

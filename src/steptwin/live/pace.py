@@ -26,7 +26,7 @@ from steptwin.subject.events import line_of
 from steptwin.subject.fields import FASTEST, SLOWEST
 from steptwin.subject.following import Following
 from steptwin.subject.time import MOST_SHOWN, end_of, happened, shown_of
-from steptwin.world.expression import SignalCondition
+from steptwin.world.condition import SignalCondition
 from steptwin.world.plant import WORLD, PlantSnapshot
 
 if TYPE_CHECKING:

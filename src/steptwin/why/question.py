@@ -15,11 +15,11 @@ from steptwin.why.causes import Cause, Causes, nothing
 from steptwin.why.log import MOST_NOTED, CauseLog, in_parts
 from steptwin.why.sentences import statement
 from steptwin.world import script as do
-from steptwin.world.expression import SignalCondition, names, parse
+from steptwin.world.condition import SignalCondition
+from steptwin.world.expression import parse_condition
 from steptwin.world.plant import Plant, RecordedInput
 from steptwin.world.programs import Operand, OperandKind
 
-_SINGLE_EQUALS = re.compile(r"(?<![<>=!])=(?!=)")
 MOST_STATES = 5
 """Limit of the signals whose present levels are shown of what a program waits for."""
 
@@ -32,7 +32,7 @@ Found: TypeAlias = Generator[None, None, tuple[float, Nanos | None]]
 
 @dataclass(frozen=True, slots=True)
 class _Level:
-    """A signal whose changes were noted. As `steptwin.world.expression.Signal`."""
+    """A signal whose changes were noted. As `steptwin.world.condition.Signal`."""
 
     log: CauseLog
     name: str
@@ -104,9 +104,8 @@ class Why:
     # ------------------------------------------------------------------ signals and conditions
 
     def _condition(self, text: str, at: Nanos) -> Asking:
-        asked = self._named(_SINGLE_EQUALS.sub("==", text))
-        node = parse(asked)
-        found = tuple(dict.fromkeys(names(node)))
+        asked = self._named(text)
+        found = tuple(dict.fromkeys(parse_condition(asked).names()))
         is_bare = asked == found[0] if len(found) == 1 else False
         if is_bare and not self.log.has(found[0]) and self.log.world.signal(found[0]).continuous:
             return (yield from self._moving(found[0], at))
@@ -122,7 +121,7 @@ class Why:
     def _named(self, text: str) -> str:
         """The condition with names that leave out their controller in full, where there is only one that has it."""
         world = self.log.world
-        for name in dict.fromkeys(names(parse(text))):
+        for name in dict.fromkeys(parse_condition(text).names()):
             if not self._has(name):
                 having = [machine for machine in world.machines if self._has(f"{machine}.{name}")]
                 if len(having) > 1:

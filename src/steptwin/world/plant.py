@@ -7,7 +7,7 @@ kernels are advanced.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import groupby
@@ -21,9 +21,9 @@ from steptwin.nearmiss import NearMiss
 from steptwin.world import script as do
 from steptwin.world.actions import ExternalInput, act
 from steptwin.world.build import Files, Keep, build
+from steptwin.world.condition import SignalCondition
 from steptwin.world.contacts import Button
 from steptwin.world.elements.axis import BuiltAxis
-from steptwin.world.expression import SignalCondition
 from steptwin.world.faults import Fault
 from steptwin.world.kernel import Kernel, KernelState
 from steptwin.world.kind import AnyKind, EncoderInputs, NamedRegisters, Values, Vision, lacks
@@ -110,6 +110,8 @@ class Plant:
         """Called with everything from outside as it comes."""
         self.act_watchers: list[Callable[[str, ExternalInput], None]] = []
         """Called before each action at the present moment, with the script that does it; empty: what comes from outside."""
+        self.settled_first: Sequence[Kernel] = ()
+        """Kernels that are advanced before the others where the order is free, so that what observes them can read the others."""
         self.is_settled = False
         """Whether the scripts of the description have run since the last external input."""
         self._encoded: dict[object, tuple[bytes, ...]] = {}
@@ -397,7 +399,7 @@ class Plant:
 
     def settle_all(self) -> None:
         """Advance every kernel to the present."""
-        for kernel in self.kernels:
+        for kernel in (*self.settled_first, *self.kernels):
             kernel.advance(self.now)
 
     def run_to(self, end: Nanos, until: str | None = None) -> str | None:

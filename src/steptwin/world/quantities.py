@@ -1,9 +1,4 @@
-"""What a condition compares: numbers with units, signals, and what is calculated from them; and when a comparison changes.
-
-sum     = product { ( "+" | "-" ) product }
-product = factor { ( "*" | "/" ) factor }
-factor  = number [ unit ] | signal | "-" factor | "abs" "(" sum ")" | "(" sum ")"
-"""
+"""What an expression calculates with: numbers with units, signals, and what is made of them; and when a comparison changes."""
 
 from __future__ import annotations
 
@@ -12,7 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from heapq import merge
 from itertools import chain
-from math import inf, isnan, nan
+from math import fmod, inf, isfinite, isnan, nan
 from typing import Protocol, TypeAlias
 
 from steptwin.errors import Misuse
@@ -33,7 +28,9 @@ LOOKS_MORE = 1000
 
 Range: TypeAlias = tuple[float, float]
 """Lowest and highest value."""
-_NO_NUMBER = 2
+UnitOf: TypeAlias = Callable[[str], str]
+"""The unit of the signal of a name; empty: none."""
+NO_NUMBER = 2
 """The side of 0 of what is no number, besides -1, 0 and 1."""
 
 
@@ -49,9 +46,9 @@ class Quantity(Protocol):
         """All values that it can have while signals are within their ranges, or more; NaN if it may have no value."""
         ...
 
-    def negative(self) -> Quantity: ...
-    def in_unit(self, unit: str) -> Quantity:
-        """With numbers in this unit. Raises `Misuse` for a number whose unit is of another kind."""
+    def in_unit(self, unit: str, unit_of: UnitOf) -> Quantity:
+        """With numbers in this unit, within comparisons in that of what they are compared with. Raises `Misuse` for a number
+        whose unit is of another kind."""
         ...
 
 
@@ -69,10 +66,7 @@ class NumberLiteral:
     def range(self, ranges: Callable[[str], Range]) -> Range:
         return self.number, self.number
 
-    def negative(self) -> Quantity:
-        return NumberLiteral(-self.number, self.unit)
-
-    def in_unit(self, unit: str) -> Quantity:
+    def in_unit(self, unit: str, unit_of: UnitOf) -> Quantity:
         if not self.unit or self.unit == unit:
             return self
         for kin in UNITS:
@@ -95,10 +89,7 @@ class SignalName:
     def range(self, ranges: Callable[[str], Range]) -> Range:
         return ranges(self.text)
 
-    def negative(self) -> Quantity:
-        return Product(NumberLiteral(-1.0), self)
-
-    def in_unit(self, unit: str) -> Quantity:
+    def in_unit(self, unit: str, unit_of: UnitOf) -> Quantity:
         return self
 
 
@@ -121,11 +112,8 @@ class Sum:
         (a, b), (c, d) = self.left.range(ranges), self.right.range(ranges)
         return (a + c, b + d) if self.sign > 0 else (a - d, b - c)
 
-    def negative(self) -> Quantity:
-        return Product(NumberLiteral(-1.0), self)
-
-    def in_unit(self, unit: str) -> Quantity:
-        return Sum(self.left.in_unit(unit), self.sign, self.right.in_unit(unit))
+    def in_unit(self, unit: str, unit_of: UnitOf) -> Quantity:
+        return Sum(self.left.in_unit(unit, unit_of), self.sign, self.right.in_unit(unit, unit_of))
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,11 +143,36 @@ class Product:
         ends = [x / y if self.divides else x * y for x in (a, b) for y in (c, d)]
         return (nan, nan) if any(map(isnan, ends)) else (min(ends), max(ends))
 
-    def negative(self) -> Quantity:
-        return Product(NumberLiteral(-1.0), self)
+    def in_unit(self, unit: str, unit_of: UnitOf) -> Quantity:
+        return Product(self.left.in_unit(unit, unit_of), self.right.in_unit(unit, unit_of), self.divides)
 
-    def in_unit(self, unit: str) -> Quantity:
-        return Product(self.left.in_unit(unit), self.right.in_unit(unit), self.divides)
+
+@dataclass(frozen=True, slots=True)
+class Remainder:
+    """Of a division whose quotient is rounded towards 0; of one by 0 it is no number."""
+
+    left: Quantity
+    right: Quantity
+
+    def names(self) -> Iterator[str]:
+        yield from self.left.names()
+        yield from self.right.names()
+
+    def value(self, values: Callable[[str], float]) -> float:
+        left, right = self.left.value(values), self.right.value(values)
+        return fmod(left, right) if right and isfinite(left) else nan
+
+    def range(self, ranges: Callable[[str], Range]) -> Range:
+        (a, b), (c, d) = self.left.range(ranges), self.right.range(ranges)
+        if c <= 0.0 <= d or not all(map(isfinite, (a, b, c, d))):
+            return nan, nan
+        if c == d and a - fmod(a, c) == b - fmod(b, c):
+            return fmod(a, c), fmod(b, c)
+        most = max(abs(c), abs(d))
+        return (-most if a < 0.0 else 0.0), (most if b > 0.0 else 0.0)
+
+    def in_unit(self, unit: str, unit_of: UnitOf) -> Quantity:
+        return Remainder(self.left.in_unit(unit, unit_of), self.right.in_unit(unit, unit_of))
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,18 +189,33 @@ class Absolute:
         low, high = self.inner.range(ranges)
         return (low, high) if low >= 0.0 else (-high, -low) if high <= 0.0 else (0.0, max(-low, high))
 
-    def negative(self) -> Quantity:
-        return Product(NumberLiteral(-1.0), self)
+    def in_unit(self, unit: str, unit_of: UnitOf) -> Quantity:
+        return Absolute(self.inner.in_unit(unit, unit_of))
 
-    def in_unit(self, unit: str) -> Quantity:
-        return Absolute(self.inner.in_unit(unit))
+
+def unit_of_all(quantity: Quantity, unit_of: UnitOf) -> str:
+    """The unit of the first of its signals that has one; empty: none has."""
+    return next(filter(None, map(unit_of, quantity.names())), "")
+
+
+def negative(quantity: Quantity) -> Quantity:
+    if isinstance(quantity, NumberLiteral):
+        return NumberLiteral(-quantity.number, quantity.unit)
+    return Product(NumberLiteral(-1.0), quantity)
+
+
+def sides(low: float, high: float) -> set[int]:
+    """The sides of 0 that a range touches: -1 below, 0 at, 1 above, `NO_NUMBER`."""
+    if isnan(low) or isnan(high):
+        return {-1, 0, 1, NO_NUMBER}
+    return {side for side, touches in ((-1, low < 0.0), (0, low <= 0.0 <= high), (1, high > 0.0)) if touches}
 
 
 # ---------------------------------------------------------------------- when it changes
 
 
 class MovingSignal(Protocol):
-    """A signal that moves, as `steptwin.world.expression.Signal`."""
+    """A signal that moves, as `steptwin.world.condition.Signal`."""
 
     def value(self, now: Nanos) -> float: ...
     def turns(self, now: Nanos) -> Iterator[Nanos]: ...
@@ -238,7 +266,7 @@ class _Search:
 
     def _side(self, values: Mapping[str, float]) -> int:
         value = self._quantity.value(lambda name: values[name] if name in values else self._at_rest(name))
-        return _NO_NUMBER if isnan(value) else (value > 0.0) - (value < 0.0)
+        return NO_NUMBER if isnan(value) else (value > 0.0) - (value < 0.0)
 
     def _sides(self, ends: Iterable[Mapping[str, float]]) -> set[int]:
         """The sides of 0 that the range between the ends touches."""
@@ -250,10 +278,7 @@ class _Search:
                 return value, value
             return min(one[name], other[name]), max(one[name], other[name])
 
-        low, high = self._quantity.range(between)
-        if isnan(low) or isnan(high):
-            return {-1, 0, 1, _NO_NUMBER}
-        return {side for side, touches in ((-1, low < 0.0), (0, low <= 0.0 <= high), (1, high > 0.0)) if touches}
+        return sides(*self._quantity.range(between))
 
     def _within(self, begin: Nanos, first: Mapping[str, float], end: Nanos, last: Mapping[str, float], side: int) -> Nanos | None:
         if first == last or self._sides((first, last)) == {side}:

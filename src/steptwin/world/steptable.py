@@ -9,7 +9,7 @@ from typing import Any
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.world.control import Home, Move
-from steptwin.world.expression import parse
+from steptwin.world.expression import parse_condition
 from steptwin.world.faults import Fault
 from steptwin.world.faults import parse as parse_fault
 from steptwin.world.reader import Key, Path, TomlText, read_table
@@ -40,7 +40,7 @@ from steptwin.world.values import axis_number, name_value, number, pin_name, tex
 
 
 def _condition(value: Any) -> str:
-    parse(text_value(value))
+    parse_condition(text_value(value))
     return value
 
 

@@ -9,9 +9,10 @@ from typing import ClassVar
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.world.board import Board
+from steptwin.world.condition import SignalCondition
 from steptwin.world.elements.axis import AXIS
 from steptwin.world.elements.logic import STUCK_OUTPUT, BoardPart, BoardSpec, Joint, with_terminals
-from steptwin.world.expression import SignalCondition, names, parse
+from steptwin.world.expression import parse_condition
 from steptwin.world.kind import Terminals
 from steptwin.world.mechanics import Mechanism
 from steptwin.world.reader import Key, TomlText, optional
@@ -43,7 +44,7 @@ class CollisionSpec(BoardSpec):
     def owners(self) -> tuple[str, ...]:
         """Machines and elements whose signals are in the condition; none for one that is wrong."""
         try:
-            return tuple(dict.fromkeys(name.partition(".")[0] for name in names(parse(self.when))))
+            return tuple(dict.fromkeys(name.partition(".")[0] for name in parse_condition(self.when).names()))
         except Misuse:
             return ()
 
@@ -52,7 +53,7 @@ class CollisionSpec(BoardSpec):
 
     def check(self, text: TomlText) -> None:
         try:
-            parse(self.when)
+            parse_condition(self.when)
         except Misuse as error:
             text.wrong((*self.path, "when"), "D003", str(error))
 

@@ -13,8 +13,8 @@ from typing import ClassVar
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.state import Stateful
+from steptwin.world.condition import Signal, crossing
 from steptwin.world.element import Element, NamedSpec, Reference, Row, Table
-from steptwin.world.expression import Signal, crossing
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.table import ElementEffect, number
 from steptwin.world.kernel import Kernel, PinName, Source

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion import MotionState, plan_position
-from steptwin.world.expression import Border, SignalCondition, crossing, names, parse
+from steptwin.world.condition import Border, SignalCondition, crossing
+from steptwin.world.expression import parse_condition
 
 
 class Level:
@@ -62,6 +63,7 @@ SIGNALS = {
     "a": Level(1.0),
     "b": Level(0.0),
     "m.M1.position": Level(42.0),
+    "not_in_any_unit": Level(0.0),
     "x.position": Moving(),
     "x.velocity": Moving(velocity=True),
 }
@@ -98,7 +100,9 @@ def test_conditions(text: str, truth: bool) -> None:
         ("a b", "column 3: found 'b', expected the end, 'and' or 'or'"),
         ("(a", r"ends too early: expected '\)'"),
         ("3", "expected one of == != <= >= < >"),
-        ("a = 3", "column 3: found '=', expected the end"),
+        ("a = = 3", "column 5: found '=', expected a signal or a number"),
+        ("(a > 0) + 1", "ends too early: expected one of == != <= >= < >"),
+        ("a" * 20_001, "has 20001 characters: permitted are 20000"),
         ("a + 3", "ends too early: expected one of == != <= >= < >"),
         ("a + 3 and b", "found 'and', expected one of == != <= >= < >"),
         ("a > 3 +", "ends too early: expected a signal or a number"),
@@ -117,7 +121,7 @@ def test_conditions(text: str, truth: bool) -> None:
 )
 def test_what_is_no_condition_is_misuse(text: str, message: str) -> None:
     with pytest.raises(Misuse, match=message):
-        parse(text)
+        parse_condition(text)
 
 
 @pytest.mark.parametrize(
@@ -132,6 +136,9 @@ def test_what_is_no_condition_is_misuse(text: str, message: str) -> None:
         ("(a > 0.5) and (b + 1 > 0.5)", True),
         ("x.position == 2.4 cm and x.position < 25 mm", True),
         ("m.M1.position - 2 * 21 == 0", True),
+        ("m.M1.position % 5 = 2 && -m.M1.position % 5 = -2 && a <> b", True),
+        ("b || m.M1.position % b >= 0", False),
+        ("(a > 0.5) + (b > 0.5) + not_in_any_unit == 1", True),
     ],
 )
 def test_conditions_calculate(text: str, truth: bool) -> None:
@@ -160,7 +167,16 @@ def test_units_are_converted() -> None:
 @settings(deadline=None)
 @given(
     st.sampled_from(
-        ["{x} - {y} > {n}", "abs({x} - {y}) >= {n}", "{x} + 2 * {y} < {n}", "{x} * {y} == {n}", "{x} / 3 > {y} + {n}"]
+        [
+            "{x} - {y} > {n}",
+            "abs({x} - {y}) >= {n}",
+            "{x} + 2 * {y} < {n}",
+            "{x} * {y} == {n}",
+            "{x} / 3 > {y} + {n}",
+            "{x} % 7 > {n} / 10",
+            "{y} % ({x} + 50) == {n}",
+            "({x} > {n}) + ({y} < {n} and not {x} = 3) == 1",
+        ]
     ),
     st.integers(-60, 60),
     st.integers(SECOND // 2, 3 * SECOND),
@@ -247,7 +263,7 @@ def next_true(condition: SignalCondition, now: Nanos) -> Nanos | None:
 
 
 def test_the_signals_of_a_condition_are_known() -> None:
-    assert list(names(parse("a and not (b or x.position > 3)"))) == ["a", "b", "x.position"]
+    assert list(parse_condition("a and not (b or x.position > 3)").names()) == ["a", "b", "x.position"]
 
 
 @given(level=st.integers(-60, 110), now=st.integers(SECOND // 2, 4 * SECOND), velocity=st.booleans())

@@ -1,0 +1,150 @@
+"""Expressions of a user at a breakpoint: ``n + 1``, ``PosM1 > 50 and IN3 = ON``, ``other.OUT2 = 1``.
+
+Their language is that of `steptwin.world.expression`. Names without a dot are those of the program; with a dot, signals of the
+world.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from math import isfinite
+from operator import eq, ge, gt, le, lt
+from sys import float_info
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.world.expression import Read, parse_expression, value_of
+from steptwin.world.plant import Plant
+from steptwin.world.quantities import unit_of_all
+from steptwin.world.signals import Idle, SignalOf
+
+EXACT = 1e15
+"""Whole numbers below it are shown with all their digits."""
+
+_COUNTS: Mapping[str, Callable[[int, int], bool]] = {"=": eq, "==": eq, "<": lt, "<=": le, ">": gt, ">=": ge}
+
+
+class Calculation:
+    """An expression whose names are resolved for a controller of a world."""
+
+    def __init__(self, world: Plant, machine: str, text: str) -> None:
+        """Raises `Misuse` for what is no expression, and for unknown signals; names of a program may get their meaning later."""
+        node = parse_expression(text)
+        names = dict.fromkeys(node.names())
+        signals = {name: found for name in names if (found := _signal(world, machine, name)) is not None}
+        reads = {name: signals[name].value if name in signals else _read_by_program(world, machine, name) for name in names}
+        self.is_local = not signals
+        """Whether it has names of the program only."""
+
+        def unit_of(name: str) -> str:
+            return signals[name].unit if name in signals else ""
+
+        self._value = value_of(node.in_unit(unit_of_all(node, unit_of), unit_of), reads, _checked)
+        self._own = world.parts.kernel_of[machine]
+        kernels = {source.kernel: None for signal in signals.values() for source in signal.bring(world.now)}
+        self._others = [kernel for kernel in kernels if kernel is not self._own]
+
+    @property
+    def reads_others(self) -> bool:
+        """Whether it depends on what has no connection to the controller."""
+        return bool(self._others)
+
+    def value(self, now: Nanos) -> float:
+        """The value at the present moment of the world. Raises `Misuse` for a name that means nothing, a division by zero, and a
+        result that is too large."""
+        for kernel in (self._own, *self._others):
+            kernel.advance(now)
+        return float(self._value(now))
+
+    def is_known_before_statement(self, now: Nanos) -> bool:
+        """Whether `value_at_statement` can be asked: no controller that it depends on has gone ahead of the one that executes a
+        statement at ``now``."""
+        return all(kernel.now < now for kernel in self._others)
+
+    def value_at_statement(self, now: Nanos) -> float:
+        """The value that the statement finds which is about to be executed; what has no connection to its controller is as it was
+        before that moment. Raises `Misuse` as `value`."""
+        for kernel in self._others:
+            kernel.advance(now - 1)
+        return float(self._value(now))
+
+
+def _signal(world: Plant, machine: str, name: str) -> SignalOf | Idle | None:
+    """The signal that a name means; None for a name of the program. Raises `Misuse`."""
+    owner, dot, _ = name.partition(".")
+    if not dot:
+        return None
+    is_full = owner in world.machines or owner in world.parts.element_names
+    found = world.signal(name) if is_full else _own_signal(world, machine, name)
+    if not found.is_readable:
+        raise Misuse(f"{name} can only be written")
+    return found
+
+
+def _own_signal(world: Plant, machine: str, name: str) -> SignalOf | Idle:
+    try:
+        return world.signal(f"{machine}.{name}")
+    except Misuse:
+        known = ", ".join(world.programs_of(machine).variables(world.now)) or "none"
+        raise Misuse(f"{name!r} means nothing to {machine}: its variables are {known}") from None
+
+
+def _read_by_program(world: Plant, machine: str, name: str) -> Read:
+    """What a name means to the statement of a moment, or else to the controller."""
+    programs = world.programs_of(machine)
+
+    def read(now: Nanos) -> float:
+        value = programs.read(name, now)
+        return float(_own_signal(world, machine, name).value(now)) if value is None else value
+
+    return read
+
+
+def _checked(value: float) -> float:
+    """Raises `Misuse` for what nothing can be calculated with, and nothing set to."""
+    if not isfinite(value):
+        raise Misuse(f"a division by zero, or a result that is too large: permitted are numbers up to {float_info.max:.3g}")
+    return value
+
+
+class LogText:
+    """A text with expressions in braces: ``n is {n}``."""
+
+    def __init__(self, text: str, calculation: Callable[[str], Calculation]) -> None:
+        """Raises `Misuse` for what is no expression of the program, and for a brace without its partner."""
+        self._parts: list[str | Calculation] = []
+        for plain, inner, stray in re.findall(r"([^{}]+)|\{([^{}]*)\}|([{}])", text):
+            if stray:
+                raise Misuse(f"log {text!r}: a brace has no partner")
+            self._parts.append(plain or self._local(text, calculation(inner)))
+
+    @staticmethod
+    def _local(text: str, calculation: Calculation) -> Calculation:
+        if not calculation.is_local:
+            raise Misuse(f"log {text!r}: only names of the program can be in it")
+        return calculation
+
+    def shown(self, now: Nanos) -> str:
+        """As a statement at ``now`` finds it."""
+        return "".join(part if isinstance(part, str) else number_text(part.value_at_statement(now)) for part in self._parts)
+
+
+class HitCount:
+    """Which of the hits count: ``5`` and ``= 5`` the fifth, ``> 5``, ``>= 5``, ``< 5``, ``<= 5``, ``% 5`` every fifth."""
+
+    def __init__(self, text: str) -> None:
+        """Raises `Misuse`."""
+        match = re.fullmatch(r"\s*(%|[=<>]=?)?\s*([1-9]\d{0,8})\s*", text)
+        if match is None:
+            raise Misuse(f"hit count {text!r}: expected a number from 1 on, after nothing, or one of = < <= > >= %")
+        self._sign, self._number = match[1] or "=", int(match[2])
+
+    def counts(self, hit: int) -> bool:
+        """Whether hit ``hit``, from 1, is one of them."""
+        return hit % self._number == 0 if self._sign == "%" else _COUNTS[self._sign](hit, self._number)
+
+
+def number_text(value: float) -> str:
+    """A number for people."""
+    return str(int(value)) if abs(value) < EXACT and value == int(value) else f"{value:.9g}"
