@@ -318,7 +318,7 @@ def test_a_condition_without_a_finite_value_stops_and_the_world_goes_on(run: Run
         rig.line(line=3, condition="9e190 * 9e190 % 2 = 1")
         assert await rig.stop() == ("breakpoint", 3)
         for do, fields in (("evaluate", {}), ("set_value", {"name": "n"})):
-            with pytest.raises(Misuse, match="too large"):
+            with pytest.raises(Misuse, match="a number up to"):
                 rig.do(do, machine="table", expression="1e400", **fields)
         rig.do("clear_breakpoint", breakpoint=1)
         rig.do("resume")
