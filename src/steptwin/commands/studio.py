@@ -32,6 +32,7 @@ from steptwin.commands.studio_devices import serve_without_world
 from steptwin.commands.up_world import Running, UpOptions, up, up_with
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
+from steptwin.httpservice import Tls, listen
 from steptwin.inputfiles import read_bytes
 from steptwin.live.lookback import Lookback
 from steptwin.live.ports import serial_ports, twin_ports
@@ -41,7 +42,7 @@ from steptwin.studio.connections import Computer, DeviceConnections
 from steptwin.studio.device import DeviceSurroundings
 from steptwin.studio.hub import Hub, Moment, ProgramTexts, Surroundings
 from steptwin.studio.jogs import WorldJogs
-from steptwin.studio.service import Service, Tls, listen
+from steptwin.studio.service import Service
 from steptwin.studio.shown import Shown
 from steptwin.studio.shownworld import ShownWorld
 from steptwin.subject.events import Numbering

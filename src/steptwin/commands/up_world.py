@@ -13,6 +13,7 @@ from math import inf
 from pathlib import Path
 from typing import TypeAlias
 
+from steptwin.commands.gateways import open_gateways
 from steptwin.errors import Misuse
 from steptwin.files import session as sessions
 from steptwin.files.beginning import begin_world, check_session_target, is_session, set_faults
@@ -132,6 +133,7 @@ def up_with(world: World, options: UpOptions, addition: Addition | None = None) 
     if speed == inf and outside:
         raise Misuse(f"--speed max: line {outside[0].name!r} has external clients, which need real time; use 'steptwin run'")
     addresses = [address for line in world.spec.lines for key, address in line.links.items() if TRANSPORTS[key].is_address]
+    addresses += [gateway.listen for gateway in world.spec.gateways]
     check_addresses((*addresses, *(address for _, address in world.spec.vision_addresses())), listen_any=options.listen_any)
     if isinstance(kept, Path):
         check_target(kept)
@@ -264,6 +266,8 @@ async def _open(server: Server, live: LiveWorld, pace: Pace, options: UpOptions,
         server.join(Lookback(live, server.cell, pace))
     if addition is not None:
         await addition(Running(server, live, pace, control))
+    if not options.is_closed:
+        open_gateways(server, live.world.spec.gateways, control, listen_any=options.listen_any)
     if options.ready_file is not None:
         server.write_ready_file(options.ready_file)
 

@@ -11,6 +11,7 @@ from steptwin.errors import Misuse
 from steptwin.world.element import AnyElement, ElementSpec
 from steptwin.world.elements import ELEMENTS
 from steptwin.world.faults import Fault, parse
+from steptwin.world.gateways import GATEWAY, read_gateways
 from steptwin.world.kinds import KINDS
 from steptwin.world.links import LINK_KEYS
 from steptwin.world.names import check_names
@@ -40,12 +41,12 @@ def describe(name: str, text: str, seed: int | None = None, overrides: Overrides
     data = toml.data
     override(data, overrides)
     inner = {key for element in ELEMENTS.values() for key in element.inner}
-    known = [key for key in tables() if key not in inner]
+    known = [*(key for key in tables() if key not in inner), "fault", GATEWAY]
     for key in data:
-        if key not in known and key != "fault":
-            near = toml.near(key, [*known, "fault"])
-            fix = toml.key_replacement((key,) if isinstance(data[key], dict) else (key, 0), key, [*known, "fault"])
-            toml.wrong((key,), "D004", f"the file has no [{key}]{near}", f"permitted: {', '.join([*known, 'fault'])}", fix)
+        if key not in known:
+            near = toml.near(key, known)
+            fix = toml.key_replacement((key,) if isinstance(data[key], dict) else (key, 0), key, known)
+            toml.wrong((key,), "D004", f"the file has no [{key}]{near}", f"permitted: {', '.join(known)}", fix)
     world = read_table(toml, ("world",), data.get("world", {}), KEYS["world"])
     spec = WorldSpec(
         **world,
@@ -57,6 +58,7 @@ def describe(name: str, text: str, seed: int | None = None, overrides: Overrides
         ),
         elements={element.name: tuple(_elements(toml, element)) for element in ELEMENTS.values()},
         scripts=(*_events(toml), *_scripts(toml)),
+        gateways=tuple(read_gateways(toml)),
         faults=tuple(_faults(toml)),
         text=toml,
         overrides=dict(overrides),

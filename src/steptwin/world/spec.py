@@ -14,6 +14,7 @@ from steptwin.world.script import Step
 
 if TYPE_CHECKING:
     from steptwin.world.element import Element, ElementSpec
+    from steptwin.world.gateways import GatewaySpec
     from steptwin.world.kind import AnyKind
 
 S = TypeVar("S", bound="ElementSpec")
@@ -75,6 +76,7 @@ class WorldSpec:
     elements: Mapping[str, tuple[ElementSpec, ...]]
     """The elements by the names of their tables."""
     scripts: tuple[ScriptSpec, ...]
+    gateways: tuple[GatewaySpec, ...]
     faults: tuple[Fault | None, ...]
     """None for one with errors, which are in ``text``."""
     text: TomlText

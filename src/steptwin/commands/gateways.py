@@ -1,0 +1,43 @@
+"""Opens the gateways of a world or of devices, beside its lines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from steptwin.gateways import make_gateway
+from steptwin.live.server import EndPoint, Server
+from steptwin.live.world_control import WorldControl
+from steptwin.subject.commands import Command
+from steptwin.subject.contract import Description, Reading, Result
+from steptwin.subject.following import Filter, Following
+from steptwin.world.gateways import GatewaySpec
+
+
+def open_gateways(server: Server, specs: Iterable[GatewaySpec], control: WorldControl, *, listen_any: bool) -> None:
+    """Raises `Misuse` or `LineFailure` for one that cannot be opened."""
+    subject = _LiveWorldSubject(control)
+    for spec in specs:
+        gateway = make_gateway(spec, subject)
+        details = gateway.open(listen_any=listen_any)
+        place = str(details.get("url") or f"{details['host']}:{details['port']}")
+        server.join(gateway, EndPoint(spec.kind, place, gateway.protocol, details))
+
+
+class _LiveWorldSubject:
+    """A live world for gateways: it answers at once."""
+
+    def __init__(self, control: WorldControl) -> None:
+        self._control = control
+
+    @property
+    def description(self) -> Description:
+        return self._control.description
+
+    def read(self, *points: str) -> tuple[Reading, ...]:
+        return self._control.read(*points)
+
+    async def do(self, wanted: Command, /) -> Result:
+        return self._control.do(wanted)
+
+    def follow(self, what: Filter, bound: int) -> Following:
+        return self._control.follow(what, bound)

@@ -1,0 +1,45 @@
+"""The interface of gateways."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol
+
+from steptwin.subject.commands import Command
+from steptwin.subject.contract import Description, Reading, Result
+from steptwin.subject.following import Filter, Following
+
+
+class GatewaySubject(Protocol):
+    """What gateways see: a world, or devices. Answers of devices come later."""
+
+    @property
+    def description(self) -> Description: ...
+
+    def read(self, *points: str) -> tuple[Reading, ...]:
+        """Values known at present. `Misuse` for points that are not there."""
+        ...
+
+    async def do(self, wanted: Command, /) -> Result:
+        """Execute a command. Raises `SteptwinError` for a refusal or a failure of a line."""
+        ...
+
+    def follow(self, what: Filter, bound: int) -> Following: ...
+
+
+class Gateway(Protocol):
+    """A gateway in the event loop of its subject."""
+
+    @property
+    def protocol(self) -> str:
+        """Its name for people."""
+        ...
+
+    def open(self, *, listen_any: bool) -> Mapping[str, object]:
+        """Listen; the end point for programs, with ``host``, ``port`` and, where there is one, ``url``.
+
+        Raises `Misuse` for an address that is not permitted, `LineFailure` for one that cannot be used.
+        """
+        ...
+
+    async def close(self) -> None: ...

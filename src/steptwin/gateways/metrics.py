@@ -1,0 +1,125 @@
+"""The state of a subject as metrics, with names by the conventions of Prometheus; docs/gateways.md lists them.
+
+What is unknown has no sample.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from typing import Any, TypeAlias, cast
+
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
+
+from steptwin import __version__
+from steptwin.errors import LineFailure
+from steptwin.gateways.contract import GatewaySubject
+from steptwin.machine import SECOND
+from steptwin.subject import commands as command
+from steptwin.subject.contract import Description
+from steptwin.subject.following import Filter
+
+Sample: TypeAlias = tuple[tuple[str, ...], bool | float | None]
+"""Values of the labels, and the value; None where it is unknown."""
+
+PREFIX = "steptwin_"
+ACTIVE = ("running", "waiting")
+COUNTED = frozenset({"status", "report", "note", "fault", "input", "button"})
+"""Kinds of events that are counted; others are as frequent as motion."""
+MOST_EVENTS = 4096
+"""Events that may happen between two reads of the metrics; of more, the rest is counted as missed."""
+
+_AXIS = ("controller", "axis")
+
+
+class Metrics:
+    """Metrics of ``subject``; counters begin now."""
+
+    def __init__(self, subject: GatewaySubject) -> None:
+        self._subject = subject
+        self._following = subject.follow(Filter(COUNTED), MOST_EVENTS)
+        self._counts: Counter[tuple[str, str]] = Counter()
+        self._missed = 0
+
+    def close(self) -> None:
+        self._following.close()
+
+    async def read(self) -> list[Metric]:
+        """The present values."""
+        description = self._subject.description
+        sheets = {part.name: part.datasheet for part in description.machines}
+        states = {name: await self._state(name) for name in sheets}
+        up = [((name, sheet.kind, sheet.variant), states[name] is not None) for name, sheet in sheets.items()]
+        known = {name: state for name, state in states.items() if state is not None}
+        return [
+            _gauge("build_info", "Version of the program.", ("version", "subject"), [((__version__, description.name), True)]),
+            *await self._time(description),
+            _gauge("controller_up", "Whether it answers.", ("controller", "kind", "variant"), up),
+            *_of_controllers(known),
+            *_of_axes(known),
+            *self._events(),
+        ]
+
+    async def _state(self, machine: str) -> Mapping[str, Any] | None:
+        """None for a device that does not answer."""
+        try:
+            return cast("Mapping[str, Any]", (await self._subject.do(command.State(machine))).value)
+        except LineFailure:
+            return None
+
+    async def _time(self, description: Description) -> list[Metric]:
+        if "time" not in description.commands:
+            return []
+        time = cast("Mapping[str, Any]", (await self._subject.do(command.Time())).value)
+        return [
+            _gauge("time_seconds", "Time of the subject: virtual for twins.", (), [((), int(time["time_ns"]) / SECOND)]),
+            _gauge("paused", "Whether its time stands.", (), [((), time["paused"])]),
+        ]
+
+    def _events(self) -> list[Metric]:
+        missed, events = self._following.take()
+        self._missed += missed
+        self._counts.update((event.machine, event.kind) for event in events)
+        counted = CounterMetricFamily(f"{PREFIX}events", "Events since the gateway was opened.", labels=("controller", "kind"))
+        for labels, count in sorted(self._counts.items()):
+            counted.add_metric(labels, count)
+        return [counted, CounterMetricFamily(f"{PREFIX}events_missed", "Events that were not counted.", value=self._missed)]
+
+
+def _of_controllers(states: Mapping[str, Mapping[str, Any]]) -> list[Metric]:
+    statuses = [((name, one["status"]["level"], one["status"]["text"]), True) for name, one in states.items()]
+    programs = [
+        ((name,), one["program"]["state"] in ACTIVE) for name, one in states.items() if one["program"]["state"] is not None
+    ]
+    pins = [((name, pin), level) for name, one in states.items() for pin, level in one["pins"].items()]
+    return [
+        _gauge("controller_status", "1 for the present status.", ("controller", "level", "text"), statuses),
+        _gauge("program_running", "Whether its program runs or waits.", ("controller",), programs),
+        _gauge("pin_level", "Level of a pin: 0, 1 or volts.", ("controller", "pin"), pins),
+    ]
+
+
+def _of_axes(states: Mapping[str, Mapping[str, Any]]) -> list[Metric]:
+    axes = [(name, axis) for name, one in states.items() for axis in one["axes"]]
+
+    def values(key: str, *labels: str) -> list[Sample]:
+        return [((name, axis["name"], *(axis[label] for label in labels)), axis[key]) for name, axis in axes]
+
+    statuses = [((name, axis["name"], axis["status"]["level"], axis["status"]["text"]), True) for name, axis in axes]
+    in_unit = (*_AXIS, "unit")
+    return [
+        _gauge("axis_position", "Counted position in the unit of the axis.", in_unit, values("position", "unit")),
+        _gauge("axis_velocity", "Velocity in units per second.", in_unit, values("velocity", "unit")),
+        _gauge("axis_moving", "Whether it moves.", _AXIS, values("moving")),
+        _gauge("axis_enabled", "Whether its drive is on.", _AXIS, values("enabled")),
+        _gauge("axis_encoder_counts", "Counts of its encoder.", _AXIS, values("encoder")),
+        _gauge("axis_status", "1 for the present status.", (*_AXIS, "level", "text"), statuses),
+    ]
+
+
+def _gauge(name: str, meaning: str, labels: tuple[str, ...], samples: Iterable[Sample]) -> Metric:
+    found = GaugeMetricFamily(PREFIX + name, meaning, labels=labels)
+    for values, value in samples:
+        if value is not None:
+            found.add_metric(values, float(value))
+    return found

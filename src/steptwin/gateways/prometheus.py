@@ -1,0 +1,111 @@
+"""``[gateway.prometheus]``: metrics, health and readiness over HTTP.
+
+``/metrics`` is what Prometheus reads (text or OpenMetrics, as it asks); ``/health`` answers 200 while the process works,
+``/ready`` 200 while every controller answers and 503 otherwise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable, Iterable, Mapping, MutableMapping
+from typing import Any, TypeAlias
+
+from prometheus_client import CollectorRegistry
+from prometheus_client.core import Metric
+from prometheus_client.exposition import choose_encoder
+
+from steptwin.gateways.contract import GatewaySubject
+from steptwin.gateways.metrics import PREFIX, Metrics
+from steptwin.httpservice import HttpService, listen
+from steptwin.world.addresses import Address, parse_address
+from steptwin.world.gateways import GatewaySpec
+
+Send: TypeAlias = Callable[[MutableMapping[str, Any]], Awaitable[None]]
+TEXT = "text/plain; charset=utf-8"
+
+
+class PrometheusGateway:
+    """Serves the metrics of ``subject`` where ``spec`` says. A `Gateway`."""
+
+    protocol = "metrics"
+
+    def __init__(self, spec: GatewaySpec, subject: GatewaySubject) -> None:
+        self._spec = spec
+        self._subject = subject
+        self._metrics: Metrics | None = None
+        self._service: HttpService | None = None
+
+    def open(self, *, listen_any: bool) -> Mapping[str, object]:
+        listening = listen(parse_address(self._spec.listen, listen_any=listen_any), is_fixed=True)
+        self._metrics = Metrics(self._subject)
+        self._service = HttpService(Pages(self._metrics), listening)
+        self._service.start()
+        host, port = listening.getsockname()[:2]
+        return {"host": host, "port": port, "url": f"http://{Address(host, port)}/metrics"}
+
+    async def close(self) -> None:
+        if self._service is not None:
+            await self._service.close()
+        if self._metrics is not None:
+            self._metrics.close()
+
+
+make = PrometheusGateway
+
+
+class Pages:
+    """The ASGI application."""
+
+    def __init__(self, metrics: Metrics) -> None:
+        self._metrics = metrics
+
+    async def __call__(self, scope: Mapping[str, Any], receive: object, send: Send) -> None:
+        if scope["type"] != "http":
+            return
+        if scope["method"] not in ("GET", "HEAD"):
+            await _answer(send, scope, 405, TEXT, b"only GET and HEAD are served\n")
+            return
+        path = scope["path"]
+        if path == "/metrics":
+            found = await self._metrics.read()
+            accepted = dict(scope["headers"]).get(b"accept", b"").decode("latin-1")
+            encode, kind = choose_encoder(accepted)
+            await _answer(send, scope, 200, kind, encode(_registry(found)))
+        elif path == "/health":
+            await _answer(send, scope, 200, TEXT, b"ok\n")
+        elif path == "/ready":
+            silent = [name for name, is_up in controllers_up(await self._metrics.read()).items() if not is_up]
+            text = f"no answer from {', '.join(silent)}\n" if silent else "ready\n"
+            await _answer(send, scope, 503 if silent else 200, TEXT, text.encode())
+        else:
+            await _answer(send, scope, 404, TEXT, b"served are /metrics, /health and /ready\n")
+
+
+def controllers_up(metrics: Iterable[Metric]) -> dict[str, bool]:
+    """Whether each controller answers, by name."""
+    found = next(metric for metric in metrics if metric.name == f"{PREFIX}controller_up")
+    return {sample.labels["controller"]: sample.value > 0 for sample in found.samples}
+
+
+class _Found:
+    """A collector of metrics that have been read."""
+
+    def __init__(self, metrics: Iterable[Metric]) -> None:
+        self._metrics = metrics
+
+    def collect(self) -> Iterable[Metric]:
+        return self._metrics
+
+    def describe(self) -> Iterable[Metric]:
+        return ()
+
+
+def _registry(metrics: Iterable[Metric]) -> CollectorRegistry:
+    registry = CollectorRegistry(auto_describe=False)
+    registry.register(_Found(metrics))
+    return registry
+
+
+async def _answer(send: Send, scope: Mapping[str, Any], status: int, kind: str, body: bytes) -> None:
+    headers = [(b"content-type", kind.encode()), (b"content-length", str(len(body)).encode())]
+    await send({"type": "http.response.start", "status": status, "headers": headers})
+    await send({"type": "http.response.body", "body": b"" if scope["method"] == "HEAD" else body})
