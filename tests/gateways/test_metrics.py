@@ -150,7 +150,10 @@ def test_a_silent_device_is_not_ready() -> None:
     assert answer(subject, "/ready")[0::2] == (503, "no answer from drum\n")
     assert answer(subject, "/health")[0] == 200
     found = samples(Metrics(subject))
-    assert [found["steptwin_controller_up", labels] for labels in (("table", "mic488", "1.70"), ("drum", "m1486", "B"))] == [1.0, 0.0]
+    assert [found["steptwin_controller_up", labels] for labels in (("table", "mic488", "1.70"), ("drum", "m1486", "B"))] == [
+        1.0,
+        0.0,
+    ]
 
 
 @pytest.mark.parametrize(("path", "method", "status"), [("/", "GET", 404), ("/metrics", "POST", 405), ("/metrics/", "GET", 404)])

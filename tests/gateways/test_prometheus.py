@@ -42,7 +42,9 @@ def test_promtool_reads_the_metrics(require_peer: Callable[[str], str], tmp_path
         with urllib.request.urlopen(url, timeout=60) as answer:
             text = answer.read().decode()
         assert 'steptwin_axis_enabled{axis="M1",controller="table"} 1.0\n' in text
-        checked = subprocess.run([promtool, "check", "metrics"], input=text, capture_output=True, text=True, timeout=60, check=False)
+        checked = subprocess.run(
+            [promtool, "check", "metrics"], input=text, capture_output=True, text=True, timeout=60, check=False
+        )
         assert (checked.returncode, checked.stderr) == (0, "")
     finally:
         process.send_signal(signal.SIGINT)

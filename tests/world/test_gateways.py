@@ -24,7 +24,7 @@ def test_without_keys_it_listens_on_its_usual_port() -> None:
     ("table", "message"),
     [
         ("[gateway.promteheus]\n", "there is no [gateway.promteheus] (did you mean 'prometheus'?)"),
-        ('[gateway.prometheus]\nport = 1\n', "[gateway.prometheus] has no 'port'"),
+        ("[gateway.prometheus]\nport = 1\n", "[gateway.prometheus] has no 'port'"),
         ('[gateway.prometheus]\nlisten = "9100"\n', "[gateway.prometheus]: listen: '9100' is not an address"),
         ("gateway = 1\n", "[gateway] is 1"),
         ("[gateway]\nprometheus = 1\n", "[gateway.prometheus] is 1"),
