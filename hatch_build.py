@@ -17,7 +17,7 @@ class PageHook(BuildHookInterface):
         builder = root / "studio-web/build.py"
         if version == "editable" or not builder.exists() or is_current(root):
             return
-        if subprocess.run([sys.executable, str(builder)], check=False).returncode:
+        if subprocess.run([sys.executable, str(builder), "build"], check=False).returncode:
             raise RuntimeError("the page of the studio could not be built: studio-web/README.md says what that needs")
 
 

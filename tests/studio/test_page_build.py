@@ -143,10 +143,10 @@ def test_an_editable_install_never_builds_the_page(tmp_path: Path) -> None:
         shutil.copy(ROOT / name, clone)
     shutil.copy(ROOT / "src/steptwin/__init__.py", clone / "src/steptwin")
     (clone / "studio-web").mkdir()
-    (clone / "studio-web/build.py").write_text("import sys; sys.exit('npm was called')\n", "utf-8")
+    (clone / "studio-web/build.py").write_text("import sys; sys.exit(f'npm was called: {sys.argv[1:]}')\n", "utf-8")
     script = "import hatchling.build as b, sys; print(getattr(b, sys.argv[1])(sys.argv[2]))"
     editable = [sys.executable, "-c", script, "build_editable", str(tmp_path)]
     subprocess.run(editable, cwd=clone, check=True, capture_output=True)
     wheel = subprocess.run([*editable[:3], "build_wheel", str(tmp_path)], cwd=clone, check=False, capture_output=True, text=True)
-    assert "npm was called" in wheel.stderr
+    assert "npm was called: ['build']" in wheel.stderr
     assert "the page of the studio could not be built" in wheel.stderr
