@@ -41,8 +41,9 @@ def verify(
     progress: Progress = lambda id_, number, count: None,
     is_cancelled: Callable[[], bool] = lambda: False,
 ) -> Report:
-    """Check a controller. ``now`` (ISO 8601) and ``version`` (of steptwin) are for the report; ``move``: an axis of a MIC488 and how
-    far it may move.
+    """Check a controller.
+
+    ``now`` (ISO 8601) and ``version`` (of steptwin) are for the report; ``move``: an axis of a MIC488 and how far it may move.
 
     Raises `Misuse`, `Refusal`, `LineFailure`.
     """
