@@ -16,12 +16,11 @@ from typing import Any
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+from shell import Shell
 
-from steptwin.cli import main
-from steptwin.cli.device import SuspensionDetector, print_started, shown, table, tied
+from steptwin.cli.device import SuspensionDetector, print_started, shown, table
 from steptwin.drivers import Mic488
-from steptwin.drivers.address import DeviceAddress, parse_device
-from steptwin.errors import Misuse, Refusal
+from steptwin.errors import Refusal
 from steptwin.live.ports import FoundPort
 from steptwin.mic488.registers import register_map
 
@@ -47,33 +46,6 @@ def test_somebody_at_a_terminal_is_told_that_it_moves(
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     print_started(["M1", "M3"])
     assert capsys.readouterr() == ("", "M1, M3 under way; Ctrl-C stops\n")
-
-
-class Shell:
-    """Runs the command line in this process. What it printed, what it complained about, and its exit code."""
-
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-        self._monkeypatch = monkeypatch
-        self._capsys = capsys
-        self.errors = ""
-        self.code = 0
-
-    def __call__(self, *arguments: str) -> str:
-        self._monkeypatch.setattr("sys.argv", ["steptwin", *arguments])
-        self._capsys.readouterr()
-        self.code = 0
-        try:
-            main()
-        except SystemExit as end:
-            self.code = end.code if isinstance(end.code, int) else 0
-        out, self.errors = self._capsys.readouterr()
-        return out
-
-
-@pytest.fixture
-def shell(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Shell:
-    monkeypatch.delenv("STEPTWIN_DEVICE", raising=False)
-    return Shell(monkeypatch, capsys)
 
 
 @pytest.fixture
@@ -191,7 +163,7 @@ def test_who_does_not_answer(twin: Any, shell: Shell, monkeypatch: pytest.Monkey
     assert "gateway target failed to respond" in shell.errors
     shell("info", "--device", f"rtu-tcp://127.0.0.1:{twin.rtu_tcp_port},unit=9,timeout=0.01")
     assert "no answer to 'unit 9: read the control registers of firmware" in shell.errors
-    assert "If these are M1486 chips, put ',kind=m1486' behind the address" in shell.errors
+    assert "If it is an M1486, put ',kind=m1486' behind the address" in shell.errors
     monkeypatch.delenv("STEPTWIN_DEVICE")
     monkeypatch.setattr("steptwin.live.twins.running", list)
     shell("info")
@@ -229,23 +201,6 @@ def check_that_a_key_ends_a_jog(place: str) -> None:
 
 
 # ---------------------------------------------------------------------- without a device
-
-
-def test_addresses() -> None:
-    assert parse_device("/dev/ttyUSB0") == DeviceAddress("/dev/ttyUSB0")
-    address = parse_device("tcp://h:1, unit=3,baud=9600,firmware=1.23,config=a b.cfg,timeout=2.5")
-    assert address == DeviceAddress("tcp://h:1", 3, 9600, "1.23", "a b.cfg", 2.5)
-    assert str(address) == "tcp://h:1,unit=3"
-
-
-@pytest.mark.parametrize("text", ["", ",unit=1", "x,units=1", "x,unit=", "x,unit=a", "x,unit=1,unit=2", "x,unit"])
-def test_what_is_no_address(text: str) -> None:
-    with pytest.raises(Misuse, match=r"has no address|is none of|is not a number"):
-        parse_device(text)
-
-
-def test_numbers_tied_to_axes() -> None:
-    assert tied(["1=12,5", "m2=-3", "3=0x10"]) == {1: 12.5, 2: -3.0, 3: 16.0}
 
 
 def test_tables() -> None:

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from steptwin.drivers.address import DeviceAddress
+from steptwin.drivers.kind import DeviceAddress
 from steptwin.errors import LineFailure, Misuse
 from steptwin.live import twins
 from steptwin.live.twins import find_controller, find_device, running_twins
@@ -85,9 +85,17 @@ def test_what_twins_announce(run: Any) -> None:
     ]
 
 
-DRUM = DeviceAddress("tcp://127.0.0.1:6000", unit=2, firmware="1.40")
-DEMO_AT = DeviceAddress("tcp://127.0.0.1:5020", unit=3, firmware="1.70")
-RIGHT = DeviceAddress("rfc2217://[::1]:6002", baud=4800, timeout=0.5, kind="m1486", chip=10, variant="E1")
+def mic488(place: str, unit: int = 1, firmware: str | None = None) -> DeviceAddress:
+    return DeviceAddress(place, "mic488", unit, 38400, 0.3, firmware)
+
+
+def m1486(place: str, chip: int | None = None, variant: str | None = None) -> DeviceAddress:
+    return DeviceAddress(place, "m1486", chip, 4800, 0.5, variant)
+
+
+DRUM = mic488("tcp://127.0.0.1:6000", 2, "1.40")
+DEMO_AT = mic488("tcp://127.0.0.1:5020", 3, "1.70")
+RIGHT = m1486("rfc2217://[::1]:6002", 10, "E1")
 
 
 @pytest.mark.parametrize(
@@ -101,9 +109,9 @@ RIGHT = DeviceAddress("rfc2217://[::1]:6002", baud=4800, timeout=0.5, kind="m148
         ("/plant/machine.toml,unit=2", DRUM, ("machine", "drum")),
         ("machine.right", RIGHT, ("machine", "right")),
         ("machine,chip=a", RIGHT, ("machine", "right")),
-        ("127.0.0.1:5021,unit=3", DeviceAddress("rtu-tcp://127.0.0.1:5021", unit=3), ("mic488", "mic488")),
-        ("localhost:5020", DeviceAddress("tcp://127.0.0.1:5020"), ("mic488", None)),
-        ("tcp://localhost:5020", DeviceAddress("tcp://127.0.0.1:5020"), ("mic488", None)),
+        ("127.0.0.1:5021,unit=3", mic488("rtu-tcp://127.0.0.1:5021", 3), ("mic488", "mic488")),
+        ("localhost:5020", mic488("tcp://127.0.0.1:5020"), ("mic488", None)),
+        ("tcp://localhost:5020", mic488("tcp://127.0.0.1:5020"), ("mic488", None)),
     ],
 )
 def test_a_running_twin_is_found(run: Any, text: str, device: DeviceAddress, controller: tuple[str, str | None]) -> None:
@@ -120,9 +128,7 @@ def test_the_only_twin_needs_no_name(run: Any) -> None:
 
 def test_a_whole_line_of_chips(run: Any) -> None:
     run(MACHINE)
-    assert find_device("machine,kind=m1486", whole_line=True) == DeviceAddress(
-        "rfc2217://[::1]:6002", baud=4800, timeout=0.5, kind="m1486", variant="E1"
-    )
+    assert find_device("machine,kind=m1486", whole_line=True) == m1486("rfc2217://[::1]:6002", None, "E1")
     with pytest.raises(Misuse, match=r"machine has several controllers: .* machine\.left \(m1486 chip=7\), machine\.right"):
         find_device("machine,kind=m1486")
 
@@ -132,7 +138,7 @@ def test_the_pty_of_a_twin_says_what_is_there(run: Any, tmp_path: Path) -> None:
     link.symlink_to(os.ttyname(line[1]))
     run({**CABLE, "end_points": [{"kind": "pty", "protocol": "M1486 line", "line": "m1486", "path": str(link)}]})
     for place in (str(link), os.ttyname(line[1])):
-        assert find_device(place) == DeviceAddress(place, baud=4800, timeout=0.5, kind="m1486")
+        assert find_device(place) == m1486(place)
         assert find_device(f"{place},kind=mic488").kind == "mic488"
     for number in line:
         os.close(number)
@@ -142,7 +148,7 @@ def test_the_pty_of_a_twin_says_what_is_there(run: Any, tmp_path: Path) -> None:
 def test_addresses_of_devices_pass_as_they_are(run: Any, text: str) -> None:
     """No twin is asked: one that is suspended would delay a stop."""
     run(DEMO, suspended=("mic488",))
-    assert find_device(f"{text},unit=2") == DeviceAddress(text, unit=2)
+    assert find_device(f"{text},unit=2") == mic488(text, 2)
 
 
 def test_a_host_and_a_port_are_modbus_tcp() -> None:

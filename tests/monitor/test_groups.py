@@ -44,7 +44,7 @@ def test_without_textual_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> 
         ("tcp://127.0.0.1:1", 0.0, "--hz 0: permitted are"),
         ("tcp://127.0.0.1:1", 50.0, "--hz 50: permitted are"),
         ("nonsense:", 5.0, "'nonsense:' is not an address"),
-        ("tcp://127.0.0.1:1,chip=7", 5.0, "the monitor shows a MIC488; for an M1486 use 'steptwin watch'"),
+        ("tcp://127.0.0.1:1,chip=7", 5.0, "the monitor is for a MIC488; tcp://127.0.0.1:1 is of kind m1486"),
         ("tcp://127.0.0.1:1", 5.0, "the monitor needs a terminal"),
     ],
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import sys
 import time
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from math import isfinite
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,9 +15,7 @@ from steptwin.cli import completion
 from steptwin.errors import LineFailure, Misuse, Refusal
 
 if TYPE_CHECKING:
-    from steptwin.drivers import Mic488
-    from steptwin.drivers.address import DeviceAddress
-    from steptwin.drivers.m1486.identify import SearchLine
+    from steptwin.drivers.kind import AnyDriverKind, DeviceAddress, Values
 
 Device = Annotated[
     str | None,
@@ -34,9 +32,8 @@ Device = Annotated[
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 LogFrames = Annotated[bool, typer.Option("--log-frames", help="Print every frame in words to the standard error.")]
-Axes = Annotated[list[str] | None, typer.Argument(metavar="AXES", help="1 to 4, or M1 to M4. Default: all.")]
+Axes = Annotated[list[str] | None, typer.Argument(metavar="AXES", help="1 or M1, 2 or M2, … Default: all.")]
 REAL_LIMIT = 3.4e38
-TIED = "expected AXIS=NUMBER, such as 1=12.5 or M1=12.5"
 
 
 def find(device: str | None, *, whole_line: bool = False) -> DeviceAddress:
@@ -46,58 +43,52 @@ def find(device: str | None, *, whole_line: bool = False) -> DeviceAddress:
     return find_device(device, whole_line=whole_line)
 
 
-@contextlib.contextmanager
-def opened(address: DeviceAddress, *, observe: bool = True, log_frames: bool = False) -> Generator[Mic488]:
-    """A driver of the MIC488 there. ``observe``: DATA_TYPE is left as it is. Raises `Misuse` for another kind of device."""
-    from steptwin.drivers import Mic488, NoAnswer
+def kind_of(address: DeviceAddress) -> AnyDriverKind:
+    """What the drivers of the device offer."""
+    from steptwin.drivers.kinds import DRIVERS
 
-    if address.kind != "mic488":
-        commands = "info, get, set, watch, home, seek, move, jog, stop, send and terminal"
-        raise Misuse(f"this command is for the MIC488; for an M1486 there are {commands}")
-    mic = Mic488(
-        address.place,
-        address.unit,
-        baud=address.baud,
-        firmware=address.firmware,
-        config=address.config,
-        timeout_s=address.timeout,
-        observe=observe,
-        log=complain if log_frames else None,
-    )
+    return DRIVERS[address.kind]
+
+
+def no_command(kind: AnyDriverKind, command: str) -> Misuse:
+    """Refuse a command that only other devices have."""
+    return Misuse(f"{kind.title} has no {command}")
+
+
+@contextlib.contextmanager
+def opened(address: DeviceAddress, *, observe: bool = True, log_frames: bool = False) -> Generator[Any]:
+    """A driver of the device there. ``observe``: settings are left as they are."""
+    kind = kind_of(address)
+    with contextlib.ExitStack() as stack:
+        with other_kinds_named(kind, address):
+            driver = stack.enter_context(kind.opened(address, observe, log_of(log_frames)))
+        yield driver
+
+
+@contextlib.contextmanager
+def other_kinds_named(kind: AnyDriverKind, address: DeviceAddress) -> Generator[None]:
+    """If the device does not answer, name other kinds that it may be, and end what they have received."""
+    from steptwin.drivers import NoAnswer
+    from steptwin.drivers.kinds import others_there
+
     try:
-        mic.open()
+        yield
     except NoAnswer as error:
-        drop_rubbish(address.place, address.baud)
-        raise LineFailure(f"{error}. If these are M1486 chips, put ',kind=m1486' behind the address") from error
-    try:
-        yield mic
-    finally:
-        mic.close()
+        clear_line(kind, address.place, address.baud)
+        raise LineFailure(f"{error}{others_there(kind)}") from error
 
 
-@contextlib.contextmanager
-def search_line(place: str, baud: int) -> Generator[SearchLine]:
-    """Open a line to search it for M1486 chips."""
-    from steptwin.drivers.blocking import finish
-    from steptwin.drivers.m1486.identify import SearchLine
+def clear_line(kind: AnyDriverKind, place: str, baud: int) -> None:
+    """End the bytes of a kind of device on a line, so that devices of other kinds read their next command correctly."""
+    from steptwin.drivers.kinds import DRIVERS
 
-    line = SearchLine(place, baud=baud)
-    finish(line.open())
-    try:
-        yield line
-    finally:
-        finish(line.close())
+    for other in DRIVERS.values():
+        if other is not kind and other.clear is not None:
+            other.clear(place, baud)
 
 
-def drop_rubbish(place: str, baud: int) -> None:
-    """End the Modbus bytes on the line, so that M1486 chips on it, if any, read their next command correctly."""
-    from steptwin.drivers.address import CHIP_BAUD
-    from steptwin.drivers.blocking import finish
-    from steptwin.drivers.m1486.identify import end_line
-
-    for rate in (baud,) if "://" in place else (baud, CHIP_BAUD):
-        with contextlib.suppress(LineFailure, Misuse), search_line(place, rate) as line:
-            finish(end_line(line))
+def log_of(log_frames: bool) -> Callable[[str], object] | None:
+    return complain if log_frames else None
 
 
 def complain(text: str) -> None:
@@ -108,39 +99,11 @@ def complain(text: str) -> None:
 # ---------------------------------------------------------------------- what people type
 
 
-def axis_of(text: str) -> int:
-    """``1`` or ``M1``. Raises `Misuse`."""
-    number = text.strip().upper().removeprefix("M")
-    if number not in ("1", "2", "3", "4"):
-        raise Misuse(f"{text!r} is not an axis: permitted are 1 to 4, or M1 to M4")
-    return int(number)
+def axes_of(texts: Sequence[str] | None, kind: AnyDriverKind) -> list[int]:
+    """``1 M2`` or ``1,2``; none: an empty list. Raises `Misuse`."""
+    from steptwin.drivers.typed import axis_of
 
-
-def axes_of(texts: Sequence[str] | None) -> list[int]:
-    return [axis_of(part) for text in texts or [] for part in text.split(",")]
-
-
-def tied(texts: Sequence[str]) -> dict[int, float]:
-    """``1=12.5 M2=-3`` as numbers by axis. Raises `Misuse`."""
-    values: dict[int, float] = {}
-    for text in texts:
-        name, equals, value = text.partition("=")
-        if not equals:
-            raise Misuse(f"{text!r}: {TIED}")
-        axis = axis_of(name)
-        if axis in values:
-            raise Misuse(f"{text!r}: M{axis} is given twice")
-        values[axis] = number_of(value, text)
-    return values
-
-
-def number_of(value: str, whole: str) -> float:
-    """A number with a point or a comma, or hexadecimal. Raises `Misuse`."""
-    value = value.strip()
-    try:
-        return int(value, 16) if value.lower().startswith("0x") else float(value.replace(",", "."))
-    except ValueError:
-        raise Misuse(f"{whole!r}: {value!r} is not a number") from None
+    return [axis_of(part, kind.axes) for text in texts or [] for part in text.split(",")]
 
 
 # ---------------------------------------------------------------------- what people read
@@ -170,13 +133,26 @@ def print_started(names: Sequence[str]) -> None:
 
 
 def shown(value: object) -> str:
-    if isinstance(value, bool):
-        return "ON" if value else "OFF"
-    if not isinstance(value, float):
-        return str(value)
-    from steptwin.mic488.encoding import shortest_real
+    from steptwin.drivers import typed
 
-    return shortest_real(value)
+    return typed.shown(value)
+
+
+def values_table(values: Values) -> str:
+    """Names, values, and their units or meanings."""
+    return table([(name, shown(one.value), one.unit or one.meaning) for name, one in values.items()])
+
+
+def values_data(values: Values) -> dict[str, Any]:
+    """For JSON: ``value``, and where there is one ``unit`` or ``meaning``."""
+    return {
+        name: {
+            "value": one.value,
+            **({"unit": one.unit} if one.unit else {}),
+            **({"meaning": one.meaning} if one.meaning else {}),
+        }
+        for name, one in values.items()
+    }
 
 
 def as_json(value: Any) -> Any:

@@ -1,19 +1,17 @@
 """``steptwin enable``, ``disable``, ``home``, ``seek``, ``move``, ``jog``, ``stop``: axes from the command line.
 
-From Python: `steptwin.drivers.Mic488` and its axes.
+From Python: `steptwin.drivers.Mic488` and its axes, `steptwin.drivers.m1486.M1486`.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from steptwin.cli import chip_motion
 from steptwin.cli.device import (
     Axes,
     Device,
@@ -23,33 +21,43 @@ from steptwin.cli.device import (
     axes_of,
     complain,
     find,
-    number_of,
+    kind_of,
+    log_of,
+    no_command,
     opened,
+    other_kinds_named,
     print_json,
     print_started,
-    tied,
 )
 from steptwin.cli.keys import interruptible, keys
 from steptwin.errors import Misuse, Refusal
 
 if TYPE_CHECKING:
-    from steptwin.drivers import Mic488, MoveEnd
-    from steptwin.drivers.address import DeviceAddress
+    from steptwin.drivers.kind import DeviceAddress, DeviceMotion, EndedMotion
 
 Wait = Annotated[bool, typer.Option("--wait/--no-wait", help="Wait for the end, and stop at Ctrl-C.")]
 Timeout = Annotated[float | None, typer.Option(help="Seconds to wait at most. Default: computed from the motion.")]
+HOLD_RANGE_S = (0.2, 2.0)
 
 
 def enable(axes: Axes = None, device: Device = None, log_frames: LogFrames = False) -> None:
     """Switch drives on."""
-    with opened(find(device), log_frames=log_frames) as mic:
-        mic.enable(*axes_of(axes))
+    _switch("enable", axes, device, log_frames=log_frames)
 
 
 def disable(axes: Axes = None, device: Device = None, log_frames: LogFrames = False) -> None:
     """Switch drives off. Pulses end at once."""
-    with opened(find(device), log_frames=log_frames) as mic:
-        mic.disable(*axes_of(axes))
+    _switch("disable", axes, device, log_frames=log_frames)
+
+
+def _switch(command: str, axes: Sequence[str] | None, device: str | None, *, log_frames: bool) -> None:
+    address = find(device)
+    kind = kind_of(address)
+    if kind.enable is None:
+        raise no_command(kind, command)
+    wanted = axes_of(axes, kind)
+    with opened(address, log_frames=log_frames) as driver:
+        kind.enable(driver, wanted, command == "enable")
 
 
 def stop(
@@ -62,15 +70,11 @@ def stop(
 ) -> None:
     """Stop axes at once, without ramp; an M1486 with its ramp. A program that runs may move them again: see --program."""
     address = find(device)
-    if address.kind == "m1486":
-        chip_motion.stop(address, program=program, log_frames=log_frames)
-        return
-    with opened(find(device), log_frames=log_frames) as mic:
-        mic.stop(*axes_of(axes))
-        if program:
-            mic.program.stop()
-        elif mic.program.state() == 1:
-            complain("the program in the controller runs on and may move the axes again: --program ends it")
+    kind = kind_of(address)
+    with other_kinds_named(kind, address):
+        warning = kind.stop(address, log_of(log_frames), axes_of(axes, kind), program)
+    if warning is not None:
+        complain(warning)
 
 
 def move(
@@ -87,32 +91,13 @@ def move(
 
     An M1486 has axis 1, and its unit is the full step.
     """
-    from steptwin.drivers.line import check_wait
+    from steptwin.drivers.kind import WantedMoves
+    from steptwin.drivers.typed import tied
 
     address = find(device)
-    if address.kind == "m1486":
-        check_wait(timeout)
-        target = number_of(chip_motion.axis_value(targets, "NUMBER"), " ".join(targets))
-        chip_motion.move(address, target, by=by, velocity=velocity, wait=wait, timeout=timeout, json=json, log_frames=log_frames)
-        return
-    values = tied(targets)
-
-    held_up = SuspensionDetector()
-
-    def begin(mic: Mic488, begun: set[int]) -> None:
-        held_up.check()
-        if velocity is not None:
-            for axis in values:
-                mic.axis(axis).set_ramp(velocity=velocity)
-        held_up.check()
-        if len(values) > 1:
-            (mic.move_together_by if by else mic.move_together)(values)
-        else:
-            ((axis, value),) = values.items()
-            (mic.axis(axis).move_by if by else mic.axis(axis).move_to)(value)
-        begun.update(values)
-
-    _do(address, values, begin, wait=wait, timeout=timeout, json=json, log_frames=log_frames)
+    kind = kind_of(address)
+    motion = kind.move(WantedMoves(tied(targets, kind.axes), by, velocity))
+    _do(address, motion, wait=wait, timeout=timeout, json=json, log_frames=log_frames)
 
 
 def home(
@@ -132,25 +117,11 @@ def home(
 
     An M1486 seeks the line at start/stop speed, and its position is 0 there.
     """
-    from steptwin.drivers.line import check_wait
-
     address = find(device)
-    if address.kind == "m1486":
-        check_wait(timeout)
-        wanted = chip_motion.sought(velocities)
-        chip_motion.seek(address, wanted, home=True, wait=wait, timeout=timeout, json=json, log_frames=log_frames)
-        return
-    values = tied(velocities)
-
-    held_up = SuspensionDetector()
-
-    def begin(mic: Mic488, begun: set[int]) -> None:
-        for axis, velocity in values.items():
-            held_up.check()
-            mic.axis(axis).home(velocity)
-            begun.add(axis)
-
-    _do(address, values, begin, wait=wait, timeout=timeout, json=json, log_frames=log_frames)
+    kind = kind_of(address)
+    if kind.home is None:
+        raise no_command(kind, "home")
+    _do(address, kind.home(velocities), wait=wait, timeout=timeout, json=json, log_frames=log_frames)
 
 
 def seek(
@@ -165,62 +136,57 @@ def seek(
 
     That is low for B1 to B3, B8 to B11 and B16 to B19, else high. The number of the line is in the internal variable afterwards.
     """
-    from steptwin.drivers.line import check_wait
-
-    check_wait(timeout)
     address = find(device)
-    if address.kind != "m1486":
-        raise Misuse("seek is a command of the M1486; a MIC488 has home")
-    wanted = chip_motion.sought([line])
-    chip_motion.seek(address, wanted, home=False, wait=wait, timeout=timeout, json=json, log_frames=log_frames)
+    kind = kind_of(address)
+    if kind.seek is None:
+        raise no_command(kind, "seek")
+    _do(address, kind.seek([line]), wait=wait, timeout=timeout, json=json, log_frames=log_frames)
 
 
 def _do(
-    address: DeviceAddress,
-    values: Mapping[int, float],
-    begin: Callable[[Mic488, set[int]], None],
-    *,
-    wait: bool,
-    timeout: float | None,
-    json: bool,
-    log_frames: bool,
+    address: DeviceAddress, motion: DeviceMotion[Any], *, wait: bool, timeout: float | None, json: bool, log_frames: bool
 ) -> None:
+    """Begin a motion and wait for its end. What interrupts it stops the axes."""
     from steptwin.drivers.line import check_wait
 
     check_wait(timeout)
-    with opened(address, observe=False, log_frames=log_frames) as mic, interruptible():
+    kind = kind_of(address)
+    if motion.must_wait and not wait:
+        raise Misuse(f"--no-wait is not possible for {kind.title}: {motion.must_wait}")
+    held_up = SuspensionDetector()
+    with opened(address, observe=False, log_frames=log_frames) as driver, interruptible():
         begun: set[int] = set()
         try:
-            begin(mic, begun)
+            motion.begin(driver, begun, held_up.check)
             if not wait:
                 return
-            print_started([f"M{axis}" for axis in values])
-            ends = mic.wait(*values, timeout_s=timeout, check=False)
+            print_started([f"M{axis}" for axis in motion.axes])
+            ends = [motion.end(driver, end) if end.ok else end for end in kind.wait(driver, motion.axes, timeout)]
         except (Misuse, Refusal):
             if begun:
-                mic.stop(*begun)
+                kind.halt(driver, begun)
             raise
         except BaseException:
-            mic.stop(*values)
-            complain(f"stopped: {' '.join(f'M{axis}' for axis in values)}")
+            kind.halt(driver, motion.axes)
+            complain(f"stopped: {' '.join(f'M{axis}' for axis in motion.axes)}{motion.stop_note}")
             raise
-        if any(end.reason.name == "OVERDUE" for end in ends.values()):
-            mic.stop(*values)
-            complain("stopped: timeout")
+        if any(end.is_overdue for end in ends):
+            kind.halt(driver, motion.axes)
+            complain(f"stopped: timeout{motion.stop_note}")
     if json:
-        print_json([_data(end) for end in ends.values()])
+        print_json([_data(end) for end in ends])
     else:
-        typer.echo("\n".join(map(str, ends.values())))
-    if not all(end.ok for end in ends.values()):
+        typer.echo("\n".join(map(str, ends)))
+    if not all(end.ok for end in ends):
         raise typer.Exit(1)
 
 
-def _data(end: MoveEnd) -> dict[str, Any]:
+def _data(end: EndedMotion) -> dict[str, Any]:
     return {
         "axis": end.axis,
         "ok": end.ok,
-        "reason": end.reason.value,
-        "position": end.position_u,
+        "reason": end.reason,
+        "position": end.position,
         "unit": end.unit,
         "after_s": round(end.after_s, 3),
         **({"detail": end.detail} if end.detail else {}),
@@ -237,38 +203,40 @@ def jog(
 ) -> None:
     """Jog an axis until a key is pressed. It is a dead-man's switch: if this command dies, the axis stops by itself.
 
-    An M1486 makes one short move after the other, at the velocity given (full steps/s), which V keeps. E types, which write every
-    command into their EEPROM, are not jogged.
+    An M1486 makes one short move after the other, of 0.15 s at the velocity given (full steps/s) and its ramps, whatever --hold
+    is. E types, which write every command into their EEPROM, are not jogged.
     """
-    ((axis, speed),) = tied([velocity]).items()
+    from steptwin.drivers.typed import tied
+
+    address = find(device)
+    kind = kind_of(address)
+    if kind.jog is None:
+        raise no_command(kind, "jog")
+    given = tied([velocity], kind.axes)
     if seconds is None and not sys.stdin.isatty():
         raise Misuse("no terminal, so no key can end the jog: give --seconds")
     if seconds is not None and not seconds > 0.0:
         raise Misuse(f"--seconds {seconds:g}: permitted are more than 0")
-    address = find(device)
-    if address.kind == "m1486":
-        with keys() as pressed:
-            chip_motion.jog(address, speed, seconds=seconds, hold=hold, pressed=pressed, json=json, log_frames=log_frames)
-        return
+    if not HOLD_RANGE_S[0] <= hold <= HOLD_RANGE_S[1]:
+        raise Misuse(f"--hold {hold:g}: permitted are {HOLD_RANGE_S[0]:g} to {HOLD_RANGE_S[1]:g} s")
+    ((axis, speed),) = given.items()
     held_up = SuspensionDetector()
-    with opened(address, observe=False, log_frames=log_frames) as mic, interruptible(), keys() as pressed:
+    with opened(address, observe=False, log_frames=log_frames) as driver, interruptible(), keys() as pressed:
         held_up.check()
-        held = mic.axis(axis).jog(speed, hold_s=hold)
+        jog = kind.jog(driver, axis, speed, hold)
+        end_at = None if seconds is None else time.monotonic() + seconds - jog.ahead_s
         try:
-            with held:
+            with jog:
                 if seconds is None:
-                    complain(f"M{axis} runs at {speed:g} {mic.axis(axis).unit}/s; any key stops it")
-                end_at = None if seconds is None else time.monotonic() + seconds
-                while not pressed() and (end_at is None or time.monotonic() < end_at) and held.hold():
+                    complain(f"M{axis} runs at {speed:g} {jog.unit}/s; any key stops it")
+                while not pressed() and (end_at is None or time.monotonic() < end_at) and jog.hold():
                     pass
         except KeyboardInterrupt:
             complain("released")
-        end = held.end
-        rest = mic.axis(axis).wait(check=False)
-    result = rest if end is None else dataclasses.replace(end, position_u=rest.position_u)
+        end = jog.ended()
     if json:
-        print_json(_data(result))
+        print_json(_data(end))
     else:
-        typer.echo(str(result))
-    if not result.ok:
+        typer.echo(str(end))
+    if not end.ok:
         raise typer.Exit(1)

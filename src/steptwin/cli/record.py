@@ -1,6 +1,6 @@
 """``steptwin record``, ``diff``: the same session with a twin and with the device, and where they differ.
 
-From Python: `steptwin.commands.devicesession`.
+From Python: `steptwin.drivers.mic488.session`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from typing import Annotated, Any
 import typer
 
 from steptwin.cli.device import Device, Json, LogFrames, complain, find, opened, print_json
-from steptwin.cli.get import map_of
 from steptwin.errors import LineFailure, Misuse
 
 
@@ -29,10 +28,12 @@ def record(
 
     All lines are checked before the first is carried out.
     """
-    from steptwin.commands.devicesession import carry_out, steps_of, to_text
+    from steptwin.drivers.mic488.kind import of_mic488
+    from steptwin.drivers.mic488.named import map_of
+    from steptwin.drivers.mic488.session import carry_out, steps_of, to_text
 
     text = _read(session)
-    with opened(find(device), observe=False, log_frames=log_frames) as mic:
+    with opened(of_mic488(find(device), "record"), observe=False, log_frames=log_frames) as mic:
         try:
             steps = steps_of(text, map_of(mic))
         except Misuse as error:
@@ -63,7 +64,7 @@ def diff(
     json: Json = False,
 ) -> None:
     """Report where two recordings of the same session differ. Exit code 1 if they do."""
-    from steptwin.commands.devicesession import differences, from_text
+    from steptwin.drivers.mic488.session import differences, from_text
 
     found = differences(from_text(_read(one), str(one)), from_text(_read(two), str(two)), tolerance=tolerance, time_s=time)
     if json:

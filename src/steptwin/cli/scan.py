@@ -6,25 +6,21 @@ From Python: `steptwin.live.ports`, `steptwin.drivers.mic488.identify.scan`, `st
 from __future__ import annotations
 
 import contextlib
-import enum
 import sys
 from collections.abc import Callable, Generator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from steptwin.cli.device import Json, complain, drop_rubbish, print_json, search_line, table
+from steptwin.cli.device import Json, clear_line, complain, print_json, table
 from steptwin.errors import LineFailure, Misuse
 
-BAUDS = (38400, 9600, 19200, 57600, 115200)
-"""Baud rates at which MIC488 controllers are searched, bit/s."""
+if TYPE_CHECKING:
+    from steptwin.drivers.kind import AnyDriverKind, DeviceSearch, FoundDevice
 
-
-class ScannedKind(enum.StrEnum):
-    ANY = "any"
-    MIC488 = "mic488"
-    M1486 = "m1486"
+ANY = "any"
 
 
 def ports(json: Json = False) -> None:
@@ -44,7 +40,7 @@ def scan(
     places: Annotated[
         list[str] | None, typer.Argument(metavar="ADDRESS", help="Ports or addresses. Default: all that 'ports' lists.")
     ] = None,
-    kind: Annotated[ScannedKind, typer.Option(help="Kind of controller to find.")] = ScannedKind.ANY,
+    kind: Annotated[str, typer.Option(help="Kind of controller to find: mic488, m1486; any of them.")] = ANY,
     units: Annotated[str, typer.Option(help="Slave addresses of MIC488, such as 1-247 or 1,2,5.")] = "1-16",
     baud: Annotated[
         str | None, typer.Option(help="Baud rates to try on serial ports. Default: all rates of each kind of controller.")
@@ -62,54 +58,93 @@ def scan(
     """
     from steptwin.live.ports import serial_ports, twin_ports
 
+    kinds = _kinds(kind)
     numbers = numbers_of(units, "--units", 1, 247)
     bauds = None if baud is None else numbers_of(baud, "--baud", 300, 1_000_000)
     if not 0.0 < timeout <= 10.0:
         raise Misuse(f"--timeout {timeout:g}: permitted are more than 0 and at most 10 s")
     wanted = places or [place.address for place in serial_ports() + twin_ports()]
-    rows: list[dict[str, Any]] = []
+    rows: list[_Row] = []
     try:
         for place in wanted:
-            rows += _found_at(place, kind, numbers, bauds, timeout)
+            rows += _found_at(place, kinds, numbers, bauds, timeout)
     except KeyboardInterrupt:
         complain("interrupted: the scan is not complete")
     if json:
-        print_json(rows)
+        print_json([row.data() for row in rows])
     elif rows:
-        typer.echo(table([(r["address"], f"{r['baud'] or ''}", _which(r), r["what"]) for r in rows]))
+        typer.echo(table([row.text() for row in rows]))
     if not rows:
         complain(f"no device responded on {', '.join(wanted) or 'any port: there is none'}")
         raise typer.Exit(1)
 
 
-def _which(row: dict[str, Any]) -> str:
-    return f"unit {row['unit']}" if row["kind"] == ScannedKind.MIC488 else f"chip {row['chip']:X}"
+@dataclass(frozen=True, slots=True)
+class _Row:
+    """A device at an address; ``baud`` is None on a network."""
+
+    place: str
+    baud: int | None
+    kind: AnyDriverKind
+    found: FoundDevice
+
+    def text(self) -> tuple[str, ...]:
+        how = self.kind.selection
+        return self.place, f"{self.baud or ''}", f"{how.option} {how.show(self.found.number)}", self.found.what
+
+    def data(self) -> dict[str, Any]:
+        how, found = self.kind.selection, self.found
+        where = {"address": self.place, "baud": self.baud, "kind": self.kind.name}
+        return {**where, how.option: found.number, how.variant: found.variant, "what": found.what}
 
 
-def _found_at(place: str, kind: ScannedKind, units: list[int], bauds: list[int] | None, timeout: float) -> list[dict[str, Any]]:
-    """All devices that respond at an address. An address that cannot be opened is reported and gives none."""
-    from steptwin.drivers.m1486.identify import CHIP_BAUDS
+def _kinds(name: str) -> list[AnyDriverKind]:
+    """The kinds to be searched in this order: first those whose search disturbs no others. Raises `Misuse`."""
+    from steptwin.drivers.kinds import DRIVERS
 
-    rows: list[dict[str, Any]] = []
+    searched = {kind.name: kind for kind in DRIVERS.values() if kind.search is not None}
+    if name != ANY and name not in searched:
+        raise Misuse(f"--kind {name}: permitted are {ANY}, {', '.join(searched)}")
+    wanted = searched.values() if name == ANY else [searched[name]]
+    return sorted(wanted, key=lambda kind: kind.search is not None and kind.search.disturbs)
+
+
+def _found_at(place: str, kinds: list[AnyDriverKind], numbers: list[int], bauds: list[int] | None, timeout: float) -> list[_Row]:
+    """The devices that respond at an address, of the first kind that does. An address that cannot be opened is reported and
+    gives none."""
+    searches = [(kind, kind.search, _rates(place, bauds or list(kind.search.bauds))) for kind in kinds if kind.search]
+    rows: list[_Row] = []
     try:
-        if kind is not ScannedKind.MIC488:
-            chip_bauds = _rates(place, bauds or list(CHIP_BAUDS))
-            try:
-                rows = _chips(place, chip_bauds, timeout)
-                if not rows and kind is ScannedKind.ANY:
-                    rows = _controllers(place, _rates(place, bauds or list(BAUDS)), units, timeout)
-            finally:
-                if not rows:
-                    _let_chips_listen(place, chip_bauds)
-        else:
-            rates = _rates(place, bauds or list(BAUDS))
-            rows = _controllers(place, rates, units, timeout)
-            if not rows:
-                for rate in rates:
-                    drop_rubbish(place, rate)
+        for kind, search, rates in searches:
+            rows = rows or _searched(place, kind, search, rates, numbers, timeout)
     except LineFailure as failure:
         complain(str(failure))
+    finally:
+        if not rows:
+            for kind, search, rates in searches:
+                _leave(place, kind, search, rates, kinds)
     return rows
+
+
+def _searched(
+    place: str, kind: AnyDriverKind, search: DeviceSearch, rates: list[int], numbers: list[int], timeout: float
+) -> list[_Row]:
+    for baud in rates:
+        with _progress(f"{_title(place, baud)} {search.title}", search.numbers or len(numbers), search.form) as step:
+            found = search.find(place, baud, numbers, timeout, step)
+        if found:  # a line has one baud rate
+            return [_Row(place, None if "://" in place else baud, kind, one) for one in found]
+    return []
+
+
+def _leave(place: str, kind: AnyDriverKind, search: DeviceSearch, rates: list[int], searched: list[AnyDriverKind]) -> None:
+    """Nothing was found: leave the line as it was. The most likely rate is last, because characters at other rates are rubbish
+    at it."""
+    for baud in reversed(rates):
+        search.leave(place, baud)
+    if search.disturbs and searched == [kind]:
+        for baud in rates:
+            clear_line(kind, place, baud)
 
 
 def _rates(place: str, bauds: list[int]) -> list[int]:
@@ -117,73 +152,6 @@ def _rates(place: str, bauds: list[int]) -> list[int]:
     if place.startswith("rfc2217://") or not ("://" in place or str(Path(place).resolve()).startswith("/dev/pts/")):
         return bauds
     return bauds[:1]
-
-
-def _row(place: str, baud: int, kind: ScannedKind, what: str, **more: object) -> dict[str, Any]:
-    return {"address": place, "baud": None if "://" in place else baud, "kind": kind.value, **more, "what": what}
-
-
-def _chips(place: str, bauds: list[int], timeout: float) -> list[dict[str, Any]]:
-    from steptwin.drivers import LineLost
-    from steptwin.drivers.blocking import finish
-    from steptwin.drivers.m1486.identify import scan_chips
-    from steptwin.machine import SECOND
-
-    for baud in bauds:
-        with search_line(place, baud) as line, _progress(f"{_title(place, baud)} M1486 chip", 16, "X") as step:
-            try:
-                found = finish(scan_chips(line, baud=baud, timeout_ns=round(timeout * SECOND), progress=step))
-            except LineLost:
-                if "://" not in place:
-                    raise
-                return []  # a server of Modbus TCP closes the connection when it receives characters
-        if found:
-            return [
-                _row(
-                    place,
-                    baud,
-                    ScannedKind.M1486,
-                    "M1486, busy" if chip.variant is None else f"M1486{chip.variant}",
-                    chip=chip.address,
-                    variant=chip.variant,
-                )
-                for chip in found
-            ]
-    return []
-
-
-def _let_chips_listen(place: str, bauds: list[int]) -> None:
-    """Select all chips again at each rate; the most likely rate is last, because characters at other rates are rubbish at it."""
-    from steptwin.drivers.blocking import finish
-    from steptwin.drivers.m1486.identify import select_all
-
-    for baud in reversed(bauds):
-        with contextlib.suppress(LineFailure), search_line(place, baud) as line:
-            finish(select_all(line))
-
-
-def _controllers(place: str, bauds: list[int], units: list[int], timeout: float) -> list[dict[str, Any]]:
-    from steptwin.drivers.blocking import finish
-    from steptwin.drivers.mic488.identify import scan as scan_units
-    from steptwin.drivers.mic488.sync import ModbusLine
-    from steptwin.machine import SECOND
-
-    for baud in bauds:
-        with ModbusLine(place, baud=baud) as line, _progress(f"{_title(place, baud)} unit", len(units), "d") as step:
-            found = finish(scan_units(line.line, units, timeout_ns=round(timeout * SECOND), progress=step))
-        if found:  # a line has one baud rate
-            return [
-                _row(
-                    place,
-                    baud,
-                    ScannedKind.MIC488,
-                    "responds, but is not a MIC488" if one.firmware is None else f"MIC488, firmware {one.firmware}",
-                    unit=one.unit,
-                    firmware=one.firmware,
-                )
-                for one in found
-            ]
-    return []
 
 
 def _title(place: str, baud: int) -> str:

@@ -5,16 +5,16 @@ From Python: `steptwin.drivers.m1486.M1486.download`.
 
 from __future__ import annotations
 
+import contextlib
+import sys
+from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from steptwin.cli.chip import send as send_to_chip
-from steptwin.cli.device import Device, Json, LogFrames, find
+from steptwin.cli.device import Device, Json, LogFrames, SuspensionDetector, find, kind_of, log_of, print_json
 from steptwin.errors import Refusal
-
-MIC488_PROGRAMS = (".prg", ".wbc")
 
 
 def send(
@@ -27,12 +27,34 @@ def send(
 
     A program that selects chips with X is sent to all of them; --device then names their line: ADDRESS,kind=m1486, or the twin.
     """
-    address = None if file.suffix.lower() in MIC488_PROGRAMS else find(device, whole_line=True)
-    if address is not None and address.kind == "m1486":
-        send_to_chip(address, file, json=json, log_frames=log_frames)
+    from steptwin.drivers.kinds import DRIVERS
+    from steptwin.files.textfiles import read_text
+
+    # A program that no device of its kind takes needs no device.
+    refused = [kind for kind in DRIVERS.values() if file.suffix.lower() in kind.programs and kind.send is None]
+    address = None if refused else find(device, whole_line=True)
+    kind = refused[0] if address is None else kind_of(address)
+    if address is None or kind.send is None:
+        raise Refusal(f"{file} was not sent: {kind.cannot_send or f'{kind.title} takes no programs'}")
+    text = read_text(file).source.text
+    held_up = SuspensionDetector()
+    with _progress(file.name) as progress:
+        sent = kind.send(address, file, text, progress, held_up.check, log_of(log_frames))
+    if json:
+        print_json(sent.data)
+    else:
+        typer.echo(sent.text)
+
+
+@contextlib.contextmanager
+def _progress(title: str) -> Generator[Callable[[int, int], object]]:
+    """A progress bar on standard error, if that is a terminal."""
+    if not sys.stderr.isatty():
+        yield lambda done, total: None
         return
-    raise Refusal(
-        f"{file} was not sent: the download protocol of the MIC488 is not documented. Compile it with 'steptwin build' and "
-        "download the image with the vendor's tool, or run it in a twin with 'steptwin serve mic488 --program'. To send to an "
-        "M1486, name it with --device"
-    )
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(title)
+        yield lambda done, total: bar.update(task, completed=done, total=total)

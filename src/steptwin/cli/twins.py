@@ -47,7 +47,7 @@ def _data(twin: Twin) -> dict[str, Any]:
                 "device": each.full_name,
                 "kind": each.kind,
                 "line": each.line,
-                **({} if each.address is None else {"chip" if each.kind == "m1486" else "unit": each.address}),
+                **each.selected,
                 "addresses": list(each.places),
             }
             for each in twin.controllers

@@ -13,19 +13,11 @@ from typing import Annotated, Any
 
 import typer
 
-from steptwin.cli.chip import opened_chip, read
-from steptwin.cli.device import Device, LogFrames, as_json, find, opened, shown, table
-from steptwin.cli.get import expanded, map_of, names_from
-from steptwin.cli.get import look as look_at
+from steptwin.cli.device import Device, LogFrames, as_json, find, kind_of, opened, shown, table
+from steptwin.cli.get import names_from
 from steptwin.errors import Misuse
 
 Look = Callable[[], dict[str, tuple[Any, str]]]
-CHIP_NAMES = ("POSITION", "VARIABLE", "FLAGS")
-ONLY_OF_DRIVER = frozenset({"POSITION", "FLAGS", "FUNCTIONS", "TYPE", "INTERFACE", "SERIES"})
-"""What a driver of an M1486 reads and is no point of its data sheet, or in another unit and from another origin."""
-CHIP_POINTS = ("position", "velocity", "counter", "variable")
-"""Of a twin."""
-DEFAULT_NAMES = ("M?_POS_ACT", "M?_VEL_ACT", "M?_STATUS")
 MOST_HZ = 50.0
 LEAST_WIDTH = 10
 """Of a column: as wide as most values."""
@@ -62,30 +54,24 @@ def watch(
 
 @contextlib.contextmanager
 def _reading(device: str | None, names: list[str] | None, *, log_frames: bool) -> Generator[Look]:
-    """A function that reads the values once. A twin is not polled; raw addresses are read over its line."""
+    """A function that reads the values once. A twin is not polled; what is no point of it is read over its line."""
+    from steptwin.drivers.kinds import DRIVERS
     from steptwin.live.remote import RemoteSubject
     from steptwin.live.twins import controller_of
     from steptwin.live.watching import TwinWatch
-    from steptwin.mic488.registers import DEFAULT_FIRMWARE, register_map
 
     twin = None if log_frames else controller_of(device)
-    if twin is not None:
+    if twin is not None and twin.kind in DRIVERS:
         with RemoteSubject(twin.twin) as subject:
-            wanted: Sequence[object] = names or CHIP_POINTS
-            if twin.kind == "mic488":
-                wanted = expanded(register_map(twin.type or DEFAULT_FIRMWARE), names or DEFAULT_NAMES)
-            paths = [one for one in wanted if isinstance(one, str) and one.upper() not in ONLY_OF_DRIVER]
-            if len(paths) == len(wanted):
-                yield TwinWatch(subject, twin.name, paths).look
+            points = DRIVERS[twin.kind].followed(names or (), twin.type)
+            if points is not None:
+                yield TwinWatch(subject, twin.name, points).look
                 return
     address = find(device)
-    if address.kind == "m1486":
-        with opened_chip(address, log_frames=log_frames) as one:
-            yield lambda: read(one, names or CHIP_NAMES)
-        return
-    with opened(address, log_frames=log_frames) as mic:
-        wanted = expanded(map_of(mic), names or DEFAULT_NAMES)
-        yield lambda: look_at(mic, wanted)
+    kind = kind_of(address)
+    read = kind.reading(names or kind.usual)
+    with opened(address, log_frames=log_frames) as driver:
+        yield lambda: {name: (one.value, one.unit) for name, one in read(driver).items()}
 
 
 def _looks(look: Look, hz: float, count: int | None) -> Iterator[tuple[float, dict[str, tuple[Any, str]]]]:

@@ -22,12 +22,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from steptwin.drivers.address import DeviceAddress, device_at, split_device
+from steptwin.drivers.address import device_at, split_device
+from steptwin.drivers.kind import AddressSelection, DeviceAddress
+from steptwin.drivers.kinds import DRIVERS
 from steptwin.errors import LineFailure, Misuse, Refusal
 from steptwin.live.remote import START, ask, running
 from steptwin.subject.commands import EndPoints
-from steptwin.world.kind import Selection
-from steptwin.world.kinds import KINDS
 
 PATIENCE_S = 2.0
 """Time-out of the description of a twin, s."""
@@ -60,6 +60,12 @@ class TwinController:
     @property
     def full_name(self) -> str:
         return self.twin if self.name == self.twin else f"{self.twin}.{self.name}"
+
+    @property
+    def selected(self) -> Mapping[str, int]:
+        """Its address on the line by the option that names it; empty without one."""
+        how = _selection(self.kind)
+        return {} if how is None or self.address is None else {how.option: self.address}
 
     @property
     def selection(self) -> str:
@@ -150,14 +156,14 @@ def _controller(twin: str, announced: Mapping[str, Any], places: Mapping[str, st
     return TwinController(twin, announced["name"], announced["kind"], line, address, variant, reached)
 
 
-def _selection(kind: str) -> Selection | None:
-    """The option that selects a controller; None for a kind without drivers, or one that only the other process knows."""
-    return KINDS[kind].selection if kind in KINDS else None
+def _selection(kind: str) -> AddressSelection | None:
+    """The option that selects a controller; None for a kind without drivers."""
+    return DRIVERS[kind].selection if kind in DRIVERS else None
 
 
-def _other_options(how: Selection | None) -> set[str]:
+def _other_options(how: AddressSelection | None) -> set[str]:
     """Options that select controllers of other kinds."""
-    return {kind.selection.option for kind in KINDS.values() if kind.selection is not None} - ({how.option} if how else set())
+    return {kind.selection.option for kind in DRIVERS.values()} - ({how.option} if how else set())
 
 
 # ---------------------------------------------------------------------- which one is meant

@@ -8,7 +8,9 @@ from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, field
 
 from steptwin.drivers import AsyncMic488, AsyncMic488Jog, Mic488Status
+from steptwin.drivers.address import text_of
 from steptwin.drivers.mic488.frames import ObservedFrame
+from steptwin.drivers.mic488.kind import of_mic488
 from steptwin.drivers.mic488.program import ProgramState
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.live.twins import controller_of, find_device
@@ -190,18 +192,16 @@ class _Jogging:
 
 def session_at(device: str | None, hz: float) -> MonitorSession:
     """A session with the controller that ``device`` names, as of `steptwin.live.twins.find_device`. A twin is followed."""
-    address = find_device(device)
-    if address.kind != "mic488":
-        raise Misuse("the monitor shows a MIC488; for an M1486 use 'steptwin watch', 'info' or 'terminal'")
+    address = of_mic488(find_device(device), "the monitor")
     mic = AsyncMic488(
         address.place,
-        address.unit,
+        1 if address.number is None else address.number,
         baud=address.baud,
-        firmware=address.firmware,
+        firmware=address.variant,
         config=address.config,
         timeout_s=address.timeout,
         observe=True,
         log=lambda _: None,  # there have to be words for frames to be shown
     )
     twin = controller_of(device)
-    return MonitorSession(mic, str(address), hz, None if twin is None else FollowedValues(twin))
+    return MonitorSession(mic, text_of(address), hz, None if twin is None else FollowedValues(twin))

@@ -8,15 +8,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from steptwin.drivers.address import DeviceAddress
 from steptwin.drivers.exchange import NoAnswer
+from steptwin.drivers.kind import DeviceAddress
+from steptwin.drivers.kinds import DRIVERS, others_there
 from steptwin.drivers.line import DriverLine
-from steptwin.drivers.m1486.driver import AsyncM1486
-from steptwin.drivers.m1486.lines import AsyncM1486Line
-from steptwin.drivers.m1486.subject import M1486Part
-from steptwin.drivers.mic488.driver import AsyncMic488
-from steptwin.drivers.mic488.lines import AsyncModbusLine
-from steptwin.drivers.mic488.subject import Mic488Part
 from steptwin.drivers.subject import AsyncDeviceSubject, DevicePart
 from steptwin.errors import LineFailure, Misuse
 from steptwin.nearmiss import NearMiss
@@ -102,7 +97,8 @@ class DeviceConnections:
             if name in taken:
                 raise Misuse(f"name = {name!r}: a machine is called that already")
             return name
-        usual = address.kind if address.chip is None else f"{address.kind}-{address.chip:X}"
+        how, there = DRIVERS[address.kind].selection, address.number
+        usual = address.kind if there is None or there == how.usual else f"{address.kind}-{how.show(there)}"
         number = 1
         while (found := usual if number == 1 else f"{usual}-{number}") in taken:
             number += 1
@@ -129,21 +125,18 @@ class DeviceConnections:
 
 
 def _line_of(address: DeviceAddress) -> DriverLine[Any, Any]:
-    kind = AsyncModbusLine if address.kind == "mic488" else AsyncM1486Line
-    return kind(address.place, baud=address.baud)
+    kind = DRIVERS[address.kind]
+    if kind.line is None:
+        raise Misuse(f"{kind.title} cannot be connected: its driver is for commands only")
+    return kind.line(address.place, address.baud)
 
 
 async def _device_at(address: DeviceAddress, line: DriverLine[Any, Any]) -> DevicePart:
     """Open the driver, which moves nothing. Raises `Misuse`, `Refusal`, `LineFailure`."""
-    if address.kind == "m1486":
-        chip = AsyncM1486(line, address.chip, variant=address.variant, timeout_s=address.timeout)
-        await chip.open()
-        return M1486Part(chip)
-    mic = AsyncMic488(
-        line, address.unit, firmware=address.firmware, config=address.config, timeout_s=address.timeout, observe=True
-    )
+    kind = DRIVERS[address.kind]
+    if kind.part is None:
+        raise Misuse(f"{kind.title} cannot be connected: its driver is for commands only")
     try:
-        await mic.open()
+        return await kind.part(address, line)
     except NoAnswer as error:
-        raise LineFailure(f"{error}. If these are M1486 chips, put ',kind=m1486' behind the address") from error
-    return Mic488Part(mic)
+        raise LineFailure(f"{error}{others_there(kind)}") from error

@@ -44,9 +44,9 @@ def driver_of(address: str, config: ControllerConfig | None = None) -> Mic488:
     given = parse_device(address)
     return Mic488(
         given.place,
-        given.unit,
+        1 if given.number is None else given.number,
         baud=given.baud,
-        firmware=given.firmware,
+        firmware=given.variant,
         config=given.config or config,
         timeout_s=given.timeout,
     )

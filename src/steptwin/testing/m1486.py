@@ -145,7 +145,7 @@ class M1486Rig(LineRig):
         options, time = self.options, self._time
         if self._device is not None:
             given = parse_device(self._device)
-            return host.M1486(given.place, given.chip, baud=given.baud, variant=given.variant)
+            return host.M1486(given.place, given.number, baud=given.baud, variant=given.variant)
         if isinstance(time, VirtualTime):
             return joined_chip(MemoryEndpoint(time, self._port, "the M1486"), time, options.address)
         return host.M1486(self.address, options.address)

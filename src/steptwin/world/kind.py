@@ -100,19 +100,6 @@ class MotionEnds(NamedTuple):
     """The last motion has reached its target."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Selection:
-    """How options behind an address of a device select a controller on its line (``,unit=2``), and name its variant. Running
-    twins announce both under the same names."""
-
-    option: str
-    variant: str
-    show: Callable[[int], str] = str
-    read: Callable[[str], int] = int
-    may_be_open: bool = False
-    """Whether a driver may hold the line without selecting one of its controllers."""
-
-
 class LineUnit(NamedTuple):
     """Where a controller is served."""
 
@@ -190,10 +177,8 @@ class ControllerKind(Generic[S, M, V]):
     keep_memory: Callable[[M, bytes | None, Callable[[bytes], None]], None]
     """Call a function with its non-volatile memory after each change, and at once if it differs from the saved content."""
     announced: Callable[[M, int], dict[str, object]]
-    """How drivers reach it at present: ``kind``, and what ``selection`` names. The number is its address on the line, as it was
-    built."""
-    selection: Selection | None = None
-    """None without drivers for it."""
+    """How drivers reach it at present: ``kind``, and the options behind an address that select it there
+    (`steptwin.drivers.kind.AddressSelection`). The number is its address on the line, as it was built."""
     line: LineKind
     """The connection of its line."""
     address: Callable[[S, M], int]

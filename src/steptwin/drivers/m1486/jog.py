@@ -26,6 +26,8 @@ LINK_S = 0.15
 """A move is as long as the velocity of the jog makes in this time; it lasts longer by its ramps."""
 BEGIN_NS: Nanos = SECOND
 """A move is begun at most so long after the last sign of the one before it: a program that was suspended begins none."""
+RELEASED = "released"
+"""The end of a jog that was held no longer."""
 PATIENCE_NS: Nanos = 2 * SECOND
 """A move that lasts longer is not one of a jog: LIMIT or Kill holds the chip."""
 
@@ -102,7 +104,7 @@ class AsyncM1486Jog:
         """Wait for the end of the present move, and put V back."""
         try:
             end = await self._chip.wait(check=False)
-            self.end = self.end or ("released" if end.ok else str(end))
+            self.end = self.end or (RELEASED if end.ok else str(end))
             if self._before is not None:
                 await self._chip.configure(velocity=self._before)
         except SteptwinError:

@@ -15,6 +15,7 @@ from steptwin.drivers.m1486.chip import TIMEOUT_S
 from steptwin.drivers.m1486.download import DownloadProgress
 from steptwin.drivers.m1486.driver import AsyncM1486
 from steptwin.drivers.m1486.driver import download_to as async_download_to
+from steptwin.drivers.m1486.jog import AsyncM1486Jog
 from steptwin.drivers.m1486.lines import BAUD, ThreadM1486Line
 from steptwin.drivers.m1486.settings import ChipSettings
 from steptwin.drivers.m1486.subject import M1486Part
@@ -50,6 +51,26 @@ class M1486Line(Blocking):
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self.close()
+
+
+class M1486Jog(Blocking):
+    """A jog: ``with chip.jog(200.0) as jog: while pressed() and jog.hold(): pass``. See `AsyncM1486Jog`."""
+
+    _driver: AsyncM1486Jog
+
+    @property
+    def end(self) -> str | None:
+        """Why the motor has stopped; None while it runs."""
+        return self._driver.end
+
+    hold = blocking(AsyncM1486Jog.hold)
+
+    def __enter__(self) -> Self:
+        finish(self._driver.__aenter__())
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        finish(self._driver.__aexit__(kind, error, trace))
 
 
 class _ThreadM1486(AsyncM1486):
@@ -113,6 +134,10 @@ class M1486(Blocking):
     def download(self, text: str, *, progress: DownloadProgress | None = None, name: str = "program") -> bytes:
         """Send a program to the chip; see `AsyncM1486.download`."""
         return finish(self._driver.download(text, progress=progress, name=name))
+
+    def jog(self, velocity: float) -> M1486Jog:
+        """Run at a velocity (units/s) while it is held: a dead-man's switch. See `AsyncM1486Jog`."""
+        return M1486Jog(AsyncM1486Jog(self._driver, velocity))
 
     def subject(self, name: str = "m1486", *, period_s: float = PERIOD_S) -> DeviceSubject:
         """The open device with the commands, points and events of a twin. It is polled for events while there are followers, at

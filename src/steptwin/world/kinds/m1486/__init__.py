@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 
 from steptwin.m1486 import datasheet, points
 from steptwin.m1486.chip import M1486Chip
@@ -11,7 +10,7 @@ from steptwin.m1486.pins import CONTROL_PINS, LINE_PINS, OUTPUT_PINS, refuse_tak
 from steptwin.m1486.present import state_of
 from steptwin.m1486.variants import Store, variant
 from steptwin.machine import MachineEvent
-from steptwin.world.kind import ControllerKind, LineKind, LinkKind, Selection, Terminals
+from steptwin.world.kind import ControllerKind, LineKind, LinkKind, Terminals
 from steptwin.world.kinds.m1486 import axes, build, control, faults, lanes, line, memory, programs, table
 from steptwin.world.kinds.m1486.heldjog import M1486HeldJog
 from steptwin.world.kinds.m1486.table import M1486Spec
@@ -46,9 +45,6 @@ M1486: ControllerKind[M1486Spec, M1486Chip, M1486View] = ControllerKind(
     watch_events=_watch_events,
     keep_memory=build.keep_memory,
     announced=lambda chip, _: {"kind": "m1486", "chip": f"{chip.address:X}", "variant": chip.variant.name},
-    selection=Selection(
-        option="chip", variant="variant", show=lambda address: f"{address:X}", read=partial(int, base=16), may_be_open=True
-    ),
     line=CHARACTERS,
     address=lambda spec, chip: chip.address,
     # User lines are both inputs and outputs (manual chapter II).

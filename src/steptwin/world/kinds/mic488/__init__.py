@@ -12,7 +12,7 @@ from steptwin.mic488.present import empty_banks, state_of, statement_of
 from steptwin.mic488.registers import DEFAULT_FIRMWARE
 from steptwin.mic488.status import ProgramState
 from steptwin.mic488.vision import VisionReceiver, VisionRecord
-from steptwin.world.kind import ControllerKind, LineKind, LinkKind, NamedRegisters, Selection, Terminals, Vision
+from steptwin.world.kind import ControllerKind, LineKind, LinkKind, NamedRegisters, Terminals, Vision
 from steptwin.world.kinds.mic488 import axes, build, control, faults, line, memory, programs, table
 from steptwin.world.kinds.mic488.heldjog import Mic488HeldJog
 from steptwin.world.kinds.mic488.program_watch import watch_program
@@ -76,7 +76,6 @@ MIC488: ControllerKind[Mic488Spec, Mic488Device, Mic488View] = ControllerKind(
     watch_events=_watch_events,
     keep_memory=_keep_memory,
     announced=lambda device, unit: {"kind": "mic488", "unit": unit, "firmware": device.firmware.name},
-    selection=Selection(option="unit", variant="firmware"),
     line=MODBUS,
     address=_address,
     terminals=Terminals(

@@ -7,7 +7,7 @@ import dataclasses
 import pytest
 from host_rig import Wire, driver
 
-from steptwin.commands.devicesession import SessionStep, carry_out, carry_out_one, differences, from_text, steps_of, to_text
+from steptwin.drivers.mic488.session import SessionStep, carry_out, carry_out_one, differences, from_text, steps_of, to_text
 from steptwin.errors import Misuse, Refusal
 from steptwin.mic488.registers import register_map
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from steptwin.cli.addresses import places
+from steptwin.drivers.mic488.addresses import places
 from steptwin.errors import Misuse
 from steptwin.mic488.registers import register_map
 

@@ -7,8 +7,8 @@ import time
 
 import pytest
 
-from steptwin.commands.m1486_terminal import ChipTerminal, TerminalWords, command_of
 from steptwin.drivers import LineLost
+from steptwin.drivers.m1486.terminal import ChipTerminal, TerminalWords, command_of
 from steptwin.errors import LineFailure, Misuse
 from steptwin.m1486.variants import variant
 

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
+from steptwin.drivers.mic488.sync import Mic488
 from steptwin.errors import Misuse
-
-if TYPE_CHECKING:
-    from steptwin.drivers import Mic488
-    from steptwin.mic488.registermap import RegisterMap
+from steptwin.mic488.encoding import word_to_int, words_to_dint, words_to_real
+from steptwin.mic488.registermap import RegisterMap, Space
+from steptwin.wire import pdu
 
 SPACES = {"hr": 3, "co": 1, "di": 2}
 """Holding registers, coils and discrete inputs, with the function that reads them."""
@@ -77,8 +77,6 @@ def places(text: str, registers: RegisterMap) -> list[ValueAddress] | list[str] 
 
 
 def _register_at(registers: RegisterMap, address: int) -> str:
-    from steptwin.mic488.registermap import Space
-
     found = [register for space in Space if (register := registers.find(space, address)) is not None]
     if not found:
         raise Misuse(f"firmware {registers.firmware.name} has no register at {address}; hr:{address} reads it all the same")
@@ -95,8 +93,6 @@ def _register_at(registers: RegisterMap, address: int) -> str:
 
 def read_places(mic: Mic488, wanted: Iterable[ValueAddress]) -> dict[ValueAddress, Any]:
     """Read the values. Raises `ModbusRefusal` for addresses the device does not have."""
-    from steptwin.wire import pdu
-
     content: dict[tuple[str, int, int], Sequence[int]] = {}
     values: dict[ValueAddress, Any] = {}
     for place in wanted:
@@ -113,8 +109,6 @@ def read_places(mic: Mic488, wanted: Iterable[ValueAddress]) -> dict[ValueAddres
 
 
 def _value(place: ValueAddress, words: Sequence[int]) -> Any:
-    from steptwin.mic488.encoding import word_to_int, words_to_dint, words_to_real
-
     match place.form:
         case "":
             return bool(words[0])
