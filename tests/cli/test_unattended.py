@@ -100,6 +100,7 @@ def test_output_to_a_file(here: Path, name: str) -> None:
             end(process)
         finally:
             process.kill()
+    assert process.returncode == 0
 
 
 def test_a_client_that_only_listens_hears_the_program(serve_m1486: Callable[..., Any], tmp_path: Path) -> None:

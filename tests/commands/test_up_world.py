@@ -207,6 +207,7 @@ def test_a_world_wakes_up_by_itself() -> None:
         cell = Cell(live, Clock(1000.0))
         Pace(live, cell, lambda _: None, has_clients=False).begin(1000.0)
         await asyncio.wait_for(noted.wait(), 60)
+        assert live.world.now > 0
         cell.close()
 
     asyncio.run(run())

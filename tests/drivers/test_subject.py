@@ -636,6 +636,8 @@ def test_after_a_loss_the_same_device_is_there(rig: Rig) -> None:
     mic, chip = Mic488Part(rig.mic._driver), M1486Part(rig.chip._driver)
     finish(mic.reconnect())
     finish(chip.reconnect())
+    assert finish(mic.values(["M1_POS_ACT"]))["M1_POS_ACT"][0] is not None
+    assert finish(chip.values(["COUNTER"]))["COUNTER"][0] is not None
 
 
 def test_after_a_loss_another_controller_is_there() -> None:

@@ -81,7 +81,8 @@ def test_what_it_contributes_is_registered(run_node: Callable[..., str]) -> None
 
 
 def test_the_expressions_of_inline_values_are_names_with_a_value(run_node: Callable[..., str]) -> None:
-    run_node("tests/names.test.mjs", "", "--test")
+    done = run_node("tests/names.test.mjs", "", "--test")
+    assert re.search(r"^\S+ fail 0$", done, re.MULTILINE), done
 
 
 def test_the_package_has_everything_that_it_names(node: Path) -> None:

@@ -349,4 +349,4 @@ def test_a_session_of_other_values_is_refused_or_replayed(way: list[int], value:
     with suppress(SteptwinError):
         session = load(path)
         if session.until <= world.now:
-            session.replay()
+            assert session.replay().now == session.until

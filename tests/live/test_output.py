@@ -78,6 +78,8 @@ def test_a_reader_that_has_left_is_no_error(pipe: Pipe) -> None:
         out.line("nobody reads this")
     out.close()
     out.line("nor this")
+    with pytest.raises(BrokenPipeError):
+        os.write(pipe.stream.fileno(), b"the reader has left")
 
 
 def test_a_stream_somebody_made_non_blocking(pipe: Pipe) -> None:

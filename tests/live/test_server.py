@@ -102,8 +102,9 @@ def test_what_a_living_server_wrote_stays(tmp_path: Path) -> None:
     assert path.exists()
 
 
-def test_there_need_not_be_one(tmp_path: Path) -> None:
+def test_clearing_a_ready_file_that_is_not_there_changes_nothing(tmp_path: Path) -> None:
     clear_ready_file(tmp_path / "ready.json")
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("content", [b"precious", b"[1]", b"{}", b'{"end_points": 1, "pid": "x"}', b"\xff", b""])

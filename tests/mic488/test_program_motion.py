@@ -146,7 +146,7 @@ def trapezoid(length: float, speed: float, acc: float, dec: float) -> Callable[[
     return way
 
 
-def follows(rig: Rig, begin_s: float, course: Course, way: Callable[[float], float], gears: Place = (100.0, 100.0)) -> None:
+def check_course(rig: Rig, begin_s: float, course: Course, way: Callable[[float], float], gears: Place = (100.0, 100.0)) -> None:
     """From ``begin_s`` on, each axis' count is within a pulse of the course at every moment looked at, up to its end."""
     x, y = rig.device.axes[:2]
     end = max(x.profile.end or 0, y.profile.end or 0)
@@ -190,7 +190,7 @@ def test_a_line_stays_within_a_pulse_and_ends_exactly(x: float, y: float, speed:
     rig.wait(0.0051)
     length, course = line(begin, end)
     if round(length, 6):
-        follows(rig, 0.005, course, trapezoid(length, speed, 400, 250))
+        check_course(rig, 0.005, course, trapezoid(length, speed, 400, 250))
     rig.pin_until("OUT1", 1.0, 1000)
     assert (rig.position(1), rig.position(2)) == pytest.approx(end, abs=1e-4)
     assert (rig.status(1), rig.status(2)) == (4, 4)
@@ -201,19 +201,19 @@ def test_a_line_is_straight_with_different_gears(gears: Place) -> None:
     rig = ready(f"{ON}MOVELIN @A\nWAIT 1 = 2\n", "A;30;-40;20;x\n", *(replace(XY, gear=gear) for gear in gears))
     rig.wait(0.0031)
     length, course = line((0, 0), (30, -40))
-    follows(rig, 0.003, course, trapezoid(length, 20, 400, 250), gears)
+    check_course(rig, 0.003, course, trapezoid(length, 20, 400, 250), gears)
 
 
 def test_an_axis_left_alone_stays_and_wbc_11_vmax_of_m1_is_the_speed() -> None:
     rig = ready(f"{ON}AccM1 = 100\nVmaxM1 = 7\nMOVELIN @A\nWAIT 1 = 2\n", "A;x;30;x;x\n")
     rig.wait(0.0051)
-    follows(rig, 0.005, line((0, 0), (0, 30))[1], trapezoid(30, 7, 100, 250))
+    check_course(rig, 0.005, line((0, 0), (0, 30))[1], trapezoid(30, 7, 100, 250))
 
 
 def test_linacc_is_the_acceleration_of_lines_when_it_is_set() -> None:
     rig = ready(f"{ON}$R0 = LinAcc\nLinAcc = 50\n$R2 = LinAcc\nMOVELIN @A\nWAIT 1 = 2\n", "A;30;40;30;x\n")
     rig.wait(0.0061)
-    follows(rig, 0.006, line((0, 0), (30, 40))[1], trapezoid(50, 30, 50, 50))
+    check_course(rig, 0.006, line((0, 0), (30, 40))[1], trapezoid(50, 30, 50, 50))
     assert (rig.r(0), rig.r(2)) == (400, 50)
 
 
@@ -247,7 +247,7 @@ def test_wbc_26_a_path_begins_at_rest() -> None:
     rig = ready(f"{ON}VABS M1 50\nVABS M2 -20\nDELAY 1\nMOVELIN @A\nWAIT 1 = 2\n", "A;0;0;30;x\n")
     rig.wait(1.0051)
     before = rig.position(1), rig.position(2)
-    follows(rig, 1.005, line(before, (0, 0))[1], trapezoid(hypot(*before), 30, 400, 250))
+    check_course(rig, 1.005, line(before, (0, 0))[1], trapezoid(hypot(*before), 30, 400, 250))
 
 
 @pytest.mark.parametrize(
@@ -324,7 +324,7 @@ def test_a_circle_stays_within_a_pulse_and_ends_exactly(x: int, y: int, radius: 
     rig.wait(0.0011)
     # Positive angles are clockwise.
     length, course = arc((x, y), radius, begin_rad, -radians(angle))
-    follows(rig, begin, course, trapezoid(length, 60, 400, 250))
+    check_course(rig, begin, course, trapezoid(length, 60, 400, 250))
     rig.pin_until("OUT2", 1.0, 1000)
     assert (rig.position(1), rig.position(2)) == pytest.approx(course(length), abs=0.0051)
     assert (rig.status(1), rig.status(2)) == (4, 4)
@@ -355,7 +355,7 @@ def test_an_arc_stays_within_a_pulse_and_ends_exactly(x: int, y: int, more: floa
     sweep = 2 * atan2(chord / 2, abs(rise)) * (-1 if bulge_left else 1)
     length, course = arc(centre, radius, atan2(begin[1] - centre[1], begin[0] - centre[0]), sweep)
     assert course(length) == pytest.approx(end, abs=1e-6)
-    follows(rig, 0.004, course, trapezoid(length, 60, 400, 250))
+    check_course(rig, 0.004, course, trapezoid(length, 60, 400, 250))
     rig.pin_until("OUT1", 1.0, 1000)
     assert (rig.position(1), rig.position(2)) == end
 

@@ -34,7 +34,7 @@ class Line:
                 data += os.read(self.file, 256)
         return data.hex(" ").upper()
 
-    def ask(self, request: str, answer: str) -> None:
+    def check_answer(self, request: str, answer: str) -> None:
         self.send(request)
         assert self.receive(len(bytes.fromhex(answer))) == answer
 
@@ -55,7 +55,7 @@ def open_line() -> Iterator[Callable[[Any], Line]]:
 def test_the_manuals_frames_1_70(serve: Callable[..., Any], open_line: Callable[[Any], Line]) -> None:
     twin = serve("--firmware", "1.70")
     line = open_line(twin)
-    line.ask(IN1_TO_IN8, "01 02 01 00 A1 88")
+    line.check_answer(IN1_TO_IN8, "01 02 01 00 A1 88")
     assert twin.command("pin", "IN1=1", "IN8=1").returncode == 0
     # The inputs' filters let a change through after 10 ms.
     deadline = time.monotonic() + 60
@@ -63,14 +63,14 @@ def test_the_manuals_frames_1_70(serve: Callable[..., Any], open_line: Callable[
     while (answer := line.receive(6)) == "01 02 01 00 A1 88" and time.monotonic() < deadline:
         line.send(IN1_TO_IN8)
     assert answer == "01 02 01 81 61 E8"
-    line.ask("01 05 17 71 FF 00 D9 95", "01 05 17 71 FF 00 D9 95")
-    line.ask("01 01 17 70 00 08 39 A3", "01 01 01 02 D0 49")
-    line.ask(OUT2_OFF, OUT2_OFF)
-    line.ask("01 01 17 70 00 08 39 A3", "01 01 01 00 51 88")
-    line.ask(POS_ACT_1_70, "01 03 04 00 00 00 00 FA 33")
+    line.check_answer("01 05 17 71 FF 00 D9 95", "01 05 17 71 FF 00 D9 95")
+    line.check_answer("01 01 17 70 00 08 39 A3", "01 01 01 02 D0 49")
+    line.check_answer(OUT2_OFF, OUT2_OFF)
+    line.check_answer("01 01 17 70 00 08 39 A3", "01 01 01 00 51 88")
+    line.check_answer(POS_ACT_1_70, "01 03 04 00 00 00 00 FA 33")
 
 
 def test_the_manuals_frames_1_23(serve: Callable[..., Any], open_line: Callable[[Any], Line]) -> None:
     line = open_line(serve("--firmware", "1.23"))
-    line.ask(POS_ACT_1_23, "01 03 04 00 00 00 00 FA 33")
-    line.ask(OUT2_OFF, OUT2_OFF)
+    line.check_answer(POS_ACT_1_23, "01 03 04 00 00 00 00 FA 33")
+    line.check_answer(OUT2_OFF, OUT2_OFF)

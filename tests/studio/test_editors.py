@@ -132,4 +132,7 @@ def test_a_client_that_says_exit_does_not_end_the_studio(start_studio: Start) ->
     editor = Editor(studio)
     editor.ask("shutdown")
     editor.notify("exit")
-    Editor(studio).open(PROGRAM, "wbc", "END\n")
+    other = Editor(studio)
+    other.open(PROGRAM, "wbc", "ED\n")
+    assert other.diagnostics(PROGRAM, 1)
+    assert studio.process.poll() is None

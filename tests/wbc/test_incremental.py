@@ -33,7 +33,7 @@ lines = st.lists(st.sampled_from(LINES), max_size=14)
 ends = st.sampled_from(("\n", "\r\n", "\r"))
 
 
-def same(edited: Edited, text: str) -> None:
+def check_same(edited: Edited, text: str) -> None:
     for table, setup in ((TABLE, SETUP), (None, None)):
         edited.update(text)
         found, _ = edited.check(table, setup, DIALECT)
@@ -50,17 +50,17 @@ def same(edited: Edited, text: str) -> None:
 def test_every_edit_gives_what_the_whole_text_gives(edits: list[tuple[int, int, list[str], str]], first: list[str]) -> None:
     edited = Edited()
     text = list(first)
-    same(edited, "\n".join(text))
+    check_same(edited, "\n".join(text))
     for place, removed, inserted, end in edits:
         text[place : place + removed] = inserted
-        same(edited, end.join(text))
+        check_same(edited, end.join(text))
 
 
 @given(st.lists(st.text(st.sampled_from("M1 =\r\n#OUT:@/*x,5(IF"), max_size=40), max_size=5))
 def test_any_text_is_taken(texts: list[str]) -> None:
     edited = Edited()
     for text in texts:
-        same(edited, text)
+        check_same(edited, text)
 
 
 @pytest.mark.parametrize("name", sorted(path.stem for path in EXAMPLES.glob("*.prg")))
@@ -68,7 +68,7 @@ def test_an_example_typed_line_by_line(name: str) -> None:
     text = (EXAMPLES / f"{name}.prg").read_text()
     edited = Edited()
     for part in itertools.accumulate(text.splitlines(keepends=True)):
-        same(edited, part)
+        check_same(edited, part)
 
 
 def test_a_name_that_cannot_be_a_variable_is_refused_everywhere() -> None:
