@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from steptwin.cli.device import Device, axis_of, complain, find, number_of
+from steptwin.cli.device import Device, complain, find, kind_of
 from steptwin.errors import LineFailure, Misuse
 
 
@@ -48,7 +48,7 @@ def verify(
             datetime.now(UTC).isoformat(timespec="seconds"),
             __version__,
             write=write,
-            move=None if move is None else _move(move),
+            move=None if move is None else _move(move, kind_of(address).axes),
             progress=_progress,
             is_cancelled=lambda: interrupt.came,
         )
@@ -59,11 +59,13 @@ def verify(
         raise typer.Exit(1)
 
 
-def _move(text: str) -> tuple[int, float]:
+def _move(text: str, axes: int) -> tuple[int, float]:
+    from steptwin.drivers.typed import axis_of, number_of
+
     name, equals, value = text.partition("=")
     if not equals:
         raise Misuse(f"--move {text}: expected AXIS=DISTANCE, such as 1=0.5")
-    return axis_of(name), number_of(value, text)
+    return axis_of(name, axes), number_of(value, text)
 
 
 def _progress(id_: str, number: int, count: int) -> None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from steptwin.drivers import AsyncMic488, AsyncMic488Jog, Mic488Status
 from steptwin.drivers.address import text_of
 from steptwin.drivers.mic488.frames import ObservedFrame
-from steptwin.drivers.mic488.kind import of_mic488
+from steptwin.drivers.mic488.kind import of_mic488, unit_of
 from steptwin.drivers.mic488.program import ProgramState
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.live.twins import controller_of, find_device
@@ -195,7 +195,7 @@ def session_at(device: str | None, hz: float) -> MonitorSession:
     address = of_mic488(find_device(device), "the monitor")
     mic = AsyncMic488(
         address.place,
-        1 if address.number is None else address.number,
+        unit_of(address),
         baud=address.baud,
         firmware=address.variant,
         config=address.config,

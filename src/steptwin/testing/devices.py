@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from steptwin.drivers import Mic488
 from steptwin.drivers.address import parse_device
+from steptwin.drivers.mic488.kind import unit_of
 from steptwin.drivers.place import parse_line_address
 from steptwin.errors import Misuse
 from steptwin.mic488.config import ControllerConfig
@@ -44,7 +45,7 @@ def driver_of(address: str, config: ControllerConfig | None = None) -> Mic488:
     given = parse_device(address)
     return Mic488(
         given.place,
-        1 if given.number is None else given.number,
+        unit_of(given),
         baud=given.baud,
         firmware=given.variant,
         config=given.config or config,

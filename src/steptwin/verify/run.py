@@ -6,11 +6,12 @@ import time
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
-from steptwin.drivers.address import DeviceAddress
 from steptwin.drivers.blocking import finish
+from steptwin.drivers.kind import DeviceAddress
 from steptwin.drivers.m1486.identify import SearchLine, scan_chips
 from steptwin.drivers.m1486.lines import line_endpoint
 from steptwin.drivers.mic488.identify import firmware_of
+from steptwin.drivers.mic488.kind import unit_of
 from steptwin.drivers.mic488.lines import ThreadModbusLine
 from steptwin.drivers.place import Channel, Endpoint, parse_line_address
 from steptwin.errors import LineFailure, Misuse, Refusal
@@ -52,25 +53,25 @@ def verify(
         if move:
             raise Misuse("no check moves an M1486: leave out --move")
         chip = _chip(address)
-        chip_talk = ChipTalk(address.chip, chip, wait_s=address.timeout)
+        chip_talk = ChipTalk(address.number, chip, wait_s=address.timeout)
         endpoint = line_endpoint(address.place, address.baud)
         results, is_complete = _over(endpoint, chip_talk, OF_M1486, permitted, progress, is_cancelled)
-        of_device = {"kind": "M1486", "address": address.chip, "type": chip.name, "baud": address.baud}
+        of_device = {"kind": "M1486", "address": address.number, "type": chip.name, "baud": address.baud}
     else:
         axis, distance_u = _checked_move(move)
-        firmware = address.firmware or _firmware(address)
+        firmware = address.variant or _firmware(address)
         place = parse_line_address(address.place, address.baud)
         talk = ModbusTalk(
-            address.unit,
+            unit_of(address),
             register_map(firmware),
             framed=place.framed,
             wait_s=address.timeout,
-            is_detected=address.firmware is None,
+            is_detected=address.variant is None,
             axis=axis,
             distance_u=distance_u,
         )
         results, is_complete = _over(place.endpoint, talk, OF_MIC488, permitted, progress, is_cancelled)
-        of_device = {"kind": "MIC488", "unit": address.unit, "firmware": "1.70 or 1.40" if talk.may_be_older else firmware}
+        of_device = {"kind": "MIC488", "unit": unit_of(address), "firmware": "1.70 or 1.40" if talk.may_be_older else firmware}
         if place.serial is not None:
             of_device["baud"] = address.baud
     names = ", ".join(need.name.lower() for need in sorted(permitted))
@@ -92,7 +93,7 @@ def _firmware(address: DeviceAddress) -> str:
     line = ThreadModbusLine(address.place, baud=address.baud)
     finish(line.open())
     try:
-        return finish(firmware_of(line, address.unit, round(address.timeout * SECOND)))
+        return finish(firmware_of(line, unit_of(address), round(address.timeout * SECOND)))
     finally:
         finish(line.close())
 
@@ -107,9 +108,9 @@ def _chip(address: DeviceAddress) -> Variant:
         found = finish(scan_chips(line, baud=address.baud, timeout_ns=round(address.timeout * SECOND)))
     finally:
         finish(line.close())
-    chips = [chip for chip in found if address.chip in (None, chip.address)]
+    chips = [chip for chip in found if address.number in (None, chip.address)]
     if not chips:
-        where = "" if address.chip is None else f" with address {address.chip:X}"
+        where = "" if address.number is None else f" with address {address.number:X}"
         raise LineFailure(f"{address.place}: no M1486{where} responds at {address.baud} bit/s; it may move or run a program")
     if len(chips) > 1:
         raise Misuse(f"{address.place} has several chips: choose one, such as ,chip={chips[0].address:X}")

@@ -47,7 +47,7 @@ def opened(address: DeviceAddress, observe: bool, log: Log | None) -> Generator[
     """An open driver. ``observe``: DATA_TYPE is left as it is."""
     with Mic488(
         address.place,
-        _unit(address),
+        unit_of(address),
         baud=address.baud,
         firmware=address.variant,
         config=address.config,
@@ -65,7 +65,8 @@ def of_mic488(address: DeviceAddress, what: str) -> DeviceAddress:
     return address
 
 
-def _unit(address: DeviceAddress) -> int:
+def unit_of(address: DeviceAddress) -> int:
+    """The slave address; 1 if none is given."""
     return 1 if address.number is None else address.number
 
 
@@ -78,7 +79,7 @@ def _line(place: str, baud: int) -> DriverLine[Any, Any]:
 
 async def _part(address: DeviceAddress, line: DriverLine[Any, Any]) -> Mic488Part:
     mic = AsyncMic488(
-        line, _unit(address), firmware=address.variant, config=address.config, timeout_s=address.timeout, observe=True
+        line, unit_of(address), firmware=address.variant, config=address.config, timeout_s=address.timeout, observe=True
     )
     await mic.open()
     return Mic488Part(mic)
