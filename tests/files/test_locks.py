@@ -40,13 +40,14 @@ def test_a_file_is_locked_once(tmp_path: Path) -> None:
         assert os.read(other, 1) == b""  # others read it all the same
 
 
-def test_an_unlocked_file_can_be_locked_by_another(tmp_path: Path) -> None:
-    with opened(tmp_path / "lock") as one, opened(tmp_path / "lock") as other:
-        lock(one)
-        unlock(one)
+def test_a_closed_file_can_be_locked_by_another(tmp_path: Path) -> None:
+    with opened(tmp_path / "lock") as other, opened(tmp_path / "lock") as third:
+        with opened(tmp_path / "lock") as one:
+            lock(one)
+            unlock(one)
         lock(other)
         with pytest.raises(BlockingIOError):
-            lock(one)
+            lock(third)
 
 
 def test_an_owner_is_named_and_leaves_nothing_behind(tmp_path: Path) -> None:

@@ -7,16 +7,23 @@ import os
 import shutil
 import signal
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any, Self
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import pytest
 from tests.conftest import STEPTWIN, until
 from websockets.sync.client import ClientConnection, connect
 
 from steptwin.commands.demo import FOLDER, describe_demo
+from steptwin.errors import Refusal
+from steptwin.studio.page import find_page
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
+    from studio_page import Studio
 
 WORLD = """
     [world]
@@ -44,20 +51,32 @@ WORLD = """
     address = 7
 """
 
-FILES: dict[str, str] = {}
-"""Those that it names."""
+ROOT = Path(__file__).parent.parent.parent
+
+
+class StudioWorld(NamedTuple):
+    """A description of a world, and the files that it names."""
+
+    text: str = WORLD
+    files: Mapping[str, str] = MappingProxyType({})
+
+
+@pytest.fixture
+def studio_world() -> StudioWorld:
+    """What `start_studio` serves; a module may have its own."""
+    return StudioWorld()
 
 
 class Process:
     """``steptwin studio`` on free ports, with a small world, ``--demo`` with the demo machine; ``--itself`` without a file."""
 
-    def __init__(self, directory: Path, *options: str) -> None:
+    def __init__(self, directory: Path, served: StudioWorld, *options: str) -> None:
         self.directory = directory
         self.ready_file = directory / "ready.json"
         world = directory / "hall.toml"
-        world.write_text(describe_demo(free_ports=True) if "--demo" in options else WORLD)
+        world.write_text(describe_demo(free_ports=True) if "--demo" in options else served.text)
         shutil.copy(FOLDER / "demo.prg", directory)
-        for name, text in FILES.items():
+        for name, text in served.files.items():
             (directory / name).write_text(text)
         self.environment = {**os.environ, "XDG_RUNTIME_DIR": str(directory), "TERM": "dumb"}
         self._opened = ExitStack()
@@ -113,12 +132,12 @@ class Process:
 
 
 @pytest.fixture
-def start_studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Process]]:
+def start_studio(tmp_path_factory: pytest.TempPathFactory, studio_world: StudioWorld) -> Iterator[Callable[..., Process]]:
     """``start_studio("--remote", ...)``; it is ended cleanly after the test."""
     started: list[Process] = []
 
     def start(*options: str) -> Process:
-        process = Process(tmp_path_factory.mktemp("studio"), *options)
+        process = Process(tmp_path_factory.mktemp("studio"), studio_world, *options)
         started.append(process)
         return process.wait_until_ready()
 
@@ -130,3 +149,44 @@ def start_studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[
     finally:
         for process in started:
             process.close()
+
+
+def newer_source(page: Path, web: Path = ROOT / "studio-web") -> Path | None:
+    """A source of the page that is newer than the built one, compared as `make page` does; None if there is none."""
+    built = (page / "index.html").stat().st_mtime
+    for folder, folders, files in os.walk(web):
+        folders[:] = set(folders) - {"node_modules", "__pycache__"}
+        for name in files:
+            if (Path(folder) / name).stat().st_mtime > built:
+                return Path(folder) / name
+    return None
+
+
+@pytest.fixture(scope="module")
+def browser(require_peer: Callable[[str], str]) -> Iterator[Browser]:
+    """Skipped without a browser or a page; a page that is older than its sources fails."""
+    from playwright.sync_api import sync_playwright
+
+    chromium = require_peer("chromium")
+    try:
+        changed = newer_source(find_page())
+    except Refusal as error:
+        pytest.skip(str(error))
+    if changed is not None:
+        pytest.fail(f"{changed.relative_to(ROOT)} is newer than the built page of the studio: run 'make page'", pytrace=False)
+    with sync_playwright() as playwright:
+        # Root has no user namespace to put the sandbox into.
+        started = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        yield started
+        started.close()
+
+
+@pytest.fixture
+def studio(start_studio: Callable[..., Process], browser: Browser) -> Iterator[Studio]:
+    """A studio with ``studio_world``, whose pages must not complain."""
+    from studio_page import Studio
+
+    found = Studio(start_studio(), browser)
+    yield found
+    found.close()
+    assert found.complaints == []

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.studio.conftest import newer_source
 
 from steptwin.errors import Refusal
 from steptwin.studio import page
@@ -60,6 +61,18 @@ def test_a_studio_without_a_page_names_the_command_that_builds_it(monkeypatch: p
         page.find_page()
     (tmp_path / "index.html").touch()
     assert page.find_page() == tmp_path
+
+
+def test_a_source_that_is_newer_than_the_built_page_is_named(tmp_path: Path) -> None:
+    built, web = tmp_path / "page", tmp_path / "web"
+    for path in (built / "index.html", web / "src/App.svelte", web / "node_modules/x.js"):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+        os.utime(path, (1000, 1000))
+    os.utime(web / "node_modules/x.js", (2000, 2000))
+    assert newer_source(built, web) is None
+    os.utime(web / "src/App.svelte", (1001, 1001))
+    assert newer_source(built, web) == web / "src/App.svelte"
 
 
 def _members(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
+from studio_page import AXE, PICTURES, WAIT_MS, Studio, button, show
 from tests.conftest import until
-from tests.studio.conftest import Process
-from tests.studio.test_page_panels import AXE, PICTURES, WAIT_MS, Studio, browser, button, show
+from tests.studio.conftest import Process, StudioWorld
 from tests.studio.test_page_program import choose, text_of
 
 from steptwin.files.session import save, session_of
 from steptwin.files.world import World
-
-__all__ = ["browser"]
 
 WORLD = """
     [world]
@@ -57,13 +55,8 @@ CHIP = "[\n:5\n@1\nL2\n+1\nE\n'2\nW5\nJ1\n@2\n+2\n.\n]\n"
 
 
 @pytest.fixture
-def studio(start_studio: Callable[..., Process], browser: Browser, monkeypatch: pytest.MonkeyPatch) -> Iterator[Studio]:
-    monkeypatch.setattr("tests.studio.conftest.WORLD", WORLD)
-    monkeypatch.setattr("tests.studio.conftest.FILES", {"cell.prg": PROGRAM, "drum.m1486": CHIP})
-    found = Studio(start_studio(), browser)
-    yield found
-    found.close()
-    assert found.complaints == []
+def studio_world() -> StudioWorld:
+    return StudioWorld(WORLD, {"cell.prg": PROGRAM, "drum.m1486": CHIP})
 
 
 def count(studio: Studio) -> float:

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterator
 
 import httpx
 import pytest
-from playwright.sync_api import Browser, Locator, Page, expect
+from playwright.sync_api import Locator, Page, expect
+from studio_page import AXE, Studio, button
 from tests.conftest import until
-from tests.studio.conftest import Process
-from tests.studio.test_page_panels import AXE, Studio, browser, button
-
-__all__ = ["browser"]
+from tests.studio.conftest import StudioWorld
 
 WORLD = """
     [world]
@@ -44,13 +41,8 @@ TABLE = "HOME;1;x;x;x\nPICK;5;x;x;x\n"
 
 
 @pytest.fixture
-def studio(start_studio: Callable[..., Process], browser: Browser, monkeypatch: pytest.MonkeyPatch) -> Iterator[Studio]:
-    monkeypatch.setattr("tests.studio.conftest.WORLD", WORLD)
-    monkeypatch.setattr("tests.studio.conftest.FILES", {"cell.prg": PROGRAM, "cell.csv": TABLE})
-    found = Studio(start_studio(), browser)
-    yield found
-    found.close()
-    assert found.complaints == []
+def studio_world() -> StudioWorld:
+    return StudioWorld(WORLD, {"cell.prg": PROGRAM, "cell.csv": TABLE})
 
 
 def text_of(page: Page, name: str = "cell.prg") -> Locator:

@@ -6,12 +6,8 @@ from pathlib import Path
 
 import pytest
 from playwright.sync_api import Page, expect
+from studio_page import Studio, button, show
 from tests.conftest import until
-from tests.studio import test_page_panels as panels
-from tests.studio.test_page_panels import Studio, button
-
-browser = panels.browser
-studio = panels.studio
 
 M1_ACC, M1_DEC, M1_VMAX = 10036, 10044, 10052
 
@@ -58,7 +54,7 @@ def test_the_settings_of_a_chip_are_sent_as_commands(studio: Studio) -> None:
     calculated(page, distance="64000", velocity="2000")
     button(page, "Send to drum").click()
     expect(page.get_by_role("row", name="V 2000 2000")).to_be_visible()
-    panels.show(page, "Configuration")
+    show(page, "Configuration")
     page.get_by_label("Controller", exact=True).select_option("drum")
     expect(page.get_by_role("status", name="Velocity", exact=True)).to_have_text("2000")
     page.get_by_label("New value of Velocity").fill("30000")

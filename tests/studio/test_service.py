@@ -20,7 +20,7 @@ import pytest
 from pymodbus.client import ModbusTcpClient
 from tests.conftest import until
 from tests.peers.conftest import Master
-from tests.studio.conftest import Process
+from tests.studio.conftest import Process, StudioWorld
 from tests.support.studio_rig import check_answer, check_message
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection
@@ -113,7 +113,7 @@ def test_it_moves_what_an_independent_master_sees(start_studio: Start) -> None:
 
 @pytest.fixture(scope="module")
 def shared(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    process = Process(tmp_path_factory.mktemp("studio")).wait_until_ready()
+    process = Process(tmp_path_factory.mktemp("studio"), StudioWorld()).wait_until_ready()
     yield process
     try:
         process.end()
