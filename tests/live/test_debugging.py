@@ -372,3 +372,14 @@ def test_a_world_without_programs_does_not_keep_its_past(run: Run) -> None:
         rig.cell.close()
 
     run(play())
+
+
+def test_a_breakpoint_of_two_clients_stays_until_both_have_removed_it(run: Run) -> None:
+    async def play(rig: Rig) -> None:
+        assert rig.line(line=3) == rig.line(line=3)
+        rig.do("clear_breakpoint", breakpoint=1)
+        assert [one["number"] for one in rig.do("breakpoints")["breakpoints"]] == [1]
+        rig.do("clear_breakpoint", breakpoint=1)
+        assert rig.do("breakpoints")["breakpoints"] == []
+
+    scene(run, play)

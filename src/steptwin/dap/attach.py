@@ -202,12 +202,14 @@ class AttachedTwin:
         return self._after(command.StepProgram(machine, "back"))
 
     def go(self, moment: Nanos) -> Stop:
-        travel = self._after(command.LookAt(moment))
+        self._drop()
+        self._ask(command.LookAt(moment))
         while True:
-            try:
-                next(travel)
-            except StopIteration as end:
-                return end.value
+            for event in self._events(PART_S):
+                if isinstance(event.payload, StoppedPayload):
+                    return self._stop(event, event.payload)
+                if isinstance(event.payload, PacePayload) and not event.payload.paused:
+                    raise Misuse("another client has let time go on")
 
     def branch(self) -> None:
         self._ask(command.Branch())

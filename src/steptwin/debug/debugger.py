@@ -64,7 +64,7 @@ class Debugger:
             raise Misuse(f"{world.spec.name}: no controller has a program whose text is known")
         for name, programs in debugged.items():
             if programs.statement_time == 0:
-                raise Misuse(f"{name}: statement_time = 0: a debugger stops between statements, which must take 1 µs at least")
+                raise Misuse(f"{name}: statement_time = 0: a debugger stops between statements: give them '1 us' at least")
         self._world = world
         self._statement = min(programs.statement_time for programs in debugged.values())
         self._apply_input = apply_input or world.apply_input

@@ -37,6 +37,8 @@ _EVENTS = complete("event", command.EVENTS, "codes", {event.code: event for even
 class _Requested(NamedTuple):
     wanted: command.SetBreakpoint
     point: AnyPoint
+    times: int = 1
+    """How often it was set and not removed: it stays until each of its clients has removed it."""
 
 
 class Debugging:
@@ -91,6 +93,8 @@ class Debugging:
             raise Misuse(f"{command.MOST_BREAKPOINTS} breakpoints are set, as many as may be")
         same = next((number for number, one in self._breakpoints.items() if one.wanted == wanted), None)
         if same is not None:
+            found = self._breakpoints[same]
+            self._breakpoints[same] = found._replace(times=found.times + 1)
             return self._plain(same)
         number, self._next = self._next, self._next + 1
         self._breakpoints[number] = _Requested(wanted, _point(wanted))
@@ -104,7 +108,11 @@ class Debugging:
         if wanted.number not in self._breakpoints:
             known = ", ".join(map(str, self._breakpoints)) or "none"
             raise Misuse(f"there is no breakpoint {wanted.number}; there are {known}")
-        self._remove(wanted.number)
+        found = self._breakpoints[wanted.number]
+        if found.times > 1:
+            self._breakpoints[wanted.number] = found._replace(times=found.times - 1)
+        else:
+            self._remove(wanted.number)
 
     def _remove(self, number: int) -> None:
         del self._breakpoints[number]

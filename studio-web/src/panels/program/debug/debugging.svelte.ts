@@ -177,11 +177,7 @@ export class Debugging {
   /** Sets a breakpoint, instead of another one where its number is given. Gives whether it is set. */
   async set(wanted: Wanted, instead: number | null = null): Promise<boolean> {
     const isSet = await this.studio.act("breakpoint", wanted);
-    if (isSet && instead !== null) {
-      const same = this.breakpoints.find(({ number }) => number === instead);
-      if (same === undefined || !isSame(same, wanted))
-        await this.studio.act("clear_breakpoint", { breakpoint: instead });
-    }
+    if (isSet && instead !== null) await this.studio.act("clear_breakpoint", { breakpoint: instead });
     await this.refresh();
     return isSet;
   }
@@ -214,6 +210,3 @@ export class Debugging {
     return isDone;
   }
 }
-
-const KEYS = ["machine", "program", "line", "label", "value", "condition", "hits", "log"] as const;
-const isSame = (one: Breakpoint, wanted: Wanted): boolean => KEYS.every((key) => one[key] === (wanted[key] ?? null));
