@@ -233,6 +233,7 @@ def _run_world(file: Path, given: _Run) -> bool:
         world=file,
         moment=given.world.moment,
         seed=given.world.seed,
+        overrides=given.world.overrides,
         state=given.world.state,
         limit=given.limit,
         until=given.until,

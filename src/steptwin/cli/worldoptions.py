@@ -13,6 +13,7 @@ from steptwin.cli.optiongroups import OptionGroup
 if TYPE_CHECKING:
     from steptwin.commands.up_world import UpOptions
     from steptwin.machine import Nanos
+    from steptwin.world.overrides import Overrides
 
 Faults = Annotated[
     list[str] | None,
@@ -40,6 +41,14 @@ class WorldRunOptions(OptionGroup):
 
     fault: Faults = None
     seed: Annotated[int | None, typer.Option(help="Random seed. Default: that of the description.")] = None
+    with_: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--with",
+            metavar="NAME.KEY=VALUE",
+            help="Replace a value of the description, or a parameter of what it uses, such as x.pitch=4.0; repeatable.",
+        ),
+    ] = None
     state: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Directory of the non-volatile memory. Default: that of the description, or none."),
@@ -53,6 +62,13 @@ class WorldRunOptions(OptionGroup):
     allow_outside: Annotated[
         bool, typer.Option("--allow-outside", help="Permit files outside the folder of the description.")
     ] = False
+
+    @property
+    def overrides(self) -> Overrides:
+        """Values that replace those of the description. Raises `Misuse`."""
+        from steptwin.world.overrides import read_overrides
+
+        return read_overrides(self.with_ or ())
 
     @property
     def moment(self) -> Nanos | None:
@@ -97,6 +113,7 @@ def up_options(world: Path | None, ready_file: Path | None, live: LiveOptions, o
         world=world,
         moment=options.moment,
         seed=options.seed,
+        overrides=options.overrides,
         state=options.state,
         speed=live.speed,
         name=live.name,

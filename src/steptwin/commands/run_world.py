@@ -6,7 +6,7 @@ import json
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -26,6 +26,7 @@ from steptwin.live.interrupts import FirstInterrupt
 from steptwin.machine import SECOND, Nanos
 from steptwin.world import script as do
 from steptwin.world.kind import ProgramAct, ProgramReport
+from steptwin.world.overrides import Overrides
 from steptwin.world.records import describe, is_shown
 from steptwin.world.references import check_step
 
@@ -49,6 +50,8 @@ class WorldRun:
     moment: Nanos | None = None
     """The moment of the session to continue from; None: its end."""
     seed: int | None = None
+    overrides: Overrides = field(default_factory=dict)
+    """Values that replace those of the description."""
     state: Path | None = None
     """Directory of the non-volatile memory; None: that of the description."""
     limit: Nanos | None = None
@@ -81,6 +84,7 @@ def run(options: WorldRun, out: Print, warn: Print) -> bool:
         warn,
         moment=options.moment,
         seed=options.seed,
+        overrides=options.overrides,
         keep_trace=keep_trace,
         allow_outside=options.allow_outside,
         state=options.state,

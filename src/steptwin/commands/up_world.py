@@ -6,7 +6,7 @@ import asyncio
 import sys
 from collections.abc import Awaitable, Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import count
 from math import inf
@@ -39,6 +39,7 @@ from steptwin.world.addresses import check_addresses, parse_address
 from steptwin.world.kind import LinkKind
 from steptwin.world.kinds import line_kinds
 from steptwin.world.lines import SCRIPTS
+from steptwin.world.overrides import Overrides
 from steptwin.world.records import is_shown
 from steptwin.world.spec import LineSpec
 from steptwin.world.trace import TraceRecord
@@ -53,6 +54,8 @@ class UpOptions:
     moment: Nanos | None = None
     """The moment of the session to continue from; None: its end."""
     seed: int | None = None
+    overrides: Overrides = field(default_factory=dict)
+    """Values that replace those of the description."""
     state: Path | None = None
     """Directory of the non-volatile memory; None: that of the description."""
     speed: str = "1"
@@ -106,6 +109,7 @@ def up(options: UpOptions, addition: Addition | None = None) -> bool:
         lambda text: sys.stderr.write(f"{text}\n"),
         moment=options.moment,
         seed=options.seed,
+        overrides=options.overrides,
         keep_trace=options.trace not in (None, "off") or not is_session(options.world),
         keep_inputs=options.session is not None,
         allow_outside=options.allow_outside,

@@ -12,6 +12,7 @@ from steptwin.files.world import World
 from steptwin.machine import Nanos
 from steptwin.world import script as do
 from steptwin.world.faults import read as read_fault
+from steptwin.world.overrides import NO_OVERRIDES, Overrides
 
 SESSION_SUFFIX = ".json"
 
@@ -34,6 +35,7 @@ def begin_world(
     *,
     moment: Nanos | None = None,
     seed: int | None = None,
+    overrides: Overrides = NO_OVERRIDES,
     keep_trace: bool = True,
     keep_inputs: bool = True,
     allow_outside: bool = False,
@@ -47,13 +49,21 @@ def begin_world(
         if moment is not None:
             raise Misuse(f"--from: {path} is not a session; a description begins at 0 s")
         world = World.load(
-            path, seed=seed, keep_trace=keep_trace, keep_inputs=keep_inputs, allow_outside=allow_outside, state=state
+            path,
+            seed=seed,
+            overrides=overrides,
+            keep_trace=keep_trace,
+            keep_inputs=keep_inputs,
+            allow_outside=allow_outside,
+            state=state,
         )
         for warning in world.parts.warnings:
             warn(warning)
         return world
     if seed is not None:
         raise Misuse(f"--seed: {path} is a session, which continues with its own seed")
+    if overrides:
+        raise Misuse(f"--with: {path} is a session, which continues with its own values")
     if state is not None:
         raise Misuse(f"--state: {path} is a session, which continues with its own memory")
     session = sessions.load(path)

@@ -26,6 +26,7 @@ from steptwin.world.description import read_world
 from steptwin.world.faults import Fault, parse
 from steptwin.world.history import replay
 from steptwin.world.overrides import Overrides
+from steptwin.world.pieces import given_files
 from steptwin.world.plant import RecordedInput
 
 FORMAT = 1
@@ -57,7 +58,7 @@ class Session:
     def world(self, *, keep_trace: bool = True, keep_inputs: bool = True) -> World:
         """The world at its beginning. Raises `WorldError`, and `Misuse` where the firmware is not the description's."""
         world = World(
-            read_world(self.name, self.text, self.seed, self.overrides),
+            read_world(self.name, self.text, self.seed, self.overrides, given_files(self.files)),
             self.files,
             keep_trace=keep_trace,
             keep_inputs=keep_inputs,

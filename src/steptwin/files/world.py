@@ -31,6 +31,7 @@ from steptwin.world.faults import read as read_fault
 from steptwin.world.kind import ControllerKind, M, S, V
 from steptwin.world.kinds import M1486, MIC488
 from steptwin.world.overrides import NO_OVERRIDES, Overrides
+from steptwin.world.pieces import given_files
 from steptwin.world.plant import Plant, PlantSnapshot
 from steptwin.world.running import Script
 from steptwin.world.spec import WorldSpec
@@ -120,11 +121,16 @@ class World(Plant):
         owns that directory until `close`, and raises `StateInUse` or `StateFailure` if it cannot be used.
         """
         place = Path(path)
-        spec = describe(str(path), read_text(place, MOST_DESCRIPTION_BYTES).source.text, seed, overrides)
         files: dict[str, bytes] = {}
+
+        def read(name: str) -> bytes:
+            files[name] = read_beside(place.parent, name, allow_outside=allow_outside)
+            return files[name]
+
+        spec = describe(str(path), read_text(place, MOST_DESCRIPTION_BYTES).source.text, seed, overrides, read)
         for name, key in spec.files():
             try:
-                files[name] = read_beside(place.parent, name, allow_outside=allow_outside)
+                _ = files.get(name) or read(name)
             except Misuse as error:
                 spec.text.wrong(key, "D009", str(error))
         where = None if state is None else Path(state)
@@ -179,7 +185,7 @@ class World(Plant):
     ) -> Self:
         """The world described by a text. ``files`` are the contents of the files it names; the rest is as in `load`, but that
         non-volatile memory lasts in ``state`` alone: a text lies in no folder."""
-        spec = describe(name, text, seed, overrides)
+        spec = describe(name, text, seed, overrides, given_files(files or {}))
         where = None if state is None else Path(state)
         return cls._with_memory(spec, dict(files or {}), where, keep_trace=keep_trace, keep_inputs=keep_inputs)
 
@@ -331,7 +337,7 @@ class World(Plant):
 
 def _revived(kind: type[World], name: str, snapshot: PlantSnapshot, keep_inputs: bool) -> World:
     text, seed, overrides, files = snapshot.description
-    world = kind(read_world(name, text, seed, overrides), files, keep_inputs=keep_inputs)
+    world = kind(read_world(name, text, seed, overrides, given_files(files)), files, keep_inputs=keep_inputs)
     world.restore(snapshot)
     return world
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass
+from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeVar
@@ -14,7 +15,7 @@ from steptwin.drivers.place import Channel, parse_line_address
 from steptwin.durations import duration
 from steptwin.errors import Misuse
 from steptwin.files.textfiles import read_text
-from steptwin.files.world import World
+from steptwin.files.world import World, read_beside
 from steptwin.inputfiles import MOST_DESCRIPTION_BYTES
 from steptwin.live.world import LiveWorld, PlacePort
 from steptwin.machine import Nanos
@@ -53,7 +54,8 @@ class WorldOptions:
 
 def controllers_in(file: Path) -> list[str]:
     """Names of the controllers in the world that a file describes. Raises `Misuse`."""
-    return _controllers(read_world(str(file), read_text(file, MOST_DESCRIPTION_BYTES).source.text))
+    text = read_text(file, MOST_DESCRIPTION_BYTES).source.text
+    return _controllers(read_world(str(file), text, read=partial(read_beside, file.parent)))
 
 
 def _controllers(spec: WorldSpec) -> list[str]:

@@ -164,8 +164,8 @@ class Causes:
             return _acted(act)
         path = self._world.parts.driven.get(pin)
         if path is not None:
-            line = self._world.spec.text.line(path)
-            return Cause(Link(change.time, pin.machine, f"[[{path[0]}]] in line {line} of the description drives {pin}"), nothing)
+            where = self._world.spec.text.where(path)
+            return Cause(Link(change.time, pin.machine, f"[[{path[0]}]] in {where} drives {pin}"), nothing)
         return self.in_machine(pin.machine, change, Operand(OperandKind.PIN, pin.pin))
 
     def _operated(self, name: str, change: Change) -> Found:

@@ -18,6 +18,7 @@ from steptwin.world.kernel import Kernel
 from steptwin.world.kind import Member, Terminals
 from steptwin.world.kinds import line_kinds
 from steptwin.world.parts import WorldParts
+from steptwin.world.pieces import beside
 from steptwin.world.site import Site
 from steptwin.world.spec import ControllerSpec, LineSpec, WorldSpec
 from steptwin.world.trace import Recorder, TraceRecord
@@ -31,13 +32,6 @@ Keep = Callable[[str, bytes, Nanos], None]
 def memory_file(name: str) -> str:
     """The name, among the files of a world, of the initial non-volatile memory of a controller."""
     return f"state:{name}"
-
-
-def beside(description: str, name: str) -> str:
-    """The path of a file that a description names, for a user: seen from where the path of the description is seen from."""
-    is_absolute = name.startswith(("/", "\\")) or name[1:2] == ":"
-    folder = "" if is_absolute else description[: max(map(description.rfind, "/\\")) + 1]
-    return folder + name
 
 
 def build(spec: WorldSpec, files: Files, record: Recorder, keep: Keep | None = None) -> WorldParts:

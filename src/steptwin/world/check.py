@@ -8,8 +8,9 @@ from dataclasses import replace
 from steptwin.diagnostics import Diagnostic, in_order
 from steptwin.errors import Misuse
 from steptwin.world.description import describe
+from steptwin.world.pieces import is_piece
 from steptwin.world.plant import Plant
-from steptwin.world.reader import WorldError
+from steptwin.world.reader import TomlText, WorldError
 
 LONGEST_MESSAGE = 500
 """Limit of a message, in characters: the errors in a program that a description names are many, and shown in the program too."""
@@ -17,15 +18,22 @@ LONGEST_MESSAGE = 500
 
 def diagnose(name: str, text: str, read: Callable[[str], bytes]) -> Sequence[Diagnostic]:
     """``read`` gives the content of a file by the name it has in the text. Never raises."""
+    files: dict[str, bytes] = {}
+
+    def keep(file: str) -> bytes:
+        files[file] = read(file)
+        return files[file]
+
     try:
-        spec = describe(name, text)
+        if is_piece(TomlText(name, text)):
+            return ()  # what it is depends on what uses it
+        spec = describe(name, text, read=keep)
     except WorldError as error:
         return error.findings
     try:
-        files: dict[str, bytes] = {}
         for file, key in spec.files():
             try:
-                files[file] = read(file)
+                _ = files.get(file) or keep(file)
             except Misuse as error:
                 spec.text.wrong(key, "D009", str(error))
         Plant(spec, files, keep_trace=False, keep_inputs=False)

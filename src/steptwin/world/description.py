@@ -16,6 +16,7 @@ from steptwin.world.kinds import KINDS
 from steptwin.world.links import LINK_KEYS
 from steptwin.world.names import check_names
 from steptwin.world.overrides import NO_OVERRIDES, Overrides, override
+from steptwin.world.pieces import PARAMETERS, USE, Pieces, ReadFile, is_piece, no_files
 from steptwin.world.reader import TomlText, read_table
 from steptwin.world.sense import check_sense
 from steptwin.world.spec import LineSpec, ScriptSpec, WorldSpec
@@ -23,23 +24,34 @@ from steptwin.world.steptable import STEPS, read_steps
 from steptwin.world.tables import KEYS, SEED, tables
 
 
-def read_world(name: str, text: str, seed: int | None = None, overrides: Overrides = NO_OVERRIDES) -> WorldSpec:
+def read_world(
+    name: str, text: str, seed: int | None = None, overrides: Overrides = NO_OVERRIDES, read: ReadFile = no_files
+) -> WorldSpec:
     """The world that a TOML text called ``name`` describes. Raises `WorldError` with everything that is wrong with it.
 
-    ``seed`` and ``overrides`` replace values of the text; `Misuse` for what is no seed, or is not there to be replaced.
+    ``seed`` and ``overrides`` replace values of the text; `Misuse` for what is no seed, or is not there to be replaced. ``read``
+    gives the content of files of tables that it uses.
     """
-    spec = describe(name, text, seed, overrides)
+    spec = describe(name, text, seed, overrides, read)
     spec.text.check()
     return spec
 
 
-def describe(name: str, text: str, seed: int | None = None, overrides: Overrides = NO_OVERRIDES) -> WorldSpec:
+def describe(
+    name: str, text: str, seed: int | None = None, overrides: Overrides = NO_OVERRIDES, read: ReadFile = no_files
+) -> WorldSpec:
     """As `read_world`, but raises `WorldError` only for text that is not TOML. Other errors are kept in ``text`` of the result,
     because building the world may find more."""
     named = ("line", *(element.name for element in ELEMENTS.values() if element.is_named))
     toml = TomlText(name, text, tuple(KINDS), named)
     data = toml.data
-    override(data, overrides)
+    if is_piece(toml):
+        toml.wrong((PARAMETERS,), "D004", "a file with [parameters] is for [[use]] of a description")
+        raise toml.error()
+    late = override(data, overrides, USE)
+    pieces = Pieces(read, tables(), toml.controllers, named)
+    pieces.put_into(toml)
+    override(data, late)
     inner = {key for element in ELEMENTS.values() for key in element.inner}
     known = [*(key for key in tables() if key not in inner), "fault", GATEWAY]
     for key in data:
@@ -62,6 +74,7 @@ def describe(name: str, text: str, seed: int | None = None, overrides: Overrides
         faults=tuple(_faults(toml)),
         text=toml,
         overrides=dict(overrides),
+        pieces=pieces.files,
     )
     check_names(spec, [one for element in ELEMENTS.values() for one in element.named(spec.elements[element.name])])
     return spec if seed is None else replace(spec, seed=_seed(seed))

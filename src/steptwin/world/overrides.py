@@ -1,29 +1,79 @@
-"""Parameters of a description that take other values than its text has: ``{"axis.x.pitch": 4.0, "mic488.table.M1.gear": 2}``."""
+"""Parameters of a description that take other values than its text has: ``{"axis.x.pitch": 4.0, "x.motor.load": 0.2}``."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.nearmiss import NearMiss
 
 Overrides: TypeAlias = Mapping[str, Any]
-"""By key with its tables, joined by points. Of several tables of a kind one is chosen by its name, or by its number from 0."""
+"""By key with its tables, joined by points. Of several tables of a kind one is chosen by its name, or its number from 0. The kind
+can be left out before a name that only one table has."""
 
 NO_OVERRIDES: Overrides = {}
+_WITH = "with"
+"""The table of a use that has the values of its parameters."""
 
 
-def override(data: dict[str, Any], overrides: Overrides) -> None:
-    """Put the values into what was read from TOML. Raises `Misuse` for tables that are not there."""
+def read_overrides(texts: Iterable[str]) -> Overrides:
+    """From texts such as ``x.pitch=4.0``; values as in TOML, others are text. Raises `Misuse`."""
+    found: dict[str, Any] = {}
+    for text in texts:
+        key, sign, value = text.partition("=")
+        if not sign or not key.strip():
+            raise Misuse(f"--with {text}: expected NAME.KEY=VALUE, such as x.pitch=4.0")
+        found[key.strip()] = _value(value.strip())
+    return found
+
+
+def _value(text: str) -> Any:
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except (tomllib.TOMLDecodeError, RecursionError, ValueError):
+        return text
+
+
+def override(data: dict[str, Any], overrides: Overrides, only: str | None = None) -> Overrides:
+    """Put the values into what was read from TOML. Raises `Misuse` for tables that are not there.
+
+    ``only``: those of one kind of table; the others are returned.
+    """
+    left: dict[str, Any] = {}
     for key, value in overrides.items():
-        *tables, last = key.split(".")
+        *tables, last = _whole_path(data, key.split("."), only)
+        if only is not None and tables[:1] != [only]:
+            left[key] = value
+            continue
         inner: Any = data
         for table in tables:
             inner = _inside(inner, table, key)
         if not isinstance(inner, dict) or not tables:
             raise Misuse(f"override {key!r}: expected TABLE.KEY or TABLE.NAME.KEY, such as 'axis.x.pitch'")
         inner[last] = value
+    return left
+
+
+def _whole_path(data: Mapping[str, Any], path: list[str], only: str | None) -> list[str]:
+    """With the kind of table, where it was left out, and with the table of parameters of a use."""
+    if path[0] in data or len(path) < 2:
+        return path
+    kinds = [kind for kind in data if path[0] in _names(data[kind])]
+    if len(kinds) > 1:
+        raise Misuse(f"override {'.'.join(path)!r}: {path[0]!r} is in {' and '.join(kinds)}: begin with one of these")
+    if kinds == [only]:
+        use = _inside(data[kinds[0]], path[0], ".".join(path))
+        use.setdefault(_WITH, {})
+        return [kinds[0], path[0], *([] if path[1] == _WITH else [_WITH]), *path[1:]]
+    return [*kinds, *path]
+
+
+def _names(tables: object) -> Iterator[str]:
+    for table in tables if isinstance(tables, list) else ():
+        if isinstance(table, dict) and isinstance(table.get("name"), str):
+            yield table["name"]
 
 
 def _inside(holder: Any, wanted: str, key: str) -> Any:
@@ -34,5 +84,6 @@ def _inside(holder: Any, wanted: str, key: str) -> Any:
         known = {str(number): table for number, table in enumerate(holder)}
         known |= {table["name"]: table for table in holder if isinstance(table, dict) and isinstance(table.get("name"), str)}
     if wanted not in known:
-        raise Misuse(f"override {key!r}: there is no {wanted!r}{NearMiss().hint(wanted, known)}")
+        names = known if holder is not known else {**known, **dict.fromkeys(name for of in known.values() for name in _names(of))}
+        raise Misuse(f"override {key!r}: there is no {wanted!r}{NearMiss().hint(wanted, names)}")
     return known[wanted]

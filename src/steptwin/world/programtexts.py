@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -143,7 +142,7 @@ class WorldPrograms:
     def files(self) -> Mapping[str, bytes]:
         """What an editor server needs by address: texts, configurations, and a description of their controllers."""
         plant = self._plant
-        data: Any = tomllib.loads(plant.spec.text.source.text)
+        data: Any = plant.spec.text.data
         found: dict[str, bytes] = {}
         tables: list[str] = []
         for spec in plant.spec.controllers:

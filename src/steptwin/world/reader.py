@@ -6,7 +6,7 @@ import re
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from steptwin.diagnostics import Diagnostic, Fix, Severity, SourceText, Span, in_order, render
 from steptwin.errors import Misuse, SourceErrors
@@ -37,8 +37,20 @@ class WorldError(SourceErrors):
         super().__init__("\n".join([*in_files, *([render(source, own)] if own else [])]))
 
 
+class Adopted(NamedTuple):
+    """A table that comes from another text: there, and the use of that text here."""
+
+    text: TomlText
+    path: Path
+    use: Path
+
+
 class TomlText:
-    """A TOML text that knows where its keys are, and collects what is wrong with them."""
+    """A TOML text that knows where its keys are, and collects what is wrong with them.
+
+    Some of its tables may come from other texts, which it uses; what is wrong with these is shown where it is, and where they are
+    used.
+    """
 
     def __init__(self, name: str, text: str, controllers: Sequence[str] = (), named: Sequence[str] = ()) -> None:
         """``controllers`` are the tables that describe one, ``named`` the others with names that tables refer to. Raises
@@ -54,6 +66,11 @@ class TomlText:
         self._wrong: set[Path] = set()
         """Errors in the order of their reports; tables of these are not looked at further."""
         self._left_out: set[str] = set()
+        self._left_out_uses: tuple[str, ...] = ()
+        """What names from uses with errors begin with."""
+        self._adopted: dict[Path, Adopted] = {}
+        self._used: tuple[TomlText, Path] | None = None
+        """The text that uses this one, and where."""
         try:
             self._spans = find_places(text)
             self.data: dict[str, Any] = tomllib.loads(text)
@@ -90,13 +107,22 @@ class TomlText:
         """Raises `WorldError` when there is more wrong than anybody reads."""
         if len(message) > _LONGEST_MESSAGE and "\n" not in message:
             message = f"{message[: _LONGEST_MESSAGE - 61]}…{message[-60:]}"
-        self.findings.append(Diagnostic(code, Severity.ERROR, span, message, hint, fix))
+        found = Diagnostic(code, Severity.ERROR, span, message, hint, fix)
+        self.findings.append(found)
+        if code != FILE_ERRORS:
+            self._tell_user(render(self.source, [found]))
         if len(self.findings) >= MOST_FINDINGS:
             raise self.error()
 
     def wrong(self, path: Path, code: str, message: str, hint: str | None = None, fix: Fix | None = None) -> None:
         """Something is wrong with the value at ``path``, or with what holds it."""
         self._wrong.add(path)
+        adopted = self._adopted.get(path[:2])
+        if adopted is not None and code != FILE_ERRORS:
+            adopted.text.wrong((*adopted.path, *path[2:]), code, message, hint)
+            return
+        if adopted is not None:
+            path = adopted.use
         if (*path, 0) in self._spans and path not in self._spans:
             path = *path, 0
         while path and path not in self._spans:
@@ -108,6 +134,35 @@ class TomlText:
         if str(error) not in self._in_files:
             self._in_files.append(str(error))
         self.wrong(path, FILE_ERRORS, f"a file has errors: {str(error).splitlines()[0]}")
+
+    # ------------------------------------------------------------------ tables of other texts
+
+    def use(self, other: TomlText, path: Path) -> None:
+        """Tables of another text will be adopted, for what is at ``path``."""
+        other._used = self, path
+
+    def adopt(self, here: Path, other: TomlText, there: Path, use: Path) -> None:
+        """The table at ``here`` is that at ``there`` in another text, which is used at ``use``."""
+        self._adopted[here] = Adopted(other, there, use)
+
+    def leave_out_use(self, name: str) -> None:
+        """What a use gives is not there, because of what is wrong with it."""
+        self._left_out_uses = (*self._left_out_uses, f"{name}_")
+
+    def _tell_user(self, shown: str) -> None:
+        """Report something wrong in this text to the one that uses it."""
+        if self._used is None:
+            return
+        user, path = self._used
+        place = f"{shown}\n  used in {user.source.name}:"
+        same = next((number for number, known in enumerate(user._in_files) if known.startswith(place)), None)
+        shown = f"{place}{user.line(path)}"
+        if same is None:
+            user._in_files.append(shown)
+        else:
+            user._in_files[same] += f", {user.line(path)}"
+        user.wrong(path, FILE_ERRORS, f"a file has errors: {shown.splitlines()[0]}")
+        user._tell_user(shown)
 
     def wrong_reference(self, path: Path, error: Misuse, place: str = "") -> None:
         """What is at ``path`` does not fit the rest. Not reported where it only follows from something else that
@@ -138,13 +193,21 @@ class TomlText:
 
     def may_be_broken(self, name: str) -> bool:
         """Whether this is the name of a table with something wrong in it, or may be, because such a table has none."""
-        if name in self._left_out:
+        if name in self._left_out or name.startswith(self._left_out_uses):
             return True
         for kind, number in {(wrong[0], wrong[1]) for wrong in self._wrong if len(wrong) > 1}:
             found = self._name_of(kind, number)
             if found == name or (kind in self.named and found is None):
                 return True
         return False
+
+    def where(self, path: Path) -> str:
+        """The line of a value, or of what holds it: ``line 12``, of another text with its name."""
+        adopted = self._adopted.get(path[:2])
+        if adopted is None:
+            return f"line {self.line(path)}"
+        found = adopted.text.where((*adopted.path, *path[2:]))
+        return found if " of " in found else f"{found} of {adopted.text.source.name}"
 
     def line(self, path: Path) -> int:
         """The line (from 1) of a value, or of what holds it."""

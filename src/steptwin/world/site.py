@@ -104,7 +104,7 @@ class Site:
         """An input, reserved for one driver."""
         target = PinName(*name)
         if target in self.parts.driven:
-            raise Misuse(f"{target} is driven already, from line {self.spec.text.line(self.parts.driven[target])}")
+            raise Misuse(f"{target} is driven already, from {self.spec.text.where(self.parts.driven[target])}")
         self.terminal(name, kind)
         self.parts.driven[target] = path
         return target
@@ -118,9 +118,9 @@ class Site:
             self.parts.circuits[target], self._joins[target] = circuit, join
             return circuit
         if join is None or join != self._joins[target]:
-            line = self.spec.text.line(self.parts.driven[target])
+            where = self.spec.text.where(self.parts.driven[target])
             raise Misuse(
-                f"{target} is driven already, from line {line}: contacts that share an input all have join = 'parallel', "
+                f"{target} is driven already, from {where}: contacts that share an input all have join = 'parallel', "
                 "or all join = 'series'"
             )
         return there

@@ -82,6 +82,8 @@ class WorldSpec:
     text: TomlText
     overrides: Overrides
     """Values that replace those of the text."""
+    pieces: Mapping[str, Path]
+    """Files of tables that it uses, and the keys that name them first."""
 
     def elements_of(self, element: Element[S, Any]) -> tuple[S, ...]:
         """The tables of a kind of element."""
@@ -96,6 +98,7 @@ class WorldSpec:
 
     def files(self) -> Iterator[tuple[str, Path]]:
         """Names of the files the description refers to, and the keys that do."""
+        yield from self.pieces.items()
         for spec in self.controllers:
             for name, key in spec.kind.files(spec):
                 yield name, (*spec.path, key)

@@ -16,6 +16,7 @@ from steptwin.machine import MILLISECOND, Nanos
 from steptwin.world.elements import ELEMENTS
 from steptwin.world.kinds import KINDS, line_kinds
 from steptwin.world.links import LINK_KEYS
+from steptwin.world.pieces import USE, USES
 from steptwin.world.reader import Key, optional
 from steptwin.world.sense import TableRows, of_lines
 from steptwin.world.steptable import STEPS
@@ -99,6 +100,7 @@ def tables() -> dict[str, TableRows]:
     """Every table, in the order of a description: its name and seed, lines, controllers, what is around them, scripts."""
     found = {
         "world": TableRows(written="[world]", keys=KEYS["world"]),
+        USE: USES,
         "line": TableRows(written="[[line]]", keys=_line_keys(), only=of_lines()),
     }
     for kind in KINDS.values():

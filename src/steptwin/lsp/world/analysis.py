@@ -22,11 +22,12 @@ from steptwin.world.elements import ELEMENTS
 from steptwin.world.kind import AnyKind
 from steptwin.world.kinds import KINDS
 from steptwin.world.names import RESERVED
+from steptwin.world.pieces import FILE_KEYS, USE
 from steptwin.world.values import name_value
 
 _KEY = re.compile(r"[ \t]*([A-Za-z0-9_-]+)[ \t]*=")
-_FILE = re.compile(r"""(["'])([^"'\n]+\.(?:prg|csv|cfg|m1486|wbc))\1""", re.IGNORECASE)
-_FILE_KEYS = frozenset({"config", "program", "programs", "positions"})
+_FILE = re.compile(r"""(["'])([^"'\n]+\.(?:prg|csv|cfg|m1486|wbc|toml))\1""", re.IGNORECASE)
+_FILES = {**dict.fromkeys(KINDS, FILE_KEYS), USE: frozenset({"file"})}
 _KINDS = {
     **dict.fromkeys(KINDS, SymbolKind.CONTROLLER),
     **dict.fromkeys(ELEMENTS, SymbolKind.ELEMENT),
@@ -166,9 +167,9 @@ class WorldAnalysis(Analysis):
     def links(self) -> Sequence[DocumentLink]:
         found: list[DocumentLink] = []
         for table in self._outline.tables:
-            for number in range(table.first + 1, table.last + 1) if table.kind in KINDS else ():
+            for number in range(table.first + 1, table.last + 1) if table.kind in _FILES else ():
                 key = _KEY.match(self.text, self.lines.starts[number], self.lines.ends[number])
-                if key is not None and key[1] in _FILE_KEYS:
+                if key is not None and key[1] in _FILES[table.kind]:
                     found += self._files(key.end(), self.lines.ends[number])
         return found
 

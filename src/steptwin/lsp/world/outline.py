@@ -13,20 +13,16 @@ from steptwin.lsp.positions import LineIndex
 from steptwin.symbols import Symbol, SymbolKind, SymbolRole, Use
 from steptwin.world.elements import ELEMENTS
 from steptwin.world.kinds import KINDS
+from steptwin.world.pieces import referring_keys
 from steptwin.world.tables import tables
 from steptwin.world.tomlplaces import Path, find_places
-from steptwin.world.values import NameOf, PinOf
 
 _HEADER = re.compile(r"[ \t]*(\[\[?)[ \t]*([A-Za-z0-9_.\- \t]*)(\]?\]?)")
 _KEY = re.compile(r"[ \t]*([A-Za-z0-9_-]+)[ \t]*=[ \t]*")
 _IDENTIFIER = re.compile(r"(?<![\w.&-])[A-Za-z_][\w-]*")
 _NAMED = {"line": SymbolKind.LINE, "axis": SymbolKind.AXIS, "button": SymbolKind.BUTTON}
 _SCRIPTS = ("script", "event")
-NAMING = frozenset(
-    {"line", "drive", "to", "from", "follows", "when", "until", "expect", "set", "press", "release", "write", "send"}
-    | {"power_cycle", "turn", "couple", "machine", "element", "of", "move", "home", "wait_for"}
-    | {key.name for rows in tables().values() for key in rows.keys if isinstance(key.read, PinOf | NameOf)}
-)
+NAMING = referring_keys(tables())
 """Keys whose values name controllers, lines and elements."""
 
 
