@@ -192,6 +192,24 @@ points = [[-50, 1.0], [302, 9.0]]
 name = "bump"
 when = "x.position > 10 and clamp.position > 1"
 [[axis]]
+name = "left"
+drive = "table.M3"
+pitch = 5.0
+[axis.motor]
+torque = [[0, 1.0], [600, 0.5]]
+[[axis]]
+name = "right"
+drive = "table.M4"
+pitch = 5.0
+[axis.motor]
+torque = [[0, 1.0], [600, 0.5]]
+[[gantry]]
+name = "beam"
+axis = "left"
+other = "right"
+limit = 0.01
+mass = 5.0
+[[axis]]
 name = "turret"
 drive = "drum.M1"
 kind = "rotary"
@@ -300,7 +318,7 @@ until_s = 1.5
 [[script]]
 name = "both"
 steps = [
-  { write = { "table.M2_EN" = 1, "table.M2_VEL_ABS" = 400.0 } },
+  { write = { "table.M2_EN" = 1, "table.M2_VEL_ABS" = 400.0, "table.M3_EN" = 1, "table.M3_VEL_ABS" = 90.0 } },
   { send = "chips", text = "x3\\rv2000\\rf12800\\rr\\r" },
   { press = "start", for = "300 ms" },
 ]

@@ -19,6 +19,7 @@ from steptwin.state import Plain, Stateful
 from steptwin.world.course import Build, Course, LoadPiece, MechanicalState
 from steptwin.world.free import FreeMotion, slow_from
 from steptwin.world.kernel import Kernel
+from steptwin.world.motor import NO_BURDEN, Burden
 
 _OUTDATED = -1
 """A revision that no drive has."""
@@ -75,6 +76,7 @@ class Mechanism(Stateful):
     __slots__ = (
         "_blockers",
         "_brake",
+        "_burden",
         "_catch_due",
         "_changes",
         "_coupled",
@@ -119,6 +121,7 @@ class Mechanism(Stateful):
         """What blocks the rotor."""
         self._brake = 0.0
         """Torque of the brake, N·m."""
+        self._burden = NO_BURDEN
         self._had_current = True
         self._is_free = False
         """Whether no current holds the rotor: none flows, or the rotor is too fast for it."""
@@ -244,7 +247,7 @@ class Mechanism(Stateful):
         jump = profile_of(plan).velocity(now) - led.velocity(now)
         self._revision = drive.revision
         free = self._free(drive, before, state, now) if self.build.is_free else None
-        self._course = Course(self._braked(), plan, now, state, blocked=self._blocked, jump=jump, free=free)
+        self._course = Course(self._loaded(), plan, now, state, blocked=self._blocked, jump=jump, free=free)
         self._changes += 1
         if self._encoders:
             self._turn_encoders(now)
@@ -272,9 +275,9 @@ class Mechanism(Stateful):
         away = state.load - state.rotor
         ends = sorted((stop - away - build.zero) * build.sign for stop in (build.low, build.high) if stop is not None)
         motion = FreeMotion(
-            inertia=motor.inertia,
+            inertia=motor.inertia + self._burden.inertia,
             load=motor.load * build.sign,
-            friction=motor.friction + self._brake,
+            friction=motor.friction + self._brake + self._burden.friction,
             low=ends[0] if ends else None,
             high=ends[-1] if ends else None,
         )
@@ -285,12 +288,13 @@ class Mechanism(Stateful):
             self._catch_due = slow_from(found, now, motor.catch_p)
         return found
 
-    def _braked(self) -> Build:
-        """What a powered motor has to move: the friction of the brake, too."""
-        motor = self.build.motor
-        if motor is None or self._brake == 0.0:
+    def _loaded(self) -> Build:
+        """What a powered motor has to move: the friction of the brake and a further load, too."""
+        motor, more = self.build.motor, self._burden
+        if motor is None or (self._brake == 0.0 and more == NO_BURDEN):
             return self.build
-        return replace(self.build, motor=replace(motor, friction=motor.friction + self._brake))
+        friction = motor.friction + self._brake + more.friction
+        return replace(self.build, motor=replace(motor, inertia=motor.inertia + more.inertia, friction=friction))
 
     def _watch_fall(self, now: Nanos, free: Profile | None) -> None:
         """Report that a rotor without current begins to move, and that it rests again."""
@@ -311,6 +315,23 @@ class Mechanism(Stateful):
         self._brake = torque
         self._renew(self._drive, now, state)
         self._kernel.mark(self.machine)
+
+    def burden(self, more: Burden, now: Nanos) -> None:
+        """Let a further load act on the rotor, in place of the one before."""
+        if more == self._burden:
+            return
+        state = self.at(now)
+        self._burden = more
+        self._renew(self._drive, now, state)
+        self._kernel.mark(self.machine)
+
+    def pulls(self, now: Nanos) -> bool:
+        """Whether the motor follows its field, or would: it has current, has not stalled, and nothing blocks it."""
+        return self._drive.is_energised and not self._blocked and not self.at(now).stalled
+
+    def next_stall(self, now: Nanos) -> Nanos | None:
+        """First moment after ``now`` at which the motor stalls or synchronises again."""
+        return self.course(now).next_stall(now)
 
     # ------------------------------------------------------------------ encoders
 

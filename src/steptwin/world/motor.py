@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from math import inf, sqrt
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.motion import Segment
@@ -30,6 +30,16 @@ Quadratic: TypeAlias = tuple[float, float, float]
 """q0 + q1·u + q2·u²."""
 _SLACK = 1e-12
 """Relative tolerance for rounding when required and available torque are equal."""
+
+
+class Burden(NamedTuple):
+    """A further load of a motor: inertia, N·m per pulse/s², and friction, N·m."""
+
+    inertia: float
+    friction: float
+
+
+NO_BURDEN = Burden(0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)

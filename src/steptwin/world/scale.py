@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from steptwin.errors import Misuse
 from steptwin.motion.trig import PI
-from steptwin.world.motor import StepperMotor
+from steptwin.world.motor import Burden, StepperMotor
 
 if TYPE_CHECKING:
     from steptwin.world.elements.axis import AxisSpec
@@ -97,16 +97,25 @@ def _per_unit(spec: AxisSpec, drive: DriveScale) -> tuple[str, Fraction]:
     raise Misuse(f"unit = {unit!r}: give pulses_per_unit or pitch, for {spec.drive[0]} {drive.text}")
 
 
+def _arm(scale: Scale, what: str) -> float:
+    """Metres per radian of the motor. Raises `Misuse` for a unit that is no length."""
+    metres = LENGTHS.get(scale.unit)
+    if metres is None:
+        raise Misuse(f"{what}: mass and forces need a unit of {', '.join(LENGTHS)}, not {scale.unit!r}")
+    return float(scale.pulses_per_rev / scale.pulses_per_unit * metres) / (2.0 * PI)
+
+
+def burden_of(mass: float, friction_force: float, scale: Scale, what: str) -> Burden:
+    """What ``mass`` (kg) and ``friction_force`` (N) are for a motor. Raises `Misuse` for a unit that is no length."""
+    arm = _arm(scale, what)
+    return Burden(mass * arm * arm * 2.0 * PI / float(scale.pulses_per_rev), friction_force * arm)
+
+
 def motor_of(motor: MotorSpec, kind: str, scale: Scale) -> StepperMotor:
     """Torques at the motor; speeds and accelerations in pulses. Raises `Misuse` for masses and forces without a length."""
     per_rev = float(scale.pulses_per_rev)
-    arm = 0.0
-    if kind == "linear" and (motor.mass or motor.force or motor.friction_force):
-        metres = LENGTHS.get(scale.unit)
-        if metres is None:
-            raise Misuse(f"motor: mass and forces need a unit of {', '.join(LENGTHS)}, not {scale.unit!r}")
-        # Metres per radian of the motor.
-        arm = float(scale.pulses_per_rev / scale.pulses_per_unit * metres) / (2.0 * PI)
+    has_forces = kind == "linear" and (motor.mass or motor.force or motor.friction_force)
+    arm = _arm(scale, "motor") if has_forces else 0.0
     inertia = motor.inertia + motor.mass * arm * arm
     return StepperMotor(
         curve=tuple((speed / 60.0 * per_rev, torque) for speed, torque in motor.torque),

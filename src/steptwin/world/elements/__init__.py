@@ -14,6 +14,7 @@ from steptwin.world.elements.collision import COLLISION
 from steptwin.world.elements.conveyor import CONVEYOR
 from steptwin.world.elements.counter import COUNTER
 from steptwin.world.elements.cylinder import CYLINDER
+from steptwin.world.elements.gantry import GANTRY
 from steptwin.world.elements.gate import GATE
 from steptwin.world.elements.latch import LATCH
 from steptwin.world.elements.relay import RELAY
@@ -73,5 +74,6 @@ for _one in (
     SHAFT,
     TRANSDUCER,
     COLLISION,
+    GANTRY,
 ):
     register(_one)

@@ -58,16 +58,16 @@ class CollisionSpec(BoardSpec):
             text.wrong((*self.path, "when"), "D003", str(error))
 
 
-class Collision(BoardPart):
-    """HIT is on while parts touch. With `JAM` the axes stand from then on; they are free again when RESET is switched on, and jam
-    again when they touch the next time."""
+class Touch(BoardPart):
+    """The output is on while parts touch. If that jams them, the axes stand from then on; they are free again when RESET is
+    switched on, and jam again when they touch the next time."""
 
-    __slots__ = ("_axes", "_condition", "_due", "_is_jammed", "_touches", "_was_reset", "count", "spec")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_axes", "_condition", "spec"}) | BoardPart.FIXED
+    __slots__ = ("_axes", "_condition", "_due", "_is_jammed", "_jams", "_touches", "_was_reset", "count")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_axes", "_condition", "_jams"}) | BoardPart.FIXED
 
-    def __init__(self, board: Board, spec: CollisionSpec, condition: SignalCondition, axes: Mapping[str, Mechanism]) -> None:
+    def __init__(self, board: Board, jams: bool, condition: SignalCondition, axes: Mapping[str, Mechanism]) -> None:
         super().__init__(board)
-        self.spec = spec
+        self._jams = jams
         self._condition = condition
         self._axes = axes
         self._due: Nanos | None = None
@@ -82,6 +82,23 @@ class Collision(BoardPart):
     def watches(self) -> None:
         """The condition may be over anything."""
 
+    @property
+    def axes(self) -> Iterable[str]:
+        """The names of the axes that jam."""
+        return self._axes
+
+    def is_moved_by(self, mechanism: Mechanism) -> bool:
+        return any(one is mechanism for one in self._axes.values())
+
+    @property
+    def output(self) -> str:
+        """The terminal that is on while they touch."""
+        return HIT
+
+    def touching(self) -> str:
+        """What happens when they touch, as text."""
+        return f"{self.board.name}: {' and '.join(self._axes) or 'parts'} touch"
+
     def update(self, now: Nanos) -> None:
         touches = self._condition.holds(now)
         if touches is not self._touches:
@@ -89,35 +106,35 @@ class Collision(BoardPart):
             if touches:
                 self._touch(now)
             else:
-                self._report(f"{self.spec.name}: apart again", touches=False)
+                self._report(f"{self.board.name}: apart again", touches=False)
         is_reset = self.board.is_on(RESET)
         if is_reset and not self._was_reset and self._is_jammed:
             self._block(False, now)
         self._was_reset = is_reset
-        self.board.put(HIT, float(touches))
+        self.board.put(self.output, float(touches))
         self._due = self._condition.change(now)
 
     def _touch(self, now: Nanos) -> None:
         self.count += 1
-        self._report(f"{self.spec.name}: {' and '.join(self._axes) or 'parts'} touch", touches=True)
-        if self.spec.effect == JAM and not self._is_jammed:
+        self._report(self.touching(), touches=True)
+        if self._jams and not self._is_jammed:
             self._block(True, now)
 
     def _block(self, blocked: bool, now: Nanos) -> None:
         self._is_jammed = blocked
         for mechanism in self._axes.values():
-            mechanism.block(blocked, now, by=self.spec.name)
+            mechanism.block(blocked, now, by=self.board.name)
 
     def _report(self, text: str, *, touches: bool) -> None:
         kernel = self.board.kernel
-        facts = ("collision", self.spec.name), ("touches", touches), ("jams", self.spec.effect == JAM)
+        facts = ("collision", self.board.name), ("touches", touches), ("jams", self._jams)
         kernel.report(kernel.owner(self.board.name), "event", "collision", text, *facts)
 
     def deadline(self) -> Nanos | None:
         return self._due
 
 
-def _make(spec: CollisionSpec, site: Site) -> Collision:
+def _make(spec: CollisionSpec, site: Site) -> Touch:
     board = site.board(spec.name)
 
     def signal(name: str) -> SignalOf | Idle:
@@ -129,7 +146,7 @@ def _make(spec: CollisionSpec, site: Site) -> Collision:
 
     condition = SignalCondition(spec.when, signal)
     built = site.parts.built(AXIS)
-    return Collision(board, spec, condition, {name: built[name].mechanism for name in spec.owners if name in built})
+    return Touch(board, spec.effect == JAM, condition, {name: built[name].mechanism for name in spec.owners if name in built})
 
 
 COLLISION = with_terminals(

@@ -1,0 +1,174 @@
+"""``[[gantry]]``: a beam that two axes move, one at each end; what one of them does not move, the other one has to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import ClassVar
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.world.board import Board
+from steptwin.world.elements.axis import BuiltAxis, find_axis
+from steptwin.world.elements.collision import JAM, REPORT, RESET, Touch
+from steptwin.world.elements.logic import STUCK_OUTPUT, BoardSpec, Joint, with_terminals
+from steptwin.world.expression import SignalCondition
+from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
+from steptwin.world.faults.table import ElementEffect, number
+from steptwin.world.kind import Terminals
+from steptwin.world.motor import Burden
+from steptwin.world.reader import Key, TomlText, optional
+from steptwin.world.scale import burden_of
+from steptwin.world.signals import SignalOf, find_signal
+from steptwin.world.site import Site, Terminal
+from steptwin.world.spec import WorldSpec
+from steptwin.world.values import OUTPUT_PIN, NameOf, word
+from steptwin.world.values import number as number_value
+
+SKEWED = "SKEWED"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GantrySpec(BoardSpec):
+    """``limit`` in the unit of its axes, ``mass`` in kg, ``friction_force`` in N."""
+
+    axis: str
+    other: str
+    limit: float
+    mass: float
+    friction_force: float
+    effect: str
+    reset: Terminal | None
+
+    @property
+    def terminals(self) -> Terminals:
+        return Terminals(digital_inputs=(RESET,), outputs=(SKEWED,))
+
+    @property
+    def joints(self) -> Iterable[Joint]:
+        if self.reset is not None:
+            yield Joint("reset", RESET, self.reset)
+
+    def others(self, world: WorldSpec) -> Iterator[tuple[str, str]]:
+        yield "axis", self.axis
+        yield "other", self.other
+
+    def check(self, text: TomlText) -> None:
+        if self.axis == self.other:
+            text.wrong((*self.path, "other"), "D007", f"other = {self.other!r} is its axis already: a gantry has two")
+
+
+class Gantry(Touch):
+    """Each motor moves half of the beam while both follow their fields; while one does not, the other one moves all of it.
+
+    SKEWED is on while the ends are further apart than the limit; then the beam is stuck in its guides, with `JAM`.
+    """
+
+    __slots__ = ("_ends", "_loads", "_pulling", "is_stiff")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_ends", "_loads"}) | Touch.FIXED
+
+    def __init__(self, board: Board, spec: GantrySpec, condition: SignalCondition, ends: tuple[BuiltAxis, BuiltAxis]) -> None:
+        super().__init__(board, spec.effect == JAM, condition, {end.spec.name: end.mechanism for end in ends})
+        self._ends = ends
+        self._loads = tuple(burden_of(spec.mass, spec.friction_force, end.scale, "gantry") for end in ends)
+        """The whole beam, for each motor."""
+        self._pulling = (True, True)
+        self.is_stiff = 1.0
+        """Fault: factor of its friction."""
+
+    @property
+    def output(self) -> str:
+        return SKEWED
+
+    def touching(self) -> str:
+        return f"the ends of {self.board.name} are skewed by {self.skew(self.board.kernel.now):g} {self.unit}"
+
+    def update(self, now: Nanos) -> None:
+        one, other = (end.mechanism for end in self._ends)
+        self._pulling = one.pulls(now), other.pulls(now)
+        shares = (0.5, 0.5) if self._pulling[0] is self._pulling[1] else tuple(map(float, self._pulling))
+        for end, whole, share in zip(self._ends, self._loads, shares, strict=True):
+            end.mechanism.burden(Burden(whole.inertia * share, whole.friction * share * self.is_stiff), now)
+        super().update(now)
+
+    def deadline(self) -> Nanos | None:
+        now = self.board.kernel.now
+        dues = (super().deadline(), *(end.mechanism.next_stall(now) for end in self._ends))
+        return min((due for due in dues if due is not None), default=None)
+
+    @property
+    def unit(self) -> str:
+        return self._ends[0].scale.unit
+
+    def skew(self, now: Nanos) -> float:
+        """By how much the end on its axis is ahead of the other one."""
+        one, other = (end.units(end.mechanism.place(now)) for end in self._ends)
+        return one - other
+
+    def position(self, now: Nanos) -> float:
+        """Of the middle of the beam."""
+        one, other = (end.units(end.mechanism.place(now)) for end in self._ends)
+        return (one + other) / 2.0
+
+
+def _stiffen(active: ActiveFault, gantry: Gantry, begins: bool, now: Nanos) -> str:
+    gantry.is_stiff = active.fault.number("factor") if begins else 1.0
+    return f"the guides of {gantry.board.name} have {gantry.is_stiff:g} times their friction"
+
+
+def _make(spec: GantrySpec, site: Site) -> Gantry:
+    board = site.board(spec.name)
+    one, other = find_axis(spec.axis, site), find_axis(spec.other, site)
+    for end in (one, other):
+        if end.mechanism.build.motor is None:
+            raise Misuse(f"axis {end.spec.name!r} has no [axis.motor]: a gantry shares the load of two")
+    if one.scale.unit != other.scale.unit:
+        raise Misuse(f"{spec.axis!r} is in {one.scale.unit} and {spec.other!r} in {other.scale.unit}: a gantry has one unit")
+    for name, gantry in site.parts.built(GANTRY).items():
+        if taken := [end.spec.name for end in (one, other) if gantry.is_moved_by(end.mechanism)]:
+            raise Misuse(f"axis {taken[0]!r} moves the gantry {name!r} already")
+    text = f"abs({spec.axis}.position - {spec.other}.position) > {spec.limit!r}"
+    return Gantry(board, spec, SignalCondition(text, lambda name: find_signal(site.parts, name)), (one, other))
+
+
+def _signals(gantry: Gantry) -> Mapping[str, SignalOf]:
+    def refuse(name: str, formula: str) -> None:
+        one, other = (f"{end}.position" for end in gantry.axes)
+        raise Misuse(f"{gantry.board.name}.{name} moves with two axes: write {formula.format(one, other)}")
+
+    source = (gantry.board.source,)
+    unit = gantry.unit
+    return {
+        "skew": SignalOf(source, gantry.skew, unit=unit, check=partial(refuse, "skew", "{} - {}")),
+        "position": SignalOf(source, gantry.position, unit=unit, check=partial(refuse, "position", "({} + {}) / 2")),
+        "count": SignalOf(source, lambda now: float(gantry.count)),
+    }
+
+
+GANTRY = with_terminals(
+    "gantry",
+    GantrySpec,
+    (
+        Key("axis", NameOf("axis"), "the axis that moves one end"),
+        Key("other", NameOf("axis"), "the axis that moves the other end"),
+        Key("limit", number_value(0.0, above=True), "skew in the unit of the axes, beyond which SKEWED is on"),
+        optional(number_value(0.0), "mass", "kg of the beam and what is on it; each motor moves half", 0.0),
+        optional(number_value(0.0), "friction_force", "N against its motion; each motor moves half", 0.0),
+        optional(word(REPORT, JAM), "effect", "of too much skew: report, or jam (both axes stand)", JAM),
+        optional(OUTPUT_PIN, "reset", "output joined to RESET, which frees jammed axes"),
+    ),
+    make=_make,
+    signals=_signals,
+    faults=(
+        STUCK_OUTPUT,
+        FaultKind(
+            "stiff-guides",
+            Layer.ELEMENT,
+            Occasion.ALWAYS,
+            "The guides of a gantry have a multiple of their friction.",
+            own=(number("factor", "Of its friction.", 1.0, 1000.0, default=3.0),),
+            effect=ElementEffect(_stiffen),
+        ),
+    ),
+)

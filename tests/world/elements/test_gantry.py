@@ -1,0 +1,189 @@
+"""Gantries: moments at which a motor has to move the whole beam, and at which it skews, against steps of time in SI units."""
+
+from __future__ import annotations
+
+from math import pi
+
+import pytest
+
+from steptwin.files.session import load, save, session_of
+from steptwin.files.world import World
+from steptwin.machine import SECOND
+from steptwin.world.reader import WorldError
+
+CONTROLLER = """
+[[mic488]]
+name = "{name}"
+[mic488.M1]
+unit = "mm"
+gear = 640.0
+acc = {acc}
+dec = {acc}
+vel = 100.0
+mot_resol = 3200
+[[axis]]
+name = "y{name}"
+drive = "{name}.M1"
+pitch = 5.0
+[axis.motor]
+torque = [[0, 0.5], [1500, 0.3]]
+inertia = 0.00002
+start_speed = 60
+"""
+GANTRY = """
+[[gantry]]
+name = "beam"
+axis = "ya"
+other = "yb"
+limit = 2.0
+mass = 20.0
+friction_force = 480.0
+reset = "a.OUT3"
+"""
+
+
+def text(acc_b: float = 400.0) -> str:
+    return CONTROLLER.format(name="a", acc=400.0) + CONTROLLER.format(name="b", acc=acc_b) + GANTRY
+
+
+def start(world: World, *names: str) -> None:
+    for name in names:
+        world.mic488[name].write("M1_EN", 1)
+    for name in names:
+        world.mic488[name].write("M1_POS_ABS", 200.0)
+
+
+def events(world: World, subject: str) -> list[tuple[float, str]]:
+    return [(record.time / SECOND, str(record.value)) for record in world.trace.of("event") if record.subject == subject]
+
+
+def stalled_after(share: float) -> float | None:
+    """Seconds from the start after which a motor is too weak for a share of the beam: 0.4 m/s² up to 0.1 m/s, in steps."""
+    lead = 0.005 / (2 * pi)  # m per radian
+    step_s, steps = 1e-6, 300_000
+    for n in range(steps):
+        speed = min(0.4 * n * step_s, 0.1)
+        acceleration = 0.4 if speed < 0.1 else 0.0
+        needed = (20e-6 + share * 20.0 * lead**2) * acceleration / lead + share * 480.0 * lead
+        rpm = speed / lead * 60 / (2 * pi)
+        if needed > 0.5 - 0.2 * rpm / 1500:
+            return n * step_s
+    return None
+
+
+def test_each_motor_moves_half_while_both_follow() -> None:
+    assert stalled_after(0.5) is None
+    world = World.from_toml(text())
+    start(world, "a", "b")
+    world.run(until="idle")
+    assert (world.axis["ya"].position, world.axis["yb"].position) == (200.0, 200.0)
+    assert world.read("beam.position") == 200.0
+    assert events(world, "stall") == []
+
+
+def test_a_motor_whose_partner_has_no_current_moves_all_of_it() -> None:
+    expected = stalled_after(1.0)
+    assert expected is not None
+    assert 0.05 < expected < 0.25
+    world = World.from_toml(text(), overrides={"beam.limit": 50.0})
+    start(world, "b")
+    world.run(until="idle")
+    assert events(world, "stall")[0] == (pytest.approx(expected, abs=2e-6), "yb loses the field")
+    loaded = World.from_toml(text(), overrides={"beam.limit": 50.0, "beam.friction_force": 200.0})
+    start(loaded, "b")
+    loaded.run(until="yb.position > 40")
+    assert events(loaded, "stall") == []
+
+
+def test_what_one_loses_the_other_has_to_move() -> None:
+    world = World.from_toml(text())
+    start(world, "a", "b")
+    world.run(for_=0.5)
+    world.fault("stall machine=a axis=1 for_s=0.3")
+    world.run(until="idle")
+    assert events(world, "stall")[0] == (0.5, "yb loses the field")
+    assert events(world, "collision") == []
+
+
+def travelled(seconds: float, acceleration: float) -> float:
+    ramp = min(seconds, 100.0 / acceleration)
+    return acceleration * ramp * ramp / 2 + 100.0 * (seconds - ramp)
+
+
+def test_it_is_stuck_at_the_moment_at_which_it_is_too_skewed() -> None:
+    low, high = 0.0, 1.0
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (middle, high) if travelled(middle, 400.0) - travelled(middle, 200.0) <= 2.0 else (low, middle)
+    world = World.from_toml(text(200.0))
+    start(world, "a", "b")
+    world.run(for_=1.0)
+    ((moment, words),) = events(world, "collision")
+    assert moment == pytest.approx(high, abs=1 / 640 / 10)  # a pulse at no less than 10 mm/s between them
+    assert words == "the ends of beam are skewed by 2.00156 mm"
+    assert world.read("beam.skew") == pytest.approx(2.0 + 1 / 640)
+    assert world.read("beam.skewed") == world.read("beam.count") == 1.0
+    stuck = world.axis["ya"].position
+    world.run(for_=10.0)
+    assert world.axis["ya"].position == stuck
+    free = World.from_toml(text(200.0), overrides={"beam.effect": "report"})
+    start(free, "a", "b")
+    free.run(until="idle")
+    assert events(free, "collision")[0] == (moment, words)
+    assert events(free, "collision")[1][1] == "beam: apart again"
+    assert free.axis["yb"].position == 200.0
+
+
+def test_stiff_guides_stall_both() -> None:
+    world = World.from_toml(text())
+    start(world, "a", "b")
+    world.run(for_=0.5)
+    world.fault("stiff-guides element=beam factor=3")
+    world.run(for_=0.1)
+    assert [words for _, words in events(world, "stall")] == ["ya loses the field", "yb loses the field"]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (('other = "yb"', 'other = "ya"'), "other = 'ya' is its axis already: a gantry has two"),
+        (('other = "yb"', 'other = "yc"'), "nothing is called 'yc'"),
+        (("limit = 2.0", "limt = 2.0"), r"\[gantry\] has no 'limt' \(did you mean 'limit'\?\)"),
+        (("limit = 2.0", "limit = 0"), "permitted are numbers above 0"),
+        (('effect = "jam"', 'effect = "jamm"'), r"'jamm' \(did you mean 'jam'\?\): permitted are report, jam"),
+        (("pitch = 5.0", 'pitch = 5.0\nunit = "cm"'), "'ya' is in mm and 'yb' in cm: a gantry has one unit"),
+        (("[axis.motor]\ntorque = [[0, 0.5], [1500, 0.3]]\ninertia = 0.00002\nstart_speed = 60\n", ""), "axis 'yb' has no"),
+        (("mass = 20.0", "mass = 20.0\nunit = 3"), r"\[gantry\] has no 'unit'"),
+        (
+            ('reset = "a.OUT3"', 'reset = "a.OUT3"\n[[gantry]]\nname = "g"\naxis = "ya"\nother = "yb"\nlimit = 1\n'),
+            "moves the gantry",
+        ),
+        (
+            ('reset = "a.OUT3"', '[[event]]\nwhen = "beam.skew > 1"\nsteps = []'),
+            r"moves with two axes: write ya\.position - yb\.p",
+        ),
+    ],
+)
+def test_mistakes_have_their_places(change: tuple[str, str], message: str) -> None:
+    whole = text().replace('reset = "a.OUT3"', 'effect = "jam"\nreset = "a.OUT3"')
+    before, found, after = whole.rpartition(change[0])
+    assert found
+    with pytest.raises(WorldError, match=f"(?s)w.toml:.*{message}"):
+        World.from_toml(before + change[1] + after, name="w.toml")
+
+
+@pytest.mark.parametrize("moment_s", [0.0, 0.1, 0.5, 0.7, 1.5])
+def test_it_can_be_restored_anywhere(moment_s: float, tmp_path: object) -> None:
+    found, other = (World.from_toml(text(), overrides={"beam.limit": 1.0}) for _ in range(2))
+    start(found, "a", "b")
+    found.fault("stall machine=a axis=1 at_s=0.5 for_s=0.3")
+    found.fault("stiff-guides element=beam factor=1.5 from_s=0.6")
+    found.run(until=moment_s)
+    snapshot = found.snapshot()
+    found.run(until=5.0)
+    other.restore(snapshot)
+    other.run(until=5.0)
+    assert other.trace.digest() == found.trace.digest()
+    place = f"{tmp_path}/s.json"
+    save(session_of(found), place)
+    assert load(place).replay().trace.digest() == found.trace.digest()
