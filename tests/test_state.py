@@ -178,6 +178,13 @@ torque = [[0, 1.0], [600, 0.5]]
 inertia = 1e-5
 friction = 0.05
 when_off = "free"
+[[carriage]]
+name = "slide"
+axis = "x"
+frequency = 15.0
+[[carriage.switch]]
+above = 19.99
+to = "table.IN7"
 [[brake]]
 name = "hold"
 axis = "x"

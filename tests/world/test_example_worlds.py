@@ -14,6 +14,7 @@ ENDS = {
     "press": "the press is safe",
     "indexer": "two revolutions",
     "labeller": "ten products labelled",
+    "two_stations": "both stations served",
 }
 
 

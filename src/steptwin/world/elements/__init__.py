@@ -10,6 +10,7 @@ from steptwin.world.element import AnyElement
 from steptwin.world.elements.axis import AXIS
 from steptwin.world.elements.brake import BRAKE
 from steptwin.world.elements.button import BUTTON
+from steptwin.world.elements.carriage import CARRIAGE
 from steptwin.world.elements.collision import COLLISION
 from steptwin.world.elements.conveyor import CONVEYOR
 from steptwin.world.elements.counter import COUNTER
@@ -75,5 +76,6 @@ for _one in (
     TRANSDUCER,
     COLLISION,
     GANTRY,
+    CARRIAGE,
 ):
     register(_one)
