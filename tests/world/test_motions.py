@@ -8,6 +8,7 @@ from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
 from steptwin.machine import SECOND
 from steptwin.world.reader import WorldError
+from steptwin.world.script import Send
 
 TEXT = """
 [[mic488]]
@@ -152,6 +153,84 @@ def test_mistakes_have_their_places(step: str, text: str) -> None:
     assert len(raised.value.findings) == 1
 
 
-def test_a_chip_has_no_status_of_motions() -> None:
-    with pytest.raises(WorldError, match=r"'c' is an? .*M1486, which has no status of motions"):
-        World.from_toml('[[m1486]]\nname = "c"\n[[script]]\nname = "s"\nsteps = [{ move = "c.M1", to = 5 }]\n')
+CHIP = """
+[[line]]
+name = "chips"
+kind = "m1486"
+{timing}
+[[m1486]]
+name = "c"
+line = "chips"
+address = 3
+[[script]]
+name = "s"
+steps = [
+  {{ send = "chips", text = "x3\\rv2000\\r" }},
+  {{ wait_for = "c.M1" }},
+  {steps}
+]
+"""
+
+
+def chip(*steps: str, timing: str = "") -> World:
+    return World.from_toml(CHIP.format(steps=",\n  ".join(steps), timing=timing), name="t.toml")
+
+
+@pytest.mark.parametrize("timing", ["", 'timing = "real"'])
+def test_a_chip_moves_and_is_waited_for(timing: str) -> None:
+    found = chip(
+        '{ move = "c.M1", by = 128000, within = "10 s" }',
+        '{ note = "there" }',
+        '{ move = "c.M1", to = 64000, within = "10 s" }',
+        '{ note = "half way back" }',
+        '{ expect = "c.position == 64000 and c.counter == 64000 and chips.idle and not c.busy" }',
+        timing=timing,
+    )
+    found.run(for_=5)
+    assert not found.failures
+    assert not found.overdue
+    (there, _), (back, _) = notes(found)
+    assert there > 1.0  # at 2000 full steps of 64 microsteps each second
+    other = chip('{ move = "c.M1", by = 128000 }', '{ move = "c.M1", to = 64000 }', timing=timing)
+    other.run(until="c.position == 128000")
+    assert other.now / SECOND == there
+    other.run(until="c.position == 64000")
+    assert other.now / SECOND == back
+
+
+def test_a_move_of_a_chip_that_is_stopped_is_a_failure() -> None:
+    found = chip('{ move = "c.M1", by = 640000 }', '{ note = "end" }')
+    found.at(2.0, Send("chips", b"k\r"))
+    found.run(for_=10)
+    assert [str(record.value) for record in found.failures] == ["c.valid"]
+    ((end, _),) = notes(found)
+    assert 2.0 < end < 2.5
+
+
+def test_what_a_chip_cannot_do_now_is_a_failure() -> None:
+    found = chip('{ move = "c.M1", by = 7 }', '{ send = "chips", text = "f100000\\rr\\r" }', '{ move = "c.M1", by = 64 }')
+    found.run(for_=20)
+    first, second = (str(record.value) for record in found.failures)
+    assert first == "distance 7 microstep: no multiple of 64, the microstep of M1"
+    assert second.startswith("c is not at rest (")
+
+
+def test_a_chip_that_has_no_home_or_line_says_so() -> None:
+    with pytest.raises(WorldError, match=r"step 3: 'c' is an M1486, which .* home"):
+        chip('{ home = "c.M1", velocity = 5 }')
+    found = World.from_toml('[[m1486]]\nname = "c"\n[[script]]\nname = "s"\nsteps = [{ move = "c.M1", to = 64 }]\n')
+    found.run(for_=1)
+    assert [str(record.value) for record in found.failures] == ["c is on no line, so no commands can be sent to it"]
+
+
+@pytest.mark.parametrize("moment_s", [0.0, 0.01, 0.5, 1.2])
+def test_moves_of_a_chip_can_be_restored_anywhere(moment_s: float) -> None:
+    steps = ('{ move = "c.M1", by = 64000 }', '{ note = "a" }', '{ move = "c.M1", to = 0 }', '{ note = "b" }')
+    found, other = (chip(*steps, timing='timing = "real"') for _ in range(2))
+    found.run(until=moment_s)
+    snapshot = found.snapshot()
+    found.run(until=5.0)
+    assert len(notes(found)) == 2
+    other.restore(snapshot)
+    other.run(until=5.0)
+    assert other.trace.digest() == found.trace.digest()

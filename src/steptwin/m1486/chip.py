@@ -223,6 +223,13 @@ class M1486Chip(Stateful):
         self._touch()
         self.advance(self.now)
 
+    def is_busy(self, now: Nanos) -> bool:
+        """Whether a motion, a command or a program is in progress at ``now``, to which it has come; one that is held is not."""
+        if self.drive.is_busy:
+            return True
+        at_work = self.program.ready > now or not self.program.is_at_end
+        return not self.program.is_held and (at_work or self._hardware_deadline() is not None or self.receiver.is_stalled)
+
     def is_idle(self) -> bool:
         """Whether nothing is in progress or pending; a program that is held or waits for a line is not idle."""
         at_work = self.program.ready > self.now or not self.program.is_at_end

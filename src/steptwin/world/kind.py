@@ -199,8 +199,9 @@ class ControllerKind(Generic[S, M, V]):
     point: Callable[[M, str], LivePoint | None]
     """The point of its data sheet that a name or an address means: what conditions, scripts and programs outside read of it. None
     where there is none; raises `Misuse` for what is half a value."""
-    motion_ends: Callable[[str], MotionEnds] | None = None
-    """Conditions on an axis, which has that name in conditions; None where its state does not show how a motion ended."""
+    motion_ends: Callable[[str, str | None], MotionEnds] | None = None
+    """Conditions on an axis, which has that name in conditions, of a controller on a line with that name; None where its state
+    does not show how a motion ended."""
     control: Mapping[type[ControllerCommand], Callable[[M, str | None, Any], Step]]
     """The steps by which its master does the commands for controllers that it can do. The text is the name of its line; the
     machine is at the present. Raises `Misuse`, and `Refusal` for what cannot be done now."""

@@ -21,6 +21,7 @@ def ordered(plant: Plant, command: ControllerCommand) -> Step:
     if make is None:
         raise lacks(name, kind, f"command {type(command).__name__.lower()}")
     plant.touch(name)
+    machine.advance(plant.now)  # a command may have ended since its last event
     on = plant.parts.line_of.get(name)
     return make(machine, None if on is None else on[0].name, command)
 
@@ -33,4 +34,5 @@ def motion_ends(plant: Plant, name: str, axis: int) -> MotionEnds:
     axes = len(plant.machine(name).axes)
     if not 1 <= axis <= axes:
         raise Misuse(f"{name}.M{axis}: {name} has {', '.join(f'M{number}' for number in range(1, axes + 1))}")
-    return kind.motion_ends(f"{name}.M{axis}")
+    on = plant.parts.line_of.get(name)
+    return kind.motion_ends(f"{name}.M{axis}", None if on is None else on[0].name)

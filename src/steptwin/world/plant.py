@@ -228,6 +228,10 @@ class Plant:
         condition.bring(self.now)
         return condition.holds(self.now)
 
+    def report_refused(self, text: str) -> None:
+        """Report a command of a script that cannot be done."""
+        self._report(self.failures, "expectation", text)
+
     def report_overdue(self, text: str) -> None:
         """Report that a wait of a script of the description timed out."""
         self._report(self.overdue, "overdue", text)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from heapq import heappop, heappush
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
-from steptwin.errors import Runaway
+from steptwin.errors import Refusal, Runaway
 from steptwin.machine import Nanos
 from steptwin.tables import complete
 from steptwin.world import script as do
@@ -231,7 +231,12 @@ class Scripts:
         return ScriptWait(None if step.within is None else self._plant.now + step.within, step.condition), None
 
     def _order(self, step: do.Order, script: Script) -> StepResult:
-        return self._take(ordered(self._plant, step.command), script)
+        try:
+            found = ordered(self._plant, step.command)
+        except Refusal as error:
+            self._plant.report_refused(str(error))
+            return None, None
+        return self._take(found, script)
 
     def _wait_for_end(self, step: do.UntilOver, script: Script) -> StepResult:
         over = motion_ends(self._plant, step.machine, step.axis).over

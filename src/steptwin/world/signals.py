@@ -131,6 +131,9 @@ def find_signal(plan: WorldParts, name: str) -> SignalOf | Idle:
     of_element = plan.element_signals(owner)
     if of_element is not None:
         return _chosen(of_element, rest, name)
+    line = plan.lines.get(owner)
+    if line is not None:
+        return _chosen({"idle": _quiet(line, plan.kernel_of[owner].source(owner))}, rest, name)
     machine = plan.machines.get(owner)
     if machine is None:
         known = [*plan.machines, *plan.element_names, "time", "idle"]
@@ -149,6 +152,11 @@ def _of_machine(kind: AnyKind, machine: MotionController, source: Source, rest: 
     if point is None:
         raise _unknown([point.path for point in kind.datasheet(machine).points], rest, name, ", and pins")
     return SignalOf((source,), point.read, point.turns, point.version, point.point.unit, is_kept=point.is_kept)
+
+
+def _quiet(line: Line, source: Source) -> SignalOf:
+    """The signal ``idle`` of a line."""
+    return SignalOf((source,), lambda now: float(_is_quiet(line, now)))
 
 
 def _is_quiet(line: Line, now: Nanos) -> bool:

@@ -57,6 +57,7 @@ M1486: ControllerKind[M1486Spec, M1486Chip, M1486View] = ControllerKind(
     datasheet_of=lambda name: datasheet.datasheet_of(variant(name or table.DEFAULT_VARIANT)),
     point=points.live_point,
     control=control.CONTROL,
+    motion_ends=control.motion_ends,
     held_jog=M1486HeldJog,
     state=state_of,
     texts=memory.texts,

@@ -14,6 +14,14 @@ from steptwin.m1486.ranges import out_of_range
 from steptwin.m1486.syntax import ChipCommand
 from steptwin.world import script as do
 from steptwin.world.control import ControllerCommand, Jog, Move, StopAxes
+from steptwin.world.kind import MotionEnds
+
+
+def motion_ends(axis: str, line: str | None) -> MotionEnds:
+    """What was typed has been executed, and no move was stopped before its end."""
+    name = axis.partition(".")[0]
+    pending = "" if line is None else f" and {line}.idle"
+    return MotionEnds(f"not {name}.busy{pending}", f"{name}.valid")
 
 
 def _typed(chip: M1486Chip, line: str | None, command: Any, *texts: str) -> do.Send:
@@ -42,8 +50,9 @@ def _number(chip: M1486Chip, letter: str, value: float, what: str) -> str:
 
 
 def _on_grid(chip: M1486Chip, distance: float, what: str) -> None:
+    """Raises `Refusal` for a distance that the present microstep does not give."""
     if distance % chip.drive.grid_u:
-        raise Misuse(f"{what}: no multiple of {chip.drive.grid_u}, the microstep of M{chip.drive.microstep}")
+        raise Refusal(f"{what}: no multiple of {chip.drive.grid_u}, the microstep of M{chip.drive.microstep}")
 
 
 def _move(chip: M1486Chip, line: str | None, command: Move) -> do.Send:

@@ -19,7 +19,7 @@ PROGRAM = {"stop": 0, "start": 1, "pause": 2}
 """PROGRAM_CTRL by action."""
 
 
-def motion_ends(axis: str) -> MotionEnds:
+def motion_ends(axis: str, line: str | None) -> MotionEnds:
     """By the status, which is that of a motion as soon as the request that starts it has been answered."""
     busy = (AxisStatus.POSITION, AxisStatus.HOMING, AxisStatus.CORRECTION)
     over = " and ".join(f"{axis}.status != {status.value}" for status in busy)
