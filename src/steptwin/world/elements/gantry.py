@@ -10,10 +10,10 @@ from typing import ClassVar
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.world.board import Board
+from steptwin.world.condition import SignalCondition
 from steptwin.world.elements.axis import BuiltAxis, find_axis
 from steptwin.world.elements.collision import JAM, REPORT, RESET, Touch
 from steptwin.world.elements.logic import STUCK_OUTPUT, BoardSpec, Joint, with_terminals
-from steptwin.world.expression import SignalCondition
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.table import ElementEffect, number
 from steptwin.world.kind import Terminals
