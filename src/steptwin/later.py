@@ -20,19 +20,20 @@ class Later(Generic[T]):
 
     def __init__(self) -> None:
         self.is_done = False
-        self._value: T | None = None
+        self._value: tuple[T, ...] = ()
+        """Empty until there is one."""
         self._error: Exception | None = None
         self._actions: list[Callable[[], object]] = []
 
     def put(self, value: T) -> None:
         """Set the result. Only the first result counts."""
-        self._end(value, None)
+        self._end((value,), None)
 
     def fail(self, error: Exception) -> None:
         """Set an error instead of a result."""
-        self._end(None, error)
+        self._end((), error)
 
-    def _end(self, value: T | None, error: Exception | None) -> None:
+    def _end(self, value: tuple[T, ...], error: Exception | None) -> None:
         if self.is_done:
             return
         self.is_done, self._value, self._error = True, value, error
@@ -44,7 +45,8 @@ class Later(Generic[T]):
         """The result, once it is done. Raises its error."""
         if self._error is not None:
             raise self._error
-        return self._value  # type: ignore[return-value]
+        (value,) = self._value
+        return value
 
     def then(self, action: Callable[[], object]) -> None:
         """Call ``action`` when the result is done: at once if it already is."""

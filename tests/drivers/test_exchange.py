@@ -122,7 +122,7 @@ def test_an_urgent_job_is_the_next_on_the_line_whatever_waits() -> None:
 
 def test_a_job_that_is_tried_again_lets_an_urgent_one_pass() -> None:
     e = engine()
-    job = submit(e, "one", most=2)
+    job = submit(e, "one", most_attempts=2)
     e.step(0)
     submit(e, "stop", urgent=True)
     deadline = TIMEOUT + 3 * MILLISECOND
@@ -136,7 +136,7 @@ def test_a_job_that_is_tried_again_lets_an_urgent_one_pass() -> None:
 
 def test_no_answer_says_how_often_how_long_and_what_was_heard() -> None:
     e = engine()
-    job = submit(e, "one", most=2, changes=True)
+    job = submit(e, "one", most_attempts=2, changes=True)
     e.step(0)
     second = e.deadline()
     assert second is not None
@@ -167,7 +167,7 @@ def test_no_answer_to_what_only_reads_leaves_no_doubt() -> None:
 
 def test_a_refusal_is_an_answer_and_not_tried_again() -> None:
     e = engine()
-    job = submit(e, "one", most=3)
+    job = submit(e, "one", most_attempts=3)
     e.step(0)
     e.receive(b"one?", 1)
     with pytest.raises(Refusal, match=r"one\?"):
@@ -251,7 +251,7 @@ def test_what_is_not_allowed_any_more_is_not_sent() -> None:
 def test_a_repetition_that_is_not_allowed_any_more_is_told_as_such() -> None:
     e = engine()
     allowed = [True]
-    job = submit(e, "one", most=3, permission=Permission(lambda: 0, 1, lambda: not allowed[0]))
+    job = submit(e, "one", most_attempts=3, permission=Permission(lambda: 0, 1, lambda: not allowed[0]))
     e.step(0)
     allowed[0] = False
     assert e.step(e.deadline() or 0) == b""
@@ -306,7 +306,7 @@ def test_between_steps_an_urgent_job_passes_where_that_is_possible(may_wait: boo
 
 def test_a_lost_connection_begins_the_exchange_anew_if_that_is_allowed() -> None:
     e = engine()
-    job = submit(e, "one", most=2)
+    job = submit(e, "one", most_attempts=2)
     e.step(0)
     e.lost(LineLost("unplugged"))
     assert (e.in_flight, e.discipline.resets) == (False, 1)  # type: ignore[attr-defined]
@@ -363,8 +363,8 @@ class Time:
         return self.now
 
 
-def permitted(e: Exchanger[Ask, str], time: Time, *, most: int = 1) -> Job[Ask, str]:
-    return submit(e, "one", changes=True, most=most, permission=Permission(time, SECOND))
+def permitted(e: Exchanger[Ask, str], time: Time, *, most_attempts: int = 1) -> Job[Ask, str]:
+    return submit(e, "one", changes=True, most_attempts=most_attempts, permission=Permission(time, SECOND))
 
 
 def test_what_was_asked_for_too_long_ago_is_not_sent() -> None:
@@ -380,7 +380,7 @@ def test_what_was_asked_for_too_long_ago_is_not_sent() -> None:
 
 def test_what_was_sent_once_and_is_too_late_to_be_repeated_is_in_doubt() -> None:
     e, time = engine(), Time()
-    job = permitted(e, time, most=3)
+    job = permitted(e, time, most_attempts=3)
     assert e.step(0) == b"one"
     time.now = SECOND + 1
     assert e.step(time.now) == b""

@@ -111,7 +111,7 @@ def test_a_waiting_motion_is_not_begun_after_a_stop() -> None:
     stopped = [False]
     engine = line._engine
     permission = Permission(wire.clock, TIMEOUT, lambda: stopped[0])
-    motion: Job[Query, bytes] = Job(Query(1, WriteCoilRequest(2008, True)), TIMEOUT, most=3, permission=permission)
+    motion: Job[Query, bytes] = Job(Query(1, WriteCoilRequest(2008, True)), TIMEOUT, most_attempts=3, permission=permission)
     engine.submit(motion)
     stopped[0] = True
     finish(line.exchange(Job(Query(1, M1_STOP), TIMEOUT, urgent=True)))

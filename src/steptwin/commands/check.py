@@ -32,11 +32,12 @@ class CheckOptions:
     config: Path | None = None
     firmware: str | None = None
 
-    def refuse(self, language: str, *names: str) -> None:
-        """Raises `Misuse` if one of these options was given, which do not apply to the language of the file."""
-        for name in names:
-            if getattr(self, name):
-                raise Misuse(f"--{name} is not for {language}")
+
+def _refuse(language: str, **options: object) -> None:
+    """Raises `Misuse` if one of these options was given, which do not apply to the language of the file."""
+    for name, given in options.items():
+        if given:
+            raise Misuse(f"--{name} is not for {language}")
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ def count(number: int, what: str) -> str:
 
 
 def _check_m1486(source: SourceText, options: CheckOptions) -> CheckReport:
-    options.refuse("M1486 programs", "positions", "config", "firmware")
+    _refuse("M1486 programs", positions=options.positions, config=options.config, firmware=options.firmware)
     variant = variants.DEFAULT if options.variant is None else variants.variant(options.variant)
     interface = lines.STEP_DIRECTION if options.interface is None else lines.interface(options.interface)
     checked = check_program(source.text, variant, interface)
@@ -109,7 +110,7 @@ def _memory_data(source: SourceText, chip: ChipMemory) -> dict[str, Any]:
 
 
 def _check_wbc(source: SourceText, options: CheckOptions) -> CheckReport:
-    options.refuse("WBC programs", "variant", "interface", "memory")
+    _refuse("WBC programs", variant=options.variant, interface=options.interface, memory=options.memory)
     dialect = DEFAULT if options.firmware is None else dialect_for(options.firmware)
     files = CompanionFiles.of(Path(source.name), options.positions, options.config)
     read = check_source(source, files.positions, files.config, dialect)
@@ -128,20 +129,43 @@ def _check_wbc(source: SourceText, options: CheckOptions) -> CheckReport:
 
 
 def _check_positions(source: SourceText, options: CheckOptions) -> CheckReport:
-    options.refuse("position tables", "variant", "interface", "memory", "positions", "config", "firmware")
+    _refuse(
+        "position tables",
+        variant=options.variant,
+        interface=options.interface,
+        memory=options.memory,
+        positions=options.positions,
+        config=options.config,
+        firmware=options.firmware,
+    )
     table, found = parse_positions(source.text)
     return CheckReport("positions", found, {"positions": len(table.rows)}, [count(len(table.rows), "position")])
 
 
 def _check_config(source: SourceText, options: CheckOptions) -> CheckReport:
-    options.refuse("configurations", "variant", "interface", "memory", "positions", "config")
+    _refuse(
+        "configurations",
+        variant=options.variant,
+        interface=options.interface,
+        memory=options.memory,
+        positions=options.positions,
+        config=options.config,
+    )
     dialect = DEFAULT if options.firmware is None else dialect_for(options.firmware)
     _, found = examine_config(IniFile.of_text(source.text), dialect.firmware)
     return CheckReport("config", found, {"firmware": dialect.firmware}, [f"MIC488 firmware {dialect.firmware}"])
 
 
 def _check_world(source: SourceText, options: CheckOptions) -> CheckReport:
-    options.refuse("worlds", "variant", "interface", "memory", "positions", "config", "firmware")
+    _refuse(
+        "worlds",
+        variant=options.variant,
+        interface=options.interface,
+        memory=options.memory,
+        positions=options.positions,
+        config=options.config,
+        firmware=options.firmware,
+    )
     folder = Path(source.name).parent
     return CheckReport("world", list(diagnose(source.name, source.text, lambda name: read_beside(folder, name))))
 

@@ -150,8 +150,8 @@ class Job(Generic[Q, A]):
     """
 
     __slots__ = (
-        "_answer", "_error", "attempts", "done", "is_late", "missed", "most", "on_done", "permission", "request", "timeout_ns",
-        "urgent",
+        "_answer", "_error", "attempts", "done", "is_late", "missed", "most_attempts", "on_done", "permission", "request",
+        "timeout_ns", "urgent",
     )  # fmt: skip
 
     def __init__(
@@ -159,13 +159,13 @@ class Job(Generic[Q, A]):
         request: Q,
         timeout_ns: Nanos,
         *,
-        most: int = 1,
+        most_attempts: int = 1,
         urgent: bool = False,
         permission: Permission | None = None,
     ) -> None:
         self.request = request
         self.timeout_ns = timeout_ns
-        self.most = most
+        self.most_attempts = most_attempts
         self.urgent = urgent
         self.permission = permission
         self.attempts = 0
@@ -176,14 +176,16 @@ class Job(Generic[Q, A]):
         """Whether it was sent after its permission had expired: the program was suspended between check and sending."""
         self.done = False
         self.on_done: Callable[[], object] | None = None
-        self._answer: A | None = None
+        self._answer: tuple[A, ...] = ()
+        """Empty until there is one."""
         self._error: SteptwinError | None = None
 
     def result(self) -> A:
         """The answer of a finished job. Raises its error."""
         if self._error is not None:
             raise self._error
-        return self._answer  # type: ignore[return-value]
+        (answer,) = self._answer
+        return answer
 
     def refusal(self) -> SteptwinError | None:
         """The reason why it must not be sent now; None if it may be."""
@@ -200,7 +202,7 @@ class Job(Generic[Q, A]):
         if self.is_late and self.permission is not None:
             self.fail(SentLate(self.request, self.permission.patience_ns))
             return
-        self._answer = answer
+        self._answer = (answer,)
         self.done = True
         if self.on_done is not None:
             self.on_done()
@@ -363,7 +365,7 @@ class Exchanger(Generic[Q, A]):
             return
         if job.is_late and job.permission is not None:
             job.fail(SentLate(job.request, job.permission.patience_ns))
-        elif job.attempts < job.most:
+        elif job.attempts < job.most_attempts:
             (self._urgent if job.urgent else self._waiting).appendleft(job)
         else:
             job.fail(error)

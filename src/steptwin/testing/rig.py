@@ -5,9 +5,10 @@ from __future__ import annotations
 import textwrap
 from collections import deque
 from collections.abc import Callable, Mapping
+from dataclasses import fields
 from itertools import count
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, TypeAlias, TypeVar
 
 import pytest
 
@@ -29,7 +30,11 @@ from steptwin.world.records import describe
 from steptwin.world.small import LINE
 from steptwin.world.trace import TraceRecord
 
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
 T = TypeVar("T")
+D = TypeVar("D", bound="DataclassInstance")
 
 MOST_SHOWN = 24
 """So many of the last frames and events are shown when a test fails."""
@@ -256,10 +261,10 @@ def _shortened(item: object) -> str:
     return f"{item.time / SECOND:12.6f} s  {arrow} {textwrap.shorten(item.meaning, WIDTH, placeholder=' …')}"
 
 
-def options_of(marker: str, kind: type[T], arguments: tuple[Any, ...], given: dict[str, Any]) -> T:
+def options_of(marker: str, kind: type[D], arguments: tuple[Any, ...], given: dict[str, Any]) -> D:
     """The options of a marker. Raises `Misuse` for those that are not there."""
-    names = list(kind.__dataclass_fields__)  # type: ignore[attr-defined]
-    positional = [name for name, field in kind.__dataclass_fields__.items() if not field.kw_only]  # type: ignore[attr-defined]
+    names = [field.name for field in fields(kind)]
+    positional = [field.name for field in fields(kind) if not field.kw_only]
     if len(arguments) > len(positional):
         raise Misuse(f"@pytest.mark.{marker}: {arguments[len(positional)]!r} needs a name: there are {', '.join(names)}")
     given = dict(zip(positional, arguments, strict=False)) | given

@@ -7,6 +7,7 @@ refused with exception 06.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from bisect import insort
 from collections import deque
 from typing import NamedTuple
@@ -102,7 +103,7 @@ def _turn(port: GatewayPort) -> tuple[Nanos, int]:
     return port.waiting[0][:2]
 
 
-class GatewayPort(SlavePort):
+class GatewayPort(SlavePort, ABC):
     """Base of the ports of a `Gateway`; responses leave when they have come over the line. Call `to_send` at every `deadline`."""
 
     __slots__ = ("__weakref__", "_gateway", "_responses", "waiting")
@@ -114,21 +115,21 @@ class GatewayPort(SlavePort):
         self._responses: list[tuple[Nanos, bytes]] = []
         self.waiting: deque[_Waiting] = deque()
 
+    @abstractmethod
     def _requests(self, data: bytes, now: Nanos) -> list[bytes]:
         """The requests completed by ``data``."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _addressed(self, raw: bytes) -> tuple[tuple[int, ...], bytes]:
         """The units to which a request is addressed, and its PDU."""
-        raise NotImplementedError
 
+    @abstractmethod
     def is_broadcast(self, raw: bytes) -> bool:
         """Whether a request is not answered."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _response(self, raw: bytes, pdu: bytes) -> bytes:
         """The frame that answers the request ``raw`` with ``pdu``."""
-        raise NotImplementedError
 
     def _refuse(self, raw: bytes, now: Nanos) -> None:
         """Respond to a request for a unit that is not served, if the protocol has a response."""

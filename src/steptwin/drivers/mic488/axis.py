@@ -164,7 +164,7 @@ class AsyncMic488Axis:
         unit = self._unit
         unit.notes.stops[self.number] += 1
         try:
-            await unit.write(unit.item(key, self.number), on, urgent=True, most=URGENT_TRIES)
+            await unit.write(unit.item(key, self.number), on, urgent=True, most_attempts=URGENT_TRIES)
         except LineFailure as failure:
             raise unconfirmed(f"M{self.number}", what, failure) from failure
         self.forget()
@@ -195,7 +195,7 @@ class AsyncMic488Axis:
         unit = self._unit
         item = unit.item("JOG_PLUS" if direction > 0 else "JOG_MINUS", self.number)
         if not on:
-            await unit.write(item, False, urgent=True, most=URGENT_TRIES)
+            await unit.write(item, False, urgent=True, most_attempts=URGENT_TRIES)
             return
         permission = unit.permission(self.number)
         async with unit.lock(), unit.stopping_if_late(self.number):

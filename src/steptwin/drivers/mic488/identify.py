@@ -49,7 +49,7 @@ async def firmware_of(line: DriverLine[Query, bytes], unit: int, timeout_ns: Nan
         request = pdu.ReadRequest(pdu.READ_HOLDING_REGISTERS, first.address, last.last - first.address + 1)
         query = Query(unit, request, lambda _: f"read the control registers of firmware {name}")
         try:
-            answer = await line.exchange(Job(query, timeout_ns, most=PROBE_TRIES))
+            answer = await line.exchange(Job(query, timeout_ns, most_attempts=PROBE_TRIES))
         except pdu.ModbusException as exception:
             refusal = ModbusRefusal(line.place, query, exception)
             if exception.code in _GATEWAY_CODES:

@@ -44,6 +44,6 @@ class AsyncMic488Program:
         for axis in range(1, AXES + 1):
             unit.notes.stops[axis] += 1
         try:
-            await unit.write(unit.item("PROGRAM_CTRL"), ProgramState.STOPPED, urgent=True, most=URGENT_TRIES)
+            await unit.write(unit.item("PROGRAM_CTRL"), ProgramState.STOPPED, urgent=True, most_attempts=URGENT_TRIES)
         except LineFailure as failure:
             raise unconfirmed("the program", "stopped", failure) from failure

@@ -133,19 +133,23 @@ class Unit:
         urgent: bool = False,
         permission: Permission | None = None,
         timeout_ns: Nanos | None = None,
-        most: int | None = None,
+        most_attempts: int | None = None,
     ) -> bytes:
         """Send a request and return the answer PDU. Raises `ModbusRefusal` or a `LineFailure`."""
-        if most is None:
-            most = self.tries if repeatable(self.registers, request) else 1
+        if most_attempts is None:
+            most_attempts = self.tries if repeatable(self.registers, request) else 1
         if permission is None and moves(self.registers, request):
             permission = self.permission()
-        return await self._exchange(Query(self.number, request, self.wording.request), urgent, permission, timeout_ns, most)
+        return await self._exchange(
+            Query(self.number, request, self.wording.request), urgent, permission, timeout_ns, most_attempts
+        )
 
     async def _exchange(
-        self, query: Query, urgent: bool, permission: Permission | None, timeout_ns: Nanos | None, most: int
+        self, query: Query, urgent: bool, permission: Permission | None, timeout_ns: Nanos | None, most_attempts: int
     ) -> bytes:
-        job: Job[Query, bytes] = Job(query, timeout_ns or self.timeout_ns, most=most, urgent=urgent, permission=permission)
+        job: Job[Query, bytes] = Job(
+            query, timeout_ns or self.timeout_ns, most_attempts=most_attempts, urgent=urgent, permission=permission
+        )
         try:
             return await self.line.exchange(job)
         except pdu.ModbusException as exception:
@@ -197,12 +201,12 @@ class Unit:
         urgent: bool = False,
         permission: Permission | None = None,
         timeout_ns: Nanos | None = None,
-        most: int | None = None,
+        most_attempts: int | None = None,
     ) -> None:
         """Write a value in the form of ``data_type``."""
         axis = item.register.axis
         request = encoded(item, value, data_type, self.unit_name(axis) if axis else "u")
-        await self.ask(request, urgent=urgent, permission=permission, timeout_ns=timeout_ns, most=most)
+        await self.ask(request, urgent=urgent, permission=permission, timeout_ns=timeout_ns, most_attempts=most_attempts)
 
     async def read_user(self, number: int, view: UserFormat, count: int) -> list[RegisterValue]:
         """Read ``count`` user registers from ``number`` on, as ``view``."""
@@ -320,7 +324,7 @@ class Unit:
         for axis in axes:
             self.notes.stops[axis] += 1
         try:
-            await self.write(self.item(key), axis_mask(axes), urgent=True, most=URGENT_TRIES)
+            await self.write(self.item(key), axis_mask(axes), urgent=True, most_attempts=URGENT_TRIES)
         except LineFailure as failure:
             raise unconfirmed(" ".join(f"M{axis}" for axis in axes), what, failure) from failure
 
