@@ -97,6 +97,7 @@ def failed(arguments: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest
         ["build", "missing.prg"],
         ["decompile", "missing.wbc"],
         ["run", "missing.prg"],
+        ["explain", "missing.prg"],
         ["run", "missing.m1486"],
         ["run", "missing.toml"],
         ["run", "missing.json"],

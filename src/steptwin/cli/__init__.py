@@ -27,6 +27,7 @@ from steptwin.cli import (
     dap,
     datasheet,
     decompile,
+    explain,
     export,
     fault,
     fmt,
@@ -73,6 +74,7 @@ COMMANDS: Mapping[str, Mapping[str, Callable[..., None]]] = {
     },
     "Programs and runs": {
         "check": check.check,
+        "explain": explain.explain,
         "fmt": fmt.fmt,
         "build": build.build,
         "decompile": decompile.decompile,

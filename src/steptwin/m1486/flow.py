@@ -13,7 +13,7 @@ from functools import reduce
 from typing import NamedTuple
 
 from steptwin.m1486.commands import find
-from steptwin.m1486.functions import INPUT, REGISTER, RUNSIGN
+from steptwin.m1486.functions import CONTINUE, INPUT, REGISTER, RUNSIGN
 from steptwin.m1486.lines import Interface, line_group
 from steptwin.m1486.microsteps import DEFAULT_DISTANCE_U, DEFAULT_PROFILE, DEFAULT_VELOCITY, microstep_size
 from steptwin.m1486.structure import CommandStream
@@ -92,6 +92,20 @@ def value(command: ChipCommand, state: Settings) -> int | None:
     return state.variable if command.from_variable else command.number
 
 
+def continues_after_wrong_data(stream: CommandStream) -> bool:
+    """Whether function 44 may be ON, so that a wrong command is left out and the next one executed (M-11)."""
+    return any(command.key == "T" and (command.from_variable or command.number == CONTINUE) for command in stream.commands)
+
+
+def loop_starts(stream: CommandStream, index: int) -> tuple[int, ...]:
+    """Where the E at ``index`` can go back to: after its L; where a jump leads into or out of a loop, after every L, because the
+    loops in progress are then not those around it in the text."""
+    if stream.are_loops_nested:
+        loop = stream.loops.get(index)
+        return () if loop is None else (loop + 1,)
+    return tuple(loop + 1 for loop in stream.depth)
+
+
 def follow(stream: CommandStream, variant: Variant, interface: Interface) -> FlowAnalysis:
     """Follow every path of the stream from its beginning and from each reset."""
     return _Walk(stream, variant, interface).run()
@@ -131,6 +145,7 @@ class _Walk:
         self.stream = stream
         self.variant = variant
         self.start = defaults(variant, interface)
+        self.goes_on = continues_after_wrong_data(stream)
         self.flow = FlowAnalysis()
         self.points: dict[tuple[int, int], _Point] = {}
         self.open: list[tuple[int, int, Settings]] = []
@@ -183,9 +198,9 @@ class _Walk:
                 self.jump(index, index, state, value(command, state))
             case ".":
                 self.come_back(index, call, state)
-            case "E" if index in self.stream.loops:
-                self.arrive(self.stream.loops[index] + 1, call, state)
-                self.arrive(index + 1, call, state)
+            case "E":
+                for target in (*loop_starts(self.stream, index), index + 1):
+                    self.arrive(target, call, state)
             case "\\" if self.stream.in_file[index] is None:
                 self.arrive(index + 1, _MAIN, self.start)
             case _:
@@ -196,6 +211,8 @@ class _Walk:
         """Continue at ``label``; at every label if it is unknown; at the next command if it does not exist."""
         if label is None:
             targets = list(self.stream.visible_labels(index).values())
+            if self.goes_on:
+                self.arrive(index + 1, _MAIN if call == index else call, state)
         else:
             target = self.stream.resolve(index, label)
             targets = [] if target is None else [target]

@@ -63,6 +63,8 @@ class CommandStream:
     #: For each command: how many resets came before it.
     resets: list[int] = field(default_factory=list)
     labels: dict[int, list[int]] = field(default_factory=dict)
+    #: Whether every jump stays in its loop, so that the loops in progress are always those around a command.
+    are_loops_nested: bool = True
 
     @property
     def bits(self) -> int:
@@ -129,7 +131,18 @@ def _stream(address: int | None, commands: list[ChipCommand]) -> CommandStream:
     for index, command in enumerate(commands):
         if command.key == "@" and command.number is not None:
             stream.labels.setdefault(command.number, []).append(index)
+    stream.are_loops_nested = not stream.depth or not any(_leaves_loop(stream, index) for index in range(len(commands)))
     return stream
+
+
+def _leaves_loop(stream: CommandStream, index: int) -> bool:
+    """Whether a jump leads to another loop than that around it, or its label is computed."""
+    command = stream.commands[index]
+    if command.key in ("J", "'") and command.from_variable:
+        return True
+    label = written_label(command)
+    target = None if label is None else stream.resolve(index, label)
+    return target is not None and stream.innermost[target] != stream.innermost[index]
 
 
 def _measure(stream: CommandStream) -> None:

@@ -64,10 +64,10 @@ def check_program(
     diagnostics += usage.endless_waits(executable)
     wrong = [step for step in executable.steps if isinstance(step, IllegalStep)]
     if not any(step.opaque for step in wrong):
-        paths = flow.flow_of(executable)
+        paths = flow.flow_of(executable.steps)
         diagnostics += flow.interrupt_ends(paths, executable)
         diagnostics += flow.unreached(paths, executable)
-        diagnostics += flow.stray_returns(paths)
+        diagnostics += flow.stray_returns(paths, executable)
     if not wrong:
         diagnostics += mistaken.unused_variables(executable, resolution.scope, dialect)
         diagnostics += mistaken.waits_for_variables(executable, dialect)

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from steptwin.errors import Misuse
+from steptwin.explain.m1486 import move_duration
 from steptwin.lsp.answers import Hint
 from steptwin.lsp.m1486 import texts
 from steptwin.m1486.check import ChipMemory
-from steptwin.m1486.drive import speed_curve
-from steptwin.m1486.flow import Settings, follow
+from steptwin.m1486.flow import follow
 from steptwin.m1486.lines import Interface
-from steptwin.m1486.microsteps import HIGHEST_SPEED
 from steptwin.m1486.structure import streams
 from steptwin.m1486.syntax import ParsedProgram
 from steptwin.m1486.variants import Variant
 from steptwin.machine import SECOND
-from steptwin.motion.ramps import plan_distance
 
 MOST_COMMANDS = 1_000
 """Of a program whose moves are timed: more than any chip holds."""
@@ -52,21 +49,10 @@ def _times(program: ParsedProgram, variant: Variant, interface: Interface) -> It
         for index, states in follow(stream, variant, interface).states.items():
             command = stream.commands[index]
             if command.key == "R":
-                known = {_seconds(state, variant) for state in states}
-                if len(known) == 1 and (seconds := known.pop()) is not None:
+                known = {move_duration(state, variant) for state in states}
+                if len(known) == 1 and (duration := known.pop()) is not None:
                     yield Hint(
-                        command.span.end, f"{seconds:.4g} s", "time of the move with the settings it is always made with here"
+                        command.span.end,
+                        f"{duration / SECOND:.4g} s",
+                        "time of the move with the settings it is always made with here",
                     )
-
-
-def _seconds(state: Settings, variant: Variant) -> float | None:
-    settings = state.start_stop, state.acceleration, state.profile, state.velocity
-    if None in settings or state.qualification not in HIGHEST_SPEED or state.distance is None:
-        return None
-    start_stop, acceleration, profile, velocity = (number or 0 for number in settings)
-    try:
-        curve = speed_curve((start_stop, acceleration, profile, velocity), state.qualification, variant.clock)
-        plan = plan_distance(0, 0, state.distance, curve)
-    except Misuse:
-        return None
-    return None if plan.end is None else plan.end / SECOND

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from steptwin.errors import Misuse
+from steptwin.explain.durations import move_duration
 from steptwin.lsp.answers import Hint
 from steptwin.lsp.wbc.names import Names, row_values
-from steptwin.mic488.axis_motion import MAX_SPEED_P
+from steptwin.machine import SECOND
 from steptwin.mic488.config import ControllerConfig
-from steptwin.motion.planner import MotionState, plan_position
 from steptwin.symbols import SymbolKind, SymbolRole, Use
 from steptwin.wbc import steps as s
 from steptwin.wbc.check import CheckedProgram
@@ -60,10 +59,11 @@ def _times(edited: Edited, names: Names, config: ControllerConfig) -> Iterator[H
         value = _literal(names.scope, distance) if isinstance(distance, Identifier | DecimalNumber) else None
         if register is None or value is None or register.number in numbers or not 1 <= register.number <= len(config.axes):
             continue
-        seconds = _seconds(config, register.number, value)
-        if seconds is not None:
+        axis = config.axes[register.number - 1]
+        duration = move_duration(axis, round(value * axis.gear))
+        if duration is not None:
             text = "time of the move from rest, with ramps and velocity of the configuration"
-            yield Hint(edited.place(statement.end), f"{seconds:.3g} s", text)
+            yield Hint(edited.place(statement.end), f"{duration / SECOND:.3g} s", text)
 
 
 def _number(scope: ProgramScope, key: str) -> int:
@@ -76,14 +76,3 @@ def _literal(scope: ProgramScope, node: ValueNode) -> float | None:
         return node.value
     known = scope.known.get(node.key)
     return known.value if isinstance(known, s.Literal) else None
-
-
-def _seconds(config: ControllerConfig, number: int, distance_u: float) -> float | None:
-    axis = config.axes[number - 1]
-    gear = axis.gear
-    try:
-        speed = min(axis.vel * gear, MAX_SPEED_P)
-        profile = plan_position(MotionState(0, 0, 0.0, 0.0), round(distance_u * gear), axis.acc * gear, axis.dec * gear, speed)
-    except (Misuse, OverflowError, ValueError):
-        return None
-    return profile.segments[-1].end_s if profile.segments else 0.0

@@ -14,7 +14,7 @@ from steptwin.m1486.points import live_point
 from steptwin.m1486.program import WaitReason
 from steptwin.m1486.registers import GENERAL
 from steptwin.m1486.structure import CommandStream, streams
-from steptwin.m1486.successors import successors
+from steptwin.m1486.successors import flow_of
 from steptwin.m1486.syntax import ChipCommand, parse
 from steptwin.m1486.unit import MASK
 from steptwin.machine import Nanos
@@ -83,9 +83,9 @@ class _Text:
     def after(self) -> Mapping[int, Sequence[int]]:
         if self._stream is None:
             return {}
-        following = successors(self._stream, self._chip.variant, self._chip.interface)
+        flow = flow_of(self._stream, self._chip.variant, self._chip.interface)
         return {
-            number: tuple(bisect_left(self._indices, target) for target in following[index])
+            number: tuple(bisect_left(self._indices, target) for target in flow.calls.get(index, flow.after[index]))
             for number, index in enumerate(self._indices)
         }
 

@@ -6,6 +6,7 @@ from bisect import bisect_right
 from collections.abc import Collection, Mapping, Sequence
 from functools import cached_property
 
+from steptwin.controlflow import ControlFlow
 from steptwin.diagnostics import SourceText
 from steptwin.machine import Nanos
 from steptwin.mic488.device import Mic488Device
@@ -13,9 +14,9 @@ from steptwin.mic488.program_banks import LoadedProgram
 from steptwin.mic488.program_registers import ACCESS
 from steptwin.statements import StatementHook
 from steptwin.wbc.dialect import Dialect
-from steptwin.wbc.flow import returning, successors
+from steptwin.wbc.flow import flow_of
 from steptwin.wbc.scope import ProgramScope
-from steptwin.wbc.steps import BLOCK_MARKS, JumpStep, Literal, RegisterOperand, Source, Variable
+from steptwin.wbc.steps import BLOCK_MARKS, Literal, RegisterOperand, Source, Variable
 from steptwin.wbc.syntax import parse
 from steptwin.wbc.tree import Identifier, ProgramTree
 from steptwin.world.kind import TextContext
@@ -134,12 +135,12 @@ class _Bank:
 
     @cached_property
     def after(self) -> Mapping[int, Sequence[int]]:
-        following = successors(self.program.steps)
+        following = self._flow.after
         return {number: following[number] for number, step in enumerate(self.program.steps) if not isinstance(step, BLOCK_MARKS)}
 
     @cached_property
-    def _returns(self) -> list[bool]:
-        return returning(self.program.steps)
+    def _flow(self) -> ControlFlow:
+        return flow_of(self.program.steps)
 
     @cached_property
     def _tree(self) -> ProgramTree:
@@ -156,9 +157,7 @@ class _Bank:
         return self._scope.value(Identifier(0, 0, name, key))
 
     def comes_back(self, number: int) -> bool:
-        steps = self.program.steps
-        step = steps[number] if number < len(steps) else None
-        return self._returns[step.target] if isinstance(step, JumpStep) else True
+        return self._flow.comes_back(number)
 
     def name(self, number: int) -> str:
         """Of the label at or before a statement."""

@@ -1,0 +1,270 @@
+"""Explanation of the program of an M1486: one for each chip that it is for."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from itertools import pairwise
+
+from steptwin.controlflow import ControlFlow
+from steptwin.diagnostics import SourceText
+from steptwin.errors import Misuse
+from steptwin.explain.blocks import Timing, blocks_of
+from steptwin.explain.model import EndlessLoop, ExplainedStatement, Explanation, LongWait, MemoryPart, MemorySection, Usage
+from steptwin.m1486.commands import When, when
+from steptwin.m1486.drive import speed_curve
+from steptwin.m1486.flow import FlowAnalysis, Settings, follow
+from steptwin.m1486.lines import LINES, STEP_DIRECTION, Interface, line_group
+from steptwin.m1486.microsteps import HIGHEST_SPEED
+from steptwin.m1486.structure import CommandStream, stored_bits, streams
+from steptwin.m1486.successors import flow_of
+from steptwin.m1486.syntax import ChipCommand, JumpCondition, parse
+from steptwin.m1486.variants import DEFAULT, Store, Variant
+from steptwin.machine import MILLISECOND, Nanos
+from steptwin.motion.ramps import plan_distance
+
+_WRITES = frozenset("CT!")
+
+
+def explain(
+    source: SourceText, variant: Variant = DEFAULT, interface: Interface = STEP_DIRECTION, statement_time: Nanos | None = None
+) -> list[Explanation]:
+    """One for each chip of a chain. Raises `Misuse` for a text with wrong commands."""
+    program, found = parse(source.text)
+    if found:
+        line = source.position(found[0].span.start)[0]
+        raise Misuse(f"{source.name}:{line}: {found[0].message}: steptwin check shows all errors")
+    time = variant.statement_ns if statement_time is None else statement_time
+    return [_Chip(source, stream, variant, interface, time).explanation() for stream in streams(program)]
+
+
+def move_duration(state: Settings, variant: Variant) -> Nanos | None:
+    """Of a move with these settings; None where one of them is not known."""
+    settings = state.start_stop, state.acceleration, state.profile, state.velocity
+    if None in settings or state.qualification not in HIGHEST_SPEED or state.distance is None:
+        return None
+    start_stop, acceleration, profile, velocity = (number or 0 for number in settings)
+    try:
+        curve = speed_curve((start_stop, acceleration, profile, velocity), state.qualification, variant.clock)
+        return plan_distance(0, 0, state.distance, curve).end
+    except Misuse:
+        return None
+
+
+class _Chip:
+    """What one chip receives. Statements are its commands; those that act when received or compressed take no time."""
+
+    def __init__(
+        self, source: SourceText, stream: CommandStream, variant: Variant, interface: Interface, statement_time: Nanos
+    ) -> None:
+        self._source = source
+        self._stream = stream
+        self._commands = stream.commands
+        self._variant = variant
+        self._interface = interface
+        self._time = statement_time
+        self._flow: ControlFlow = flow_of(stream, variant, interface)
+        self._paths: FlowAnalysis = follow(stream, variant, interface)
+        self._starts = [0, *(i for i, c in enumerate(self._commands) if c.key == "\\" and stream.in_file[i] is None)]
+        self._statements = [
+            ExplainedStatement(source.position(command.span.start)[0], str(command)) for command in self._commands
+        ]
+
+    def explanation(self) -> Explanation:
+        reached = set(self._paths.states)
+        names = self._names()
+        timing = [self._timing(index) for index in range(len(self._commands))]
+        entries = self._starts if self._commands else []
+        blocks = blocks_of(self._flow, reached, names, entries, self._when, timing)
+        address = "" if self._stream.address is None else f", chip {self._stream.address:X}"
+        return Explanation(
+            source=self._source,
+            language="m1486",
+            title=f"{self._variant.title}, {self._interface.title} interface{address}",
+            statement_time=self._time,
+            statements=self._statements,
+            blocks=blocks,
+            memory=self._memory(),
+            sections=self._sections(names),
+            section_unit="bits",
+            usage=self._usage(reached),
+            waits=self._waits(reached),
+            loops=self._loops(),
+            lost=(),
+            unreachable=[
+                index
+                for index, command in enumerate(self._commands)
+                if index not in reached and when(command.key, command.number) is When.QUEUED
+            ],
+            notes=(
+                "an M1486 has no interrupts: K and LIMIT stop its motion, and function 51 decides whether the program goes on",
+            ),
+        )
+
+    def _names(self) -> dict[int, list[str]]:
+        return {i: [f"label {c.number}"] for i, c in enumerate(self._commands) if c.key == "@"}
+
+    def _when(self, number: int, target: int) -> str:
+        command = self._commands[number]
+        if isinstance(command.argument, JumpCondition) and target != number + 1:
+            asked = command.argument
+            what = f"B{asked.line}" if asked.line in LINES else f"flag {asked.line}"
+            return f"{what} {'high' if asked.high else 'low'}"
+        if command.key in "IE" and len(self._flow.after[number]) > 1:
+            return "else" if command.key == "I" else "done" if target == number + 1 else "again"
+        if command.key in "J'" and command.from_variable:
+            return f"variable = {self._commands[target].number}" if target < len(self._commands) else ""
+        return ""
+
+    # ------------------------------------------------------------------ time
+
+    def _timing(self, index: int) -> Timing:
+        command = self._commands[index]
+        if when(command.key, command.number) is not When.QUEUED:
+            return Timing(0)
+        match command.key:
+            case "W":
+                if command.number is None:
+                    return Timing(None, "the time in the internal variable")
+                return Timing(max(self._time, command.number * MILLISECOND // self._variant.clock))
+            case "R":
+                known = {move_duration(state, self._variant) for state in self._paths.states.get(index, ())}
+                duration = known.pop() if len(known) == 1 else None
+                return Timing(self._time, "the end of the motion") if duration is None else Timing(max(self._time, duration))
+            case "O" | "Z" | ")" | "(":
+                return Timing(self._time, self._line_text(command))
+            case "U":
+                return Timing(self._time, "the serial line, if it is not free")
+        return Timing(self._time)
+
+    def _line_text(self, command: ChipCommand) -> str:
+        if command.key in "OZ":
+            return f"{self._line(command)} {'high' if command.key == 'O' else 'low'}"
+        return f"the end of the seek, {self._line(command)}"
+
+    @staticmethod
+    def _line(command: ChipCommand) -> str:
+        return "the line in the internal variable" if command.number is None else f"B{command.number}"
+
+    # ------------------------------------------------------------------ memory and lines
+
+    def _memory(self) -> list[MemoryPart]:
+        limit = self._variant.memory_bits
+        store = "EEPROM" if self._variant.store is Store.EEPROM else "command memory"
+        files = [
+            MemoryPart(
+                f"{store}, file {number}" if len(self._stream.files) > 1 else f"{store}, file in [ ]", file.bits, limit, "bits"
+            )
+            for number, file in enumerate(self._stream.files, 1)
+        ]
+        everything = MemoryPart("all commands", self._stream.bits, None, "bits")
+        shared = self._variant.shared_bits
+        parts = [MemoryPart("of them shared with registers 1 to 8", shared, limit, "bits")] if shared else []
+        return [*files, everything, *parts]
+
+    def _sections(self, names: Mapping[int, Sequence[str]]) -> list[MemorySection]:
+        begins = sorted({0, *names, len(self._commands)})
+        found: list[MemorySection] = []
+        for begin, end in pairwise(begins):
+            part = self._commands[begin:end]
+            queued = sum(when(command.key, command.number) is When.QUEUED for command in part)
+            name = ", ".join(names.get(begin, ("program",)))
+            bits = sum(stored_bits(command) for command in part)
+            found.append(MemorySection(name, self._statements[begin].line, queued, bits))
+        return found
+
+    def _usage(self, reached: Collection[int]) -> dict[str, list[Usage]]:
+        read: dict[int, set[int]] = {}
+        written: dict[int, set[int]] = {}
+        registers: dict[int, tuple[set[int], set[int]]] = {}
+        for index in sorted(reached):
+            command, line = self._commands[index], self._statements[index].line
+            for used in _lines_of(command):
+                (written if command.key in _WRITES else read).setdefault(used, set()).add(line)
+            if command.key in "<>" and command.number is not None:
+                registers.setdefault(command.number, (set(), set()))[command.key == ">"].add(line)
+        lines = [
+            Usage(f"B{n}", tuple(sorted(read.get(n, ()))), tuple(sorted(written.get(n, ())))) for n in sorted({*read, *written})
+        ]
+        kept = [Usage(f"register {n}", tuple(sorted(r)), tuple(sorted(w))) for n, (r, w) in sorted(registers.items())]
+        goals = [
+            Usage(str(self._commands[i].number), (self._statements[i].line,), ())
+            for i in sorted(reached)
+            if self._commands[i].key == "G" and self._commands[i].number is not None
+        ]
+        return {"lines": lines, "registers": kept, "positions": goals}
+
+    # ------------------------------------------------------------------ waits and loops
+
+    def _waits(self, reached: Collection[int]) -> list[LongWait]:
+        found: list[tuple[int, LongWait]] = []
+        endless = self._endless_moves()
+        for index in sorted(reached):
+            command = self._commands[index]
+            line, text = self._statements[index]
+            if command.key in "OZ" and len(command.key) == 1:
+                found.append((index, LongWait(line, text, f"only something outside makes {self._line_text(command)}")))
+            elif command.key in (")", "("):
+                found.append((index, LongWait(line, text, f"only {self._line(command)} ends the seek", "K or LIMIT")))
+            elif command.key == "R" and index in endless:
+                found.append((index, LongWait(line, text, "after G+ or G- the move has no end", "K or LIMIT")))
+        for component in self._flow.components(self._starts):
+            found += self._polling(component)
+        return [wait for _, wait in sorted(found, key=lambda one: one[0])]
+
+    def _endless_moves(self) -> set[int]:
+        """Commands that come, on some path of the graph, after G+ or G- without another distance between."""
+        seen: set[int] = set()
+        work = [
+            n
+            for i, c in enumerate(self._commands)
+            if c.key in ("G+", "G-") and i in self._paths.states
+            for n in self._flow.next[i]
+        ]
+        while work:
+            index = work.pop()
+            if index in seen or index >= len(self._commands):
+                continue
+            seen.add(index)
+            if self._commands[index].key not in ("F", "B", "G", "H", "\\"):
+                work += self._flow.next[index]
+        return seen
+
+    def _polling(self, component: set[int]) -> list[tuple[int, LongWait]]:
+        """A loop that is left only by conditions on lines that the program does not set."""
+        exits = [i for i in component if i < len(self._commands) and not component.issuperset(self._flow.next[i])]
+        written = {
+            line
+            for i in component
+            if i < len(self._commands) and self._commands[i].key in _WRITES
+            for line in _lines_of(self._commands[i])
+        }
+        asked = [argument.line for i in exits if isinstance(argument := self._commands[i].argument, JumpCondition)]
+        is_loop = any(target in component for i in component if i < len(self._commands) for target in self._flow.next[i])
+        if not is_loop or not exits or len(asked) != len(exits) or any(n not in LINES or n in written for n in asked):
+            return []
+        if any(self._commands[i].from_variable for i in component if self._commands[i].key in _WRITES):
+            return []
+        first = min(component)
+        line, text = self._statements[first]
+        names = " or ".join(dict.fromkeys(f"B{n}" for n in asked))
+        return [
+            (first, LongWait(line, text, f"lines {line} to {self._statements[max(component)].line} repeat until {names} changes"))
+        ]
+
+    def _loops(self) -> list[EndlessLoop]:
+        found: list[EndlessLoop] = []
+        for loop in self._flow.without_way_out(self._starts):
+            reads = {f"B{line}" for i in loop if self._commands[i].key not in _WRITES for line in _lines_of(self._commands[i])}
+            found.append(EndlessLoop(tuple(loop), tuple(sorted(reads, key=lambda name: int(name[1:]))), ()))
+        return found
+
+
+def _lines_of(command: ChipCommand) -> Sequence[int]:
+    """The lines that a command names."""
+    if isinstance(command.argument, JumpCondition):
+        return (command.argument.line,) if command.argument.line in LINES else ()
+    if command.number is None:
+        return ()
+    if command.key in "?!":
+        return tuple(line_group(command.number) or ())
+    return (command.number,) if command.key in ("C", "T", "O", "Z", ")", "(") and command.number in LINES else ()
