@@ -98,6 +98,7 @@ def failed(arguments: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest
         ["decompile", "missing.wbc"],
         ["run", "missing.prg"],
         ["explain", "missing.prg"],
+        ["migrate", "missing.prg", "--to", "1.40"],
         ["run", "missing.m1486"],
         ["run", "missing.toml"],
         ["run", "missing.json"],

@@ -34,6 +34,7 @@ from steptwin.cli import (
     get,
     info,
     lsp,
+    migrate,
     monitor,
     move,
     pace,
@@ -75,6 +76,7 @@ COMMANDS: Mapping[str, Mapping[str, Callable[..., None]]] = {
     "Programs and runs": {
         "check": check.check,
         "explain": explain.explain,
+        "migrate": migrate.migrate,
         "fmt": fmt.fmt,
         "build": build.build,
         "decompile": decompile.decompile,

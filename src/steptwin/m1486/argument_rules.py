@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 
 from steptwin.diagnostics import Diagnostic, Fix
 from steptwin.m1486 import findings
@@ -18,16 +19,34 @@ _REFUSES_OCCUPIED = frozenset("CT!OZ()")
 _INSTEAD_OF_ZERO = {"=": "C100", "G": "H"}
 
 
-def argument_rules(command: ChipCommand, variant: Variant, interface: Interface) -> Iterator[Diagnostic]:
-    """Findings about the number written in the command."""
+def free_labels(commands: Iterable[ChipCommand], variant: Variant) -> Mapping[int, int]:
+    """For labels that the variant does not have others that are free; empty if there are too few, or labels are computed."""
+    used: set[int] = set()
+    for command in commands:
+        if command.key in ("J", "'") and command.from_variable:
+            return {}
+        if isinstance(command.argument, JumpCondition):
+            used.add(command.argument.label)
+        elif command.key in ("@", "J", "'") and command.number is not None:
+            used.add(command.number)
+    wrong = sorted(label for label in used if label > variant.labels)
+    free = [label for label in range(1, variant.labels + 1) if label not in used]
+    return dict(zip(wrong, free, strict=False)) if len(wrong) <= len(free) else {}
+
+
+def argument_rules(
+    command: ChipCommand, variant: Variant, interface: Interface, labels: Mapping[int, int]
+) -> Iterator[Diagnostic]:
+    """Findings about the number written in the command. ``labels``: see `free_labels`."""
     number = command.number
     if number is None:
         return
     problem = number_problem(command, number, variant, interface)
     if problem is not None:
-        yield problem
+        is_label = rows(command.key)[0].kind is ArgType.LABEL and number in labels
+        yield replace(problem, fix=Fix(command.argument_span, str(labels[number]))) if is_label else problem
     if isinstance(command.argument, JumpCondition):
-        yield from _label_of_condition(command.argument, variant)
+        yield from _label_of_condition(command.argument, variant, labels)
 
 
 def number_problem(command: ChipCommand, number: int, variant: Variant, interface: Interface) -> Diagnostic | None:
@@ -83,10 +102,11 @@ def _others_that_take(key: str, number: int, variant: Variant) -> str:
     return f"; {', '.join(others)} would take it" if others else ""
 
 
-def _label_of_condition(condition: JumpCondition, variant: Variant) -> Iterator[Diagnostic]:
+def _label_of_condition(condition: JumpCondition, variant: Variant, labels: Mapping[int, int]) -> Iterator[Diagnostic]:
     if find("J", condition.label, variant) is None:
         hint = f"{range_text(rows('J')[0], variant)} on {variant.title}{_others_that_take('J', condition.label, variant)}"
-        yield findings.OUT_OF_RANGE(condition.label_span, f"label {grouped(condition.label)} is out of range", hint)
+        fix = Fix(condition.label_span, str(labels[condition.label])) if condition.label in labels else None
+        yield findings.OUT_OF_RANGE(condition.label_span, f"label {grouped(condition.label)} is out of range", hint, fix)
 
 
 def _reserved(command: ChipCommand, spec: CommandSpec, number: int) -> Diagnostic | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from steptwin.diagnostics import Diagnostic, Severity, in_order
-from steptwin.m1486.argument_rules import argument_rules
+from steptwin.m1486.argument_rules import argument_rules, free_labels
 from steptwin.m1486.flow_rules import flow_rules
 from steptwin.m1486.lines import STEP_DIRECTION, Interface
 from steptwin.m1486.position_rules import position_rules
@@ -56,8 +56,9 @@ def check(text: str, variant: Variant = DEFAULT, interface: Interface = STEP_DIR
     """Check the text of a program for one variant and driver interface, as if started after power-up. Never raises."""
     program, found = parse(text)
     diagnostics = list(found)
+    labels = free_labels(program.all_commands, variant)
     for command in program.all_commands:
-        diagnostics += argument_rules(command, variant, interface)
+        diagnostics += argument_rules(command, variant, interface, labels)
     chips = streams(program)
     for stream in chips:
         diagnostics += structure_rules(stream, variant)

@@ -140,8 +140,11 @@ class _Outliner:
         name, entries = label.name, self._outline.entries
         since = HARD_SINCE if hard else event.since
         if not self._dialect.has(since):
+            soft = PREFIX + event.name if hard and self._dialect.has(event.since) else None
             hint = f"checked for {self._dialect.firmware}"
-            self._report(f.NOT_IN_FIRMWARE.at(name, f"the label {name.text} needs firmware {since}", hint))
+            if soft is not None:
+                hint += f"; {soft} breaks into the statement in progress"
+            self._report(f.NOT_IN_FIRMWARE.at(name, f"the label {name.text} needs firmware {since}", hint, fix=soft))
         if event in entries:
             other = (PREFIX if hard else HARD_PREFIX) + event.name
             hint = "an event has one label"
