@@ -133,6 +133,14 @@ def _inside(found: Explanation, entries: list[int]) -> set[int]:
     return {n for index in seen for n in range(found.blocks[index].first, found.blocks[index].last + 1)}
 
 
+def test_numbers_are_compared_as_the_controller_holds_them() -> None:
+    """A REAL has 24 bits: these two are one number to it."""
+    text = "IF 0,1 = 0,1000000001\nOUT1 = ON\nENDIF\nEND\n"
+    found, device = explained(text)
+    assert {number for _, number in executed(device())} >= {0, 1}
+    assert found.unreachable == []
+
+
 MOVES = (
     "PREL M1 10",
     "PREL M1 -3,5",

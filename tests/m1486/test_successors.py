@@ -6,7 +6,7 @@ import pytest
 
 from steptwin.m1486.lines import STEP_DIRECTION
 from steptwin.m1486.structure import streams
-from steptwin.m1486.successors import successors
+from steptwin.m1486.successors import flow_of
 from steptwin.m1486.syntax import parse
 from steptwin.m1486.variants import variant
 
@@ -26,9 +26,13 @@ from steptwin.m1486.variants import variant
         ("J9 R", [(), (2,)]),
         # The label of a J or ' without a number is that of the variable.
         ("[ :2 J @1 R @2 R ]", [(1,), (2,), (5,), (4,), (5,), (6,), (7,), (8,)]),
-        ("[ :2 ' @1 R . @2 R . ]", [(1,), (2,), (6,), (4,), (5,), (6,), (7,), (8,), (9,), (10,)]),
+        # A dot leads back to calls, wherever they are.
+        ("[ :2 ' @1 R . @2 R . ]", [(1,), (2,), (6,), (4,), (5,), (), (7,), (8,), (), (10,)]),
+        # After a jump out of it, an E belongs to whichever loop is in progress.
+        ("[ L2 J1 E @1 L3 E ]", [(1,), (2,), (4,), (2, 6, 4), (5,), (6,), (2, 6, 7), (8,)]),
     ],
 )
 def test_the_ways_out_of_commands(text: str, after: list[tuple[int, ...]]) -> None:
     (stream,) = streams(parse(text.replace(" ", "\r")).program)
-    assert successors(stream, variant("B"), STEP_DIRECTION) == after
+    flow = flow_of(stream, variant("B"), STEP_DIRECTION)
+    assert [flow.calls.get(index, ways) for index, ways in enumerate(flow.after)] == after

@@ -30,8 +30,10 @@ def explain(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Explain a program without running it: control flow, durations, memory, what it reads and writes, where it can wait for
-    ever, loops it never leaves, interrupts that can be lost, lines that are never reached."""
+    """Explain a program without running it: control flow, durations, memory, inputs and outputs, where it can wait for ever.
+
+    Also loops that it never leaves, interrupts that can be lost, and lines that are never reached.
+    """
     from steptwin.commands.explain import ExplainOptions, show
 
     show(file, ExplainOptions(variant, interface, positions, config, firmware), output, typer.echo, as_json=json)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from steptwin.tables import complete
-from steptwin.wbc.real import COMPARISONS
+from steptwin.wbc.real import COMPARISONS, real
 from steptwin.wbc.registers import Domain
 from steptwin.wbc.steps import Literal, RegisterOperand, Source, StepCondition
 
@@ -15,12 +15,12 @@ def outcome(condition: StepCondition) -> bool | None:
     left, sign, right = condition.left, condition.sign, condition.right
     if isinstance(left, Literal):
         if isinstance(right, Literal):
-            return COMPARISONS[sign](left.value, right.value)
+            return COMPARISONS[sign](real(left.value), real(right.value))
         left, sign, right = right, _MIRRORED[sign], left
     domain = _domain(left)
     if domain is None or not isinstance(right, Literal):
         return None
-    value = right.value
+    value = real(right.value)
     if sign == "=":
         return None if domain.has(value) and not (domain.whole and value != int(value)) else False
     at_low, at_high = COMPARISONS[sign](domain.low, value), COMPARISONS[sign](domain.high, value)
