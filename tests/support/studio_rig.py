@@ -79,6 +79,20 @@ def check_answer(name: str, message: dict[str, Any]) -> None:
         ANSWERS[name].validate(message["ok"])
 
 
+class NoWork:
+    def scan(self, places: Any, kind: str, units: str, baud: str | None, timeout: float) -> None:
+        raise Misuse("there are no lines here")
+
+    def verify(self, address: str, *, write: bool) -> None:
+        raise Misuse("there are no lines here")
+
+    def plain(self) -> None:
+        return None
+
+    def cancel(self) -> None:
+        return None
+
+
 class NoConnections:
     """To devices."""
 
@@ -118,6 +132,7 @@ class Studio:
             configuration=partial(configuration_text, self.world),
             lookback=None if lookback is None else lookback(self),
             connections=NoConnections(),
+            work=NoWork(),
             on_internal=self.errors.append,
         )
         world = ShownWorld(self.subject, self.subject.followers, self.jogs)

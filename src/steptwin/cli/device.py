@@ -69,22 +69,13 @@ def opened(address: DeviceAddress, *, observe: bool = True, log_frames: bool = F
 def other_kinds_named(kind: AnyDriverKind, address: DeviceAddress) -> Generator[None]:
     """If the device does not answer, name other kinds that it may be, and end what they have received."""
     from steptwin.drivers import NoAnswer
-    from steptwin.drivers.kinds import others_there
+    from steptwin.drivers.kinds import clear_line, others_there
 
     try:
         yield
     except NoAnswer as error:
         clear_line(kind, address.place, address.baud)
         raise LineFailure(f"{error}{others_there(kind)}") from error
-
-
-def clear_line(kind: AnyDriverKind, place: str, baud: int) -> None:
-    """End the bytes of a kind of device on a line, so that devices of other kinds read their next command correctly."""
-    from steptwin.drivers.kinds import DRIVERS
-
-    for other in DRIVERS.values():
-        if other is not kind and other.clear is not None:
-            other.clear(place, baud)
 
 
 def log_of(log_frames: bool) -> Callable[[str], object] | None:

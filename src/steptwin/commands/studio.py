@@ -29,6 +29,7 @@ from steptwin.commands.demo import demo_world
 from steptwin.commands.keptsettings import keep_settings
 from steptwin.commands.recorded import recorded
 from steptwin.commands.studio_devices import serve_without_world
+from steptwin.commands.studio_work import LineWork
 from steptwin.commands.up_world import Running, UpOptions, up, up_with
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
@@ -45,6 +46,7 @@ from steptwin.studio.jogs import WorldJogs
 from steptwin.studio.service import Service
 from steptwin.studio.shown import Shown
 from steptwin.studio.shownworld import ShownWorld
+from steptwin.studio.work import DeviceWork
 from steptwin.subject.events import Numbering
 from steptwin.textcodec import decode
 from steptwin.world.addresses import Address, is_loopback, parse_address
@@ -200,6 +202,7 @@ class _Page:
 
         of_devices = DeviceSurroundings(clock=time.monotonic_ns, keep=keep_settings, on_internal=report)
         connections = DeviceConnections(shown, of_devices, Computer(ports=_ports, find=find_device))
+        work = DeviceWork(LineWork(), report)
         around = Surroundings(
             moment=moment,
             gate=self._entrance.gate,
@@ -207,6 +210,7 @@ class _Page:
             program=__version__,
             programs=programs,
             connections=connections,
+            work=work,
             configuration=configuration,
             lookback=lookback,
             on_internal=report,
@@ -227,7 +231,7 @@ class _Page:
         service.start()
         url = f"{'http' if entrance.tls is None else 'https'}://{Address(_reached(host), port)}/"
         details = {"host": host, "port": port, "url": url}
-        server.join(_Links(service, connections), EndPoint("http", _place(url, entrance.tokens), "studio", details))
+        server.join(_Links(service, work, connections), EndPoint("http", _place(url, entrance.tokens), "studio", details))
         if self._own.http is None and port != DEFAULT.port:
             server.notice(f"port {DEFAULT.port} is taken: the studio is at {url}")
         if self._own.browser and has_desktop():
@@ -240,10 +244,12 @@ class _Links:
     """Of viewers and of devices: when viewers have gone, jogs end, and then devices can be left."""
 
     service: Service
+    work: DeviceWork
     connections: DeviceConnections
 
     async def close(self) -> None:
         await self.service.close()
+        await self.work.close()
         await self.connections.close()
 
 

@@ -28,3 +28,10 @@ def others_there(kind: AnyDriverKind) -> str:
 
 register(MIC488_DRIVER)
 register(M1486_DRIVER)
+
+
+def clear_line(kind: AnyDriverKind, place: str, baud: int) -> None:
+    """End the bytes of a kind of device on a line, so that devices of other kinds read their next command correctly."""
+    for other in DRIVERS.values():
+        if other is not kind and other.clear is not None:
+            other.clear(place, baud)

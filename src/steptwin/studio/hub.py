@@ -124,6 +124,24 @@ class Connections(Protocol):
         ...
 
 
+class LongWork(Protocol):
+    """Searches for devices and checks of one, one at a time."""
+
+    def scan(self, places: Sequence[str], kind: str, units: str, baud: str | None, timeout: float) -> None:
+        """Begin a search. Raises `Misuse`, and `Refusal` while another work is running."""
+        ...
+
+    def verify(self, address: str, *, write: bool) -> None:
+        """Begin the checks of a device. Raises `Refusal` while another work is running."""
+        ...
+
+    def plain(self) -> dict[str, object] | None:
+        """What was begun last, as JSON."""
+        ...
+
+    def cancel(self) -> None: ...
+
+
 class Shared:
     """A part of the state that is sent to all viewers after a change. ``version`` counts the changes."""
 
@@ -151,6 +169,7 @@ class Surroundings:
     """Version of steptwin."""
     programs: ProgramTexts
     connections: Connections
+    work: LongWork
     configuration: Callable[[str], SourceText | None] = lambda machine: None
     """The configuration file of a controller by name; None without one."""
     lookback: KeptPast | None = None

@@ -20,6 +20,7 @@ from steptwin.plaintypes import shown
 from steptwin.studio.requestrow import NOTHING, RequestRow
 from steptwin.studio.shapes import MOMENT
 from steptwin.studio.toolrequests import TOOLS, ToolRequest
+from steptwin.studio.workrequests import WORKS, WorkRequest
 from steptwin.subject.commands import COMMANDS, CommandRow
 from steptwin.subject.fields import FLAG, NAMES, TEXT, TIME, Field, Schema, number, read_fields, whole
 from steptwin.subject.shapes import members
@@ -159,6 +160,7 @@ StudioRequest: TypeAlias = (
     | ListPrograms
     | ReadProgram
     | ToolRequest
+    | WorkRequest
     | ListPorts
     | Connect
     | Disconnect
@@ -349,7 +351,7 @@ _ROWS = (
     ),
 )
 
-REQUESTS: Mapping[str, RequestRow] = {row.name: row for row in (*_ROWS, *TOOLS)}
+REQUESTS: Mapping[str, RequestRow] = {row.name: row for row in (*_ROWS, *TOOLS, *WORKS)}
 ALL: Mapping[str, RequestRow | CommandRow] = {**COMMANDS, **REQUESTS}
 """Every request by name."""
 OF_THE_PAST = frozenset({"look", "go_back"})

@@ -18,6 +18,7 @@ from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.later import Later, start
 from steptwin.machine import SECOND, Nanos
 from steptwin.studio import requests as ask
+from steptwin.studio import workrequests as work
 from steptwin.studio.hub import Hub
 from steptwin.studio.looking import OF_A_MOMENT, Looking
 from steptwin.studio.messages import VERSION
@@ -123,6 +124,10 @@ class ViewerSession:
             ask.Renew: lambda wanted: hub.renew(self.viewer, wanted.lease),
             ask.LetGo: lambda wanted: hub.let_go(self.viewer, wanted.lease),
             **hub.tools,
+            work.Scan: lambda wanted: hub.around.work.scan(wanted.places, wanted.kind, wanted.units, wanted.baud, wanted.timeout),
+            work.Verify: lambda wanted: hub.around.work.verify(wanted.address, write=wanted.write),
+            work.ReadWork: lambda _: hub.around.work.plain(),
+            work.CancelWork: lambda _: hub.around.work.cancel(),
             ask.ReadAudit: lambda wanted: [entry.plain() for entry in hub.around.audit.last(wanted.most)],
         }
         return complete("request", [row.kind for row in REQUESTS.values() if row.kind not in self._asking], "action", actions)

@@ -331,7 +331,7 @@ def test_whatever_stops_goes_before_what_waits_and_is_sent_five_times() -> None:
     inner = unit.write
 
     async def write(item: Any, value: Any, **options: Any) -> None:
-        asked.append((item.name, options.get("urgent", False), options.get("most")))
+        asked.append((item.name, options.get("urgent", False), options.get("most_attempts")))
         await inner(item, value, **options)
 
     unit.write = write  # type: ignore[method-assign]

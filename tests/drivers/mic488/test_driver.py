@@ -354,7 +354,7 @@ def test_a_running_program_is_paused_before_what_waits_and_ended_by_a_stop() -> 
     inner = unit.write
 
     async def write(item: object, value: object, **options: Any) -> None:
-        asked.append((value, options.get("urgent", False), options.get("most")))
+        asked.append((value, options.get("urgent", False), options.get("most_attempts")))
         await inner(item, value, **options)  # type: ignore[arg-type]
 
     unit.write = write  # type: ignore[method-assign]

@@ -1,6 +1,6 @@
 // Made from docs/studio.schema.json by `npm run protocol`; not to be changed by hand.
 
-export type Request = DescribeRequest | ReadRequest | PinsRequest | StateRequest | EncodersRequest | FaultsRequest | FaultKindsRequest | TimeRequest | EndPointsRequest | FollowRequest | UnfollowRequest | SetRequest | PressRequest | ReleaseRequest | WriteRequest | SendRequest | RequestRequest | PowerCycleRequest | TurnRequest | CoupleRequest | FaultRequest | ClearFaultRequest | ExpectRequest | NoteRequest | SeeRequest | EnableRequest | MoveRequest | HomeRequest | JogRequest | StopRequest | ProgramRequest | DownloadRequest | PauseRequest | ResumeRequest | StepRequest | SnapshotRequest | SnapshotsRequest | RestoreRequest | DropSnapshotRequest | SaveRequest | DebugRequest | BreakpointRequest | ClearBreakpointRequest | BreakpointsRequest | StopOnRequest | StepProgramRequest | RunRequest | LookAtRequest | BranchRequest | StackRequest | ValuesRequest | EvaluateRequest | SetValueRequest | ProgramSourceRequest | WhyRequest | HelloRequest | ResyncRequest | WatchRequest | UnwatchRequest | TakeControlRequest | ReleaseControlRequest | RenewRequest | LetGoRequest | StopAllRequest | LookRequest | GoBackRequest | ProgramsRequest | ProgramTextRequest | PortsRequest | ConnectRequest | DisconnectRequest | AuditRequest | CalculatorRequest | CalculateRequest | GearRequest | ConfigurationRequest | EditConfigurationRequest;
+export type Request = DescribeRequest | ReadRequest | PinsRequest | StateRequest | EncodersRequest | FaultsRequest | FaultKindsRequest | TimeRequest | EndPointsRequest | FollowRequest | UnfollowRequest | SetRequest | PressRequest | ReleaseRequest | WriteRequest | SendRequest | RequestRequest | PowerCycleRequest | TurnRequest | CoupleRequest | FaultRequest | ClearFaultRequest | ExpectRequest | NoteRequest | SeeRequest | EnableRequest | MoveRequest | HomeRequest | JogRequest | StopRequest | ProgramRequest | DownloadRequest | PauseRequest | ResumeRequest | StepRequest | SnapshotRequest | SnapshotsRequest | RestoreRequest | DropSnapshotRequest | SaveRequest | DebugRequest | BreakpointRequest | ClearBreakpointRequest | BreakpointsRequest | StopOnRequest | StepProgramRequest | RunRequest | LookAtRequest | BranchRequest | StackRequest | ValuesRequest | EvaluateRequest | SetValueRequest | ProgramSourceRequest | WhyRequest | HelloRequest | ResyncRequest | WatchRequest | UnwatchRequest | TakeControlRequest | ReleaseControlRequest | RenewRequest | LetGoRequest | StopAllRequest | LookRequest | GoBackRequest | ProgramsRequest | ProgramTextRequest | PortsRequest | ConnectRequest | DisconnectRequest | AuditRequest | CalculatorRequest | CalculateRequest | GearRequest | ConfigurationRequest | EditConfigurationRequest | ScanRequest | VerifyRequest | WorkRequest | CancelWorkRequest;
 
 /** Every request has exactly one. */
 export type Answer = {
@@ -1383,6 +1383,52 @@ export type EditConfigurationRequest = {
   changes?: Record<string, string> | null;
 };
 
+/** Search lines for devices, as steptwin scan does: nothing moves, and no setting is changed. The answer to work has what is found. */
+export type ScanRequest = {
+  do: "scan";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Ports and addresses; all serial ports without. */
+  places?: string[] | null;
+  /** any, mic488 or m1486. */
+  kind?: string | null;
+  /** Slave addresses of MIC488, such as 1-16. */
+  units?: string | null;
+  /** Baud rates of serial ports, such as 9600,38400; the usual ones without. */
+  baud?: string | null;
+  /** Time to wait for each answer, besides that on the wire. [s] */
+  timeout?: number | null;
+};
+
+/** Check a device that is not connected, as steptwin verify does. The answer to work has the report. */
+export type VerifyRequest = {
+  do: "verify";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** As of connect. */
+  address: string;
+  /** Permit checks that write settings and put them back. */
+  write?: boolean | null;
+};
+
+/** The search or the checks that were begun last. */
+export type WorkRequest = {
+  do: "work";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+};
+
+/** A search ends with what it has found, checks after the present one. */
+export type CancelWorkRequest = {
+  do: "cancel_work";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+};
+
 export type JogAnswer = {
   lease: number;
   /** Renew it in a third of this. [ms] */
@@ -1667,6 +1713,52 @@ export type EditConfigurationAnswer = {
   points: Record<string, number>;
 };
 
+export type ScanAnswer = null;
+
+export type VerifyAnswer = null;
+
+export type WorkAnswer = {
+  work: "scan" | "verify";
+  is_running: boolean;
+  /** What is tried at present. */
+  doing: string;
+  step: number;
+  steps: number;
+  tried: string[];
+  found: {
+    /** As connect takes it. */
+    device: string;
+    what: string;
+  }[];
+  problems: string[];
+  report: {
+    format: string;
+    /** Version. */
+    steptwin: string;
+    time: string;
+    device: Record<string, unknown>;
+    permitted: string;
+    is_complete: boolean;
+    counts: Record<string, number>;
+    results: ({
+      /** Of the interpretation. */
+      id: string;
+      outcome: "confirmed" | "refuted" | "not checked";
+      what: string;
+      /** It was not checked. */
+      why: string;
+      probes: {
+        what: string;
+        expected: string;
+        came: string;
+        holds: boolean;
+      }[];
+    })[];
+  } | null;
+} | null;
+
+export type CancelWorkAnswer = null;
+
 /** The whole state, after hello and resync. */
 export type HelloMessage = {
   /** Counts the messages to this viewer from hello on, which has 0. */
@@ -1889,4 +1981,8 @@ export interface Requests {
   gear: { request: GearRequest; answer: GearAnswer };
   configuration: { request: ConfigurationRequest; answer: ConfigurationAnswer };
   edit_configuration: { request: EditConfigurationRequest; answer: EditConfigurationAnswer };
+  scan: { request: ScanRequest; answer: ScanAnswer };
+  verify: { request: VerifyRequest; answer: VerifyAnswer };
+  work: { request: WorkRequest; answer: WorkAnswer };
+  cancel_work: { request: CancelWorkRequest; answer: CancelWorkAnswer };
 }

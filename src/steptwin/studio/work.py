@@ -1,0 +1,130 @@
+"""Searches for devices and checks of one, in a thread: one at a time, for all viewers."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from steptwin.errors import Refusal, SteptwinError
+from steptwin.later import Later
+from steptwin.studio.eventloop import later, result_of
+
+
+class Cancelled(Exception):
+    """The work was cancelled."""
+
+
+@dataclass(slots=True)
+class Work:
+    """What is going on, and what it has brought. Written by its thread, read by the event loop."""
+
+    kind: str
+    doing: str = ""
+    step: int = 0
+    steps: int = 0
+    is_running: bool = True
+    is_cancelled: bool = False
+    tried: list[str] = field(default_factory=list)
+    found: list[dict[str, str]] = field(default_factory=list)
+    problems: list[str] = field(default_factory=list)
+    report: dict[str, object] | None = None
+
+    def plain(self) -> dict[str, object]:
+        return {
+            "work": self.kind,
+            "is_running": self.is_running,
+            "doing": self.doing,
+            "step": self.step,
+            "steps": self.steps,
+            "tried": list(self.tried),
+            "found": list(self.found),
+            "problems": list(self.problems),
+            "report": self.report,
+        }
+
+    def check(self, id_: str, number: int, count: int) -> None:
+        """Progress of checks."""
+        self.doing, self.step, self.steps = id_, number, count
+
+    @contextlib.contextmanager
+    def search(self, title: str, total: int, form: str) -> Generator[Callable[[int], object]]:
+        """Progress of a search on a line."""
+        self.doing, self.step, self.steps = title, 0, total
+        if self.is_cancelled:
+            raise Cancelled
+
+        def tried(number: int) -> None:
+            if self.is_cancelled:
+                raise Cancelled
+            self.step += 1
+            self.doing = f"{title} {number:{form}}"
+
+        yield tried
+        self.tried.append(title)
+
+
+class Worker(Protocol):
+    """Does the work. Blocks; raises `SteptwinError`, and `Cancelled` out of a progress."""
+
+    def plan(self, places: Sequence[str], kind: str, units: str, baud: str | None, timeout: float) -> Callable[[Work], None]:
+        """A search, whose rows it adds to ``found``. Raises `Misuse` for wrong fields."""
+        ...
+
+    def verify(self, work: Work, address: str, *, write: bool) -> dict[str, object]:
+        """The report of the checks."""
+        ...
+
+
+class DeviceWork:
+    """See `steptwin.studio.hub.LongWork`."""
+
+    def __init__(self, worker: Worker, on_internal: Callable[[Exception], object]) -> None:
+        self._worker = worker
+        self._on_internal = on_internal
+        self._work: Work | None = None
+        self._running: Later[None] | None = None
+
+    def scan(self, places: Sequence[str], kind: str, units: str, baud: str | None, timeout: float) -> None:
+        search = self._worker.plan(places, kind, units, baud, timeout)
+        self._begin("scan", search)
+
+    def verify(self, address: str, *, write: bool) -> None:
+        def checks(work: Work) -> None:
+            work.report = self._worker.verify(work, address, write=write)
+
+        self._begin("verify", checks)
+
+    def plain(self) -> dict[str, object] | None:
+        return None if self._work is None else self._work.plain()
+
+    def cancel(self) -> None:
+        if self._work is not None:
+            self._work.is_cancelled = True
+
+    def _begin(self, kind: str, do: Callable[[Work], None]) -> None:
+        if self._work is not None and self._work.is_running:
+            raise Refusal(f"{self._work.kind} is running: wait, or cancel it")
+        work = self._work = Work(kind)
+        self._running = later(asyncio.to_thread(self._run, work, do))
+
+    def _run(self, work: Work, do: Callable[[Work], Any]) -> None:
+        try:
+            do(work)
+        except Cancelled:
+            work.problems.append("cancelled")
+        except SteptwinError as error:
+            work.problems.append(str(error))
+        except Exception as error:  # noqa: BLE001  it is reported, and the next work can begin
+            work.problems.append("an error in steptwin")
+            self._on_internal(error)
+        finally:
+            work.is_running = False
+
+    async def close(self) -> None:
+        """Wait for its end, so that what was changed is put back."""
+        self.cancel()
+        if self._running is not None:
+            await result_of(self._running)

@@ -1,0 +1,76 @@
+"""Search for devices and their checks in a real browser; a twin in a process of its own plays the device."""
+
+from __future__ import annotations
+
+import json
+import socket
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from playwright.sync_api import expect
+from pymodbus.client import ModbusTcpClient
+from studio_page import PICTURES, Studio, button
+from tests.conftest import until
+
+
+def test_a_device_is_found_checked_and_connected(studio: Studio, serve: Callable[..., Any], tmp_path: Path) -> None:
+    twin = serve("--lenient")
+    place = f"tcp://127.0.0.1:{twin.tcp_port}"
+    page = studio.page(panel="Devices", viewport={"width": 1280, "height": 1000})
+    page.get_by_label("Address of the device").fill(place)
+    page.get_by_label("Units").fill("1-3")
+    button(page, f"Search {place}").click()
+    found = page.get_by_role("table", name="Found")
+    expect(found).to_contain_text(f"{place},unit=1MIC488, firmware 1.70")
+    expect(page.get_by_text(f"Tried: {place}")).to_contain_text("unit")
+
+    button(page, f"Check {place},unit=1").click()
+    results = page.get_by_role("table", name="Results of the checks")
+    row = results.get_by_role("row").filter(has=page.get_by_role("rowheader", name="MIC-3", exact=True))
+    expect(row).to_contain_text("refuted")
+    expect(row).to_contain_text("expected exception 02 (illegal data address), came answer 03 02 00 00")
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    page.screenshot(path=PICTURES / "devices.png")
+    with page.expect_download() as download:
+        button(page, "Download report").click()
+    download.value.save_as(tmp_path / "report.json")
+    report = json.loads((tmp_path / "report.json").read_text())
+    assert (report["device"]["at"], report["counts"]["refuted"]) == (place, 2)
+
+    button(page, f"Connect {place},unit=1").click()
+    expect(button(page, "Disconnect mic488")).to_be_visible()
+    expect(page.get_by_text("REAL", exact=True).first).to_be_visible()
+    master = ModbusTcpClient("127.0.0.1", port=twin.tcp_port)
+    assert master.connect()
+    assert master.read_holding_registers(10010, count=4, device_id=1).registers == [0, 0, 0, 0]  # nothing moves, all is off
+    master.close()
+
+
+@pytest.mark.parametrize("language", ["en-US", "pl-PL"])
+def test_the_panel_on_a_tablet_in_the_dark(studio: Studio, language: str) -> None:
+    name = "Devices" if language == "en-US" else "Urządzenia"
+    page = studio.page(language, panel=name, viewport={"width": 834, "height": 1112}, color_scheme="dark")
+    page.screenshot(path=PICTURES / f"devices-tablet-{language}.png")
+    expect(page.get_by_role("heading", name="Search" if language == "en-US" else "Szukanie")).to_be_visible()
+
+
+def test_a_search_is_cancelled_over_rest(start_studio: Callable[..., Any]) -> None:
+    process = start_studio()
+    silent = socket.create_server(("127.0.0.1", 0))
+    place = f"rtu-tcp://127.0.0.1:{silent.getsockname()[1]}"
+
+    def ask(name: str, **fields: object) -> Any:
+        return httpx.post(f"{process.url}/api/do/{name}", json=fields).json()
+
+    assert ask("work")["ok"] is None
+    assert ask("scan", places=[place], kind="plc")["error"]["message"] == "kind plc: permitted are any, mic488, m1486"
+    assert ask("scan", places=[place], kind="mic488", units="2-247", timeout=1.0)["ok"] is None
+    assert ask("verify", address=place)["error"]["message"] == "scan is running: wait, or cancel it"
+    assert ask("cancel_work")["ok"] is None
+    until(lambda: not ask("work")["ok"]["is_running"], "the search has ended")
+    assert ask("work")["ok"]["problems"] == ["cancelled"]
+    assert ask("work")["ok"]["found"] == []
+    silent.close()
