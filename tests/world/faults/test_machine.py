@@ -286,6 +286,19 @@ def test_supply_drop_silences_everything_and_comes_back_as_after_power_on() -> N
     assert not rig.device.axes[0].enabled
 
 
+def test_supply_drops_that_overlap_end_with_the_last() -> None:
+    rig = moving("supply-drop at_s=1 for_s=0.5 name=first", "supply-drop at_s=1.2 for_s=0.1 name=second")
+    rig.wait(1.4)
+    assert rig.ask() == b""
+    rig.wait(0.2)
+    assert rig.ask() != b""
+    rig = moving("supply-drop at_s=1 for_s=0.2 name=first", "supply-drop at_s=1.1 for_s=0.5 name=second")
+    rig.wait(1.5)
+    assert rig.ask() == b""
+    rig.wait(0.2)
+    assert rig.ask() != b""
+
+
 # ---------------------------------------------------------------------- memory
 
 
