@@ -111,6 +111,12 @@ def test_registers_on_a_are_safe_after_a_reset_up_to_736_bits() -> None:
     assert codes(">9\n<10", A) == []
 
 
+def test_a_command_that_is_reached_in_several_ways_is_found_once() -> None:
+    """With two velocities, and with the variable unknown or 1."""
+    assert codes("T40\nI2H1\nV300\n@1\nC1", B).count("M215") == 1
+    assert codes("[\nT40\n:1\nI2H1\n?12\n@1\n!12\nJ1\n]", B).count("M215") == 1
+
+
 # ---------------------------------------------------------------------- memory
 
 

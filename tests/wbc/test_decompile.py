@@ -137,6 +137,33 @@ def test_a_record_the_builder_would_not_write_stays_data(record: str) -> None:
     assert unknown(record) == [f"//!record {bytes.fromhex(record).ljust(16, bytes(1)).hex().upper()}"]
 
 
+def test_blocks_in_blocks_are_written_as_blocks() -> None:
+    text = """\
+WHILE IN1 = 1
+    IF IN2 = 1
+        WHILE IN3 = 1
+            WAITPOS
+        ENDWHILE
+    ELSE
+        IF IN4 = 1
+            WAITPOS
+        ENDIF
+    ENDIF
+ENDWHILE
+IF IN5 = 1
+    WAITPOS
+ENDIF
+"""
+    table, _ = parse_positions("")
+    checked = check(text, table)
+    assert checked.executable is not None
+    data, findings = build(checked.executable, table, inferred=True)
+    assert findings == []
+    assert data is not None
+    found = decompile(data)
+    assert found.text.splitlines()[1:] == text.splitlines()
+
+
 def test_blocks_that_do_not_nest_stay_data() -> None:
     condition = "00 01 00 00 00 3D FE 00 00 80 3F"
     records = f"""

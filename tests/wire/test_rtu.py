@@ -390,6 +390,16 @@ def test_a_response_without_its_request_waits_for_what_tells_it_from_one() -> No
     assert framer.expire(GAP) == [RtuFrame(response, FrameRole.RESPONSE, 6)]
 
 
+def test_after_a_beginning_given_up_too_a_response_without_its_request_waits() -> None:
+    framer = RtuFramer({1}, gap_ns=rtu.UART_GAP_NS)
+    framer.feed(bytes.fromhex("01 10 27 38 00 7B F6 41"), 0)
+    response = hexed("02 01 01 15")
+    assert framer.feed(response, 1_000_000) == []
+    frames = framer.expire(1_000_000 + rtu.UART_GAP_NS)
+    assert [(frame.raw, frame.role) for frame in frames] == [(response, FrameRole.RESPONSE)]
+    assert framer.rubbish == 8
+
+
 @pytest.mark.parametrize("unit", [248, 255])
 def test_reserved_units_are_rubbish(unit: int) -> None:
     framer = RtuFramer({1})

@@ -121,6 +121,13 @@ def test_a_mic488_stands_in_time_after_the_last_renewal(acc: float, renewals: in
     assert rig.jogs.deadline() is None
 
 
+@pytest.mark.parametrize(("acc", "lasts_ms"), [(20.0, 160), (100.0, 160), (400.0, 170), (800.0, 220), (5000.0, 250)])
+def test_a_jog_of_a_mic488_lasts_as_long_as_braking_leaves_time(acc: float, lasts_ms: int) -> None:
+    """Of 270 ms, 40 mm/s take 40/acc to brake; but 160 to 250 ms in any case."""
+    rig = mic(acc)
+    assert rig.begin(Jog("a", 1, 40.0)).lasts_ns == lasts_ms * MILLISECOND
+
+
 @pytest.mark.parametrize("acc", [20.0, 100.0, 400.0, 5000.0])
 def test_a_mic488_whose_viewer_has_gone_brakes_at_once_and_stands_in_time(acc: float) -> None:
     rig = mic(acc)

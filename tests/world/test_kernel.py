@@ -206,6 +206,20 @@ def test_the_deadline_is_the_earliest_of_all() -> None:
     assert dues == [3, 5, 9]
 
 
+def test_a_machine_takes_the_place_of_another_with_what_it_has_to_do() -> None:
+    kernel = Kernel()
+    kernel.add("a", Relay())
+    kernel.add("b", Relay())
+    assert kernel.deadline() is None
+    relay = Relay(5)
+    relay.set_pin("A", 1.0, 0)
+    kernel.replace("a", relay)
+    assert kernel.deadline() == 5
+    kernel.advance(5)
+    relay.set_pin("A", 0.0, 5)
+    assert kernel.deadline() == 10
+
+
 def test_ties_are_broken_by_the_order_of_joining() -> None:
     kernel = Kernel()
     seen: list[str] = []

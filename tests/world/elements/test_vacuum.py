@@ -133,6 +133,25 @@ def test_it_takes_a_workpiece_from_a_belt_to_another() -> None:
     assert (world.read("outfeed.count"), world.read("a.IN2"), world.read("cup.dropped")) == (1, 1, 0)
 
 
+def test_a_workpiece_is_put_back_where_it_came_from() -> None:
+    world = World.from_toml(BELTS)
+    device = world.mic488["a"]
+    device.write("OUT2", 1)
+    world.run(until="infeed.count == 1")
+    world.run(for_=0.9)
+    device.write("OUT2", 0)
+    device.write("OUT1", 1)
+    device.write("OUT4", 1)
+    world.run(until="cup.held", for_=1)
+    held = world.read("infeed.count")
+    device.write("OUT1", 0)
+    world.run(until="not cup.held", for_=1)
+    assert (world.read("infeed.count"), world.read("outfeed.count"), world.read("cup.dropped")) == (held + 1, 0, 0)
+    # It lies with its front under the cup, which can take it again.
+    device.write("OUT1", 1)
+    world.run(until="cup.held", for_=1)
+
+
 def test_what_is_let_go_elsewhere_falls() -> None:
     world = World.from_toml(BELTS)
     device = world.mic488["a"]

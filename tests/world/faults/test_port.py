@@ -428,3 +428,11 @@ def test_a_request_that_comes_on_no_known_link_meets_the_faults_of_every_link() 
     assert rig.ask() == ANSWER
     refused = rig.faults.machines["1"].refusal(1, "", READ, rig.now)
     assert refused == bytes.fromhex("83 06")
+
+
+def test_a_stream_that_is_no_modbus_tcp_is_broken_behind_the_faults_too() -> None:
+    rig = FaultRig("delay for_ms=1", line=LineProtocol.TCP)
+    assert rig.port.broken is None
+    rig.send(b"\0\1\0\1\0\2\1\3")
+    rig.arrivals(0.1)
+    assert rig.port.broken == "MBAP protocol 1 is not 0"
