@@ -29,6 +29,12 @@ def test_wbc_4_a_variable_read_above_its_assignment_is_known() -> None:
     assert codes("OUT1 = x\n") == ["W104"]
 
 
+def test_what_is_wrong_with_a_constant_is_told_once() -> None:
+    """Not again where it is read or set."""
+    assert codes("#pump nothing\nOUT1 = pump\npump = 3\n") == codes("#pump nothing\n")
+    assert len(codes("#pump nothing\n")) == 1
+
+
 def test_wbc_7_short_delays_are_told() -> None:
     assert codes("DELAY 0.009\n") == ["W212"]
     assert codes("DELAY 0.01\n") == []

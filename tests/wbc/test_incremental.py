@@ -33,42 +33,52 @@ lines = st.lists(st.sampled_from(LINES), max_size=14)
 ends = st.sampled_from(("\n", "\r\n", "\r"))
 
 
-def check_same(edited: Edited, text: str) -> None:
-    for table, setup in ((TABLE, SETUP), (None, None)):
-        edited.update(text)
-        found, _ = edited.check(table, setup, DIALECT)
-        whole = check(text, table, setup, DIALECT)
-        assert found.diagnostics == whole.diagnostics
-        assert found.executable == whole.executable
-        assert found.lines == whole.lines
-        assert found.program == whole.program
+class Both:
+    """The same text, edited with a position table and without. Steps are kept from edit to edit while the table stays."""
+
+    def __init__(self) -> None:
+        self._edited = (Edited(), TABLE, SETUP), (Edited(), None, None)
+
+    def check_same(self, text: str) -> None:
+        for edited, table, setup in self._edited:
+            edited.update(text)
+            found, _ = edited.check(table, setup, DIALECT)
+            whole = check(text, table, setup, DIALECT)
+            assert found.diagnostics == whole.diagnostics
+            assert found.executable == whole.executable
+            assert found.lines == whole.lines
+            assert found.program == whole.program
 
 
 @given(st.lists(st.tuples(st.integers(0, 20), st.integers(0, 4), lines, ends), min_size=1, max_size=8), lines)
 @example([(0, 1, [], "\n")], ["SET y = x + STATUS", "y = STATUS", "OUT1 = y"])  # the word about STATUS goes to the next line
+@example(
+    [(0, 0, ["x = 1"], "\n")], ["MAIN:", "IF IN1 = ON", "OUT1 = ON", "ELSE", "JUMP MAIN", "ENDIF", "WHILE x < 5", "ENDWHILE"]
+)
+@example([(0, 0, ["x = 1"], "\n"), (0, 1, [], "\n")], ["CircX = 5", "MOVEPTP 0", "MOVELIN @TOP", "MOVEPTP @P0"])
 @example([(0, 0, ["a /* b"], "\n"), (3, 0, ["b */"], "\n")], ["x = 1", "x = 2", "OUT1 = x"])
 def test_every_edit_gives_what_the_whole_text_gives(edits: list[tuple[int, int, list[str], str]], first: list[str]) -> None:
-    edited = Edited()
+    edited = Both()
     text = list(first)
-    check_same(edited, "\n".join(text))
+    edited.check_same("\n".join(text))
     for place, removed, inserted, end in edits:
         text[place : place + removed] = inserted
-        check_same(edited, end.join(text))
+        edited.check_same(end.join(text))
 
 
 @given(st.lists(st.text(st.sampled_from("M1 =\r\n#OUT:@/*x,5(IF"), max_size=40), max_size=5))
 def test_any_text_is_taken(texts: list[str]) -> None:
-    edited = Edited()
+    edited = Both()
     for text in texts:
-        check_same(edited, text)
+        edited.check_same(text)
 
 
 @pytest.mark.parametrize("name", sorted(path.stem for path in EXAMPLES.glob("*.prg")))
 def test_an_example_typed_line_by_line(name: str) -> None:
     text = (EXAMPLES / f"{name}.prg").read_text()
-    edited = Edited()
+    edited = Both()
     for part in itertools.accumulate(text.splitlines(keepends=True)):
-        check_same(edited, part)
+        edited.check_same(part)
 
 
 def test_a_name_that_cannot_be_a_variable_is_refused_everywhere() -> None:

@@ -264,6 +264,8 @@ def test_the_program_ends_at_end_and_behind_its_last_line() -> None:
             (3, "OUT1", 0.0),
         ]
         assert (rig.state, rig.m_status, rig.device.deadline()) == (STOPPED, 0, None)
+        interpreter = rig.device.program.interpreter
+        assert (interpreter.running, interpreter.due) == (False, None)
 
 
 def test_progreset_starts_again_with_drives_off() -> None:

@@ -147,8 +147,6 @@ class ProgramScope:
             if name.key in self._broken:
                 return None
             found = self._look_up(name)
-            if found is None:
-                return None
         if isinstance(found, Literal):
             kind = "a constant" if name.key in self.constants else "predefined"
             self._report(f.NOT_ASSIGNABLE.at(name, f"{name.text} is {kind} and cannot be set", "set a variable or a register"))

@@ -18,6 +18,7 @@ from steptwin.drivers import (
     Overtaken,
     ProgramState,
     Reason,
+    SentLate,
     TooLate,
     Unconfirmed,
     load_config,
@@ -214,6 +215,23 @@ def test_no_trigger_mode_is_left_when_its_answer_is_lost() -> None:
         mic.move_together({1: 10.0, 3: 20.0})
     assert wire.twin.trigger_mode == 0
     assert not wire.moving(1)
+
+
+def test_a_program_that_was_started_too_late_is_stopped_and_said_to_be_so() -> None:
+    """The process is suspended while it writes the frame that starts the program."""
+    wire = Wire()
+    mic = driver(wire)
+    start = Query(1, WriteRegisterRequest(10003, 1)).rtu_frame
+
+    def suspend(frame: bytes) -> None:
+        if frame == start:
+            wire.before_each = None
+            wire.sleep(70.0)
+
+    wire.before_each = suspend
+    with pytest.raises(SentLate, match="was sent more than"):
+        mic.program.start()
+    assert wire.sent[-1][1] == Query(1, WriteRegisterRequest(10003, 0)).rtu_frame
 
 
 def test_a_trigger_mode_that_cannot_be_left_is_told() -> None:

@@ -362,6 +362,20 @@ def test_a_program_that_is_suspended_while_it_reads_the_status_does_not_move_the
     assert mic.get("M1_VMAX") == {"M1_VMAX": 25.0}
 
 
+@pytest.mark.parametrize("holds", [0, 1])
+@pytest.mark.parametrize(("before_ms", "runs_on"), [(25, True), (15, False)])
+def test_the_hold_time_counts_from_the_decision_to_move(holds: int, before_ms: int, *, runs_on: bool) -> None:
+    """The frame leaves up to 10 ms later (100 frames a second), and its answer comes after that."""
+    wire, mic = ready()
+    with mic.axis(1).jog(5.0, hold_s=0.4) as jog:
+        for _ in range(holds):
+            assert jog.hold()
+        moved = wire.sent[-1][0]
+        wire.sleep((moved + (400 - before_ms) * MILLISECOND - wire.now) / SECOND)
+        assert jog.hold() is runs_on
+    assert jog_moves(wire) == 1 + holds + runs_on
+
+
 @pytest.mark.parametrize(
     ("hold_s", "away_s", "begins"), [(0.4, 0.9, True), (0.4, 1.1, False), (1.0, 1.5, True), (1.0, 1.7, False)]
 )

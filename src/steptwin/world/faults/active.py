@@ -101,7 +101,7 @@ class ActiveFault(Stateful):
         if self.due is None or not isinstance(period, float):
             self.due = None
             return
-        self.due += max(1, round(period * SECOND))
+        self.due += round(period * SECOND)
         if (self._until is not None and self.due > self._until) or (self._count is not None and self.struck >= self._count):
             self.due = None
 

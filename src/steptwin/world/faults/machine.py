@@ -376,7 +376,6 @@ class FaultyMachine(Stateful):
             return False
         self._cut = None
         self.inner.power_off(now)
-        self.changed()
         return True
 
 
