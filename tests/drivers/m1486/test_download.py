@@ -253,6 +253,10 @@ def test_what_a_program_uploads_is_read() -> None:
     with pytest.raises(LineFailure, match="the chip uploaded 2 of 3 bytes within 1 s"):
         chip.uploaded(3, 1.0)
     assert chip.uploaded(2) == bytes((0x7E, 0x7E))
+    begin = wire.now
+    with pytest.raises(LineFailure, match="the chip uploaded 0 of 1 bytes within 10 s"):
+        chip.uploaded()
+    assert wire.now - begin == pytest.approx(10 * SECOND, abs=SECOND // 2)
     assert chip.variable() == 0x7E7E
     with pytest.raises(Misuse, match="0 bytes: at least 1"):
         chip.uploaded(0)
