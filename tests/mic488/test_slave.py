@@ -508,6 +508,9 @@ def test_mic_3_lenient_last_values_follow_data_type_and_end_with_the_power() -> 
     rig.device.power_cycle(rig.now)
     rig.dint = False
     assert rig.get("POS_ABS") == 0
+    rig.use_dint()
+    assert [rig.get(key, 2) for key in ("POS_ABS", "POS_REL", "VEL_ABS", "HOME")] == [0, 0, 0, 0]
+    assert [rig.word(key) for key in ("M_ENABLE", "M_DISABLE", "M_STOP")] == [0, 0, 0]
 
 
 def test_mic_3_a_refused_write_is_not_remembered() -> None:

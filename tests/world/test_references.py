@@ -52,7 +52,7 @@ at_s = 3600
         (do.Expect("nobody.x == 1"), "no signal 'nobody.x': nothing is called 'nobody'; there are m, c, x, go, time, idle"),
         (do.UntilOver("nobody", 1), "no machine is called 'nobody'; there are m, c"),
         (do.UntilOver("m", 5), "m.M5: m has M1, M2, M3, M4"),
-        (do.UntilOver("c", 2), "'c' is an M1486, which has no status of motions: send its commands, and wait for a condition"),
+        (do.UntilOver("c", 2), "c.M2: c has M1"),
         (do.ExpectReached("m", 0), "m.M0: m has M1, M2, M3, M4"),
         (do.ExpectReached("nobody", 1), "no machine is called 'nobody'; there are m, c"),
         (do.Set((("m", "IN99", 1.0),)), "no input pin 'IN99': inputs are IN1 to IN20 and AIN1 to AIN2"),
