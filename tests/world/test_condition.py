@@ -103,6 +103,8 @@ def test_conditions(text: str, truth: bool) -> None:
         ("a = = 3", "column 5: found '=', expected a signal or a number"),
         ("(a > 0) + 1", "ends too early: expected one of == != <= >= < >"),
         ("a" * 20_001, "has 20001 characters: permitted are 20000"),
+        (" " * 20_000, "ends too early: expected a signal or a number"),
+        ("a-" * 10_000, r"there are more than 200 of \+ - \* /"),
         ("a + 3", "ends too early: expected one of == != <= >= < >"),
         ("a + 3 and b", "found 'and', expected one of == != <= >= < >"),
         ("a > 3 +", "ends too early: expected a signal or a number"),

@@ -50,6 +50,7 @@ LONGEST = 20_000
 _COMPARE: Mapping[str, Callable[[float, float], bool]] = {"==": eq, "!=": ne, "<=": le, ">=": ge, "<": lt, ">": gt}
 _OTHER_SIGNS: Mapping[str, str] = {"=": "==", "<>": "!=", "&&": "and", "||": "or"}
 _WORDS = ("and", "or", "not")
+_OPERATIONS = ("+", "-", "*", "/", "%")
 _TOKEN = re.compile(
     r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
     r"|(?P<name>[A-Za-z_][\w-]*(?:\.(?:[\w-]|&(?!&))+(?:\[\d+\])?(?::\w+)*)+|\$?[A-Za-z_]\w*)"
@@ -191,11 +192,20 @@ class _Parser:
         self._operand = "a signal or a number" if self._must_compare else "a name or a number"
         if len(text) > LONGEST:
             raise Misuse(f"{self._start} has {len(text)} characters: permitted are {LONGEST}")
-        self._tokens = [(m.lastgroup or "", m[m.lastgroup or 0], m.start(m.lastgroup or 0)) for m in _TOKEN.finditer(text)]
-        if sum(token in ("+", "-", "*", "/", "%") for _, token, _ in self._tokens) > MOST_OPERATIONS:
-            raise Misuse(f"{self._start}: there are more than {MOST_OPERATIONS} of + - * / %")
+        self._tokens = list(self._tokens_of(text.rstrip()))
         self._at = 0
         self._depth = 0
+
+    def _tokens_of(self, text: str) -> Iterator[tuple[str, str, int]]:
+        """Kind, text and place of each. ``text`` must not end with spaces, and operations are counted at once: otherwise the time
+        grows with the square of the length, of spaces without a token or of hyphens that might be in a name."""
+        operations = 0
+        for match in _TOKEN.finditer(text):
+            kind = match.lastgroup or ""
+            operations += match[kind] in _OPERATIONS
+            if operations > MOST_OPERATIONS:
+                raise Misuse(f"{self._start}: there are more than {MOST_OPERATIONS} of + - * / %")
+            yield kind, match[kind], match.start(kind)
 
     def condition(self) -> Truth:
         node = self._truth(self._or())
