@@ -71,8 +71,9 @@ class SignalCondition:
         self._test = truth_of(node, {name: signal.value for name, signal in self._signals.items()})
         found = (_Comparison.of(one, self._signals) for one in comparisons(node))
         self._comparisons = [one for one in found if one.moving]
-        self._crossings: list[_Crossing | None] = [None] * len(self._comparisons)
+        self._crossings: list[_Crossing | None]
         """The crossings computed last."""
+        self.forget()
 
     def bring(self, now: Nanos) -> tuple[Any, ...]:
         """As `Signal.bring`, for all its signals. Must be called before `holds` and `due`."""
@@ -94,6 +95,10 @@ class SignalCondition:
         """The next moment at which one of its comparisons may change without an event; None if never."""
         dues = [due for n in range(len(self._comparisons)) if (due := self._crossing(n, now)) is not None]
         return min(dues, default=None)
+
+    def forget(self) -> None:
+        """Compute crossings again: after a restored snapshot, whose signals may have versions that they had in another past."""
+        self._crossings = [None] * len(self._comparisons)
 
     def _crossing(self, n: int, now: Nanos) -> Nanos | None:
         """The moment at which a comparison changes; cached while the courses of its signals are unchanged."""

@@ -195,3 +195,16 @@ def test_it_can_be_restored_anywhere(moment_s: float, tmp_path: object) -> None:
     place = f"{tmp_path}/s.json"
     save(session_of(found), place)
     assert load(place).replay().trace.digest() == found.trace.digest()
+
+
+def test_collisions_and_sensors_can_be_of_a_carriage() -> None:
+    """The axis never comes to 20.05 mm."""
+    found = world(
+        '[[collision]]\nname = "frame"\nwhen = "tool.position > 20.05"\n'
+        '[[transducer]]\nname = "gauge"\nof = "tool.position"\nto = "a.AIN1"\npoints = [[0, 0], [30, 3]]\n'
+    )
+    start(found)
+    found.run(until=2.0)
+    touched = [record.time / SECOND for record in found.trace.of("event") if record.subject == "collision"]
+    assert touched[0] == pytest.approx(next(t for t, x in integrated(1.0) if x > 20.05), abs=2.1e-5)
+    assert found.read("a.AIN1") == pytest.approx(2.0, abs=0.02)

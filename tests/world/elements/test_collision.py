@@ -185,3 +185,24 @@ def test_snapshots_and_sessions_have_it(moment_s: float, tmp_path: object) -> No
 def test_mistakes_have_their_places(old: str, new: str, text: str) -> None:
     with pytest.raises(WorldError, match=f"(?s){text}"):
         World.from_toml(TEXT.replace(old, new, 1), name="t.toml")
+
+
+def test_a_restored_snapshot_of_another_past_has_its_own_moment() -> None:
+    """The cylinder has been sent once in both pasts."""
+    cylinder = '[[cylinder]]\nname = "arm"\nextend = "a.OUT1"\nstroke = 100.0\n'
+    cylinder += "extend_time = 0.5\nretract_time = 0.5\nswitching = 0\n"
+    world = World.from_toml(f'[[mic488]]\nname = "a"\n{cylinder}[[collision]]\nname = "zone"\nwhen = "arm.position >= 60"')
+
+    def sent_at(seconds: float) -> None:
+        world.run(until=seconds)
+        world.mic488["a"].write("OUT1", 1)
+        world.run(until=0.3)
+
+    begin = world.snapshot()
+    sent_at(0.1)
+    early = world.snapshot()
+    world.restore(begin)
+    sent_at(0.2)
+    world.restore(early)
+    world.run(until=1.0)
+    assert hits(world) == [(0.4, "zone: parts touch")]

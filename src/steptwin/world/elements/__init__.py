@@ -73,9 +73,9 @@ for _one in (
     VACUUM,
     BRAKE,
     SHAFT,
+    CARRIAGE,
     TRANSDUCER,
     COLLISION,
     GANTRY,
-    CARRIAGE,
 ):
     register(_one)

@@ -8,6 +8,7 @@ from typing import ClassVar
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.state import Plain
 from steptwin.world.board import Board
 from steptwin.world.condition import SignalCondition
 from steptwin.world.elements.axis import AXIS
@@ -132,6 +133,10 @@ class Touch(BoardPart):
 
     def deadline(self) -> Nanos | None:
         return self._due
+
+    def set_state(self, plain: Plain) -> None:
+        super().set_state(plain)
+        self._condition.forget()
 
 
 def _make(spec: CollisionSpec, site: Site) -> Touch:
