@@ -118,7 +118,7 @@ def test_a_count_turns_where_it_begins_anew(name: str, start: int, way: str, end
 def test_what_stands_still_between_events_has_no_turns() -> None:
     bench = Bench("B")
     following = [path for path in POINTS if point(bench, path).turns is not None]
-    assert following == ["POSITION", "VELOCITY", "COUNTER", "BUSY", "REGISTER9", "U1", "U2", "U3"]
+    assert following == ["POSITION", "VELOCITY", "COUNTER", "REGISTER9", "U1", "U2", "U3"]
 
 
 def test_there_is_room_unless_lines_wait_or_the_eeprom_is_written() -> None:

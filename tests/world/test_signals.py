@@ -8,8 +8,9 @@ from world_rig import small
 from steptwin.errors import Misuse
 from steptwin.files.world import World
 from steptwin.live.world import LiveWorld, PlacePort
-from steptwin.machine import SECOND
+from steptwin.machine import MILLISECOND, SECOND
 from steptwin.wire.crc import with_crc
+from steptwin.world.script import Send
 from steptwin.world.signals import Idle, SignalOf, find_signal
 
 OF_M1 = "M1.status, M1.enabled, M1.moving, M1.position, M1.velocity, M1.encoder"
@@ -170,6 +171,17 @@ def test_idle_looks_at_what_was_busy_last_and_at_all_when_nothing_is() -> None:
     world.mic488["c"].axis[1].move_to(100.0)
     assert idle.bring(world.now) == (world.parts.kernel_of["c"].source("c"),)
     assert world.read("idle") == 0.0
+
+
+def test_a_chip_is_idle_when_its_last_command_is_over() -> None:
+    """On a line that gives characters at once nothing else happens at that moment."""
+    world = World.from_toml('[[line]]\nname = "chips"\nkind = "m1486"\ntiming = "off"\n[[m1486]]\nname = "c"\nline = "chips"\n')
+    world.at(0.1, Send("chips", b"v100\r"))
+    world.run(until=0.1)
+    assert (world.read("idle"), world.read("c.busy")) == (0, 1)
+    world.run(until="idle", for_=1.0)
+    assert world.now == 101 * MILLISECOND
+    assert (world.read("idle"), world.read("c.busy")) == (1, 0)
 
 
 def test_a_program_and_a_line_keep_a_world_busy() -> None:

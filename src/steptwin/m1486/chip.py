@@ -216,6 +216,8 @@ class M1486Chip(Stateful):
         else:
             due, other = self._hardware_deadline(), self.program.deadline(self.now)
             self._due = other if due is None else due if other is None else min(due, other)
+            if self._due is None and self.program.ready > self.now:
+                self._due = self.program.ready  # the end of the last command, since when it is idle
         self.changed()
 
     def _settle(self) -> None:

@@ -28,8 +28,6 @@ class _PointRow(NamedTuple):
     bits: int | None = None
     """Number of low bits of the position in a count that wraps."""
     has_version: bool = False
-    turns: Callable[[M1486Chip, Nanos], Iterator[Nanos]] | None = None
-    """Further moments between events at which the value changes."""
 
 
 def _sentence(text: str) -> str:
@@ -55,12 +53,6 @@ def _has_room(chip: M1486Chip, now: Nanos) -> bool:
     return not receiver.is_listening or not (receiver.is_stalled or receiver.busy_until is not None)
 
 
-def _last_command(chip: M1486Chip, now: Nanos) -> Iterator[Nanos]:
-    """When the last command ends, which is no event."""
-    if chip.program.ready > now:
-        yield chip.program.ready
-
-
 def _values() -> Iterator[_PointRow]:
     yield _PointRow(
         _value("position", "Where the pulses given so far have led, since power-on.", UNIT),
@@ -84,7 +76,6 @@ def _values() -> Iterator[_PointRow]:
     yield _PointRow(
         _value("busy", "Whether a motion, a command or a program is in progress; one that is stopped is not.", kind="switch"),
         lambda chip, now: chip.is_busy(now),
-        turns=_last_command,
     )
     yield _PointRow(
         _value("valid", "Whether the counter shows where it is: no move was stopped before its end.", "", "VII.7", kind="switch"),
@@ -156,8 +147,6 @@ def live_point(chip: M1486Chip, text: str) -> LivePoint | None:
 
 
 def _turns(chip: M1486Chip, row: _PointRow) -> TurningPoints | None:
-    if row.turns is not None:
-        return partial(row.turns, chip)
     if not row.follows:
         return None
     profile = partial(_profile, chip)

@@ -21,7 +21,7 @@ def ordered(plant: Plant, command: ControllerCommand) -> Step:
     if make is None:
         raise lacks(name, kind, f"command {type(command).__name__.lower()}")
     plant.touch(name)
-    machine.advance(plant.now)  # a command may have ended since its last event
+    machine.advance(plant.now)
     on = plant.parts.line_of.get(name)
     return make(machine, None if on is None else on[0].name, command)
 
