@@ -94,7 +94,8 @@ def test_homing_seeking_and_jogging(serve_m1486: Callable[..., Any]) -> None:
     assert 20 <= jogged["position"] <= 100
     assert run("get", "POSITION").split()[1] == f"{jogged['position']:g}"
     for arguments, message in (
-        (("home", "1=-20", "--no-wait"), "--no-wait is not possible for an M1486: the command sets"),
+        (("home", "1=-B3", "--no-wait"), "--no-wait is not possible for an M1486: the command sets"),
+        (("home", "1=-20"), "expected the direction and the line of an M1486, such as 1=-B8 or 1=+B8"),
         (("home", "1=B3"), "expected the direction and the line of an M1486, such as 1=-B8 or 1=+B8"),
         (("home", "2=-B3"), "an M1486 has one axis: expected 1=-B8"),
         (("seek", "1=+B22"), "the line to seek = 22: M1486B takes 1 to 21"),

@@ -69,6 +69,9 @@ def test_a_session(twin: Any, shell: Shell) -> None:
     assert shell.code == 1
     assert json.loads(shell("home", "1=-50", "--json"))[0]["reason"] == "target reached"
     assert "released at" in shell("jog", "2=5", "--seconds", "0.2")
+    jogged = json.loads(shell("jog", "2=-5", "--seconds", "0.5", "--json"))
+    assert jogged["reason"] == "released"
+    assert jogged["after_s"] >= 0.5
     assert shell.code == 0
     assert shell("get", "M1_POS_ACT", "OUT3", "M1_STATUS").splitlines() == [
         "M1_POS_ACT   0  u",

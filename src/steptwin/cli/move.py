@@ -224,7 +224,8 @@ def jog(
     with opened(address, observe=False, log_frames=log_frames) as driver, interruptible(), keys() as pressed:
         held_up.check()
         jog = kind.jog(driver, axis, speed, hold)
-        end_at = None if seconds is None else time.monotonic() + seconds - jog.ahead_s
+        begun = time.monotonic()
+        end_at = None if seconds is None else begun + seconds - jog.ahead_s
         try:
             with jog:
                 if seconds is None:
@@ -233,7 +234,7 @@ def jog(
                     pass
         except KeyboardInterrupt:
             complain("released")
-        end = jog.ended()
+        end = jog.ended()._replace(after_s=time.monotonic() - begun)
     if json:
         print_json(_data(end))
     else:

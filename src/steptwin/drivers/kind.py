@@ -147,7 +147,7 @@ class DeviceHeldJog(Protocol):
         ...
 
     def ended(self) -> EndedMotion:
-        """After the block: why and where the axis has stopped."""
+        """After the block: why and where the axis has stopped. Its time is not that of the whole jog."""
         ...
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import re
-import time
 from collections.abc import Callable, Collection, Generator, Sequence
 from types import TracebackType
 from typing import Any, NamedTuple
@@ -40,7 +39,7 @@ from steptwin.machine import SECOND
 
 LOST = "; the chip has counted the whole move, so its position is wrong: home the axis, or set POSITION"
 """After Kill in a move (M-16)."""
-_SOUGHT = re.compile(r"([+-])B?(\d{1,2})", re.IGNORECASE)
+_SOUGHT = re.compile(r"([+-])B(\d{1,2})", re.IGNORECASE)
 
 
 def _driver(address: DeviceAddress, log: Log | None) -> M1486:
@@ -182,10 +181,8 @@ class _Jog:
     def __init__(self, chip: M1486, velocity: float) -> None:
         self._chip = chip
         self._jog: M1486Jog = chip.jog(velocity)
-        self._begun = time.monotonic()
 
     def __enter__(self) -> object:
-        self._begun = time.monotonic()
         return self._jog.__enter__()
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
@@ -204,8 +201,7 @@ class _Jog:
     def ended(self) -> EndedMotion:
         rest = _ended(self._chip.wait(check=False))
         end = self._jog.end
-        after_s = time.monotonic() - self._begun
-        return rest._replace(ok=rest.ok and end == RELEASED, reason=end or rest.reason, after_s=after_s)
+        return rest._replace(ok=rest.ok and end == RELEASED, reason=end or rest.reason)
 
 
 def _wait(chip: M1486, axes: Collection[int], timeout_s: float | None) -> Sequence[EndedMotion]:
