@@ -49,6 +49,7 @@ DELAY 0.2
 JUMP LOOP
 PART:
 $R6 = n * 2
+OUT3 = ON
 RETURN
 """
 CHIP = "[\n:5\n@1\nL2\n+1\nE\n'2\nW5\nJ1\n@2\n+2\n.\n]\n"
@@ -289,6 +290,24 @@ def test_a_recording_is_looked_through(start_studio: Callable[..., Process], bro
     past.get_by_role("button", name="To the present").click()
     expect(last).to_have_text(str(n))
     context.close()
+
+
+def test_why_answers_and_a_click_on_a_cause_shows_its_moment(studio: Studio) -> None:
+    page = opened(studio)
+    until(lambda: count(studio) >= 3, "the program goes round")
+    page.get_by_label("Why is it so?").fill("OUT3 == 1")
+    button(page, "Why?").click()
+    causes = page.get_by_role("status", name="Causes")
+    expect(causes).to_contain_text("OUT3 == 1 is true, since 0.")
+    became, executed = causes.get_by_role("button").filter(has_text=re.compile("OUT3")).all()
+    expect(became).to_contain_text("table table.OUT3 became 1")
+    expect(executed).to_contain_text("table line 10 `OUT3 = ON` was executed")
+    expect(executed).to_have_attribute("aria-current", "false")
+    executed.click()
+    expect(page.get_by_role("group", name="The past")).to_be_visible()
+    expect(executed).to_have_attribute("aria-current", "true")
+    expect(variable(page, "n")).to_have_text("1")
+    assert count(studio) >= 3
 
 
 def test_why_answers_what_is_no_question(studio: Studio) -> None:
