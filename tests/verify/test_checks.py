@@ -11,6 +11,7 @@ import pytest
 
 from steptwin.errors import LineFailure
 from steptwin.m1486.chip import M1486Chip
+from steptwin.m1486.commands import LETTERS
 from steptwin.m1486.line import SerialChain
 from steptwin.m1486.variants import VARIANTS, variant
 from steptwin.machine import MILLISECOND, SECOND
@@ -22,6 +23,7 @@ from steptwin.verify.m1486 import CHECKS as OF_M1486
 from steptwin.verify.m1486 import ChipTalk
 from steptwin.verify.mic488 import CHECKS as OF_MIC488
 from steptwin.verify.modbus import ModbusTalk
+from steptwin.verify.run import _over
 from steptwin.verify.running import check_all, complete
 from steptwin.verify.unchecked import UNCHECKED
 from steptwin.wire.slave import RtuSlavePort, TcpSlavePort
@@ -174,6 +176,46 @@ def test_a_controller_that_keeps_a_bad_value_is_reported() -> None:
         verified(line, "1.70")
 
 
+def test_a_refused_half_that_changes_the_value_is_put_back_without_permission() -> None:
+    class Whole:
+        """Takes one word written to M1_ACC for its value, as for JOG_SPEED."""
+
+        def __init__(self, device: Mic488Device) -> None:
+            self._device = device
+
+        def execute(self, pdu: bytes, now: int) -> bytes:
+            if pdu.startswith(bytes.fromhex("06 2734")):
+                self._device.execute(bytes.fromhex("10 2734 0002 04 0000 40a0"), now)  # 5.0
+                return pdu
+            return self._device.execute(pdu, now)
+
+    device = Mic488Device(ControllerConfig())
+    device.advance(SECOND)
+    before = state_of(device)
+    results = verified(Line(device, RtuSlavePort({1: Whole(device)})), "1.70", permitted=frozenset({Need.READ}))
+    assert ids(results, Outcome.REFUTED) == {"MIC-5"}
+    assert state_of(device) == before
+
+
+def test_a_lost_answer_does_not_leave_a_value_changed() -> None:
+    line = mic("1.70")
+    before = state_of(line.machine)
+    exchange, to_send = line.port.exchange, line.port.to_send
+    lost: list[bytes] = []
+
+    def exchanged(data: bytes, now: int) -> bytes:
+        received = exchange(data, now)
+        if b"\x06\x27\x10\x00\x01" in b"".join(line.sent[-2:-1]) and not lost:  # DATA_TYPE = 1
+            lost.append(received)
+            return b""
+        return received
+
+    line.port = type("Lossy", (), {"exchange": lambda _, d, n: exchanged(d, n), "to_send": lambda _, n: to_send(n)})()
+    assert ids(verified(line, "1.70"), Outcome.REFUTED) == set()
+    assert lost
+    assert state_of(line.machine) == before
+
+
 def test_a_silent_unit_is_a_failure() -> None:
     talk = ModbusTalk(2, register_map("1.70"), framed=False, wait_s=0.05)
     with pytest.raises(LineFailure, match="unit 2 does not respond"):
@@ -185,6 +227,33 @@ def test_an_adapter_that_echoes() -> None:
     exchange, to_send = line.port.exchange, line.port.to_send
     line.port = type("Echo", (), {"exchange": lambda _, d, now: d + exchange(d, now), "to_send": lambda _, now: to_send(now)})()
     assert ids(verified(line, "1.70"), Outcome.REFUTED) == set()
+
+
+def test_a_second_interrupt_names_what_is_not_put_back() -> None:
+    line = mic("1.70")
+
+    class Channel:
+        """Interrupted while DATA_TYPE is another one."""
+
+        def __init__(self) -> None:
+            self.came = b""
+
+        def write(self, data: bytes) -> None:
+            self.came = line.port.exchange(data, line.now)
+            if line.machine.data_type:
+                raise KeyboardInterrupt
+
+        def read(self, timeout_s: float) -> bytes:
+            line._advance(10)
+            came, self.came = self.came + b"".join(data for _, data in line.port.to_send(line.now)), b""
+            return came
+
+        def close(self) -> None: ...
+
+    endpoint = type("Endpoint", (), {"open": lambda _: Channel()})()
+    talk = ModbusTalk(1, register_map("1.70"), framed=False, wait_s=0.01)
+    with pytest.raises(NotRestored, match=r"interrupted; not put back: DATA_TYPE \(address 10000\) = 0000 hex"):
+        _over(endpoint, talk, [c for c in OF_MIC488 if c.id == "MIC-17"], ALL, lambda *_: None, lambda: False)
 
 
 # ---------------------------------------------------------------------- M1486
@@ -213,6 +282,14 @@ def checked(line: Line, expected: str, address: int | None = None) -> dict[str, 
 def test_a_chip_confirms_every_check(kind: str) -> None:
     results = checked(chip(kind), kind)
     assert ids(results, Outcome.CONFIRMED) == {check.id for check in OF_M1486}, results
+
+
+def test_nothing_in_a_comment_is_a_command_of_a_chip_without_comments() -> None:
+    line = chip("B")
+    checked(line, "B")
+    comments = {char for data in line.sent for char in data.partition(b";")[2].decode("ascii").upper()} - {"\r"}
+    assert comments
+    assert comments & LETTERS == set()
 
 
 def test_one_chip_of_a_chain() -> None:

@@ -32,7 +32,8 @@ def verify(
 
     The checks read, send requests that a controller is to refuse, and wrong frames. They take half a minute on a serial line,
     and other masters must leave it alone meanwhile. Wrong data end a program of an M1486; a chip that runs one does not
-    respond, and is not checked.
+    respond, and is not checked. Commands of the checks take command memory: they can overwrite what was sent to an M1486
+    before, and registers 1 to 8 of a type A or C.
 
     Exit code 1 when an interpretation is refuted. The report can be sent to the project.
     """

@@ -10,6 +10,8 @@ from steptwin.verify.check import Check, Need, NotRestored, Probes, Send, Steps,
 
 SPOILER = "%"
 """A character that is in no command: its line is wrong data (M-11)."""
+COMMENT = "; yy"
+"""Of characters that are in no command, as a chip that does not know comments may take what follows for commands."""
 _FLAGS, _INTERFACE, _SERIES, _TYPE, _RESERVED = 14, 15, 16, 20, 7
 """Bytes that U sends."""
 SELECT_S = 0.1
@@ -82,8 +84,8 @@ def _mixed(talk: ChipTalk) -> str | None:
 
 def _comments(talk: ChipTalk) -> Steps[None]:
     letter = talk.variant.type_letter
-    yield from talk.expect("U20 with a comment behind it", f"u{_TYPE};comment\r", letter)
-    yield from talk.expect("a comment alone", "; and nothing else\r")
+    yield from talk.expect("U20 with a comment behind it", f"u{_TYPE}{COMMENT}\r", letter)
+    yield from talk.expect("a comment alone", f"{COMMENT}\r")
     yield from talk.expect("U20 with LF behind it", f"u{_TYPE}\n\r", letter)
 
 

@@ -72,8 +72,13 @@ def _halves(talk: ModbusTalk) -> Steps[None]:
     (program,) = yield from talk.words(talk.at("PROGRAM_CTRL"), 1)
     if program:
         return  # it could change the value meanwhile
-    yield from talk.expect_refusal("its first word written as it is, function 06", write_one(address, both[0]), ADDRESS)
-    yield from talk.expect_refusal("its second word written as it is, function 16", write(address + 1, both[1]), ADDRESS)
+    # A controller that takes one word for a whole value, as it does for JOG_SPEED (MIC-6), would change the value.
+    before = yield from talk.remember("M1_ACC", address, 2)
+    yield from talk.expect_refusal("its first word written as it is, function 06", write_one(address, before[0]), ADDRESS)
+    yield from talk.keep("M1_ACC", address, before)
+    before = yield from talk.remember("M1_ACC", address, 2)
+    yield from talk.expect_refusal("its second word written as it is, function 16", write(address + 1, before[1]), ADDRESS)
+    yield from talk.keep("M1_ACC", address, before)
 
 
 def _after_rubbish(talk: ModbusTalk) -> Steps[None]:

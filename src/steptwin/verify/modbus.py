@@ -14,7 +14,7 @@ from steptwin.wire import pdu, rtu
 from steptwin.wire.crc import crc16
 
 TRIES = 3
-"""Of a write that puts a value back."""
+"""Of a write that puts a value back, and of a read whose answer was lost."""
 _MBAP = 7
 
 
@@ -116,7 +116,9 @@ class ModbusTalk:
 
     def words(self, address: int, count: int) -> Steps[tuple[int, ...]]:
         """Registers that can be read. Raises `Undecided`."""
-        answer = yield from self.ask(read(address, count))
+        for _ in range(TRIES):
+            if (answer := (yield from self.ask(read(address, count)))).pdu:
+                break
         if len(answer.pdu) != 2 + 2 * count or answer.refusal is not None:
             raise Undecided(f"registers {address} to {address + count - 1} cannot be read: {answer}")
         return struct.unpack(f">{count}H", answer.pdu[2:])
@@ -152,6 +154,13 @@ class ModbusTalk:
         words = yield from self.words(address, count)
         self.probes.unrestored[name] = f"{name} (address {address}) = {' '.join(f'{word:04X}' for word in words)} hex"
         return words
+
+    def keep(self, name: str, address: int, words: tuple[int, ...]) -> Steps[None]:
+        """Write what was remembered only if it has changed. Raises `NotRestored`."""
+        if (yield from self.ask(read(address, len(words)))).pdu[2:] == struct.pack(f">{len(words)}H", *words):
+            del self.probes.unrestored[name]
+        else:
+            yield from self.put_back(name, address, words)
 
     def put_back(self, name: str, address: int, words: tuple[int, ...]) -> Steps[None]:
         """Write what was remembered, and read it. Raises `NotRestored`."""

@@ -140,6 +140,10 @@ def _over(
         if not talk.probes.unrestored:
             raise
         raise NotRestored(f"{failure}; not put back: {'; '.join(talk.probes.unrestored.values())}") from failure
+    except KeyboardInterrupt:
+        if not talk.probes.unrestored:
+            raise
+        raise NotRestored(f"interrupted; not put back: {'; '.join(talk.probes.unrestored.values())}") from None
     finally:
         channel.close()
     return results, len(results) == len(checks)
