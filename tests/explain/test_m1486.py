@@ -112,6 +112,12 @@ def test_a_jump_out_of_a_loop_makes_its_end_lead_to_any_loop() -> None:
     assert {"again", "done"} <= {way.when for way in last.ways}
 
 
+def test_errors_that_the_chip_finds_are_named() -> None:
+    late = "@1\nI1H2\nJ1\n@2\nT1\n"
+    assert any(note.startswith("steptwin check finds errors") for note in explained(late).notes)
+    assert not any(note.startswith("steptwin check finds errors") for note in explained(f"[\n{late}]\n").notes)
+
+
 def test_wrong_commands_are_refused() -> None:
     with pytest.raises(Misuse, match=r"p\.m1486:2: .* steptwin check shows all errors"):
         explained("[\nY5\n]\n")

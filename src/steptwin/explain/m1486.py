@@ -6,10 +6,11 @@ from collections.abc import Collection, Mapping, Sequence
 from itertools import pairwise
 
 from steptwin.controlflow import ControlFlow
-from steptwin.diagnostics import SourceText
+from steptwin.diagnostics import Severity, SourceText
 from steptwin.errors import Misuse
 from steptwin.explain.blocks import Timing, blocks_of
 from steptwin.explain.model import EndlessLoop, ExplainedStatement, Explanation, LongWait, MemoryPart, MemorySection, Usage
+from steptwin.m1486.check import check
 from steptwin.m1486.commands import When, when
 from steptwin.m1486.drive import speed_curve
 from steptwin.m1486.flow import FlowAnalysis, Settings, follow
@@ -23,6 +24,8 @@ from steptwin.machine import MILLISECOND, Nanos
 from steptwin.motion.ramps import plan_distance
 
 _WRITES = frozenset("CT!")
+_ERRORS = "steptwin check finds errors in this program: a chip drops such commands and, unless function 44 is ON, stops there"
+_NO_INTERRUPTS = "an M1486 has no interrupts: K and LIMIT stop its motion, and function 51 decides whether the program goes on"
 
 
 def explain(
@@ -34,7 +37,8 @@ def explain(
         line = source.position(found[0].span.start)[0]
         raise Misuse(f"{source.name}:{line}: {found[0].message}: steptwin check shows all errors")
     time = variant.statement_ns if statement_time is None else statement_time
-    return [_Chip(source, stream, variant, interface, time).explanation() for stream in streams(program)]
+    has_errors = any(one.severity is Severity.ERROR for one in check(source.text, variant, interface).diagnostics)
+    return [_Chip(source, stream, variant, interface, time).explanation(has_errors=has_errors) for stream in streams(program)]
 
 
 def move_duration(state: Settings, variant: Variant) -> Nanos | None:
@@ -69,7 +73,7 @@ class _Chip:
             ExplainedStatement(source.position(command.span.start)[0], str(command)) for command in self._commands
         ]
 
-    def explanation(self) -> Explanation:
+    def explanation(self, *, has_errors: bool) -> Explanation:
         reached = set(self._paths.states)
         names = self._names()
         timing = [self._timing(index) for index in range(len(self._commands))]
@@ -95,9 +99,7 @@ class _Chip:
                 for index, command in enumerate(self._commands)
                 if index not in reached and when(command.key, command.number) is When.QUEUED
             ],
-            notes=(
-                "an M1486 has no interrupts: K and LIMIT stop its motion, and function 51 decides whether the program goes on",
-            ),
+            notes=(*((_ERRORS,) if has_errors else ()), _NO_INTERRUPTS),
         )
 
     def _names(self) -> dict[int, list[str]]:
