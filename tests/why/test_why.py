@@ -130,6 +130,21 @@ def test_a_switch_at_a_place_of_an_axis_that_was_commanded_to_move() -> None:
     assert world.why("table.hr:10020").since == reached.since
 
 
+def test_a_wait_for_all_axes_is_for_the_one_that_ends_last() -> None:
+    """Not for the one that was commanded last, which arrives long before."""
+    program = "M1 = ON\nM2 = ON\nPABS M1 2000\nPABS M2 10\nWAITPOS\nOUT1 = ON\n"
+    world = World.from_toml('[[mic488]]\nname = "table"\nprogram = "a.prg"\nstart = true\n', {"a.prg": program.encode()})
+    world.run(3.0)
+    waiting = shown(world, "table")
+    assert waiting[0].startswith("table waits at line 5 `WAITPOS`")
+    assert waiting[1].endswith("table table.M1 began to move")
+    assert len(set(waiting)) == len(waiting)
+    world.run(60.0)
+    ended = shown(world, "OUT1")
+    assert ended[3].endswith("table line 5 `WAITPOS` ended")
+    assert "the motion of table.M1 ended, which began at" in ended[4]
+
+
 def test_a_fault_is_a_cause_of_what_it_names_only() -> None:
     world = line()
     world.run(1.0)

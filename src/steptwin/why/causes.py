@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import partial
 from typing import NamedTuple, TypeAlias
@@ -301,8 +302,8 @@ class Causes:
     # ------------------------------------------------------------------ motions
 
     def motion(self, machine: str, axis: str, until: Nanos, mechanics: str = "") -> Found:
-        """The motion of an axis at a moment."""
-        plan = self._log.last_plan(machine, axis, until)
+        """The motion of an axis at a moment; of all axes the one that ends last, if ``axis`` is empty."""
+        plan = max(self._log.plans_in_force(machine, axis, until), key=self._end, default=None)
         if plan is None:
             return None
         record = self._log.record(plan)
@@ -321,6 +322,13 @@ class Causes:
         else:
             link = Link(plan.time, machine, f"{shown} began to move")
         return Cause(link, partial(self.in_machine, machine, plan, Operand(OperandKind.AXIS, record.subject)))
+
+    def _end(self, plan: Change) -> tuple[float, Nanos]:
+        """When the motion of a plan ends, which may be never; of several at once, the one planned last."""
+        profile = profile_of(self._log.record(plan).value)  # type: ignore[arg-type]
+        if not profile.segments:
+            return plan.time, plan.time
+        return math.inf if profile.end is None else profile.end, plan.time
 
     # ------------------------------------------------------------------ programs
 

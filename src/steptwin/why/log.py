@@ -181,15 +181,13 @@ class CauseLog:
         last = self.last_change(signal, until)
         return None if last is None or self.is_first(signal, last) else last.time
 
-    def last_plan(self, machine: str, axis: str, until: Nanos) -> Change | None:
-        """The plan of an axis that is in force at a moment; of the axis planned last, if ``axis`` is empty."""
-        found: Change | None = None
+    def plans_in_force(self, machine: str, axis: str, at: Nanos) -> Iterator[Change]:
+        """The plan of an axis that is in force at a moment; of each axis, if ``axis`` is empty."""
         for (name, number), plans in self.plans.items():
             if name == machine and axis in ("", number):
-                index = bisect_right(plans, until, key=lambda plan: plan.time)
-                if index and (found is None or plans[index - 1].time >= found.time):
-                    found = plans[index - 1]
-        return found
+                index = bisect_right(plans, at, key=lambda plan: plan.time)
+                if index:
+                    yield plans[index - 1]
 
     def record(self, change: Change) -> TraceRecord:
         return self.records[change.group][change.position]

@@ -242,7 +242,7 @@ class Why:
         changed = [cause for cause in found if cause.link.time > here.time]
         first = max(changed, key=lambda cause: cause.link.time, default=None) or causes.statement(machine, index)
         answer = yield from self._answer(machine, at, f"{machine} waits at {text}", since, first)
-        return answer._replace(links=(*links, *answer.links)[:MOST_LINKS])
+        return answer._replace(links=tuple(dict.fromkeys((*links, *answer.links)))[:MOST_LINKS])
 
     def _awaited(self, machine: str, operand: Operand, at: Nanos) -> Iterator[Link]:
         """The present state of what a statement waits for, and of what that depends on."""
