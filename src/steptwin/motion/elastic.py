@@ -13,6 +13,7 @@ below 1e-9 of the amplitude.
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from math import ceil, sqrt
@@ -165,12 +166,7 @@ class Response:
         self.stretches = found
 
     def stretch(self, now: Nanos) -> Stretch:
-        found = self.stretches[0]
-        for one in self.stretches:
-            if one.drive.begin > now:
-                break
-            found = one
-        return found
+        return self.stretches[max(bisect_right(self.stretches, now, key=lambda one: one.drive.begin) - 1, 0)]
 
     def at(self, now: Nanos) -> tuple[float, float]:
         """Position and velocity of the mass."""
