@@ -187,3 +187,13 @@ def test_it_can_be_restored_anywhere(moment_s: float, tmp_path: object) -> None:
     place = f"{tmp_path}/s.json"
     save(session_of(found), place)
     assert load(place).replay().trace.digest() == found.trace.digest()
+
+
+@pytest.mark.parametrize(("old", "new"), [("friction_force = 480.0", "friction_force = 2000.0"), ("mass = 20.0", "mass = 1e6")])
+def test_a_beam_that_is_too_heavy_for_both_stands(old: str, new: str) -> None:
+    """Half of it is 0.8 N·m of 0.5 at each motor, or far more."""
+    world = World.from_toml(text().replace(old, new))
+    start(world, "a", "b")
+    world.run(until=0.1)
+    assert (world.read("ya.stalled"), world.read("yb.stalled")) == (1, 1)
+    assert abs(world.read("beam.position")) < 1.0

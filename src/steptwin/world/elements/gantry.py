@@ -65,7 +65,7 @@ class Gantry(Touch):
     SKEWED is on while the ends are further apart than the limit; then the beam is stuck in its guides, with `JAM`.
     """
 
-    __slots__ = ("_ends", "_loads", "_pulling", "is_stiff")
+    __slots__ = ("_ends", "_failed", "_loads", "_looked_at", "_pulling", "is_stiff")
     FIXED: ClassVar[frozenset[str]] = frozenset({"_ends", "_loads"}) | Touch.FIXED
 
     def __init__(self, board: Board, spec: GantrySpec, condition: SignalCondition, ends: tuple[BuiltAxis, BuiltAxis]) -> None:
@@ -74,6 +74,9 @@ class Gantry(Touch):
         self._loads = tuple(burden_of(spec.mass, spec.friction_force, end.scale, "gantry") for end in ends)
         """The whole beam, for each motor."""
         self._pulling = (True, True)
+        self._looked_at: Nanos = -1
+        self._failed = (False, False)
+        """Which motor has stalled at that moment: without its load it could pull at once, and fail again, without end."""
         self.is_stiff = 1.0
         """Fault: factor of its friction."""
 
@@ -86,7 +89,13 @@ class Gantry(Touch):
 
     def update(self, now: Nanos) -> None:
         one, other = (end.mechanism for end in self._ends)
-        self._pulling = one.pulls(now), other.pulls(now)
+        pulls = one.pulls(now), other.pulls(now)
+        if now != self._looked_at:
+            self._looked_at, self._failed = now, (False, False)
+        stalled = one.at(now).stalled, other.at(now).stalled
+        failed = [has or (did and lost) for has, did, lost in zip(self._failed, self._pulling, stalled, strict=True)]
+        self._failed = failed[0], failed[1]
+        self._pulling = pulls[0] and not failed[0], pulls[1] and not failed[1]
         shares = (0.5, 0.5) if self._pulling[0] is self._pulling[1] else tuple(map(float, self._pulling))
         for end, whole, share in zip(self._ends, self._loads, shares, strict=True):
             end.mechanism.burden(Burden(whole.inertia * share, whole.friction * share * self.is_stiff), now)
