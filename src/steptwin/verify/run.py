@@ -15,7 +15,7 @@ from steptwin.drivers.mic488.kind import unit_of
 from steptwin.drivers.mic488.lines import ThreadModbusLine
 from steptwin.drivers.place import Channel, Endpoint, parse_line_address
 from steptwin.errors import LineFailure, Misuse, Refusal
-from steptwin.m1486.variants import Variant
+from steptwin.m1486.variants import Store, Variant
 from steptwin.m1486.variants import variant as variant_named
 from steptwin.machine import SECOND
 from steptwin.mic488.registers import AXES, register_map
@@ -53,6 +53,8 @@ def verify(
         if move:
             raise Misuse("no check moves an M1486: leave out --move")
         chip = _chip(address)
+        if chip.store is Store.EEPROM and not write:
+            raise Misuse(f"{chip.title} writes every command into its EEPROM, also those of checks: permit it with --write")
         chip_talk = ChipTalk(address.number, chip, wait_s=address.timeout)
         endpoint = line_endpoint(address.place, address.baud)
         results, is_complete = _over(endpoint, chip_talk, OF_M1486, permitted, progress, is_cancelled)
