@@ -15,9 +15,9 @@ from steptwin.m1486.commands import LETTERS
 from steptwin.m1486.line import SerialChain
 from steptwin.m1486.variants import VARIANTS, variant
 from steptwin.machine import MILLISECOND, SECOND
-from steptwin.mic488.config import ControllerConfig
+from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.mic488.device import Mic488Device
-from steptwin.mic488.registers import register_map
+from steptwin.mic488.registers import AXES, register_map
 from steptwin.verify.check import Need, NotRestored, Outcome, Result
 from steptwin.verify.m1486 import CHECKS as OF_M1486
 from steptwin.verify.m1486 import ChipTalk
@@ -133,6 +133,18 @@ def test_what_was_written_is_put_back() -> None:
     before = state_of(line.machine)
     verified(line, "1.70", permitted=frozenset({Need.READ, Need.WRITE}))
     assert state_of(line.machine) == before
+
+
+@pytest.mark.parametrize(("gear", "acc", "vel"), [(100.0, 50.0, 40.0), (0.37, 10_000.0, 3.0), (12_800.0, 0.5, 0.01)])
+def test_parameters_are_compared_with_any_number_of_pulses_per_unit(gear: float, acc: float, vel: float) -> None:
+    axis = AxisConfig(gear=gear, acc=acc, dec=acc, vel=vel)
+    config = ControllerConfig(axes=(axis,) * AXES)
+    device = Mic488Device(config, firmware="1.70")
+    device.advance(SECOND)
+    before = state_of(device)
+    results = verified(Line(device, RtuSlavePort({1: device})), "1.70", permitted=frozenset({Need.READ, Need.WRITE}))
+    assert {results[id_].outcome for id_ in ("MIC-17", "MIC-42")} == {Outcome.CONFIRMED}
+    assert state_of(device) == before
 
 
 def test_a_lenient_controller_is_refuted() -> None:

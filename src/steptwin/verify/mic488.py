@@ -171,19 +171,34 @@ def _bad_values(talk: ModbusTalk) -> Steps[None]:
     yield from talk.put_back("M1_ACC", address, before)
 
 
-def _data_type(talk: ModbusTalk) -> Steps[None]:
-    yield from talk.at_rest()
-    address, acc = talk.at("DATA_TYPE"), talk.at("ACC", 1)
+def _in_both_types(talk: ModbusTalk, *keys: str) -> Steps[list[tuple[float, int]]]:
+    """Parameters of M1 with DATA_TYPE 0 (units) and 1 (pulses)."""
+    address = talk.at("DATA_TYPE")
     (before,) = yield from talk.remember("DATA_TYPE", address, 1)
     yield from talk.ask(write_one(address, 0))
-    real = words_to_real(*(yield from talk.words(acc, 2)))
+    real = []
+    for key in keys:
+        real.append(words_to_real(*(yield from talk.words(talk.at(key, 1), 2))))
     yield from talk.ask(write_one(address, 1))
-    low, high = yield from talk.words(acc, 2)
+    whole = []
+    for key in keys:
+        low, high = yield from talk.words(talk.at(key, 1), 2)
+        whole.append(low | high << 16)
     yield from talk.put_back("DATA_TYPE", address, (before,))
-    whole = low | high << 16
-    talk.probes.holds(
-        "M1_ACC with DATA_TYPE 1", f"{real:g} of DATA_TYPE 0, as a whole number", str(whole), abs(whole - real) <= 1
-    )
+    found = list(zip(real, whole, strict=True))
+    if not all(units > 0.0 and pulses > 0 for units, pulses in found):
+        raise Undecided(f"needs {' and '.join(f'M1_{key}' for key in keys)} above 0")
+    return found
+
+
+def _data_type(talk: ModbusTalk) -> Steps[None]:
+    yield from talk.at_rest()
+    (acc_u, acc), (vmax_u, vmax) = yield from _in_both_types(talk, "ACC", "VMAX")
+    # GEAR, the pulses per unit, cannot be read; it is the same for all parameters of the axis. Both are rounded to whole pulses.
+    gear = vmax / vmax_u
+    expected = f"{acc_u * gear:g}, as M1_VMAX is {vmax_u:g} and {vmax}"
+    is_right = abs(acc - acc_u * gear) <= 1 + acc_u / vmax_u
+    talk.probes.holds(f"M1_ACC, {acc_u:g} with DATA_TYPE 0, with DATA_TYPE 1", expected, str(acc), is_right)
 
 
 def _mask_bits(talk: ModbusTalk) -> Steps[None]:
@@ -209,12 +224,14 @@ def _banks(talk: ModbusTalk) -> Steps[None]:
 def _small_values(talk: ModbusTalk) -> Steps[None]:
     yield from talk.at_rest()
     address, acc = talk.at("DATA_TYPE"), talk.at("ACC", 1)
-    (before,) = yield from talk.remember("DATA_TYPE", address, 1)
-    if before != 0:
-        del talk.probes.unrestored["DATA_TYPE"]
+    (data_type,) = yield from talk.words(address, 1)
+    if data_type != 0:
         raise Undecided("needs DATA_TYPE 0, so that the value can be put back exactly")
+    ((acc_u, pulses),) = yield from _in_both_types(talk, "ACC")
+    (before,) = yield from talk.remember("DATA_TYPE", address, 1)
     value = yield from talk.remember("M1_ACC", acc, 2)
-    yield from talk.expect_answer("M1_ACC = 0.5", write(acc, *real_to_words(0.5)))
+    half = 0.5 * acc_u / pulses
+    yield from talk.expect_answer(f"M1_ACC = {half:g}, half a pulse", write(acc, *real_to_words(half)))
     yield from talk.ask(write_one(address, 1))
     low, high = yield from talk.words(acc, 2)
     yield from talk.put_back("DATA_TYPE", address, (before,))
@@ -298,5 +315,5 @@ CHECKS: tuple[Check[ModbusTalk], ...] = (
     Check("MIC-25", "Bits of M_STOP above the fourth axis", _mask_bits, WRITE),
     Check("MIC-28", "The last bank, and the one after it", _banks, WRITE),
     Check("MIC-32", "Reads in immediate succession", _in_succession),
-    Check("MIC-42", "M1_ACC = 0.5 with DATA_TYPE 1", _small_values, WRITE),
+    Check("MIC-42", "M1_ACC of half a pulse with DATA_TYPE 1", _small_values, WRITE),
 )
