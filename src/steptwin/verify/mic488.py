@@ -178,7 +178,8 @@ def _in_both_types(talk: ModbusTalk, *keys: str) -> Steps[list[tuple[float, int]
     yield from talk.ask(write_one(address, 0))
     real = []
     for key in keys:
-        real.append(words_to_real(*(yield from talk.words(talk.at(key, 1), 2))))
+        words = yield from talk.words(talk.at(key, 1), 2)
+        real.append(words_to_real(*words))
     yield from talk.ask(write_one(address, 1))
     whole = []
     for key in keys:
