@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from steptwin.diagnostics import Diagnostic, SourceText
 from steptwin.errors import Misuse
@@ -20,6 +20,9 @@ from steptwin.wbc.dialect import DEFAULT, dialect_for
 from steptwin.wbc.positions import parse_positions
 from steptwin.world.check import diagnose
 
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
 
 @dataclass(frozen=True)
 class CheckOptions:
@@ -33,10 +36,10 @@ class CheckOptions:
     firmware: str | None = None
 
 
-def _refuse(language: str, **options: object) -> None:
-    """Raises `Misuse` if one of these options was given, which do not apply to the language of the file."""
-    for name, given in options.items():
-        if given:
+def refuse_others(language: str, options: DataclassInstance, *taken: str) -> None:
+    """Raises `Misuse` if an option was given that is not among those ``taken`` for the language of the file."""
+    for name, given in asdict(options).items():
+        if given and name not in taken:
             raise Misuse(f"--{name} is not for {language}")
 
 
@@ -59,7 +62,7 @@ def count(number: int, what: str) -> str:
 
 
 def _check_m1486(source: SourceText, options: CheckOptions) -> CheckReport:
-    _refuse("M1486 programs", positions=options.positions, config=options.config, firmware=options.firmware)
+    refuse_others("M1486 programs", options, "variant", "interface", "memory")
     variant = variants.DEFAULT if options.variant is None else variants.variant(options.variant)
     interface = lines.STEP_DIRECTION if options.interface is None else lines.interface(options.interface)
     checked = check_program(source.text, variant, interface)
@@ -110,7 +113,7 @@ def _memory_data(source: SourceText, chip: ChipMemory) -> dict[str, Any]:
 
 
 def _check_wbc(source: SourceText, options: CheckOptions) -> CheckReport:
-    _refuse("WBC programs", variant=options.variant, interface=options.interface, memory=options.memory)
+    refuse_others("WBC programs", options, "positions", "config", "firmware")
     dialect = DEFAULT if options.firmware is None else dialect_for(options.firmware)
     files = CompanionFiles.of(Path(source.name), options.positions, options.config)
     read = check_source(source, files.positions, files.config, dialect)
@@ -129,43 +132,20 @@ def _check_wbc(source: SourceText, options: CheckOptions) -> CheckReport:
 
 
 def _check_positions(source: SourceText, options: CheckOptions) -> CheckReport:
-    _refuse(
-        "position tables",
-        variant=options.variant,
-        interface=options.interface,
-        memory=options.memory,
-        positions=options.positions,
-        config=options.config,
-        firmware=options.firmware,
-    )
+    refuse_others("position tables", options)
     table, found = parse_positions(source.text)
     return CheckReport("positions", found, {"positions": len(table.rows)}, [count(len(table.rows), "position")])
 
 
 def _check_config(source: SourceText, options: CheckOptions) -> CheckReport:
-    _refuse(
-        "configurations",
-        variant=options.variant,
-        interface=options.interface,
-        memory=options.memory,
-        positions=options.positions,
-        config=options.config,
-    )
+    refuse_others("configurations", options, "firmware")
     dialect = DEFAULT if options.firmware is None else dialect_for(options.firmware)
     _, found = examine_config(IniFile.of_text(source.text), dialect.firmware)
     return CheckReport("config", found, {"firmware": dialect.firmware}, [f"MIC488 firmware {dialect.firmware}"])
 
 
 def _check_world(source: SourceText, options: CheckOptions) -> CheckReport:
-    _refuse(
-        "worlds",
-        variant=options.variant,
-        interface=options.interface,
-        memory=options.memory,
-        positions=options.positions,
-        config=options.config,
-        firmware=options.firmware,
-    )
+    refuse_others("worlds", options)
     folder = Path(source.name).parent
     return CheckReport("world", list(diagnose(source.name, source.text, lambda name: read_beside(folder, name))))
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from steptwin.commands.check import CHECKERS
+from steptwin.commands.check import CHECKERS, refuse_others
 from steptwin.errors import Misuse
 from steptwin.explain import m1486, mic488
 from steptwin.explain.model import Explanation
@@ -33,12 +33,6 @@ class ExplainOptions:
     config: Path | None = None
     firmware: str | None = None
 
-    def refuse(self, language: str, *names: str) -> None:
-        """Raises `Misuse` if one of these options was given, which do not apply to the language of the file."""
-        for name in names:
-            if getattr(self, name):
-                raise Misuse(f"--{name} is not for {language}")
-
 
 def explanations(path: Path, options: ExplainOptions) -> list[Explanation]:
     """One for each chip that the program is for. Raises `Misuse` for what is no program, or has errors."""
@@ -49,11 +43,11 @@ def explanations(path: Path, options: ExplainOptions) -> list[Explanation]:
         raise Misuse(f"cannot explain {path}: permitted are WBC programs ({PROGRAM}) and M1486 programs")
     source = read_text(path).source
     if suffix != PROGRAM:
-        options.refuse("M1486 programs", "positions", "config", "firmware")
+        refuse_others("M1486 programs", options, "variant", "interface")
         variant = variants.DEFAULT if options.variant is None else variants.variant(options.variant)
         interface = lines.STEP_DIRECTION if options.interface is None else lines.interface(options.interface)
         return m1486.explain(source, variant, interface)
-    options.refuse("WBC programs", "variant", "interface")
+    refuse_others("WBC programs", options, "positions", "config", "firmware")
     dialect = DEFAULT if options.firmware is None else dialect_for(options.firmware)
     files = CompanionFiles.of(path, options.positions, options.config)
     read = check_source(source, files.positions, files.config, dialect)
