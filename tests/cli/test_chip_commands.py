@@ -190,20 +190,20 @@ def test_a_terminal_moves_the_chip_it_was_told_whatever_stands_in_the_input_buff
         done = twin.command("terminal", "-d", device, script=script)
         return done.returncode, done.stdout, done.stderr
 
-    for rubbish in (b"", bytes.fromhex("01 03 27 74 00 02 8e 67"), b"f999", b"r"):
+    for noise in (b"", bytes.fromhex("01 03 27 74 00 02 8e 67"), b"f999", b"r"):
         with socket.create_connection(("127.0.0.1", twin.tcp_port)) as line:
             line.sendall(b"xg\rxg\rt41\rx0\r")
             time.sleep(0.2)
-            line.sendall(rubbish)
+            line.sendall(noise)
             time.sleep(0.2)
         before = position_of(twin, place, 0)
         stood = position_of(twin, place, 7)
         with socket.create_connection(("127.0.0.1", twin.tcp_port)) as line:
-            line.sendall(b"x0\r" + rubbish)
+            line.sendall(b"x0\r" + noise)
             time.sleep(0.2)
         assert terminal("f640\nr\nwait\n") == (0, "42H  U20 type letter in ASCII: M1486B\n", "")
-        assert position_of(twin, place, 7) == stood + 10.0, rubbish
-        assert position_of(twin, place, 0) == before, rubbish
+        assert position_of(twin, place, 7) == stood + 10.0, noise
+        assert position_of(twin, place, 0) == before, noise
 
 
 def test_a_terminal_to_a_chip_that_is_not_there_types_only_k(serve_m1486: Callable[..., Any]) -> None:

@@ -68,12 +68,12 @@ ANSWERS = [
 
 
 @pytest.mark.parametrize(("request_", "frame", "pdu"), ANSWERS)
-def test_an_answer_whole_byte_by_byte_and_behind_rubbish(request_: ReadRequest, frame: bytes, pdu: bytes) -> None:
+def test_an_answer_whole_byte_by_byte_and_behind_noise(request_: ReadRequest, frame: bytes, pdu: bytes) -> None:
     assert asked(request_).receive(frame, 1) == pdu
     master = asked(request_)
     assert [master.receive(bytes((byte,)), 1) for byte in frame] == [None] * (len(frame) - 1) + [pdu]
-    for rubbish in (b"\0", b"\1", b"\1\3", b"\1\x83\2", bytes(range(40))):
-        assert asked(request_).receive(rubbish + frame, 1) == pdu
+    for noise in (b"\0", b"\1", b"\1\3", b"\1\x83\2", bytes(range(40))):
+        assert asked(request_).receive(noise + frame, 1) == pdu
 
 
 @pytest.mark.parametrize(("request_", "frame", "pdu"), ANSWERS)

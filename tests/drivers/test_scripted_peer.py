@@ -82,7 +82,7 @@ def test_the_frames_of_the_manual() -> None:
     peer.end()
 
 
-def test_answers_come_in_pieces_behind_rubbish_and_as_refusals() -> None:
+def test_answers_come_in_pieces_behind_noise_and_as_refusals() -> None:
     answer = framed("01 03 04 0000 4148")
     peer = Peer(
         [

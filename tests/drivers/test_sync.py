@@ -91,7 +91,7 @@ def test_a_modbus_line_has_its_pace_and_tells_its_frames(kind: type[ThreadModbus
     with pytest.raises(Misuse, match=r"^0 frames per second: must be above 0$"):
         kind(NOWHERE, frames_per_second=0.0)
     frames: Any = line.notes["frames"]
-    frames.rubbish(0, b"\x01\x02")
+    frames.unframed(0, b"\x01\x02")
     assert len(log) == 1
 
 

@@ -96,7 +96,7 @@ def test_mic_32_what_arrives_while_a_request_is_served_is_lost(run: Run, make_ce
     assert run(scene()) == 9
 
 
-def test_rubbish_is_given_up_after_the_gap_without_a_further_byte(run: Run, make_cell: Make) -> None:
+def test_noise_is_given_up_after_the_gap_without_a_further_byte(run: Run, make_cell: Make) -> None:
     """The second half of a frame begins inside what looks like a longer one; only time tells."""
 
     async def scene() -> list[tuple[Nanos, bytes]]:

@@ -245,7 +245,7 @@ def test_what_was_answered_before_a_wrong_header_is_sent_though_it_has_to_wait(r
 
 
 def test_a_connection_that_is_to_end_ends_when_its_last_answers_have_found_room(run: Run, make_cell: Make) -> None:
-    """Requests and rubbish come together, and their answers find no room."""
+    """Requests and noise come together, and their answers find no room."""
 
     async def play(scene: Scene) -> tuple[int, int, int]:
         deaf = deafen(scene)

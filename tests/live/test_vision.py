@@ -92,7 +92,7 @@ def test_only_programs_that_ask_for_records_have_them_on_the_line() -> None:
 
 
 def test_a_vision_system_belongs_to_one_controller() -> None:
-    """On a line of several a record is rubbish."""
+    """On a line of several a record is noise."""
     live = running(units=(1, 2))
     PlacePort(live, LINE, "pty", "rtu").exchange(RECORD, live.now)
     live.advance(live.now + 100 * MILLISECOND)

@@ -33,7 +33,7 @@ from steptwin.world.kernel import Kernel
 
 LINE = '[[line]]\nname = "bus"\ntcp = "127.0.0.1:0"\n[[mic488]]\nname = "twin"\nline = "bus"\n'
 READ = bytes.fromhex("00 01 00 00 00 06 01 03 27 24 00 0a")
-RUBBISH = "9 bytes that belong to no frame"
+UNFRAMED = "9 bytes that belong to no frame"
 MORE_CALLS = 8
 """Of a read through a world: the world around the kernel, the place, its line."""
 
@@ -214,16 +214,16 @@ def test_frames_of_a_world_are_shown_in_words(timing: str) -> None:
     shown: list[FrameLine] = []
     follow_frames(live, shown.append)
     places = PlacePort(live, "bus", "tcp-1", "tcp"), PlacePort(live, "bus", "rtu-1", "rtu")
-    for number, data in ((0, READ), (1, bytes.fromhex("01 03 27 24 00 02 8e b4")), (1, b"rubbish!!!"), (0, READ)):
+    for number, data in ((0, READ), (1, bytes.fromhex("01 03 27 24 00 02 8e b4")), (1, b"line noise"), (0, READ)):
         live.advance(live.now + 100 * MILLISECOND)
         places[number].exchange(data, live.now)
         live.advance(live.now + 90 * MILLISECOND)
     told = [(frame.link, frame.direction, frame.meaning[:15]) for frame in shown]
-    rubbish = told.pop(4)
+    noise = told.pop(4)
     position = "read M1_POS_ACT"
     asked = [(link, way, position) for link in ("tcp-1", "rtu-1", "tcp-1") for way in (FrameDirection.IN, FrameDirection.OUT)]
     assert told == asked
-    assert (rubbish[0], shown[4].meaning) == ("rtu-1", RUBBISH)
+    assert (noise[0], shown[4].meaning) == ("rtu-1", UNFRAMED)
 
 
 def test_characters_of_a_world_are_shown_with_the_line_where_there_are_several() -> None:
@@ -240,7 +240,7 @@ def test_characters_of_a_world_are_shown_with_the_line_where_there_are_several()
 
 
 @pytest.mark.parametrize(("given", "nanoseconds"), [("0.75", 750_000), ("5", 5_000_000), ('"2 ms"', 2_000_000)])
-def test_a_line_gives_up_rubbish_after_its_gap(given: str, nanoseconds: int) -> None:
+def test_a_line_gives_up_noise_after_its_gap(given: str, nanoseconds: int) -> None:
     world = World.from_toml(LINE.replace("tcp =", f"gap = {given}\ntcp ="))
     live = LiveWorld(world)
     PlacePort(live, "bus", "rtu-1", "rtu").exchange(b"\x01", live.now)

@@ -375,7 +375,7 @@ LINES = st.one_of(
     NAMES.map("[{}]".format),
     NAMES.map("[{}".format),
     st.tuples(KEYS, st.sampled_from(["=", " = ", "=\t", ""]), VALUES).map("".join),
-    st.sampled_from([";", "; comment", "# c", "// c", "", "   ", "rubbish", "\x0b", "\u2028"]),
+    st.sampled_from([";", "; comment", "# c", "// c", "", "   ", "noise", "\x0b", "\u2028"]),
 )
 TEXTS = st.lists(st.tuples(LINES, ENDS).map("".join)).map("".join)
 FILES = st.one_of(st.binary(max_size=200), TEXTS.map(lambda t: t.encode()), TEXTS.map(lambda t: t.encode("cp1250", "replace")))

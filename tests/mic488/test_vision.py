@@ -13,7 +13,7 @@ RECORDS = [
     (b"N1 X2 Y3 A4\r", VisionRecord(1, 2, 3, 4)),
     (b"N12 X-2.5 Y+3,25 A-180\r\n", VisionRecord(12, -2.5, 3.25, -180)),
     (b"n7x1y2a3\n", VisionRecord(7, 1, 2, 3)),
-    (b"rubbish N7 X1 Y2 A3\n", VisionRecord(7, 1, 2, 3)),
+    (b"noise N7 X1 Y2 A3\n", VisionRecord(7, 1, 2, 3)),
 ]
 
 

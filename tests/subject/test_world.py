@@ -255,9 +255,9 @@ def test_bytes_that_belong_to_no_frame_are_counted_among_the_frames() -> None:
     world.apply_input(Bytes("bus", "tcp-1", "rtu", READ_POSITION))
     world.run(for_=0.5)
     frames = [event.payload.plain() for event in following.take().events]
-    rubbish = [str(frame["words"]).split(maxsplit=1) for frame in frames if not frame["data"]]
-    assert sum(int(count) for count, _ in rubbish) == 3
-    assert {what for _, what in rubbish} <= {"byte that belongs to no frame", "bytes that belong to no frame"}
+    noise = [str(frame["words"]).split(maxsplit=1) for frame in frames if not frame["data"]]
+    assert sum(int(count) for count, _ in noise) == 3
+    assert {what for _, what in noise} <= {"byte that belongs to no frame", "bytes that belong to no frame"}
 
 
 def test_frames_of_chips_are_lines_and_characters() -> None:

@@ -97,7 +97,7 @@ def test_a_conversation_in_pieces_of_any_size(own: set[int], size: int) -> None:
     frames = [frame for at in range(0, len(STREAM), size) for frame in framer.feed(STREAM[at : at + size], at)]
     assert [(frame.raw, frame.role) for frame in frames] == CONVERSATION
     assert framer.deadline() is None
-    assert framer.rubbish == 0
+    assert framer.unframed == 0
     assert frames[-1].end == len(STREAM)
 
 
@@ -131,13 +131,13 @@ def test_any_requests_in_any_pieces(sent: list[tuple[int, ModbusRequest]], rando
 
 
 @pytest.mark.parametrize(
-    "rubbish", ["FF", "00", "01", "01 03", "FF FF FF", "01 03 01", "C8 41 41", "F9 F9 03 10", "01 83 02 00 00"]
+    "noise", ["FF", "00", "01", "01 03", "FF FF FF", "01 03 01", "C8 41 41", "F9 F9 03 10", "01 83 02 00 00"]
 )
-def test_a_frame_right_behind_rubbish_is_found_at_once(rubbish: str) -> None:
+def test_a_frame_right_behind_noise_is_found_at_once(noise: str) -> None:
     framer = RtuFramer({1})
     good = hexed("01 03 27 24 00 02")
-    assert cut(framer, bytes.fromhex(rubbish) + good) == [("01 03 27 24 00 02", FrameRole.REQUEST)]
-    assert framer.rubbish == len(bytes.fromhex(rubbish))
+    assert cut(framer, bytes.fromhex(noise) + good) == [("01 03 27 24 00 02", FrameRole.REQUEST)]
+    assert framer.unframed == len(bytes.fromhex(noise))
     assert framer.deadline() is None
 
 
@@ -145,7 +145,7 @@ def test_a_wrong_crc_costs_the_frame_and_not_the_next() -> None:
     framer = RtuFramer({1})
     good = hexed("01 03 27 24 00 02")
     assert framer.feed(good[:-1] + b"\0" + good, 0) == [RtuFrame(good, FrameRole.REQUEST, 16)]
-    assert framer.rubbish == 8
+    assert framer.unframed == 8
 
 
 def test_what_may_be_the_response_of_another_unit_delays_the_next_frame_by_a_gap_at_most() -> None:
@@ -251,7 +251,7 @@ def test_mic_15_a_beginning_given_up_does_not_delay_the_next_frame() -> None:
     good = hexed("01 03 27 24 00 02")
     framer.feed(bytes.fromhex("01 10 27 38 00 7B F6 41"), 0)  # announces 255 bytes
     assert [frame.raw for frame in framer.feed(good, 1_000_000)] == [good]
-    assert framer.rubbish == 8
+    assert framer.unframed == 8
     assert framer.deadline() is None
 
 
@@ -260,10 +260,10 @@ def test_mic_15_a_beginning_is_not_kept_for_ever() -> None:
     good = hexed("01 03 27 24 00 02")
     framer.feed(good[:5], 0)
     assert framer.feed(good[5:], PAUSE_NS + 1) == []
-    assert framer.rubbish == 5
+    assert framer.unframed == 5
 
 
-def test_mic_15_frames_swallowed_by_rubbish_come_when_the_gap_has_passed() -> None:
+def test_mic_15_frames_swallowed_by_noise_come_when_the_gap_has_passed() -> None:
     framer = RtuFramer({1})
     good = hexed("01 03 27 24 00 02")
     # What looks like a request of 255 bytes keeps the framer waiting.
@@ -292,7 +292,7 @@ def test_a_rest_with_a_right_crc_is_a_frame_of_unknown_length(body: str) -> None
     before = hexed("02 03 27 24 00 04")
     assert [frame.raw for frame in framer.feed(before + raw, 0)] == [before]
     assert framer.expire(GAP) == [RtuFrame(raw, FrameRole.UNKNOWN, len(before + raw))]
-    assert framer.rubbish == 0
+    assert framer.unframed == 0
 
 
 def test_an_unknown_frame_after_a_beginning_given_up() -> None:
@@ -302,7 +302,7 @@ def test_an_unknown_frame_after_a_beginning_given_up() -> None:
     raw = hexed("01 41 01 02 03")
     assert framer.feed(raw, 2_000_000) == []
     assert [frame.raw for frame in framer.expire(2_750_000)] == [raw]
-    assert framer.rubbish == 8
+    assert framer.unframed == 8
 
 
 @pytest.mark.parametrize(
@@ -397,11 +397,11 @@ def test_after_a_beginning_given_up_too_a_response_without_its_request_waits() -
     assert framer.feed(response, 1_000_000) == []
     frames = framer.expire(1_000_000 + rtu.UART_GAP_NS)
     assert [(frame.raw, frame.role) for frame in frames] == [(response, FrameRole.RESPONSE)]
-    assert framer.rubbish == 8
+    assert framer.unframed == 8
 
 
 @pytest.mark.parametrize("unit", [248, 255])
-def test_reserved_units_are_rubbish(unit: int) -> None:
+def test_reserved_units_are_noise(unit: int) -> None:
     framer = RtuFramer({1})
     assert framer.feed(with_crc(bytes((unit, 3, 0, 0, 0, 1))), 0) == []
     good = hexed("01 03 27 24 00 02")
@@ -419,7 +419,7 @@ def test_whatever_comes_frames_are_intact_and_memory_is_bounded(pieces: list[tup
             assert rtu.MIN_FRAME <= len(frame.raw) <= rtu.MAX_FRAME
             framed += len(frame.raw)
         assert len(framer.held) <= rtu.MAX_FRAME
-        assert framer.rubbish == fed - framed - len(framer.held) >= 0
+        assert framer.unframed == fed - framed - len(framer.held) >= 0
     deadline = framer.deadline()
     if deadline is not None:
         framer.expire(deadline)
@@ -430,7 +430,7 @@ def test_whatever_comes_frames_are_intact_and_memory_is_bounded(pieces: list[tup
 @pytest.mark.parametrize(
     "pattern", ["01", "01 03", "01 10", "02 03", "02 17", "01 10 00 00 00 7B F6", "00 10 10 10 10 10 F6", "41 41", "00", "FF"]
 )
-def test_a_flood_of_rubbish_costs_a_bounded_number_of_looks_per_byte(pattern: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_flood_of_noise_costs_a_bounded_number_of_looks_per_byte(pattern: str, monkeypatch: pytest.MonkeyPatch) -> None:
     looks = 0
     look = RtuFramer._look
 
@@ -453,13 +453,13 @@ def test_a_flood_of_rubbish_costs_a_bounded_number_of_looks_per_byte(pattern: st
 
 
 @pytest.mark.parametrize("pattern", ["01", "02 03", "01 10 00 00 00 7B F6"])
-def test_a_request_behind_a_flood_of_rubbish_is_found_when_the_gap_has_passed(pattern: str) -> None:
+def test_a_request_behind_a_flood_of_noise_is_found_when_the_gap_has_passed(pattern: str) -> None:
     framer, good = RtuFramer({1}), hexed("01 03 27 24 00 02")
     assert framer.feed(bytes.fromhex(pattern) * 2000 + good, 0) == []
     assert [frame.raw for frame in framer.expire(GAP)] == [good]
 
 
-def test_requests_behind_each_other_are_no_rubbish() -> None:
+def test_requests_behind_each_other_are_no_noise() -> None:
     """Any number comes in one delivery."""
     assert len(RtuFramer({1}).feed(hexed("01 03 27 24 00 02") * 1000, 0)) == 1000
 
@@ -500,7 +500,7 @@ def test_a_snapshot_of_an_untouched_framer_is_one_of_an_untouched_framer() -> No
     framer = RtuFramer({1})
     framer.feed(b"\x01\x03", 5)
     framer.set_state(RtuFramer({1}).copy_state())
-    assert (framer.held, framer.fed, framer.rubbish, framer.deadline()) == (b"", 0, 0, None)
+    assert (framer.held, framer.fed, framer.unframed, framer.deadline()) == (b"", 0, 0, None)
 
 
 def test_the_shortest_gap() -> None:

@@ -206,12 +206,12 @@ def test_other_slaves_on_the_line_do_not_disturb(bank: Any) -> None:
         assert [pdu for _, pdu in bank.executed] == [mine[1:-2]] * 2
 
 
-@pytest.mark.parametrize("rubbish", ["FF FF FF", "00", "01 03", "F9 00 41 01"])
-def test_a_good_request_right_behind_rubbish_is_answered_at_once(bank: Any, rubbish: str) -> None:
+@pytest.mark.parametrize("noise", ["FF FF FF", "00", "01 03", "F9 00 41 01"])
+def test_a_good_request_right_behind_noise_is_answered_at_once(bank: Any, noise: str) -> None:
     port = RtuSlavePort({1: bank})
-    assert port.exchange(bytes.fromhex(rubbish), 0) == b""
+    assert port.exchange(bytes.fromhex(noise), 0) == b""
     assert port.exchange(hexed("01 03 00 05 00 01"), 1) == hexed("01 03 02 00 05")
-    assert port.rubbish == len(bytes.fromhex(rubbish))
+    assert port.unframed == len(bytes.fromhex(noise))
 
 
 def test_a_good_request_after_the_gap_is_answered_at_once_whatever_was_before(bank: Any) -> None:
@@ -253,7 +253,7 @@ def test_an_answer_is_given_at_once_and_only_once(new_bank: NewBank) -> None:
         port.close()
 
 
-def test_no_rubbish_breaks_a_line(bank: Any) -> None:
+def test_no_noise_breaks_a_line(bank: Any) -> None:
     ports: list[Port] = [RtuSlavePort({1: bank}), TimedRtuSlavePort(TimedUnits({1: bank}, LineTiming(SerialLine(38400))))]
     for port in ports:
         assert port.exchange(b"GET / HTTP/1.1\r\n", 0) == b""
@@ -460,7 +460,7 @@ def test_a_burst_is_answered_as_its_bytes_one_by_one(
         port = RtuSlavePort(banks, on_frame=lambda _, way, raw, seen=seen: seen.append((way, raw)))
         out = b"".join(port.exchange(piece, 5) for piece in pieces)
         out += b"".join(sent for _, sent in port.to_send(5 + GAP))
-        found.append((out, seen, [[body for _, body in bank.executed] for bank in banks.values()], port.rubbish))
+        found.append((out, seen, [[body for _, body in bank.executed] for bank in banks.values()], port.unframed))
     assert found[0] == found[1]
 
 

@@ -214,7 +214,7 @@ def test_mic_32_a_flood_is_bounded_and_the_line_recovers(bank: Any) -> None:
     free = LINE.duration(LINE_CHARACTERS) + GAP
     port.exchange(READ, free)
     assert run(port, 10**12) == [(free + READ_NS + TURN + TOLD_NS, TOLD)]
-    assert port.rubbish == LINE_CHARACTERS
+    assert port.unframed == LINE_CHARACTERS
 
 
 def test_mic_32_a_full_line_takes_nothing(bank: Any) -> None:

@@ -389,7 +389,7 @@ class Heard:
     def frame(self, now: int, place: str, direction: FrameDirection, data: bytes) -> None:
         self.frames.append((now, place, direction.value, data))
 
-    def rubbish(self, now: int, place: str, count: int) -> None:
+    def unframed(self, now: int, place: str, count: int) -> None:
         self.lost.append((place, count))
 
 

@@ -100,7 +100,7 @@ def _searched(
 
 
 def _leave(place: str, kind: AnyDriverKind, search: DeviceSearch, rates: list[int], searched: list[AnyDriverKind]) -> None:
-    """Nothing was found: leave the line as it was. The most likely rate is last, because characters at other rates are rubbish
+    """Nothing was found: leave the line as it was. The most likely rate is last, because characters at other rates are noise
     at it."""
     for baud in reversed(rates):
         search.leave(place, baud)

@@ -39,7 +39,7 @@ class FrameLog:
 
         return observe
 
-    def rubbish(self, now: Nanos, link: str, count: int) -> None:
+    def unframed(self, now: Nanos, link: str, count: int) -> None:
         """Log received bytes that belong to no frame."""
         words = "1 byte that belongs to no frame" if count == 1 else f"{count} bytes that belong to no frame"
         line = FrameLine(now, link, FrameDirection.IN, b"", words)

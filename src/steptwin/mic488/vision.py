@@ -86,9 +86,9 @@ class Com1Port(Stateful):
             modbus.on_frame = note
 
     @property
-    def rubbish(self) -> int:
+    def unframed(self) -> int:
         """Bytes that belonged to no frame; those of records are among them."""
-        return 0 if self.modbus is None else self.modbus.rubbish
+        return 0 if self.modbus is None else self.modbus.unframed
 
     def exchange(self, data: bytes, now: Nanos) -> bytes:
         answer = b""

@@ -8,7 +8,7 @@ from steptwin.m1486.receiver import CR, EMPTY, NO_ROOM, THREE_FREE
 from steptwin.m1486.variants import Store, Variant
 from steptwin.verify.check import Check, Need, NotRestored, Probes, Send, Steps, Undecided
 
-SPOILER = "%"
+INVALID_COMMAND = "%"
 """A character that is in no command: its line is wrong data (M-11)."""
 COMMENT = "; yy"
 """Of characters that are in no command, as a chip that does not know comments may take what follows for commands."""
@@ -94,7 +94,7 @@ def _blanks(talk: ChipTalk) -> Steps[None]:
 
 
 def _wrong_data(talk: ChipTalk) -> Steps[None]:
-    yield from talk.expect("an unknown letter", f"{SPOILER}\r")
+    yield from talk.expect("an unknown letter", f"{INVALID_COMMAND}\r")
     yield from talk.expect("a number out of range", "u21\r")
     yield from talk.expect("U20 after them", f"u{_TYPE}\r", talk.variant.type_letter)
 
@@ -121,10 +121,10 @@ def _room(talk: ChipTalk) -> int:
 
 
 def _long_line(talk: ChipTalk) -> Steps[None]:
-    inverted = ~ord(SPOILER) & 0xFF
+    inverted = ~ord(INVALID_COMMAND) & 0xFF
     room = _room(talk)
     yield from talk.expect(
-        f"a line of {room + 1} characters without CR", SPOILER * (room + 1), inverted, inverted, inverted, NO_ROOM
+        f"a line of {room + 1} characters without CR", INVALID_COMMAND * (room + 1), inverted, inverted, inverted, NO_ROOM
     )
     yield from talk.expect("its CR", "\r")
     yield from talk.expect("U20 after it", f"u{_TYPE}\r", talk.variant.type_letter)
@@ -132,7 +132,7 @@ def _long_line(talk: ChipTalk) -> Steps[None]:
 
 def _last_three(talk: ChipTalk) -> Steps[None]:
     room = _room(talk)
-    text = SPOILER * (room - 3)
+    text = INVALID_COMMAND * (room - 3)
     yield from talk.expect(f"a line of {room - 2} characters with its CR", f"{text}\r", ~CR & 0xFF)
     yield from talk.expect("U20 after it", f"u{_TYPE}\r", talk.variant.type_letter)
 

@@ -81,10 +81,10 @@ def _halves(talk: ModbusTalk) -> Steps[None]:
     yield from talk.keep("M1_ACC", address, before)
 
 
-def _after_rubbish(talk: ModbusTalk) -> Steps[None]:
+def _after_noise(talk: ModbusTalk) -> Steps[None]:
     request = rtu.encode_frame(talk.unit, read(talk.at("DATA_TYPE"), 1))
     yield Send(b"\xff\x00\xff", 0.1)
-    yield from talk.expect_answer("a request 0.1 s behind rubbish", request[1:-2])
+    yield from talk.expect_answer("a request 0.1 s behind noise", request[1:-2])
     yield Send(request[:4], 0.1)
     torn = yield from talk.raw(request[4:], at_once=True)
     came = "answered" if torn.pdu else "dropped"
@@ -308,7 +308,7 @@ CHECKS: tuple[Check[ModbusTalk], ...] = (
     Check("MIC-7", "Bad values of DATA_TYPE and M1_ACC", _bad_values, WRITE),
     Check("MIC-8", "A motion command to an axis that is off", _move_while_off, MOVE),
     Check("MIC-10", "STOP during a motion", _stop_without_ramp, MOVE),
-    Check("MIC-15", "Requests behind rubbish and with a pause", _after_rubbish, unless=_serial_only),
+    Check("MIC-15", "Requests behind noise and with a pause", _after_noise, unless=_serial_only),
     Check("MIC-17", "M1_ACC with both values of DATA_TYPE", _data_type, WRITE),
     Check("MIC-22", "What PROGRAM_CTRL reads", _program_state),
     Check("MIC-23", "Units 0 and 255 on Modbus TCP, of a single controller", _tcp_units, unless=_tcp_only),

@@ -1,12 +1,12 @@
 """Modbus RTU frames in a stream of bytes.
 
 A frame is cut where its function makes it end and its CRC is right; silence does not cut frames, because pseudo
-terminals, USB adapters and networks deliver in bursts (MIC-15). The gap only synchronises the framer after rubbish.
+terminals, USB adapters and networks deliver in bursts (MIC-15). The gap only synchronises the framer after noise.
 
 A line with several slaves carries requests and responses, and both have to be cut so that nothing inside them is taken for
 a frame. At the front of the held bytes the framer tries the length that the function has as a request and the one it has
 as a response. When neither can match any more, one byte is discarded and the rest is examined again, so that a good frame behind
-rubbish is found at once. When the gap has passed, complete frames are taken wherever they are, and
+noise is found at once. When the gap has passed, complete frames are taken wherever they are, and
 a rest with a right CRC is a frame even where the length of its function is not known.
 """
 
@@ -38,7 +38,7 @@ BURSTY_GAP_NS: Nanos = 20 * MILLISECOND
 PAUSE_NS: Nanos = 2 * SECOND
 MAX_LOOKS = MAX_FRAME
 """Most places of one delivery that are examined and at which no frame begins. Behind them only the last 256 bytes are kept,
-until the gap has passed. It bounds the cost of rubbish."""
+until the gap has passed. It bounds the cost of noise."""
 
 # function: (length of the frame, index of a byte to be added to it or 0). Modbus application protocol V1.1b3, section 6.
 _REQUEST_LENGTHS = {
@@ -170,7 +170,7 @@ class RtuFramer(Stateful):
         return self._fed
 
     @property
-    def rubbish(self) -> int:
+    def unframed(self) -> int:
         """Bytes received and discarded so far."""
         return self._fed - self._framed - len(self.held)
 

@@ -59,7 +59,7 @@ class SlavePort(Stateful):
         self.on_frame = on_frame
 
     @property
-    def rubbish(self) -> int:
+    def unframed(self) -> int:
         """Number of bytes received so far that belonged to no frame; 0 where such bytes end the connection."""
         return 0
 
@@ -130,7 +130,7 @@ class PauseReports(Stateful):
 class RtuSlavePort(SlavePort):
     """One RTU line without line timing (with it: `steptwin.wire.timed`).
 
-    ``devices`` is read once. ``gap_ns`` is the silence after which rubbish is discarded (MIC-15). ``line`` gives the time of the
+    ``devices`` is read once. ``gap_ns`` is the silence after which noise is discarded (MIC-15). ``line`` gives the time of the
     characters of a delivery; without it a delivery takes no time.
     """
 
@@ -158,9 +158,9 @@ class RtuSlavePort(SlavePort):
         self._pauses = PauseReports(on_pause)
 
     @property
-    def rubbish(self) -> int:
+    def unframed(self) -> int:
         """Number of bytes received so far that belonged to no frame."""
-        return self._framer.rubbish
+        return self._framer.unframed
 
     def is_lone_read(self, data: bytes) -> bool:
         is_whole = len(data) == 8 and not self._held and self._line is None

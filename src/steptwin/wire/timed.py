@@ -91,7 +91,7 @@ class TimedRtuSlavePort(SlavePort):
     """As `steptwin.wire.slave.RtuSlavePort`, with line timing. Responses leave when their last character would have.
 
     Call `to_send` at every `deadline`: a request is executed at the moment of the call that finds it due. ``gap_ns`` is the
-    silence after which rubbish is discarded; with strict timing 750 µs.
+    silence after which noise is discarded; with strict timing 750 µs.
     """
 
     broken = None
@@ -138,9 +138,9 @@ class TimedRtuSlavePort(SlavePort):
         """Characters lost because `LINE_CHARACTERS` were waiting."""
 
     @property
-    def rubbish(self) -> int:
+    def unframed(self) -> int:
         """Number of bytes received so far that belonged to no frame."""
-        return self._framer.rubbish
+        return self._framer.unframed
 
     def exchange(self, data: bytes, now: Nanos) -> bytes:
         self._receive(data, now)
@@ -157,7 +157,7 @@ class TimedRtuSlavePort(SlavePort):
         begin = max(now, clock.end)
         end = clock.send(len(data), now)
         for frame in self._framer.feed(data, begin, end):
-            # A frame inside rubbish may have ended before the byte that completes its recognition.
+            # A frame inside noise may have ended before the byte that completes its recognition.
             self._arriving.append((max(now, clock.end_before(self._framer.fed - frame.end)), frame))
 
     def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:

@@ -35,7 +35,7 @@ class FrameFollower(Protocol):
         """Take a frame, or characters; ``place`` is ``"chips"`` for characters that M1486 chips send."""
         ...
 
-    def rubbish(self, now: Nanos, place: str, count: int) -> None:
+    def unframed(self, now: Nanos, place: str, count: int) -> None:
         """Take the number of bytes that belong to no frame."""
         ...
 
@@ -55,9 +55,9 @@ class LineWords(FrameFollower, Protocol):
 class LineEndPoint(Stateful):
     """The connection of one program. ``received``: pieces not fetched yet, with their moments."""
 
-    __slots__ = ("at_once", "framed", "inner", "is_connected", "kind", "on_output", "port", "received", "rubbish", "talks")
+    __slots__ = ("at_once", "framed", "inner", "is_connected", "kind", "on_output", "port", "received", "talks", "unframed")
     FIXED: ClassVar[frozenset[str]] = frozenset(
-        {"at_once", "framed", "inner", "is_connected", "kind", "on_output", "port", "rubbish", "talks"}
+        {"at_once", "framed", "inner", "is_connected", "kind", "on_output", "port", "unframed", "talks"}
     )
 
     def __init__(self, kind: str, port: FaultyPort, inner: Any, framed: SlavePort | None, *, talks: bool) -> None:
@@ -67,7 +67,7 @@ class LineEndPoint(Stateful):
         """The port without the faults of the line."""
         self.framed = framed
         """The port that reports Modbus frames."""
-        self.rubbish = 0
+        self.unframed = 0
         """Number of reported bytes that belonged to no frame."""
         self.at_once = False
         """Whether the port answers every request immediately and sends nothing else."""
@@ -188,15 +188,15 @@ class Line(Stateful, ABC):
             found.is_connected = False
             found.port.close()
 
-    def _count_rubbish(self, name: str, place: LineEndPoint, now: Nanos) -> None:
+    def _count_unframed(self, name: str, place: LineEndPoint, now: Nanos) -> None:
         """Report bytes that belonged to no frame."""
         if place.framed is None:
             return
-        rubbish = place.framed.rubbish
-        if rubbish > place.rubbish:
+        unframed = place.framed.unframed
+        if unframed > place.unframed:
             for follower in self._followers:
-                follower.rubbish(now, name, rubbish - place.rubbish)
-        place.rubbish = rubbish
+                follower.unframed(now, name, unframed - place.unframed)
+        place.unframed = unframed
 
     def exchange(self, place: str, found: LineEndPoint, data: bytes, now: Nanos) -> bytes:
         """Take bytes of the program at ``place``, connected as ``found``; the kernel is at ``now``. Returns the immediate answer;
@@ -208,7 +208,7 @@ class Line(Stateful, ABC):
         if self._kernel.is_attentive:
             self._kernel.mark()
         if self._followers:
-            self._count_rubbish(place, found, now)
+            self._count_unframed(place, found, now)
         return answer
 
     def is_idle_read(self, place: LineEndPoint, data: bytes) -> bool:
@@ -244,7 +244,7 @@ class Line(Stateful, ABC):
             if pieces:
                 self._came(name, place, pieces)
             if self._followers:
-                self._count_rubbish(name, place, now)
+                self._count_unframed(name, place, now)
             if not place.talks and place.port.deadline() is None:
                 self._busy.pop(name, None)
 

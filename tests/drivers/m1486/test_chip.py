@@ -11,7 +11,7 @@ from steptwin.drivers import Unconfirmed
 from steptwin.drivers.exchange import Job
 from steptwin.drivers.m1486 import M1486, Busy, Garbled, NoEcho, WrongType
 from steptwin.drivers.m1486.lines import TALK
-from steptwin.drivers.m1486.talk import SPOILER, ChipRequest
+from steptwin.drivers.m1486.talk import INVALID_COMMAND, ChipRequest
 from steptwin.errors import LineFailure, Misuse
 from steptwin.m1486.lines import DUAL_DAC
 from steptwin.machine import SECOND
@@ -114,7 +114,7 @@ def test_after_an_ordinary_session_no_letter_is_expected_and_a_stray_one_counts(
     wire.sleep(0.1)
     wire.sent.clear()
     assert chip.counter() == 640
-    assert wire.sent[0][1] == SPOILER
+    assert wire.sent[0][1] == INVALID_COMMAND
 
 
 def test_the_functions_of_a_chip_are_found_when_it_is_opened() -> None:

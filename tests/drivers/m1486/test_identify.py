@@ -86,7 +86,7 @@ FRAMES = b"".join(rtu.encode_frame(unit, pdu.encode_request(pdu.ReadRequest(2, 5
 
 
 def test_a_program_survives_the_search_and_the_modbus_frames_after_it() -> None:
-    """A chip that runs a program cannot answer. It is deaf to the rubbish, among which there are CRs."""
+    """A chip that runs a program cannot answer. It is deaf to the noise, among which there are CRs."""
     wire = ChipWire("B", (15,))
     wire.send(b"[\r@1\rf640\rr\rw100\rd\rr\rj1\r]\r")
     wire.sleep(2.0)

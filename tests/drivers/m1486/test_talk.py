@@ -198,7 +198,7 @@ def test_5eh_says_that_there_was_no_room() -> None:
     assert line.say(None, "f64") == b"%"
     assert line.hear(b"\x5e") == SendNext(b"\r", may_wait=False)
     assert line.hear(b"\r") == SendNext(b"f64", may_wait=False)
-    assert line.talk.dirty, "the spoiler found no room: it is to be said again"
+    assert line.talk.dirty, "the invalid command found no room: it is to be said again"
 
 
 def test_a_selection_that_may_have_been_taken_or_not_leaves_nobody_known() -> None:
@@ -318,7 +318,7 @@ def test_what_a_program_uploads_is_listened_for() -> None:
 
 
 def test_time_on_the_wire() -> None:
-    """Twice the command, for its echo, and 16 characters for selection, spoiler and CRs; who listens needs none."""
+    """Twice the command, for its echo, and 16 characters for selection, the invalid command and CRs; who listens needs none."""
     talk = Line().talk
     assert talk.allowance_ns(ChipRequest(1, "f12800")) == talk.wire_ns(28)
     for sort in (ChipRequestKind.LISTEN, ChipRequestKind.LETTER, ChipRequestKind.UPLOAD):

@@ -41,7 +41,7 @@ def test_questions_and_answers_of_one_wire(size: int) -> None:
     ]
 
 
-def test_rubbish_is_counted() -> None:
+def test_noise_is_counted() -> None:
     ear, heard = listener()
     ear.feed(b"\xff\xfe\xfd" + READ, 0)
     assert meanings(heard)[0] == "→ unit 1: read M1_POS_ACT"

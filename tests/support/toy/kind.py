@@ -64,7 +64,7 @@ class ToyWords:
         text = f"{chr(data[0])} {int.from_bytes(data[1:], signed=True)}"
         self._sink(FrameLine(now, self._prefix + place, direction, data, text))
 
-    def rubbish(self, now: Nanos, place: str, count: int) -> None:
+    def unframed(self, now: Nanos, place: str, count: int) -> None:
         """Every two bytes are a command."""
 
     def recorded(self, record: TraceRecord) -> None:

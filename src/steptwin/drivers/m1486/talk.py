@@ -1,7 +1,7 @@
 """The protocol of a line of M1486 chips: one-letter commands, verified by the chip's echo (function 41). Pure.
 
 The language has neither checksum nor acknowledgement. So a command is sent without its CR first; only if the echo of every
-character is correct, CR makes the chip accept it. A command with a wrong echo is made invalid (by `SPOILER`) and sent again.
+character is correct, CR makes the chip accept it. A command with a wrong echo is made invalid (`INVALID_COMMAND`) and sent again.
 Characters that take one of the last three places of the input buffer also come back inverted; 5EH means that one found no room.
 
 Commands are sent in lower case, so that no echo looks like a type letter that was requested earlier.
@@ -21,7 +21,7 @@ from steptwin.machine import MILLISECOND, Nanos
 from steptwin.wire.line import SerialLine
 from steptwin.wire.slave import FrameDirection
 
-SPOILER = b"%"
+INVALID_COMMAND = b"%"
 """A character that is in no command: a line with it is dropped as wrong data (M-11)."""
 QUIET_NS: Nanos = 30 * MILLISECOND
 """Silence after a failed exchange before the line is used again, ns."""
@@ -124,7 +124,7 @@ class CharacterTalk:
         """Whether characters of an abandoned command may precede the next one."""
         self.nearly_full = False
         """Whether the last command took one of the last three places of the input buffer."""
-        self._is_stuck = False  # the buffer had no room for the spoiler, which is sent again
+        self._is_stuck = False  # the buffer had no room for the invalid command, which is sent again
         self._request: ChipRequest | None = None
         self._lines: list[bytes] = []  # characters still to be sent; the first is being sent
         self._sent = b""
@@ -176,7 +176,7 @@ class CharacterTalk:
         self.nearly_full = self._is_stuck = False
         request.committed = request.commented = False
         selection = [] if request.address in (ALL, self.selected) else [f"x{request.address:x}".encode()]
-        spoiler = [SPOILER] if self.dirty else []
+        invalid = [INVALID_COMMAND] if self.dirty else []
         text = request.text.encode("ascii")
         match request.sort:
             case ChipRequestKind.LISTEN | ChipRequestKind.LETTER | ChipRequestKind.UPLOAD:
@@ -191,14 +191,14 @@ class CharacterTalk:
                 request.committed = True
                 said = b"".join(line + _END for line in (*selection, *text.splitlines()))
                 if self.dirty:
-                    said = SPOILER + _END + said
+                    said = INVALID_COMMAND + _END + said
                 elif not self.knows(request.address):
                     said *= 2  # the first line may meet the rest of another one
                 return self._put(said, now)
             case ChipRequestKind.SELECT:
-                self._lines = [*spoiler, *selection]
+                self._lines = [*invalid, *selection]
             case ChipRequestKind.LINE:
-                self._lines = [*spoiler, *selection, text]
+                self._lines = [*invalid, *selection, text]
         if not self._lines:
             raise Misuse(f"{request}: the driver selects chips by itself")
         return self._put(self._lines[0], now)
@@ -258,7 +258,9 @@ class CharacterTalk:
             self.nearly_full = True
             return None
         if byte == NO_ROOM:
-            if expected == SPOILER[0] or (request.sort is ChipRequestKind.KILL and self._echoed.endswith(SPOILER)):
+            if expected == INVALID_COMMAND[0] or (
+                request.sort is ChipRequestKind.KILL and self._echoed.endswith(INVALID_COMMAND)
+            ):
                 self._is_stuck = True
                 return self._echo(request, expected, rest, now)
             self._give_up(now)
@@ -305,7 +307,7 @@ class CharacterTalk:
 
     def _line_taken(self, request: ChipRequest, rest: bytes, now: Nanos) -> bytes | SendNext | None:
         line = self._lines.pop(0)
-        if line == SPOILER:
+        if line == INVALID_COMMAND:
             self.dirty = self._is_stuck
             self.spoilt[request.address] = self.spoilt.get(request.address, 0) + 1
         elif request.sort is ChipRequestKind.SELECT or self._lines:

@@ -14,7 +14,7 @@ from steptwin.drivers.m1486.failures import Busy, Garbled, NoEcho, Restarted, Wr
 from steptwin.drivers.m1486.lines import TALK
 from steptwin.drivers.m1486.motion import ChipMotionCommand
 from steptwin.drivers.m1486.settings import ChipSettings
-from steptwin.drivers.m1486.talk import SPOILER, TYPE_QUERY, CharacterTalk, ChipRequest, ChipRequestKind, chip_name
+from steptwin.drivers.m1486.talk import INVALID_COMMAND, TYPE_QUERY, CharacterTalk, ChipRequest, ChipRequestKind, chip_name
 from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Misuse
 from steptwin.m1486.functions import FUNCTIONS, RECOVER, REPORT, RETURN, TABLE
@@ -436,7 +436,7 @@ class ChipUnit:
         notes = self.notes
         notes.stops += 1
         notes.is_killed = True
-        text = f"{SPOILER.decode()}\rk" if program else "k"
+        text = f"{INVALID_COMMAND.decode()}\rk" if program else "k"
         failure: LineFailure | None = None
         for attempt in range(STOP_TRIES):
             if attempt and not self.talk.knows(self.address):

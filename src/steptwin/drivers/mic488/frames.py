@@ -49,7 +49,7 @@ class FrameWords:
         """Take a frame that a master sent or received: a `steptwin.wire.slave.FrameObserver`."""
         self._emit(self.frame(now, direction, raw))
 
-    def rubbish(self, now: Nanos, raw: bytes) -> None:
+    def unframed(self, now: Nanos, raw: bytes) -> None:
         self._emit(ObservedFrame(now, None, None, raw, "no frame"))
 
     def lost(self, now: Nanos, count: int) -> None:

@@ -15,7 +15,7 @@ class RtuListener:
     def __init__(self, words: FrameWords, gap_ns: Nanos = BURSTY_GAP_NS) -> None:
         self._words = words
         self._framer = RtuFramer(gap_ns=gap_ns)
-        self._rubbish = 0
+        self._unframed = 0
 
     def feed(self, data: bytes, now: Nanos) -> None:
         self._take(self._framer.feed(data, now), now)
@@ -33,12 +33,12 @@ class RtuListener:
     def _take(self, frames: list[RtuFrame], now: Nanos) -> None:
         for frame in frames:
             if frame.role is FrameRole.UNKNOWN:
-                self._words.rubbish(now, frame.raw)
+                self._words.unframed(now, frame.raw)
             else:
                 self._words.observe(now, FrameDirection.IN if frame.role is FrameRole.REQUEST else FrameDirection.OUT, frame.raw)
-        lost = self._framer.rubbish - self._rubbish
+        lost = self._framer.unframed - self._unframed
         if lost:
-            self._rubbish += lost
+            self._unframed += lost
             self._words.lost(now, lost)
 
 
@@ -54,5 +54,5 @@ class TcpListener:
         for frame in framer.feed(data):
             self._words.observe(now, direction, frame.raw)
         if framer.broken is not None:
-            self._words.rubbish(now, data)
+            self._words.unframed(now, data)
             self._framers[direction] = mbap.TcpFramer()

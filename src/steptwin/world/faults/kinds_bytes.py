@@ -63,9 +63,9 @@ def _split(active: ActiveFault, run: Run, count: int, report: FaultReporter) -> 
 
 
 def _noise(active: ActiveFault, run: Run, report: FaultReporter) -> None:
-    rubbish = active.chance.some_bytes(active.fault.whole("length") or 1)
-    report(active, f"{len(rubbish)} bytes of noise: {rubbish.hex(' ')}")
-    run.put(rubbish)
+    noise = active.chance.some_bytes(active.fault.whole("length") or 1)
+    report(active, f"{len(noise)} bytes of noise: {noise.hex(' ')}")
+    run.put(noise)
 
 
 BYTES = (

@@ -33,7 +33,7 @@ class ChipLineWords:
             splitter = self._splitters[place] = LineSplitter(self._log, place)
         splitter.take(data, now)
 
-    def rubbish(self, now: Nanos, place: str, count: int) -> None:
+    def unframed(self, now: Nanos, place: str, count: int) -> None:
         """Every character is one of the line."""
 
     def changes(self, place: str, data: bytes) -> Collection[int]:

@@ -41,8 +41,8 @@ class ModbusWords:
             return ()
         return (unit,) if unit in self._line.units else self._line.units
 
-    def rubbish(self, now: Nanos, place: str, count: int) -> None:
-        self._log.rubbish(now, self._prefix + place, count)
+    def unframed(self, now: Nanos, place: str, count: int) -> None:
+        self._log.unframed(now, self._prefix + place, count)
 
     def recorded(self, record: TraceRecord) -> None:
         """Only frames are shown of what goes over the line."""
