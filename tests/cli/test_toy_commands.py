@@ -80,6 +80,7 @@ def test_a_terminal_takes_its_commands(place: str, shell: Shell, monkeypatch: py
         (["set", "speed=1"], 2, "nothing of a toy can be set"),
         (["send", "program.toy"], 1, "program.toy was not sent: a toy has no memory"),
         (["record", "s.txt"], 2, "cannot read"),
+        (["verify"], 2, "there are no checks of a toy: permitted is a MIC488 or an M1486"),
     ],
 )
 def test_what_it_does_not_offer_is_refused(place: str, shell: Shell, arguments: list[str], code: int, message: str) -> None:

@@ -6,13 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol, TypeVar
 
 from steptwin.verify.check import Check, Need, NotRestored, Outcome, Probes, Result, Steps, Undecided
-from steptwin.verify.m1486 import CHECKS as OF_M1486
-from steptwin.verify.mic488 import CHECKS as OF_MIC488
-from steptwin.verify.unchecked import UNCHECKED
 
-FAMILIES: Mapping[str, tuple[str, ...]] = {"mic488": ("MIC-", "WBC-"), "m1486": ("M-",)}
-"""Ids of the interpretations of each kind of controller, by how they begin."""
-TABLES: Mapping[str, Sequence[Check]] = {"mic488": OF_MIC488, "m1486": OF_M1486}
 _NEEDED = {
     Need.WRITE: "writes settings and puts them back: permit it with --write",
     Need.MOVE: "moves an axis: permit it with --move",
@@ -69,10 +63,12 @@ def _checked(talk: T, check: Check[T], permitted: frozenset[Need]) -> Steps[Resu
     return Result(check.id, outcome, check.what, tuple(probes.found))
 
 
-def complete(kind: str, results: Sequence[Result]) -> list[Result]:
-    """The results with those that no check decides, in the order of the ids."""
-    of_kind = [Result(id_, Outcome.NOT_CHECKED, "", why=why) for id_, why in UNCHECKED.items() if id_.startswith(FAMILIES[kind])]
-    return sorted([*results, *of_kind], key=lambda result: _order(result.id))
+def complete(results: Sequence[Result], unchecked: Mapping[str, str]) -> list[Result]:
+    """The results with the ids that no check decides, in the order of the ids."""
+    return sorted(
+        [*results, *(Result(id_, Outcome.NOT_CHECKED, "", why=why) for id_, why in unchecked.items())],
+        key=lambda result: _order(result.id),
+    )
 
 
 def _order(id_: str) -> tuple[str, int]:

@@ -1,4 +1,7 @@
-"""The interpretations that no check decides, each with the reason."""
+"""The interpretations that no check decides, each with the reason.
+
+With the tables of checks these are all ids of docs/interpretations.md.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,7 @@ def _spread(groups: Mapping[str, str]) -> dict[str, str]:
     return {id_: reason for ids, reason in groups.items() for id_ in ids.split()}
 
 
-UNCHECKED: Mapping[str, str] = _spread(
+OF_MIC488: dict[str, str] = _spread(
     {
         "MIC-6": "JOG_SPEED cannot be read, so it could not be put back",
         "MIC-9 MIC-11 MIC-13 MIC-14 MIC-18 MIC-29 MIC-40 MIC-41": _MOTION,
@@ -32,6 +35,10 @@ UNCHECKED: Mapping[str, str] = _spread(
         "WBC-15 WBC-27": "needs a program that reads vision records",
         "WBC-40 WBC-42": "about the vendor's compiler, not the controller",
         "WBC-41": _PROGRAM,
+    }
+)
+OF_M1486: dict[str, str] = _spread(
+    {
         "M-3 M-4 M-6 M-7 M-8 M-9 M-10 M-16 M-18 M-26 M-28 M-34 M-39 M-40 M-41": _MOTION,
         "M-5 M-12 M-14 M-17 M-20 M-24 M-29 M-35": _CHIP_PROGRAM,
         "M-13": "needs writes to counters",
@@ -44,4 +51,3 @@ UNCHECKED: Mapping[str, str] = _spread(
         "M-44": "wrong data have no answer that tells them from a command",
     }
 )
-"""By id. With the tables of checks these are all ids of docs/interpretations.md."""
