@@ -455,7 +455,7 @@ def test_going_back_leaves_programs_connected_and_the_session_whole(run: Run) ->
 def test_what_cannot_go_back_is_refused(run: Run, tmp_path: Path) -> None:
     async def scene(world: World, *, writes: bool) -> None:
         rig = Rig(world)
-        rig.live.writes_trace = writes
+        rig.live.trace_file = Path("t.jsonl") if writes else None
         rig.do("snapshot", name="a")
         rig.do("restore", name="a")
 

@@ -20,7 +20,10 @@ from studio_page import AXE, PICTURES, Studio, button, show
 from tests.conftest import until
 from tests.studio.conftest import Process
 
-PANELS = ("Overview", "Axes", "I/O", "Scope", "Program", "Calculator", "Registers", "Configuration", "Frames", "Faults", "Time")
+PANELS = (
+    *("Overview", "Axes", "I/O", "Scope", "Program", "Calculator", "Registers", "Configuration", "Frames", "Faults", "Time"),
+    *("Recordings", "Devices"),
+)
 LARGEST_FIRST_LOAD = 400_000
 
 
@@ -603,6 +606,8 @@ POLISH = dict(
             "Ramki",
             "Usterki",
             "Czas",
+            "Nagrania",
+            "Urządzenia",
         ),
         strict=True,
     )

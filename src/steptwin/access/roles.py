@@ -37,5 +37,7 @@ ACT = Permit(Role.OPERATOR, control=True)
 """Changes something that can be seen at the machine."""
 TAKE = Permit(Role.OPERATOR)
 """Takes control, which cannot need it."""
+KEEP = Permit(Role.OPERATOR)
+"""Writes a file to look at later, and changes nothing at the machine."""
 SERVICE = Permit(Role.ENGINEER, control=True)
 """Reaches below the commands of an operator, or outside of the subject."""

@@ -29,7 +29,7 @@ def demo_world(options: UpOptions, *, free_ports: bool = False) -> World:
         files,
         name=NAME,
         seed=options.seed,
-        keep_inputs=options.session is not None,
+        keep_inputs=options.records_session,
         state=None if options.state is None else str(options.state),
     )
 

@@ -26,9 +26,10 @@ from steptwin.access.roles import Role
 from steptwin.access.tokens import AccessGate, Token, read_tokens
 from steptwin.commands.auditfile import AuditFile
 from steptwin.commands.demo import demo_world
-from steptwin.commands.keptsettings import keep_settings
+from steptwin.commands.keptsettings import keep_settings, state_directory
 from steptwin.commands.recorded import recorded
 from steptwin.commands.studio_devices import serve_without_world
+from steptwin.commands.studio_recordings import WorldRecordings
 from steptwin.commands.studio_work import LineWork
 from steptwin.commands.up_world import Running, UpOptions, up, up_with
 from steptwin.diagnostics import SourceText
@@ -95,14 +96,16 @@ def studio(own: StudioOptions, options: UpOptions) -> bool:
                 raise Misuse("--view shows one session (.json), and no device: name its file")
             world, history = recorded(options.world, lambda text: sys.stderr.write(f"{text}\n"))
             stack.enter_context(world)
-            return up_with(world, replace(options, speed="0", is_closed=True), partial(page.open, history=history))
+            opening = partial(page.open, beside=options, history=history)
+            return up_with(world, replace(options, speed="0", is_closed=True), opening)
         if options.world is not None:
-            return up(options, page.open)
+            return up(replace(options, keeps_inputs=True), partial(page.open, beside=options))
         if own.devices:
             asyncio.run(serve_without_world(options.ready_file, page.open_without_world))
             return True
+        options = replace(options, keeps_inputs=True)
         with demo_world(options) as world:
-            return up_with(world, options, page.open)
+            return up_with(world, options, partial(page.open, beside=options))
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,8 +159,8 @@ class _Page:
         self._listening = listening
         self._audit = audit
 
-    async def open(self, running: Running, history: History | None = None) -> None:
-        """Serve it in the event loop of the world, with the past of a world that has one already."""
+    async def open(self, running: Running, *, beside: UpOptions, history: History | None = None) -> None:
+        """Serve it in the event loop of the world of ``beside``, with the past of a world that has one already."""
         live, pace, server = running.live, running.pace, running.server
 
         def moment() -> Moment:
@@ -175,7 +178,12 @@ class _Page:
 
         lookback = Lookback(live, server.cell, pace, history)
         server.join(lookback)
-        await self._serve(server, shown, moment, WorldPrograms(live.world), configuration, lookback)
+        folder = state_directory() / "recordings" if beside.world is None else beside.world.absolute().parent
+        stem = live.world.spec.name if beside.world is None else beside.world.stem
+        may_view = is_loopback(self._entrance.address.host)
+        recordings = WorldRecordings(live, server.cell, folder, stem, beside.session, may_view=may_view)
+        server.join(recordings)
+        await self._serve(server, shown, moment, WorldPrograms(live.world), configuration, lookback, recordings)
 
     async def open_without_world(self, server: Server) -> None:
         """Serve it in the event loop of ``server``."""
@@ -194,6 +202,7 @@ class _Page:
         programs: ProgramTexts,
         configuration: Callable[[str], SourceText | None],
         lookback: Lookback | None = None,
+        recordings: WorldRecordings | None = None,
     ) -> None:
         loop = asyncio.get_running_loop()
 
@@ -213,6 +222,7 @@ class _Page:
             work=work,
             configuration=configuration,
             lookback=lookback,
+            recordings=recordings,
             on_internal=report,
         )
         hub = Hub(shown, shown, around)

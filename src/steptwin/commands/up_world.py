@@ -61,6 +61,9 @@ class UpOptions:
     speed: str = "1"
     name: str | None = None
     session: Path | None = None
+    """Where the session is written at the end."""
+    keeps_inputs: bool = False
+    """Whether a session is recorded that is only written on request."""
     trace: str | None = None
     """A file or directory, ``ring N`` or ``off``; None: the setting of the description."""
     past: bool = False
@@ -79,6 +82,10 @@ class UpOptions:
     """Files of the description may lie anywhere."""
     is_closed: bool = False
     """Whether nothing is open for other programs: neither lines nor the control endpoint."""
+
+    @property
+    def records_session(self) -> bool:
+        return self.keeps_inputs or self.session is not None
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +118,7 @@ def up(options: UpOptions, addition: Addition | None = None) -> bool:
         seed=options.seed,
         overrides=options.overrides,
         keep_trace=options.trace not in (None, "off") or not is_session(options.world),
-        keep_inputs=options.session is not None,
+        keep_inputs=options.records_session,
         allow_outside=options.allow_outside,
         state=options.state,
     ) as world:
@@ -128,7 +135,7 @@ def up_with(world: World, options: UpOptions, addition: Addition | None = None) 
     kept = read_kept(options.trace or world.spec.trace or "off")
     if kept is None:
         world.trace.let_go()
-        if options.session is None:
+        if not options.records_session:
             world.stop_recording()
     set_faults(world, options.faults)
     reports = CoverageReports(options.coverage)
@@ -206,7 +213,7 @@ def _recorder(live: LiveWorld, kept: Kept) -> TraceFile | None:
     if isinstance(kept, int):
         live.ring = Ring(world.trace, kept)
     elif kept is not None:
-        live.writes_trace = True
+        live.trace_file = kept
         recorder = TraceFile(world.trace, growing_file(kept), axis_views(world), world.spec.name, live.show)
     if kept is not None:
         world.trace.let_go()

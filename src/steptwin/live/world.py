@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from pathlib import Path
+from typing import NamedTuple, Protocol
 
 from steptwin.errors import Misuse, Refusal
 from steptwin.files import session as sessions
@@ -34,6 +35,17 @@ def announced(world: World) -> list[dict[str, object]]:
         where = {"line": None} if on is None else {"line": on[0].name, **kind.announced(machine, on[1])}
         found.append({"name": name, "kind": kind.name, **where})
     return found
+
+
+class RecordedSession(NamedTuple):
+    """How much of a session is recorded so far."""
+
+    until: Nanos
+    inputs: int
+    size: int
+    """Bytes of the inputs, as `MOST_INPUT_BYTES` limits them."""
+    is_full: bool
+    """Whether it has ended because there was no room for more."""
 
 
 class Companion(Protocol):
@@ -83,8 +95,8 @@ class LiveWorld:
         self.history: History | None = None
         """Its past, if kept."""
         self.subject = WorldSubject(world, self.apply_input)
-        self.writes_trace = False
-        """Whether its trace is written to a file as it happens."""
+        self.trace_file: Path | None = None
+        """Where its trace is written as it happens."""
         self.ports: set[PlacePort] = set()
         """Programs that are connected to lines."""
         self.companion: Companion | None = None
@@ -139,7 +151,7 @@ class LiveWorld:
             raise Refusal(
                 f"this world keeps its memory in {world.state}, which cannot go back: start it without a state directory"
             )
-        if self.writes_trace:
+        if self.trace_file is not None:
             raise Refusal(
                 "the trace of this world is written to a file, which cannot go back: start it without that, or with a ring"
             )
@@ -169,6 +181,15 @@ class LiveWorld:
         if not self.world.keeps_inputs:
             raise Misuse("this world does not record a session: start it with --session FILE")
         return sessions.session_of(self.world)
+
+    @property
+    def recorded(self) -> RecordedSession | None:
+        """How much there is of the session; None if none is recorded."""
+        if self._full is not None:
+            return RecordedSession(self._full.until, len(self._full.inputs), self._recorded_bytes, is_full=True)
+        if not self.world.keeps_inputs:
+            return None
+        return RecordedSession(self.now, len(self.world.inputs), self._recorded_bytes, is_full=False)
 
     # ------------------------------------------------------------------ time
 

@@ -26,7 +26,8 @@ from steptwin.studio.jogs import Held, Jogs
 from steptwin.studio.looking import KeptPast
 from steptwin.studio.machines import Sheets
 from steptwin.studio.programs import ProgramTexts
-from steptwin.studio.requests import OF_THE_PAST, REQUESTS, permit_of
+from steptwin.studio.recordingrequests import Recordings
+from steptwin.studio.requests import OF_RECORDINGS, OF_THE_PAST, REQUESTS, permit_of
 from steptwin.studio.streams import Streams
 from steptwin.studio.tools import tools
 from steptwin.studio.watches import Watches
@@ -174,6 +175,8 @@ class Surroundings:
     """The configuration file of a controller by name; None without one."""
     lookback: KeptPast | None = None
     """The past, where one is kept."""
+    recordings: Recordings | None = None
+    """Of the world, where there is one."""
     on_internal: Callable[[Exception], object] = lambda error: None
 
 
@@ -221,6 +224,13 @@ class Hub:
     def is_virtual(self) -> bool:
         return not any(part.is_real for part in self.subject.description.machines)
 
+    @property
+    def recordings(self) -> Recordings:
+        """Raises `Refusal` where there is no world."""
+        if self.around.recordings is None:
+            raise Refusal("nothing is recorded here: there is no world")
+        return self.around.recordings
+
     # ------------------------------------------------------------------ viewers
 
     def number(self) -> int:
@@ -245,7 +255,12 @@ class Hub:
     def may(self, role: Role) -> list[str]:
         """Names of requests that a role may use here."""
         of_subject = [name for name in COMMANDS if name in self.subject.description.commands]
-        own = [name for name in REQUESTS if self.around.lookback is not None or name not in OF_THE_PAST]
+        missing = frozenset[str]()
+        if self.around.lookback is None:
+            missing |= OF_THE_PAST
+        if self.around.recordings is None:
+            missing |= OF_RECORDINGS
+        own = [name for name in REQUESTS if name not in missing]
         return [name for name in (*of_subject, *own) if permit_of(name).role <= role]
 
     # ------------------------------------------------------------------ control

@@ -17,6 +17,7 @@ from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.nearmiss import NearMiss
 from steptwin.plaintypes import shown
+from steptwin.studio.recordingrequests import RECORDINGS, RecordingRequest
 from steptwin.studio.requestrow import NOTHING, RequestRow
 from steptwin.studio.shapes import MOMENT
 from steptwin.studio.toolrequests import TOOLS, ToolRequest
@@ -161,6 +162,7 @@ StudioRequest: TypeAlias = (
     | ReadProgram
     | ToolRequest
     | WorkRequest
+    | RecordingRequest
     | ListPorts
     | Connect
     | Disconnect
@@ -351,11 +353,13 @@ _ROWS = (
     ),
 )
 
-REQUESTS: Mapping[str, RequestRow] = {row.name: row for row in (*_ROWS, *TOOLS, *WORKS)}
+REQUESTS: Mapping[str, RequestRow] = {row.name: row for row in (*_ROWS, *TOOLS, *WORKS, *RECORDINGS)}
 ALL: Mapping[str, RequestRow | CommandRow] = {**COMMANDS, **REQUESTS}
 """Every request by name."""
 OF_THE_PAST = frozenset({"look", "go_back"})
 """What needs a past that is kept."""
+OF_RECORDINGS = frozenset(row.name for row in RECORDINGS)
+"""What needs a world."""
 IN_THE_PAST = OF_THE_PAST | {"breakpoint", "clear_breakpoint", "stop_on", "step_program", "run", "look_at", "branch"}
 """What changes something and is possible while the past is looked at: a debugger goes forwards from there, too."""
 OF_CONNECTION = frozenset({"follow", "unfollow", *(row.name for row in _ROWS if row.is_of_connection)})

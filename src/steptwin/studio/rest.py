@@ -10,11 +10,13 @@ from collections.abc import Awaitable, Callable, Mapping
 from typing import Any, TypeAlias
 
 from fastapi import FastAPI, Request, Response
+from fastapi.responses import FileResponse
 
 from steptwin import __version__
 from steptwin.access.control import Viewer
 from steptwin.access.roles import Role
-from steptwin.errors import Misuse, Refusal
+from steptwin.errors import Misuse, Refusal, SteptwinError
+from steptwin.later import start
 from steptwin.machine import Nanos
 from steptwin.studio.eventloop import result_of
 from steptwin.studio.hub import Hub
@@ -99,6 +101,24 @@ class Rest:
             openapi_extra=_extra(parameters=[names]),
             responses=RESPONSES,
         )
+        if self._hub.around.recordings is not None:
+            file = {
+                "name": "file",
+                "in": "path",
+                "required": True,
+                "description": "NAME.json: a saved session; NAME.vcd and so on: what is made of it.",
+                "schema": {"type": "string", "minLength": 1},
+            }
+            app.add_api_route(
+                "/api/recordings/{file}",
+                self._recording,
+                methods=["GET"],
+                name="get_recording",
+                summary="A saved session, or an export of one, as a file.",
+                openapi_extra=_extra(parameters=[file]),
+                responses={**RESPONSES, DONE: FILE_RESPONSE},
+                response_class=Response,
+            )
 
     # ------------------------------------------------------------------ routes
 
@@ -131,6 +151,19 @@ class Rest:
         names = [name for name in request.query_params.get("names", "").split(",") if name]
         return await self._answer(request, "read", {"points": names[: MOST_POINTS + 1]})
 
+    async def _recording(self, request: Request) -> Response:
+        name = request.path_params["file"]
+        try:
+            self._hub.around.gate.enter(_bearer(request))
+        except Refusal as error:
+            return _response(failure(error), NO_TOKEN)
+        try:
+            path = await result_of(start(self._hub.recordings.file(name)))
+        except SteptwinError as error:
+            answer: Any = failure(error)
+            return _response(answer, STATUS[answer["error"]["code"]])
+        return FileResponse(path, filename=name, media_type=FILE_TYPE, headers={"cache-control": "no-store"})
+
     async def _answer(self, request: Request, name: str, fields: Mapping[str, object]) -> Response:
         return _response(*await self._ask(request, name, fields))
 
@@ -148,8 +181,7 @@ class Rest:
 
     def _session(self, request: Request) -> ViewerSession:
         """Raises `Refusal` for a missing or wrong token."""
-        scheme, _, given = request.headers.get("authorization", "").partition(" ")
-        role, name = self._hub.around.gate.enter(given.strip() if scheme.lower() == "bearer" else None)
+        role, name = self._hub.around.gate.enter(_bearer(request))
         found = self._sessions.get((role, name))
         if found is None:
             viewer = Viewer(self._hub.number(), name or "REST", role)
@@ -159,6 +191,12 @@ class Rest:
 
 TOO_LONG_TEXT = f"a body has at most {LONGEST_REQUEST} bytes"
 OWN = ("do", "id", "version")
+
+
+def _bearer(request: Request) -> str | None:
+    """The token of a request."""
+    scheme, _, given = request.headers.get("authorization", "").partition(" ")
+    return given.strip() if scheme.lower() == "bearer" else None
 
 
 async def _fields(request: Request) -> dict[str, object]:
@@ -210,6 +248,13 @@ def _named(name: str) -> str:
 RESPONSES: dict[int | str, dict[str, Any]] = {
     status: {"description": text, "content": {"application/json": {"schema": {"$ref": "#/components/schemas/Answer"}}}}
     for status, text in STATUS_TEXTS.items()
+}
+
+
+FILE_TYPE = "application/octet-stream"
+FILE_RESPONSE: dict[str, Any] = {
+    "description": "The file.",
+    "content": {FILE_TYPE: {"schema": {"type": "string", "format": "binary"}}},
 }
 
 

@@ -17,6 +17,7 @@ from steptwin.access.roles import LOOK, Permit, Role
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.later import Later, start
 from steptwin.machine import SECOND, Nanos
+from steptwin.studio import recordingrequests as recording
 from steptwin.studio import requests as ask
 from steptwin.studio import workrequests as work
 from steptwin.studio.hub import Hub
@@ -109,6 +110,9 @@ class ViewerSession:
             ask.ListPorts: lambda _: hub.around.connections.ports(),
             ask.Connect: self._connect,
             ask.Disconnect: lambda wanted: hub.around.connections.disconnect(wanted.machine),
+            recording.ReadRecordings: lambda _: hub.recordings.plain(),
+            recording.SaveRecording: lambda wanted: hub.recordings.save(wanted.name),
+            recording.ViewRecording: self._view_recording,
         }
 
     def _own_actions(self) -> Mapping[object, Callable[[Any], object]]:
@@ -183,6 +187,9 @@ class ViewerSession:
 
     async def _connect(self, wanted: ask.Connect) -> object:
         return {"machine": await self._hub.around.connections.connect(wanted.address, wanted.name)}
+
+    async def _view_recording(self, wanted: recording.ViewRecording) -> object:
+        return {"url": await self._hub.recordings.view(wanted.name)}
 
     async def _jog(self, wanted: command.Jog) -> Result:
         return self._hub.subject.result_of(await self._hub.begin_jog(self.viewer, wanted))

@@ -93,6 +93,11 @@ class History:
         return len(self._states)
 
     @property
+    def kept_inputs(self) -> int:
+        """The number of inputs, at most `MOST_INPUTS`."""
+        return len(self._inputs)
+
+    @property
     def begin(self) -> Nanos:
         """The oldest moment that can be restored, ns; the present if there is no snapshot."""
         return self._states[0].snapshot.now if self._states else self.world.now

@@ -1,3 +1,5 @@
+import { tokenHeaders } from "./state/greeting";
+
 /** Gives a file to the browser's downloads. */
 export function save(blob: Blob, name: string): void {
   const link = document.createElement("a");
@@ -5,4 +7,12 @@ export function save(blob: Blob, name: string): void {
   link.download = name;
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}
+
+/** A file of the studio. Rejects with the words of the studio. */
+export async function fetchFile(path: string): Promise<Blob> {
+  const response = await fetch(path, { headers: tokenHeaders() });
+  if (response.ok) return response.blob();
+  const answer = (await response.json().catch(() => null)) as { error?: { message?: string } } | null;
+  throw answer?.error?.message ?? `${response.status} ${response.statusText}`;
 }

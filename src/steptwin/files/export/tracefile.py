@@ -25,6 +25,19 @@ class Ring:
         self._records: deque[TraceRecord] = deque(trace, maxlen=size)
         trace.watchers.append(self._records.append)
 
+    def __len__(self) -> int:
+        return len(self._records)
+
+    @property
+    def size(self) -> int:
+        """The most records."""
+        return self._records.maxlen or 0
+
+    @property
+    def begin(self) -> Nanos | None:
+        """The moment of the oldest record; None if there is none."""
+        return self._records[0].time if self._records else None
+
     def clear(self) -> None:
         """Drop all earlier records."""
         self._records.clear()

@@ -1,6 +1,6 @@
 // Made from docs/studio.schema.json by `npm run protocol`; not to be changed by hand.
 
-export type Request = DescribeRequest | ReadRequest | PinsRequest | StateRequest | EncodersRequest | FaultsRequest | FaultKindsRequest | TimeRequest | EndPointsRequest | FollowRequest | UnfollowRequest | SetRequest | PressRequest | ReleaseRequest | WriteRequest | SendRequest | RequestRequest | PowerCycleRequest | TurnRequest | CoupleRequest | FaultRequest | ClearFaultRequest | ExpectRequest | NoteRequest | SeeRequest | EnableRequest | MoveRequest | HomeRequest | JogRequest | StopRequest | ProgramRequest | DownloadRequest | PauseRequest | ResumeRequest | StepRequest | SnapshotRequest | SnapshotsRequest | RestoreRequest | DropSnapshotRequest | SaveRequest | DebugRequest | BreakpointRequest | ClearBreakpointRequest | BreakpointsRequest | StopOnRequest | StepProgramRequest | RunRequest | LookAtRequest | BranchRequest | StackRequest | ValuesRequest | EvaluateRequest | SetValueRequest | ProgramSourceRequest | WhyRequest | HelloRequest | ResyncRequest | WatchRequest | UnwatchRequest | TakeControlRequest | ReleaseControlRequest | RenewRequest | LetGoRequest | StopAllRequest | LookRequest | GoBackRequest | ProgramsRequest | ProgramTextRequest | PortsRequest | ConnectRequest | DisconnectRequest | AuditRequest | CalculatorRequest | CalculateRequest | GearRequest | ConfigurationRequest | EditConfigurationRequest | ScanRequest | VerifyRequest | WorkRequest | CancelWorkRequest;
+export type Request = DescribeRequest | ReadRequest | PinsRequest | StateRequest | EncodersRequest | FaultsRequest | FaultKindsRequest | TimeRequest | EndPointsRequest | FollowRequest | UnfollowRequest | SetRequest | PressRequest | ReleaseRequest | WriteRequest | SendRequest | RequestRequest | PowerCycleRequest | TurnRequest | CoupleRequest | FaultRequest | ClearFaultRequest | ExpectRequest | NoteRequest | SeeRequest | EnableRequest | MoveRequest | HomeRequest | JogRequest | StopRequest | ProgramRequest | DownloadRequest | PauseRequest | ResumeRequest | StepRequest | SnapshotRequest | SnapshotsRequest | RestoreRequest | DropSnapshotRequest | SaveRequest | DebugRequest | BreakpointRequest | ClearBreakpointRequest | BreakpointsRequest | StopOnRequest | StepProgramRequest | RunRequest | LookAtRequest | BranchRequest | StackRequest | ValuesRequest | EvaluateRequest | SetValueRequest | ProgramSourceRequest | WhyRequest | HelloRequest | ResyncRequest | WatchRequest | UnwatchRequest | TakeControlRequest | ReleaseControlRequest | RenewRequest | LetGoRequest | StopAllRequest | LookRequest | GoBackRequest | ProgramsRequest | ProgramTextRequest | PortsRequest | ConnectRequest | DisconnectRequest | AuditRequest | CalculatorRequest | CalculateRequest | GearRequest | ConfigurationRequest | EditConfigurationRequest | ScanRequest | VerifyRequest | WorkRequest | CancelWorkRequest | RecordingsRequest | SaveRecordingRequest | ViewRecordingRequest;
 
 /** Every request has exactly one. */
 export type Answer = {
@@ -1429,6 +1429,34 @@ export type CancelWorkRequest = {
   version?: 1;
 };
 
+/** What is recorded of the world, and which sessions are saved. */
+export type RecordingsRequest = {
+  do: "recordings";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+};
+
+/** Save the session up to now as a file beside the world. Nothing changes in the world. */
+export type SaveRecordingRequest = {
+  do: "save_recording";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Of the file, without .json; the world and the time of day without. */
+  name?: string | null;
+};
+
+/** Open a saved session as a page of its own, as steptwin studio FILE --view does; at a loopback address only. */
+export type ViewRecordingRequest = {
+  do: "view_recording";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Of a saved session. */
+  name: string;
+};
+
 export type JogAnswer = {
   lease: number;
   /** Renew it in a third of this. [ms] */
@@ -1759,6 +1787,67 @@ export type WorkAnswer = {
 
 export type CancelWorkAnswer = null;
 
+export type RecordingsAnswer = {
+  /** Inputs from outside since the beginning; null: none is recorded. */
+  session: {
+    /** Virtual time, as decimal text [ns] */
+    until_ns: string;
+    inputs: number;
+    most_inputs: number;
+    bytes: number;
+    most_bytes: number;
+    /** Whether it has ended for want of room. */
+    is_full: boolean;
+    /** Where it is written at the end of the studio. */
+    file: string | null;
+  } | null;
+  /** What look can show. */
+  past: {
+    /** Virtual time, as decimal text [ns] */
+    from_ns: string;
+    states: number;
+    inputs: number;
+    most_inputs: number;
+  } | null;
+  /** What happened, as --trace keeps it. */
+  trace: {
+    kind: "none" | "ring" | "file";
+    file: string | null;
+    records: number | null;
+    most_records: number | null;
+    /** Of the oldest record of a ring. */
+    from_ns: string | null;
+  };
+  /** Where sessions are saved. */
+  folder: string;
+  /** Sessions there, the newest first. */
+  saved: {
+    /** Of the file, without .json. */
+    name: string;
+    bytes: number;
+    /** Wall clock, ISO 8601. */
+    saved: string;
+    /** Virtual time, as decimal text [ns] */
+    until_ns: string;
+  }[];
+  /** What GET /api/recordings/NAME.FORMAT makes of them. */
+  formats: string[];
+};
+
+export type SaveRecordingAnswer = {
+  /** Of the file, without .json. */
+  name: string;
+  bytes: number;
+  /** Wall clock, ISO 8601. */
+  saved: string;
+  /** Virtual time, as decimal text [ns] */
+  until_ns: string;
+};
+
+export type ViewRecordingAnswer = {
+  url: string;
+};
+
 /** The whole state, after hello and resync. */
 export type HelloMessage = {
   /** Counts the messages to this viewer from hello on, which has 0. */
@@ -1985,4 +2074,7 @@ export interface Requests {
   verify: { request: VerifyRequest; answer: VerifyAnswer };
   work: { request: WorkRequest; answer: WorkAnswer };
   cancel_work: { request: CancelWorkRequest; answer: CancelWorkAnswer };
+  recordings: { request: RecordingsRequest; answer: RecordingsAnswer };
+  save_recording: { request: SaveRecordingRequest; answer: SaveRecordingAnswer };
+  view_recording: { request: ViewRecordingRequest; answer: ViewRecordingAnswer };
 }

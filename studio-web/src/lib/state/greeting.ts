@@ -16,3 +16,9 @@ export function greetingOf(): Fields<"hello"> {
 export function giveToken(token: string): void {
   sessionStorage.setItem(TOKEN, token);
 }
+
+/** Of a request over HTTP. */
+export function tokenHeaders(): Record<string, string> {
+  const token = sessionStorage.getItem(TOKEN);
+  return token === null ? {} : { authorization: `Bearer ${token}` };
+}

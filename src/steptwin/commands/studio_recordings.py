@@ -1,0 +1,225 @@
+"""Sessions of the world that a studio shows: saved beside it, exported, and opened as studios of their own.
+
+Exports and views are processes of their own, so that the world goes on undisturbed.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TypeAlias
+
+from steptwin.errors import LineFailure, Misuse, Refusal
+from steptwin.files import session as sessions
+from steptwin.files.beginning import SESSION_SUFFIX
+from steptwin.files.export import FORMATS
+from steptwin.files.savedsessions import SavedSession, path_of, read_saved, saved_sessions
+from steptwin.live.cell import Cell
+from steptwin.live.world import MOST_INPUT_BYTES, MOST_INPUTS, LiveWorld
+from steptwin.studio.eventloop import later
+from steptwin.world import history
+
+EXPORT_S = 300.0
+"""Longest duration of an export, and of the start of a view."""
+MOST_VIEWS = 4
+POLL_S = 0.05
+Process: TypeAlias = subprocess.Popen[bytes]
+
+
+class WorldRecordings:
+    """See `steptwin.studio.recordingrequests.Recordings`. A `Link` of the server.
+
+    ``folder``: where sessions are saved; ``stem``: how their names begin; ``may_view``: whether views can be opened, which are
+    served at a loopback address.
+    """
+
+    def __init__(self, live: LiveWorld, cell: Cell, folder: Path, stem: str, file: Path | None, *, may_view: bool) -> None:
+        self._live = live
+        self._cell = cell
+        self._folder = folder
+        self._stem = stem
+        self._file = file
+        self._may_view = may_view
+        self._processes = _Processes()
+
+    # ------------------------------------------------------------------ requests
+
+    async def plain(self) -> Mapping[str, object]:
+        saved = await later(asyncio.to_thread(saved_sessions, self._folder))
+        return {
+            "session": self._session(),
+            "past": self._past(),
+            "trace": self._trace(),
+            "folder": str(self._folder),
+            "saved": [_plain(one) for one in saved],
+            "formats": [name for name, form in FORMATS.items() if not form.missing],
+        }
+
+    async def save(self, name: str | None) -> Mapping[str, object]:
+        path = path_of(self._folder, name or f"{self._stem}-{datetime.now(UTC):%Y%m%d-%H%M%S}")
+        self._cell.enter()
+        return _plain(await later(asyncio.to_thread(_save, self._live.session(), path)))
+
+    async def view(self, name: str) -> str:
+        path = self._saved(name)
+        if not self._may_view:
+            raise Refusal(f"a view is reached from the computer of the studio only: start it with steptwin studio {path} --view")
+        return await later(asyncio.to_thread(self._processes.view, path))
+
+    async def file(self, name: str) -> str:
+        stem, _, form = name.rpartition(".")
+        path = self._saved(stem)
+        if f".{form}" == SESSION_SUFFIX:
+            return str(path)
+        if form not in FORMATS:
+            raise Misuse(f"{name}: formats are {SESSION_SUFFIX[1:]}, {', '.join(FORMATS)}")
+        return str(await later(asyncio.to_thread(self._processes.export, path, form)))
+
+    def _saved(self, name: str) -> Path:
+        """Raises `Misuse` where there is no such session."""
+        path = path_of(self._folder, name)
+        if not path.is_file():
+            raise Misuse(f"no session is called {name!r} in {self._folder}")
+        read_saved(path)  # whatever else is there is nobody's business
+        return path
+
+    # ------------------------------------------------------------------ what is recorded
+
+    def _session(self) -> Mapping[str, object] | None:
+        recorded = self._live.recorded
+        if recorded is None:
+            return None
+        return {
+            "until_ns": str(recorded.until),
+            "inputs": recorded.inputs,
+            "most_inputs": MOST_INPUTS,
+            "bytes": recorded.size,
+            "most_bytes": MOST_INPUT_BYTES,
+            "is_full": recorded.is_full,
+            "file": None if self._file is None else str(self._file),
+        }
+
+    def _past(self) -> Mapping[str, object] | None:
+        past = self._live.history
+        if past is None:
+            return None
+        limits = {"inputs": past.kept_inputs, "most_inputs": history.MOST_INPUTS}
+        return {"from_ns": str(past.begin), "states": len(past), **limits}
+
+    def _trace(self) -> Mapping[str, object]:
+        ring, file = self._live.ring, self._live.trace_file
+        kind = "ring" if ring is not None else "none" if file is None else "file"
+        begin = None if ring is None else ring.begin
+        return {
+            "kind": kind,
+            "file": None if file is None else str(file),
+            "records": None if ring is None else len(ring),
+            "most_records": None if ring is None else ring.size,
+            "from_ns": None if begin is None else str(begin),
+        }
+
+    async def close(self) -> None:
+        await asyncio.to_thread(self._processes.close)
+
+
+class _Processes:
+    """Exports and views. All methods block."""
+
+    def __init__(self) -> None:
+        self._folder = TemporaryDirectory(prefix="steptwin-")
+        self._turn = threading.Lock()
+        self._running: set[Process] = set()
+        self._views: dict[Path, tuple[Process, str]] = {}
+        self._is_closed = False
+
+    def export(self, path: Path, form: str) -> Path:
+        """One at a time; what has been made is kept. Raises `Refusal`."""
+        target = Path(self._folder.name) / f"{path.stem}.{form}"
+        with self._turn:
+            if target.exists() and target.stat().st_mtime > path.stat().st_mtime:
+                return target
+            target.unlink(missing_ok=True)
+            process = self._start("replay", str(path), "--trace", str(target))
+            try:
+                _, errors = process.communicate(timeout=EXPORT_S)
+            except subprocess.TimeoutExpired:
+                raise Refusal(f"{path.name} as {form} takes more than {EXPORT_S:g} s: use steptwin replay and export") from None
+            finally:
+                self._end(process)
+        if not target.exists():
+            raise Refusal(f"{path.name} as {form}: {_last_line(errors)}")
+        return target
+
+    def view(self, path: Path) -> str:
+        """The address of a view, which may be running already; the oldest of too many ends. Raises `LineFailure`."""
+        with self._turn:
+            process, url = self._views.get(path, (None, ""))
+            if process is not None and process.poll() is None:
+                return url
+            while len(self._views) >= MOST_VIEWS:
+                self._end(self._views.pop(next(iter(self._views)))[0])
+            ready = Path(self._folder.name) / f"{path.stem}.ready.json"
+            ready.unlink(missing_ok=True)
+            options = ("--view", "--no-browser", "--http", "127.0.0.1:0", "--ready-file", str(ready))
+            process = self._start("studio", str(path), *options)
+            until = time.monotonic() + EXPORT_S
+            while not ready.exists() and process.poll() is None and time.monotonic() < until:
+                time.sleep(POLL_S)
+            if not ready.exists():
+                raise LineFailure(f"the view of {path.name} has not started: {_last_line(self._end(process))}")
+            url = _url_in(ready.read_text("utf-8"))
+            self._views[path] = process, url
+            return url
+
+    def _start(self, *arguments: str) -> Process:
+        if self._is_closed:
+            raise Refusal("the studio ends")
+        none = subprocess.DEVNULL
+        process = subprocess.Popen(
+            [sys.executable, "-m", "steptwin", *arguments], stdin=none, stdout=none, stderr=subprocess.PIPE
+        )
+        self._running.add(process)
+        return process
+
+    def _end(self, process: Process) -> bytes:
+        """What it has written about errors."""
+        self._running.discard(process)
+        process.terminate()
+        return process.communicate()[1]
+
+    def close(self) -> None:
+        self._is_closed = True
+        for process in list(self._running):
+            self._end(process)
+        with self._turn:  # an export notices
+            self._folder.cleanup()
+
+
+def _save(session: sessions.Session, path: Path) -> SavedSession:
+    """Raises `Refusal` where there is such a file, `Misuse` where it cannot be written."""
+    if path.exists():
+        raise Refusal(f"{path} is there already: give another name")
+    sessions.save(session, path)
+    return read_saved(path)
+
+
+def _plain(saved: SavedSession) -> Mapping[str, object]:
+    return {"name": saved.name, "bytes": saved.size, "saved": saved.saved, "until_ns": str(saved.until)}
+
+
+def _last_line(errors: bytes) -> str:
+    lines: Sequence[str] = errors.decode("utf-8", "replace").strip().splitlines()
+    return lines[-1] if lines else "it ended without a word"
+
+
+def _url_in(ready: str) -> str:
+    points = json.loads(ready)["end_points"]
+    return str(next(point["url"] for point in points if point["kind"] == "http"))

@@ -1,0 +1,63 @@
+"""The sessions in a folder."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import NamedTuple
+
+from steptwin.errors import Misuse
+from steptwin.files.beginning import SESSION_SUFFIX
+from steptwin.machine import Nanos
+from steptwin.system import reason
+
+MOST = 200
+"""The newest ones."""
+HEAD_BYTES = 20_000
+"""In which a session says what it is, and when it ends."""
+NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,79}")
+NAME_FORM = "1 to 80 letters, digits, '-', '_' and '.', the first no '-' and no '.'"
+_UNTIL = re.compile(rb'"until_ns": (\d{1,25})')
+
+
+class SavedSession(NamedTuple):
+    name: str
+    """That of the file, without its suffix."""
+    size: int
+    """Bytes."""
+    saved: str
+    """ISO 8601."""
+    until: Nanos
+
+
+def saved_sessions(folder: Path) -> list[SavedSession]:
+    """The newest first. Files that are no sessions, or cannot be read, are left out."""
+    found: list[SavedSession] = []
+    for path in folder.glob(f"*{SESSION_SUFFIX}"):
+        with contextlib.suppress(Misuse):
+            found.append(read_saved(path))
+    return sorted(found, key=lambda one: one.saved, reverse=True)[:MOST]
+
+
+def read_saved(path: Path) -> SavedSession:
+    """From the head of a file. Raises `Misuse` where it is no session, or cannot be read."""
+    try:
+        with path.open("rb") as file:
+            head = file.read(HEAD_BYTES)
+        about = path.stat()
+    except OSError as error:
+        raise Misuse(f"cannot read {path}: {reason(error)}") from error
+    until = _UNTIL.search(head)
+    if b'"steptwin_session"' not in head or until is None:
+        raise Misuse(f"{path} is not a session of a world")
+    at = datetime.fromtimestamp(about.st_mtime, UTC).isoformat(timespec="milliseconds")
+    return SavedSession(path.stem, about.st_size, at, int(until[1]))
+
+
+def path_of(folder: Path, name: str) -> Path:
+    """Where the session called ``name`` is, or would be. Raises `Misuse` for what is no name."""
+    if not NAME.fullmatch(name):
+        raise Misuse(f"name = {name!r}: permitted are {NAME_FORM}")
+    return folder / f"{name}{SESSION_SUFFIX}"
