@@ -26,6 +26,7 @@ from steptwin.machine import SECOND, Nanos
 from steptwin.motion import Profile, Segment
 from steptwin.motion.divisions import Plan, profile_of
 from steptwin.world.motor import StepperMotor
+from steptwin.world.resonance import Spell, spells
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +46,11 @@ class Build:
     motor: StepperMotor | None = None
     is_free: bool = False
     """Whether the load moves the rotor while no current does."""
+
+    @property
+    def is_loose(self) -> bool:
+        """Whether the rotor may move otherwise than its field."""
+        return self.is_free or (self.motor is not None and self.motor.overruns)
 
     @property
     def ideal(self) -> bool:
@@ -93,7 +99,7 @@ class Course:
     ``blocked``: nothing moves the rotor. ``free``: its motion without current, in pulses of the drive.
     """
 
-    __slots__ = ("_laid", "_now", "_state", "begin", "blocked", "build", "free", "plan")
+    __slots__ = ("_amplitude", "_laid", "_now", "_shaken", "_spells", "_state", "begin", "blocked", "build", "free", "plan")
 
     def __init__(
         self,
@@ -105,8 +111,9 @@ class Course:
         blocked: bool = False,
         jump: float = 0.0,
         free: Profile | None = None,
+        vibration: float = 0.0,
     ) -> None:
-        """``jump``: by how much (pulses/s) the speed of the field changes at once at ``begin``."""
+        """``jump``: by how much (pulses/s) the speed of the field changes at once at ``begin``. ``vibration`` in full steps."""
         self.build = build
         self.plan = plan
         self.begin = begin
@@ -114,6 +121,9 @@ class Course:
         self.free = free
         self._laid: list[CoursePiece] = []
         motor = build.motor
+        self._spells: list[Spell] = []
+        self._amplitude = vibration if motor is None or motor.resonance is None else max(vibration, motor.resonance.least)
+        self._shaken: list[Nanos] = []
         if motor is not None and not motor.follows(jump) and profile_of(plan).moving(begin):
             state = state._replace(stalled=True)
         self._state = self._now = state
@@ -185,6 +195,19 @@ class Course:
         stalled = self._piece(after).stalled
         return next((piece.begin for piece in self.pieces if piece.begin > after and piece.stalled is not stalled), None)
 
+    def vibration(self, now: Nanos) -> float:
+        """The amplitude of the rotor about the field, full steps; 0 where no resonance is described."""
+        motor = self.build.motor
+        if motor is None or motor.resonance is None or not self.pieces or not self._spells:
+            return self._amplitude
+        now_s = (now - profile_of(self.plan).start) / SECOND
+        before = max(bisect_right(self._spells, now_s, key=attrgetter("begin_s")) - 1, 0)
+        return self._spells[before].at(max(now_s, self._spells[before].begin_s), motor.resonance.least)
+
+    def is_shaken(self, now: Nanos) -> bool:
+        """Whether the rotor loses the field by resonance in this moment."""
+        return now in self._shaken
+
     def load_pieces(self) -> tuple[LoadPiece, ...]:
         """Where the load is, with as few entries as possible; for a drive at rest the distance of the load from it."""
         build, end = self.build, profile_of(self.plan).end
@@ -224,6 +247,8 @@ class Course:
         if profile.end is not None:
             rest = max(profile.end, begin)
             motor = self.build.motor
+            if motor is not None and motor.resonance is not None:
+                self._spells.append(Spell((rest - profile.start) / SECOND, self._amplitude, -motor.resonance.fading))
             if not self.blocked and (not self._now.stalled or motor is None or motor.holds()):
                 self._catch(rest)
             self._stand(rest, 1)
@@ -262,7 +287,7 @@ class Course:
                     self._stand(before, direction)
                 self._catch(now)
             else:
-                found = motor.loses(s, now_s, end_s, self.build.sign)
+                found = self._loses(motor, s, now_s, end_s)
                 if found is None:
                     self._follow(now, end, direction)
                     return
@@ -274,6 +299,27 @@ class Course:
                     return
                 self._follow(before, now, direction)
                 self._now = self._now._replace(stalled=True)
+
+    def _loses(self, motor: StepperMotor, s: Segment, now_s: float, end_s: float) -> float | None:
+        """When the rotor loses the field in a segment, because it is too weak or vibrates too much."""
+        weak = motor.loses(s, now_s, end_s, self.build.sign)
+        resonance = motor.resonance
+        if resonance is None:
+            return weak
+        least = resonance.least
+        for spell, lost in spells(resonance, motor.parts(s, now_s, end_s, self.build.sign), self._amplitude):
+            if weak is not None and spell.begin_s >= weak:
+                break
+            self._spells.append(spell)
+            if lost is not None and (weak is None or lost < weak):
+                self._shaken.append(max(self.begin, profile_of(self.plan).start + ceil(lost * SECOND)))
+                weak = lost
+        if weak is not None:
+            self._spells.append(Spell(weak, least, -resonance.fading))
+            self._amplitude = least
+        elif self._spells:
+            self._amplitude = self._spells[-1].at(end_s, least) if end_s < inf else least
+        return weak
 
     def _follow(self, begin: Nanos, end: Nanos | None, direction: int) -> None:
         """The rotor goes with the field until a stop holds it, the load when its play is used up."""

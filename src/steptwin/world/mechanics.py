@@ -13,12 +13,12 @@ from typing import ClassVar, NamedTuple, Protocol
 
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, Drive, Nanos
-from steptwin.motion import Profile, at_rest
+from steptwin.motion import Profile
 from steptwin.motion.divisions import profile_of
 from steptwin.state import Plain, Stateful
 from steptwin.world.course import Build, Course, LoadPiece, MechanicalState
-from steptwin.world.free import FreeMotion, slow_from
 from steptwin.world.kernel import Kernel
+from steptwin.world.loose import Looseness
 from steptwin.world.motor import NO_BURDEN, Burden
 
 _OUTDATED = -1
@@ -77,16 +77,14 @@ class Mechanism(Stateful):
         "_blockers",
         "_brake",
         "_burden",
-        "_catch_due",
         "_changes",
         "_coupled",
         "_course",
         "_due",
         "_encoders",
         "_falls",
-        "_had_current",
-        "_is_free",
         "_kernel",
+        "_loose",
         "_lost",
         "_name",
         "_reported",
@@ -122,11 +120,8 @@ class Mechanism(Stateful):
         self._brake = 0.0
         """Torque of the brake, N·m."""
         self._burden = NO_BURDEN
-        self._had_current = True
-        self._is_free = False
-        """Whether no current holds the rotor: none flows, or the rotor is too fast for it."""
-        self._catch_due: Nanos | None = None
-        """When current takes hold of a free rotor."""
+        self._loose = None if build.motor is None or not build.is_loose else Looseness(build, build.motor, kernel.now)
+        """None for a rotor that always goes with its field, or stands."""
         self._falls = False
         self._rest_due: Nanos | None = None
         """When a free rotor that moves comes to rest."""
@@ -143,7 +138,7 @@ class Mechanism(Stateful):
             raise Misuse(f"{machine} axis {number} stands at {here} imp, outside its hard stops {build.low} to {build.high} imp")
         self._revision = drive.revision
         self._course = Course(build, drive.plan, kernel.now, MechanicalState(here, here))
-        if build.is_free:
+        if self._loose is not None:
             self._renew(drive, kernel.now)
 
     @property
@@ -160,10 +155,8 @@ class Mechanism(Stateful):
         return self._course
 
     def _is_switched(self, drive: Drive, now: Nanos) -> bool:
-        """Whether current has been switched, or takes hold of a free rotor."""
-        if not self.build.is_free:
-            return False
-        return drive.is_energised is not self._had_current or (self._catch_due is not None and self._catch_due <= now)
+        """Whether the field begins or ceases to hold the rotor, or may."""
+        return self._loose is not None and self._loose.is_switched(drive, now)
 
     def at(self, now: Nanos) -> MechanicalState:
         return self.course(now).at(now)
@@ -218,7 +211,7 @@ class Mechanism(Stateful):
 
     def deadline(self) -> Nanos | None:
         """Courses are computed in advance: what is due is to be reported, or concerns followers and the current of the axis."""
-        dues = (self._due, self._stall_due, self._catch_due, self._rest_due)
+        dues = (self._due, self._stall_due, self._rest_due, None if self._loose is None else self._loose.due)
         return min((due for due in dues if due is not None), default=None)
 
     def _watch_motor(self, now: Nanos) -> None:
@@ -226,7 +219,8 @@ class Mechanism(Stateful):
         stalled = self._course.at(now).stalled
         if stalled is not self._stalled:
             self._stalled = stalled
-            text = f"{self._name} loses the field" if stalled else f"{self._name} is caught, {self.lost(now)} pulses behind"
+            why = " by resonance" if self._course.is_shaken(now) else ""
+            text = f"{self._name} loses the field{why}" if stalled else f"{self._name} is caught, {self.lost(now)} pulses behind"
             facts = ("axis", self.number), ("stalled", stalled), ("lost", 0 if stalled else self.lost(now))
             self._kernel.report(self.machine, "event", "stall", text, *facts)
         self._stall_due = self._course.next_stall(now)
@@ -245,64 +239,46 @@ class Mechanism(Stateful):
                 state = state._replace(behind=state.behind + counted_anew)
         led = profile_of(before.plan) if before.free is None else before.free
         jump = profile_of(plan).velocity(now) - led.velocity(now)
+        is_new = drive.revision != self._revision
         self._revision = drive.revision
-        free = self._free(drive, before, state, now) if self.build.is_free else None
-        self._course = Course(self._loaded(), plan, now, state, blocked=self._blocked, jump=jump, free=free)
+        free = None
+        if self._loose is not None:
+            free, state = self._loose.motion(
+                drive, before, state, now, is_new=is_new, burden=self._carried, blocked=self._blocked
+            )
+        vibration = before.vibration(now)
+        self._course = Course(self._loaded(), plan, now, state, blocked=self._blocked, jump=jump, free=free, vibration=vibration)
         self._changes += 1
         if self._encoders:
             self._turn_encoders(now)
         if self.build.motor is not None:
             self._watch_motor(now)
-        if self.build.is_free:
+        if self._loose is not None:
             self._watch_fall(now, free)
 
-    # ------------------------------------------------------------------ without current
+    # ------------------------------------------------------------------ load
 
-    def _free(self, drive: Drive, before: Course, state: MechanicalState, now: Nanos) -> Profile | None:
-        """The motion of a rotor that no current holds; None where it does. Also when it will."""
-        motor, build = self.build.motor, self.build
-        if motor is None:
-            return None
-        led = profile_of(before.plan) if before.free is None else before.free
-        moves = before.leads(now) and not self._blocked
-        velocity = led.velocity(now) if moves else 0.0
-        self._had_current, self._catch_due = drive.is_energised, None
-        is_too_fast = self._is_free and not motor.follows(velocity)
-        self._is_free = not drive.is_energised or is_too_fast
-        if not self._is_free:
-            return None
-        base = (state.rotor - build.zero) * build.sign
-        away = state.load - state.rotor
-        ends = sorted((stop - away - build.zero) * build.sign for stop in (build.low, build.high) if stop is not None)
-        motion = FreeMotion(
-            inertia=motor.inertia + self._burden.inertia,
-            load=motor.load * build.sign,
-            friction=motor.friction + self._brake + self._burden.friction,
-            low=ends[0] if ends else None,
-            high=ends[-1] if ends else None,
-        )
-        if self._blocked:
-            return at_rest(now, base)
-        found = motion.profile(now, base, led.phase(now) if moves else 0.0, velocity)
-        if drive.is_energised:
-            self._catch_due = slow_from(found, now, motor.catch_p)
-        return found
+    @property
+    def _carried(self) -> Burden:
+        """What the motor moves besides its own: a further load, and the friction of the brake."""
+        return self._burden._replace(friction=self._burden.friction + self._brake)
 
     def _loaded(self) -> Build:
-        """What a powered motor has to move: the friction of the brake and a further load, too."""
-        motor, more = self.build.motor, self._burden
-        if motor is None or (self._brake == 0.0 and more == NO_BURDEN):
+        """What a powered motor has to move."""
+        motor, more = self.build.motor, self._carried
+        if motor is None or more == NO_BURDEN:
             return self.build
-        friction = motor.friction + self._brake + more.friction
-        return replace(self.build, motor=replace(motor, inertia=motor.inertia + more.inertia, friction=friction))
+        return replace(
+            self.build, motor=replace(motor, inertia=motor.inertia + more.inertia, friction=motor.friction + more.friction)
+        )
 
     def _watch_fall(self, now: Nanos, free: Profile | None) -> None:
-        """Report that a rotor without current begins to move, and that it rests again."""
+        """Report that a rotor that its field does not hold begins to move, and that it rests again."""
         falls = free is not None and free.moving(now)
-        if falls is not self._falls:
+        if falls is not self._falls and self._loose is not None:
             self._falls = falls
             lost = self.lost(now)
-            text = f"{self._name} moves without current" if falls else f"{self._name} stands, {lost} pulses behind"
+            text = f"{self._name} {self._loose.why}" if falls else f"{self._name} stands, {lost} pulses behind"
             facts = ("axis", self.number), ("falls", falls), ("lost", lost)
             self._kernel.report(self.machine, "event", "fall", text, *facts)
         self._rest_due = free.end if free is not None and falls else None

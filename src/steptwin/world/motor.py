@@ -6,8 +6,8 @@ Torques in N·m, speeds in pulses/s. While the torque that a motion needs,
 
 does not exceed the curve at its speed, the rotor follows the field. Where it exceeds the curve, the rotor stops at once, and
 pulses are lost until the field is slow enough and the torque is sufficient; then the rotor synchronises. Velocity within a
-segment is a polynomial, so both moments are computed in closed form. The transient of a rotor that stops because of a jump of the
-field's speed is not modelled.
+segment is a polynomial, so both moments are computed in closed form. What it does in a band of resonance is in
+`steptwin.world.resonance`, what it does when its field stops at once in `steptwin.world.wells`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,9 @@ from math import inf, sqrt
 from typing import Any, NamedTuple, TypeAlias
 
 from steptwin.errors import Misuse
+from steptwin.machine import Nanos
 from steptwin.motion import Segment
+from steptwin.world.resonance import Part, Resonance
 
 FASTEST = 1e15
 """Limit of accelerations without current, pulses/s², far above all that is built, so that no product overflows."""
@@ -57,6 +59,15 @@ class StepperMotor:
     """Highest start-stop speed, pulses/s: the largest jump of the field's speed that the rotor follows, and the highest speed at
     which a stopped rotor synchronises. None: every jump is followed, and the rotor synchronises where the field stops or
     reverses."""
+    detent: float = 0.0
+    """Detent torque without current, with a period of a full step."""
+    hold: float = 1.0
+    """Share of the holding torque while the current is reduced at rest."""
+    hold_ns: Nanos = 0
+    """How long after the last pulse, or after current was switched on, it is reduced."""
+    overruns: bool = False
+    """Whether the rotor runs on where the field stops at once and cannot hold it."""
+    resonance: Resonance | None = None
 
     def __post_init__(self) -> None:
         speeds = [speed for speed, _ in self.curve]
@@ -95,7 +106,31 @@ class StepperMotor:
 
     def holds(self) -> bool:
         """Whether the motor holds the load at rest."""
-        return abs(self.load) <= self.curve[0][1] + self.friction
+        return abs(self.load) <= self.holding + self.friction
+
+    @property
+    def holding(self) -> float:
+        """Torque of the field at rest, with the whole current."""
+        return self.curve[0][1]
+
+    def parts(self, s: Any, begin_s: float, end_s: float, sign: int) -> Iterator[Part]:
+        """What a segment is for its resonance, between passages of the band and of corners of the curve."""
+        band = () if self.resonance is None else (self.resonance.low, self.resonance.high)
+        if not isinstance(s, Segment):
+            for t, speed, need in self._looks(s, begin_s, end_s, sign):
+                yield Part(t, min(t + LOOK_S, end_s), speed, self._use(speed, need))
+            return
+        begins = [begin_s, *self._corners(s, begin_s, end_s, *band)] if end_s < inf else [begin_s]
+        for t0, t1 in zip(begins, [*begins[1:], end_s], strict=True):
+            middle = 0.5 * (t0 + t1) if t1 < inf else t0
+            u, speed = middle - s.anchor_s, abs(s.velocity(middle))
+            need = self.needs(sign * (2.0 * s.c2 + 6.0 * s.c3 * u), sign * s.direction)
+            yield Part(t0, t1, speed, self._use(speed, need))
+
+    def _use(self, speed: float, need: float) -> float:
+        """The share of its torque that is needed, at most 1."""
+        torque = self.torque(speed)
+        return 1.0 if torque <= abs(need) else abs(need) / torque
 
     def needs(self, acceleration: float, direction: int) -> float:
         """Torque required for an acceleration (pulses/s²) while moving in ``direction``."""

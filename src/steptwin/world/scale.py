@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from steptwin.errors import Misuse
 from steptwin.motion.trig import PI
 from steptwin.world.motor import Burden, StepperMotor
+from steptwin.world.resonance import Resonance
 
 if TYPE_CHECKING:
     from steptwin.world.elements.axis import AxisSpec
@@ -123,4 +124,13 @@ def motor_of(motor: MotorSpec, kind: str, scale: Scale) -> StepperMotor:
         friction=motor.friction + motor.friction_force * arm,
         load=motor.load + motor.force * arm,
         start_p=None if motor.start_speed is None else motor.start_speed / 60.0 * per_rev,
+        detent=motor.detent,
+        hold=motor.hold_current,
+        hold_ns=motor.hold_delay,
+        overruns=motor.overruns,
+        resonance=None if motor.resonance is None else _resonance(motor, *motor.resonance, per_rev),
     )
+
+
+def _resonance(motor: MotorSpec, low: float, high: float, per_rev: float) -> Resonance:
+    return Resonance(low / 60.0 * per_rev, high / 60.0 * per_rev, motor.resonance_growth, motor.resonance_fading, motor.vibration)

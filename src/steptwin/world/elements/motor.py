@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
+from steptwin.errors import Misuse
+from steptwin.machine import MILLISECOND, Nanos
 from steptwin.world.element import Table
 from steptwin.world.reader import Key, TomlText, optional, read_table
 from steptwin.world.sense import TableRows, check_sense
 from steptwin.world.tomlplaces import Path
-from steptwin.world.values import number, points, whole, word
+from steptwin.world.values import flag, number, pair, points, time_value, whole, word
 
 _not_negative = number(0.0)
+_rate = number(0.001, 10_000.0)
+
+
+def _band(value: Any) -> tuple[float, float]:
+    low, high = pair(value)
+    if low < 0.0:
+        raise Misuse(f"{value!r}: permitted are speeds of 0 and more")
+    return low, high
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,6 +38,14 @@ class MotorSpec:
     start_speed: float | None
     full_steps: int | None
     when_off: str
+    detent: float
+    hold_current: float
+    hold_delay: Nanos
+    overruns: bool
+    resonance: tuple[float, float] | None
+    resonance_growth: float
+    resonance_fading: float
+    vibration: float
     path: Path = ()
 
 
@@ -43,7 +62,21 @@ MOTOR = TableRows(
         optional(_not_negative, "start_speed", "rev/min it starts with at once and is caught at; default any, caught at rest"),
         optional(word("holds", "free"), "when_off", "without current: holds (self-locking), or free: its load moves it", "holds"),
         optional(whole(4, 10_000), "full_steps", "full steps per revolution; default 200"),
+        optional(_not_negative, "detent", "N·m without current, with when_off = 'free': holds the rotor at full steps", 0.0),
+        optional(number(0.0, 1.0), "hold_current", "share of the current at rest; below 1 with when_off = 'free'", 1.0),
+        optional(time_value, "hold_delay", "from the last pulse until the current is reduced", 100 * MILLISECOND),
+        optional(flag, "overruns", "whether it runs on after a stop without ramp, as far as its energy goes", False),
+        optional(_band, "resonance", "[low, high] rev/min: the rotor vibrates there, ever more, until it loses the field"),
+        optional(_rate, "resonance_growth", "1/s with which the vibration grows there", 20.0),
+        optional(_rate, "resonance_fading", "1/s with which it fades elsewhere", 20.0),
+        optional(number(1e-6, 1.0), "vibration", "full steps: the vibration that there always is, with resonance", 0.05),
     ),
+    need={
+        "hold_delay": "hold_current",
+        "resonance_growth": "resonance",
+        "resonance_fading": "resonance",
+        "vibration": "resonance",
+    },
     only={"mass": ("linear",), "friction_force": ("linear",), "force": ("linear",)},
 )
 
@@ -62,4 +95,9 @@ def read_motor(text: TomlText, axis: Path, table: Table) -> MotorSpec | None:
         text.wrong((*path, "torque"), "D003", "a torque curve begins at 0 rev/min and is never negative")
     if motor.when_off == "free" and not motor.inertia and not motor.mass:
         text.wrong((*path, "when_off"), "D007", "what moves freely needs an inertia or a mass")
+    if motor.overruns and not motor.inertia and not motor.mass:
+        text.wrong((*path, "overruns"), "D007", "what runs on needs an inertia or a mass")
+    for key in ("detent", "hold_current"):
+        if key in table["motor"] and motor.when_off != "free":
+            text.wrong((*path, key), "D007", f"{key} acts on a rotor that may move: it needs when_off = 'free'")
     return motor
