@@ -100,6 +100,14 @@ class MotionController(Machine, Protocol):
         """The drives, the same objects throughout."""
         ...
 
+    def advance_to_change(self, until: Nanos) -> Nanos:
+        """Advance to the first moment at which an output, a plan or anything else outside a program may have changed, or to
+        ``until``; returns that moment.
+
+        Nothing may come in before ``until``: a program that only calculates may have been executed up to there already.
+        """
+        ...
+
     def set_pin(self, pin: str, value: float, now: Nanos) -> None:
         """Apply an input change after everything that happens at ``now``. Unknown names raise with the permitted ones."""
         ...

@@ -163,6 +163,16 @@ class M1486Chip(Stateful):
             due = self._due
         self.now = now
 
+    def advance_to_change(self, until: Nanos) -> Nanos:
+        """See `steptwin.machine.MotionController.advance_to_change`."""
+        due = self._due
+        if due is None or due > until:
+            self.advance(until)
+        else:
+            self._run_instant(due, until)
+            self.advance(self.now)
+        return self.now
+
     def _run_instant(self, at: Nanos, until: Nanos) -> None:
         """Execute one deadline at ``at``. A received character comes after everything else, so that the splitting of input does
         not matter."""

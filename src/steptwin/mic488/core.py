@@ -202,8 +202,19 @@ class ControllerCore(Stateful):
             due = self._due
         self.now = now
 
+    def advance_to_change(self, until: Nanos) -> Nanos:
+        """See `steptwin.machine.MotionController.advance_to_change`."""
+        due = self._due
+        if due is None or due > until:
+            self.advance(until)
+        else:
+            self._run_instant(due, until)
+            self.advance(self.now)
+        return self.now
+
     def _run_instant(self, at: Nanos, until: Nanos) -> None:
-        """Execute all deadlines at ``at``; a program without effects on other parts may run on up to ``until``."""
+        """Execute all deadlines at ``at``; a program without effects on other parts may run on up to ``until``, unless something
+        else has happened."""
         self.now = at
         for _ in range(MAX_EVENTS_PER_INSTANT):
             others = self._others
@@ -211,6 +222,7 @@ class ControllerCore(Stateful):
             if happened:
                 self._run_others(at)
                 others = self._due_without_program()
+                until = at
             due = self.program.deadline()
             acted_at = None
             if due is not None and due <= at:

@@ -269,7 +269,9 @@ class ProgramControl(Stateful):
         Returns the moment at which the program acted on the rest of the controller, where it stops; None if it did not.
         """
         interpreter = self.interpreter
-        acted = now if self._pulses and self._invert(now) else None
+        acted = None
+        if self._pulses and self._invert(now):
+            acted = until = now
         if self.state is not RUNNING:
             return acted
         code = self._code()

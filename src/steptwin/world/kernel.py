@@ -356,23 +356,36 @@ class Kernel:
             return
         while self._due is not None and self._due <= now:
             self.now = self._due
-            for number in self._machine_dues.take(self.now):
-                name = self._names[number]
-                self.stale = False
-                self.machines[name].advance(self.now)
-                if not self.stale:  # the machine has not called its hook
-                    self.mark(name)
+            self._advance_machines(now)
             for number in self._part_dues.take(self.now):
                 self._part_turns.add(number)
             if self._flights:
                 self._arrive()
             self.settle()
 
+    def _advance_machines(self, now: Nanos) -> None:
+        """Advance the machines that are due; a single one to where it changes something, or where anything else is due."""
+        due = self._machine_dues.take(self.now)
+        until = self._nothing_else_until(now) if len(due) == 1 and not self.is_attentive else self.now
+        for number in due:
+            name = self._names[number]
+            self.stale = False
+            if until > self.now:
+                self.now = self.machines[name].advance_to_change(until)
+            else:
+                self.machines[name].advance(self.now)
+            if not self.stale:  # the machine has not called its hook
+                self.mark(name)
+
+    def _nothing_else_until(self, now: Nanos) -> Nanos:
+        """The last moment, at most ``now``, before anything is due besides a machine that is due now."""
+        dues = [self._machine_dues.first(), self._part_dues.first(), *(flight.arrival for flight in self._flights)]
+        return min((due - 1 for due in dues if due is not None and due <= now), default=now)
+
     def _advance_alone(self, name: str, plans: RecordedPlans, now: Nanos) -> None:
         machine, due = self.machines[name], self._due
         while due is not None and due <= now:
-            self.now = due
-            machine.advance(due)
+            self.now = machine.advance_to_change(now)
             self._settle_alone(name, plans)
             due = self._due
 

@@ -40,6 +40,12 @@ class Bare(Stateful):
             raise TimeReversal(self.now, now)
         self.now = now
 
+    def advance_to_change(self, until: Nanos) -> Nanos:
+        due = self.deadline()
+        moment = until if due is None else min(due, until)
+        self.advance(moment)
+        return moment
+
     def deadline(self) -> Nanos | None:
         return None
 

@@ -163,6 +163,16 @@ class FaultyMachine(Stateful):
             self._run(due)
         self.inner.advance(now)
 
+    def advance_to_change(self, until: Nanos) -> Nanos:
+        """See `steptwin.machine.MotionController.advance_to_change`."""
+        own, due = self._own(), self.inner.deadline()
+        if own is None or own > until:
+            return self.inner.advance_to_change(until)
+        if due is not None and due < own:
+            return self.inner.advance_to_change(own - 1)
+        self.advance(own)
+        return own
+
     def deadline(self) -> Nanos | None:
         dues = (self.inner.deadline(), self._own())
         return min((due for due in dues if due is not None), default=None)
