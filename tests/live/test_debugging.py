@@ -383,3 +383,25 @@ def test_a_breakpoint_of_two_clients_stays_until_both_have_removed_it(run: Run) 
         assert rig.do("breakpoints")["breakpoints"] == []
 
     scene(run, play)
+
+
+def test_followers_are_told_what_time_stops_at_where_that_changes(run: Run) -> None:
+    async def play(rig: Rig) -> None:
+        told = rig.control.follow(filter_of(["breakpoints"]), 1000)
+        number = rig.line(line=9)["number"]
+        rig.line(line=9)
+        rig.do("stop_on", events=["limit"])
+        rig.do("stop_on", events=["limit"])
+        with pytest.raises(Misuse):
+            rig.line(line=99)
+        for _ in range(2):
+            rig.do("clear_breakpoint", breakpoint=number)
+        seen = [event.payload.plain() for event in told.take().events]
+        assert [([one["line"] for one in state["breakpoints"]], state["stop_on"]) for state in seen] == [
+            ([10], []),
+            ([10], ["limit"]),
+            ([], ["limit"]),
+        ]
+        told.close()
+
+    scene(run, play)

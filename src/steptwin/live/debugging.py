@@ -26,7 +26,7 @@ from steptwin.live.world import LiveWorld
 from steptwin.machine import Nanos
 from steptwin.subject import debugcommands as command
 from steptwin.subject.dispatch import Action
-from steptwin.subject.payloads import LogPayload, StoppedPayload
+from steptwin.subject.payloads import BreakpointsPayload, LogPayload, StoppedPayload
 from steptwin.tables import complete
 from steptwin.world.actions import Download
 from steptwin.world.plant import WORLD, PlantSnapshot, RecordedInput
@@ -54,6 +54,7 @@ class Debugging:
         """What became of them."""
         self._next = 1
         self._events: tuple[str, ...] = ()
+        self._said = BreakpointsPayload((), ())
         self._open: _OpenDebugger | None = None
         live.subject.on_followed = self._followed
 
@@ -74,9 +75,9 @@ class Debugging:
         if self._open is None:
             if not self._is_followed:
                 raise Refusal(f"nobody would learn where time stops: follow events of kind {StoppedPayload.kind!r} first")
-            self._open = _OpenDebugger(self._live, self._cell, self._pace, self._set_all, self._numbers)
+            self._open = _OpenDebugger(self._live, self._cell, self._pace, self._renew, self._numbers)
             self._open.debugger.set_events([_EVENTS[name] for name in self._events])
-            self._set_all()
+            self._renew()
         return self._open
 
     # ------------------------------------------------------------------ breakpoints
@@ -86,6 +87,18 @@ class Debugging:
         if self._open is not None:
             found = self._open.debugger.set_breakpoints([one.point for one in self._breakpoints.values()])
             self._set = dict(zip(self._breakpoints, found, strict=True))
+
+    def _renew(self) -> None:
+        """`_set_all`, and say what has changed by it."""
+        self._set_all()
+        self._tell()
+
+    def _tell(self) -> None:
+        """Say what time stops at, if that is not what was said last."""
+        said = BreakpointsPayload(tuple(self._plain(number) for number in self._breakpoints), self._events)
+        if said != self._said:
+            self._said = said
+            self._live.subject.publish(self._live.now, WORLD, said)
 
     def _add(self, wanted: command.SetBreakpoint) -> object:
         self._opened()
@@ -102,6 +115,7 @@ class Debugging:
         if problem := self._set[number].problem:
             self._remove(number)
             raise Misuse(f"breakpoint: {problem}")
+        self._tell()
         return self._plain(number)
 
     def _clear(self, wanted: command.ClearBreakpoint) -> None:
@@ -117,7 +131,7 @@ class Debugging:
     def _remove(self, number: int) -> None:
         del self._breakpoints[number]
         self._set.pop(number, None)
-        self._set_all()
+        self._renew()
 
     def _numbers(self, points: Sequence[int]) -> tuple[int, ...]:
         """Of breakpoints, by their numbers in the debugger."""
@@ -139,6 +153,7 @@ class Debugging:
     def _stop_on(self, wanted: command.StopOn) -> None:
         self._opened().debugger.set_events([_EVENTS[name] for name in wanted.events])
         self._events = wanted.events
+        self._tell()
 
     # ------------------------------------------------------------------ commands
 

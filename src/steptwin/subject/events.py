@@ -14,6 +14,7 @@ from steptwin.machine import SECOND, Nanos
 from steptwin.motion.plain import read_plan
 from steptwin.subject.payloads import (
     KINDS,
+    BreakpointsPayload,
     ButtonPayload,
     CoordinatePayload,
     EdgePayload,
@@ -184,6 +185,7 @@ _READ: Mapping[str, Callable[[Mapping[str, Any]], Payload]] = complete(
         "restored": lambda data: RestoredPayload(data["snapshot"]),
         "stopped": _read_stopped,
         "log": lambda data: LogPayload(data["words"], data["program"], data["line"]),
+        "breakpoints": lambda data: BreakpointsPayload(tuple(data["breakpoints"]), tuple(data["stop_on"])),
     },
 )
 

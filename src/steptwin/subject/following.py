@@ -10,7 +10,7 @@ from typing import NamedTuple
 from steptwin.subject.events import Event
 from steptwin.subject.payloads import KINDS
 
-USUAL = frozenset(KINDS) - {"frame", "statement", "stopped", "log"}
+USUAL = frozenset(KINDS) - {"frame", "statement", "stopped", "log", "breakpoints"}
 """What is followed where no kinds are named: frames are as frequent as requests, statements as milliseconds; a debugger is there
 for followers that name its events."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, TypeAlias, get_args
 
@@ -355,6 +356,23 @@ class LogPayload:
         return {"words": self.words, "program": self.program, "line": self.line}
 
 
+@dataclass(frozen=True, slots=True)
+class BreakpointsPayload:
+    """Time stops at these breakpoints and events from now on. ``breakpoints`` are as the command ``breakpoints`` gives them."""
+
+    kind: ClassVar[str] = "breakpoints"
+    axis: ClassVar[None] = None
+    breakpoints: tuple[Mapping[str, object], ...]
+    stop_on: tuple[str, ...]
+
+    @property
+    def text(self) -> str:
+        return f"{len(self.breakpoints)} breakpoints; stops on {', '.join(self.stop_on) or 'no events'}"
+
+    def plain(self) -> dict[str, object]:
+        return {"breakpoints": [dict(one) for one in self.breakpoints], "stop_on": list(self.stop_on)}
+
+
 Payload: TypeAlias = (
     PlanPayload
     | CoordinatePayload
@@ -374,6 +392,7 @@ Payload: TypeAlias = (
     | RestoredPayload
     | StoppedPayload
     | LogPayload
+    | BreakpointsPayload
 )
 KINDS: tuple[str, ...] = tuple(payload.kind for payload in get_args(Payload))
 SHOWN_KINDS = frozenset({"status", "note", "report", "button", "input", "fault", "pace", "restored"})

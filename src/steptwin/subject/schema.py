@@ -90,6 +90,21 @@ _PAYLOADS: Mapping[str, Mapping[str, object]] = complete(
             "past": _FLAG,
         },
         "log": {"words": _TEXT, "program": _TEXT, "line": _WHOLE},
+        "breakpoints": {
+            "breakpoints": {
+                "type": "array",
+                "items": members(
+                    {
+                        "number": _WHOLE,
+                        "machine": _TEXT_OR_NULL,
+                        "program": _TEXT_OR_NULL,
+                        "line": {"type": ["integer", "null"]},
+                        **dict.fromkeys(("label", "value", "condition", "hits", "log", "problem"), _TEXT_OR_NULL),
+                    }
+                ),
+            },
+            "stop_on": {"type": "array", "items": _TEXT},
+        },
         "pace": {"paused": _FLAG, "speed": {"anyOf": [_REAL, {"const": "max"}, {"type": "null"}]}},
     },
 )

@@ -293,6 +293,30 @@ export type SubjectEvent = {
   /** Virtual time, as decimal text [ns] */
   time_ns: string;
   machine: string;
+  kind: "breakpoints";
+  breakpoints: ({
+    number: number;
+    machine: string | null;
+    program: string | null;
+    line: number | null;
+    label: string | null;
+    value: string | null;
+    condition: string | null;
+    hits: string | null;
+    log: string | null;
+    problem: string | null;
+  })[];
+  stop_on: string[];
+  /** The command or the event that led to it. */
+  cause: number | null;
+  /** As text; it adds nothing to the rest. */
+  text: string;
+} | {
+  /** Commands and events are numbered together; 0: a plan from before. */
+  number: number;
+  /** Virtual time, as decimal text [ns] */
+  time_ns: string;
+  machine: string;
   kind: "pace";
   paused: boolean;
   speed: number | "max" | null;
@@ -614,7 +638,7 @@ export type FollowRequest = {
   id?: string | number | null;
   version?: 1;
   /** Kinds of events; all but frames without. */
-  kinds?: ("plan" | "coordinate" | "sample" | "load" | "free" | "edge" | "frame" | "statement" | "status" | "note" | "report" | "button" | "input" | "fault" | "pace" | "restored" | "stopped" | "log")[] | null;
+  kinds?: ("plan" | "coordinate" | "sample" | "load" | "free" | "edge" | "frame" | "statement" | "status" | "note" | "report" | "button" | "input" | "fault" | "pace" | "restored" | "stopped" | "log" | "breakpoints")[] | null;
   /** Names of machines, lines, or 'world'; all without. */
   machines?: string[] | null;
   /** Numbers of axes as text; events of other axes are left out. */

@@ -61,7 +61,9 @@ export const REASONS = [
   "limit",
 ] as const;
 
-const REFRESH_MS = 500;
+/** What tells that breakpoints, stops or values may be others. */
+const FOLLOWED: readonly SubjectEvent["kind"][] = ["stopped", "log", "breakpoints", "pace", "restored"];
+const WATCHED_MS = 500;
 const MOST_LOGGED = 200;
 
 /** The debugger of the world, as one page shows it: breakpoints, where it stands, values there. */
@@ -95,18 +97,18 @@ export class Debugging {
 
   /** Follows the debugger; gives what ends that. */
   follow(): () => void {
-    const end = this.studio.listen(["stopped", "log", "pace", "restored"], (events) => this.happened(events));
-    void this.refresh();
-    const timer = setInterval(() => void this.refresh(), REFRESH_MS);
-    return () => {
-      clearInterval(timer);
-      end();
-    };
+    return this.studio.listen(FOLLOWED, (events) => this.happened(events));
+  }
+
+  /** Reads what is watched while time goes on; gives what ends that. */
+  readWatches(): () => void {
+    const timer = setInterval(() => void this.look(), WATCHED_MS);
+    return () => clearInterval(timer);
   }
 
   private happened(events: readonly SubjectEvent[]): void {
     for (const event of events) if (event.kind === "log") this.logged = [event, ...this.logged].slice(0, MOST_LOGGED);
-    void this.refresh();
+    if (events.some(({ kind }) => kind !== "log" && FOLLOWED.includes(kind))) void this.refresh();
   }
 
   /** All panels show the moment at which the debugger stands, until the viewer looks at another one. */
@@ -118,7 +120,7 @@ export class Debugging {
     else if (before?.past) this.studio.lookback.live();
   }
 
-  private async refresh(): Promise<void> {
+  async refresh(): Promise<void> {
     if (this.studio.hello === null) return;
     try {
       const found = (await this.studio.ask("breakpoints", {})) as {
@@ -202,6 +204,7 @@ export class Debugging {
     if (way === "continue") await this.studio.act("run", { way: "forwards" });
     else if (way === "run_back") await this.studio.act("run", { way: "backwards" });
     else await this.studio.act("step_program", { machine, way });
+    await this.refresh();
   }
 
   async assign(name: string, expression: string): Promise<boolean> {
