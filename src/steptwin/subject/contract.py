@@ -106,17 +106,19 @@ class SignalPart:
 
 @dataclass(frozen=True, slots=True)
 class DrawingPart:
-    """How an element is drawn: a track from 0 to ``length`` mm with what moves along it."""
+    """How an element is drawn: a track of ``length`` from ``low`` on with what moves along it."""
 
     shape: str
     """``rod``: the place is that of the end of a rod, which comes out of its body at 0. ``belt``: places are those of the fronts
-    of workpieces on a belt that moves away from 0."""
+    of workpieces on a belt that moves away from 0. ``slide``: the place is that of a slide on a rail. ``dial``: the place is the
+    angle of a hand, ``length`` is a turn."""
     length: float
     places: tuple[str, ...]
-    """Signals of the element, mm along the track; unknown where there is nothing."""
+    """Signals of the element, places on the track in their unit; unknown where there is nothing."""
     size: float
-    """Length of a body, mm: it ends so far before its place."""
+    """Length of a body: it ends so far before its place."""
     switches: tuple[SwitchPart, ...]
+    low: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -248,7 +250,7 @@ def read_description(data: Mapping[str, Any]) -> Description:
 
 def _read_drawing(data: Mapping[str, Any]) -> DrawingPart:
     switches = tuple(SwitchPart(**switch) for switch in data["switches"])
-    return DrawingPart(data["shape"], data["length"], tuple(data["places"]), data["size"], switches)
+    return DrawingPart(data["shape"], data["length"], tuple(data["places"]), data["size"], switches, data.get("low", 0.0))
 
 
 def _read_control(data: Mapping[str, Any]) -> ControlDescription:

@@ -83,7 +83,8 @@ def _connections(world: Plant) -> Iterator[ConnectionPart]:
 
 
 def _drawing(drawing: Drawing) -> DrawingPart:
-    return DrawingPart(drawing.shape, drawing.length, drawing.places, drawing.size, tuple(map(_switch, drawing.sensors)))
+    switches = tuple(map(_switch, drawing.sensors))
+    return DrawingPart(drawing.shape, drawing.length, drawing.places, drawing.size, switches, drawing.low)
 
 
 def _switch(zone: SensorZone) -> SwitchPart:

@@ -15,6 +15,7 @@ from steptwin.world.elements.collision import COLLISION
 from steptwin.world.elements.conveyor import CONVEYOR
 from steptwin.world.elements.counter import COUNTER
 from steptwin.world.elements.cylinder import CYLINDER
+from steptwin.world.elements.follower import FOLLOWER
 from steptwin.world.elements.gantry import GANTRY
 from steptwin.world.elements.gate import GATE
 from steptwin.world.elements.latch import LATCH
@@ -73,6 +74,7 @@ for _one in (
     VACUUM,
     BRAKE,
     SHAFT,
+    FOLLOWER,
     CARRIAGE,
     TRANSDUCER,
     COLLISION,

@@ -15,6 +15,7 @@ from steptwin.motion.divisions import profile_of
 from steptwin.motion.elastic import DriveStretch, Response, Spring
 from steptwin.state import Plain, Stateful
 from steptwin.world.course import Course
+from steptwin.world.drawing import rail
 from steptwin.world.element import Element, NamedSpec, Reference, Row, Table
 from steptwin.world.elements.axis import AXIS, BuiltAxis, find_axis
 from steptwin.world.elements.switch import SWITCH, SwitchSpec, lane_of, put_switch, read_switches, zone_of
@@ -244,6 +245,7 @@ CARRIAGE: Element[CarriageSpec, Carriage] = Element(
     refers=_refers,
     build=_build,
     signals=_signals,
+    drawing=lambda carriage: rail(carriage.axis.spec.travel, tuple(one.zone for one in carriage.spec.switches)),
     lanes=lambda spec: tuple(lane_of(spec.name, n) for n in range(1, len(spec.switches) + 1)),
     faults=(
         FaultKind(

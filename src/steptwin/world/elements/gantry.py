@@ -11,6 +11,7 @@ from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.world.board import Board
 from steptwin.world.condition import SignalCondition
+from steptwin.world.drawing import Drawing, rail
 from steptwin.world.elements.axis import BuiltAxis, find_axis
 from steptwin.world.elements.collision import JAM, REPORT, RESET, Touch
 from steptwin.world.elements.logic import STUCK_OUTPUT, BoardSpec, Joint, with_terminals
@@ -107,6 +108,10 @@ class Gantry(Touch):
         return min((due for due in dues if due is not None), default=None)
 
     @property
+    def drawing(self) -> Drawing:
+        return rail(self._ends[0].spec.travel)
+
+    @property
     def unit(self) -> str:
         return self._ends[0].scale.unit
 
@@ -169,6 +174,7 @@ GANTRY = with_terminals(
     ),
     make=_make,
     signals=_signals,
+    drawing=lambda gantry: gantry.drawing,
     faults=(
         STUCK_OUTPUT,
         FaultKind(

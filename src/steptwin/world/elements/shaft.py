@@ -12,6 +12,7 @@ from typing import Any
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.world.contacts import Zone
+from steptwin.world.drawing import DIAL, Drawing, SensorZone
 from steptwin.world.element import Element, NamedSpec, Reference, Row, Table
 from steptwin.world.elements.axis import AXIS, BuiltAxis, find_axis, turns_of_axis
 from steptwin.world.elements.contact import CONTACT_KEYS
@@ -39,6 +40,11 @@ class CamSpec:
     bounce: Nanos
     bounces: int
     path: Path = ()
+
+    @property
+    def zone(self) -> SensorZone:
+        """Where it is on, as it is drawn."""
+        return SensorZone(self.target, self.begin, self.end if self.end > self.begin else self.end + TURN)
 
 
 CAM = TableRows(
@@ -153,5 +159,6 @@ SHAFT: Element[ShaftSpec, GearedShaft] = Element(
     refers=_refers,
     build=_build,
     signals=_signals,
+    drawing=lambda shaft: Drawing(DIAL, float(TURN), ("angle",), sensors=tuple(one.zone for one in shaft.spec.cams)),
     lanes=lambda spec: tuple(lane_of(spec.name, n) for n in range(1, len(spec.cams) + 1)),
 )

@@ -102,8 +102,10 @@ class ContactSpec(Protocol):
     def path(self) -> Path: ...
 
 
-def put_switch(kernel: Kernel, carriage: Carriage, moved_by: str, zone: Zone, spec: ContactSpec, lane: str, site: Site) -> None:
-    """Put a switch where a carriage, which the machine or element ``moved_by`` moves, runs over it."""
+def put_switch(
+    kernel: Kernel, carriage: Carriage, moved_by: str | tuple[str, ...], zone: Zone, spec: ContactSpec, lane: str, site: Site
+) -> None:
+    """Put a switch where a carriage, which the machines or elements ``moved_by`` move, runs over it."""
     circuit = site.circuit(kernel, spec.target, (*spec.path, "to"), spec.join)
     part = Switch(
         circuit,
@@ -116,7 +118,7 @@ def put_switch(kernel: Kernel, carriage: Carriage, moved_by: str, zone: Zone, sp
         chance=site.bounce_of(circuit),
         lane=lane,
     )
-    kernel.add_part(part, (moved_by,))
+    kernel.add_part(part, (moved_by,) if isinstance(moved_by, str) else moved_by)
 
 
 def zone_of(spec: SwitchSpec, places: Callable[[float], int], period: Fraction | int | None = None) -> Zone:

@@ -368,6 +368,7 @@ export type Description = {
         high: number | null;
         period: number | null;
       })[];
+      low: number;
     } | null;
   })[];
   connections: ({

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { Mechanics } from "../../lib/state/model";
-import { bodyOf, trackOf, zonesOf } from "./geometry";
+import { arcOf, bodyOf, trackOf, zonesOf } from "./geometry";
 
 const axis = (more: Partial<Mechanics>): Mechanics =>
   ({ name: "x", unit: "mm", kind: "linear", travel: null, switches: [], ...more }) as Mechanics;
@@ -35,7 +35,10 @@ test("marks come again", () => {
 });
 
 test("a rod comes out of its body, a workpiece ends behind its front", () => {
-  expect(bodyOf({ shape: "rod", length: 60, size: 0 }, 15)).toEqual([0, 0.25]);
-  expect(bodyOf({ shape: "belt", length: 400, size: 40 }, 200)).toEqual([0.4, 0.5]);
-  expect(bodyOf({ shape: "belt", length: 400, size: 40 }, 20)).toEqual([0, 0.05]);
+  expect(bodyOf({ shape: "rod", length: 60, size: 0, low: 0 }, 15)).toEqual([0, 0.25]);
+  expect(bodyOf({ shape: "belt", length: 400, size: 40, low: 0 }, 200)).toEqual([0.4, 0.5]);
+  expect(bodyOf({ shape: "belt", length: 400, size: 40, low: 0 }, 20)).toEqual([0, 0.05]);
+  expect(bodyOf({ shape: "slide", length: 400, size: 0, low: -100 }, 0)).toEqual([0.25, 0.25]);
+  expect(arcOf(10, 0, 90)).toBe("M0.00 -10.00 A10 10 0 0 1 10.00 -0.00");
+  expect(arcOf(10, 90, 360)).toBe("M10.00 -0.00 A10 10 0 1 1 -0.00 -10.00");
 });

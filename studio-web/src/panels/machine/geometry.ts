@@ -49,11 +49,20 @@ export function turnOf(unit: string): number {
   return unit === "degree" ? 360 : 1;
 }
 
+/** The arc of a circle with this radius from one angle to another in degrees, 0 above, clockwise. */
+export function arcOf(radius: number, from: number, to: number): string {
+  const at = (degrees: number) => {
+    const radians = (degrees * Math.PI) / 180;
+    return `${(radius * Math.sin(radians)).toFixed(2)} ${(-radius * Math.cos(radians)).toFixed(2)}`;
+  };
+  return `M${at(from)} A${radius} ${radius} 0 ${to - from > 180 ? 1 : 0} 1 ${at(to)}`;
+}
+
 /** Where a body is drawn, from and to as fractions of the track. */
 export function bodyOf(
-  { shape, length, size }: { shape: string; length: number; size: number },
+  { shape, length, size, low }: { shape: string; length: number; size: number; low: number },
   place: number,
 ): [number, number] {
-  const part = (at: number) => Math.min(1, Math.max(0, at / length));
+  const part = (at: number) => Math.min(1, Math.max(0, (at - low) / length));
   return [shape === "rod" ? 0 : part(place - size), part(place)];
 }

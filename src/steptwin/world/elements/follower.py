@@ -1,0 +1,249 @@
+"""``[[follower]]``: a slide or lever that a cam disc on a shaft moves: its place is a table over the angle of the shaft."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import partial
+from math import floor
+from typing import ClassVar
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.state import Stateful
+from steptwin.world.cam import Cam
+from steptwin.world.drawing import ROD, Drawing
+from steptwin.world.element import Element, NamedSpec, Reference, Row, Table
+from steptwin.world.elements.axis import AXIS, turns_of_axis
+from steptwin.world.elements.shaft import SHAFT, TURN, GearedShaft
+from steptwin.world.elements.switch import SWITCH, SwitchSpec, lane_of, put_switch, read_switches, zone_of
+from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
+from steptwin.world.faults.table import ElementEffect, number
+from steptwin.world.names import Unknown
+from steptwin.world.reader import Key, TomlText, optional
+from steptwin.world.sense import TableRows
+from steptwin.world.signals import SignalOf
+from steptwin.world.site import Site
+from steptwin.world.spec import WorldSpec
+from steptwin.world.values import NameOf, name_value, points, text_value
+
+PLACES = 10**6
+"""Places of a unit of the follower: nanometres of a millimetre."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FollowerSpec(NamedSpec):
+    shaft: str
+    points: tuple[tuple[float, float], ...]
+    unit: str
+    switches: tuple[SwitchSpec, ...]
+
+    @property
+    def highest(self) -> float:
+        return max(lift for _, lift in self.points)
+
+
+class Follower(Stateful):
+    """Is where the cam lifts it at the whole pulse of the axis that turns the shaft; it never leaves the cam."""
+
+    __slots__ = ("_cam", "_held", "_share", "shaft", "spec")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_cam", "shaft", "spec"})
+
+    def __init__(self, spec: FollowerSpec, shaft: GearedShaft) -> None:
+        self.spec = spec
+        self.shaft = shaft
+        turn = abs(shaft.pulses_per_turn)
+        found = ((shaft.place(angle), Fraction(str(lift))) for angle, lift in spec.points)
+        self._cam = Cam(((place - floor(place / turn) * turn, lift) for place, lift in found), turn)
+        self._held: Fraction | None = None
+        """Fault: the place at which it is stuck."""
+        self._share = Fraction(1)
+        """Fault: of its lift that a worn cam gives it."""
+
+    # ------------------------------------------------------------------ part of a kernel
+
+    def update(self, now: Nanos) -> None:
+        """It has no state of its own: the kernel looks again at what depends on it."""
+
+    def deadline(self) -> Nanos | None:
+        """None: its motion is that of its axis."""
+        return None
+
+    # ------------------------------------------------------------------ the carriage of switches
+
+    def version(self) -> object:
+        return self.shaft.axis.mechanism.version(), self._held, self._share
+
+    def lift(self, now: Nanos) -> Fraction:
+        return self._cam.lift(self.shaft.axis.mechanism.place(now)) * self._share if self._held is None else self._held
+
+    def place(self, now: Nanos) -> int:
+        return floor(self.lift(now) * PLACES + Fraction(1, 2))
+
+    def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
+        if self._held is not None or self._share == 0:
+            return None
+        mechanism = self.shaft.axis.mechanism
+        level = Fraction(2 * position - direction, 2 * PLACES) / self._share
+        here, found = mechanism.place(after), []
+        for way in (1, -1):
+            place = self._cam.next(level, here, direction, way)
+            if place is not None and (due := mechanism.reaches(place, after, way)) is not None:
+                found.append(due)
+        return min(found, default=None)
+
+    # ------------------------------------------------------------------ signals and faults
+
+    def position(self, now: Nanos) -> float:
+        return float(self.lift(now))
+
+    def turns(self, now: Nanos) -> Iterator[Nanos]:
+        """Moments after ``now`` between which it moves one way."""
+        if self._held is not None:
+            return
+        for leg in (*turns_of_axis(self.shaft.axis, now), None):
+            yield from self._corners(now, leg)
+            if leg is not None:
+                yield leg
+                now = leg
+
+    def _corners(self, begin: Nanos, end: Nanos | None) -> Iterator[Nanos]:
+        """When its axis, which goes one way from ``begin`` to ``end``, passes points of the cam, in one revolution."""
+        mechanism = self.shaft.axis.mechanism
+        here = mechanism.place(begin)
+        for way in (1, -1):
+            now = begin
+            for place in self._cam.corners(here, way):
+                due = mechanism.reaches(place, now, way)
+                if due is None or (end is not None and due >= end):
+                    break
+                if due > now + 1:
+                    yield due - 1
+                yield due
+                now = due
+
+    def hold(self, holds: bool, now: Nanos) -> None:
+        self._held = self.lift(now) if holds else None
+        self.shaft.axis.kernel.mark(self.spec.name)
+
+    def wear(self, share: float) -> None:
+        self._share = Fraction(str(share))
+        self.shaft.axis.kernel.mark(self.spec.name)
+
+    @property
+    def drawing(self) -> Drawing:
+        return Drawing(ROD, self.spec.highest, ("position",), sensors=tuple(one.zone for one in self.spec.switches))
+
+
+def _stick(active: ActiveFault, follower: Follower, begins: bool, now: Nanos) -> str:
+    follower.hold(begins, now)
+    return f"{follower.spec.name} {'is stuck' if begins else 'follows its cam again'}"
+
+
+def _wear(active: ActiveFault, follower: Follower, begins: bool, now: Nanos) -> str:
+    share = active.fault.number("share") if begins else 1.0
+    follower.wear(share)
+    return f"the cam of {follower.spec.name} has {share:g} of its lift"
+
+
+# ---------------------------------------------------------------------- the element
+
+
+def _read(text: TomlText, row: Row, table: Table) -> FollowerSpec:
+    spec = FollowerSpec(**row, switches=tuple(read_switches(text, row["path"], table)))
+    angles = [angle for angle, _ in spec.points]
+    where = (*spec.path, "points")
+    if len(angles) < 2 or not (angles[0] >= 0.0 and angles[-1] < TURN):
+        text.wrong(where, "D007", f"{len(angles)} angles: a cam has at least two, from 0 to below {TURN} degrees")
+    if min(lift for _, lift in spec.points) < 0.0 or spec.highest == 0.0:
+        text.wrong(where, "D007", "lifts are counted from 0, and one of them is above 0")
+    return spec
+
+
+def _machine(spec: FollowerSpec, world: WorldSpec) -> str:
+    """What drives the axis of its shaft; otherwise the name that does not exist."""
+    axes = {shaft.name: shaft.axis for shaft in world.elements_of(SHAFT)}
+    drives = {axis.name: axis.drive[0] for axis in world.elements_of(AXIS)}
+    axis = axes.get(spec.shaft)
+    return spec.shaft if axis is None else drives.get(axis, axis)
+
+
+def _refers(spec: FollowerSpec, world: WorldSpec) -> Iterator[Reference]:
+    machine = _machine(spec, world)
+    yield Reference(machine, machine, (*spec.path, "shaft"))
+    for switch in spec.switches:
+        yield Reference(machine, switch.target[0], (*switch.path, "to"))
+
+
+def _build(spec: FollowerSpec, site: Site) -> Follower:
+    shaft = site.parts.built(SHAFT).get(spec.shaft)
+    if shaft is None:
+        raise Unknown(spec.shaft, f"no shaft is called {spec.shaft!r}")
+    if abs(shaft.pulses_per_turn) < 2 * len(spec.points):
+        raise Misuse(f"points: a turn of {spec.shaft!r} has {float(abs(shaft.pulses_per_turn)):g} imp, too few for so many")
+    follower = Follower(spec, shaft)
+    kernel = shaft.axis.kernel
+    kernel.add_part(follower, (shaft.axis.mechanism.machine, shaft.axis.spec.name, spec.name), spec.name)
+    for n, switch in enumerate(spec.switches, start=1):
+        site.unless_wrong(switch.path, partial(_put_switch, follower, switch, lane_of(spec.name, n), site))
+    return follower
+
+
+def _put_switch(follower: Follower, spec: SwitchSpec, lane: str, site: Site) -> None:
+    if spec.period is not None:
+        raise Misuse(f"period = {spec.period:g}: a follower moves between two ends, its switches have one zone")
+
+    def places(units: float) -> int:
+        return floor(Fraction(str(units)) * PLACES + Fraction(1, 2))
+
+    zone = zone_of(spec, places)
+    mechanism = follower.shaft.axis.mechanism
+    kernel = follower.shaft.axis.kernel
+    put_switch(kernel, follower, (mechanism.machine, follower.spec.name), zone, spec, lane, site)
+
+
+def _signals(follower: Follower) -> Mapping[str, SignalOf]:
+    source, spec = (follower.shaft.axis.kernel.source(follower.spec.name),), follower.spec
+    bounds = 0.0, spec.highest
+    return {"position": SignalOf(source, follower.position, follower.turns, follower.version, spec.unit, bounds)}
+
+
+FOLLOWER: Element[FollowerSpec, Follower] = Element(
+    name="follower",
+    spec=FollowerSpec,
+    rows=TableRows(
+        written="[[follower]]",
+        keys=(
+            Key("name", name_value, "how conditions and faults name it"),
+            Key("shaft", NameOf("shaft"), "the shaft that its cam disc is on"),
+            Key("points", points, "[[degrees, lift], ...], linear between, also from the last to the first"),
+            optional(text_value, "unit", "of its lift: mm, cm, m, degree or anything", "mm"),
+        ),
+    ),
+    inner={"switch": SWITCH},
+    inner_attributes={"switch": "switches"},
+    read=_read,
+    refers=_refers,
+    build=_build,
+    signals=_signals,
+    drawing=lambda follower: follower.drawing,
+    lanes=lambda spec: tuple(lane_of(spec.name, n) for n in range(1, len(spec.switches) + 1)),
+    faults=(
+        FaultKind(
+            "stuck-follower",
+            Layer.ELEMENT,
+            Occasion.ALWAYS,
+            "A follower stays where it is; afterwards it is on its cam again at once.",
+            effect=ElementEffect(_stick),
+        ),
+        FaultKind(
+            "worn-cam",
+            Layer.ELEMENT,
+            Occasion.ALWAYS,
+            "A cam lifts its follower by a share only.",
+            own=(number("share", "Of its lift.", 0.0, 1.0, default=0.9),),
+            effect=ElementEffect(_wear),
+        ),
+    ),
+)
