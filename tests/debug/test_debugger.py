@@ -398,3 +398,32 @@ def test_a_run_in_parts_can_be_ended_anywhere() -> None:
     assert stop.time == debugger.now > SECOND
     debugger.step_over("m")
     debugger.step_back("m")
+
+
+def test_a_breakpoint_that_no_run_comes_to_says_so() -> None:
+    program = "n = 1\nMAIN:\n    n = n + 1\nJUMP MAIN\nOUT1 = ON\nJUMP OUTSIDE\nOUTSIDE:\nRETURN\nINT_IN3:\n    n = 5\nRETURN\n"
+    debugger = Debugger(make(program))
+    debugger.run_to_entry()
+    points = [at(1), at(3), at(5), at(8), at(10), LabelPoint(label="OUTSIDE")]
+
+    def notes() -> list[str]:
+        found = debugger.set_breakpoints(points)
+        assert all(point.is_set for point in found)
+        return [point.note for point in found]
+
+    dead = ["no way of the program leads to line 5", "no way of the program leads to line 8"]
+    assert notes() == ["", "", *dead, "", "no way of the program leads to line 8"]
+    debugger.run()
+    debugger.step_in("m")
+    once = "from where it is, the program comes to line 1 only if it is started again"
+    assert notes() == [once, "", *dead, "", "no way of the program leads to line 8"]
+    debugger.step_back("m")
+    debugger.step_back("m")
+    assert (line(debugger), notes()[0]) == (1, "")
+
+
+def test_a_command_of_an_m1486_that_was_executed_at_power_on() -> None:
+    debugger = Debugger(make(world=BOTH))
+    found = debugger.set_breakpoints([LinePoint(machine="c", text="program", line=number) for number in (2, 5, 10)])
+    once = "from where it is, the program comes to line 2 only if it is started again"
+    assert [point.note for point in found] == [once, "", ""]

@@ -238,9 +238,9 @@ class Adapter:
         return [by_point[point] for point in wanted]
 
     def _point(self, found: SetPoint, source: object = None) -> Body:
-        body: dict[str, object] = {"id": found.number, "verified": found.is_set}
-        if found.problem:
-            body["message"] = found.problem
+        body: dict[str, object] = {"id": found.number, "verified": found.is_set and not found.note}
+        if message := found.problem or found.note:
+            body["message"] = message
         if found.line is not None:
             body |= {"line": found.line - 1 + self._first_line, "source": source}
         return body

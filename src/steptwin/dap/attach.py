@@ -168,7 +168,7 @@ class AttachedTwin:
                 answer = self._ask(_wanted(point))
             except Misuse as error:
                 return SetPoint(0, problem=str(error))
-            self._set[point] = SetPoint(answer["number"], (), answer["line"])
+            self._set[point] = SetPoint(answer["number"], (), answer["line"], note=answer["problem"] or "")
         return self._set[point]
 
     def set_events(self, events: Iterable[Events]) -> None:

@@ -13,6 +13,7 @@ from steptwin.debug.values import DataPoint, LabelPoint, LinePoint, SetPoint
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.nearmiss import NearMiss
+from steptwin.world.plant import Plant
 from steptwin.world.programs import Place, Programs
 
 MOST_HITS = 1 << 16
@@ -162,6 +163,18 @@ def _labels(programs: Mapping[str, Programs]) -> Iterator[tuple[str, str, str, i
                 yield machine, text, name, number
 
 
+def _why_not_reached(programs: Programs, place: Place, standing: Plant | None, machine: str) -> str:
+    """Why a program will not come to a statement; empty where it can."""
+    line = programs.statements(place.text)[place.number].line
+    if place.number not in programs.reached(place.text, (0,)):
+        return f"no way of the program leads to line {line}"
+    stack = () if standing is None else standing.programs_of(machine).stack(standing.now)
+    here = [frame.place.number for frame in stack if frame.place.text == place.text]
+    if here and place.number not in programs.reached(place.text, here):
+        return f"from where it is, the program comes to line {line} only if it is started again"
+    return ""
+
+
 class Breakpoints:
     """All breakpoints that are set. ``calculate`` is of the world in which they are looked for."""
 
@@ -174,13 +187,14 @@ class Breakpoints:
         """By controller and statement."""
         self._next = 1
 
-    def set(self, asked: Sequence[AnyPoint]) -> list[SetPoint]:
-        """Set these and no others. Those that were set before keep their number and their hits."""
+    def set(self, asked: Sequence[AnyPoint], standing: Plant | None = None) -> list[SetPoint]:
+        """Set these and no others. Those that were set before keep their number and their hits. ``standing``: where the programs
+        go on from, if nobody else can start them again."""
         known: dict[AnyPoint, Breakpoint] = {point.asked: point for point in self._all}
         self._all, self.watches, self.at = [], [], {}
-        return [self._set(one, known) for one in asked]
+        return [self._set(one, known, standing) for one in asked]
 
-    def _set(self, asked: AnyPoint, known: Mapping[AnyPoint, Breakpoint]) -> SetPoint:
+    def _set(self, asked: AnyPoint, known: Mapping[AnyPoint, Breakpoint], standing: Plant | None) -> SetPoint:
         before = known.get(asked)
         number = self._next if before is None else before.number
         self._next += before is None
@@ -204,7 +218,9 @@ class Breakpoints:
         for machine, its_places in places.items():
             for place in its_places:
                 self.at.setdefault(machine, {}).setdefault(place, []).append(point)
-        return SetPoint(number, [place for its in places.values() for place in its], line)
+        found = [(machine, place) for machine, its in places.items() for place in its]
+        notes = [_why_not_reached(self._programs[machine], place, standing, machine) for machine, place in found]
+        return SetPoint(number, [place for _, place in found], line, note="" if "" in notes else notes[0])
 
     def reading_others(self) -> list[str]:
         """The controllers with conditions that depend on what has no connection to them."""

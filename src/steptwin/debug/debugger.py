@@ -198,7 +198,7 @@ class Debugger:
     def set_breakpoints(self, points: Sequence[AnyPoint]) -> Sequence[SetPoint]:
         """Set these breakpoints and no others; what became of each."""
         self._scout.release()
-        return self._scout.points.set(points)
+        return self._scout.points.set(points, self.view if self._is_own_history else None)
 
     def set_events(self, events: Iterable[Events]) -> None:
         """Stop at these events and no others."""

@@ -100,6 +100,8 @@ class SetPoint(NamedTuple):
     line: int | None = None
     """Of the statement, which may come after the line that was asked for."""
     problem: str = ""
+    note: str = ""
+    """Why it is set, but no run comes there."""
 
     @property
     def is_set(self) -> bool:

@@ -141,7 +141,8 @@ class Debugging:
         found = self._set.get(number)
         given = {name: value for name, value in asdict(self._breakpoints[number].wanted).items() if name != "line"}
         line = self._breakpoints[number].wanted.line if found is None or found.line is None else found.line
-        return {"number": number, **given, "line": line, "problem": found.problem or None if found is not None else None}
+        why_not = None if found is None else found.problem or found.note or None
+        return {"number": number, **given, "line": line, "problem": why_not}
 
     def _list(self) -> object:
         return {

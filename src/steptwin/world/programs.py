@@ -96,6 +96,11 @@ class Programs(Protocol):
         only close a block."""
         ...
 
+    def reached(self, text: str, starts: Collection[int]) -> Collection[int]:
+        """The statements of a text, by number, that can be executed after those at ``starts``, by any way and in interrupts;
+        these included."""
+        ...
+
     def labels(self, text: str) -> Mapping[str, int]:
         """Numbers of the statements at labels and interrupts, by name."""
         ...

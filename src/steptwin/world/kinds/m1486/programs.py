@@ -5,6 +5,7 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Collection, Mapping, Sequence
 
+from steptwin.controlflow import ControlFlow
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.m1486.chip import M1486Chip
@@ -83,11 +84,20 @@ class _Text:
     def after(self) -> Mapping[int, Sequence[int]]:
         if self._stream is None:
             return {}
-        flow = flow_of(self._stream, self._chip.variant, self._chip.interface)
+        flow = self._flow(self._stream)
         return {
             number: tuple(bisect_left(self._indices, target) for target in flow.calls.get(index, flow.after[index]))
             for number, index in enumerate(self._indices)
         }
+
+    def reached(self, starts: Collection[int]) -> Collection[int]:
+        if self._stream is None:
+            return ()
+        found = self._flow(self._stream).reached([self._indices[number] for number in starts if number < len(self._indices)])
+        return [number for number, index in enumerate(self._indices) if index in found]
+
+    def _flow(self, stream: CommandStream) -> ControlFlow:
+        return flow_of(stream, self._chip.variant, self._chip.interface)
 
     def name(self, number: int) -> str:
         """Of the label at or before a statement."""
@@ -127,6 +137,9 @@ class ChipPrograms:
 
     def after(self, text: str) -> Mapping[int, Sequence[int]]:
         return self._text.after()
+
+    def reached(self, text: str, starts: Collection[int]) -> Collection[int]:
+        return self._text.reached(starts)
 
     def labels(self, text: str) -> Mapping[str, int]:
         return self._text.labels

@@ -63,6 +63,9 @@ class WbcPrograms:
     def after(self, text: str) -> Mapping[int, Sequence[int]]:
         return self._bank(text).after
 
+    def reached(self, text: str, starts: Collection[int]) -> Collection[int]:
+        return self._bank(text).reached(starts)
+
     def labels(self, text: str) -> Mapping[str, int]:
         return self._bank(text).labels
 
@@ -137,6 +140,9 @@ class _Bank:
     def after(self) -> Mapping[int, Sequence[int]]:
         following = self._flow.after
         return {number: following[number] for number, step in enumerate(self.program.steps) if not isinstance(step, BLOCK_MARKS)}
+
+    def reached(self, starts: Collection[int]) -> Collection[int]:
+        return self._flow.reached((*starts, *self._flow.interrupts))
 
     @cached_property
     def _flow(self) -> ControlFlow:
