@@ -113,7 +113,7 @@ def test_what_is_not_kept_is_refused_and_looks_are_bounded(run: Run) -> None:
         looks = [rig.lookback.open() for _ in range(module.MOST_LOOKS)]
         with pytest.raises(Refusal, match="8 viewers look back already"):
             rig.lookback.open()
-        with pytest.raises(Misuse, match="the past is kept from 0 to 2000000000 ns"):
+        with pytest.raises(Misuse, match="the past is kept from 0 s to 2 s"):
             await result_of(looks[0].go(3 * SECOND))
         await result_of(looks[0].go(SECOND))
         looks[0].close()
@@ -153,7 +153,7 @@ def test_the_world_goes_back_to_what_is_looked_at_and_its_session_replays(run: R
         assert rig.world.now == moment + SECOND
         later = rig.lookback.open()
         assert await at(later, moment) == seen
-        with pytest.raises(Misuse, match="is kept from 0 to"):
+        with pytest.raises(Misuse, match="is kept from 0 s to"):
             await result_of(later.go(moment + 2 * SECOND))
         later.close()
         return await rig.end()

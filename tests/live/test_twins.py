@@ -20,11 +20,18 @@ MACHINE = {
     "pid": 7,
     "file": "/plant/machine.toml",
     "controllers": [
-        {"name": "table", "kind": "mic488", "line": "bus", "unit": 1, "firmware": "1.70"},
-        {"name": "drum", "kind": "mic488", "line": "bus", "unit": 2, "firmware": "1.40"},
-        {"name": "left", "kind": "m1486", "line": "chips", "chip": "7", "variant": "E1"},
-        {"name": "right", "kind": "m1486", "line": "chips", "chip": "A", "variant": "E1"},
-        {"name": "alone", "kind": "mic488", "line": None},
+        {"name": "table", "kind": "mic488", "line": "bus", "unit": 1, "firmware": "1.70", "axes": []},
+        {
+            "name": "drum",
+            "kind": "mic488",
+            "line": "bus",
+            "unit": 2,
+            "firmware": "1.40",
+            "axes": [{"unit": "mm", "pulses_per_unit": 200.0}],
+        },
+        {"name": "left", "kind": "m1486", "line": "chips", "chip": "7", "variant": "E1", "axes": []},
+        {"name": "right", "kind": "m1486", "line": "chips", "chip": "A", "variant": "E1", "axes": []},
+        {"name": "alone", "kind": "mic488", "line": None, "axes": []},
     ],
     "end_points": [
         {"kind": "pty", "protocol": "Modbus RTU, bus", "line": "bus", "path": "/run/bus"},
@@ -37,7 +44,7 @@ DEMO = {
     "name": "mic488",
     "pid": 8,
     "file": None,
-    "controllers": [{"name": "mic488", "kind": "mic488", "line": "modbus", "unit": 3, "firmware": "1.70"}],
+    "controllers": [{"name": "mic488", "kind": "mic488", "line": "modbus", "unit": 3, "firmware": "1.70", "axes": []}],
     "end_points": [
         {"kind": "rtu-tcp", "protocol": "RTU over TCP", "line": "modbus", "host": "127.0.0.1", "port": 5021},
         {"kind": "tcp", "protocol": "Modbus TCP", "line": "modbus", "host": "127.0.0.1", "port": 5020},
@@ -47,7 +54,7 @@ CABLE = {
     "name": "cable",
     "pid": 9,
     "file": None,
-    "controllers": [{"name": "cable", "kind": "m1486", "line": "m1486", "chip": "F", "variant": "A"}],
+    "controllers": [{"name": "cable", "kind": "m1486", "line": "m1486", "chip": "F", "variant": "A", "axes": []}],
     "end_points": [{"kind": "serial", "protocol": "M1486 line", "line": "m1486", "device": "/dev/ttyUSB0", "baud": 9600}],
 }
 
@@ -93,7 +100,7 @@ def m1486(place: str, chip: int | None = None, variant: str | None = None) -> De
     return DeviceAddress(place, "m1486", chip, 4800, 0.5, variant)
 
 
-DRUM = mic488("tcp://127.0.0.1:6000", 2, "1.40")
+DRUM = replace(mic488("tcp://127.0.0.1:6000", 2, "1.40"), scales=(("mm", 200.0),))
 DEMO_AT = mic488("tcp://127.0.0.1:5020", 3, "1.70")
 RIGHT = m1486("rfc2217://[::1]:6002", 10, "E1")
 
@@ -107,6 +114,7 @@ RIGHT = m1486("rfc2217://[::1]:6002", 10, "E1")
         ("machine.DRUM", DRUM, ("machine", "drum")),
         ("machine,unit=2", DRUM, ("machine", "drum")),
         ("/plant/machine.toml,unit=2", DRUM, ("machine", "drum")),
+        ("127.0.0.1:6000,unit=2,firmware=1.40", DRUM, ("machine", "drum")),
         ("machine.right", RIGHT, ("machine", "right")),
         ("machine,chip=a", RIGHT, ("machine", "right")),
         ("127.0.0.1:5021,unit=3", mic488("rtu-tcp://127.0.0.1:5021", 3), ("mic488", "mic488")),

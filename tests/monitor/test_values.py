@@ -72,8 +72,7 @@ def test_a_twin_that_is_followed_shows_what_polling_shows(twin: RemoteSubject) -
     assert followed.values.keys() == polled.values.keys(), "M1_HOME can only be written"
     for name, (value, _) in polled.values.items():
         assert followed.values[name][0] == pytest.approx(value, abs=0.011), name
-    # A driver without the configuration does not know the unit.
-    assert (followed.status.units[0], polled.status.units[0]) == ("mm", "u")
+    assert (followed.status.units[0], polled.status.units[0]) == ("mm", "mm")
 
 
 def test_a_motion_costs_neither_frames_nor_reads(twin: RemoteSubject) -> None:

@@ -288,7 +288,7 @@ def test_a_question_changes_nothing() -> None:
     [
         ("cell.OUT99", None, "no signal"),
         ("nothing.x == 1", None, "nothing is called 'nothing'"),
-        ("cell", 6.0, "the past is known from 0 to 5 s"),
+        ("cell", 6.0, "6 s: the past is kept from 0 s to 5 s"),
         ("cell.OUT1 ==", None, "ends too early"),
     ],
 )

@@ -180,7 +180,9 @@ def test_a_program_outside_talks_to_it() -> None:
     assert port.exchange(b"\0", 0) == b"P\0"
     live.advance(200_000_000)
     assert port.exchange(b"P\0", 200_000_000) == b"P\x02"
-    assert announced(live.world) == [{"line": "bus", "name": "t", "kind": "toy"}]
+    assert announced(live.world) == [
+        {"line": "bus", "name": "t", "kind": "toy", "axes": [{"unit": "pulse", "pulses_per_unit": 1.0}]}
+    ]
 
 
 def test_the_live_view_shows_it(run: Callable[..., Any]) -> None:

@@ -8,16 +8,18 @@ from pathlib import Path
 from steptwin.commands.up_world import UpOptions
 from steptwin.files.world import World
 from steptwin.inputfiles import read_bytes
+from steptwin.live.clients import listening
 from steptwin.live.directory import runtime_directory
 from steptwin.system import HAS_PTYS
 from steptwin.textcodec import decode
+from steptwin.world.addresses import Address
 from steptwin.world.description import read_world
 
 FOLDER = Path(__file__).with_name("demo_machine")
 NAME = "demo"
 HOST = "127.0.0.1"
-BUS_TCP, BUS_RTU_TCP, CHIPS_TCP = 5020, 5021, 5022
-"""Ports, as those of `steptwin serve`."""
+PORTS = (5020, 5021, 5022)
+"""Of the bus over Modbus TCP and RTU over TCP, and of the chips, as those of `steptwin serve`."""
 
 
 def demo_world(options: UpOptions, *, free_ports: bool = False) -> World:
@@ -35,13 +37,25 @@ def demo_world(options: UpOptions, *, free_ports: bool = False) -> World:
 
 
 def describe_demo(*, free_ports: bool = False) -> str:
-    """The description with its ports."""
+    """The description with its ports and pseudo terminals; where others have these, a free port and none."""
     text = decode(read_bytes(FOLDER / "demo.toml"), "demo.toml").text
-    ports = (0, 0, 0) if free_ports else (BUS_TCP, BUS_RTU_TCP, CHIPS_TCP)
-    tcp, rtu_tcp, chips = (f"{HOST}:{port}" for port in ports)
+    tcp, rtu_tcp, chips = (f"{HOST}:{0 if free_ports or _is_taken(port) else port}" for port in PORTS)
     ptys = HAS_PTYS and not free_ports
-    bus = {"pty": str(runtime_directory() / "mic488") if ptys else None, "tcp": tcp, "rtu_tcp": rtu_tcp}
-    line = {"pty": str(runtime_directory() / "m1486") if ptys else None, "tcp": chips}
+    bus = {"pty": _pty("mic488") if ptys else None, "tcp": tcp, "rtu_tcp": rtu_tcp}
+    line = {"pty": _pty("m1486") if ptys else None, "tcp": chips}
     for mark, keys in (("# ports of bus", bus), ("# ports of chips", line)):
         text = text.replace(mark, "\n".join(f"{key} = {json.dumps(value)}" for key, value in keys.items() if value is not None))
     return text
+
+
+def _is_taken(port: int) -> bool:
+    try:
+        listening(Address(HOST, port)).close()
+    except OSError:
+        return True
+    return False
+
+
+def _pty(name: str) -> str | None:
+    path = runtime_directory() / name
+    return None if path.exists() else str(path)

@@ -24,7 +24,7 @@ from steptwin.subject.time import next_due
 from steptwin.why.answer import Answer
 from steptwin.why.kept import KeptPast
 from steptwin.world.actions import ExternalInput
-from steptwin.world.history import History
+from steptwin.world.history import History, outside_past
 from steptwin.world.plant import Plant, PlantSnapshot
 from steptwin.world.programs import Place, Programs
 
@@ -346,7 +346,7 @@ class Debugger:
 
     def going(self, moment: Nanos) -> Travel:
         if not self.begin <= moment <= self.present:
-            raise Misuse(f"{moment} ns: the past is kept from {self.begin} to {self.present} ns")
+            raise Misuse(outside_past(moment, self.begin, self.present))
         return self._going(moment)
 
     def _going(self, moment: Nanos) -> Travel:

@@ -51,7 +51,8 @@ class DeviceAddress:
     """A device address taken apart. ``timeout`` in s.
 
     ``number``: the address on the line (unit, chip), None if nothing is selected. ``variant``: firmware or type, None:
-    determined when opened. ``config``: the configuration file.
+    determined when opened. ``config``: the configuration file. ``scales``: unit and pulses per unit of each axis, which a running
+    twin announces; empty where they are not known.
     """
 
     place: str
@@ -61,6 +62,7 @@ class DeviceAddress:
     timeout: float
     variant: str | None = None
     config: str | None = None
+    scales: tuple[tuple[str, float], ...] = ()
 
 
 class ReadValue(NamedTuple):

@@ -46,7 +46,7 @@ class TwinController:
     """A controller of a running twin.
 
     ``address``: its address on the line; None without a line. ``type``: its variant. ``places``: addresses of the line from
-    this computer, the fastest first.
+    this computer, the fastest first. ``scales``: unit and pulses per unit of each axis.
     """
 
     twin: str
@@ -56,6 +56,7 @@ class TwinController:
     address: int | None
     type: str | None
     places: tuple[str, ...]
+    scales: tuple[tuple[str, float], ...]
 
     @property
     def full_name(self) -> str:
@@ -89,7 +90,7 @@ class TwinController:
         if how is None:
             raise LineFailure(f"{self.full_name} is of kind {self.kind}, for which there is no driver")
         known: dict[str, Any] = {"kind": self.kind, how.option: self.address, how.variant: self.type}
-        return device_at(text, self.places[0], {**known, **options})
+        return replace(device_at(text, self.places[0], {**known, **options}), scales=self.scales)
 
     def _why(self) -> str:
         if self.line is None:
@@ -153,7 +154,8 @@ def _controller(twin: str, announced: Mapping[str, Any], places: Mapping[str, st
     address = None if how is None or how.option not in announced else how.read(str(announced[how.option]))
     reached = () if line is None else tuple(place for place, there in places.items() if there == line)
     variant = None if how is None else announced.get(how.variant)
-    return TwinController(twin, announced["name"], announced["kind"], line, address, variant, reached)
+    scales = tuple((axis["unit"], axis["pulses_per_unit"]) for axis in announced["axes"])
+    return TwinController(twin, announced["name"], announced["kind"], line, address, variant, reached, scales)
 
 
 def _selection(kind: str) -> AddressSelection | None:
@@ -181,7 +183,8 @@ def find_device(text: str | None, *, whole_line: bool = False) -> DeviceAddress:
     if of_twin is None:
         address = _address(place or "")
         there = _controllers_at(address) if "kind" not in options else ()
-        return device_at(shown, address, {**({"kind": there[0].kind} if there else {}), **options})
+        found = device_at(shown, address, {**({"kind": there[0].kind} if there else {}), **options})
+        return replace(found, scales=next((each.scales for each in there if each.address == found.number), ()))
     meant = [each for each in of_twin if each.is_meant(options)]
     if whole_line and len(meant) > 1 and len({each.line for each in meant}) == 1 and all(map(_may_be_open, meant)):
         types = {each.type for each in meant}

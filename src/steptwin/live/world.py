@@ -28,12 +28,13 @@ MOST_INPUT_BYTES = 16 << 20
 
 
 def announced(world: World) -> list[dict[str, object]]:
-    """The announced controllers of a world: name, kind, line and present address."""
+    """The announced controllers of a world: name, kind, line, present address, and the units of axes."""
     found: list[dict[str, object]] = []
     for name, machine in world.machines.items():
         kind, on = world.kind(name), world.parts.line_of.get(name)
         where = {"line": None} if on is None else {"line": on[0].name, **kind.announced(machine, on[1])}
-        found.append({"name": name, "kind": kind.name, **where})
+        axes = [{"unit": axis.unit, "pulses_per_unit": axis.pulses_per_unit} for axis in kind.datasheet(machine).axes]
+        found.append({"name": name, "kind": kind.name, **where, "axes": axes})
     return found
 
 

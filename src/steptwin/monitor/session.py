@@ -199,6 +199,7 @@ def session_at(device: str | None, hz: float) -> MonitorSession:
         baud=address.baud,
         firmware=address.variant,
         config=address.config,
+        scales=address.scales,
         timeout_s=address.timeout,
         observe=True,
         log=lambda _: None,  # there have to be words for frames to be shown

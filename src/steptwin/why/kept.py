@@ -11,7 +11,7 @@ from functools import partial
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.why.question import Asking, Why
-from steptwin.world.history import History
+from steptwin.world.history import History, outside_past
 from steptwin.world.plant import Plant, PlantSnapshot
 
 FIRST_SPAN_NS: Nanos = 5 * SECOND
@@ -34,7 +34,7 @@ class KeptPast:
         now = history.world.now
         at = now if at is None else at
         if not history.begin <= at <= now:
-            raise Misuse(f"at_ns = {at}: the past is kept from {history.begin} to {now} ns")
+            raise Misuse(outside_past(at, history.begin, now))
         known, span = self._known, FIRST_SPAN_NS
         if known is None or not known.fits(at, now - span):
             known = self._known = _Known(history, max(history.begin, at - span))

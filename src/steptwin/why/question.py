@@ -17,6 +17,7 @@ from steptwin.why.sentences import statement
 from steptwin.world import script as do
 from steptwin.world.condition import SignalCondition
 from steptwin.world.expression import parse_condition
+from steptwin.world.history import outside_past
 from steptwin.world.plant import Plant, RecordedInput
 from steptwin.world.programs import Operand, OperandKind
 
@@ -85,7 +86,7 @@ class Why:
         """As `ask`, in parts."""
         moment, begin = self.end if at is None else at, self.log.begin
         if not begin <= moment <= self.end:
-            raise Misuse(f"at {moment / SECOND:g} s: the past is known from {begin / SECOND:g} to {self.end / SECOND:g} s")
+            raise Misuse(outside_past(moment, begin, self.end))
         text = question.strip().removeprefix("why ").strip()
         text = text or self._only_program()
         yield from self.log.run(self._inputs, self.end)

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Iterator
 from itertools import islice
 from typing import NamedTuple
 
+from steptwin.durations import duration_text
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.world.actions import size_of
@@ -57,6 +58,11 @@ def _bring(world: Plant, moment: Nanos, slice_ns: Nanos | None) -> Iterator[None
         if slice_ns is not None:
             world.settle_all()
         yield
+
+
+def outside_past(moment: Nanos, begin: Nanos, end: Nanos) -> str:
+    """The message about a moment of which nothing is known, ns."""
+    return f"{duration_text(moment)}: the past is kept from {duration_text(begin)} to {duration_text(end)}"
 
 
 class _State(NamedTuple):
@@ -144,7 +150,7 @@ class History:
         """The newest snapshot at or before a moment, and the number of inputs before it. Raises `Misuse` if there is none."""
         index = bisect_right(self._states, moment, key=lambda state: state.snapshot.now)
         if not index:
-            raise Misuse(f"to_ns = {moment}: the past is kept from {self.begin} to {self.world.now} ns")
+            raise Misuse(outside_past(moment, self.begin, self.world.now))
         return self._states[index - 1]
 
     @property
@@ -159,7 +165,7 @@ class History:
     def inputs_from(self, number: int) -> list[RecordedInput]:
         """The inputs after the first ``number``. Raises `Misuse` if they are no longer kept."""
         if not self.keeps_inputs_from(number):
-            raise Misuse(f"the past is kept from {self.begin} to {self.world.now} ns")
+            raise Misuse(f"the past is kept from {duration_text(self.begin)} to {duration_text(self.world.now)}")
         newest = list(islice(reversed(self._inputs), self.inputs_so_far - number))
         newest.reverse()
         return newest
@@ -207,7 +213,7 @@ class Past:
         """
         history = self._history
         if moment > history.world.now:
-            raise Misuse(f"to_ns = {moment}: the past is kept from {history.begin} to {history.world.now} ns")
+            raise Misuse(outside_past(moment, history.begin, history.world.now))
         if self._branch != history.branch:
             self._near.clear()
         state = self._state_at(moment)

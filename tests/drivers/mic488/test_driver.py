@@ -122,6 +122,17 @@ def test_with_dint_motions_need_gear() -> None:
     assert wire.position() == 300
 
 
+def test_gear_and_units_of_a_twin_need_no_file() -> None:
+    wire = Wire()
+    dint(wire)
+    mic = driver(wire, observe=True, config=None, scales=[("mm", 100.0), ("degree", 2.5), ("imp", 1.0), ("mm", 100.0)])
+    assert [mic.axis(n).unit for n in (1, 2, 3)] == ["mm", "degree", "imp"]
+    mic.enable(1)
+    mic.axis(1).move_to(3.0)
+    assert str(mic.axis(1).wait()) == "M1: target reached at 3 mm"
+    assert wire.position() == 300
+
+
 def test_gear_and_units_come_from_the_vendors_file(tmp_path: Path) -> None:
     path = tmp_path / "machine.cfg"
     path.write_text(CFG)

@@ -12,8 +12,8 @@ from steptwin.errors import Misuse
 
 NAMES = ("POSITION", "COUNTER", "VARIABLE", "FLAGS", "FUNCTIONS", "TYPE", "INTERFACE", "SERIES")
 USUAL = ("POSITION", "VARIABLE", "FLAGS")
-USUAL_POINTS = ("position", "velocity", "counter", "variable")
-"""Of a twin."""
+USUAL_POINTS = ("counter", "velocity", "variable")
+"""Of a twin. Its point ``position`` is not what `POSITION` is: it counts from power-on."""
 ONLY_OF_DRIVER = frozenset({"POSITION", "FLAGS", "FUNCTIONS", "TYPE", "INTERFACE", "SERIES"})
 """What the driver reads and is no point of the data sheet, or in another unit and from another origin."""
 _SETTINGS = {

@@ -34,8 +34,13 @@ class AsyncMic488Axis:
 
     @property
     def unit(self) -> str:
-        """Name of the configured unit; ``u`` where no configuration was given."""
+        """Name of the configured unit; ``u`` if unknown."""
         return self._unit.unit_name(self.number)
+
+    @property
+    def gear(self) -> float | None:
+        """Pulses per unit; None if unknown."""
+        return self._unit.gear(self.number)
 
     # ------------------------------------------------------------------ what it does
 

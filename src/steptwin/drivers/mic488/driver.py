@@ -24,6 +24,7 @@ from steptwin.errors import Misuse
 from steptwin.inputfiles import read_bytes
 from steptwin.machine import SECOND
 from steptwin.mic488.config import ControllerConfig, read_config
+from steptwin.mic488.describe import AxisScale
 from steptwin.mic488.inifile import IniFile
 from steptwin.mic488.registermap import DataType, WriteEffect
 from steptwin.mic488.registers import AXES, DEFAULT_FIRMWARE, INPUTS, OUTPUTS, register_map
@@ -63,8 +64,9 @@ class AsyncMic488:
     """A MIC488 at an address (``/dev/ttyUSB0``, ``tcp://host:5020``, ``rtu-tcp://host:5021``) or on a line shared with others.
 
     ``firmware``: determined when not given. ``config``: the vendor tool's ``.cfg`` or its contents; without it units have no
-    names and pulses are unknown. ``observe``: DATA_TYPE is left as it is, so that opening changes nothing; else it is set to
-    REAL. Motions work with both. ``log`` gets every frame in words. Nothing is sent before `open` (or ``async with``).
+    names and pulses are unknown, unless ``scales`` has the unit of each axis and its pulses per unit. ``observe``: DATA_TYPE is
+    left as it is, so that opening changes nothing; else it is set to REAL. Motions work with both. ``log`` gets every frame in
+    words. Nothing is sent before `open` (or ``async with``).
     """
 
     def __init__(
@@ -75,6 +77,7 @@ class AsyncMic488:
         baud: int = 38400,
         firmware: str | None = None,
         config: str | Path | ControllerConfig | None = None,
+        scales: Sequence[tuple[str, float]] = (),
         timeout_s: float = TIMEOUT_S,
         observe: bool = False,
         log: Callable[[str], object] | None = None,
@@ -89,7 +92,8 @@ class AsyncMic488:
         if isinstance(config, str | Path):
             config = load_config(config, firmware or DEFAULT_FIRMWARE)
         registers = register_map(firmware or DEFAULT_FIRMWARE)
-        self._unit = Unit(self.line, unit, registers, config, timeout_ns=round(timeout_s * SECOND), tries=TRIES)
+        known = [AxisScale(*scale) for scale in scales]
+        self._unit = Unit(self.line, unit, registers, config, known, timeout_ns=round(timeout_s * SECOND), tries=TRIES)
         self._axes = {number: AsyncMic488Axis(self._unit, number) for number in ALL_AXES}
         self.program = AsyncMic488Program(self._unit)
         self.user = AsyncUserRegisters(self._unit)

@@ -51,6 +51,7 @@ def opened(address: DeviceAddress, observe: bool, log: Log | None) -> Generator[
         baud=address.baud,
         firmware=address.variant,
         config=address.config,
+        scales=address.scales,
         timeout_s=address.timeout,
         observe=observe,
         log=log,
@@ -79,7 +80,13 @@ def _line(place: str, baud: int) -> DriverLine[Any, Any]:
 
 async def _part(address: DeviceAddress, line: DriverLine[Any, Any]) -> Mic488Part:
     mic = AsyncMic488(
-        line, unit_of(address), firmware=address.variant, config=address.config, timeout_s=address.timeout, observe=True
+        line,
+        unit_of(address),
+        firmware=address.variant,
+        config=address.config,
+        scales=address.scales,
+        timeout_s=address.timeout,
+        observe=True,
     )
     await mic.open()
     return Mic488Part(mic)

@@ -33,15 +33,14 @@ MOST_NAMED = 9
 
 
 class Mic488Part:
-    """Positions are in configured units if the driver has the configuration; else pulses per unit are unknown."""
+    """Positions are in configured units if the driver knows them; else pulses per unit are unknown."""
 
     line_kind = "modbus"
 
     def __init__(self, mic: AsyncMic488) -> None:
         self._mic = mic
         self._registers = register_map(mic.firmware)
-        gears = [None] * len(ALL_AXES) if mic.config is None else [axis.gear for axis in mic.config.axes]
-        scales = tuple((mic.axis(n).unit, gear) for n, gear in zip(ALL_AXES, gears, strict=True))
+        scales = tuple((mic.axis(n).unit, mic.axis(n).gear) for n in ALL_AXES)
         self.datasheet: Datasheet = datasheet_of(mic.firmware, scales)
         self._points = {point.path.upper(): point for point in self.datasheet.points}
         self._pins = {pin.name: pin for pin in self.datasheet.pins}

@@ -98,7 +98,7 @@ class Mic488Axis(Blocking):
 
     @property
     def unit(self) -> str:
-        """Name of the configured unit; ``u`` where no configuration was given."""
+        """Name of the configured unit; ``u`` if unknown."""
         return self._driver.unit
 
     def jog(self, velocity_u: float, *, hold_s: float = HOLD_S) -> Mic488Jog:
@@ -195,13 +195,14 @@ class Mic488(Blocking):
         baud: int = 38400,
         firmware: str | None = None,
         config: str | Path | ControllerConfig | None = None,
+        scales: Sequence[tuple[str, float]] = (),
         timeout_s: float = TIMEOUT_S,
         observe: bool = False,
         log: Callable[[str], object] | None = None,
     ) -> None:
         place = where.line if isinstance(where, ModbusLine) else where
         driver = _ThreadMic488(
-            place, unit, baud=baud, firmware=firmware, config=config, timeout_s=timeout_s, observe=observe, log=log
+            place, unit, baud=baud, firmware=firmware, config=config, scales=scales, timeout_s=timeout_s, observe=observe, log=log
         )
         super().__init__(driver)
         self._axes = {number: Mic488Axis(driver.axis(number)) for number in range(1, 5)}

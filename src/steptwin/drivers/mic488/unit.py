@@ -70,7 +70,8 @@ class UnitNotes:
 class Unit:
     """The controller with slave address ``number`` on ``line``.
 
-    ``config`` gives units and GEAR. Reads are tried ``tries`` times, and so are writes that cannot move anything twice.
+    ``scales`` are units and GEAR of the axes; empty if unknown. ``config`` has their ramps, too. Reads are tried ``tries`` times,
+    and so are writes that cannot move anything twice.
     """
 
     def __init__(
@@ -79,6 +80,7 @@ class Unit:
         number: int,
         registers: RegisterMap,
         config: ControllerConfig | None,
+        scales: Sequence[AxisScale],
         *,
         timeout_ns: Nanos,
         tries: int,
@@ -86,6 +88,7 @@ class Unit:
         self.line = line
         self.number = number
         self.config = config
+        self.scales = scales if config is None else [AxisScale(axis.unit_name, axis.gear) for axis in config.axes]
         self.timeout_ns = timeout_ns
         self.tries = tries
         self.notes: UnitNotes = line.notes.setdefault(("mic488", number), UnitNotes())
@@ -94,8 +97,7 @@ class Unit:
     def use(self, registers: RegisterMap) -> None:
         """Use the register map of that firmware."""
         self.registers = registers
-        axes = self.config.axes if self.config is not None else ()
-        self.wording = Wording(registers, [AxisScale(axis.unit_name, axis.gear) for axis in axes])
+        self.wording = Wording(registers, self.scales)
         frames = self.line.notes.get("frames")
         if isinstance(frames, FrameWords):
             frames.know(self.number, self.wording)
@@ -118,11 +120,11 @@ class Unit:
 
     def unit_name(self, axis: int) -> str:
         """The configured unit of an axis; ``u`` if unknown."""
-        return self.config.axes[axis - 1].unit_name if self.config is not None else "u"
+        return self.scales[axis - 1].unit if self.scales else "u"
 
     def gear(self, axis: int) -> float | None:
         """Pulses per unit; None if unknown."""
-        return self.config.axes[axis - 1].gear if self.config is not None else None
+        return self.scales[axis - 1].gear if self.scales else None
 
     # ------------------------------------------------------------------ exchanges
 
