@@ -105,6 +105,15 @@ class NoConnections:
     async def disconnect(self, machine: str) -> None:
         raise Misuse(f"no device is called {machine!r}; there is none")
 
+    async def settings(self, machine: str) -> str:
+        raise Misuse(f"no device is called {machine!r}; there is none")
+
+    async def shadow(self, machine: str, *, on: bool) -> None:
+        raise Misuse(f"no device is called {machine!r}; there is none")
+
+    def shadow_of(self, machine: str, after: Nanos) -> None:
+        raise Misuse(f"no device is called {machine!r}; there is none")
+
 
 class Studio:
     """The world, its hub and time."""

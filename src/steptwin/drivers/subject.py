@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from types import TracebackType
-from typing import Any, Protocol, TypeAlias
+from typing import Any, NamedTuple, Protocol, TypeAlias
 
 from steptwin.controllerstate import ControllerState
 from steptwin.datasheet import Datasheet, plain
@@ -35,6 +35,22 @@ PERIODS_S = (0.02, 60.0)
 DeviceAction: TypeAlias = Callable[[Any], Awaitable[object]]
 PointValue: TypeAlias = tuple[float | None, str]
 """The value of a point, None if unknown; and its unit."""
+
+
+class DeviceTwin(NamedTuple):
+    """What a twin of a device is made of, in the state in which the device is."""
+
+    text: str
+    """The description of its world."""
+    files: Mapping[str, bytes]
+    line: str
+    """The name of its line there."""
+    values: Sequence[tuple[str, float]]
+    """Registers, to be written in this order."""
+    enabled: Sequence[int]
+    """Axes whose drives are on."""
+    compared: Sequence[str]
+    """Registers that both have to have alike."""
 
 
 class DevicePart(Protocol):
@@ -99,6 +115,10 @@ class DevicePart(Protocol):
 
     async def settings_text(self) -> str:
         """What can be read and written, as JSON, to keep it before it is changed."""
+        ...
+
+    async def twin(self, name: str) -> DeviceTwin:
+        """A twin called ``name``. Raises `Refusal` where there can be none, or not now."""
         ...
 
 

@@ -14,6 +14,7 @@ from steptwin.drivers.kinds import DRIVERS, others_there
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.subject import AsyncDeviceSubject, DevicePart
 from steptwin.errors import LineFailure, Misuse
+from steptwin.machine import Nanos
 from steptwin.nearmiss import NearMiss
 from steptwin.studio.device import DeviceSurroundings, ShownDevice
 from steptwin.studio.eventloop import later
@@ -66,6 +67,26 @@ class DeviceConnections:
     async def disconnect(self, machine: str) -> None:
         await later(self._close(machine))
 
+    async def settings(self, machine: str) -> str:
+        return await later(self._connected(machine).shown.settings())
+
+    async def shadow(self, machine: str, *, on: bool) -> None:
+        shown = self._connected(machine).shown
+        if on:
+            await later(shown.begin_shadow())
+        else:
+            shown.end_shadow()
+
+    def shadow_of(self, machine: str, after: Nanos) -> Mapping[str, object] | None:
+        return self._connected(machine).shown.shadow_state(after)
+
+    def _connected(self, machine: str) -> _Connected:
+        """Raises `Misuse`."""
+        if machine not in self._devices:
+            known = f"there are {', '.join(self._devices)}" if self._devices else "there is none"
+            raise Misuse(f"no device is called {machine!r}{NearMiss().hint(machine, self._devices)}; {known}")
+        return self._devices[machine]
+
     async def open(self, text: str, name: str | None = None) -> str:
         """As `connect`, in the event loop."""
         address = await asyncio.to_thread(self._computer.find, text)
@@ -106,10 +127,8 @@ class DeviceConnections:
 
     async def _close(self, machine: str) -> None:
         async with self._turn:
-            if machine not in self._devices:
-                known = f"there are {', '.join(self._devices)}" if self._devices else "there is none"
-                raise Misuse(f"no device is called {machine!r}{NearMiss().hint(machine, self._devices)}; {known}")
-            connected = self._devices.pop(machine)
+            connected = self._connected(machine)
+            del self._devices[machine]
             await connected.shown.close()
             self._shown.remove(connected.shown)
             line = self._lines[connected.key]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from steptwin.drivers.subject import AsyncDeviceSubject, DevicePart
@@ -16,6 +16,7 @@ from steptwin.machine import SECOND, Nanos
 from steptwin.studio.devicejog import DeviceHeld
 from steptwin.studio.eventloop import later
 from steptwin.studio.jogs import Held
+from steptwin.studio.shadow import Known, Shadow
 from steptwin.subject import commands as command
 from steptwin.subject.commands import Command, row_of
 from steptwin.subject.contract import UNKNOWN, Description, Reading, Result
@@ -32,6 +33,8 @@ RECONNECT_S = (0.5, 5.0)
 """Pause after the first failure, doubled after each further one, up to the second."""
 PATIENCE_NS: Nanos = 5 * SECOND
 """A command that has waited longer for those before it is not sent."""
+REGISTERS_NS: Nanos = 5 * SECOND
+"""Settings of a device with a twin beside it are compared so often, at rest."""
 JOG_WAIT_S = 2.0
 """For the jog before of the same axis to end."""
 LOOKS = (command.ReadPoints, command.ReadPins, command.Describe, command.Time, command.Encoders, command.State)
@@ -65,6 +68,8 @@ class ShownDevice:
         self._jogs: dict[int, DeviceHeld] = {}
         self._jog_turns: dict[int, asyncio.Lock] = {}
         self._wanted = asyncio.Event()
+        self._shadow: Shadow | None = None
+        self._registers_due: Nanos = 0
         self._polling = asyncio.get_running_loop().create_task(self._poll())
 
     @property
@@ -131,6 +136,8 @@ class ShownDevice:
         await self._subject.poll()
         found = await self._subject.read(*points) if points else ()
         self._known = {one.point: one for one in found}
+        if self._shadow is not None:
+            await self._compare(self._shadow)
 
     def _lose(self, why: str) -> None:
         self._known.clear()
@@ -153,7 +160,7 @@ class ShownDevice:
         try:
             if _is_stop(wanted):
                 self._stops += 1
-                return await self._subject.do(wanted)
+                return await self._execute(wanted)
             if self.lost is not None:
                 raise LineFailure(f"{row_of(wanted).name} was not sent: the connection is lost ({self.lost})")
             if type(wanted) in LOOKS:
@@ -170,10 +177,18 @@ class ShownDevice:
             if type(wanted) in WRITES and not self._is_kept:
                 await self._keep_settings()
                 self._refuse_late(wanted, stops, asked)  # that took its time, and a write may begin a motion
-            result = await self._subject.do(wanted)
+            result = await self._execute(wanted)
             if type(wanted) is command.Move:
                 self._look_away()
             return result
+
+    async def _execute(self, wanted: Command) -> Result:
+        """Also by the twin beside it."""
+        begun = self._around.clock()
+        result = await self._subject.do(wanted)
+        if self._shadow is not None:
+            self._shadow.did(wanted, begun, self._around.clock())
+        return result
 
     def _refuse_late(self, wanted: Command, stops: int, asked: Nanos) -> None:
         """Refuse what a stop has overtaken, and what was asked for too long ago."""
@@ -193,6 +208,44 @@ class ShownDevice:
         where = self._around.keep(self.name, await self._device.settings_text())
         self._is_kept = True
         self._subject.publish(StatusPayload("settings-kept", f"settings before the first write are in {where}"))
+
+    async def settings(self) -> str:
+        """What can be read and written, as JSON. Raises `LineFailure`."""
+        async with self._turn:
+            return await self._device.settings_text()
+
+    # ------------------------------------------------------------------ the twin beside it
+
+    async def begin_shadow(self) -> None:
+        """Put a twin beside it, in place of one that is there. Raises `Refusal`, `LineFailure`."""
+        async with self._turn:
+            if self._jogs:
+                raise Refusal(f"{self.name}: a twin can be made at rest: an axis is jogged")
+            twin = await self._device.twin(self.name)
+            now = self._around.clock()
+            self._shadow = Shadow(self.name, self._subject.description.machines[0].datasheet, twin, now)
+            self._registers_due = now + REGISTERS_NS
+        self._wanted.set()
+
+    def end_shadow(self) -> None:
+        self._shadow = None
+
+    def shadow_state(self, after: Nanos) -> Mapping[str, object] | None:
+        return None if self._shadow is None else self._shadow.plain(after)
+
+    async def _compare(self, shadow: Shadow) -> None:
+        """Not while a command is executed, of which the twin knows nothing yet."""
+        async with self._turn:
+            begun = self._around.clock()
+            known = await self._read_known(shadow.points)
+            is_at_rest = shadow.compare(known, begun, self._around.clock())
+            if is_at_rest and self._around.clock() >= self._registers_due:
+                known = await self._read_known(shadow.registers)
+                shadow.compare_registers(known, self._around.clock())
+                self._registers_due = self._around.clock() + REGISTERS_NS
+
+    async def _read_known(self, points: tuple[str, ...]) -> Known:
+        return {one.point: one.value for one in await self._subject.read(*points)}
 
     # ------------------------------------------------------------------ jogs
 
@@ -215,6 +268,8 @@ class ShownDevice:
             if self._stops != stops:
                 raise Refusal("jog was not begun: a stop was requested meanwhile")
             self._jogs[wanted.axis] = held
+            if self._shadow is not None:
+                self._shadow.jogs(wanted.axis, on=True)
             self._look_away()
             await held.begin()
         except BaseException:
@@ -225,6 +280,8 @@ class ShownDevice:
 
     def _end_jog(self, axis: int) -> None:
         self._jogs.pop(axis, None)
+        if self._shadow is not None:
+            self._shadow.jogs(axis, on=False)
         self._jog_turns[axis].release()
         self._wanted.set()
 

@@ -124,6 +124,18 @@ class Connections(Protocol):
         """Disconnect a device. Raises `Misuse` for a machine that is not a device."""
         ...
 
+    async def settings(self, machine: str) -> str:
+        """As text. Raises as `disconnect`, `Refusal` and `LineFailure`."""
+        ...
+
+    async def shadow(self, machine: str, *, on: bool) -> None:
+        """Put a twin beside a device, or remove it. Raises as `settings`."""
+        ...
+
+    def shadow_of(self, machine: str, after: Nanos) -> Mapping[str, object] | None:
+        """See `steptwin.studio.devicerequests`. Raises `Misuse`."""
+        ...
+
 
 class LongWork(Protocol):
     """Searches for devices and checks of one, one at a time."""

@@ -17,6 +17,7 @@ from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.nearmiss import NearMiss
 from steptwin.plaintypes import shown
+from steptwin.studio.devicerequests import OF_DEVICES, DeviceRequest
 from steptwin.studio.recordingrequests import RECORDINGS, RecordingRequest
 from steptwin.studio.requestrow import NOTHING, RequestRow
 from steptwin.studio.shapes import MOMENT
@@ -163,6 +164,7 @@ StudioRequest: TypeAlias = (
     | ToolRequest
     | WorkRequest
     | RecordingRequest
+    | DeviceRequest
     | ListPorts
     | Connect
     | Disconnect
@@ -353,7 +355,7 @@ _ROWS = (
     ),
 )
 
-REQUESTS: Mapping[str, RequestRow] = {row.name: row for row in (*_ROWS, *TOOLS, *WORKS, *RECORDINGS)}
+REQUESTS: Mapping[str, RequestRow] = {row.name: row for row in (*_ROWS, *TOOLS, *WORKS, *RECORDINGS, *OF_DEVICES)}
 ALL: Mapping[str, RequestRow | CommandRow] = {**COMMANDS, **REQUESTS}
 """Every request by name."""
 OF_THE_PAST = frozenset({"look", "go_back"})

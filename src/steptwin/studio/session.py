@@ -17,6 +17,7 @@ from steptwin.access.roles import LOOK, Permit, Role
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.later import Later, start
 from steptwin.machine import SECOND, Nanos
+from steptwin.studio import devicerequests as device
 from steptwin.studio import recordingrequests as recording
 from steptwin.studio import requests as ask
 from steptwin.studio import workrequests as work
@@ -110,6 +111,8 @@ class ViewerSession:
             ask.ListPorts: lambda _: hub.around.connections.ports(),
             ask.Connect: self._connect,
             ask.Disconnect: lambda wanted: hub.around.connections.disconnect(wanted.machine),
+            device.ReadSettings: self._read_settings,
+            device.SetShadow: lambda wanted: hub.around.connections.shadow(wanted.machine, on=wanted.on),
             recording.ReadRecordings: lambda _: hub.recordings.plain(),
             recording.SaveRecording: lambda wanted: hub.recordings.save(wanted.name),
             recording.ViewRecording: self._view_recording,
@@ -131,6 +134,7 @@ class ViewerSession:
             work.Scan: lambda wanted: hub.around.work.scan(wanted.places, wanted.kind, wanted.units, wanted.baud, wanted.timeout),
             work.Verify: lambda wanted: hub.around.work.verify(wanted.address, write=wanted.write),
             work.ReadWork: lambda _: hub.around.work.plain(),
+            device.ReadShadow: lambda wanted: hub.around.connections.shadow_of(wanted.machine, wanted.after),
             work.CancelWork: lambda _: hub.around.work.cancel(),
             ask.ReadAudit: lambda wanted: [entry.plain() for entry in hub.around.audit.last(wanted.most)],
         }
@@ -187,6 +191,9 @@ class ViewerSession:
 
     async def _connect(self, wanted: ask.Connect) -> object:
         return {"machine": await self._hub.around.connections.connect(wanted.address, wanted.name)}
+
+    async def _read_settings(self, wanted: device.ReadSettings) -> object:
+        return {"machine": wanted.machine, "text": await self._hub.around.connections.settings(wanted.machine)}
 
     async def _view_recording(self, wanted: recording.ViewRecording) -> object:
         return {"url": await self._hub.recordings.view(wanted.name)}

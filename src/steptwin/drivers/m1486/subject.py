@@ -18,7 +18,7 @@ from steptwin.drivers.m1486.driver import AsyncM1486
 from steptwin.drivers.m1486.failures import Busy, PositionUnknown
 from steptwin.drivers.m1486.jog import AsyncM1486Jog
 from steptwin.drivers.m1486.talk import ChipRequest
-from steptwin.drivers.subject import DeviceAction, PointValue
+from steptwin.drivers.subject import DeviceAction, DeviceTwin, PointValue
 from steptwin.errors import Misuse, Refusal
 from steptwin.m1486.datasheet import axis, datasheet_of
 from steptwin.m1486.microsteps import FULL_STEP
@@ -206,6 +206,9 @@ class M1486Part:
     def held_jog(self, wanted: command.Jog) -> AsyncM1486Jog:
         self._check_axis(wanted.axis)
         return AsyncM1486Jog(self._chip, wanted.velocity)
+
+    async def twin(self, name: str) -> DeviceTwin:
+        raise Refusal(f"{self.line.place}: no twin beside an M1486, whose position is unknown while it moves (M-28)")
 
     async def settings_text(self) -> str:
         """What can be read of the chip: S, A, V and other settings cannot, so only those are known that this driver has made."""

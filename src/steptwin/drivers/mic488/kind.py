@@ -89,7 +89,7 @@ async def _part(address: DeviceAddress, line: DriverLine[Any, Any]) -> Mic488Par
         observe=True,
     )
     await mic.open()
-    return Mic488Part(mic)
+    return Mic488Part(mic, address.config)
 
 
 def _find(

@@ -19,7 +19,7 @@ from steptwin.mic488.registermap import DataType, Register, Type, WriteEffect
 from steptwin.mic488.values import RegisterItem, RegisterValue, UserFormat, encoded
 
 FORMAT = "steptwin MIC488 snapshot 1"
-_COUNTERS = ("POS_ACT", "ENC_IMP", "ENC_XPOS")
+COUNTERS = ("POS_ACT", "ENC_IMP", "ENC_XPOS")
 _OUTPUTS = ("OUT",)
 
 
@@ -104,7 +104,7 @@ async def changes(unit: Unit, snapshot: Mic488Snapshot, *, counters: bool, outpu
     if len(snapshot.user) > memory.cells:
         raise Misuse(f"the snapshot has {len(snapshot.user)} user registers, this controller {memory.cells}")
     present = await take(unit)
-    left_out = (() if counters else _COUNTERS) + (() if outputs else _OUTPUTS)
+    left_out = (() if counters else COUNTERS) + (() if outputs else _OUTPUTS)
     comparable = present.data_type is snapshot.data_type
     found: list[SnapshotChange] = []
     for name, new in snapshot.values.items():

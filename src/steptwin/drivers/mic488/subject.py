@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 from steptwin.controllerstate import ControllerState, DetailValue, StateAxis, StateProgram, StateStatus
 from steptwin.datasheet import AxisDescription, Datasheet
@@ -10,11 +12,13 @@ from steptwin.drivers.line import DriverLine
 from steptwin.drivers.mic488.driver import ALL_AXES, AsyncMic488, Mic488Status
 from steptwin.drivers.mic488.failures import ModbusRefusal, NotReady
 from steptwin.drivers.mic488.jog import AsyncMic488Jog
-from steptwin.drivers.mic488.motion import status_text
+from steptwin.drivers.mic488.motion import MOVING, status_text
 from steptwin.drivers.mic488.program import ProgramState
+from steptwin.drivers.mic488.snapshot import COUNTERS
 from steptwin.drivers.modbus import Query
-from steptwin.drivers.subject import DeviceAction, PointValue
-from steptwin.errors import Misuse
+from steptwin.drivers.subject import DeviceAction, DeviceTwin, PointValue
+from steptwin.errors import Misuse, Refusal
+from steptwin.inputfiles import read_bytes
 from steptwin.mic488.datasheet import datasheet_of
 from steptwin.mic488.points import item_of
 from steptwin.mic488.present import ACTIVITIES, axis_status, controller_status
@@ -28,6 +32,8 @@ from steptwin.subject.payloads import EdgePayload, Payload, SamplePayload, Statu
 from steptwin.wire import pdu
 from steptwin.world import script as steps
 
+LINE, CONFIG = "line", "device.cfg"
+"""Of the world of a twin."""
 MOST_NAMED = 9
 """Most points listed in a message."""
 
@@ -37,8 +43,9 @@ class Mic488Part:
 
     line_kind = "modbus"
 
-    def __init__(self, mic: AsyncMic488) -> None:
+    def __init__(self, mic: AsyncMic488, config_file: str | None = None) -> None:
         self._mic = mic
+        self._config_file = config_file
         self._registers = register_map(mic.firmware)
         scales = tuple((mic.axis(n).unit, mic.axis(n).gear) for n in ALL_AXES)
         self.datasheet: Datasheet = datasheet_of(mic.firmware, scales)
@@ -219,6 +226,32 @@ class Mic488Part:
     async def settings_text(self) -> str:
         """A snapshot, which `AsyncMic488.restore_snapshot` writes back."""
         return (await self._mic.take_snapshot()).to_json()
+
+    async def twin(self, name: str) -> DeviceTwin:
+        """With its registers, positions and drives. Programs cannot be read; pulses per unit are in no register (MIC-27)."""
+        if self._config_file is None:
+            raise Refusal(f"{self.line.place}: a twin needs the configuration of the controller: connect it with config=FILE")
+        status = await self._mic.status()
+        moving = [f"M{axis}" for axis, code in zip(ALL_AXES, status.axes, strict=True) if code in MOVING]
+        if moving or status.program:
+            raise Refusal(f"{self.line.place}: a twin can be made at rest: {', '.join(moving) or 'its program'} runs")
+        snapshot = await self._mic.take_snapshot()
+        shown = await self._mic.get_shown(*snapshot.values)
+        # Values mean something only with the DATA_TYPE they were read with.
+        names = sorted(shown, key=lambda register: register != "DATA_TYPE")
+        user = [(f"USER_REGISTER[{number}]", float(word)) for number, word in enumerate(snapshot.user) if word]
+        kinds = {register: self._registers.named(register).key for register in names}
+        enabled = [axis for axis, code in zip(ALL_AXES, status.axes, strict=True) if code != AxisStatus.OFF]
+        head = {"name": name, "line": LINE, "unit": self.address, "firmware": self._mic.firmware, "config": CONFIG}
+        table = "\n".join(f"{key} = {json.dumps(value)}" for key, value in head.items())
+        return DeviceTwin(
+            f'[world]\nname = "twin"\n[[line]]\nname = "{LINE}"\nkind = "modbus"\n[[mic488]]\n{table}\n',
+            {CONFIG: read_bytes(Path(self._config_file))},
+            LINE,
+            [*((register, float(shown[register][0])) for register in names), *user],
+            enabled,
+            [register for register in names if kinds[register] not in COUNTERS],
+        )
 
 
 _DETAILS = {

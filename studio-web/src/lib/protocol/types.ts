@@ -1,6 +1,6 @@
 // Made from docs/studio.schema.json by `npm run protocol`; not to be changed by hand.
 
-export type Request = DescribeRequest | ReadRequest | PinsRequest | StateRequest | EncodersRequest | FaultsRequest | FaultKindsRequest | TimeRequest | EndPointsRequest | FollowRequest | UnfollowRequest | SetRequest | PressRequest | ReleaseRequest | WriteRequest | SendRequest | RequestRequest | PowerCycleRequest | TurnRequest | CoupleRequest | FaultRequest | ClearFaultRequest | ExpectRequest | NoteRequest | SeeRequest | EnableRequest | MoveRequest | HomeRequest | JogRequest | StopRequest | ProgramRequest | DownloadRequest | PauseRequest | ResumeRequest | StepRequest | SnapshotRequest | SnapshotsRequest | RestoreRequest | DropSnapshotRequest | SaveRequest | DebugRequest | BreakpointRequest | ClearBreakpointRequest | BreakpointsRequest | StopOnRequest | StepProgramRequest | RunRequest | LookAtRequest | BranchRequest | StackRequest | ValuesRequest | EvaluateRequest | SetValueRequest | ProgramSourceRequest | WhyRequest | HelloRequest | ResyncRequest | WatchRequest | UnwatchRequest | TakeControlRequest | ReleaseControlRequest | RenewRequest | LetGoRequest | StopAllRequest | LookRequest | GoBackRequest | ProgramsRequest | ProgramTextRequest | PortsRequest | ConnectRequest | DisconnectRequest | AuditRequest | CalculatorRequest | CalculateRequest | GearRequest | ConfigurationRequest | EditConfigurationRequest | ScanRequest | VerifyRequest | WorkRequest | CancelWorkRequest | RecordingsRequest | SaveRecordingRequest | ViewRecordingRequest;
+export type Request = DescribeRequest | ReadRequest | PinsRequest | StateRequest | EncodersRequest | FaultsRequest | FaultKindsRequest | TimeRequest | EndPointsRequest | FollowRequest | UnfollowRequest | SetRequest | PressRequest | ReleaseRequest | WriteRequest | SendRequest | RequestRequest | PowerCycleRequest | TurnRequest | CoupleRequest | FaultRequest | ClearFaultRequest | ExpectRequest | NoteRequest | SeeRequest | EnableRequest | MoveRequest | HomeRequest | JogRequest | StopRequest | ProgramRequest | DownloadRequest | PauseRequest | ResumeRequest | StepRequest | SnapshotRequest | SnapshotsRequest | RestoreRequest | DropSnapshotRequest | SaveRequest | DebugRequest | BreakpointRequest | ClearBreakpointRequest | BreakpointsRequest | StopOnRequest | StepProgramRequest | RunRequest | LookAtRequest | BranchRequest | StackRequest | ValuesRequest | EvaluateRequest | SetValueRequest | ProgramSourceRequest | WhyRequest | HelloRequest | ResyncRequest | WatchRequest | UnwatchRequest | TakeControlRequest | ReleaseControlRequest | RenewRequest | LetGoRequest | StopAllRequest | LookRequest | GoBackRequest | ProgramsRequest | ProgramTextRequest | PortsRequest | ConnectRequest | DisconnectRequest | AuditRequest | CalculatorRequest | CalculateRequest | GearRequest | ConfigurationRequest | EditConfigurationRequest | ScanRequest | VerifyRequest | WorkRequest | CancelWorkRequest | RecordingsRequest | SaveRecordingRequest | ViewRecordingRequest | SettingsRequest | ShadowRequest | ShadowStateRequest;
 
 /** Every request has exactly one. */
 export type Answer = {
@@ -1482,6 +1482,40 @@ export type ViewRecordingRequest = {
   name: string;
 };
 
+/** What can be read and written in a device, as the text that is kept before the first write. */
+export type SettingsRequest = {
+  do: "settings";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Of a device. */
+  machine: string;
+};
+
+/** Put a twin beside a device at rest, which is given the same commands from then on, or remove it. Of the device it only reads. */
+export type ShadowRequest = {
+  do: "shadow";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Of a device. */
+  machine: string;
+  /** Whether there is to be one. */
+  on?: boolean | null;
+};
+
+/** How a device and the twin beside it differ; null without one. */
+export type ShadowStateRequest = {
+  do: "shadow_state";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Of a device. */
+  machine: string;
+  /** Only samples later than this, from the beginning of the shadow. [ns] */
+  after_ns?: string | number | null;
+};
+
 export type JogAnswer = {
   lease: number;
   /** Renew it in a third of this. [ms] */
@@ -1873,6 +1907,53 @@ export type ViewRecordingAnswer = {
   url: string;
 };
 
+export type SettingsAnswer = {
+  machine: string;
+  text: string;
+};
+
+export type ShadowAnswer = null;
+
+export type ShadowStateAnswer = {
+  machine: string;
+  axes: ({
+    axis: number;
+    name: string;
+    unit: string;
+    first: {
+      /** Since when, from the beginning of the shadow, as decimal text [ns] */
+      at_ns: string;
+      /** An axis or a register. */
+      what: string;
+      device: number;
+      twin: number;
+    } | null;
+    samples: ((number | null)[])[];
+  })[];
+  /** Those that differ now. */
+  registers: {
+    /** Since when, from the beginning of the shadow, as decimal text [ns] */
+    at_ns: string;
+    /** An axis or a register. */
+    what: string;
+    device: number;
+    twin: number;
+  }[];
+  /** Registers that are compared at rest. */
+  compared: number;
+  /** The first difference of all. */
+  first: {
+    /** Since when, from the beginning of the shadow, as decimal text [ns] */
+    at_ns: string;
+    /** An axis or a register. */
+    what: string;
+    device: number;
+    twin: number;
+  } | null;
+  /** What the twin could not be told. */
+  problems: string[];
+} | null;
+
 /** The whole state, after hello and resync. */
 export type HelloMessage = {
   /** Counts the messages to this viewer from hello on, which has 0. */
@@ -2102,4 +2183,7 @@ export interface Requests {
   recordings: { request: RecordingsRequest; answer: RecordingsAnswer };
   save_recording: { request: SaveRecordingRequest; answer: SaveRecordingAnswer };
   view_recording: { request: ViewRecordingRequest; answer: ViewRecordingAnswer };
+  settings: { request: SettingsRequest; answer: SettingsAnswer };
+  shadow: { request: ShadowRequest; answer: ShadowAnswer };
+  shadow_state: { request: ShadowStateRequest; answer: ShadowStateAnswer };
 }
