@@ -46,6 +46,8 @@ class WorldParts:
     """The contacts of the inputs that have some."""
     elements: dict[str, dict[str, Any]] = field(default_factory=dict)
     """Built elements with names: by the name of the kind, then by their own."""
+    supplied: dict[str, str] = field(default_factory=dict)
+    """The power supplies of machines that have one."""
     warnings: list[str] = field(default_factory=list)
     """Warnings about the files that the description names."""
 

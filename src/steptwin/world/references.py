@@ -140,6 +140,9 @@ def _send(plant: Plant, step: do.Send) -> None:
 
 def _power_cycle(plant: Plant, step: do.PowerCycle) -> None:
     plant.machine(step.machine)
+    supply = plant.parts.supplied.get(step.machine)
+    if supply is not None:
+        raise Misuse(f"{step.machine!r} is switched by its supply {supply!r}: switch that, or let it have a brown-out")
 
 
 def _turn(plant: Plant, step: do.Turn) -> None:

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from steptwin.machine import Nanos
 from steptwin.world.faults import ActiveFault, Fault, RequestRoute, check_place, rig
+from steptwin.world.faults.machine import FaultyMachine
 from steptwin.world.faults.table import Layer, RequestEffect
 from steptwin.world.kind import LineUnit
 from steptwin.world.kinds import line_kinds
 from steptwin.world.lines import SCRIPTS
-from steptwin.world.parts import WorldParts
+
+if TYPE_CHECKING:
+    from steptwin.world.parts import WorldParts
 
 
 class Rigging:
@@ -42,19 +45,19 @@ class Rigging:
     def _prepare(self, fault: Fault) -> None:
         if fault.kind.layer is Layer.PHYSICS or isinstance(fault.kind.effect, RequestEffect):
             for name in self._plan.machines:
-                self._rig(name)
+                self.rig(name)
 
-    def _rig(self, name: str) -> None:
+    def rig(self, name: str) -> FaultyMachine:
         """Prepare a machine for faults; if an axis has mechanics, its faults act on these instead of on the encoder."""
         plan = self._plan
         machine = plan.machines[name]
         if name in plan.faults.machines:
-            return
+            return plan.faults.machines[name]
         mechanisms = {axis.mechanism.number: axis.mechanism for axis in plan.axes.values() if axis.spec.drive[0] == name}
         on = plan.line_of.get(name)
         service = LineUnit() if on is None else LineUnit(on[1], on[0].name)
         body = plan.kind_of[name].body(machine, service, mechanisms)
-        rig(plan.kernel_of[name], name, plan.faults, body)
+        return rig(plan.kernel_of[name], name, plan.faults, body)
 
 
 def _wires(plan: WorldParts) -> Iterator[RequestRoute]:

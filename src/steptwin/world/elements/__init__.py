@@ -22,6 +22,7 @@ from steptwin.world.elements.latch import LATCH
 from steptwin.world.elements.relay import RELAY
 from steptwin.world.elements.shaft import SHAFT
 from steptwin.world.elements.source import SOURCE
+from steptwin.world.elements.supply import SUPPLY
 from steptwin.world.elements.timer import TIMER
 from steptwin.world.elements.transducer import TRANSDUCER
 from steptwin.world.elements.vacuum import VACUUM
@@ -79,5 +80,6 @@ for _one in (
     TRANSDUCER,
     COLLISION,
     GANTRY,
+    SUPPLY,
 ):
     register(_one)

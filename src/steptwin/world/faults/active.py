@@ -142,8 +142,8 @@ class Faults(Stateful):
     faults is not part of its state: a state is restored into the same set.
     """
 
-    __slots__ = ("active", "elements", "link", "machines", "ports", "seed", "sinks")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"elements", "link", "machines", "ports", "seed", "sinks"})
+    __slots__ = ("active", "elements", "has_supplies", "link", "machines", "ports", "seed", "sinks")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"elements", "has_supplies", "link", "machines", "ports", "seed", "sinks"})
 
     def __init__(self, seed: int = 0) -> None:
         self.seed = seed
@@ -155,8 +155,20 @@ class Faults(Stateful):
         """Elements with faults."""
         self.link = ""
         """The link whose request is being served."""
+        self.has_supplies = False
+        """Whether machines may be without supply, so that they do not answer."""
         self.ports: WeakSet[FaultyPort] = WeakSet()
         """Ports in use, which change with programs and clients."""
+
+    @property
+    def interfere(self) -> bool:
+        """Whether what ports receive and send may be altered."""
+        return bool(self.active) or self.has_supplies
+
+    def expect_supplies(self) -> None:
+        """Machines may be without supply from now on."""
+        self.has_supplies = True
+        self._changed()
 
     def add(self, fault: Fault, now: Nanos = 0) -> ActiveFault:
         """Set a fault at ``now``. Raises `Misuse` for a name in use, or an unknown machine, pin or axis."""

@@ -84,6 +84,7 @@ class FaultyMachine(Stateful):
         "_outer",
         "_released",
         "_stuck",
+        "_unsupplied",
         "body",
         "changed",
         "inner",
@@ -113,6 +114,8 @@ class FaultyMachine(Stateful):
         self._released: list[tuple[Nanos, str, int]] = []
         """The moment at which each fault releases its axis."""
         self._off_until: Nanos | None = None
+        self._unsupplied = False
+        """Whether its power supply is off, or too low."""
         self._cut: Nanos | None = None
         """The moment of a supply failure during an action that ends first; None without one."""
         self._fresh = self.copy_state()
@@ -188,7 +191,8 @@ class FaultyMachine(Stateful):
             self.after_request(now)
         if self._off_until is not None and self._off_until <= now:
             self._off_until = None
-            self.inner.power_cycle(now)
+            if not self._unsupplied:
+                self.inner.power_cycle(now)
         for active in self._mine():
             while active.due is not None and active.due <= now:
                 self._moment(active, now)
@@ -216,9 +220,18 @@ class FaultyMachine(Stateful):
 
     def drop_supply(self, now: Nanos, until: Nanos) -> None:
         """Switch the supply off until a moment, or longer if it is off already."""
-        if self._off_until is None:
+        if self._off_until is None and not self._unsupplied:
             self.inner.power_off(now)
         self._off_until = max(until, self._off_until or 0)
+
+    def supply(self, on: bool, now: Nanos) -> None:
+        """Its power supply is on, or off: then nothing answers until it is on again, as after power-on."""
+        if on is not self._unsupplied:
+            return
+        self._unsupplied = not on
+        if self._off_until is None:
+            self.inner.power_cycle(now) if on else self.inner.power_off(now)
+        self.changed()
 
     def cut_supply(self, now: Nanos, until: Nanos) -> None:
         """As `drop_supply`, at the end of the present action."""
@@ -362,7 +375,7 @@ class FaultyMachine(Stateful):
     def refusal(self, unit: int, line: str, pdu: bytes, now: Nanos) -> bytes | None:
         """The answer to a request on ``line`` that a fault refuses; None if it is executed."""
         function = pdu[0] if pdu else 0
-        if self._off_until is not None:
+        if self._off_until is not None or self._unsupplied:
             return exception_pdu(function, NEVER_SENT)
         for active in self._faults.refusing():
             if active.matches(unit, pdu) and active.is_on(self._faults.link, line) and active.strikes(now):

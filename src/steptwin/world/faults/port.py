@@ -118,7 +118,7 @@ class FaultyPort(Stateful):
 
     def choose(self) -> None:
         """Select the path of calls from now on."""
-        if self._faults.active or self._arriving or self._leaving:
+        if self._faults.interfere or self._arriving or self._leaving:
             self._be_faulty()
         else:
             self._be_transparent()
@@ -161,7 +161,7 @@ class FaultyPort(Stateful):
         out = []
         while self._leaving and self._leaving[0][0] <= now:
             out.append(self._leaving.popleft())
-        if not self._faults.active:
+        if not self._faults.interfere:
             self.choose()
         return out
 

@@ -75,7 +75,7 @@ class ModbusBus(Line):
 
     def is_idle_read(self, place: LineEndPoint, data: bytes) -> bool:
         # With timing a request takes the line and the controller; faults count requests.
-        is_free = self._timed is None and not self._faults.active and place.framed is place.inner
+        is_free = self._timed is None and not self._faults.interfere and place.framed is place.inner
         return is_free and place.framed is not None and place.framed.is_lone_read(data)
 
     def _ask(self, frame: bytes, now: Nanos) -> None:
