@@ -22,6 +22,10 @@ PAGE_SOURCES := $(shell find studio-web -type f -not -path '*/node_modules/*' -n
 EXTENSION := editors/vscode
 EXTENSION_STAMP := $(EXTENSION)/node_modules/.steptwin
 
+# Clients of other makers, for tests of the gateways.
+CLIENTS := tests/gateways/clients
+CLIENTS_STAMP := $(CLIENTS)/node_modules/.steptwin
+
 # uv takes the interpreter it is given and what the lock files name, whatever project or environment surrounds it.
 export UV_PYTHON_DOWNLOADS := never
 unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
@@ -39,7 +43,7 @@ run: $(RUN_STAMP)  ## Show a demo machine in the browser (ARGS="MACHINE.toml --s
 	@$(MAKE) --no-print-directory page || echo "the page of the studio could not be built; the service runs without it" >&2
 	@exec $(BIN)/steptwin studio $(ARGS)
 
-test: $(DEV_STAMP) $(PAGE) $(EXTENSION_STAMP)  ## Run the tests (ARGS="-k mic_7 ..."); peers that are missing are skipped
+test: $(DEV_STAMP) $(PAGE) $(EXTENSION_STAMP) $(CLIENTS_STAMP)  ## Run the tests (ARGS="-k mic_7 ..."); peers that are missing are skipped
 	$(BIN)/pytest -n auto $(ARGS)
 
 golden: $(DEV_STAMP)  ## Make the golden files of tests anew (ARGS=tests/mic488/test_registers_golden.py): read the diff
@@ -107,7 +111,7 @@ COMPILE := env -u UV_FIND_LINKS -u PIP_FIND_LINKS UV_CUSTOM_COMPILE_COMMAND="mak
   $(UV) pip compile --quiet --universal --python-version 3.11 --fork-strategy fewest --generate-hashes --no-annotate $(ARGS)
 
 clean:  ## Remove everything that was built, downloaded or cached here
-	rm -rf .venv .tools build dist studio-web/node_modules $(EXTENSION)/node_modules $(EXTENSION)/dist src/steptwin/studio/page .pytest_cache .hypothesis .ruff_cache .import_linter_cache
+	rm -rf .venv .tools build dist studio-web/node_modules $(EXTENSION)/node_modules $(EXTENSION)/dist $(CLIENTS)/node_modules src/steptwin/studio/page .pytest_cache .hypothesis .ruff_cache .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 NEED_PYTHON := [ -n "$(PYTHON_ID)" ] || { \
@@ -148,6 +152,11 @@ $(PAGE): $(NODE_STAMP) $(PAGE_SOURCES)
 $(EXTENSION_STAMP): $(NODE_STAMP) $(EXTENSION)/package-lock.json
 	@echo "installing what the extension for VS Code needs"
 	@$(WEB) install $(EXTENSION)
+	@touch $@
+
+$(CLIENTS_STAMP): $(NODE_STAMP) $(CLIENTS)/package-lock.json
+	@echo "installing clients that the gateways are tested with"
+	@$(WEB) install $(CLIENTS)
 	@touch $@
 
 $(DEV_STAMP): $(RUN_STAMP) requirements/dev.txt

@@ -7,16 +7,12 @@ from collections.abc import Mapping
 from typing import Any
 
 import pytest
+from gateway_rig import GatewayWorld
 
-from steptwin import World
-from steptwin.errors import LineFailure
 from steptwin.gateways.metrics import MOST_EVENTS, Metrics
 from steptwin.gateways.prometheus import Pages
 from steptwin.machine import SECOND
 from steptwin.subject import commands as command
-from steptwin.subject.contract import Description, Reading, Result
-from steptwin.subject.following import Filter, Following
-from steptwin.subject.world import WorldSubject
 from steptwin.world import script as steps
 
 TEXT = """
@@ -35,30 +31,6 @@ TEXT = """
 """
 
 
-class Subject:
-    """A world whose controllers may be silent, as devices are."""
-
-    def __init__(self) -> None:
-        self.world = World.from_toml(TEXT)
-        self.inner = WorldSubject(self.world)
-        self.silent: set[str] = set()
-
-    @property
-    def description(self) -> Description:
-        return self.inner.description
-
-    def read(self, *points: str) -> tuple[Reading, ...]:
-        return self.inner.read(*points)
-
-    async def do(self, wanted: command.Command, /) -> Result:
-        if isinstance(wanted, command.State) and wanted.machine in self.silent:
-            raise LineFailure("no answer")
-        return self.inner.do(wanted)
-
-    def follow(self, what: Filter, bound: int) -> Following:
-        return self.inner.follow(what, bound)
-
-
 def samples(metrics: Metrics) -> dict[tuple[str, tuple[str, ...]], float]:
     """By name and the values of the labels."""
     found = asyncio.run(metrics.read())
@@ -66,7 +38,7 @@ def samples(metrics: Metrics) -> dict[tuple[str, tuple[str, ...]], float]:
 
 
 def test_axes_have_position_and_velocity_with_their_unit() -> None:
-    subject = Subject()
+    subject = GatewayWorld(TEXT)
     metrics = Metrics(subject)
     subject.inner.do(command.Enable("table", 1))
     subject.inner.do(command.Move("table", 1, to=50.0))
@@ -84,13 +56,13 @@ def test_axes_have_position_and_velocity_with_their_unit() -> None:
 
 
 def test_what_is_unknown_has_no_sample() -> None:
-    found = samples(Metrics(Subject()))
+    found = samples(Metrics(GatewayWorld(TEXT)))
     assert ("steptwin_axis_enabled", ("table", "M1")) in found
     assert ("steptwin_axis_enabled", ("drum", "M1")) not in found  # an M1486 does not switch its drive
 
 
 def test_events_are_counted_from_the_beginning_of_the_gateway() -> None:
-    subject = Subject()
+    subject = GatewayWorld(TEXT)
     subject.inner.do(steps.Note("before"))
     metrics = Metrics(subject)
     for _ in range(3):
@@ -103,7 +75,7 @@ def test_events_are_counted_from_the_beginning_of_the_gateway() -> None:
 
 
 def test_events_beyond_the_bound_are_counted_as_missed() -> None:
-    subject = Subject()
+    subject = GatewayWorld(TEXT)
     metrics = Metrics(subject)
     for _ in range(MOST_EVENTS + 5):
         subject.inner.do(steps.Note("x"))
@@ -114,14 +86,14 @@ def test_events_beyond_the_bound_are_counted_as_missed() -> None:
 
 
 def test_after_the_end_nothing_is_followed() -> None:
-    subject = Subject()
+    subject = GatewayWorld(TEXT)
     metrics = Metrics(subject)
     assert subject.inner.followers
     metrics.close()
     assert not subject.inner.followers
 
 
-def answer(subject: Subject, path: str, method: str = "GET", accept: str = "*/*") -> tuple[int, str, str]:
+def answer(subject: GatewayWorld, path: str, method: str = "GET", accept: str = "*/*") -> tuple[int, str, str]:
     """Status, content type and text."""
     sent: list[Mapping[str, Any]] = []
 
@@ -135,16 +107,16 @@ def answer(subject: Subject, path: str, method: str = "GET", accept: str = "*/*"
 
 
 def test_the_page_is_in_the_format_that_is_asked_for() -> None:
-    status, kind, text = answer(Subject(), "/metrics")
+    status, kind, text = answer(GatewayWorld(TEXT), "/metrics")
     assert (status, kind.split(";")[0]) == (200, "text/plain")
     assert 'steptwin_axis_position{axis="M1",controller="table",unit="mm"} 0.0\n' in text
-    _, kind, text = answer(Subject(), "/metrics", accept="application/openmetrics-text;version=1.0.0")
+    _, kind, text = answer(GatewayWorld(TEXT), "/metrics", accept="application/openmetrics-text;version=1.0.0")
     assert kind.startswith("application/openmetrics-text")
     assert text.endswith("# EOF\n")
 
 
 def test_a_silent_device_is_not_ready() -> None:
-    subject = Subject()
+    subject = GatewayWorld(TEXT)
     assert answer(subject, "/ready")[0::2] == (200, "ready\n")
     subject.silent.add("drum")
     assert answer(subject, "/ready")[0::2] == (503, "no answer from drum\n")
@@ -158,11 +130,11 @@ def test_a_silent_device_is_not_ready() -> None:
 
 @pytest.mark.parametrize(("path", "method", "status"), [("/", "GET", 404), ("/metrics", "POST", 405), ("/metrics/", "GET", 404)])
 def test_other_requests_are_refused(path: str, method: str, status: int) -> None:
-    found, _, text = answer(Subject(), path, method)
+    found, _, text = answer(GatewayWorld(TEXT), path, method)
     assert found == status
     assert text.startswith(("served are", "only GET"))
 
 
 def test_head_has_no_body() -> None:
-    status, _, text = answer(Subject(), "/metrics", "HEAD")
+    status, _, text = answer(GatewayWorld(TEXT), "/metrics", "HEAD")
     assert (status, text) == (200, "")

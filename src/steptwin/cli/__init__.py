@@ -22,6 +22,7 @@ from steptwin import __version__
 from steptwin.cli import (
     build,
     calc,
+    certificate,
     check,
     commands,
     dap,
@@ -72,6 +73,7 @@ COMMANDS: Mapping[str, Mapping[str, Callable[..., None]]] = {
         "step": pace.step,
         "resume": pace.resume,
         "save": pace.save,
+        "certificate": certificate.certificate,
     },
     "Programs and runs": {
         "check": check.check,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 
 from steptwin.gateways import make_gateway
 from steptwin.live.server import EndPoint, Server
@@ -13,12 +14,14 @@ from steptwin.subject.following import Filter, Following
 from steptwin.world.gateways import GatewaySpec
 
 
-def open_gateways(server: Server, specs: Iterable[GatewaySpec], control: WorldControl, *, listen_any: bool) -> None:
-    """Raises `Misuse` or `LineFailure` for one that cannot be opened."""
+async def open_gateways(
+    server: Server, specs: Iterable[GatewaySpec], folder: Path, control: WorldControl, *, listen_any: bool
+) -> None:
+    """Open those of a description in ``folder``. Raises `Misuse` or `LineFailure` for one that cannot be opened."""
     subject = _LiveWorldSubject(control)
     for spec in specs:
-        gateway = make_gateway(spec, subject)
-        details = gateway.open(listen_any=listen_any)
+        gateway = make_gateway(spec, subject, folder)
+        details = await gateway.open(listen_any=listen_any)
         place = str(details.get("url") or f"{details['host']}:{details['port']}")
         server.join(gateway, EndPoint(spec.kind, place, gateway.protocol, details))
 

@@ -278,7 +278,8 @@ async def _open(server: Server, live: LiveWorld, pace: Pace, options: UpOptions,
     if addition is not None:
         await addition(Running(server, live, pace, control))
     if not options.is_closed:
-        open_gateways(server, live.world.spec.gateways, control, listen_any=options.listen_any)
+        folder = Path() if options.world is None else options.world.parent
+        await open_gateways(server, live.world.spec.gateways, folder, control, listen_any=options.listen_any)
     if options.ready_file is not None:
         server.write_ready_file(options.ready_file)
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from importlib import import_module
+from pathlib import Path
 from typing import NamedTuple, cast
 
 from steptwin.errors import Misuse
@@ -23,16 +24,23 @@ class _Kind(NamedTuple):
 
 
 KINDS: Mapping[str, _Kind] = complete(
-    "gateway", GATEWAYS, "kind", {"prometheus": _Kind("steptwin.gateways.prometheus", "metrics")}
+    "gateway",
+    GATEWAYS,
+    "kind",
+    {
+        "prometheus": _Kind("steptwin.gateways.prometheus", "metrics"),
+        "opcua": _Kind("steptwin.gateways.opcua.gateway", "opcua"),
+    },
 )
 
 
-def make_gateway(spec: GatewaySpec, subject: GatewaySubject) -> Gateway:
-    """The gateway that a table describes; `Gateway.open` opens it. Raises `Misuse` if a library is missing."""
+def make_gateway(spec: GatewaySpec, subject: GatewaySubject, folder: Path) -> Gateway:
+    """The gateway that a table of a description in ``folder`` describes; `Gateway.open` opens it. Raises `Misuse` if a library is
+    missing."""
     kind = KINDS[spec.kind]
     try:
-        make = cast("Callable[[GatewaySpec, GatewaySubject], Gateway]", import_module(kind.module).make)
+        make = cast("Callable[[GatewaySpec, GatewaySubject, Path], Gateway]", import_module(kind.module).make)
     except ImportError as error:
         where = f"[gateway.{spec.kind}]"
         raise Misuse(f"{where} needs {error.name}: pip install 'steptwin[{kind.extra}]'") from None
-    return make(spec, subject)
+    return make(spec, subject, folder)

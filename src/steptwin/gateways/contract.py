@@ -35,7 +35,7 @@ class Gateway(Protocol):
         """Its name for people."""
         ...
 
-    def open(self, *, listen_any: bool) -> Mapping[str, object]:
+    async def open(self, *, listen_any: bool) -> Mapping[str, object]:
         """Listen; the end point for programs, with ``host``, ``port`` and, where there is one, ``url``.
 
         Raises `Misuse` for an address that is not permitted, `LineFailure` for one that cannot be used.

@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Iterable, Mapping, MutableMapping
+from pathlib import Path
 from typing import Any, TypeAlias
 
 from prometheus_client import CollectorRegistry
@@ -28,13 +29,13 @@ class PrometheusGateway:
 
     protocol = "metrics"
 
-    def __init__(self, spec: GatewaySpec, subject: GatewaySubject) -> None:
+    def __init__(self, spec: GatewaySpec, subject: GatewaySubject, folder: Path) -> None:
         self._spec = spec
         self._subject = subject
         self._metrics: Metrics | None = None
         self._service: HttpService | None = None
 
-    def open(self, *, listen_any: bool) -> Mapping[str, object]:
+    async def open(self, *, listen_any: bool) -> Mapping[str, object]:
         listening = listen(parse_address(self._spec.listen, listen_any=listen_any), is_fixed=True)
         self._metrics = Metrics(self._subject)
         self._service = HttpService(Pages(self._metrics), listening)

@@ -24,6 +24,12 @@ def text_value(value: Any) -> str:
     return value
 
 
+def texts(value: Any) -> tuple[str, ...]:
+    if not isinstance(value, list):
+        raise Misuse(f"{value!r}: expected a list of texts")
+    return tuple(map(text_value, value))
+
+
 def address_value(value: Any) -> str:
     """HOST:PORT as it is written; whether it may be reached by others is decided where it is opened."""
     parse_address(text_value(value), listen_any=True)

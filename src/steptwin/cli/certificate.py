@@ -1,0 +1,22 @@
+"""``steptwin certificate``: a certificate for encrypted connections to gateways and to the studio."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def certificate(
+    folder: Annotated[Path, typer.Argument(help="Folder for certificate.pem and key.pem.")],
+    host: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="Another host name or address of this computer; may be repeated.")
+    ] = None,
+    days: Annotated[int, typer.Option(help="How long it is valid.")] = 1825,
+) -> None:
+    """Make a certificate of this computer, signed by itself, and its key: for [gateway.opcua] and steptwin studio."""
+    from steptwin.commands.certificate import make_certificate
+
+    for file in make_certificate(folder, host or [], days):
+        typer.echo(file)

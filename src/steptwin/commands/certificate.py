@@ -1,0 +1,92 @@
+"""``steptwin certificate``: a certificate of this computer for servers, signed by itself, with its key."""
+
+from __future__ import annotations
+
+import os
+import socket
+from collections.abc import Iterable, Iterator, Sequence
+from datetime import UTC, datetime, timedelta
+from ipaddress import ip_address
+from pathlib import Path
+
+from steptwin.errors import Misuse
+from steptwin.system import reason
+from steptwin.world.gateways import APPLICATION_URI
+
+CERTIFICATE, KEY = "certificate.pem", "key.pem"
+ALWAYS = ("localhost", "127.0.0.1", "::1")
+DAYS = (1, 7300)
+
+
+def make_certificate(folder: Path, hosts: Sequence[str], days: int) -> tuple[Path, Path]:
+    """Write certificate and key into ``folder``, for this computer and the names and addresses in ``hosts``.
+
+    Raises `Misuse` for files that are there already or cannot be written, and where the package cryptography is missing.
+    """
+    if not DAYS[0] <= days <= DAYS[1]:
+        raise Misuse(f"--days {days}: permitted are {DAYS[0]} to {DAYS[1]}")
+    files = folder / CERTIFICATE, folder / KEY
+    for file in files:
+        if file.exists():
+            raise Misuse(f"{file} is there already; remove it, or name another folder")
+    certificate, key = _make(dict.fromkeys([*ALWAYS, socket.gethostname(), *hosts]), days)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        files[0].write_bytes(certificate)
+        with open(os.open(files[1], os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
+            file.write(key)
+    except OSError as error:
+        raise Misuse(f"{folder}: {reason(error)}") from error
+    return files
+
+
+def _make(hosts: Iterable[str], days: int) -> tuple[bytes, bytes]:
+    """Both as PEM."""
+    try:
+        from cryptography import x509
+        from cryptography.hazmat.primitives import hashes
+        from cryptography.hazmat.primitives.asymmetric import rsa
+        from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
+        from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
+    except ImportError as error:
+        raise Misuse(f"certificates need {error.name}: pip install 'steptwin[opcua]'") from None
+
+    def names() -> Iterator[x509.GeneralName]:
+        yield x509.UniformResourceIdentifier(APPLICATION_URI)
+        for host in hosts:
+            try:
+                yield x509.IPAddress(ip_address(host))
+            except ValueError:
+                yield x509.DNSName(host)
+
+    key = rsa.generate_private_key(public_exponent=65537, key_size=2048)
+    name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "steptwin")])
+    usage = x509.KeyUsage(
+        digital_signature=True,
+        content_commitment=True,
+        key_encipherment=True,
+        data_encipherment=True,
+        key_cert_sign=True,
+        key_agreement=False,
+        crl_sign=False,
+        encipher_only=False,
+        decipher_only=False,
+    )
+    now = datetime.now(UTC)
+    certificate = (
+        x509.CertificateBuilder()
+        .subject_name(name)
+        .issuer_name(name)
+        .public_key(key.public_key())
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(now - timedelta(minutes=5))
+        .not_valid_after(now + timedelta(days=days))
+        .add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
+        .add_extension(x509.SubjectKeyIdentifier.from_public_key(key.public_key()), critical=False)
+        .add_extension(usage, critical=True)
+        .add_extension(x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH]), critical=False)
+        .add_extension(x509.SubjectAlternativeName(list(names())), critical=False)
+        .sign(key, hashes.SHA256())
+    )
+    private = key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
+    return certificate.public_bytes(Encoding.PEM), private

@@ -1,0 +1,237 @@
+"""The nodes of a subject: one object for each controller, with its status, program, axes, pins, details and registers.
+
+Node ids are texts: ``table.M1.position``, as the control endpoint names points. Axes have the components ``ParameterSet`` and
+``MotionProfile`` of OPC 40010-1 (Robotics), where clients look for ``ActualPosition`` and ``ActualSpeed``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from asyncua import ua
+
+from steptwin.gateways.opcua.methods import METHODS, MethodArgument, MethodRow, methods_of
+from steptwin.gateways.opcua.nodetypes import VARIANTS, ZEROS, engineering_unit, standard, value_range
+from steptwin.gateways.points import CLOCK, CLOCK_POINTS, GatewayPoint, PointType, points_of
+from steptwin.subject.contract import Description, MachinePart
+
+NAMESPACE_URI = "urn:steptwin:machines"
+NAMESPACE: Any = 2
+"""Its number: 0 is OPC UA, 1 the server."""
+ROOT = "machines"
+
+_ROBOTICS: Mapping[str, tuple[str, str]] = {
+    "position": ("ParameterSet", "ActualPosition"),
+    "velocity": ("ParameterSet", "ActualSpeed"),
+}
+_MOTION_PROFILES = {"rotary": 1, "linear": 3}
+"""OPC 40010-1, AxisMotionProfileEnumeration; 0 is any other."""
+_OTHER_PROFILE = 0
+
+
+@dataclass(frozen=True, slots=True)
+class PointNode:
+    """A variable that shows a point."""
+
+    id: ua.NodeId
+    point: GatewayPoint
+
+
+@dataclass(frozen=True, slots=True)
+class BoundMethod:
+    """A method of an object, which is a controller, its program, or one of its axes."""
+
+    row: MethodRow
+    part: MachinePart
+    axis: int | None
+
+
+def node_id(path: Any) -> ua.NodeId:
+    return ua.NodeId(path, NAMESPACE)
+
+
+class AddressSpaceBuilder:
+    """Collects the nodes of ``description``; ``registers``: the names of further points to show, by controller."""
+
+    def __init__(self, description: Description, registers: Mapping[str, Iterable[str]]) -> None:
+        self.items: list[ua.AddNodesItem] = []
+        self.references: list[ua.AddReferencesItem] = []
+        self.points: dict[str, tuple[PointNode, ...]] = {}
+        """By controller, and of the clock."""
+        self.methods: dict[tuple[ua.NodeId, ua.NodeId], BoundMethod] = {}
+        """By the ids of object and method."""
+        self._description = description
+        self._kinds = {(one.machine, int(one.axis)): one.kind for one in description.axes}
+        self._types()
+        self._object(ROOT, standard(ua.ObjectIds.ObjectsFolder), description.name, ua.ObjectIds.FolderType)
+        if "time" in description.commands:
+            self._object(CLOCK, node_id(ROOT), _title(CLOCK), ua.ObjectIds.FolderType)
+            self.points[CLOCK] = tuple(self._point(CLOCK, point, is_of_axis=False) for point in CLOCK_POINTS)
+        for part in description.machines:
+            self._controller(part, registers.get(part.name, ()))
+
+    # ------------------------------------------------------------------ types
+
+    def _types(self) -> None:
+        """The types of objects, with their methods, which are shared by all objects of the type."""
+        for name, rows in METHODS.items():
+            path = f"types.{name}"
+            self._item(path, standard(ua.ObjectIds.BaseObjectType), f"{name}Type", ua.ObjectIds.HasSubtype, ua.NodeId())
+            self.items[-1].NodeClass = ua.NodeClass.ObjectType
+            self.items[-1].NodeAttributes = _attributes(ua.ObjectTypeAttributes, f"{name}Type", "", IsAbstract=False)
+            for row in rows:
+                self._method(f"{path}.{row.name}", node_id(path), row)
+
+    def _method(self, path: str, parent: ua.NodeId, row: MethodRow) -> None:
+        self._item(path, parent, row.name, ua.ObjectIds.HasComponent, ua.NodeId())
+        self.items[-1].NodeClass = ua.NodeClass.Method
+        self.items[-1].NodeAttributes = _attributes(
+            ua.MethodAttributes, row.name, row.meaning, Executable=True, UserExecutable=True
+        )
+        if row.arguments:
+            given = ua.Variant([_argument(one) for one in row.arguments], ua.VariantType.ExtensionObject)
+            self._property(f"{path}.InputArguments", node_id(path), "InputArguments", given, ua.ObjectIds.Argument, rank=1)
+
+    # ------------------------------------------------------------------ objects
+
+    def _controller(self, part: MachinePart, registers: Iterable[str]) -> None:
+        name, sheet = part.name, part.datasheet
+        self._object(name, node_id(ROOT), name, "types.Controller", sheet.title)
+        self._bind(part, name, "Controller", None)
+        for what, text in (("Model", sheet.kind), ("SoftwareRevision", sheet.variant)):
+            self._property(f"{name}.{what}", node_id(name), what, ua.Variant(text), ua.ObjectIds.String)
+        points = points_of(part, self._description, registers)
+        groups = dict.fromkeys(point.path[0] for point in points if len(point.path) > 1)
+        axes = {axis.name: axis for axis in sheet.axes}
+        for group in groups:
+            path = f"{name}.{group}"
+            axis = axes.get(group)
+            if axis is not None:
+                self._object(path, node_id(name), group, "types.Axis")
+                self._bind(part, path, "Axis", axis.number)
+                self._axis(path, self._kinds.get((name, axis.number)))
+            elif group == "program":
+                self._object(path, node_id(name), _title(group), "types.Program")
+                self._bind(part, path, "Program", None)
+            else:
+                self._object(path, node_id(name), _title(group), ua.ObjectIds.FolderType)
+        self.points[name] = tuple(self._point(name, point, is_of_axis=point.path[0] in axes) for point in points)
+
+    def _axis(self, path: str, kind: str | None) -> None:
+        self._object(f"{path}.ParameterSet", node_id(path), "ParameterSet", ua.ObjectIds.BaseObjectType)
+        profile = ua.Variant(_MOTION_PROFILES.get(kind or "", _OTHER_PROFILE), ua.VariantType.Int32)
+        self._property(f"{path}.MotionProfile", node_id(path), "MotionProfile", profile, ua.ObjectIds.Int32)
+
+    def _bind(self, part: MachinePart, path: str, kind: str, axis: int | None) -> None:
+        """Give an object those methods of its type that its controller takes."""
+        for row in methods_of(part, METHODS[kind], axis):
+            method = node_id(f"types.{kind}.{row.name}")
+            self.references.append(_component(node_id(path), method))
+            self.methods[node_id(path), method] = BoundMethod(row, part, axis)
+
+    def _point(self, machine: str, point: GatewayPoint, *, is_of_axis: bool) -> PointNode:
+        path = f"{machine}.{point.name}"
+        above = f"{machine}.{point.path[0]}" if len(point.path) > 1 else machine
+        name = (
+            _title(point.path[-1])
+            if is_of_axis or point.path[0] in ("program", "details") or above == machine
+            else point.path[-1]
+        )
+        if is_of_axis and point.path[-1] in _ROBOTICS:
+            group, name = _ROBOTICS[point.path[-1]]
+            above = f"{above}.{group}"
+        has_unit = bool(point.unit) and point.type in (PointType.NUMBER, PointType.WHOLE)
+        kind = ua.ObjectIds.AnalogUnitType if has_unit else ua.ObjectIds.BaseDataVariableType
+        self._item(path, node_id(above), name, ua.ObjectIds.HasComponent, standard(kind))
+        access = ua.AccessLevel.CurrentRead.mask
+        if point.write is not None:
+            access |= ua.AccessLevel.CurrentWrite.mask
+        self.items[-1].NodeClass = ua.NodeClass.Variable
+        begin = ua.Variant(ZEROS[point.type], VARIANTS[point.type])
+        self.items[-1].NodeAttributes = _variable(name, point.meaning, begin, access=access)
+        if has_unit:
+            unit = ua.Variant(engineering_unit(point.unit), ua.VariantType.ExtensionObject)
+            self._property(f"{path}.EngineeringUnits", node_id(path), "EngineeringUnits", unit, ua.ObjectIds.EUInformation)
+            bounds = None if point.limits is None else value_range(point.limits)
+            if bounds is not None:
+                limits = ua.Variant(bounds, ua.VariantType.ExtensionObject)
+                self._property(f"{path}.EURange", node_id(path), "EURange", limits, ua.ObjectIds.Range)
+        return PointNode(node_id(path), point)
+
+    # ------------------------------------------------------------------ nodes
+
+    def _object(self, path: str, parent: ua.NodeId, name: str, kind: str | int, meaning: str = "") -> None:
+        reference = ua.ObjectIds.Organizes if path == ROOT or parent == node_id(ROOT) else ua.ObjectIds.HasComponent
+        self._item(path, parent, name, reference, node_id(kind) if isinstance(kind, str) else standard(kind))
+        self.items[-1].NodeClass = ua.NodeClass.Object
+        self.items[-1].NodeAttributes = _attributes(ua.ObjectAttributes, name, meaning, EventNotifier=0)
+
+    def _property(self, path: str, parent: ua.NodeId, name: str, value: ua.Variant, kind: int, *, rank: int = -1) -> None:
+        self._item(path, parent, name, ua.ObjectIds.HasProperty, standard(ua.ObjectIds.PropertyType))
+        item = self.items[-1]
+        if name in _STANDARD_NAMES:
+            item.BrowseName = ua.QualifiedName(name, 0)
+        item.NodeClass = ua.NodeClass.Variable
+        item.NodeAttributes = _variable(name, "", value, data_type=kind, rank=rank)
+
+    def _item(self, path: str, parent: ua.NodeId, name: str, reference: int, kind: ua.NodeId) -> None:
+        item = ua.AddNodesItem()
+        item.RequestedNewNodeId = node_id(path)
+        item.BrowseName = ua.QualifiedName(name, NAMESPACE)
+        item.ParentNodeId = parent
+        item.ReferenceTypeId = standard(reference)
+        item.TypeDefinition = kind
+        self.items.append(item)
+
+
+_STANDARD_NAMES = frozenset({"InputArguments", "EngineeringUnits", "EURange"})
+
+
+def _title(name: str) -> str:
+    """``status_code`` is StatusCode."""
+    return "".join(word[:1].upper() + word[1:] for word in name.split("_"))
+
+
+def _attributes(kind: Any, name: str, meaning: str, **others: object) -> Any:
+    """Those that are given; every one that a node has takes time and memory."""
+    given = {"DisplayName": ua.LocalizedText(name), **others}
+    if meaning:
+        given["Description"] = ua.LocalizedText(meaning)
+    return kind(**given, SpecifiedAttributes=sum(ua.NodeAttributesMask[attribute].value for attribute in given))
+
+
+def _variable(
+    name: str, meaning: str, value: ua.Variant, *, data_type: int | None = None, rank: int = -1, access: int = 1
+) -> Any:
+    kind = standard(value.VariantType.value if data_type is None else data_type)
+    return _attributes(
+        ua.VariableAttributes,
+        name,
+        meaning,
+        Value=value,
+        DataType=kind,
+        ValueRank=rank,
+        AccessLevel=access,
+        UserAccessLevel=access,
+    )
+
+
+def _argument(one: MethodArgument) -> ua.Argument:
+    found: Any = ua.Argument()
+    found.Name = one.name
+    found.DataType = standard(VARIANTS[one.type].value)
+    found.ValueRank = -1
+    found.Description = ua.LocalizedText(one.meaning)
+    return found
+
+
+def _component(source: ua.NodeId, target: ua.NodeId) -> ua.AddReferencesItem:
+    found = ua.AddReferencesItem()
+    found.IsForward = True
+    found.ReferenceTypeId = standard(ua.ObjectIds.HasComponent)
+    found.SourceNodeId = source
+    found.TargetNodeClass = ua.NodeClass.Method
+    found.TargetNodeId = target
+    return found

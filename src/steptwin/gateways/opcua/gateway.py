@@ -1,0 +1,106 @@
+"""The server: opened with its nodes, and kept up to date until it is closed."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Mapping
+from pathlib import Path
+
+from asyncua.server.server import Server
+
+from steptwin import __version__
+from steptwin.errors import LineFailure, Misuse
+from steptwin.gateways.contract import GatewaySubject
+from steptwin.gateways.opcua.addressspace import NAMESPACE, NAMESPACE_URI, AddressSpaceBuilder
+from steptwin.gateways.opcua.notifications import Notifications
+from steptwin.gateways.opcua.security import Security
+from steptwin.gateways.opcua.service import NodeService
+from steptwin.gateways.opcua.session import GatewayServer
+from steptwin.gateways.points import registers_by_machine
+from steptwin.gateways.sampling import Sampler
+from steptwin.machine import SECOND
+from steptwin.system import reason
+from steptwin.world.addresses import Address, is_loopback, parse_address
+from steptwin.world.gateways import APPLICATION_URI, OpcUaSpec
+
+PRODUCT_URI = "urn:steptwin"
+
+
+class OpcUaGateway:
+    """Serves ``subject`` where ``spec`` says. A `Gateway`."""
+
+    protocol = "OPC UA"
+
+    def __init__(self, spec: OpcUaSpec, subject: GatewaySubject, folder: Path) -> None:
+        self._spec = spec
+        self._folder = folder
+        self._subject = subject
+        self._server: Server | None = None
+        self._sampler: Sampler | None = None
+        self._notifications: Notifications | None = None
+        self._task: asyncio.Task[None] | None = None
+
+    async def open(self, *, listen_any: bool) -> Mapping[str, object]:
+        address = parse_address(self._spec.listen, listen_any=listen_any)
+        security = Security(self._spec, self._folder, is_local=is_loopback(address.host))
+        registers = self._registers()
+        logging.getLogger("asyncua").addHandler(logging.NullHandler())
+        logging.getLogger("asyncua").propagate = False
+        inside = GatewayServer(user_manager=security)
+        server = Server(inside)
+        server.set_endpoint(f"opc.tcp://{address}/")
+        server.set_server_name(f"steptwin {self._subject.description.name}")
+        await server.init()
+        await server.set_application_uri(APPLICATION_URI)
+        await server.set_build_info(PRODUCT_URI, "steptwin", "steptwin", __version__, "", security.began)
+        if await server.register_namespace(NAMESPACE_URI) != NAMESPACE:
+            raise AssertionError
+        await security.apply(server)
+        builder = AddressSpaceBuilder(self._subject.description, registers)
+        for result in await inside.isession.add_nodes(builder.items):
+            result.StatusCode.check()
+        for code in await inside.isession.add_references(builder.references):
+            code.check()
+        self._sampler = Sampler(self._subject, registers)
+        inside.service = service = NodeService(inside.aspace, self._subject, self._sampler, builder.points, builder.methods)
+        await service.refresh_all()
+        self._notifications = await Notifications.open(server, self._subject)
+        try:
+            await server.start()
+        except OSError as error:
+            raise LineFailure(f"cannot listen on {address}: {reason(error)}") from error
+        self._server = server
+        self._task = asyncio.create_task(self._publish(service, self._notifications))
+        port = _port(server)
+        return {"host": address.host, "port": port, "url": f"opc.tcp://{Address(address.host, port)}/"}
+
+    def _registers(self) -> dict[str, list[str]]:
+        try:
+            return registers_by_machine(self._spec.registers, self._subject.description)
+        except KeyError as error:
+            raise Misuse(f"[gateway.opcua]: registers: no point is called {error.args[0]!r}") from None
+
+    async def _publish(self, service: NodeService, notifications: Notifications) -> None:
+        while True:
+            await asyncio.sleep(self._spec.interval / SECOND)
+            await service.publish()
+            await notifications.publish()
+
+    async def close(self) -> None:
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.wait((self._task,))
+        if self._server is not None:
+            await self._server.stop()
+        for one in (self._sampler, self._notifications):
+            if one is not None:
+                one.close()
+
+
+make = OpcUaGateway
+
+
+def _port(server: Server) -> int:
+    """That of a server that has been started; the library gives it its own number where 0 was asked for."""
+    return 0 if server.bserver is None else int(server.bserver.port or 0)

@@ -1,0 +1,93 @@
+"""Encryption, certificates and users of the server."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from asyncua import ua
+from asyncua.crypto.truststore import TrustStore
+from asyncua.crypto.validator import CertificateValidator, CertificateValidatorOptions
+from asyncua.server.server import Server
+from asyncua.server.user_managers import UserManager
+
+from steptwin.access.roles import Role
+from steptwin.access.tokens import AccessGate, read_tokens
+from steptwin.errors import Misuse, Refusal
+from steptwin.gateways.clients import GatewayClient
+from steptwin.gateways.opcua.session import GatewayUser
+from steptwin.inputfiles import read_bytes
+from steptwin.textcodec import decode
+from steptwin.world.gateways import OpcUaSpec
+
+_SIGNED = (
+    ua.SecurityPolicyType.Basic256Sha256_Sign,
+    ua.SecurityPolicyType.Aes128Sha256RsaOaep_Sign,
+    ua.SecurityPolicyType.Aes256Sha256RsaPss_Sign,
+)
+_ENCRYPTED = (
+    ua.SecurityPolicyType.Basic256Sha256_SignAndEncrypt,
+    ua.SecurityPolicyType.Aes128Sha256RsaOaep_SignAndEncrypt,
+    ua.SecurityPolicyType.Aes256Sha256RsaPss_SignAndEncrypt,
+)
+
+
+class Security(UserManager):
+    """Users are admitted by tokens: the name of the user is free, the password is the token. Without tokens everybody on this
+    computer is an engineer."""
+
+    def __init__(self, options: OpcUaSpec, folder: Path, *, is_local: bool) -> None:
+        """Files are relative to ``folder``. Raises `Misuse` for options and files that cannot be used."""
+        self._options = options
+        self._folder = folder
+        self.began = datetime.now(UTC)
+        if not is_local and (options.security == "none" or options.tokens is None):
+            raise Misuse("[gateway.opcua]: others can reach this address: give security = 'encrypt', certificate, key and tokens")
+        if options.security != "none" and options.certificate is None:
+            raise Misuse(f"[gateway.opcua]: security = {options.security!r} needs certificate and key: see steptwin certificate")
+        tokens = () if options.tokens is None else read_tokens(self._text(options.tokens), options.tokens)
+        self._gate = AccessGate(tokens, open_to=None if tokens else Role.ENGINEER)
+
+    def _text(self, name: str) -> str:
+        return decode(read_bytes(self._folder / name), name).text
+
+    @property
+    def policies(self) -> Sequence[ua.SecurityPolicyType]:
+        """What is permitted: at least what ``security`` names."""
+        if self._options.certificate is None:
+            return (ua.SecurityPolicyType.NoSecurity,)
+        least = self._options.security
+        signed = _SIGNED if least != "encrypt" else ()
+        return (*((ua.SecurityPolicyType.NoSecurity,) if least == "none" else ()), *_ENCRYPTED, *signed)
+
+    async def apply(self, server: Server) -> None:
+        """Raises `Misuse` for a certificate that cannot be used."""
+        options = self._options
+        server.set_security_policy(list(self.policies))
+        asks = self._gate.asks
+        server.set_identity_tokens([ua.UserNameIdentityToken] if asks else [ua.AnonymousIdentityToken, ua.UserNameIdentityToken])
+        if options.certificate is not None and options.key is not None:
+            try:
+                await server.load_certificate(read_bytes(self._folder / options.certificate), "PEM")
+                await server.load_private_key(read_bytes(self._folder / options.key), format="PEM")
+            except ValueError as error:
+                raise Misuse(f"[gateway.opcua]: {options.certificate}, {options.key}: {error}") from None
+        checks = CertificateValidatorOptions.BASIC_VALIDATION | CertificateValidatorOptions.PEER_CLIENT
+        trusted: TrustStore | None = None
+        if options.trusted is not None:
+            trusted = TrustStore([self._folder / options.trusted], [])
+            await trusted.load()
+            checks |= CertificateValidatorOptions.TRUSTED
+        if options.certificate is not None:
+            server.iserver.certificate_validator = CertificateValidator(checks, trusted)
+
+    def get_user(
+        self, iserver: object, username: str | None = None, password: str | None = None, certificate: Any = None
+    ) -> GatewayUser | None:
+        try:
+            role, name = self._gate.enter(password)
+        except Refusal:
+            return None
+        return GatewayUser(client=GatewayClient(name or username or "anonymous", role))

@@ -1,0 +1,128 @@
+"""What is behind the nodes: present values, commands, and the values of what clients subscribe to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from asyncua import ua
+from asyncua.server.address_space import AddressSpace
+
+from steptwin.datasheet import Argument, Limits
+from steptwin.gateways.clients import GatewayClient
+from steptwin.gateways.contract import GatewaySubject
+from steptwin.gateways.opcua.addressspace import BoundMethod, PointNode
+from steptwin.gateways.opcua.nodetypes import data_value, number_of
+from steptwin.gateways.sampling import Sample, Sampler
+
+
+class NodeService:
+    """The `Service` of sessions, for variables ``points`` by controller and ``methods`` by object and method."""
+
+    def __init__(
+        self,
+        space: AddressSpace,
+        subject: GatewaySubject,
+        sampler: Sampler,
+        points: Mapping[str, Sequence[PointNode]],
+        methods: Mapping[tuple[ua.NodeId, ua.NodeId], BoundMethod],
+    ) -> None:
+        self._space = space
+        self._subject = subject
+        self._sampler = sampler
+        self._points = points
+        self._methods = methods
+        self._of_node = {node.id: (machine, node) for machine, nodes in points.items() for node in nodes}
+        self._watched: dict[str, list[PointNode]] = {}
+        """What has been subscribed to, by controller."""
+
+    # ------------------------------------------------------------------ values
+
+    async def refresh(self, nodes: Iterable[ua.NodeId]) -> None:
+        wanted: dict[str, list[PointNode]] = {}
+        for node in nodes:
+            found = self._of_node.get(node)
+            if found is not None:
+                wanted.setdefault(found[0], []).append(found[1])
+        for machine, points in wanted.items():
+            await self._show(await self._sampler.take(machine), points)
+
+    async def refresh_all(self) -> None:
+        for machine, points in self._points.items():
+            await self._show(await self._sampler.take(machine), points)
+
+    def watch(self, nodes: Iterable[ua.NodeId]) -> None:
+        for node in nodes:
+            found = self._of_node.get(node)
+            if found is not None:
+                machine, point = found
+                watched = self._watched.setdefault(machine, [])
+                if point not in watched:
+                    watched.append(point)
+
+    async def publish(self) -> None:
+        """Notify the clients of what has changed."""
+        self._forget()
+        for sample in await self._sampler.changed(list(self._watched)):
+            await self._show(sample, self._watched.get(sample.machine, ()))
+
+    def _forget(self) -> None:
+        """What nobody subscribes to any longer."""
+        for machine, nodes in list(self._watched.items()):
+            kept = [node for node in nodes if self._space[node.id].attributes[ua.AttributeIds.Value].datachange_callbacks]
+            if kept:
+                self._watched[machine] = kept
+            else:
+                del self._watched[machine]
+
+    async def _show(self, sample: Sample, points: Iterable[PointNode]) -> None:
+        for node in points:
+            value = None if sample.state is None else node.point.read(sample.state)
+            fresh = data_value(value, node.point.type, sample.at, is_answered=sample.state is not None)
+            await self._space.write_attribute_value(node.id, ua.AttributeIds.Value, fresh)
+
+    # ------------------------------------------------------------------ commands
+
+    async def write(self, client: GatewayClient, node: ua.NodeId, value: ua.Variant | None) -> None:
+        found = self._of_node.get(node)
+        if found is None or found[1].point.write is None:
+            known = node in self._space
+            raise ua.UaStatusCodeError(ua.StatusCodes.BadNotWritable if known else ua.StatusCodes.BadNodeIdUnknown)
+        machine, there = found
+        point = there.point
+        number = number_of(value, point.type)
+        if number is None or point.write is None:
+            raise ua.UaStatusCodeError(ua.StatusCodes.BadTypeMismatch)
+        _check_range(number, point.limits)
+        await client.do(self._subject, point.write(number))
+        await self._show(await self._sampler.take(machine), (there,))
+
+    async def call(self, client: GatewayClient, node: ua.NodeId, method: ua.NodeId, given: Sequence[ua.Variant]) -> None:
+        bound = self._methods.get((node, method))
+        if bound is None:
+            raise ua.UaStatusCodeError(ua.StatusCodes.BadMethodInvalid)
+        row = bound.row
+        if len(given) != len(row.arguments):
+            missing = len(given) < len(row.arguments)
+            raise ua.UaStatusCodeError(ua.StatusCodes.BadArgumentsMissing if missing else ua.StatusCodes.BadTooManyArguments)
+        values: list[float] = []
+        for argument, variant in zip(row.arguments, given, strict=True):
+            number = number_of(variant, argument.type)
+            if number is None:
+                raise ua.UaStatusCodeError(ua.StatusCodes.BadInvalidArgument)
+            _check_range(number, _argument(bound, argument.of).limits)
+            values.append(number)
+        await client.do(self._subject, row.make(bound.part.name, bound.axis, *values))
+
+
+def _argument(bound: BoundMethod, name: str) -> Argument:
+    """The argument of the command, for this axis."""
+    taken = next(one for one in bound.part.takes if (one.command, one.axis) == (bound.row.command, bound.axis))
+    return next(one for one in taken.arguments if one.name == name)
+
+
+def _check_range(number: float, limits: Limits | None) -> None:
+    if limits is None:
+        return
+    is_low = limits.low is not None and (number <= limits.low if limits.is_low_excluded else number < limits.low)
+    if is_low or (limits.high is not None and number > limits.high) or number != number:  # noqa: PLR0124  NaN
+        raise ua.UaStatusCodeError(ua.StatusCodes.BadOutOfRange)

@@ -1,0 +1,133 @@
+"""The sessions of clients: they read present values, write points and call methods. Everything else is the library's."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from asyncua import ua
+from asyncua.crypto.permission_rules import User, UserRole
+from asyncua.server.internal_server import InternalServer
+from asyncua.server.internal_session import InternalSession
+
+from steptwin.access.roles import Role
+from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
+from steptwin.gateways.clients import GatewayClient, NotPermitted
+from steptwin.gateways.opcua.nodetypes import status
+
+CODES: tuple[tuple[type[SteptwinError], int], ...] = (
+    (NotPermitted, ua.StatusCodes.BadUserAccessDenied),
+    (LineFailure, ua.StatusCodes.BadCommunicationError),
+    (Refusal, ua.StatusCodes.BadInvalidState),
+    (Misuse, ua.StatusCodes.BadInvalidArgument),
+    (SteptwinError, ua.StatusCodes.BadUnexpectedError),
+)
+"""Status codes of errors, the first that fits."""
+
+
+NOBODY = GatewayClient("nobody", Role.VIEWER)
+"""Before a session is activated."""
+
+
+@dataclass
+class GatewayUser(User):
+    """A user of the library's, who is always its ``User``: nobody changes nodes from outside."""
+
+    client: GatewayClient = NOBODY
+
+    def __post_init__(self) -> None:
+        self.role = UserRole.User
+
+
+ANONYMOUS = User(role=UserRole.Anonymous)
+
+
+class Service(Protocol):
+    """What sessions ask of the gateway."""
+
+    async def refresh(self, nodes: Iterable[ua.NodeId]) -> None:
+        """Give the variables among ``nodes`` their present values."""
+        ...
+
+    async def write(self, client: GatewayClient, node: ua.NodeId, value: ua.Variant | None) -> None:
+        """Raises `ua.UaStatusCodeError` and `SteptwinError`."""
+        ...
+
+    async def call(self, client: GatewayClient, node: ua.NodeId, method: ua.NodeId, given: Sequence[ua.Variant]) -> None:
+        """As `write`."""
+        ...
+
+    def watch(self, nodes: Iterable[ua.NodeId]) -> None:
+        """Clients subscribe to these."""
+        ...
+
+
+class GatewayServer(InternalServer):
+    """The library's server with sessions of this gateway."""
+
+    service: Service
+
+    def create_session(
+        self,
+        name: str,
+        user: User = ANONYMOUS,
+        external: bool = False,
+    ) -> InternalSession:
+        return GatewaySession(self, self.aspace, self.subscription_service, name, user=user, external=external)
+
+
+class GatewaySession(InternalSession):
+    """A session of a client."""
+
+    def __init__(self, server: GatewayServer, *arguments: Any, **named: Any) -> None:
+        super().__init__(server, *arguments, **named)
+        self._service = server.service
+
+    @property
+    def _client(self) -> GatewayClient:
+        return self.user.client if isinstance(self.user, GatewayUser) else NOBODY
+
+    async def read(self, params: ua.ReadParameters) -> list[ua.DataValue]:
+        await self._service.refresh(one.NodeId for one in params.NodesToRead if one.AttributeId == ua.AttributeIds.Value)
+        return await super().read(params)
+
+    async def write(self, params: ua.WriteParameters) -> list[ua.StatusCode]:
+        return [await _code(self._write(one)) for one in params.NodesToWrite]
+
+    async def _write(self, one: ua.WriteValue) -> None:
+        if one.AttributeId != ua.AttributeIds.Value:
+            raise ua.UaStatusCodeError(ua.StatusCodes.BadNotWritable)
+        if one.IndexRange:
+            raise ua.UaStatusCodeError(ua.StatusCodes.BadIndexRangeInvalid)
+        if one.Value.Value is None:
+            raise ua.UaStatusCodeError(ua.StatusCodes.BadTypeMismatch)
+        if one.Value.SourceTimestamp is not None or one.Value.ServerTimestamp is not None:
+            raise ua.UaStatusCodeError(ua.StatusCodes.BadWriteNotSupported)
+        await self._service.write(self._client, one.NodeId, one.Value.Value)
+
+    async def call(self, params: list[ua.CallMethodRequest]) -> list[ua.CallMethodResult]:
+        return [await self._call(one) for one in params]
+
+    async def _call(self, one: ua.CallMethodRequest) -> ua.CallMethodResult:
+        result = ua.CallMethodResult()
+        result.StatusCode = await _code(self._service.call(self._client, one.ObjectId, one.MethodId, one.InputArguments))
+        return result
+
+    async def create_monitored_items(self, params: ua.CreateMonitoredItemsParameters) -> list[ua.MonitoredItemCreateResult]:
+        wanted = [one.ItemToMonitor.NodeId for one in params.ItemsToCreate]
+        await self._service.refresh(wanted)
+        results = await super().create_monitored_items(params)
+        self._service.watch(wanted)
+        return results
+
+
+async def _code(action: Awaitable[None]) -> ua.StatusCode:
+    """The status code of what is done."""
+    try:
+        await action
+    except ua.UaStatusCodeError as error:
+        return ua.StatusCode(error.code)
+    except SteptwinError as error:
+        return status(next(code for kind, code in CODES if isinstance(error, kind)))
+    return ua.StatusCode()

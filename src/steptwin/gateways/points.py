@@ -1,0 +1,225 @@
+"""The values of a controller that gateways show: from its data sheet, alike for every protocol (docs/gateways.md).
+
+The paths are those of its state: ``M1.position``, ``program.text``, ``pins.IN3``, ``details.baud``; registers that a gateway's
+table names follow under ``registers``.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from operator import itemgetter
+from typing import Any, TypeAlias
+
+from steptwin.controllerstate import StatusLevel
+from steptwin.datasheet import Access, AxisDescription, Detail, FactType, Limits, Pin, PinDirection
+from steptwin.subject.commands import Command
+from steptwin.subject.contract import Description, MachinePart
+from steptwin.world.script import Set, Write
+
+PointValue: TypeAlias = bool | int | float | str | None
+"""None where it is not known."""
+State: TypeAlias = Mapping[str, Any]
+"""The state of a controller as JSON (`steptwin.controllerstate`), with ``registers`` by name besides."""
+
+
+class PointType(enum.Enum):
+    TRUTH = "true or false"
+    WHOLE = "whole number"
+    NUMBER = "number"
+    TEXT = "text"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GatewayPoint:
+    """One value of a controller. ``path``: under the controller, such as ``("M1", "position")``."""
+
+    path: tuple[str, ...]
+    meaning: str
+    type: PointType
+    unit: str = ""
+    limits: Limits | None = None
+    """Of its values; None where they are not known."""
+    read: Callable[[State], PointValue]
+    write: Callable[[float], Command] | None = None
+    """The command that gives it another value; None where it cannot be written."""
+
+    @property
+    def name(self) -> str:
+        return ".".join(self.path)
+
+
+def points_of(part: MachinePart, description: Description, registers: Iterable[str] = ()) -> tuple[GatewayPoint, ...]:
+    """Those of a controller, in the order in which they are shown. ``registers``: the names of further points to show."""
+    return tuple(_points(part, description, registers))
+
+
+def _points(part: MachinePart, description: Description, registers: Iterable[str]) -> Iterator[GatewayPoint]:
+    yield from _CONTROLLER
+    yield from _PROGRAM
+    for index, axis in enumerate(part.datasheet.axes):
+        yield from _axis(index, axis)
+    can_set = "set" in description.commands
+    writable = {point.path for point in part.datasheet.points if point.access is not Access.READ}
+    for pin in part.datasheet.pins:
+        yield _pin(part.name, pin, can_set=can_set, is_writable=pin.name in writable)
+    for detail in part.datasheet.details:
+        if detail.type in _DETAIL_TYPES:
+            yield _detail(detail)
+    for name in registers:
+        yield _register(part, name)
+
+
+# ---------------------------------------------------------------------- the state
+
+
+def _at(*path: str | int) -> Callable[[State], Any]:
+    def read(state: State) -> Any:
+        found: Any = state
+        for step in path:
+            found = found[step]
+        return found
+
+    return read
+
+
+_LEVELS = ", ".join(level.value for level in StatusLevel)
+
+_CONTROLLER = (
+    GatewayPoint(path=("status",), meaning="Its status in words.", type=PointType.TEXT, read=_at("status", "text")),
+    GatewayPoint(path=("status_code",), meaning="The number of its status.", type=PointType.WHOLE, read=_at("status", "code")),
+    GatewayPoint(
+        path=("status_level",), meaning=f"How serious that is: {_LEVELS}.", type=PointType.TEXT, read=_at("status", "level")
+    ),
+)
+_PROGRAM = (
+    GatewayPoint(
+        path=("program", "state"),
+        meaning="stopped, running, waiting or paused.",
+        type=PointType.TEXT,
+        read=_at("program", "state"),
+    ),
+    GatewayPoint(
+        path=("program", "text"),
+        meaning="The same in words, with what it waits for.",
+        type=PointType.TEXT,
+        read=_at("program", "text"),
+    ),
+    GatewayPoint(
+        path=("program", "line"), meaning="The line that is executed.", type=PointType.WHOLE, read=_at("program", "line")
+    ),
+    GatewayPoint(
+        path=("program", "statement"), meaning="The statement there.", type=PointType.TEXT, read=_at("program", "statement")
+    ),
+)
+
+
+def _axis(index: int, axis: AxisDescription) -> Iterator[GatewayPoint]:
+    def point(name: str, meaning: str, kind: PointType, *path: str, unit: str = "", limits: Limits | None = None) -> GatewayPoint:
+        read = _at("axes", index, *path)
+        return GatewayPoint(path=(axis.name, name), meaning=meaning, type=kind, unit=unit, limits=limits, read=read)
+
+    number, whole, truth, text = PointType.NUMBER, PointType.WHOLE, PointType.TRUTH, PointType.TEXT
+    yield point("position", "Counted position.", number, "position", unit=axis.unit, limits=axis.positions)
+    yield point("velocity", "Velocity with its sign.", number, "velocity", unit=f"{axis.unit}/s", limits=axis.velocities)
+    yield point("moving", "Whether it moves.", truth, "moving")
+    yield point("enabled", "Whether its drive is on.", truth, "enabled")
+    yield point("encoder", "Counts of its encoder.", whole, "encoder")
+    yield point("status", "Its status in words.", text, "status", "text")
+    yield point("status_code", "The number of its status.", whole, "status", "code")
+    yield point("status_level", f"How serious that is: {_LEVELS}.", text, "status", "level")
+
+
+def _pin(machine: str, pin: Pin, *, can_set: bool, is_writable: bool) -> GatewayPoint:
+    """Inputs of a twin take levels; outputs are written where the controller has a register for them."""
+    read = itemgetter(pin.name)
+    write: Callable[[float], Command] | None = None
+    if is_writable:
+        write = lambda level: Write(((machine, pin.name, level),))  # noqa: E731
+    elif can_set and pin.direction is not PinDirection.OUTPUT:
+        write = lambda level: Set(((machine, pin.name, level),))  # noqa: E731
+    return GatewayPoint(
+        path=("pins", pin.name),
+        meaning=f"Level of an {pin.direction.value}.",
+        type=PointType.NUMBER if pin.is_analog else PointType.TRUTH,
+        unit=pin.unit,
+        limits=pin.limits,
+        read=lambda state: read(state["pins"]),
+        write=write,
+    )
+
+
+_DETAIL_TYPES = {
+    FactType.WHOLE: PointType.WHOLE,
+    FactType.NUMBER: PointType.NUMBER,
+    FactType.TRUTH: PointType.TRUTH,
+    FactType.TEXT: PointType.TEXT,
+}
+
+
+def _detail(detail: Detail) -> GatewayPoint:
+    return GatewayPoint(
+        path=("details", detail.name),
+        meaning=f"{detail.meaning}.",
+        type=_DETAIL_TYPES[detail.type],
+        unit=detail.unit,
+        read=_at("details", detail.name),
+    )
+
+
+# ---------------------------------------------------------------------- the clock
+
+CLOCK = "time"
+"""The name under which the time of a subject is shown, beside its controllers."""
+CLOCK_POINTS = (
+    GatewayPoint(
+        path=("virtual_time",),
+        meaning="Time of the twins since they began.",
+        type=PointType.NUMBER,
+        unit="s",
+        read=_at("time_s"),
+    ),
+    GatewayPoint(path=("paused",), meaning="Whether it stands.", type=PointType.TRUTH, read=_at("paused")),
+    GatewayPoint(
+        path=("speed",),
+        meaning="Virtual seconds in a second; unknown where it is as fast as it can be.",
+        type=PointType.NUMBER,
+        read=lambda state: state["speed"] if isinstance(state["speed"], int | float) else None,
+    ),
+)
+"""Read from the answer to the command ``time``."""
+
+
+# ---------------------------------------------------------------------- registers
+
+
+def _register(part: MachinePart, name: str) -> GatewayPoint:
+    """A point of the data sheet, or an element of one that is a list (``USER_REGISTER[5]``)."""
+    point = part.datasheet.point(name.partition("[")[0])
+    machine = part.name
+    return GatewayPoint(
+        path=("registers", name),
+        meaning=f"{point.meaning}.",
+        type=PointType.TRUTH if point.type == "switch" else PointType.NUMBER,
+        unit=point.unit,
+        limits=point.limits,
+        read=lambda state: state["registers"][name],
+        write=None if point.access is Access.READ else lambda value: Write(((machine, name, value),)),
+    )
+
+
+def registers_by_machine(names: Iterable[str], description: Description) -> dict[str, list[str]]:
+    """``MACHINE.POINT`` by machine. Raises `KeyError` with a name that is not there."""
+    parts = {part.name: part for part in description.machines}
+    found: dict[str, list[str]] = {name: [] for name in parts}
+    for name in names:
+        machine, _, point = name.partition(".")
+        if machine not in parts:
+            raise KeyError(name)
+        try:
+            parts[machine].datasheet.point(point.partition("[")[0])
+        except KeyError:
+            raise KeyError(name) from None
+        found[machine].append(point)
+    return found

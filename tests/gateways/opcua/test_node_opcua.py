@@ -1,0 +1,179 @@
+"""The OPC UA server with an independent client: node-opcua."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Generator, Mapping
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import pytest
+from gateway_rig import served
+from node_client import NodeClient
+from pymodbus.client import ModbusTcpClient
+from tests.conftest import until
+
+from steptwin.commands.certificate import make_certificate
+
+WORLD = """
+    [[line]]
+    name = "bus"
+    tcp = "127.0.0.1:0"
+    [[mic488]]
+    name = "table"
+    line = "bus"
+    [[m1486]]
+    name = "feed"
+    [[axis]]
+    name = "x"
+    drive = "table.M1"
+    [gateway.opcua]
+    listen = "127.0.0.1:0"
+    registers = ["table.USER_REGISTER[5]", "table.M1_VMAX"]
+    interval = "20ms"
+"""
+AXIS = "ns=2;s=table.M1"
+
+
+Points: TypeAlias = Mapping[str, Mapping[str, Any]]
+
+
+@pytest.fixture(scope="module")
+def points(tmp_path_factory: pytest.TempPathFactory) -> Generator[Points]:
+    """The end points of `WORLD`."""
+    with served(WORLD, tmp_path_factory.mktemp("hall")) as found:
+        yield found
+
+
+@pytest.fixture
+def stranger(require_peer: Callable[[str], str], tmp_path: Path) -> Generator[NodeClient]:
+    """A client that is not connected."""
+    with NodeClient(require_peer("node"), "opcua.js", tmp_path) as found:
+        yield found
+
+
+@pytest.fixture
+def client(stranger: NodeClient, points: Points, tmp_path: Path) -> Generator[NodeClient]:
+    stranger("connect", url=points["opcua"]["url"], folder=str(tmp_path / "client"))
+    yield stranger
+    stranger("close")
+
+
+def double(value: float | str) -> dict[str, object]:
+    return {"type": "double", "value": value}
+
+
+def flag(value: bool) -> dict[str, object]:
+    return {"type": "boolean", "value": value}
+
+
+def call(client: NodeClient, method: str, *given: dict[str, object], node: str = AXIS, kind: str = "Axis") -> str:
+    return client("call", object=node, method=f"ns=2;s=types.{kind}.{method}", given=list(given))
+
+
+def read(client: NodeClient, path: str) -> Any:
+    found = client("read", node=f"ns=2;s={path}")
+    assert found["status"] == "Good", found
+    return found["value"]
+
+
+def test_a_client_moves_an_axis_and_sees_it_move(client: NodeClient, points: Points) -> None:
+    assert call(client, "Enable", flag(True)) == "Good"
+    client("subscribe", node="ns=2;s=table.M1.position", period=20)
+    began = time.time() * 1000
+    assert call(client, "MoveTo", double(40.0)) == "Good"
+    until(lambda: read(client, "table.M1.moving") is False, "it has arrived")
+    with ModbusTcpClient("127.0.0.1", port=points["tcp"]["port"]) as master:
+        words = master.read_holding_registers(10020, count=2, device_id=1).registers
+    assert master.convert_from_registers(words, master.DATATYPE.FLOAT32, word_order="little") == 40.0
+    seen: list[dict[str, Any]] = []
+    until(lambda: bool(seen.extend(client("seen")) or (seen[-1:] and seen[-1]["value"] == 40.0)), "the last value comes")
+    values = [one["value"] for one in seen]
+    assert len(values) > 3
+    assert values == sorted(values)
+    times = [one["time"] for one in seen[1:]]
+    assert times == sorted(times)
+    assert all(began - 1000 < one <= time.time() * 1000 for one in times)
+
+
+def test_refusals_have_status_codes(client: NodeClient) -> None:
+    assert call(client, "MoveTo", double(1e12)) == "BadOutOfRange"
+    assert call(client, "MoveTo", double("Infinity")) == call(client, "MoveTo", double("NaN")) == "BadOutOfRange"
+    assert call(client, "MoveTo", flag(True)) == "BadInvalidArgument"
+    assert call(client, "MoveTo") == "BadArgumentsMissing"
+    assert call(client, "Stop", double(1.0)) == "BadTooManyArguments"
+    assert call(client, "Home", double(5.0), node="ns=2;s=feed.M1") == "BadMethodInvalid"
+    write = lambda path, value: client("write", node=f"ns=2;s={path}", value=value)  # noqa: E731
+    assert write("table.M1.position", double(3.0)) == "BadNotWritable"
+    assert write("table.nothing", double(3.0)) == "BadNodeIdUnknown"
+    assert write("table.pins.OUT1", double(1.0)) == "BadTypeMismatch"
+    assert write("table.registers.USER_REGISTER[5]", double(65536.0)) == "BadOutOfRange"
+    assert read(client, "table.registers.USER_REGISTER[5]") == 0
+
+
+def test_points_are_written(client: NodeClient, points: Points) -> None:
+    for path, value in (
+        ("table.registers.USER_REGISTER[5]", double(77.0)),
+        ("table.pins.OUT2", flag(True)),
+        ("table.pins.IN3", flag(True)),
+    ):
+        assert client("write", node=f"ns=2;s={path}", value=value) == "Good"
+        assert read(client, path) == value["value"]
+    with ModbusTcpClient("127.0.0.1", port=points["tcp"]["port"]) as master:
+        assert master.read_holding_registers(5, count=1, device_id=1).registers == [77]
+        assert master.read_coils(6001, count=1, device_id=1).bits[0] is True
+        inputs = lambda: master.read_discrete_inputs(5002, count=1, device_id=1).bits[0]  # noqa: E731
+        until(inputs, "it is through the filter of the inputs")
+
+
+def test_nodes_have_units_ranges_and_what_robotics_clients_look_for(client: NodeClient) -> None:
+    names = lambda node: [one[0] for one in client("browse", node=node)]  # noqa: E731
+    assert names("ns=2;s=machines") == ["2:Time", "2:table", "2:feed"]
+    assert {"2:ParameterSet", "2:MotionProfile", "2:Moving", "2:Enable", "2:MoveTo", "2:Home", "2:Stop"} <= {*names(AXIS)}
+    assert {"2:Enable", "2:Home"}.isdisjoint(names("ns=2;s=feed.M1"))
+    assert names(f"{AXIS}.ParameterSet") == ["2:ActualPosition", "2:ActualSpeed"]
+    assert names(f"{AXIS}.position") == ["EngineeringUnits", "EURange"]
+    unknown = client("read", node="ns=2;s=feed.M1.enabled")
+    assert (unknown["value"], unknown["status"]) == (None, "BadNoData")
+    assert client("read", node="ns=2;s=table.program.state")["value"] == "stopped"
+    before = read(client, "time.virtual_time")
+    assert read(client, "time.virtual_time") > before
+
+
+def test_events_come_from_the_controller_and_the_server(client: NodeClient) -> None:
+    fields = ["Message", "Severity", "SourceName", "Code"]
+    for node in ("ns=0;i=2253", "ns=2;s=table"):
+        client("events", node=node, fields=fields, period=20)
+    assert call(client, "Start", node="ns=2;s=table.program", kind="Program") == "Good"
+    seen: list[dict[str, Any]] = []
+    until(lambda: bool(seen.extend(client("seen")) or len(seen) >= 2), "the events come")
+    assert {one["node"] for one in seen} == {"ns=0;i=2253", "ns=2;s=table"}
+    message, severity, source, code = seen[0]["event"]
+    assert (message, severity, source, code) == ("program bank 0 is empty", 800, "table", "program-error")
+
+
+SECURE = """
+    security = "encrypt"
+    certificate = "own/certificate.pem"
+    key = "own/key.pem"
+    tokens = "tokens"
+"""
+
+
+def test_encrypted_connections_with_roles(stranger: NodeClient, tmp_path: Path) -> None:
+    make_certificate(tmp_path / "own", [], 2)
+    (tmp_path / "tokens").write_text("viewer screen 0123456789abcdef\noperator press 0123456789abcdeF\n")
+    with served(WORLD + SECURE, tmp_path) as points:
+        where = {"url": points["opcua"]["url"], "folder": str(tmp_path / "client")}
+        secure = {"mode": "SignAndEncrypt", "policy": "Basic256Sha256", **where}
+        for wrong in (where, secure, {**secure, "user": "x", "password": "not a token of these"}):
+            with pytest.raises(RuntimeError):
+                stranger("connect", **wrong)
+        stranger("connect", **secure, user="screen", password="0123456789abcdef")
+        assert read(stranger, "table.status") == "ok"
+        assert call(stranger, "Enable", flag(True)) == "BadUserAccessDenied"
+        assert call(stranger, "Stop") == "Good"
+        stranger("connect", **secure, user="press", password="0123456789abcdeF")
+        assert call(stranger, "Enable", flag(True)) == "Good"
+        assert read(stranger, "table.M1.enabled") is True
+        stranger("close")

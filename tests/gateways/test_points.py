@@ -1,0 +1,100 @@
+"""The values of controllers that gateways show."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+from gateway_rig import GatewayWorld
+
+from steptwin.gateways.points import PointType, PointValue, points_of, registers_by_machine
+from steptwin.gateways.sampling import Sampler
+from steptwin.subject import commands as command
+from steptwin.world.script import Set, Write
+
+TEXT = """
+    [[mic488]]
+    name = "table"
+    [mic488.M1]
+    unit = "mm"
+    gear = 100.0
+    vel = 40.0
+    acc = 400.0
+    dec = 400.0
+    [[m1486]]
+    name = "drum"
+"""
+REGISTERS = ["USER_REGISTER[5]", "M1_VMAX", "M1_POS_ABS"]
+
+
+def values(world: GatewayWorld, machine: str, registers: list[str] | None = None) -> dict[str, PointValue]:
+    part = next(part for part in world.description.machines if part.name == machine)
+    sample = asyncio.run(Sampler(world, {machine: registers or []}).take(machine))
+    assert sample.state is not None
+    return {point.name: point.read(sample.state) for point in points_of(part, world.description, registers or [])}
+
+
+def test_a_controller_at_rest() -> None:
+    world = GatewayWorld(TEXT)
+    found = values(world, "table")
+    assert (found["status"], found["status_code"], found["status_level"]) == ("ok", 0, "ok")
+    assert (found["program.state"], found["program.line"]) == ("stopped", None)
+    assert (found["M1.position"], found["M1.moving"], found["M1.enabled"], found["M1.encoder"]) == (0.0, False, False, 0)
+    assert (found["pins.IN3"], found["details.data_type"]) == (0.0, "REAL")
+    assert (values(world, "drum")["M1.enabled"], values(world, "drum")["details.baud"]) == (None, 4800)
+
+
+def test_a_controller_in_motion() -> None:
+    world = GatewayWorld(TEXT)
+    world.inner.do(command.Enable("table", 1))
+    world.inner.do(command.Move("table", 1, to=40.0))
+    world.inner.do(command.Advance(duration=600_000_000))
+    found = values(world, "table")
+    # 40 mm/s after 0.1 s with 400 mm/s²: 2 mm, then 20 mm in 0.5 s
+    assert found["M1.position"] == pytest.approx(22.0, abs=0.01)
+    assert (found["M1.velocity"], found["M1.moving"], found["M1.enabled"]) == (40.0, True, True)
+
+
+def test_points_have_type_unit_and_range() -> None:
+    world = GatewayWorld(TEXT)
+    part = world.description.machines[0]
+    points = {point.name: point for point in points_of(part, world.description, REGISTERS)}
+    position = points["M1.position"]
+    assert (position.type, position.unit, points["M1.velocity"].unit) == (PointType.NUMBER, "mm", "mm/s")
+    assert position.limits == part.datasheet.axes[0].positions
+    assert (points["pins.AIN1"].type, points["pins.AIN1"].unit) == (PointType.NUMBER, "V")
+    assert points["pins.IN3"].type is PointType.TRUTH
+    assert len(points) == len(points_of(part, world.description, REGISTERS)), "two have one name"
+
+
+def test_inputs_are_set_outputs_and_registers_are_written() -> None:
+    world = GatewayWorld(TEXT)
+    part = world.description.machines[0]
+    points = {point.name: point for point in points_of(part, world.description, REGISTERS)}
+
+    def written(name: str) -> object:
+        write = points[name].write
+        return None if write is None else write(1.0)
+
+    assert written("pins.IN3") == Set((("table", "IN3", 1.0),))
+    assert written("pins.OUT2") == Write((("table", "OUT2", 1.0),))
+    assert written("registers.USER_REGISTER[5]") == Write((("table", "USER_REGISTER[5]", 1.0),))
+    assert written("M1.position") is written("pins.ERR") is None
+
+
+def test_registers_are_read_and_what_is_only_written_is_unknown() -> None:
+    world = GatewayWorld(TEXT)
+    world.inner.do(Write((("table", "USER_REGISTER[5]", 77.0),)))
+    found = values(world, "table", REGISTERS)
+    assert [found[f"registers.{name}"] for name in REGISTERS] == [77.0, 40.0, None]
+
+
+@pytest.mark.parametrize("wrong", ["tabel.M1_VMAX", "table.M9_VMAX", "table", "M1_VMAX"])
+def test_a_register_that_is_not_there(wrong: str) -> None:
+    with pytest.raises(KeyError, match=wrong):
+        registers_by_machine([wrong], GatewayWorld(TEXT).description)
+
+
+def test_registers_by_machine() -> None:
+    found = registers_by_machine(["table.M1_VMAX", "drum.variable"], GatewayWorld(TEXT).description)
+    assert found == {"table": ["M1_VMAX"], "drum": ["variable"]}

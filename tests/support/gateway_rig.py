@@ -1,0 +1,70 @@
+"""Worlds for gateways: in this process, and served by one of their own."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from tests.conftest import STEPTWIN, until
+
+from steptwin import World
+from steptwin.errors import LineFailure
+from steptwin.subject import commands as command
+from steptwin.subject.contract import Description, Reading, Result
+from steptwin.subject.following import Filter, Following
+from steptwin.subject.world import WorldSubject
+
+
+class GatewayWorld:
+    """A world whose controllers may be silent, as devices are."""
+
+    def __init__(self, text: str) -> None:
+        self.world = World.from_toml(text)
+        self.inner = WorldSubject(self.world)
+        self.silent: set[str] = set()
+        self.done: list[command.Command] = []
+
+    @property
+    def description(self) -> Description:
+        return self.inner.description
+
+    def read(self, *points: str) -> tuple[Reading, ...]:
+        return self.inner.read(*points)
+
+    async def do(self, wanted: command.Command, /) -> Result:
+        self.done.append(wanted)
+        if isinstance(wanted, command.State) and wanted.machine in self.silent:
+            raise LineFailure("no answer")
+        return self.inner.do(wanted)
+
+    def follow(self, what: Filter, bound: int) -> Following:
+        return self.inner.follow(what, bound)
+
+
+@contextmanager
+def served(text: str, folder: Path, *options: str) -> Generator[Mapping[str, Mapping[str, Any]]]:
+    """The end points of the description ``text`` by kind, while ``steptwin up`` serves it; it ends without an error."""
+    (folder / "hall.toml").write_text(text)
+    ready = folder / "ready.json"
+    environment = {**os.environ, "XDG_RUNTIME_DIR": str(folder)}
+    process = subprocess.Popen(
+        [STEPTWIN, "up", "hall.toml", "--ready-file", str(ready), *options],
+        cwd=folder,
+        env=environment,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        encoding="utf-8",
+    )
+    try:
+        until(lambda: ready.exists() or process.poll() is not None, "it is ready")
+        yield {point["kind"]: point for point in json.loads(ready.read_text())["end_points"]}
+    finally:
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=60)
+    assert (process.returncode, errors) == (0, "")
