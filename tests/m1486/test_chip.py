@@ -337,6 +337,10 @@ def test_shutdown_stops_the_motor() -> None:
     at = bench.true
     assert bench.run(1.0) == b""
     assert bench.true == at
+    assert not bench.chip.motor.drive.is_energised
+    bench.pin(SD=1, RST=1)
+    bench.run(ms=10)
+    assert bench.chip.motor.drive.is_energised
     assert [event.text for event in bench.events("shutdown")] == ["shutdown"]
 
 

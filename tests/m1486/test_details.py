@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 from m1486_rig import Bench
 
-from steptwin.m1486.details import used_bits
+from steptwin.controllerstate import details_of
+from steptwin.m1486.details import DETAILS, used_bits
 
 
 @pytest.mark.parametrize(("command", "bits"), [("r", 8), ("l5", 16), ("a1000", 24), ("f500", 32)])
@@ -24,3 +25,14 @@ def test_m_12_all_of_the_memory_is_used_once_the_ring_has_come_round() -> None:
         assert used_bits(bench.chip) == 32 * count
     bench.do("f64")
     assert used_bits(bench.chip) == 2032
+
+
+@pytest.mark.parametrize(
+    ("lines", "distance", "direction"),
+    [(["f64"], 64, 1), (["b64"], -64, -1), (["g+"], None, 1), (["g-"], None, -1), (["f64", "r", "g64"], 0, 1)],
+)
+def test_the_next_motion(lines: list[str], distance: int | None, direction: int) -> None:
+    bench = Bench("B")
+    bench.do(*lines)
+    facts = details_of(DETAILS, bench.chip, bench.now)
+    assert (facts["next_distance"], facts["next_direction"]) == (distance, direction)

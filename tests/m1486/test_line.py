@@ -122,6 +122,17 @@ def test_a_port_that_nobody_fetches_from_holds_the_last_characters() -> None:
     assert silent.pending[-1][1] == b"\x02"
 
 
+def test_a_program_is_told_when_a_character_has_left() -> None:
+    line = chain(1, is_timed=True)
+    port = line.port()
+    told: list[int] = []
+    chip = line.chips[1]
+    port.on_output = lambda: told.append(chip.now)
+    line.receive(b"u20\r", 0)
+    chip.advance(SECOND)
+    assert told == [-(-40 * SECOND // 4800) + -(-10 * SECOND // 4800)]
+
+
 def test_a_port_says_when_the_next_character_will_have_left() -> None:
     line = chain(1, is_timed=True)
     port = line.port()

@@ -52,4 +52,5 @@ def test_a_reset_ends_open_loops() -> None:
 def test_bits_between_a_label_and_what_the_chip_has() -> None:
     stream = only_stream("@1\nR\nJ1\n[\nF1\nJ1\nR\n]")
     assert stream.bits_since(0, 2) == 24
+    assert stream.bits_since(2, 2) == 16
     assert stream.bits_since(0, 5) == 24 + 32 + 16 + 8

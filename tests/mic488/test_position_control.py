@@ -524,3 +524,14 @@ def test_what_was_turned_while_the_drive_was_off_is_no_slip() -> None:
     rig.until(1, REACHED)
     rig.wait(1.0)
     assert (rig.status(), rig.get("ENC_IMP")) == (REACHED, -10)
+
+
+def test_a_move_that_arrives_where_it_should_needs_no_control_loop() -> None:
+    """Also where the encoder turns by itself, so that the motion is watched."""
+    rig = encoder_rig()
+    couple(rig, Coupling.FREE)
+    rig.set("POS_ABS", 32.0)
+    rig.until(1, REACHED)
+    rig.wait_ns(1)
+    assert rig.status() == REACHED
+    assert rig.kernel.deadline() is None

@@ -301,6 +301,21 @@ def test_a_path_ends_on_the_first_soft_limit(limits: str, stop: Place, statuses:
     assert (rig.status(1), rig.status(2)) == statuses
 
 
+def test_a_path_backwards_ends_on_the_lower_soft_limit() -> None:
+    rig = ready(f"{ON}LimLM1 = -15\nMOVELIN @A\n{DONE}", "A;-30;40;50;x\n")
+    rig.pin_until("OUT1", 1.0)
+    assert (rig.position(1), rig.position(2)) == (-15, 20)
+    assert (rig.status(1), rig.status(2)) == (9, 1)
+
+
+@pytest.mark.parametrize(("beside", "permitted"), [("0.01", True), ("0.02", False)])
+def test_a_circle_begins_a_pulse_beside_its_first_point_at_most(beside: str, *, permitted: bool) -> None:
+    """At 100 pulses per unit."""
+    rig = ready(f"{ON}PREL M1 {beside}\nWAITPOS\nDOCIRC @A\n{DONE}", "A;-10;0;10;90\n")
+    rig.wait(5)
+    assert rig.state == (RUNNING if permitted else STOPPED)
+
+
 # ---------------------------------------------------------------------- circles and arcs
 
 

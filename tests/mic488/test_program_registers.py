@@ -168,6 +168,16 @@ def test_a_wait_notices_that_a_position_wraps(direction: int) -> None:
     assert rig.position(1) == pytest.approx(-direction * 2**31, abs=200)
 
 
+@pytest.mark.parametrize("direction", [1, -1])
+def test_a_wait_for_the_last_position_before_the_wrap_ends_there(direction: int) -> None:
+    """Single precision: the last 64 positions are read as ±2³¹. The positions behind the wrap are on the other side again."""
+    first = 2**31 - 1280 if direction > 0 else -(2**31) + 1279
+    rig = programmed(f"M1 = ON\nVABS M1 {1000 * direction}\nWAIT PosM1 = {direction * 2**31}\nOUT1 = ON\nWAIT 1 = 2\n")
+    rig.device.axes[0].set_coordinate(first, 0)
+    rig.start()
+    assert rig.pin_until("OUT1", 1.0) == pytest.approx(1.28 - 0.064 + 0.5, abs=0.005)
+
+
 @pytest.mark.parametrize("first", [2**31 - 10, -(2**31) + 9])
 def test_a_wait_for_an_encoder_near_its_end_looks_at_every_statement_time(first: int) -> None:
     """The counter wraps within the foreseen time, while the axis turns it by 80 counts."""

@@ -366,6 +366,9 @@ def test_a_hole_names_its_neighbours_in_decimal_and_hex() -> None:
     )
     with pytest.raises(UnknownRegister, match="no input at 4999"):
         chart.at(Space.INPUT, 4999)
+    with pytest.raises(UnknownRegister) as caught:
+        chart.at(Space.HOLDING, 2000)
+    assert "nearest: USER_REGISTER at 0 (0x0000)…1999 (0x07CF), " in str(caught.value)
     assert chart.find(Space.COIL, 0) is None
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from mic488_rig import programmed, read_pdu
+from mic488_rig import loaded, programmed, read_pdu
 
-from steptwin.mic488.vision import Com1Port, VisionReceiver, VisionRecord
+from steptwin.mic488.vision import Com1Port, VisionReceiver, VisionRecord, uses_vision
 from steptwin.wire.rtu import encode_frame
 from steptwin.wire.slave import FrameDirection, RtuSlavePort
 
@@ -116,3 +116,16 @@ def test_wbc_15_a_frame_that_came_in_pieces_leaves_nothing_of_a_record() -> None
     rig.kernel.deadline()
     rig.wait(0.1)
     assert (rig.r(0), rig.r(8)) == (4, 1)
+
+
+@pytest.mark.parametrize(
+    ("text", "uses"),
+    [
+        ("WAIT VisionNew = 1\n", True),
+        ("VisionNew = 0\n", True),
+        ("x = VisionX\n", True),
+        ("OUT1 = ON\nWAIT IN1 = ON\n", False),
+    ],
+)
+def test_whether_a_program_reads_or_writes_records(text: str, *, uses: bool) -> None:
+    assert uses_vision(loaded(text)[0]) == uses

@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -75,6 +76,16 @@ CASES = [case for golden in GOLDEN for case in read_cases(golden)[1]]
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_messages_are_the_reviewed_ones(case: Case) -> None:
     assert case.found() == case.expected
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_what_was_probably_meant_is_the_fix(case: Case) -> None:
+    """But for W221: which of the inputs was meant is not known."""
+    for d in case.check(case.program):
+        meant = re.search(r"did you mean (\S+)\?$", d.hint or d.message)
+        if meant and d.code != "W221":
+            assert d.fix is not None, d
+            assert d.fix.text == meant[1]
 
 
 @pytest.mark.parametrize("case", read_cases(GOLDEN[1])[1], ids=lambda case: case.name)

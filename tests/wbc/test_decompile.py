@@ -137,6 +137,26 @@ def test_a_record_the_builder_would_not_write_stays_data(record: str) -> None:
     assert unknown(record) == [f"//!record {bytes.fromhex(record).ljust(16, bytes(1)).hex().upper()}"]
 
 
+def test_a_jump_to_a_handler_has_the_name_of_its_interrupt() -> None:
+    data = image("09 01 00\n0B 04 01 00\n0A\n")
+    found = decompile(data)
+    assert found.text.splitlines()[1:] == ["JUMP INT_IN5", "INT_IN5:", "RETURN"]
+    assert again(found) == data
+
+
+def test_a_jump_to_a_handler_that_no_input_has_keeps_its_label() -> None:
+    """There is no IN32."""
+    data = image("09 01 00\n0B 1F 01 00\n0A\n")
+    found = decompile(data)
+    assert found.text.splitlines()[1:3] == ["JUMP L1", "L1:"]
+    assert found.unknown == 1
+    assert again(found) == data
+
+
+def test_an_else_beyond_its_block_stays_data() -> None:
+    assert len(unknown("02 02 01 00 00 00 3D FE 00 00 80 3F 02 00 09 00\n15\n03\n")) == 2
+
+
 def test_blocks_in_blocks_are_written_as_blocks() -> None:
     text = """\
 WHILE IN1 = 1

@@ -111,6 +111,18 @@ def test_only_changed_lines_are_read_again() -> None:
     assert edited.address(len("x = 1\n\nOUT2 = x\n")) == after[3].start
 
 
+def test_steps_of_lines_that_stay_are_kept() -> None:
+    edited = Edited()
+    found = []
+    for text in ("x = 1\nOUT1 = x\nDELAY x\n", "x = 1\nOUT2 = x\nDELAY x\n"):
+        edited.update(text)
+        found.append(edited.check()[0].executable)
+    before, after = found
+    assert before is not None
+    assert after is not None
+    assert [new is old for new, old in zip(after.steps, before.steps, strict=True)] == [True, False, True]
+
+
 PLACES = [("", 0, 0), ("a\n", 2, 1), ("a\nb", 2, 1), ("a\nb", 3, 1), ("a\r\nb\n", 2, 0)]
 
 

@@ -480,6 +480,16 @@ def test_wbc_9_a_delay_is_as_much_later_as_the_pause_was_long() -> None:
     assert rig.changes("OUT1") == [(6.001, 1.0)]
 
 
+def test_without_statement_time_a_wait_ends_at_the_moment_of_its_input() -> None:
+    """Which a digital filter delays by 10 ms."""
+    rig = programmed("WAIT IN1 = ON\nOUT1 = ON\nWAIT 1 = 2\n", statement_time=0)
+    rig.start()
+    rig.wait_ns(12_345_678)
+    rig.pin("IN1", 1)
+    rig.wait(1.0)
+    assert rig.changes("OUT1") == [(0.022345678, 1.0)]
+
+
 def test_a_paused_program_can_be_stopped_and_a_stopped_one_not_paused() -> None:
     rig = run("OUT1 = ON\nWAIT IN1 = ON\n", 0.1)
     rig.pause()

@@ -50,3 +50,5 @@ def test_beyond_the_horizon_the_look_is_taken() -> None:
     assert first_change(lambda moment: 0.0, 5, 10, [FOREVER], 1000) == 1005
     assert first_change(lambda moment: 0.0, 5, 10, [20], 1000) is None
     assert first_change(lambda moment: 0.0, 5, 2000, [], 1000) == 2005
+    assert first_change(lambda moment: 0.0, 0, 1000, [FOREVER], 1000) == 2000  # the horizon itself is looked at
+    assert first_change(lambda moment: 0.0, 0, 1000, [], 1000) is None

@@ -112,6 +112,12 @@ def test_aligned_comments_move_together_when_a_line_grows() -> None:
     assert format_text(text) == "m1 = on    // drive\nx = 1 + 2  // sum\nlongName = x  // more\n"
 
 
+def test_two_blanks_align_where_others_have_one() -> None:
+    text = "#ab  1\n#abc 2\n"
+    assert format_text(text) == text
+    assert format_text("#ab 1\n#abc 2\n") == "#ab 1\n#abc 2\n"
+
+
 @pytest.mark.parametrize("tab", [4, 8])
 def test_what_tabs_align_stays_aligned(tab: int) -> None:
     text = "#a\t\t1\n#longer\t2\n" if tab == 4 else "#a\t1\n#longer\t2\n"
@@ -143,6 +149,7 @@ def test_indentation_below_labels_stays() -> None:
 
 def test_a_section_that_is_not_all_indented_is_not_indented() -> None:
     assert format_text("MAIN:\n  M1 = ON\nM2 = ON\n") == "MAIN:\nM1 = ON\nM2 = ON\n"
+    assert format_text("MAIN:\nM1 = ON\n  M2 = ON\n") == "MAIN:\nM1 = ON\nM2 = ON\n"
 
 
 def test_blocks_that_are_never_opened_are_not_indented() -> None:
