@@ -95,8 +95,9 @@ def test_every_port_hears_the_chips() -> None:
     assert other.to_send(MILLISECOND) == [(0, b"\x42"), (MILLISECOND, b"\x02")]
     other.close()
     line.receive(b"u20\r", SECOND)
-    assert other.pending == []
     assert one.to_send(SECOND) == [(SECOND, b"\x42")]
+    assert other.pending == []
+    other.close()
 
 
 def test_what_was_sent_before_a_program_came_is_not_for_it() -> None:

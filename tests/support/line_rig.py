@@ -11,9 +11,14 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Coroutine
 from typing import Any, TypeVar
 
+import pytest
 from virtual_loop import VirtualLoop
 
 from steptwin.drivers.exchange import LineLost
+from steptwin.drivers.m1486 import lines as m1486_lines
+from steptwin.drivers.mic488 import lines as mic488_lines
+from steptwin.drivers.place import LineAddress
+from steptwin.drivers.threads import ThreadLine
 from steptwin.machine import MICROSECOND, SECOND
 
 T = TypeVar("T")
@@ -242,6 +247,13 @@ class MemoryEndpoint:
             raise LineLost(f"cannot open memory: {self._wire.gone}")
         self._wire.opened += 1
         self._wire.open()
+
+
+def at_every_address(monkeypatch: pytest.MonkeyPatch, wire: VirtualWire) -> None:
+    """Whoever opens an address, of whatever device, finds the wire, and lives in its time."""
+    monkeypatch.setattr(ThreadLine.__init__, "__kwdefaults__", {"clock": wire.clock, "sleeping": wire.sleep})
+    for lines in (mic488_lines, m1486_lines):
+        monkeypatch.setattr(lines, "parse_line_address", lambda text, baud: LineAddress(MemoryEndpoint(wire)))
 
 
 def run_virtual(wire: VirtualWire, main: Coroutine[Any, Any, T]) -> T:

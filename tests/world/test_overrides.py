@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from steptwin.errors import Misuse
-from steptwin.world.overrides import override
+from steptwin.world.overrides import override, read_overrides
 
 DATA: dict[str, Any] = {
     "world": {"seed": 1},
@@ -54,3 +54,23 @@ def test_a_key_that_leads_nowhere_is_refused(key: str, message: str) -> None:
     with pytest.raises(Misuse, match=message):
         override(found, {key: 1.0})
     assert found == DATA
+
+
+def test_values_as_they_are_typed() -> None:
+    typed = ["x.pitch=4.0", " y.n = 3 ", "a.b=true", "c.d=[1, 2]", "e.f=M1", "g.h=", "i.j=a=b", "k.l='4'"]
+    assert read_overrides(typed) == {
+        "x.pitch": 4.0,
+        "y.n": 3,
+        "a.b": True,
+        "c.d": [1, 2],
+        "e.f": "M1",
+        "g.h": "",
+        "i.j": "a=b",
+        "k.l": "4",
+    }
+
+
+@pytest.mark.parametrize("text", ["x.pitch", "=4", " =4"])
+def test_what_is_no_override_as_typed(text: str) -> None:
+    with pytest.raises(Misuse, match=r"expected NAME\.KEY=VALUE, such as x\.pitch=4\.0"):
+        read_overrides([text])

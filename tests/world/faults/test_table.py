@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from steptwin.errors import Misuse
-from steptwin.world.elements import fault_kinds
+from steptwin.world.elements import ELEMENTS, fault_kinds
 from steptwin.world.faults.kinds import rows, shared
 from steptwin.world.faults.table import LARGEST_WHOLE, FaultKind, Layer, Parameter, ParameterForm, check
 
@@ -106,6 +106,26 @@ def test_what_a_parameter_takes(
         return
     with pytest.raises(Misuse, match=r"^here.*permitted are"):
         check(parameter, value, "here")
+
+
+def test_which_faults_elements_have() -> None:
+    """An output that is stuck: every element with outputs that are calculated."""
+    there = {name: {kind.name for kind in element.faults} for name, element in ELEMENTS.items() if element.faults}
+    assert there == {
+        "gate": {"stuck-output"},
+        "latch": {"stuck-output"},
+        "timer": {"stuck-output"},
+        "counter": {"stuck-output"},
+        "relay": {"stuck-output", "welded-contact", "open-coil"},
+        "cylinder": {"stuck-output", "no-air", "jam"},
+        "conveyor": {"belt-stop"},
+        "vacuum": {"stuck-output", "leak"},
+        "brake": {"stuck-output", "worn-brake", "stuck-brake"},
+        "carriage": {"slack-belt"},
+        "transducer": {"broken-wire", "drift"},
+        "collision": {"stuck-output"},
+        "gantry": {"stuck-output", "stiff-guides"},
+    }
 
 
 if __name__ == "__main__":

@@ -1,0 +1,206 @@
+"""The M1486 as a kind of device: what the commands of the shell do with it. The chips live in virtual time."""
+
+from __future__ import annotations
+
+import pytest
+from chip_rig import KNOWN, ChipWire, chip_driver, typed
+from line_rig import at_every_address
+
+from steptwin.drivers.kind import DeviceAddress, DeviceMotion, EndedMotion, FoundDevice, WantedMoves
+from steptwin.drivers.m1486.jog import LINK_S
+from steptwin.drivers.m1486.kind import LOST, M1486_DRIVER
+from steptwin.drivers.m1486.sync import M1486
+from steptwin.errors import Misuse
+
+ADDRESS = DeviceAddress("memory", "m1486", 7, 4800, 1.0)
+
+
+def ready(wire: ChipWire) -> M1486:
+    chip = chip_driver(wire, 7)
+    chip.configure(**KNOWN)
+    return chip
+
+
+def carried_out(chip: M1486, motion: DeviceMotion[M1486], checks: int) -> EndedMotion:
+    begun: set[int] = set()
+    seen: list[set[int]] = []
+    assert tuple(motion.axes) == (1,)
+    motion.begin(chip, begun, lambda: seen.append(set(begun)))
+    assert (begun, seen) == ({1}, [set()] * checks)
+    (end,) = M1486_DRIVER.wait(chip, (1,), None)
+    return motion.end(chip, end)
+
+
+def test_a_move() -> None:
+    wire = ChipWire(addresses=(7,))
+    chip = ready(wire)
+    end = carried_out(chip, M1486_DRIVER.move(WantedMoves({1: 50.0}, False, None)), 2)
+    assert (end.axis, end.name, end.ok, end.position, end.unit) == (1, "chip 7", True, 50.0, "step")
+    assert not end.is_overdue
+    assert end.after_s > 0.0
+    assert chip.settings.velocity == 1000
+    end = carried_out(chip, M1486_DRIVER.move(WantedMoves({1: 50.0}, True, 500)), 2)
+    assert end.position == 100.0
+    assert chip.settings.velocity == wire.chip.drive.velocity == 500
+    assert wire.true() == 100 * 64
+
+
+def test_a_stop_of_a_move_spoils_the_position() -> None:
+    assert M1486_DRIVER.move(WantedMoves({1: 50.0}, False, None)).stop_note == LOST
+    assert "home the axis" in LOST
+
+
+@pytest.mark.parametrize(("text", "line", "direction"), [("1=-B8", 8, -1), ("M1 = +b8", 8, 1), ("m1=-b9", 9, -1)])
+def test_a_seek_and_homing(text: str, line: int, direction: int) -> None:
+    for motion, what in ((M1486_DRIVER.seek, "seek"), (M1486_DRIVER.home, "home")):
+        assert motion is not None
+        wire = ChipWire(addresses=(7,))
+        chip = ready(wire)
+        wire.chip.set_pin(f"B{line}", 1, wire.now)
+        wanted = motion([text])
+        begun: set[int] = set()
+        wanted.begin(chip, begun, lambda: None)
+        assert begun == {1}
+        wire.at(0.5, lambda wire=wire: wire.chip.set_pin(f"B{line}", 0, wire.now))  # type: ignore[misc]
+        (end,) = M1486_DRIVER.wait(chip, wanted.axes, None)
+        assert end.ok
+        assert wire.true() * direction > 0
+        ended = wanted.end(chip, end)
+        assert (ended.position, chip.position()) == ((0.0, 0.0) if what == "home" else (end.position, end.position))
+        assert end.position != 0.0
+        assert bool(wanted.must_wait) == (what == "home")
+
+
+@pytest.mark.parametrize(
+    ("texts", "message"),
+    [
+        (["2=-B8"], "'2=-B8': an M1486 has one axis: expected 1=-B8"),
+        (["1=B8"], r"'1=B8': expected the direction and the line of an M1486, such as 1=-B8 or 1=\+B8"),
+        (["1=-B8", "1=+B9"], "expected the direction and the line"),
+        (["1=-5"], "expected the direction and the line"),
+    ],
+)
+def test_what_is_no_seek(texts: list[str], message: str) -> None:
+    for motion in (M1486_DRIVER.seek, M1486_DRIVER.home):
+        assert motion is not None
+        with pytest.raises(Misuse, match=message):
+            motion(texts)
+
+
+def test_a_held_jog() -> None:
+    wire = ChipWire(addresses=(7,))
+    chip = ready(wire)
+    assert M1486_DRIVER.jog is not None
+    jog = M1486_DRIVER.jog(chip, 1, 400.0, 0.3)
+    assert (jog.unit, jog.ahead_s) == ("step", 2.0 * LINK_S)
+    with jog:
+        assert jog.hold()
+        assert wire.moving()
+    end = jog.ended()
+    assert (end.ok, end.reason, end.name) == (True, "released", "chip 7")
+    assert not wire.moving()
+    assert end.position == wire.true() / 64 > 0.0
+
+
+def test_a_jog_that_others_end_is_not_ok() -> None:
+    wire = ChipWire(addresses=(7,))
+    chip = ready(wire)
+    assert M1486_DRIVER.jog is not None
+    jog = M1486_DRIVER.jog(chip, 1, 400.0, 0.3)
+    with jog:
+        assert jog.hold()
+        chip.stop()
+        while jog.hold():
+            pass
+    end = jog.ended()
+    assert not end.ok
+    assert end.reason != "released"
+
+
+def test_an_end_that_does_not_come_in_time_is_overdue() -> None:
+    wire = ChipWire(addresses=(7,))
+    chip = ready(wire)
+    M1486_DRIVER.move(WantedMoves({1: 5000.0}, False, None)).begin(chip, set(), lambda: None)
+    (end,) = M1486_DRIVER.wait(chip, (1,), 0.5)
+    assert (end.ok, end.is_overdue) == (False, True)
+    M1486_DRIVER.halt(chip, (1,))
+    wire.sleep(2.0)
+    assert not wire.moving()
+
+
+@pytest.mark.parametrize("program", [False, True])
+def test_a_stop_sends_k_without_any_question(monkeypatch: pytest.MonkeyPatch, *, program: bool) -> None:
+    wire = ChipWire(addresses=(7,))
+    chip = ready(wire)
+    chip.move_by(5000.0)
+    wire.sleep(0.5)
+    at_every_address(monkeypatch, wire)
+    del wire.sent[:]
+    log: list[str] = []
+    assert M1486_DRIVER.stop(ADDRESS, log.append, (), program) is None
+    wire.sleep(2.0)
+    assert not wire.moving()
+    assert "u" not in typed(wire).partition("k")[0]
+    assert log
+
+
+def test_an_open_driver_leaves_the_settings(monkeypatch: pytest.MonkeyPatch) -> None:
+    wire = ChipWire(addresses=(7,))
+    ready(wire)
+    at_every_address(monkeypatch, wire)
+    with M1486_DRIVER.opened(ADDRESS, False, None) as chip:
+        assert (chip.address, chip.variant.name) == (7, "B")
+    assert wire.chip.drive.velocity == 1000
+
+
+def test_chips_on_a_line_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    wire = ChipWire("C", addresses=(2, 10))
+    at_every_address(monkeypatch, wire)
+    search = M1486_DRIVER.search
+    assert search is not None
+    asked: list[int] = []
+    found = search.find("memory", 4800, range(16), 0.1, asked.append)
+    assert found == [FoundDevice(2, "C", "M1486C"), FoundDevice(10, "C", "M1486C")]
+    assert len(asked) == 16
+    assert (search.numbers, search.disturbs, search.form) == (16, False, "X")
+
+
+def test_after_a_search_all_chips_listen_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    wire = ChipWire(addresses=(2, 10))
+    chip_driver(wire, 2)
+    assert [chip.receiver.is_listening for chip in wire.chips.values()] == [True, False]
+    at_every_address(monkeypatch, wire)
+    assert M1486_DRIVER.search is not None
+    M1486_DRIVER.search.leave("memory", 4800)
+    wire.sleep(1.0)
+    assert [chip.receiver.is_listening for chip in wire.chips.values()] == [True, True]
+
+
+def test_bytes_of_other_protocols_are_ended_by_a_line_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    wire = ChipWire(addresses=(7,))
+    wire.send(b"v3")
+    wire.sleep(1.0)
+    at_every_address(monkeypatch, wire)
+    del wire.sent[:]
+    assert M1486_DRIVER.clear is not None
+    M1486_DRIVER.clear("tcp://memory:1", 38400)
+    once = typed(wire)
+    assert once.endswith(" ")
+    del wire.sent[:]
+    M1486_DRIVER.clear("memory", 38400)  # at the rate of the chips, too
+    assert typed(wire) == 2 * once
+
+
+def test_what_it_takes() -> None:
+    selection = M1486_DRIVER.selection
+    assert [selection.read(text) for text in ("0", "F", "a")] == [0, 15, 10]
+    assert (selection.show(15), selection.show(3), selection.usual) == ("F", "3", None)
+    assert selection.may_be_open
+    assert not selection.has_config
+    assert selection.options == {"chip", "variant"}
+    assert M1486_DRIVER.check_axis(1) == 1
+    for axis in (0, 2):
+        with pytest.raises(Misuse, match=rf"axis {axis} is not one of an M1486: permitted are 1$"):
+            M1486_DRIVER.check_axis(axis)
+    assert list(M1486_DRIVER.programs) == [".m1486"]
+    assert M1486_DRIVER.enable is None

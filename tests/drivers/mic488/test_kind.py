@@ -1,0 +1,217 @@
+"""The MIC488 as a kind of device: what the commands of the shell do with it. The twin lives in virtual time."""
+
+from __future__ import annotations
+
+import pytest
+from host_rig import Wire, driver
+from line_rig import at_every_address
+from mic488_rig import loaded
+
+from steptwin.drivers.kind import DeviceAddress, EndedMotion, FoundDevice, WantedMoves
+from steptwin.drivers.mic488.kind import MIC488_DRIVER, RUNS_ON, of_mic488, unit_of
+from steptwin.drivers.mic488.sync import Mic488
+from steptwin.errors import Misuse
+
+ADDRESS = DeviceAddress("memory", "mic488", None, 38400, 0.3, "1.70")
+
+
+def nothing() -> None:
+    """No reason not to move."""
+
+
+def begin(mic: Mic488, moves: WantedMoves) -> list[EndedMotion]:
+    begun: set[int] = set()
+    checks: list[set[int]] = []
+    motion = MIC488_DRIVER.move(moves)
+    assert list(motion.axes) == list(moves.targets)
+    motion.begin(mic, begun, lambda: checks.append(set(begun)))
+    assert begun == set(moves.targets)
+    assert checks == [set(), set()]  # before the velocity is set, and before the motion begins
+    return list(MIC488_DRIVER.wait(mic, motion.axes, None))
+
+
+def enabled(wire: Wire, *axes: int) -> Mic488:
+    mic = driver(wire)
+    assert MIC488_DRIVER.enable is not None
+    MIC488_DRIVER.enable(mic, axes or (1,), True)
+    return mic
+
+
+def test_a_move_of_one_axis() -> None:
+    wire = Wire()
+    mic = enabled(wire, 2)
+    (end,) = begin(mic, WantedMoves({2: 5.0}, False, None))
+    assert (end.axis, end.name, end.ok, end.reason, end.position, end.unit) == (2, "M2", True, "target reached", 5.0, "mm")
+    assert str(end) == "M2: target reached at 5 mm"
+    assert not end.is_overdue
+    (end,) = begin(mic, WantedMoves({2: 5.0}, True, 10.0))
+    assert end.position == 10.0
+    assert mic.get("M2_VMAX") == {"M2_VMAX": 10.0}
+    # 5 mm at 10 mm/s with ramps of 50 mm/s²: 0.5 s, and 0.2 s for the ramps.
+    assert end.after_s == pytest.approx(0.7, abs=0.1)
+
+
+def test_moves_of_several_axes_begin_together() -> None:
+    wire = Wire()
+    mic = enabled(wire, 1, 2)
+    assert [end.position for end in begin(mic, WantedMoves({1: 2.0, 2: 4.0}, False, 20.0))] == [2.0, 4.0]
+    assert [end.position for end in begin(mic, WantedMoves({1: 2.0, 2: 4.0}, True, None))] == [4.0, 8.0]
+    assert list(mic.get("M1_VMAX", "M2_VMAX", "M3_VMAX").values()) == [20.0, 20.0, 25.0]
+
+
+def test_a_refusal_before_the_motion_begins_nothing() -> None:
+    wire = Wire()
+    mic = enabled(wire)
+    begun: set[int] = set()
+
+    def refuse() -> None:
+        raise Misuse("not now")
+
+    with pytest.raises(Misuse, match="not now"):
+        MIC488_DRIVER.move(WantedMoves({1: 5.0}, False, 10.0)).begin(mic, begun, refuse)
+    assert begun == set()
+    assert mic.get("M1_VMAX") == {"M1_VMAX": 25.0}
+    wire.rest(1.0)
+    assert wire.position(1) == 0
+
+
+def test_homing_of_axes_one_after_the_other() -> None:
+    wire = Wire()
+    mic = enabled(wire, 1, 3)
+    assert MIC488_DRIVER.home is not None
+    motion = MIC488_DRIVER.home(["1=-5", "M3=-4"])
+    assert tuple(motion.axes) == (1, 3)
+    begun: set[int] = set()
+    checks: list[set[int]] = []
+    motion.begin(mic, begun, lambda: checks.append(set(begun)))
+    assert (begun, checks) == ({1, 3}, [set(), {1}])
+    ends = MIC488_DRIVER.wait(mic, motion.axes, 60.0)
+    assert [(end.name, end.ok, end.position) for end in ends] == [("M1", True, 0.0), ("M3", True, 0.0)]
+    with pytest.raises(Misuse, match="'5' is not an axis: permitted are 1 to 4, or M1 to M4"):
+        MIC488_DRIVER.home(["5=1"])
+
+
+def test_an_end_that_does_not_come_in_time_is_overdue() -> None:
+    wire = Wire()
+    mic = enabled(wire)
+    MIC488_DRIVER.move(WantedMoves({1: 200.0}, False, None)).begin(mic, set(), nothing)
+    (end,) = MIC488_DRIVER.wait(mic, (1,), 0.5)
+    assert (end.ok, end.is_overdue) == (False, True)
+    MIC488_DRIVER.halt(mic, (1,))
+    assert not wire.moving(1)
+
+
+def test_a_held_jog() -> None:
+    wire = Wire()
+    mic = enabled(wire, 2)
+    assert MIC488_DRIVER.jog is not None
+    jog = MIC488_DRIVER.jog(mic, 2, 10.0, 0.4)
+    assert (jog.unit, jog.ahead_s) == ("mm", 0.0)
+    with jog:
+        assert jog.hold()
+        assert wire.moving(2)
+        assert not wire.moving(1)
+    end = jog.ended()
+    assert not wire.moving(2)
+    assert (end.name, end.unit) == ("M2", "mm")
+    assert end.position == pytest.approx(wire.position(2) / 100.0)
+    assert wire.position(2) > 0
+
+
+def test_a_jog_that_was_not_let_go_says_why_it_ended() -> None:
+    wire = Wire()
+    mic = enabled(wire)
+    assert MIC488_DRIVER.jog is not None
+    jog = MIC488_DRIVER.jog(mic, 1, -20.0, 0.4)
+    with jog:
+        while jog.hold():
+            pass
+    end = jog.ended()
+    assert (end.ok, end.reason) == (False, "stopped at limit L")
+    assert end.position == pytest.approx(wire.position(1) / 100.0)
+
+
+def test_drives_are_switched_on_and_off() -> None:
+    wire = Wire()
+    mic = enabled(wire, 1, 3)
+    assert mic.status().axes == (1, 0, 1, 0)
+    assert MIC488_DRIVER.enable is not None
+    MIC488_DRIVER.enable(mic, (1,), False)
+    assert mic.status().axes == (0, 0, 1, 0)
+
+
+def test_a_stop_opens_the_line_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    wire = Wire()
+    mic = enabled(wire, 1, 2)
+    MIC488_DRIVER.move(WantedMoves({1: 200.0, 2: 200.0}, False, None)).begin(mic, set(), nothing)
+    wire.sleep(1.0)
+    at_every_address(monkeypatch, wire)
+    before = wire.opened
+    assert MIC488_DRIVER.stop(ADDRESS, None, (2,), False) is None
+    assert wire.opened == before + 1
+    assert (wire.moving(1), wire.moving(2)) == (True, False)
+    MIC488_DRIVER.stop(ADDRESS, None, (), False)
+    assert not wire.moving(1)
+
+
+def test_a_stop_warns_of_a_program_that_runs_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    wire = Wire()
+    wire.twin.load_program(0, loaded("WHILE 1 = 1\nDELAY 1\nENDWHILE\n")[0])
+    at_every_address(monkeypatch, wire)
+    mic = driver(wire)
+    mic.program.start()
+    assert MIC488_DRIVER.stop(ADDRESS, None, (), False) == RUNS_ON
+    assert MIC488_DRIVER.stop(ADDRESS, None, (), True) is None
+    assert mic.program.state() == 0
+    assert MIC488_DRIVER.stop(ADDRESS, None, (), False) is None
+
+
+def test_who_only_observes_leaves_the_data_type(monkeypatch: pytest.MonkeyPatch) -> None:
+    wire = Wire()
+    driver(wire).set("DATA_TYPE", 1)
+    at_every_address(monkeypatch, wire)
+    log: list[str] = []
+    with MIC488_DRIVER.opened(ADDRESS, True, log.append) as mic:
+        assert (mic.unit, mic.firmware) == (1, "1.70")
+        assert mic.get("DATA_TYPE") == {"DATA_TYPE": 1}
+    assert log
+    with MIC488_DRIVER.opened(ADDRESS, False, None) as mic:
+        assert mic.get("DATA_TYPE") == {"DATA_TYPE": 0}
+
+
+def test_controllers_on_a_line_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    wire = Wire(units=(2, 5))
+    at_every_address(monkeypatch, wire)
+    assert MIC488_DRIVER.search is not None
+    asked: list[int] = []
+    found = MIC488_DRIVER.search.find("memory", 38400, [1, 2, 5], 0.2, asked.append)
+    assert found == [FoundDevice(2, "1.70", "MIC488, firmware 1.70"), FoundDevice(5, "1.70", "MIC488, firmware 1.70")]
+    assert asked == [1, 2, 5]
+    assert (MIC488_DRIVER.search.disturbs, MIC488_DRIVER.search.numbers) == (True, None)
+
+
+def test_the_slave_address_is_1_if_none_is_given() -> None:
+    assert unit_of(ADDRESS) == 1
+    assert unit_of(DeviceAddress("memory", "mic488", 7, 38400, 0.3)) == 7
+    assert MIC488_DRIVER.selection.usual == 1
+
+
+def test_what_only_a_mic488_has() -> None:
+    assert of_mic488(ADDRESS, "record") is ADDRESS
+    with pytest.raises(Misuse, match="record is for a MIC488; memory is of kind m1486"):
+        of_mic488(DeviceAddress("memory", "m1486", None, 4800, 0.3), "record")
+
+
+def test_axes_that_it_has() -> None:
+    assert [MIC488_DRIVER.check_axis(axis) for axis in (1, 4)] == [1, 4]
+    for axis in (0, 5):
+        with pytest.raises(Misuse, match=rf"axis {axis} is not one of a MIC488: permitted are 1 to 4$"):
+            MIC488_DRIVER.check_axis(axis)
+
+
+def test_what_it_takes() -> None:
+    assert set(MIC488_DRIVER.programs) == {".prg", ".wbc"}
+    assert MIC488_DRIVER.send is None
+    assert "not documented" in MIC488_DRIVER.cannot_send
+    assert MIC488_DRIVER.selection.options == {"unit", "firmware", "config"}
+    assert (MIC488_DRIVER.axes, MIC488_DRIVER.baud) == (4, 38400)
