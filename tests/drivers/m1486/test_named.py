@@ -63,7 +63,7 @@ def test_a_position_that_is_not_known_is_none() -> None:
 
 
 def test_points_of_a_twin() -> None:
-    assert followed([], None) == ("position", "velocity", "counter", "variable")
+    assert followed([], None) == ("counter", "velocity", "variable")
     assert followed(["variable", "counter"], "B") == ["variable", "counter"]
     assert followed(["variable", "flags"], None) is None
     assert M1486_DRIVER.usual == ("POSITION", "VARIABLE", "FLAGS")

@@ -1,5 +1,4 @@
-"""Encoders of axes: counts of a revolution of 3200 pulses, of a millimetre of 640; as the controller is configured, an eighth of a
-pulse."""
+"""Encoders of axes: counts per revolution (3200 pulses), per millimetre (640 pulses), and as configured (400 per 3200 pulses)."""
 
 from __future__ import annotations
 

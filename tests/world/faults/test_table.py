@@ -124,6 +124,7 @@ def test_which_faults_elements_have() -> None:
         "carriage": {"slack-belt"},
         "transducer": {"broken-wire", "drift"},
         "collision": {"stuck-output"},
+        "follower": {"worn-cam", "stuck-follower"},
         "gantry": {"stuck-output", "stiff-guides"},
     }
 
