@@ -21,6 +21,8 @@ CASES = {
     "pick_and_place.txt": EXAMPLES / "mic488" / "pick_and_place.prg",
     "traps.txt": GOLDEN / "traps.prg",
     "traps.json": GOLDEN / "traps.prg",
+    "waits.txt": GOLDEN / "waits.prg",
+    "chip_waits.txt": GOLDEN / "chip_waits.m1486",
     "chain.txt": EXAMPLES / "m1486" / "example6.m1486",
     "chip_traps.txt": GOLDEN / "chip_traps.m1486",
     "chip_traps.json": GOLDEN / "chip_traps.m1486",

@@ -9,11 +9,14 @@ from steptwin.controlflow import ControlFlow
 from steptwin.diagnostics import Severity, SourceText
 from steptwin.errors import Misuse
 from steptwin.explain.blocks import Timing, blocks_of
+from steptwin.explain.loops import TextLoop, executed, text_loops
 from steptwin.explain.model import EndlessLoop, ExplainedStatement, Explanation, LongWait, MemoryPart, MemorySection, Usage
 from steptwin.m1486.check import check
-from steptwin.m1486.commands import When, when
+from steptwin.m1486.commands import TABLE, When, when
+from steptwin.m1486.commands import rows as find_rows
 from steptwin.m1486.drive import speed_curve
 from steptwin.m1486.flow import FlowAnalysis, Settings, follow
+from steptwin.m1486.functions import USER_FLAGS
 from steptwin.m1486.lines import LINES, STEP_DIRECTION, Interface, line_group
 from steptwin.m1486.microsteps import HIGHEST_SPEED
 from steptwin.m1486.structure import CommandStream, stored_bits, streams
@@ -24,6 +27,10 @@ from steptwin.machine import MILLISECOND, Nanos
 from steptwin.motion.ramps import plan_distance
 
 _WRITES = frozenset("CT!")
+_JUMPS = frozenset("J'")
+_NUMERIC = find_rows(":")[0].section
+_CALCULATES = frozenset(row.key for row in TABLE if row.section == _NUMERIC) - {">", "?", "!"}
+"""What gives the internal variable another value, besides the levels of lines."""
 _ERRORS = "steptwin check finds errors in this program: a chip drops such commands and, unless function 44 is ON, stops there"
 _NO_INTERRUPTS = "an M1486 has no interrupts: K and LIMIT stop its motion, and function 51 decides whether the program goes on"
 
@@ -209,9 +216,14 @@ class _Chip:
                 found.append((index, LongWait(line, text, f"only {self._line(command)} ends the seek", "K or LIMIT")))
             elif command.key == "R" and index in endless:
                 found.append((index, LongWait(line, text, "after G+ or G- the move has no end", "K or LIMIT")))
-        for component in self._flow.components(self._starts):
-            found += self._polling(component)
-        return [wait for _, wait in sorted(found, key=lambda one: one[0])]
+        for loop in text_loops(self._flow, reached):
+            reason = self._polling(loop)
+            if reason:
+                line, text = self._statements[loop.first]
+                span = f"lines {line} to {self._statements[loop.last].line}"
+                found.append((loop.first, LongWait(line, text, f"{span} repeat {reason}")))
+        first = dict(reversed(found))
+        return [wait for _, wait in sorted(first.items())]
 
     def _endless_moves(self) -> set[int]:
         """Commands that come, on some path of the graph, after G+ or G- without another distance between."""
@@ -231,27 +243,34 @@ class _Chip:
                 work += self._flow.next[index]
         return seen
 
-    def _polling(self, component: set[int]) -> list[tuple[int, LongWait]]:
-        """A loop that is left only by conditions on lines that the program does not set."""
-        exits = [i for i in component if i < len(self._commands) and not component.issuperset(self._flow.next[i])]
-        written = {
-            line
-            for i in component
-            if i < len(self._commands) and self._commands[i].key in _WRITES
-            for line in _lines_of(self._commands[i])
-        }
-        asked = [argument.line for i in exits if isinstance(argument := self._commands[i].argument, JumpCondition)]
-        is_loop = any(target in component for i in component if i < len(self._commands) for target in self._flow.next[i])
-        if not is_loop or not exits or len(asked) != len(exits) or any(n not in LINES or n in written for n in asked):
-            return []
-        if any(self._commands[i].from_variable for i in component if self._commands[i].key in _WRITES):
-            return []
-        first = min(component)
-        line, text = self._statements[first]
-        names = " or ".join(dict.fromkeys(f"B{n}" for n in asked))
-        return [
-            (first, LongWait(line, text, f"lines {line} to {self._statements[max(component)].line} repeat until {names} changes"))
-        ]
+    def _polling(self, loop: TextLoop) -> str:
+        """Until when a loop repeats, if that depends only on what it does not change itself; empty otherwise."""
+        done = [self._commands[i] for i in executed(self._flow, loop) if i < len(self._commands)]
+        if not loop.exits or any(command.from_variable and command.key in _WRITES for command in done):
+            return ""
+        written = {line for command in done if command.key in _WRITES for line in (*_lines_of(command), command.number)}
+        names: dict[str, None] = {}
+        flags: dict[str, None] = {}
+        for exit_ in (self._commands[i] for i in loop.exits):
+            asked = exit_.argument
+            if isinstance(asked, JumpCondition) and asked.line in LINES and asked.line not in written:
+                names[f"B{asked.line}"] = None
+            elif isinstance(asked, JumpCondition) and asked.line in USER_FLAGS and asked.line not in written:
+                flags[f"flag {asked.line}"] = None
+            elif exit_.key in _JUMPS and exit_.from_variable and (read := self._only_read(done)):
+                names.update(dict.fromkeys(f"B{line}" for line in read if line not in written))
+            else:
+                return ""
+        if names:
+            return f"until {' or '.join(names)} changes"
+        return f"for ever unless they are left at once: nothing in them changes {' or '.join(flags)}"
+
+    @staticmethod
+    def _only_read(done: Collection[ChipCommand]) -> Sequence[int]:
+        """The lines from which the internal variable has its value, if nothing else gives it one."""
+        if any(command.key in _CALCULATES for command in done):
+            return ()
+        return sorted({line for command in done if command.key == "?" for line in _lines_of(command)})
 
     def _loops(self) -> list[EndlessLoop]:
         found: list[EndlessLoop] = []

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 
 from steptwin.controlflow import ControlFlow
 from steptwin.diagnostics import SourceText
 from steptwin.explain import mic488_interrupts as interrupts
+from steptwin.explain.loops import TextLoop, executed, text_loops
 from steptwin.explain.model import LongWait
 from steptwin.wbc import steps as s
 from steptwin.wbc.conditions import outcome
@@ -22,23 +23,37 @@ def long_waits(source: SourceText, executable: s.Executable, flow: ControlFlow, 
     """Each place once, in the order of the text."""
     out = _way_out(executable, flow)
     set_by_interrupts = _changed(executable, flow.reached(executable.entries.values()))
-    running = _in_velocity_mode(executable, flow)
-    found: list[LongWait] = []
-    for number, step in enumerate(executable.steps):
-        if number not in there:
-            continue
-        reason = None
+    running, homing = _in_mode(executable, flow, _running_after), _in_mode(executable, flow, _homing_after)
+    found: list[tuple[int, str | None]] = []
+    for number in there:
+        step = executable.steps[number] if number < len(executable.steps) else None
         if isinstance(step, s.WaitStep):
-            reason = _reason(step.condition, set_by_interrupts)
+            found.append((number, _reason(step.condition, set_by_interrupts)))
         elif isinstance(step, s.WaitPosStep):
-            axes = [f"M{axis}" for axis in sorted(running.get(number, ()))]
-            reason = f"{' and '.join(axes)} can be in velocity mode here, which never counts as finished" if axes else None
-        elif isinstance(step, s.WhileStep):
-            reason = _of_loop(executable, flow, number, step)
-        if reason is not None:
-            line = source.position(step.start)[0]
-            found.append(LongWait(line, " ".join(source.text[step.start : step.end].split()), reason, out))
-    return found
+            found.append((number, _of_motion(running.get(number, ()), homing.get(number, ()))))
+    for loop in text_loops(flow, there):
+        reason = _of_loop(executable, flow, loop, set_by_interrupts)
+        if reason is not None and not isinstance(executable.steps[loop.first], s.WhileStep):
+            lines = [source.position(executable.steps[number].start)[0] for number in (loop.first, loop.last)]
+            reason = f"lines {lines[0]} to {lines[1]}: {reason}"
+        found.append((loop.first, reason))
+    first = {number: reason for number, reason in reversed(found) if reason is not None}
+    return [_wait(source, executable.steps[number], reason, out) for number, reason in sorted(first.items())]
+
+
+def _wait(source: SourceText, step: s.ProgramStep, reason: str, out: str) -> LongWait:
+    return LongWait(source.position(step.start)[0], " ".join(source.text[step.start : step.end].split()), reason, out)
+
+
+def _of_motion(running: Collection[int], homing: Collection[int]) -> str | None:
+    """Why WAITPOS can wait for ever for drives in velocity mode, and for those that home."""
+
+    def named(axes: Collection[int]) -> str:
+        return " and ".join(f"M{axis}" for axis in sorted(axes))
+
+    if running:
+        return f"{named(running)} can be in velocity mode here, which never counts as finished"
+    return f"{named(homing)} can be homing here, which only a switch, a stop or channel C of the encoder ends" if homing else None
 
 
 def _way_out(executable: s.Executable, flow: ControlFlow) -> str:
@@ -82,58 +97,46 @@ def _names(sides: Sequence[s.Source]) -> str:
     return " and ".join(dict.fromkeys(side.name for side in sides if not isinstance(side, s.Literal)))
 
 
-def _of_loop(executable: s.Executable, flow: ControlFlow, number: int, step: s.WhileStep) -> str | None:
-    """Why a WHILE can repeat for ever: every way out of it depends only on what is outside."""
-    inside = set(range(number, step.close + 1))
-    names: dict[str, None] = {}
-    changed = _changed(executable, _executed(flow, inside))
-    is_conditional = False
-    for one in inside:
-        if not any(after not in inside for after in _ways(flow, one)):
-            continue
-        branch = executable.steps[one]
-        if not isinstance(branch, s.IfStep | s.WhileStep):
-            # A JUMP, RETURN or END: it is the conditions around it that decide.
-            continue
-        is_conditional = True
-        names.update(dict.fromkeys(_outside_only(branch, changed)))
-        if not _outside_only(branch, changed):
-            return None
-    if not is_conditional or any(_ends(executable, flow, one, inside) for one in inside):
+def _of_loop(executable: s.Executable, flow: ControlFlow, loop: TextLoop, by_interrupts: Collection[s.Source]) -> str | None:
+    """Why a loop can repeat for ever: every way out of it depends only on what it does not change by itself."""
+    steps = executable.steps
+    done = executed(flow, loop)
+    if not loop.exits or any(_ends(executable, flow, number) for number in done.difference(loop.statements)):
         return None
-    return f"it repeats until something outside changes {' and '.join(names)}"
+    changed = _changed(executable, done)
+    outside: dict[str, None] = {}
+    own: dict[s.Source, None] = {}
+    for number in loop.exits:
+        branch = steps[number]
+        if not isinstance(branch, s.IfStep | s.WhileStep):
+            return None
+        sides = [side for side in sources(branch) if not isinstance(side, s.Literal)]
+        if not sides or any(side in changed for side in sides):
+            return None
+        registers = [side for side in sides if isinstance(side, s.RegisterOperand)]
+        if any(register.row.key not in _OUTSIDE for register in registers):
+            return None
+        outside.update(dict.fromkeys(register.name for register in registers))
+        own.update(dict.fromkeys(side for side in sides if not isinstance(side, s.RegisterOperand)))
+    if outside:
+        return f"it repeats until something outside changes {' or '.join(outside)}"
+    if any(side in by_interrupts for side in own):
+        return f"it repeats until an interrupt changes {_names(list(own))}"
+    return f"it repeats for ever unless it is left at once: nothing in it changes {_names(list(own))}"
 
 
-def _ways(flow: ControlFlow, number: int) -> Sequence[int]:
-    return flow.next[number] if number not in flow.calls else flow.within(number) or flow.calls[number]
-
-
-def _ends(executable: s.Executable, flow: ControlFlow, number: int, inside: Collection[int]) -> bool:
-    """Whether the loop can be left otherwise than by a condition of its own."""
-    step = executable.steps[number]
-    if isinstance(step, s.EndStep | s.ProgResetStep | s.ReturnStep):
+def _ends(executable: s.Executable, flow: ControlFlow, number: int) -> bool:
+    """Whether what a loop calls can end it."""
+    if number >= len(executable.steps):
         return True
-    return isinstance(step, s.JumpStep) and not flow.comes_back(number) and step.target not in inside
+    step = executable.steps[number]
+    return isinstance(step, s.EndStep | s.ProgResetStep) or (isinstance(step, s.JumpStep) and not flow.comes_back(number))
 
 
-def _executed(flow: ControlFlow, inside: Collection[int]) -> set[int]:
-    calls = {target for number in inside for target in flow.calls.get(number, ())}
-    return {*inside, *flow.reached(calls)}
-
-
-def _outside_only(step: s.IfStep | s.WhileStep, changed: Collection[s.Source]) -> list[str]:
-    """What is outside of which the condition depends; empty if it also depends on something else, or is always the same."""
-    sides = [side for side in sources(step) if not isinstance(side, s.Literal)]
-    registers = [side for side in sides if isinstance(side, s.RegisterOperand)]
-    if not sides or len(registers) != len(sides):
-        return []
-    if any(register.row.key not in _OUTSIDE or register in changed for register in registers):
-        return []
-    return [register.name for register in registers]
-
-
-def _in_velocity_mode(executable: s.Executable, flow: ControlFlow) -> dict[int, set[int]]:
-    """For each step the drives that, on some path of the graph to it, run in velocity mode."""
+def _in_mode(
+    executable: s.Executable, flow: ControlFlow, after_step: Callable[[s.ProgramStep, set[int]], Iterator[int]]
+) -> dict[int, set[int]]:
+    """For each step the drives that, on some path of the graph to it, are in a mode."""
     running: dict[int, set[int]] = {}
     seen: set[int] = set()
     work = [0, *executable.entries.values()] if executable.steps else []
@@ -142,7 +145,7 @@ def _in_velocity_mode(executable: s.Executable, flow: ControlFlow) -> dict[int, 
         if number >= len(executable.steps):
             continue
         seen.add(number)
-        after = set(_after(executable.steps[number], running.get(number, set())))
+        after = set(after_step(executable.steps[number], running.get(number, set())))
         for target in flow.next[number]:
             known = running.setdefault(target, set())
             if target not in seen or not after <= known:
@@ -151,12 +154,22 @@ def _in_velocity_mode(executable: s.Executable, flow: ControlFlow) -> dict[int, 
     return running
 
 
-def _after(step: s.ProgramStep, running: set[int]) -> Iterator[int]:
+def _homing_after(step: s.ProgramStep, homing: set[int]) -> Iterator[int]:
+    match step:
+        case s.MotionStep(keyword="HOME", axis=axis) if not (isinstance(step.value, s.Literal) and step.value.value == 0):
+            yield from {*homing, axis}
+        case s.WaitPosStep():
+            return
+        case _:
+            yield from _running_after(step, homing, starts=frozenset())
+
+
+def _running_after(step: s.ProgramStep, running: set[int], starts: frozenset[str] = _STARTS) -> Iterator[int]:
     changed = None
     match step:
         case s.MotionStep(keyword=keyword, axis=axis):
             changed = axis
-            if keyword in _STARTS and not (isinstance(step.value, s.Literal) and step.value.value == 0 and keyword == "VABS"):
+            if keyword in starts and not (isinstance(step.value, s.Literal) and step.value.value == 0 and keyword == "VABS"):
                 yield axis
         case s.HaltStep(axis=axis):
             changed = axis
