@@ -57,11 +57,23 @@ def test_a_converted_program_moves_as_before(run: Run, tmp_path: Path) -> None:
     assert moves[0][1] == 6400
 
 
-def test_a_number_out_of_range_stays_and_is_named(run: Run, tmp_path: Path) -> None:
-    (tmp_path / "a.m1486").write_text("[\nV16000\nA1\nR\n]\n")
+def test_numbers_out_of_range_stay_and_are_errors(run: Run, tmp_path: Path) -> None:
+    """At 12 MHz V would have to be 32000, P beyond 7000 is no profile, and half of W1 is no time. P9000 is none at any clock."""
+    (tmp_path / "a.m1486").write_text("[\nW500\nV16000\nA1000\nP5000\nR\nP9000\nR\n]\n")
     code, out, _ = run(tmp_path / "a.m1486", "--from", "A2x", "--to", "A")
-    assert code == 0
-    assert "V16000 would have to be V32000 on M1486A, which is out of range" in out
+    assert code == 1
+    assert "V16000 would have to be V32000 on M1486A: permitted is 16 to 20 000 step/s" in out
+    assert "P5000 would have to be P10000 on M1486A: permitted is 20 to 7000" in out
+    assert "P9000 would" not in out
+    assert "2 changes; errors left: 2\n" in out
+    code, out, _ = run(tmp_path / "a.m1486", "--from", "A2x", "--to", "A", "--json")
+    data = json.loads(out)
+    assert data["text"] == "[\nW250\nV16000\nA4000\nP5000\nR\nP9000\nR\n]\n"
+    assert [(left["code"], left["line"], left["column"]) for left in data["errors_left"]] == [("M140", 3, 2), ("M140", 5, 2)]
+    (tmp_path / "b.m1486").write_text("[\nW1\nS20\n]\n")
+    code, out, _ = run(tmp_path / "b.m1486", "--from", "A", "--to", "A2x")
+    assert code == 1
+    assert "S20 would have to be S10 on M1486A2x: permitted is 16 to 1950" in out
 
 
 WBC = "CFGINT_IN1 = RIS\nPULSE(OUT1, 2)\n$I700 = 1\nEND\nHARDINT_IN1:\nRETURN\n"

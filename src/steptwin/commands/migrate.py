@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from steptwin.commands.check import count
 from steptwin.commands.explain import PROGRAM
-from steptwin.diagnostics import Diagnostic, Severity, SourceText, render, to_json
+from steptwin.diagnostics import Diagnostic, Severity, SourceText, Span, render, to_json
 from steptwin.errors import Misuse
 from steptwin.files.programfiles import CompanionFiles, check_source
 from steptwin.files.textfiles import read_text, write_bytes
@@ -68,7 +68,15 @@ def _m1486(source: SourceText, to: str, old: str | None) -> Migration:
     found = m1486.findings(source.text, before, new)
     text = fixed(source.text, found)
     left = [d for d in m1486_check.check(text, new).diagnostics if d.severity is Severity.ERROR]
+    left += [_moved(d, found) for d in found if d.code == m1486.NOT_CONVERTED.code]
     return Migration(f"from {before.title} to {new.title}", list(m1486.differences(before, new)), found, text, left)
+
+
+def _moved(one: Diagnostic, found: Sequence[Diagnostic]) -> Diagnostic:
+    """A diagnostic at its place in the text with the fixes."""
+    fixes = [d.fix for d in found if d.fix is not None and d.fix.span.end <= one.span.start]
+    by = sum(len(fix.text) - (fix.span.end - fix.span.start) for fix in fixes)
+    return replace(one, span=Span(one.span.start + by, one.span.end + by))
 
 
 def _wbc(source: SourceText, to: str, old: str | None) -> Migration:

@@ -11,13 +11,14 @@ from fractions import Fraction
 
 from steptwin.diagnostics import Diagnostic, Fix
 from steptwin.m1486.check import check
-from steptwin.m1486.commands import find
+from steptwin.m1486.commands import PROFILE_RANGE, find, permitted_text
 from steptwin.m1486.findings import ChipFinding
 from steptwin.m1486.lines import STEP_DIRECTION, Interface
 from steptwin.m1486.syntax import ChipCommand, parse
 from steptwin.m1486.variants import Store, Variant
 
 CONVERTED = ChipFinding("M223", "number for the other clock", "At 24 MHz speeds, accelerations and times have other numbers.")
+NOT_CONVERTED = ChipFinding("M140", "no number for the other clock", "The chip does not take the number that it would need.")
 _POWERS = {"W": -1, "S": 1, "V": 1, "P": 1, "A": 2}
 """By command the power of the clock that its number is multiplied by on the chip (chapter X)."""
 
@@ -65,11 +66,14 @@ def _converted(command: ChipCommand, old: Variant, new: Variant) -> Diagnostic |
     if command.number is None:
         message = f"the internal variable means another {'time' if power < 0 else 'speed or acceleration'} here"
         return CONVERTED(command.span, message, "its values must be converted")
+    if command.key == "P" and command.number not in PROFILE_RANGE:
+        return None  # no parabolic acceleration, at any clock
     exact = command.number * Fraction(old.clock, new.clock) ** power
     number = round(exact)
-    if find(command.key, number, new) is None:
-        message = f"{command} would have to be {command.key}{float(exact):g} on {new.title}, which is out of range"
-        return CONVERTED(command.argument_span, message)
+    permitted = f"{PROFILE_RANGE[0]} to {PROFILE_RANGE[-1]}" if command.key == "P" else permitted_text(command.key, new)
+    if find(command.key, number, new) is None or (command.key == "P" and number not in PROFILE_RANGE):
+        message = f"{command} would have to be {command.key}{float(exact):g} on {new.title}: permitted is {permitted}"
+        return NOT_CONVERTED(command.argument_span, message)
     message = f"{command} is {command.key}{float(exact):g} on {new.title}"
     hint = None if exact == number else "rounded to a whole number"
     return CONVERTED(command.argument_span, message, hint, Fix(command.argument_span, str(number)))
