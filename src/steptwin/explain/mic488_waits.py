@@ -105,7 +105,7 @@ def _of_loop(executable: s.Executable, flow: ControlFlow, loop: TextLoop, by_int
         return None
     changed = _changed(executable, done)
     outside: dict[str, None] = {}
-    own: dict[s.Source, None] = {}
+    own: list[s.Source] = []
     for number in loop.exits:
         branch = steps[number]
         if not isinstance(branch, s.IfStep | s.WhileStep):
@@ -117,12 +117,12 @@ def _of_loop(executable: s.Executable, flow: ControlFlow, loop: TextLoop, by_int
         if any(register.row.key not in _OUTSIDE for register in registers):
             return None
         outside.update(dict.fromkeys(register.name for register in registers))
-        own.update(dict.fromkeys(side for side in sides if not isinstance(side, s.RegisterOperand)))
+        own += [side for side in sides if not isinstance(side, s.RegisterOperand)]
     if outside:
         return f"it repeats until something outside changes {' or '.join(outside)}"
     if any(side in by_interrupts for side in own):
-        return f"it repeats until an interrupt changes {_names(list(own))}"
-    return f"it repeats for ever unless it is left at once: nothing in it changes {_names(list(own))}"
+        return f"it repeats until an interrupt changes {_names(own)}"
+    return f"it repeats for ever unless it is left at once: nothing in it changes {_names(own)}"
 
 
 def _ends(executable: s.Executable, flow: ControlFlow, number: int) -> bool:
