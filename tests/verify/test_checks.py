@@ -19,7 +19,7 @@ from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.registers import AXES, register_map
 from steptwin.verify import unchecked
-from steptwin.verify.check import Need, NotRestored, Outcome, Result
+from steptwin.verify.check import CheckNeed, CheckOutcome, CheckResult, NotRestored
 from steptwin.verify.kind import ReadyChecks
 from steptwin.verify.m1486 import CHECKS as OF_M1486
 from steptwin.verify.m1486 import ChipTalk
@@ -29,7 +29,7 @@ from steptwin.verify.run import _over
 from steptwin.verify.running import check_all, complete
 from steptwin.wire.slave import RtuSlavePort, TcpSlavePort
 
-ALL = frozenset(Need)
+ALL = frozenset(CheckNeed)
 ROOT = Path(__file__).parents[2]
 M1_ON = bytes.fromhex("05 07d0 ff00")
 
@@ -77,7 +77,7 @@ def mic(firmware: str, *, tcp: bool = False, lenient: bool = False) -> Line:
     return Line(device, TcpSlavePort({1: device}) if tcp else RtuSlavePort({1: device}))
 
 
-def verified(line: Line, firmware: str, *, tcp: bool = False, permitted: frozenset[Need] = ALL) -> dict[str, Result]:
+def verified(line: Line, firmware: str, *, tcp: bool = False, permitted: frozenset[CheckNeed] = ALL) -> dict[str, CheckResult]:
     talk = ModbusTalk(1, register_map(firmware), framed=tcp, wait_s=0.05, axis=1, distance_u=2000.0)
     return {result.id: result for result in line.carry(check_all(talk, OF_MIC488, permitted))}
 
@@ -92,7 +92,7 @@ def state_of(device: Mic488Device) -> dict[str, bytes]:
     }
 
 
-def ids(results: dict[str, Result], outcome: Outcome) -> set[str]:
+def ids(results: dict[str, CheckResult], outcome: CheckOutcome) -> set[str]:
     return {id_ for id_, result in results.items() if result.outcome is outcome}
 
 
@@ -108,13 +108,13 @@ def test_each_interpretation_is_checked_or_has_a_reason() -> None:
 def test_a_twin_confirms_every_check(firmware: str, tcp: bool) -> None:
     line = mic(firmware, tcp=tcp)
     results = verified(line, firmware, tcp=tcp)
-    assert ids(results, Outcome.REFUTED) == set()
+    assert ids(results, CheckOutcome.REFUTED) == set()
     other_line = {"MIC-2", "MIC-15"} if tcp else {"MIC-23"}
-    assert ids(results, Outcome.NOT_CHECKED) == {*other_line, "MIC-10"}  # M1 is off
+    assert ids(results, CheckOutcome.NOT_CHECKED) == {*other_line, "MIC-10"}  # M1 is off
     line.machine.execute(M1_ON, line.now)
     results = verified(line, firmware, tcp=tcp)
-    assert ids(results, Outcome.REFUTED) == set()
-    assert ids(results, Outcome.NOT_CHECKED) == {*other_line, "MIC-8"}
+    assert ids(results, CheckOutcome.REFUTED) == set()
+    assert ids(results, CheckOutcome.NOT_CHECKED) == {*other_line, "MIC-8"}
     assert [p.what for p in results["MIC-10"].probes][-1] == "position after the return"
 
 
@@ -122,9 +122,10 @@ def test_a_twin_confirms_every_check(firmware: str, tcp: bool) -> None:
 def test_without_permission_nothing_is_changed(firmware: str) -> None:
     line = mic(firmware)
     before = state_of(line.machine)
-    results = verified(line, firmware, permitted=frozenset({Need.READ}))
+    results = verified(line, firmware, permitted=frozenset({CheckNeed.READ}))
     assert state_of(line.machine) == before
-    assert ids(results, Outcome.NOT_CHECKED) == {check.id for check in OF_MIC488 if check.need is not Need.READ} | {"MIC-23"}
+    not_permitted = {check.id for check in OF_MIC488 if check.need is not CheckNeed.READ}
+    assert ids(results, CheckOutcome.NOT_CHECKED) == not_permitted | {"MIC-23"}
     assert "--write" in results["MIC-4"].why
     assert "--move" in results["MIC-8"].why
 
@@ -132,7 +133,7 @@ def test_without_permission_nothing_is_changed(firmware: str) -> None:
 def test_what_was_written_is_put_back() -> None:
     line = mic("1.70")
     before = state_of(line.machine)
-    verified(line, "1.70", permitted=frozenset({Need.READ, Need.WRITE}))
+    verified(line, "1.70", permitted=frozenset({CheckNeed.READ, CheckNeed.WRITE}))
     assert state_of(line.machine) == before
 
 
@@ -143,21 +144,21 @@ def test_parameters_are_compared_with_any_number_of_pulses_per_unit(gear: float,
     device = Mic488Device(config, firmware="1.70")
     device.advance(SECOND)
     before = state_of(device)
-    results = verified(Line(device, RtuSlavePort({1: device})), "1.70", permitted=frozenset({Need.READ, Need.WRITE}))
-    assert {results[id_].outcome for id_ in ("MIC-17", "MIC-42")} == {Outcome.CONFIRMED}
+    results = verified(Line(device, RtuSlavePort({1: device})), "1.70", permitted=frozenset({CheckNeed.READ, CheckNeed.WRITE}))
+    assert {results[id_].outcome for id_ in ("MIC-17", "MIC-42")} == {CheckOutcome.CONFIRMED}
     assert state_of(device) == before
 
 
 def test_a_lenient_controller_is_refuted() -> None:
     results = verified(mic("1.70", lenient=True), "1.70")
-    assert ids(results, Outcome.REFUTED) == {"MIC-1", "MIC-3"}
+    assert ids(results, CheckOutcome.REFUTED) == {"MIC-1", "MIC-3"}
     (first, *_) = results["MIC-3"].probes
     assert (first.expected, first.came) == ("exception 02 (illegal data address)", "answer 03 02 00 00")
 
 
 def test_another_generation_refutes_its_number_of_banks() -> None:
     results = verified(mic("1.40"), "1.70")
-    assert ids(results, Outcome.REFUTED) == {"MIC-28"}
+    assert ids(results, CheckOutcome.REFUTED) == {"MIC-28"}
 
 
 def test_a_value_that_cannot_be_put_back_is_named() -> None:
@@ -205,8 +206,8 @@ def test_a_refused_half_that_changes_the_value_is_put_back_without_permission() 
     device = Mic488Device(ControllerConfig())
     device.advance(SECOND)
     before = state_of(device)
-    results = verified(Line(device, RtuSlavePort({1: Whole(device)})), "1.70", permitted=frozenset({Need.READ}))
-    assert ids(results, Outcome.REFUTED) == {"MIC-5"}
+    results = verified(Line(device, RtuSlavePort({1: Whole(device)})), "1.70", permitted=frozenset({CheckNeed.READ}))
+    assert ids(results, CheckOutcome.REFUTED) == {"MIC-5"}
     assert state_of(device) == before
 
 
@@ -224,7 +225,7 @@ def test_a_lost_answer_does_not_leave_a_value_changed() -> None:
         return received
 
     line.port = type("Lossy", (), {"exchange": lambda _, d, n: exchanged(d, n), "to_send": lambda _, n: to_send(n)})()
-    assert ids(verified(line, "1.70"), Outcome.REFUTED) == set()
+    assert ids(verified(line, "1.70"), CheckOutcome.REFUTED) == set()
     assert lost
     assert state_of(line.machine) == before
 
@@ -239,7 +240,7 @@ def test_an_adapter_that_echoes() -> None:
     line = mic("1.70")
     exchange, to_send = line.port.exchange, line.port.to_send
     line.port = type("Echo", (), {"exchange": lambda _, d, now: d + exchange(d, now), "to_send": lambda _, now: to_send(now)})()
-    assert ids(verified(line, "1.70"), Outcome.REFUTED) == set()
+    assert ids(verified(line, "1.70"), CheckOutcome.REFUTED) == set()
 
 
 def test_a_second_interrupt_names_what_is_not_put_back() -> None:
@@ -287,7 +288,7 @@ def chip(kind: str, address: int = 15, others: tuple[int, ...] = ()) -> Line:
     return Line(All(), chain.port())
 
 
-def checked(line: Line, expected: str, address: int | None = None) -> dict[str, Result]:
+def checked(line: Line, expected: str, address: int | None = None) -> dict[str, CheckResult]:
     talk = ChipTalk(address, variant(expected), wait_s=0.05)
     return {result.id: result for result in line.carry(check_all(talk, OF_M1486, ALL))}
 
@@ -295,7 +296,7 @@ def checked(line: Line, expected: str, address: int | None = None) -> dict[str, 
 @pytest.mark.parametrize("kind", [one.name for one in VARIANTS])
 def test_a_chip_confirms_every_check(kind: str) -> None:
     results = checked(chip(kind), kind)
-    assert ids(results, Outcome.CONFIRMED) == {check.id for check in OF_M1486}, results
+    assert ids(results, CheckOutcome.CONFIRMED) == {check.id for check in OF_M1486}, results
 
 
 def test_nothing_in_a_comment_is_a_command_of_a_chip_without_comments() -> None:
@@ -308,12 +309,12 @@ def test_nothing_in_a_comment_is_a_command_of_a_chip_without_comments() -> None:
 
 def test_one_chip_of_a_chain() -> None:
     results = checked(chip("B", 7, others=(3,)), "B", 7)
-    assert ids(results, Outcome.CONFIRMED) == {check.id for check in OF_M1486}
+    assert ids(results, CheckOutcome.CONFIRMED) == {check.id for check in OF_M1486}
 
 
 def test_a_chip_of_another_type_is_refuted() -> None:
     results = checked(chip("C"), "A")
-    assert "M-15" in ids(results, Outcome.REFUTED)
+    assert "M-15" in ids(results, CheckOutcome.REFUTED)
     assert [(p.expected, p.came) for p in results["M-15"].probes if not p.holds] == [("41H", "43H")]
 
 
@@ -324,8 +325,8 @@ def test_a_chip_that_echoes_or_reports(typed: bytes) -> None:
         line.port.exchange(bytes((byte,)), line.now)
         line._advance(10)
     results = checked(line, "B")
-    assert ids(results, Outcome.REFUTED) == set()
-    assert ids(results, Outcome.NOT_CHECKED) == {"M-36", "M-38", "M-43"}
+    assert ids(results, CheckOutcome.REFUTED) == set()
+    assert ids(results, CheckOutcome.NOT_CHECKED) == {"M-36", "M-38", "M-43"}
 
 
 def test_a_chip_that_waits_is_a_failure() -> None:

@@ -49,7 +49,7 @@ def scan(
 
     Exit code 1 when no device responds.
     """
-    from steptwin.commands.scanning import Found, found_at, kinds_named, numbers_of
+    from steptwin.commands.scanning import FoundAt, found_at, kinds_named, numbers_of
     from steptwin.live.ports import serial_ports, twin_ports
 
     kinds = kinds_named(kind, "--kind")
@@ -58,7 +58,7 @@ def scan(
     if not 0.0 < timeout <= 10.0:
         raise Misuse(f"--timeout {timeout:g}: permitted are more than 0 and at most 10 s")
     wanted = places or [place.address for place in serial_ports() + twin_ports()]
-    rows: list[Found] = []
+    rows: list[FoundAt] = []
     try:
         for place in wanted:
             rows += found_at(place, kinds, numbers, bauds, timeout, progress=_progress, report=complain)

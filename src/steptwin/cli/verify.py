@@ -39,7 +39,7 @@ def verify(
     """
     from steptwin import __version__
     from steptwin.live.interrupts import FirstInterrupt
-    from steptwin.verify.check import Outcome
+    from steptwin.verify.check import CheckOutcome
     from steptwin.verify.run import verify as check
 
     address = find(device)
@@ -56,7 +56,7 @@ def verify(
     if json is not None:
         _write(json, report.to_json())
     typer.echo(report.to_text())
-    if report.of(Outcome.REFUTED) or not report.is_complete:
+    if report.of(CheckOutcome.REFUTED) or not report.is_complete:
         raise typer.Exit(1)
 
 

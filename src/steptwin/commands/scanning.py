@@ -19,7 +19,7 @@ tried. An exception of it ends the search."""
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class FoundAt:
     """A device at an address; ``baud`` is None on a network."""
 
     place: str
@@ -65,11 +65,11 @@ def found_at(
     *,
     progress: Progress,
     report: Callable[[str], object],
-) -> list[Found]:
+) -> list[FoundAt]:
     """The devices that respond at an address, of the first kind that does. An address that cannot be opened is reported and
     gives none."""
     searches = [(kind, kind.search, _rates(place, bauds or list(kind.search.bauds))) for kind in kinds if kind.search]
-    rows: list[Found] = []
+    rows: list[FoundAt] = []
     try:
         for kind, search, rates in searches:
             rows = rows or _searched(place, kind, search, rates, numbers, timeout, progress)
@@ -90,12 +90,12 @@ def _searched(
     numbers: list[int],
     timeout: float,
     progress: Progress,
-) -> list[Found]:
+) -> list[FoundAt]:
     for baud in rates:
         with progress(f"{_title(place, baud)} {search.title}", search.numbers or len(numbers), search.form) as step:
             found = search.find(place, baud, numbers, timeout, step)
         if found:  # a line has one baud rate
-            return [Found(place, None if "://" in place else baud, kind, one) for one in found]
+            return [FoundAt(place, None if "://" in place else baud, kind, one) for one in found]
     return []
 
 

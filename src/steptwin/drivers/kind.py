@@ -212,8 +212,8 @@ class DeviceSearch:
     form: str
     """The format of an address there."""
     find: Callable[[str, int, Sequence[int], float, Callable[[int], object]], Sequence[FoundDevice]]
-    """The devices at an address and a rate: those of the numbers, waiting so many seconds for each, which the function is told
-    before. Raises `LineFailure`."""
+    """The devices at an address and a rate: those of the numbers, waiting so many seconds for each. The function is called with
+    each number before. Raises `LineFailure`."""
     disturbs: bool
     """Whether what is sent may disturb devices of other kinds, so that those are searched first."""
     leave: Callable[[str, int], None] = lambda place, baud: None

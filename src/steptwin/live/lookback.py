@@ -122,5 +122,5 @@ class Look:
     def close(self) -> None:
         """End looking back."""
         if self._going is not None:
-            self._going.fail(Refusal("nobody looks back any more"))
+            self._going.fail(Refusal("the view of the past was closed"))
         self._closed()

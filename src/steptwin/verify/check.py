@@ -10,7 +10,7 @@ from typing import Generic, NamedTuple, TypeAlias, TypeVar
 from steptwin.errors import LineFailure
 
 
-class Need(enum.IntEnum):
+class CheckNeed(enum.IntEnum):
     """What a check does to the controller."""
 
     READ = 0
@@ -21,13 +21,13 @@ class Need(enum.IntEnum):
     """It moves an axis and returns it."""
 
 
-class Outcome(enum.StrEnum):
+class CheckOutcome(enum.StrEnum):
     CONFIRMED = "confirmed"
     REFUTED = "refuted"
     NOT_CHECKED = "not checked"
 
 
-class Send(NamedTuple):
+class CheckRequest(NamedTuple):
     """Bytes to send; the answer of the line is what came within ``wait_s``, or until ``is_whole`` says that it is an answer.
 
     Without ``data`` it only waits. ``at_once``: without the usual pause before it.
@@ -40,7 +40,7 @@ class Send(NamedTuple):
 
 
 R = TypeVar("R")
-Steps: TypeAlias = Generator[Send, bytes, R]
+Steps: TypeAlias = Generator[CheckRequest, bytes, R]
 """Yields what to send, gets what came."""
 
 
@@ -85,16 +85,16 @@ class Check(Generic[T]):
     id: str
     what: str
     steps: Callable[[T], Steps[None]]
-    need: Need = Need.READ
+    need: CheckNeed = CheckNeed.READ
     unless: Callable[[T], str | None] = lambda talk: None
 
 
 @dataclass(frozen=True, slots=True)
-class Result:
+class CheckResult:
     """Of one interpretation. ``why`` it was not checked; ``probes`` otherwise."""
 
     id: str
-    outcome: Outcome
+    outcome: CheckOutcome
     what: str
     probes: tuple[Probe, ...] = ()
     why: str = ""

@@ -8,7 +8,7 @@ from typing import Generic, NamedTuple
 
 from steptwin.drivers.kind import DeviceAddress
 from steptwin.drivers.place import Endpoint
-from steptwin.verify.check import Check, Need
+from steptwin.verify.check import Check, CheckNeed
 from steptwin.verify.running import T
 
 
@@ -29,6 +29,6 @@ class CheckedKind(Generic[T]):
     name: str
     """As in `steptwin.drivers.kinds.DRIVERS`."""
     unchecked: Mapping[str, str]
-    prepare: Callable[[DeviceAddress, frozenset[Need], tuple[int, float] | None], ReadyChecks[T]]
+    prepare: Callable[[DeviceAddress, frozenset[CheckNeed], tuple[int, float] | None], ReadyChecks[T]]
     """The checks with these permissions; the tuple: an axis and how far it may move, in its units. Communicates with the device
     as far as the address leaves its variant open. Raises `Misuse`, `Refusal`, `LineFailure`."""

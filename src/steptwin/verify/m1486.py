@@ -6,7 +6,7 @@ from steptwin.drivers.m1486.talk import LETTERS
 from steptwin.errors import LineFailure
 from steptwin.m1486.receiver import CR, EMPTY, NO_ROOM, THREE_FREE
 from steptwin.m1486.variants import Store, Variant
-from steptwin.verify.check import Check, Need, NotRestored, Probes, Send, Steps, Undecided
+from steptwin.verify.check import Check, CheckNeed, CheckRequest, NotRestored, Probes, Steps, Undecided
 
 INVALID_COMMAND = "%"
 """A character that is in no command: its line is wrong data (M-11)."""
@@ -37,14 +37,14 @@ class ChipTalk:
 
     def hello(self) -> Steps[None]:
         """Select the chip, and find out whether it echoes and reports. Raises `LineFailure` if it does not respond."""
-        yield Send(b"\r", SELECT_S)
+        yield CheckRequest(b"\r", SELECT_S)
         if self.address is not None:
-            yield Send(f"x{self.address:x}\r".encode("ascii"), SELECT_S)
-        self.has_echo = (yield Send(b"\n", self.wait_s, lambda came: len(came) > 0)) == b"\n"
+            yield CheckRequest(f"x{self.address:x}\r".encode("ascii"), SELECT_S)
+        self.has_echo = (yield CheckRequest(b"\n", self.wait_s, lambda came: len(came) > 0)) == b"\n"
         query = f"u{_TYPE}\r".encode("ascii")
         wait_s = self.wait_s + BUSY_S
-        came = yield Send(query, wait_s, lambda come: not LETTERS.isdisjoint(come))
-        came += yield Send(b"", SELECT_S)
+        came = yield CheckRequest(query, wait_s, lambda come: not LETTERS.isdisjoint(come))
+        came += yield CheckRequest(b"", SELECT_S)
         self.has_report = bool({EMPTY, THREE_FREE}.intersection(came))
         if LETTERS.isdisjoint(came):
             raise LineFailure("the chip does not respond: it may move, wait or run a program")
@@ -55,7 +55,7 @@ class ChipTalk:
         echo = data if self.has_echo else b""
         size = len(echo) + answers
         can_end = answers > 0 and not self.has_report
-        came = yield Send(data, self.wait_s * max(answers, 1), lambda come: can_end and len(come) >= size)
+        came = yield CheckRequest(data, self.wait_s * max(answers, 1), lambda come: can_end and len(come) >= size)
         return came.removeprefix(echo)
 
     def without_report(self, came: bytes) -> bytes:
@@ -78,7 +78,7 @@ def _text(data: bytes) -> str:
 
 
 def _mixed(talk: ChipTalk) -> str | None:
-    """Answers that come between characters of an echo cannot be told from it."""
+    """Answers between characters of an echo cannot be distinguished from it."""
     return "needs function 41 (echo) and 57 (report) OFF" if talk.has_echo or talk.has_report else None
 
 
@@ -155,7 +155,7 @@ CHECKS: tuple[Check[ChipTalk], ...] = (
     Check("M-2", "Blanks inside a command", _blanks),
     Check("M-11", "Wrong data are dropped without an answer", _wrong_data),
     Check("M-15", "What U15, U16 and U20 send", _identity),
-    Check("M-22", "The order of bits in U14, with flag 80", _bit_order, Need.WRITE),
+    Check("M-22", "The order of bits in U14, with flag 80", _bit_order, CheckNeed.WRITE),
     Check("M-32", "What bytes without a meaning upload", _reserved_bytes),
     Check("M-36", "U while a character is on its way", _two_uploads, unless=_mixed),
     Check("M-38", "A line longer than the input buffer", _long_line, unless=_mixed),

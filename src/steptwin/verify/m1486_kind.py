@@ -10,17 +10,17 @@ from steptwin.errors import LineFailure, Misuse, Refusal
 from steptwin.m1486.variants import Store, Variant
 from steptwin.m1486.variants import variant as variant_named
 from steptwin.machine import SECOND
-from steptwin.verify.check import Need
+from steptwin.verify.check import CheckNeed
 from steptwin.verify.kind import CheckedKind, ReadyChecks
 from steptwin.verify.m1486 import CHECKS, ChipTalk
 from steptwin.verify.unchecked import OF_M1486
 
 
-def _prepare(address: DeviceAddress, permitted: frozenset[Need], move: tuple[int, float] | None) -> ReadyChecks[ChipTalk]:
+def _prepare(address: DeviceAddress, permitted: frozenset[CheckNeed], move: tuple[int, float] | None) -> ReadyChecks[ChipTalk]:
     if move:
         raise Misuse("no check moves an M1486: leave out --move")
     chip = _chip(address)
-    if chip.store is Store.EEPROM and Need.WRITE not in permitted:
+    if chip.store is Store.EEPROM and CheckNeed.WRITE not in permitted:
         raise Misuse(f"{chip.title} writes every command into its EEPROM, also those of checks: permit it with --write")
     about = {"kind": "M1486", "address": address.number, "type": chip.name, "baud": address.baud}
     talk = ChipTalk(address.number, chip, wait_s=address.timeout)

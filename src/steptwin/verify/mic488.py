@@ -8,7 +8,7 @@ from steptwin.drivers.mic488.motion import MOVING
 from steptwin.mic488.encoding import real_to_words, words_to_real
 from steptwin.mic488.registers import AXES
 from steptwin.mic488.status import AxisStatus
-from steptwin.verify.check import Check, Need, Send, Steps, Undecided
+from steptwin.verify.check import Check, CheckNeed, CheckRequest, Steps, Undecided
 from steptwin.verify.modbus import ModbusTalk, read, write, write_one
 from steptwin.wire import pdu, rtu
 from steptwin.wire.crc import with_crc
@@ -83,13 +83,13 @@ def _halves(talk: ModbusTalk) -> Steps[None]:
 
 def _after_noise(talk: ModbusTalk) -> Steps[None]:
     request = rtu.encode_frame(talk.unit, read(talk.at("DATA_TYPE"), 1))
-    yield Send(b"\xff\x00\xff", 0.1)
+    yield CheckRequest(b"\xff\x00\xff", 0.1)
     yield from talk.expect_answer("a request 0.1 s behind noise", request[1:-2])
-    yield Send(request[:4], 0.1)
+    yield CheckRequest(request[:4], 0.1)
     torn = yield from talk.raw(request[4:], at_once=True)
     came = "answered" if torn.pdu else "dropped"
     talk.probes.holds("a request with a pause of 0.1 s in it", "dropped, or answered because of a slow adapter", came, True)
-    yield Send(b"", 2.5)
+    yield CheckRequest(b"", 2.5)
     yield from talk.expect_answer("the next request", request[1:-2])
 
 
@@ -267,7 +267,7 @@ def _move_while_off(talk: ModbusTalk) -> Steps[None]:
     position = talk.at("POS_ACT", talk.axis)
     before = yield from talk.words(position, 2)
     yield from talk.expect_answer(f"M{talk.axis} by {talk.distance_u:g} units while it is off", _move_by(talk))
-    yield Send(b"", SETTLE_S)
+    yield CheckRequest(b"", SETTLE_S)
     talk.probes.equal("status", 0, (yield from _status(talk)))
     talk.probes.equal("position", before, (yield from talk.words(position, 2)))
 
@@ -283,12 +283,12 @@ def _stop_without_ramp(talk: ModbusTalk) -> Steps[None]:
     yield from talk.ask(write_one(talk.at("M_STOP"), 1 << talk.axis - 1))
     status = yield from _status(talk)
     first = yield from talk.words(position, 2)
-    yield Send(b"", SETTLE_S)
+    yield CheckRequest(b"", SETTLE_S)
     second = yield from talk.words(position, 2)
     yield from talk.ask(write(talk.at("POS_ABS", talk.axis), *before))
     waited_s = 0.0
     while (yield from _status(talk)) in MOVING and waited_s < LONGEST_MOVE_S:
-        yield Send(b"", SETTLE_S)
+        yield CheckRequest(b"", SETTLE_S)
         waited_s += SETTLE_S
     del talk.probes.unrestored[f"M{talk.axis}_POS_ACT"]
     if moving not in MOVING:
@@ -298,7 +298,7 @@ def _stop_without_ramp(talk: ModbusTalk) -> Steps[None]:
     talk.probes.equal("position after the return", words_to_real(*before), words_to_real(*(yield from talk.words(position, 2))))
 
 
-WRITE, MOVE = Need.WRITE, Need.MOVE
+WRITE, MOVE = CheckNeed.WRITE, CheckNeed.MOVE
 CHECKS: tuple[Check[ModbusTalk], ...] = (
     Check("MIC-1", "Unknown function, address, quantity; wrong CRC, other unit, short frame", _refusals),
     Check("MIC-2", "A read by broadcast (a write would change other controllers, too)", _broadcast_read, unless=_serial_only),

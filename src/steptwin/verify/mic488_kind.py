@@ -11,14 +11,14 @@ from steptwin.drivers.place import parse_line_address
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND
 from steptwin.mic488.registers import AXES, register_map
-from steptwin.verify.check import Need
+from steptwin.verify.check import CheckNeed
 from steptwin.verify.kind import CheckedKind, ReadyChecks
 from steptwin.verify.mic488 import CHECKS
 from steptwin.verify.modbus import ModbusTalk
 from steptwin.verify.unchecked import OF_MIC488
 
 
-def _prepare(address: DeviceAddress, permitted: frozenset[Need], move: tuple[int, float] | None) -> ReadyChecks[ModbusTalk]:
+def _prepare(address: DeviceAddress, permitted: frozenset[CheckNeed], move: tuple[int, float] | None) -> ReadyChecks[ModbusTalk]:
     axis, distance_u = _checked_move(move)
     firmware = address.variant or _firmware(address)
     place = parse_line_address(address.place, address.baud)

@@ -9,7 +9,7 @@ from steptwin.drivers.mic488.motion import MOVING
 from steptwin.errors import LineFailure
 from steptwin.mic488.registermap import RegisterMap
 from steptwin.mic488.registers import AXES
-from steptwin.verify.check import NotRestored, Probes, Send, Steps, Undecided
+from steptwin.verify.check import CheckRequest, NotRestored, Probes, Steps, Undecided
 from steptwin.wire import pdu, rtu
 from steptwin.wire.crc import crc16
 
@@ -18,7 +18,7 @@ TRIES = 3
 _MBAP = 7
 
 
-class Answer(NamedTuple):
+class ModbusAnswer(NamedTuple):
     """The PDU of an answer; empty for silence."""
 
     pdu: bytes
@@ -94,25 +94,25 @@ class ModbusTalk:
         received = b""
         if not self.framed:
             frame = rtu.encode_frame(self.unit, request)
-            received = yield Send(frame, self.wait_s, lambda came: _frame(came.removeprefix(frame), self.unit) != b"")
+            received = yield CheckRequest(frame, self.wait_s, lambda came: _frame(came.removeprefix(frame), self.unit) != b"")
             self.has_echo = received.startswith(frame)
         if not (yield from self.ask(request)).pdu:
             raise LineFailure(f"unit {self.unit} does not respond")
 
-    def ask(self, request: bytes, *, unit: int | None = None, at_once: bool = False) -> Steps[Answer]:
+    def ask(self, request: bytes, *, unit: int | None = None, at_once: bool = False) -> Steps[ModbusAnswer]:
         to = self.unit if unit is None else unit
         if not self.framed:
             return (yield from self.raw(rtu.encode_frame(to, request), at_once=at_once))
         self._number = self._number + 1 & 0xFFFF
         head = struct.pack(">HHHB", self._number, 0, len(request) + 1, to)
-        whole = yield Send(head + request, self.wait_s, lambda came: _tcp_answer(came, self._number) is not None, at_once)
-        return Answer(_tcp_answer(whole, self._number) or b"")
+        whole = yield CheckRequest(head + request, self.wait_s, lambda came: _tcp_answer(came, self._number) is not None, at_once)
+        return ModbusAnswer(_tcp_answer(whole, self._number) or b"")
 
-    def raw(self, frame: bytes, *, at_once: bool = False) -> Steps[Answer]:
+    def raw(self, frame: bytes, *, at_once: bool = False) -> Steps[ModbusAnswer]:
         """Bytes of any kind on a serial line; the answer of this controller to them."""
         skip = len(frame) if self.has_echo else 0
-        came = yield Send(frame, self.wait_s, lambda come: _frame(come[skip:], self.unit) != b"", at_once)
-        return Answer(_frame(came[skip:], self.unit)[1:-2])
+        came = yield CheckRequest(frame, self.wait_s, lambda come: _frame(come[skip:], self.unit) != b"", at_once)
+        return ModbusAnswer(_frame(came[skip:], self.unit)[1:-2])
 
     def words(self, address: int, count: int) -> Steps[tuple[int, ...]]:
         """Registers that can be read. Raises `Undecided`."""

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from steptwin.verify.check import Outcome, Result
+from steptwin.verify.check import CheckOutcome, CheckResult
 
 FORMAT = "steptwin verification 1"
 
@@ -20,17 +20,17 @@ class Report:
     version: str
     time: str
     permitted: str
-    results: Sequence[Result]
+    results: Sequence[CheckResult]
     is_complete: bool = True
     """Whether it was not cancelled."""
 
-    def of(self, outcome: Outcome) -> list[Result]:
+    def of(self, outcome: CheckOutcome) -> list[CheckResult]:
         return [result for result in self.results if result.outcome is outcome]
 
     @property
     def counts(self) -> Mapping[str, int]:
         found = Counter(result.outcome for result in self.results)
-        return {str(outcome): found[outcome] for outcome in Outcome}
+        return {str(outcome): found[outcome] for outcome in CheckOutcome}
 
     def plain(self) -> dict[str, object]:
         return {
@@ -50,12 +50,12 @@ class Report:
     def to_text(self) -> str:
         device = ", ".join(f"{name} {value}" for name, value in self.device.items() if value is not None)
         lines = [f"{device}; steptwin {self.version}, {self.time}, permitted: {self.permitted}"]
-        for outcome in (Outcome.CONFIRMED, Outcome.REFUTED):
+        for outcome in (CheckOutcome.CONFIRMED, CheckOutcome.REFUTED):
             for result in self.of(outcome):
                 lines.append(f"{result.id:<7} {outcome:<11} {result.what}")
                 lines += [f"        {p.what}: expected {p.expected}, came {p.came}" for p in result.probes if not p.holds]
         reasons: dict[str, list[str]] = {}
-        for result in self.of(Outcome.NOT_CHECKED):
+        for result in self.of(CheckOutcome.NOT_CHECKED):
             reasons.setdefault(result.why, []).append(result.id)
         lines += [f"not checked: {why}: {', '.join(ids)}" for why, ids in reasons.items()]
         lines.append(", ".join(f"{count} {outcome}" for outcome, count in self.counts.items()))

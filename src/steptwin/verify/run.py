@@ -9,7 +9,7 @@ from typing import TypeVar
 from steptwin.drivers.kind import DeviceAddress
 from steptwin.drivers.place import Channel
 from steptwin.errors import LineFailure
-from steptwin.verify.check import Need, NotRestored, Result, Steps
+from steptwin.verify.check import CheckNeed, CheckResult, NotRestored, Steps
 from steptwin.verify.kind import ReadyChecks
 from steptwin.verify.kinds import checked_kind
 from steptwin.verify.report import Report
@@ -37,7 +37,7 @@ def verify(
     Raises `Misuse`, `Refusal`, `LineFailure`.
     """
     kind = checked_kind(address.kind)
-    permitted = frozenset({Need.READ, *((Need.WRITE,) if write else ()), *((Need.MOVE,) if move else ())})
+    permitted = frozenset({CheckNeed.READ, *((CheckNeed.WRITE,) if write else ()), *((CheckNeed.MOVE,) if move else ())})
     ready = kind.prepare(address, permitted, move)
     results = _over(ready, permitted, progress, is_cancelled)
     names = ", ".join(need.name.lower() for need in sorted(permitted))
@@ -49,8 +49,8 @@ def verify(
 
 
 def _over(
-    ready: ReadyChecks[T], permitted: frozenset[Need], progress: Progress, is_cancelled: Callable[[], bool]
-) -> list[Result]:
+    ready: ReadyChecks[T], permitted: frozenset[CheckNeed], progress: Progress, is_cancelled: Callable[[], bool]
+) -> list[CheckResult]:
     """The results; not all of them if it was cancelled."""
     talk = ready.talk
     channel = ready.endpoint.open()

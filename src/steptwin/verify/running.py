@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol, TypeVar
 
-from steptwin.verify.check import Check, Need, NotRestored, Outcome, Probes, Result, Steps, Undecided
+from steptwin.verify.check import Check, CheckNeed, CheckOutcome, CheckResult, NotRestored, Probes, Steps, Undecided
 
 _NEEDED = {
-    Need.WRITE: "writes settings and puts them back: permit it with --write",
-    Need.MOVE: "moves an axis: permit it with --move",
+    CheckNeed.WRITE: "writes settings and puts them back: permit it with --write",
+    CheckNeed.MOVE: "moves an axis: permit it with --move",
 }
 
 
@@ -29,11 +29,11 @@ Progress = Callable[[str, int, int], object]
 def check_all(
     talk: T,
     checks: Sequence[Check[T]],
-    permitted: frozenset[Need],
+    permitted: frozenset[CheckNeed],
     *,
     progress: Progress = lambda id_, number, count: None,
     is_cancelled: Callable[[], bool] = lambda: False,
-) -> Steps[list[Result]]:
+) -> Steps[list[CheckResult]]:
     """The results of the checks that are permitted. Cancelled, it ends between two checks.
 
     Raises `LineFailure`; a message names what could not be put back.
@@ -48,25 +48,25 @@ def check_all(
     return results
 
 
-def _checked(talk: T, check: Check[T], permitted: frozenset[Need]) -> Steps[Result]:
+def _checked(talk: T, check: Check[T], permitted: frozenset[CheckNeed]) -> Steps[CheckResult]:
     why = _NEEDED[check.need] if check.need not in permitted else check.unless(talk)
     if why is not None:
-        return Result(check.id, Outcome.NOT_CHECKED, check.what, why=why)
+        return CheckResult(check.id, CheckOutcome.NOT_CHECKED, check.what, why=why)
     probes = talk.probes = Probes()
     try:
         yield from check.steps(talk)
     except Undecided as reason:
         if probes.unrestored:
             raise NotRestored(f"{check.id}: not put back: {'; '.join(probes.unrestored.values())} ({reason})") from None
-        return Result(check.id, Outcome.NOT_CHECKED, check.what, tuple(probes.found), str(reason))
-    outcome = Outcome.CONFIRMED if all(probe.holds for probe in probes.found) else Outcome.REFUTED
-    return Result(check.id, outcome, check.what, tuple(probes.found))
+        return CheckResult(check.id, CheckOutcome.NOT_CHECKED, check.what, tuple(probes.found), str(reason))
+    outcome = CheckOutcome.CONFIRMED if all(probe.holds for probe in probes.found) else CheckOutcome.REFUTED
+    return CheckResult(check.id, outcome, check.what, tuple(probes.found))
 
 
-def complete(results: Sequence[Result], unchecked: Mapping[str, str]) -> list[Result]:
+def complete(results: Sequence[CheckResult], unchecked: Mapping[str, str]) -> list[CheckResult]:
     """The results with the ids that no check decides, in the order of the ids."""
     return sorted(
-        [*results, *(Result(id_, Outcome.NOT_CHECKED, "", why=why) for id_, why in unchecked.items())],
+        [*results, *(CheckResult(id_, CheckOutcome.NOT_CHECKED, "", why=why) for id_, why in unchecked.items())],
         key=lambda result: _order(result.id),
     )
 

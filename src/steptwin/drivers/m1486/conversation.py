@@ -1,4 +1,4 @@
-"""M1486 chips for somebody who types lines: their one-letter commands, as the manual has them. See
+"""M1486 chips at a terminal: their one-letter commands, as the manual has them. See
 `steptwin.drivers.kind.DeviceTerminal`."""
 
 from __future__ import annotations

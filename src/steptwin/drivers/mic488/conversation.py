@@ -1,4 +1,4 @@
-"""A MIC488 for somebody who types lines: registers by name, and steps of a session. See
+"""A MIC488 at a terminal: registers by name, and steps of a session. See
 `steptwin.drivers.kind.DeviceTerminal`."""
 
 from __future__ import annotations

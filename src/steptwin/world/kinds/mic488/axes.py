@@ -27,7 +27,7 @@ def scale(spec: AxisSpec, device: Mic488Device, number: int) -> DriveScale:
         full_steps=FULL_STEPS if full_steps is None else full_steps,
         unit=axis.config.unit_name,
         pulses_per_unit=Fraction(str(axis.gear)),
-        text=f"is told that axis {number} goes in {axis.config.unit_name}",
+        text=f"has axis {number} in {axis.config.unit_name}",
     )
 
 
