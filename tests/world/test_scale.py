@@ -112,7 +112,7 @@ def test_an_axis_of_a_mic488_goes_as_it_says_else_as_its_controller_is_told(
         ),
         (
             TABLE + AXIS + 'unit = "mm"\n',
-            "w.toml:9:1: error D009: unit = 'mm': give pulses_per_unit or pitch, for table is told that",
+            "w.toml:9:1: error D009: unit = 'mm': give pulses_per_unit or pitch, for table has axis 1 in",
         ),
         (TABLE + AXIS + 'kind = "rotary"\nunit = "tooth"\n', "unit = 'tooth': give pulses_per_unit or pitch"),
         (

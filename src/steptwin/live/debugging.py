@@ -74,9 +74,7 @@ class Debugging:
         """Raises `Refusal` without a follower of stops, and `Misuse` for a world that cannot be debugged."""
         if self._open is None:
             if not self._is_followed:
-                raise Refusal(
-                    f"no client follows events of kind {StoppedPayload.kind!r}, which report where time stops: follow them first"
-                )
+                raise Refusal(f"without a follower a stop is not reported: follow events of kind {StoppedPayload.kind!r} first")
             self._open = _OpenDebugger(self._live, self._cell, self._pace, self._renew, self._numbers)
             self._open.debugger.set_events([_EVENTS[name] for name in self._events])
             self._renew()
