@@ -14,6 +14,8 @@ ENDS = {
     "press": "the press is safe",
     "indexer": "two revolutions",
     "labeller": "ten products labelled",
+    "plotter": "the octagon is drawn",
+    "winder": "three layers are wound",
     "two_stations": "both stations served",
 }
 
@@ -37,6 +39,8 @@ def test_it_does_what_it_is_for(name: str) -> None:
         ("press", "no-air element=ram from_s=2.2 until_s=2.25"),
         ("indexer", "lost-steps machine=cell at_s=5 pulses=64"),
         ("labeller", "belt-stop element=belt from_s=4 until_s=5"),
+        ("plotter", "stiff-guides element=beam factor=2"),
+        ("winder", "stuck machine=chip pin=B4 value=0 from_s=13 until_s=18"),
     ],
 )
 def test_it_survives_a_fault(name: str, fault: str) -> None:
@@ -53,6 +57,8 @@ def test_it_survives_a_fault(name: str, fault: str) -> None:
         ("hoist", "worn-brake element=hold share=0.2", "abs(z.position - 500) < 0.2"),
         ("press", "welded-contact element=safety", "strokes.count == 1 and danger.count == 0"),
         ("labeller", "stuck machine=cell pin=IN2 value=0 from_s=6", "belt.delivered == 10 and labels.count == products.count"),
+        ("plotter", "stall machine=cell axis=3 at_s=4 for_s=0.5", "not cell.OUT1 and not cell.OUT3 and beam.count == 0"),
+        ("winder", "stuck-follower element=guide from_s=8", "abs(guide.position - (20 - abs(spool.position % 40 - 20))) < 0.02"),
         ("indexer", "lost-steps machine=cell at_s=5 pulses=640", "nests.count == 16 and not cell.OUT2 and crash.count == 0"),
     ],
 )
