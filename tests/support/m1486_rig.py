@@ -6,6 +6,7 @@ from typing import Any
 
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.events import M1486Event
+from steptwin.m1486.microsteps import FULL_STEP
 from steptwin.m1486.variants import variant
 from steptwin.machine import MILLISECOND, SECOND, PinEdge
 from steptwin.motion.divisions import StepTrain
@@ -116,3 +117,19 @@ def way_u(train: StepTrain, after: int, until: int) -> int:
 
 def seconds(events: list[M1486Event]) -> list[float]:
     return [event.time / SECOND for event in events]
+
+
+def speed(bench: Bench) -> float:
+    """Full steps/s, with its sign."""
+    return bench.chip.drive.profile.velocity(bench.now) / FULL_STEP
+
+
+def moving(*lines: str, kind: str = "B", seconds: float = 0.2) -> Bench:
+    """A chip that has been moving for so long."""
+    bench = Bench(kind)
+    bench.do(*lines)
+    bench.send("r")
+    while not bench.chip.drive.is_busy:
+        bench.run(ms=0.5)
+    bench.run(seconds)
+    return bench

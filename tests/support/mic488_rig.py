@@ -15,6 +15,7 @@ from steptwin.machine import SECOND, PinEdge
 from steptwin.mic488.config import AxisConfig, ControllerConfig, read_config
 from steptwin.mic488.core import Mic488Event
 from steptwin.mic488.device import Mic488Device
+from steptwin.mic488.encoder import Coupling
 from steptwin.mic488.inifile import IniFile
 from steptwin.mic488.program_banks import LoadedProgram, load
 from steptwin.wbc.check import check
@@ -304,3 +305,30 @@ def example(name: str) -> Rig:
     config = read_config(IniFile.parse((EXAMPLES / f"{name}.cfg").read_bytes(), name))
     text = (EXAMPLES / f"{name}.prg").read_text()
     return programmed(text, rows.read_text() if rows.exists() else "", config)
+
+
+def encoder_rig(mode: int = 1, reaction: int = 1, /, **config: float) -> Rig:
+    """A drive that is on, by default with ENCODER and ERRMODE0."""
+    rig = Rig(controller(AxisConfig(pos_ctrl_mode=mode, err_ctrl_mode=reaction, **config)))  # type: ignore[arg-type]
+    rig.enable(1)
+    return rig
+
+
+def couple(rig: Rig, coupling: Coupling, axis: int = 1) -> None:
+    rig.kernel.advance(rig.now)
+    rig.device.couple_encoder(axis, coupling, rig.now)
+    rig.kernel.deadline()
+
+
+def turn(rig: Rig, counts: int, axis: int = 1) -> None:
+    rig.kernel.advance(rig.now)
+    rig.device.turn_encoder(axis, counts, rig.now)
+    rig.kernel.deadline()
+
+
+def run(text: str, seconds: float = 1.0, **options: object) -> Rig:
+    """A program that has been started and has had so much time."""
+    rig = programmed(text, **options)  # type: ignore[arg-type]
+    rig.start()
+    rig.wait(seconds)
+    return rig

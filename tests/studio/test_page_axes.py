@@ -1,0 +1,142 @@
+"""The axes panel of the page, in a browser."""
+
+from __future__ import annotations
+
+from playwright.sync_api import Page, expect
+from studio_page import Studio, button
+from tests.conftest import until
+
+
+def enable(page: Page, axis: str = "M1") -> None:
+    button(page, f"Enable {axis}").click()
+    expect(button(page, f"Enable {axis}")).to_have_attribute("aria-pressed", "true")
+
+
+def test_an_axis_is_enabled_and_moved(studio: Studio) -> None:
+    page = studio.page()
+    enable(page)
+    page.get_by_label("Target M1").fill("20")
+    button(page, "Move M1 to").click()
+    until(lambda: studio.at(1) == 20.0, "the axis is at 20 mm")
+    expect(page.get_by_label("M1 position", exact=True)).to_have_text("20.00")
+    expect(page.get_by_label("M1 status")).to_contain_text("position reached")
+    page.get_by_label("Step M1", exact=True).fill("2,5")
+    button(page, "Step M1 −").click()
+    until(lambda: studio.at(1) == 17.5, "the axis has gone back by 2.5 mm")
+
+
+def test_a_jog_lasts_as_long_as_it_is_held(studio: Studio) -> None:
+    page = studio.page()
+    enable(page)
+    button(page, "Jog M1 +").hover()
+    page.mouse.down()
+    until(lambda: studio.at(1) > 5, "the axis jogs")
+    expect(page.get_by_label("M1 status")).not_to_contain_text("on at rest")
+    page.mouse.up()
+    until(lambda: studio.stands(1), "the axis stands")
+    there = studio.at(1)
+    expect(page.get_by_label("M1 position", exact=True)).to_have_text(f"{there:.2f}")
+    assert studio.at(1) == there
+
+
+def test_closing_the_page_ends_a_jog(studio: Studio) -> None:
+    page = studio.page()
+    enable(page)
+    button(page, "Jog M1 −").hover()
+    page.mouse.down()
+    until(lambda: studio.at(1) < -3, "the axis jogs")
+    page.context.close()
+    until(lambda: studio.stands(1), "the axis stands")
+    assert studio.stands(1)
+
+
+def test_the_jog_pad_jogs_two_axes_with_keys(studio: Studio) -> None:
+    page = studio.page()
+    for axis in ("M1", "M2"):
+        enable(page, axis)
+    page.get_by_role("application", name="Jog pad").focus()
+    page.keyboard.down("Numpad9")
+    until(lambda: studio.at(1) > 1 and studio.at(2) > 1, "both axes jog")
+    page.keyboard.up("Numpad9")
+    until(lambda: studio.stands(1) and studio.stands(2), "both axes stand")
+    there = studio.at(2)
+    page.keyboard.down("ArrowLeft")
+    until(lambda: not studio.stands(1), "the first axis jogs")
+    # The key is never let go: the focus is.
+    page.get_by_label("Target M1").focus()
+    until(lambda: studio.stands(1), "the first axis stands")
+    assert studio.at(2) == there
+
+
+def test_space_and_escape_stop_what_somebody_else_moves(studio: Studio) -> None:
+    page = studio.page()
+    studio.master.enable(1)
+    studio.master.run(1, 10.0)
+    until(lambda: studio.at(1) > 1, "the axis moves")
+    page.locator("body").press("Space")
+    until(lambda: studio.stands(1), "space has stopped it")
+    studio.master.run(1, 10.0)
+    until(lambda: not studio.stands(1), "the axis moves")
+    field = page.get_by_label("Target M1")
+    field.fill("1 2")
+    field.press("Space")
+    assert not studio.stands(1)
+    field.press("Escape")
+    until(lambda: studio.stands(1), "Escape has stopped it, from within a text")
+    studio.master.run(1, 10.0)
+    until(lambda: not studio.stands(1), "the axis moves")
+    button(page, "Stop all").click()
+    until(lambda: studio.stands(1), "the button has stopped it")
+
+
+def test_a_click_leaves_the_space_key_to_stop(studio: Studio) -> None:
+    page = studio.page()
+    enable(page)
+    studio.master.run(1, 10.0)
+    until(lambda: studio.at(1) > 1, "the axis moves")
+    page.keyboard.press("Space")
+    until(lambda: studio.stands(1), "space has stopped it")
+    expect(button(page, "Enable M1")).to_have_attribute("aria-pressed", "true")
+
+
+def test_everything_about_an_axis_can_be_done_with_the_keyboard(studio: Studio) -> None:
+    page = studio.page(panel=None)
+    panels = page.get_by_role("navigation").get_by_role("button").all_inner_texts()
+    page.keyboard.press(str(panels.index("Overview") + 1))
+    expect(page.get_by_role("region", name="Overview").last).to_be_visible()
+    page.keyboard.press(str(panels.index("Axes") + 1))
+    expect(button(page, "Enable M1")).to_be_visible()
+    names = tab_to(page, "Enable M1")
+    page.keyboard.press("Enter")
+    until(lambda: studio.master.status(1) == 1, "the drive is on")
+    tab_to(page, "Target M1")
+    page.keyboard.press("Control+a")
+    page.keyboard.type("12")
+    page.keyboard.press("Enter")
+    until(lambda: studio.at(1) == 12.0, "the axis has moved")
+    tab_to(page, "Jog M1 +")
+    page.keyboard.down("Enter")
+    until(lambda: studio.at(1) > 12.0, "the axis jogs")
+    page.keyboard.up("Enter")
+    until(lambda: studio.stands(1), "the axis stands")
+    assert "Stop all" in names
+
+
+def tab_to(page: Page, name: str) -> list[str]:
+    """With the tab key until that has the focus; the names of what had it."""
+    names: list[str] = []
+    while name not in names:
+        page.keyboard.press("Tab")
+        names.append(page.evaluate("document.activeElement.ariaLabel ?? ''"))
+        assert len(names) < 100, names
+    return names
+
+
+def test_a_chip_has_what_its_data_sheet_has(studio: Studio) -> None:
+    page = studio.page()
+    expect(page.get_by_label("drum position")).to_have_text("0")
+    expect(button(page, "Enable drum")).to_have_count(0)
+    expect(button(page, "Home drum")).to_have_count(0)
+    page.get_by_label("Step drum", exact=True).fill("6400")
+    button(page, "Step drum +").click()
+    expect(page.get_by_label("drum position")).to_have_text("6400")
