@@ -205,6 +205,20 @@ def test_a_stop_at_or_below_the_start_speed_is_at_once_on_the_counted_pulse() ->
     assert forced_stop(train, on_full_step + 1_000_000, seek, 64).count(10**12) == 64
 
 
+def test_landing_positions_are_shifted_with_the_grid() -> None:
+    """From 3 with a grid of 8 u they are 3, 67, 131, …: a train that stands on one stops there at once."""
+    seek = SpeedCurve(200 * 64, 5000 * 64, 1e9, 200 * 64)
+    micro = Microstepping(8, 8, 1e9)
+    train = step_train(plan_endless(0, 3, 1, seek), 3, micro)
+    now = train.pulse_time(67, 0)
+    assert now is not None
+    stopped = forced_stop(train, now, seek, 64)
+    assert (stopped.count(now), stopped.profile.end) == (67, now)
+    before = train.pulse_time(59, 0)
+    assert before is not None
+    assert forced_stop(train, before, seek, 64).count(10**12) == 67
+
+
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize("begin", [0, 640])
 def test_m_26_a_stop_before_the_next_coarse_position_goes_on_to_it(begin: int, direction: int) -> None:

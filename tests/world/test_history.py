@@ -217,3 +217,24 @@ def test_a_past_that_was_used_for_something_else_begins_with_a_state_again() -> 
         assert shown(go(past, SECOND)) == before, branch
         world.restore(kept)
         history.gone_back()
+
+
+@pytest.mark.parametrize(("controller_states", "most"), [(0, 16), (16, 16), (17, 17), (300, 256)])
+def test_how_many_snapshots_are_kept(monkeypatch: pytest.MonkeyPatch, controller_states: int, most: int) -> None:
+    """Of a world with one controller: as many as there may be states of controllers, but 16 to 256."""
+    monkeypatch.setattr(module, "MOST_CONTROLLER_STATES", controller_states)
+    world = make()
+    history = History(world)
+    kept = 0
+    for _ in range(most + 5):
+        world.run(for_=0.001)
+        history.take()
+        kept = max(kept, len(history))
+    assert kept == most
+
+
+def test_a_branch_begins_whenever_the_world_goes_back() -> None:
+    history = History(make())
+    assert history.branch == 0
+    history.gone_back()
+    assert history.branch == 1

@@ -81,6 +81,11 @@ def test_every_place_of_a_text_with_everything_in_it() -> None:
     check(TEXT)
 
 
+@pytest.mark.parametrize("text", ["a = [1,22,'x',[3,4],{b=5,c=[6]}]", "a = {b=1,c=2}", "a = [[1],[2,]]", "a = [1 , 2]"])
+def test_places_without_blanks(text: str) -> None:
+    check(text)
+
+
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.toml")), ids=lambda path: path.name)
 def test_every_place_of_the_examples(path: FilePath) -> None:
     check(path.read_text())

@@ -11,6 +11,7 @@ from host_rig import Fault, Wire, thread_line
 
 from steptwin.drivers import Mic488, NoAnswer, NoMic488
 from steptwin.drivers.blocking import finish
+from steptwin.drivers.mic488.failures import ModbusRefusal
 from steptwin.drivers.mic488.identify import SCAN_NS, Found, scan
 from steptwin.errors import LineFailure
 from steptwin.machine import SECOND
@@ -115,3 +116,12 @@ def test_scanning_a_port_that_is_gone_ends() -> None:
     wire.gone = "unplugged"
     with pytest.raises(LineFailure, match="unplugged"):
         finish(scan(line, [1, 2]))
+
+
+@pytest.mark.parametrize("code", [0x0A, 0x0B])
+def test_a_gateway_that_reaches_nobody_is_not_asked_for_other_addresses(code: int) -> None:
+    wire = Wire()
+    answering(wire, lambda request: bytes((request[0] | 0x80, code)))
+    with pytest.raises(ModbusRefusal, match=f"exception {code:02X}"):
+        opened(wire)
+    assert len(wire.sent) == 1

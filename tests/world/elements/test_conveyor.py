@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from steptwin.errors import Misuse
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND
+from steptwin.world.elements.conveyor import CONVEYOR
 from steptwin.world.reader import WorldError
 
 TEXT = """
@@ -65,6 +66,15 @@ def test_the_places_of_workpieces_are_signals_but_no_conditions() -> None:
     assert world.read("belt.place1") == 300.0
     with pytest.raises(Misuse, match="conditions need a sensor"):
         world.run(until="belt.place1 > 350")
+
+
+def test_places_lie_on_the_belt() -> None:
+    """The scale of a chart is the length of the belt."""
+    world = World.from_toml(TEXT)
+    assert CONVEYOR.signals is not None
+    signals = CONVEYOR.signals(world.parts.built(CONVEYOR)["belt"])
+    assert (signals["place1"].bounds, signals["place1"].unit) == ((0.0, 400.0), "mm")
+    assert signals["count"].bounds is None
 
 
 def integrated(runs: list[tuple[int, bool]], feeds: list[int], end: int) -> tuple[list[tuple[int, bool]], int]:
