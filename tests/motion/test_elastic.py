@@ -123,6 +123,17 @@ def test_turns_are_where_the_direction_changes() -> None:
         assert min(steps) >= -1e-9 or max(steps) <= 1e-9
 
 
+def test_without_oscillation_it_turns_once_where_its_drive_does() -> None:
+    """From 100 p/s to −100 p/s within 2 s; the spring is so stiff that it has settled long before."""
+    drives = (DriveStretch(0, 0.0, 100.0, -100.0, 0.0), DriveStretch(2 * SECOND, 0.0, 0.0, 0.0, 0.0))
+    response = Response(Spring(100.0, 0.5), drives, 0.0, 0.0)
+    settled = next(begin for begin in response.ends() if begin > 0)
+    assert settled < SECOND // 2
+    assert [turn for turn in response.turns(settled) if turn < 2 * SECOND] == [SECOND]
+    assert [turn for turn in response.turns(SECOND) if turn < 2 * SECOND] == []
+    assert response.at(SECOND)[1] == 0.0
+
+
 @given(
     frequency=st.floats(0.5, 200.0),
     damping=st.floats(0.01, 0.95),

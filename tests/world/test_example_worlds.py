@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 
 from steptwin.files.world import World
+from steptwin.world.elements import ELEMENTS
+from steptwin.world.reader import WorldError
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
 ENDS = {
@@ -22,6 +24,21 @@ ENDS = {
 
 def example(name: str) -> World:
     return World.load(EXAMPLES / name / f"{name}.toml")
+
+
+@pytest.mark.parametrize("file", sorted(EXAMPLES.rglob("*.toml")), ids=lambda file: file.stem)
+def test_every_lane_of_an_element_is_recorded(file: Path) -> None:
+    """From its first level on."""
+    try:
+        loaded = World.load(file)
+    except WorldError as error:
+        assert "[parameters]" in str(error)  # a piece of other worlds
+        return
+    with loaded as world:
+        world.run(for_=0.001)
+        recorded = {record.subject for record in world.trace.edges()}
+        lanes = {lane for element in ELEMENTS.values() for spec in world.spec.elements[element.name] for lane in element.lanes(spec)}
+        assert lanes <= recorded
 
 
 @pytest.mark.parametrize("name", ENDS)

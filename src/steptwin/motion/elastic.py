@@ -86,10 +86,6 @@ class Stretch:
         """Of the oscillation at the beginning, pulses."""
         return sqrt(self.cosine_p * self.cosine_p + self.sine_p * self.sine_p)
 
-    def still(self) -> Stretch:
-        """Without its oscillation."""
-        return Stretch(self.spring, self.drive, 0.0, 0.0)
-
     def settled(self) -> Nanos:
         """From when on the oscillation is over."""
         times = self.amplitude / SETTLED_P

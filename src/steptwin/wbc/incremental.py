@@ -72,8 +72,8 @@ class Edited:
         beyond = 0
         for first in [number for number, line in enumerate(sound) if line is None]:
             number = max(first, beyond)
-            # Inside a comment of another language no line is a statement.
-            while number == first or (parser.in_comment and number < len(lines)):
+            # Inside a comment of another language, which ends in one of the lines, none is a statement.
+            while number == first or parser.in_comment:
                 said, inside = len(parser.diagnostics), parser.in_comment
                 lines[number] = line = parser.line(number, self._bases[number])
                 if not inside:

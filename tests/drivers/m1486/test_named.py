@@ -169,3 +169,18 @@ def test_commands_before_the_first_x_need_a_chip() -> None:
     message = r"p\.m1486 was not sent: the commands before its first X need a chip: --device ADDRESS,chip=N"
     with pytest.raises(Misuse, match=message):
         send(NOBODY, "V500\nX2\nV600\n", lambda *step: None, lambda: None)
+
+
+def test_commands_before_the_first_x_are_for_the_chip_that_is_addressed(monkeypatch: pytest.MonkeyPatch) -> None:
+    wire = ChipWire(addresses=(7, 10))
+    at_every_address(monkeypatch, wire)
+    sent = send(ADDRESS, "V500\nXA\nV600\n", lambda *step: None, lambda: None)
+    assert sent.data["chips"] == ["7", "A"]
+    assert [chip.drive.velocity for chip in wire.chips.values()] == [500, 600]
+
+
+def test_a_wrong_program_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    wire = ChipWire(addresses=(7,))
+    at_every_address(monkeypatch, wire)
+    with pytest.raises(Misuse, match=r"p\.m1486"):
+        send(ADDRESS, "V99999999\n", lambda *step: None, lambda: None)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from host_rig import Fault, Wire, async_driver, driver, run_virtual, spindles, task_line, thread_line
+from host_rig import Fault, MemoryEndpoint, Wire, async_driver, driver, run_virtual, spindles, task_line, thread_line
 
 from steptwin.drivers import (
     Mic488,
@@ -24,8 +24,10 @@ from steptwin.drivers import (
     load_config,
 )
 from steptwin.drivers.exchange import Job
-from steptwin.drivers.mic488.lines import ThreadModbusLine
+from steptwin.drivers.mic488.frames import FrameWords
+from steptwin.drivers.mic488.lines import ThreadModbusLine, modbus_exchanger
 from steptwin.drivers.modbus import Query
+from steptwin.drivers.place import LineAddress
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND
 from steptwin.mic488.config import ControllerConfig
@@ -34,6 +36,7 @@ from steptwin.mic488.registers import register_map
 from steptwin.mic488.values import encoded, named
 from steptwin.wire import pdu, rtu
 from steptwin.wire.pdu import BitsResponse, ReadRequest, WriteCoilRequest, WriteRegisterRequest
+from steptwin.wire.slave import FrameDirection
 
 CFG = """[Axis0]
 Unit=3
@@ -477,3 +480,24 @@ def test_outputs_from_the_first_to_the_last(output: int) -> None:
         mic.set_output(9, True)
     with pytest.raises(Misuse, match="0"):
         mic.set_output(0, True)
+
+
+@pytest.mark.parametrize("timeout_s", [0.0, -1.0, 60.5])
+def test_time_outs_have_bounds(timeout_s: float) -> None:
+    with pytest.raises(Misuse, match=f"a time-out of {timeout_s:g} s is outside 0 to 60 s"):
+        Mic488("/dev/none", timeout_s=timeout_s)
+    Mic488("/dev/none", timeout_s=60.0)
+
+
+@pytest.mark.parametrize("framed", [False, True])
+def test_frames_in_words_of_both_sorts_of_lines(*, framed: bool) -> None:
+    """Read 2 words from 10020; with the address and the CRC of RTU, or the header of Modbus TCP."""
+    log: list[str] = []
+    _, notes = modbus_exchanger(LineAddress(MemoryEndpoint(Wire()), framed=framed), None, log.append)
+    frames = notes["frames"]
+    assert isinstance(frames, FrameWords)
+    request = bytes.fromhex("03 27 24 00 02")
+    frame = bytes.fromhex("00 01 00 00 00 06 01") + request if framed else rtu.encode_frame(1, request)
+    frames.observe(0, FrameDirection.IN, frame)
+    assert len(log) == 1
+    assert "M1_POS_ACT" in log[0]

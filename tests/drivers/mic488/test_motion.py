@@ -41,6 +41,11 @@ def test_a_move_that_has_to_turn_brakes_first() -> None:
     assert travel_s(0.0, 10.0, 5.0, 5.0, 1e3) == pytest.approx(2.0 + 2.0 * sqrt(10.0 / 5.0), rel=1e-4)
 
 
+def test_a_tiny_move_lasts_as_its_trapezoid_too() -> None:
+    """0.02 s up and 0.02 s down, at 1 u/s²."""
+    assert travel_s(0.0004, 0.0, 1.0, 1.0, 1.0) == pytest.approx(0.04, rel=1e-3)
+
+
 def test_no_way_takes_no_time_and_what_cannot_be_planned_has_none() -> None:
     assert travel_s(0.0, 0.0, 1.0, 1.0, 1.0) == 0.0
     for dynamics in ((0.0, 1.0, 1.0), (1.0, 0.0, 1.0), (1.0, 1.0, 0.0), (float("nan"), 1.0, 1.0)):

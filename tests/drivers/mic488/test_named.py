@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import pytest
 from host_rig import Wire, driver
 from line_rig import at_every_address
+from mic488_rig import loaded
 
 from steptwin.drivers.kind import DeviceAddress, ReadValue, Values
 from steptwin.drivers.mic488.addresses import ValueAddress, places
@@ -218,6 +219,11 @@ def test_an_overview() -> None:
     assert found.data["axes"][1]["position"] == 3.0
     mic.set("OUT3", 0)
     assert overview(mic, ADDRESS).tail[1] == "outputs on: none"
+    wire.twin.load_program(0, loaded("WHILE 1 = 1\nDELAY 1\nENDWHILE\n")[0])
+    mic.program.start()
+    assert overview(mic, ADDRESS).data["program"] == "running"
+    mic.program.pause()
+    assert overview(mic, ADDRESS).data["program"] == "paused"
     known = DeviceAddress("memory", "mic488", 1, 38400, 0.3, "1.70")
     assert overview(mic, known).data["firmware_may_be"] == ["1.70"]
     mic.set("DATA_TYPE", 1)

@@ -7,7 +7,16 @@ import dataclasses
 import pytest
 from host_rig import Wire, driver
 
-from steptwin.drivers.mic488.session import SessionStep, carry_out, carry_out_one, differences, from_text, steps_of, to_text
+from steptwin.drivers.mic488.session import (
+    Difference,
+    SessionStep,
+    carry_out,
+    carry_out_one,
+    differences,
+    from_text,
+    steps_of,
+    to_text,
+)
 from steptwin.errors import Misuse, Refusal
 from steptwin.mic488.registers import register_map
 
@@ -111,3 +120,17 @@ def test_two_recordings() -> None:
 def test_what_is_no_recording(text: str) -> None:
     with pytest.raises(Misuse, match=r"a.json is not a recording"):
         from_text(text, "a.json")
+
+
+def test_a_motion_that_did_not_arrive_is_a_result() -> None:
+    """The switch KR is at 250 mm."""
+    mic = driver(Wire())
+    mic.set("M1_EN", 1)
+    mic.set("M1_POS_ABS", 400.0)
+    result = carry_out_one(mic, "wait M1")
+    assert result["M1"]["reason"] == "stopped at limit R"
+    assert result["M1"]["position"] == pytest.approx(250.0, abs=10.0)
+
+
+def test_differences_are_shown_as_they_are_written() -> None:
+    assert str(Difference(2, "get X", "X", "5 °C", None)) == 'step 2, get X: X: "5 °C" | nothing'
