@@ -51,10 +51,17 @@ class GatewayWorld:
 def served(text: str, folder: Path, *options: str) -> Generator[Mapping[str, Mapping[str, Any]]]:
     """The end points of the description ``text`` by kind, while ``steptwin up`` serves it; it ends without an error."""
     (folder / "hall.toml").write_text(text)
-    ready = folder / "ready.json"
-    environment = {**os.environ, "XDG_RUNTIME_DIR": str(folder)}
+    with running(folder, "up", "hall.toml", *options) as found:
+        yield found
+
+
+@contextmanager
+def running(folder: Path, *arguments: str) -> Generator[Mapping[str, Mapping[str, Any]]]:
+    """The end points of ``steptwin`` with these arguments by kind, while it runs; it ends without an error."""
+    ready = folder / f"{arguments[0]}.json"
+    environment = {**os.environ, "XDG_RUNTIME_DIR": str(folder), "XDG_STATE_HOME": str(folder)}
     process = subprocess.Popen(
-        [STEPTWIN, "up", "hall.toml", "--ready-file", str(ready), *options],
+        [STEPTWIN, *arguments, "--ready-file", str(ready)],
         cwd=folder,
         env=environment,
         stdout=subprocess.DEVNULL,

@@ -20,6 +20,7 @@ from typer.exceptions import TyperException
 
 from steptwin import __version__
 from steptwin.cli import (
+    bridge,
     build,
     calc,
     certificate,
@@ -108,6 +109,7 @@ COMMANDS: Mapping[str, Mapping[str, Callable[..., None]]] = {
         "monitor": monitor.monitor,
         "sniff": sniff.sniff,
         "verify": verify.verify,
+        "bridge": bridge.bridge,
         "record": record.record,
         "diff": record.diff,
     },

@@ -20,6 +20,7 @@ Faults = Annotated[
     typer.Option(help="Fault active from the start, such as 'crc nth=3'; repeatable. See steptwin fault --kinds."),
 ]
 ReadyFile = Annotated[Path | None, typer.Option(help="JSON file with the end points, written when all of them are open.")]
+ListenAny = Annotated[bool, typer.Option("--listen-any", help="Permit addresses that other computers can reach.")]
 Coverage = Annotated[
     list[str] | None,
     typer.Option(
@@ -101,7 +102,7 @@ class LiveOptions(OptionGroup):
         str | None,
         typer.Option(metavar="HOST:PORT", help="Also open the control endpoint on this loopback TCP address."),
     ] = None
-    listen_any: Annotated[bool, typer.Option("--listen-any", help="Permit addresses that other computers can reach.")] = False
+    listen_any: ListenAny = False
     log_frames: LogTraffic = False
 
 

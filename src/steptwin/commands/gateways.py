@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from steptwin.gateways import make_gateway
+from steptwin.gateways.contract import GatewaySubject
 from steptwin.live.server import EndPoint, Server
 from steptwin.live.world_control import WorldControl
 from steptwin.subject.commands import Command
@@ -15,10 +16,9 @@ from steptwin.world.gateways import GatewaySpec
 
 
 async def open_gateways(
-    server: Server, specs: Iterable[GatewaySpec], folder: Path, control: WorldControl, *, listen_any: bool
+    server: Server, specs: Iterable[GatewaySpec], folder: Path, subject: GatewaySubject, *, listen_any: bool
 ) -> None:
-    """Open those of a description in ``folder``. Raises `Misuse` or `LineFailure` for one that cannot be opened."""
-    subject = _LiveWorldSubject(control)
+    """Open those of a file in ``folder``. Raises `Misuse` or `LineFailure` for one that cannot be opened."""
     for spec in specs:
         gateway = make_gateway(spec, subject, folder)
         details = await gateway.open(listen_any=listen_any)
@@ -26,7 +26,7 @@ async def open_gateways(
         server.join(gateway, EndPoint(spec.kind, place, gateway.protocol, details))
 
 
-class _LiveWorldSubject:
+class LiveWorldSubject:
     """A live world for gateways: it answers at once."""
 
     def __init__(self, control: WorldControl) -> None:

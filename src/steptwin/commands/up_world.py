@@ -13,7 +13,7 @@ from math import inf
 from pathlib import Path
 from typing import TypeAlias
 
-from steptwin.commands.gateways import open_gateways
+from steptwin.commands.gateways import LiveWorldSubject, open_gateways
 from steptwin.errors import Misuse
 from steptwin.files import session as sessions
 from steptwin.files.beginning import begin_world, check_session_target, is_session, set_faults
@@ -279,7 +279,7 @@ async def _open(server: Server, live: LiveWorld, pace: Pace, options: UpOptions,
         await addition(Running(server, live, pace, control))
     if not options.is_closed:
         folder = Path() if options.world is None else options.world.parent
-        await open_gateways(server, live.world.spec.gateways, folder, control, listen_any=options.listen_any)
+        await open_gateways(server, live.world.spec.gateways, folder, LiveWorldSubject(control), listen_any=options.listen_any)
     if options.ready_file is not None:
         server.write_ready_file(options.ready_file)
 

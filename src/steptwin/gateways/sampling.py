@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -72,7 +73,7 @@ class Sampler:
             self._resting.clear()
         for event in events:
             self._resting.pop(event.machine, None)
-        return [await self.take(name) for name in machines if self._is_due(name)]
+        return await asyncio.gather(*(self.take(name) for name in machines if self._is_due(name)))
 
     def _is_due(self, machine: str) -> bool:
         left_out = self._resting.get(machine)

@@ -1,0 +1,24 @@
+"""``steptwin bridge``: real devices behind OPC UA, MQTT, metrics."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from steptwin.cli.worldoptions import ListenAny, ReadyFile
+
+
+def bridge(
+    file: Annotated[Path, typer.Argument(metavar="FILE.toml", help="Devices and gateways: see docs/gateways.md.")],
+    *,
+    listen_any: ListenAny = False,
+    ready_file: ReadyFile = None,
+) -> None:
+    """Serve real devices to programs of a plant, by the gateways of a file, until Ctrl-C.
+
+    It owns the lines of the devices: commands are sent in order, stops first, and nothing is repeated."""
+    from steptwin.commands.bridge import bridge as serve_devices
+
+    serve_devices(file, listen_any=listen_any, ready_file=ready_file)

@@ -1,0 +1,84 @@
+"""``steptwin bridge``: real devices for programs of a plant. One process owns their lines; commands go through it in order."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from steptwin.commands.gateways import open_gateways
+from steptwin.commands.keptsettings import keep_settings
+from steptwin.commands.studio_devices import serve_without_world
+from steptwin.gateways.devicefile import DeviceFile, read_device_file
+from steptwin.inputfiles import read_bytes
+from steptwin.later import start
+from steptwin.live.server import Server
+from steptwin.live.twins import find_device
+from steptwin.machine import Nanos
+from steptwin.studio.connections import Computer, DeviceConnections
+from steptwin.studio.device import DeviceSurroundings
+from steptwin.studio.eventloop import result_of
+from steptwin.studio.shown import Shown
+from steptwin.subject.commands import Command
+from steptwin.subject.contract import Description, Reading, Result
+from steptwin.subject.events import Numbering
+from steptwin.subject.following import Filter, Following
+from steptwin.textcodec import decode
+from steptwin.world.addresses import check_addresses
+
+
+def bridge(file: Path, *, listen_any: bool, ready_file: Path | None) -> None:
+    """Serve the devices of ``file`` until SIGINT, SIGTERM or SIGHUP. Raises `SteptwinError` with a text for the user."""
+    wanted = read_device_file(str(file), decode(read_bytes(file), str(file)).text)
+    check_addresses([gateway.listen for gateway in wanted.gateways], listen_any=listen_any)
+
+    async def open_all(server: Server) -> None:
+        await _open(server, wanted, file, listen_any=listen_any)
+
+    asyncio.run(serve_without_world(ready_file, open_all))
+
+
+async def _open(server: Server, wanted: DeviceFile, file: Path, *, listen_any: bool) -> None:
+    begin = time.monotonic_ns()
+
+    def now() -> Nanos:
+        return time.monotonic_ns() - begin
+
+    def report(error: Exception) -> None:
+        server.notice(f"internal error, please report it: {type(error).__name__}: {error}")
+
+    server.introduce(wanted.name, file=file)
+    shown = Shown(None, now, Numbering({}))
+    around = DeviceSurroundings(clock=now, keep=keep_settings, on_internal=report)
+    connections = DeviceConnections(shown, around, Computer(ports=_no_ports, find=find_device))
+    server.join(connections)
+    for device in wanted.devices:
+        await connections.open(device.address, device.name)
+    await open_gateways(server, wanted.gateways, file.parent, _Devices(wanted.name, shown), listen_any=listen_any)
+
+
+def _no_ports() -> Sequence[dict[str, object]]:
+    return ()
+
+
+class _Devices:
+    """Devices for gateways. See `steptwin.gateways.contract.GatewaySubject`."""
+
+    def __init__(self, name: str, shown: Shown) -> None:
+        self._name = name
+        self._shown = shown
+
+    @property
+    def description(self) -> Description:
+        return replace(self._shown.description, name=self._name)
+
+    def read(self, *points: str) -> tuple[Reading, ...]:
+        return self._shown.read(*points)
+
+    async def do(self, wanted: Command, /) -> Result:
+        return await result_of(start(self._shown.do(wanted)))
+
+    def follow(self, what: Filter, bound: int) -> Following:
+        return self._shown.follow(what, bound)

@@ -1,0 +1,65 @@
+"""The file of ``steptwin bridge``: devices, and the gateways through which other programs see them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from steptwin.world.gateways import GATEWAY, GatewaySpec, read_gateways
+from steptwin.world.reader import Key, TomlText, optional, read_table
+from steptwin.world.values import name_value, text_value
+
+DEVICE, BRIDGE = "device", "bridge"
+DEVICE_KEYS = (
+    Key("name", name_value, "how it is called in gateways"),
+    Key("address", text_value, "where it is: as --device of other commands, such as /dev/ttyUSB0,unit=2"),
+)
+BRIDGE_KEYS = (optional(name_value, "name", "how the devices are called together", "devices"),)
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceSpec:
+    name: str
+    address: str
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceFile:
+    name: str
+    devices: tuple[DeviceSpec, ...]
+    gateways: tuple[GatewaySpec, ...]
+
+
+def read_device_file(name: str, text: str) -> DeviceFile:
+    """The file ``name`` with this text. Raises `WorldError` with everything that is wrong with it."""
+    toml = TomlText(name, text)
+    known = (DEVICE, BRIDGE, GATEWAY)
+    for key in toml.data:
+        if key not in known:
+            fix = toml.key_replacement((key,), key, list(known))
+            toml.wrong(
+                (key,), "D004", f"the file has no [{key}]{toml.near(key, list(known))}", f"permitted: {', '.join(known)}", fix
+            )
+    whole = read_table(toml, (BRIDGE,), toml.data.get(BRIDGE, {}), BRIDGE_KEYS)
+    devices, gateways = tuple(_devices(toml)), tuple(read_gateways(toml))
+    for what, found in ((f"[[{DEVICE}]]", devices), (f"[{GATEWAY}.NAME]", gateways)):
+        if not found and not toml.findings:
+            toml.wrong((), "D005", f"{what} is missing")
+    toml.check()
+    return DeviceFile(whole["name"], devices, gateways)
+
+
+def _devices(toml: TomlText) -> Iterator[DeviceSpec]:
+    given = toml.data.get(DEVICE, [])
+    if not isinstance(given, list):
+        toml.wrong((DEVICE,), "D002", f"[{DEVICE}] stands once", f"expected [[{DEVICE}]], for there may be several")
+        return
+    names: set[str] = set()
+    for number, table in enumerate(given):
+        values = read_table(toml, (DEVICE, number), table, DEVICE_KEYS)
+        if "name" not in values or "address" not in values:
+            continue
+        if values["name"] in names:
+            toml.wrong((DEVICE, number, "name"), "D006", f"there is a [[{DEVICE}]] named {values['name']!r} already")
+        names.add(values["name"])
+        yield DeviceSpec(**values)

@@ -1,0 +1,37 @@
+"""Files of devices and gateways."""
+
+from __future__ import annotations
+
+import pytest
+
+from steptwin.gateways.devicefile import DeviceSpec, read_device_file
+from steptwin.world.reader import WorldError
+
+DEVICE = '[[device]]\nname = "table"\naddress = "/dev/ttyUSB0,unit=2"\n'
+GATEWAY = '[gateway.prometheus]\nlisten = "127.0.0.1:9100"\n'
+
+
+def test_devices_and_gateways() -> None:
+    found = read_device_file("cell.toml", '[bridge]\nname = "cell"\n' + DEVICE + GATEWAY)
+    assert (found.name, found.devices) == ("cell", (DeviceSpec("table", "/dev/ttyUSB0,unit=2"),))
+    assert [(gateway.kind, gateway.listen) for gateway in found.gateways] == [("prometheus", "127.0.0.1:9100")]
+    assert read_device_file("cell.toml", DEVICE + GATEWAY).name == "devices"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "error D005: [[device]] is missing"),
+        (DEVICE, "error D005: [gateway.NAME] is missing"),
+        (DEVICE + DEVICE + GATEWAY, "cell.toml:5:1: error D006: there is a [[device]] named 'table' already"),
+        (GATEWAY + "[[devise]]\n", "the file has no [devise] (did you mean 'device'?)"),
+        (GATEWAY + '[device]\nname = "table"\n', "[device] stands once"),
+        (GATEWAY + '[[device]]\nname = "table"\n', "address is missing"),
+        (GATEWAY + '[[device]]\nname = "a table"\naddress = "x"\n', "'a table' is not a name"),
+        (GATEWAY + DEVICE + "speed = 3\n", "[device] has no 'speed'"),
+    ],
+)
+def test_mistakes_are_reported(text: str, message: str) -> None:
+    with pytest.raises(WorldError) as error:
+        read_device_file("cell.toml", text)
+    assert message in str(error.value)
