@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from types import TracebackType
-from typing import Any, NamedTuple, Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 from steptwin.controllerstate import ControllerState
 from steptwin.datasheet import Datasheet, plain
@@ -26,6 +26,7 @@ from steptwin.subject import commands as command
 from steptwin.subject.commands import COMMANDS, Command, row_of
 from steptwin.subject.contract import GOOD, UNKNOWN, Description, LinePart, MachinePart, Reading, Result
 from steptwin.subject.controls import controls_of
+from steptwin.subject.devicetwin import DeviceTwin
 from steptwin.subject.events import Event, Numbering
 from steptwin.subject.following import EventBatch, Filter, Followers, Following
 from steptwin.subject.payloads import Payload, SamplePayload
@@ -35,22 +36,6 @@ PERIODS_S = (0.02, 60.0)
 DeviceAction: TypeAlias = Callable[[Any], Awaitable[object]]
 PointValue: TypeAlias = tuple[float | None, str]
 """The value of a point, None if unknown; and its unit."""
-
-
-class DeviceTwin(NamedTuple):
-    """What a twin of a device is made of, in the state in which the device is."""
-
-    text: str
-    """The description of its world."""
-    files: Mapping[str, bytes]
-    line: str
-    """The name of its line there."""
-    values: Sequence[tuple[str, float]]
-    """Registers, to be written in this order."""
-    enabled: Sequence[int]
-    """Axes whose drives are on."""
-    compared: Sequence[str]
-    """Registers that both have to have alike."""
 
 
 class DevicePart(Protocol):

@@ -16,11 +16,11 @@ from math import isclose
 from typing import NamedTuple
 
 from steptwin.datasheet import AxisDescription, Datasheet, PinDirection
-from steptwin.drivers.subject import DeviceTwin
 from steptwin.errors import SteptwinError
 from steptwin.machine import SECOND, Nanos
 from steptwin.subject import commands as command
 from steptwin.subject.commands import Command, row_of
+from steptwin.subject.devicetwin import DeviceTwin
 from steptwin.subject.world import WorldSubject
 from steptwin.world import script as steps
 from steptwin.world.description import read_world

@@ -18,12 +18,13 @@ from steptwin.drivers.m1486.driver import AsyncM1486
 from steptwin.drivers.m1486.failures import Busy, PositionUnknown
 from steptwin.drivers.m1486.jog import AsyncM1486Jog
 from steptwin.drivers.m1486.talk import ChipRequest
-from steptwin.drivers.subject import DeviceAction, DeviceTwin, PointValue
+from steptwin.drivers.subject import DeviceAction, PointValue
 from steptwin.errors import Misuse, Refusal
 from steptwin.m1486.datasheet import axis, datasheet_of
 from steptwin.m1486.microsteps import FULL_STEP
 from steptwin.m1486.registers import UPLOADS
 from steptwin.subject import commands as command
+from steptwin.subject.devicetwin import DeviceTwin
 from steptwin.subject.payloads import Payload, SamplePayload, StatusPayload
 from steptwin.world import script as steps
 

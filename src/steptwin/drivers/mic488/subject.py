@@ -16,7 +16,7 @@ from steptwin.drivers.mic488.motion import MOVING, status_text
 from steptwin.drivers.mic488.program import ProgramState
 from steptwin.drivers.mic488.snapshot import COUNTERS
 from steptwin.drivers.modbus import Query
-from steptwin.drivers.subject import DeviceAction, DeviceTwin, PointValue
+from steptwin.drivers.subject import DeviceAction, PointValue
 from steptwin.errors import Misuse, Refusal
 from steptwin.inputfiles import read_bytes
 from steptwin.mic488.datasheet import datasheet_of
@@ -28,6 +28,7 @@ from steptwin.mic488.status import AxisStatus
 from steptwin.mic488.values import named
 from steptwin.nearmiss import NearMiss
 from steptwin.subject import commands as command
+from steptwin.subject.devicetwin import DeviceTwin
 from steptwin.subject.payloads import EdgePayload, Payload, SamplePayload, StatusPayload
 from steptwin.wire import pdu
 from steptwin.world import script as steps
