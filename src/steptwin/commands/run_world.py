@@ -29,11 +29,14 @@ from steptwin.world.kind import ProgramAct, ProgramReport
 from steptwin.world.overrides import Overrides
 from steptwin.world.records import describe, is_shown
 from steptwin.world.references import check_step
+from steptwin.world.unfinished import unchanged_inputs, waiting
 
 USUAL_LIMIT_NS: Nanos = 60 * SECOND
 SESSION = "session.json"
 INTERRUPTED = "Ctrl-C"
 JSON_VERSION = 1
+MOST_WAITS = 20
+"""So many waits, and inputs that never changed, are printed."""
 
 Print = Callable[[str], None]
 
@@ -252,9 +255,24 @@ def _print_end(world: World, outcome: WorldRunResult, out: Print) -> None:
         out(f"warning: {world.overdue.more} more of these")
     if outcome.in_vain is not None:
         out(f"warning: {outcome.in_vain} did not come true in {(world.now - outcome.began) / SECOND:g} s")
+    if outcome.reason is None or world.failures or world.overdue:
+        _print_unfinished(world, outcome.began, out)
     for path in outcome.written:
         out(f"wrote {path}")
     out(f"digest {outcome.digest}")
+
+
+def _print_unfinished(world: World, began: Nanos, out: Print) -> None:
+    """What stands still: usually that is why something did not happen."""
+    waits = list(waiting(world))
+    for one in waits[:MOST_WAITS]:
+        out(f"{one.who} waits for {one.what}")
+    if len(waits) > MOST_WAITS:
+        out(f"{len(waits) - MOST_WAITS} more wait")
+    if unchanged := unchanged_inputs(world, began):
+        shown = ", ".join(unchanged[:MOST_WAITS])
+        more = f" and {len(unchanged) - MOST_WAITS} more" if len(unchanged) > MOST_WAITS else ""
+        out(f"inputs that never changed: {shown}{more}")
 
 
 def _states(world: World) -> dict[str, ControllerState]:
@@ -271,6 +289,7 @@ def _json(world: World, outcome: WorldRunResult, out: Print) -> None:
         "ended_by": outcome.reason,
         "in_vain": outcome.in_vain,
         "failures": [{"time_s": f.time / SECOND, "condition": f.value} for f in world.failures],
+        "waiting": [one._asdict() for one in waiting(world)],
         "overdue": [{"time_s": late.time / SECOND, "what": late.value} for late in world.overdue],
         "axes": {
             name: {"position": axis.position, "unit": axis.unit, "lost_pulses": axis.lost, "stalled": axis.stalled}

@@ -1,0 +1,76 @@
+"""What stands still in a world: what its programs and scripts wait for, and which inputs never changed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from steptwin.diagnostics import visible
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.world.plant import Plant
+from steptwin.world.programs import Operand, OperandKind, Place
+from steptwin.world.wiring import Connection, connections
+
+
+class Waiting(NamedTuple):
+    """``who``: a controller with its program, or a script of the description; ``what`` it waits for."""
+
+    who: str
+    what: str
+
+
+def waiting(plant: Plant) -> Iterator[Waiting]:
+    """The programs that wait for something other than time, then the scripts, but for events, which wait for the next time."""
+    drivers = _drivers(plant)
+    for name, programs in plant.programs.items():
+        stack = programs.stack(plant.now)
+        if not stack:
+            continue
+        use = programs.use(stack[0].place)
+        if use.waits and use.reads:
+            states = ", ".join(filter(None, (_state(plant, name, operand, drivers) for operand in use.reads)))
+            where = _statement(plant, name, stack[0].place)
+            yield Waiting(name, f"{where}: {states}" if states else where)
+    events = {script.name for script in plant.spec.scripts if script.when is not None or script.every is not None}
+    for script in plant.scripts:
+        if script.waiting is not None and script.name not in events:
+            asked = ", ".join(f"the answer on {pending.line}" for pending in script.waiting.asked)
+            if what := script.waiting.condition or asked:
+                yield Waiting(script.name, what)
+
+
+def _statement(plant: Plant, machine: str, place: Place) -> str:
+    programs = plant.programs[machine]
+    found, source = programs.statements(place.text)[place.number], programs.texts[place.text]
+    return f"{source.name}:{found.line} {visible(source.text[found.start : found.end].strip())}"
+
+
+def _state(plant: Plant, machine: str, operand: Operand, drivers: dict[str, list[Connection]]) -> str:
+    """The present level of a pin that a statement reads, and what drives it."""
+    if operand.kind is not OperandKind.PIN or not operand.name:
+        return ""
+    pin = f"{machine}.{operand.name}"
+    try:
+        level = plant.read(pin)
+    except Misuse:
+        return ""
+    terminals = plant.kind(machine).terminals
+    if operand.name not in (*terminals.digital_inputs, *terminals.analog_inputs):
+        return f"{pin} is {level:g}"
+    by = " and ".join(one.source for one in drivers.get(pin, ())) or "nothing"
+    return f"{pin} is {level:g}, driven by {by}"
+
+
+def _drivers(plant: Plant) -> dict[str, list[Connection]]:
+    found: dict[str, list[Connection]] = {}
+    for one in connections(plant.parts):
+        found.setdefault(str(one.target), []).append(one)
+    return found
+
+
+def unchanged_inputs(plant: Plant, since: Nanos) -> list[str]:
+    """The inputs of controllers that something drives, and that have had one level since a moment, as far as the trace is kept."""
+    changed = {(record.machine, record.subject) for record in plant.trace.edges() if record.time > since}
+    driven = dict.fromkeys(one.target for one in connections(plant.parts) if one.target.machine in plant.machines)
+    return [str(pin) for pin in driven if (pin.machine, pin.pin) not in changed]
