@@ -324,8 +324,11 @@ class Interpreter(Stateful):
                     if unmarked == 0:
                         unmarked = self._set_mark(now + pause)
                         pc = following
-                        self.now = self.due = now + pause
-                        return self.due <= until
+                        self.due = now + pause
+                        if self.due > until:
+                            return False
+                        self.now = self.due
+                        return True
                     unmarked -= 1
                 pc = following
                 now += pause
