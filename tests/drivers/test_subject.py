@@ -13,21 +13,20 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
+from device_rig import CELL, Rig
 from host_rig import Wire, async_driver, driver, run_virtual, task_line
 from mic488_rig import loaded
 from tests.conftest import until
 
-from steptwin.controllerstate import ProgramActivity, read_state
+from steptwin.controllerstate import read_state
 from steptwin.drivers.blocking import finish
-from steptwin.drivers.m1486 import M1486, Busy
 from steptwin.drivers.m1486.subject import M1486Part
 from steptwin.drivers.mic488.subject import Mic488Part
 from steptwin.drivers.mic488.sync import Mic488
 from steptwin.drivers.subject import AsyncDeviceSubject, DeviceSubject
-from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
+from steptwin.errors import LineFailure, Misuse, Refusal
 from steptwin.files.world import World
 from steptwin.live.remote import RemoteSubject
-from steptwin.live.world import LiveWorld, PlacePort
 from steptwin.machine import SECOND
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.status import ControllerStatus
@@ -38,67 +37,8 @@ from steptwin.subject.events import read_event
 from steptwin.subject.following import filter_of
 from steptwin.subject.payloads import SamplePayload
 from steptwin.subject.world import WorldSubject
-from steptwin.testing.virtualtime import MemoryEndpoint, VirtualTime, joined_chip, joined_driver
 from steptwin.world import script as do
 from steptwin.world.faults import read as read_fault
-
-CELL = """
-[world]
-name = "cell"
-
-[[line]]
-name = "bus"
-kind = "modbus"
-tcp = "127.0.0.1:0"
-
-[[line]]
-name = "chips"
-kind = "m1486"
-tcp = "127.0.0.1:0"
-
-[[mic488]]
-name = "table"
-line = "bus"
-
-[mic488.M1]
-unit = "mm"
-gear = 100.0
-acc = 100.0
-dec = 100.0
-vel = 40.0
-in_kl = "IN1"
-home_mode = "HOME1"
-
-[[m1486]]
-name = "drum"
-line = "chips"
-variant = "B"
-address = 3
-
-[[axis]]
-name = "x"
-drive = "table.M1"
-travel = [-5.0, 105.0]
-start = 10.0
-
-[[axis.switch]]
-below = 0.0
-to = "table.IN1"
-"""
-
-
-class Rig:
-    """A world in virtual time, and drivers on its lines."""
-
-    def __init__(self) -> None:
-        self.world = World.from_toml(CELL)
-        self.live = LiveWorld(self.world)
-        self.time = VirtualTime(self.live)
-        bus = MemoryEndpoint(self.time, lambda: PlacePort(self.live, "bus", "tcp-1", "tcp"), "bus")
-        config = self.world.mic488["table"].device.config
-        self.mic: Mic488 = joined_driver(bus, self.time, 1, framed=True, firmware="1.70", config=config)
-        chips = MemoryEndpoint(self.time, lambda: PlacePort(self.live, "chips", "raw-1", "raw"), "chips")
-        self.chip: M1486 = joined_chip(chips, self.time, 3)
 
 
 @pytest.fixture
@@ -422,157 +362,6 @@ def test_a_slow_follower_loses_the_oldest_and_is_told_how_many(table: DeviceSubj
     following = table.follow(filter_of(["sample"]), 3)
     missed, events = following.take()
     assert (missed, [event.axis for event in events]) == (1, ["2", "3", "4"])
-
-
-# ---------------------------------------------------------------------- an M1486
-
-
-def test_an_m1486_moves_and_is_unknown_meanwhile(drum: DeviceSubject, rig: Rig) -> None:
-    assert drum.description.machines[0].datasheet.axes[0].unit == "step"
-    assert drum.description.machines[0].controls == ("move", "jog", "stop", "program")
-    assert drum.description.machines[0].unit == 3
-    assert [reading.value for reading in drum.read("drum.B1", "drum.U3", "drum.U20")] == [None, 0.0, ord("B")]
-    drum.do(command.Move("drum", 1, by=5000.0))
-    moving = {reading.point: reading for reading in drum.read("drum.counter", "drum.moving", "drum.B1", "drum.position")}
-    assert {reading.quality for reading in moving.values()} == {UNKNOWN}
-    rig.time.sleep(60.0)
-    values = {reading.point: reading.value for reading in drum.read("drum.counter", "drum.moving", "drum.U20", "drum.position")}
-    assert values == {"drum.counter": 5000 * 64, "drum.moving": 0.0, "drum.U20": ord("B"), "drum.position": None}
-    assert rig.world.read("drum.counter") == 5000 * 64
-
-
-def test_the_state_of_an_m1486_is_known_at_rest(drum: DeviceSubject, rig: Rig) -> None:
-    """Every upload that a state has is that of the twin; levels are unknown, because reading them takes the internal variable."""
-    twin = WorldSubject(rig.world)
-    drum.do(do.Send("chips", b"t41\r"))
-    found, there = (read_state(subject.do(command.State("drum")).value) for subject in (drum, twin))
-    known = ("counter", "counter_valid", "variable", "flags_on", "functions_on")
-    assert {name: value for name, value in found.details.items() if value is not None} == {n: there.details[n] for n in known}
-    assert found.details.keys() == there.details.keys()
-    assert (found.kind, found.variant, found.program.state) == (there.kind, there.variant, ProgramActivity.STOPPED)
-    assert found.pins == dict.fromkeys(there.pins)
-    drum.do(command.Move("drum", 1, by=5000.0))
-    found = read_state(drum.do(command.State("drum")).value)
-    assert (found.program.state, found.axes[0].position, found.axes[0].moving) == (None, None, None)
-    rig.time.sleep(60.0)
-    found = read_state(drum.do(command.State("drum")).value)
-    assert (found.axes[0].position, found.axes[0].velocity, found.axes[0].moving) == (5000.0, 0.0, False)
-
-
-def test_an_m1486_jogs_and_stops(drum: DeviceSubject, rig: Rig) -> None:
-    following = drum.follow(filter_of(), 9)
-    following.take()
-    drum.do(command.Jog("drum", 1, -50.0))
-    rig.time.sleep(2.0)
-    assert [event.text for event in following.take().events] == [
-        "moves, waits or runs its program",
-        "axis 1: the position is not known",
-    ]
-    assert rig.world.read("drum.velocity") == -50.0 * 64
-    drum.do(command.StopAxes("drum", 1))
-    rig.time.sleep(2.0)
-    status, sample = following.take().events
-    assert status.text == "is at rest"
-    assert sample.payload.plain()["velocity"] == 0.0
-    assert rig.world.read("drum.velocity") == 0.0
-    rig.time.sleep(2.0)
-    assert following.take().events == []
-    assert {reading.value for reading in drum.read("drum.moving", "drum.velocity")} == {0.0}
-    drum.do(command.Jog("drum", 1, 50.0))
-    rig.time.sleep(2.0)
-    assert rig.world.read("drum.velocity") == 50.0 * 64
-    drum.do(command.StopAxes("drum"))
-
-
-def test_an_m1486_is_moved_and_shown_in_the_unit_of_its_driver(rig: Rig) -> None:
-    """40 full steps per millimetre, 0 at 100 mm of the counter."""
-    line: Any = rig.chip._driver.line
-    with M1486(line, 3, steps_per_unit=40.0, unit="mm", origin_u=100 * 40 * 64) as chip:
-        drum = chip.subject("drum")
-        drum.do(command.Move("drum", 1, to=-60.0))
-        rig.time.sleep(60.0)
-        assert rig.world.read("drum.counter") == 40 * 40 * 64
-        (sample,) = drum.follow(filter_of(), 9).take().events
-        assert sample.payload.plain() == {"axis": "1", "position": -60.0, "unit": "mm", "velocity": 0.0}
-        drum.do(command.Move("drum", 1, by=-2.0))
-        rig.time.sleep(60.0)
-        assert rig.world.read("drum.counter") == 38 * 40 * 64
-        drum.do(command.Jog("drum", 1, 0.5))
-        rig.time.sleep(1.0)
-        assert rig.world.read("drum.velocity") == 0.5 * 40 * 64
-
-
-def test_of_an_m1486_only_what_was_asked_for_is_followed(drum: DeviceSubject, rig: Rig) -> None:
-    samples, states = drum.follow(filter_of(["sample"]), 9), drum.follow(filter_of(["status"]), 9)
-    drum.do(command.Move("drum", 1, by=5000.0))
-    found = []
-    for pause in (2.0, 60.0):
-        rig.time.sleep(pause)
-        found.append([[event.kind for event in following.take().events] for following in (samples, states)])
-    assert found == [[["sample", "sample"], ["status"]], [["sample"], ["status"]]], "where it stood, not known, where it stands"
-    samples.close()
-    frames = WorldSubject(rig.world).follow(filter_of(["frame"]), 99)
-    states.take()
-    rig.time.sleep(1.0)
-    states.take()
-    asked = "".join(event.text for event in frames.take().events)
-    assert "U20 " in asked, "is it at rest"
-    assert "U1 " not in asked, "the counter is of no use to whoever follows states"
-
-
-def test_an_m1486_that_begins_to_move_while_it_is_looked_at(
-    drum: DeviceSubject, rig: Rig, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """It was at rest when it was asked, and its counter is not to be had any more."""
-    following = drum.follow(filter_of(), 9)
-    following.take()
-
-    async def moves() -> int:
-        raise Busy("it moves")
-
-    monkeypatch.setattr(rig.chip._driver, "counter", moves)
-    rig.time.sleep(1.0)
-    assert [event.text for event in following.take().events] == ["axis 1: the position is not known"]
-
-
-def test_the_program_of_an_m1486_is_ended(drum: DeviceSubject, rig: Rig) -> None:
-    rig.chip.download("[\n@3\nF640\nR\nW1000\nJ3\n]")
-    rig.time.sleep(5.0)
-    drum.do(command.ControlProgram("drum", "stop"))
-    stood = rig.world.read("drum.counter")
-    rig.time.sleep(10.0)
-    assert rig.world.read("drum.counter") == stood
-
-
-def test_characters_for_an_m1486_are_whole_commands_that_move_nothing(drum: DeviceSubject, rig: Rig) -> None:
-    line = drum.description.lines[0].name
-    drum.do(do.Send(line, b":17\rt80\r"))
-    assert drum.read("drum.variable")[0].value == 17.0
-    for text, message in ((b":18", "each with CR behind it"), (b":18\rf100\rr\r", "motions, files and questions"), (b"", "CR")):
-        with pytest.raises(Misuse, match=message):
-            drum.do(do.Send(line, text))
-    assert drum.read("drum.variable")[0].value == 17.0
-
-
-SECOND_AXIS = (command.Move("drum", 2, to=9.0), command.Jog("drum", 2, 50.0), command.StopAxes("drum", 2))
-
-
-@pytest.mark.parametrize(
-    ("wanted", "kind", "message"),
-    [
-        (command.Home("drum", 1, -5.0), Refusal, "home is not possible for this device"),
-        (command.Enable("drum", 1), Refusal, "enable is not possible for this device"),
-        (command.ControlProgram("drum", "start"), Refusal, "an M1486 has no command to start its program"),
-        (command.Jog("drum", 1, 0.0), Misuse, "the sign of the velocity is the direction"),
-        *((wanted, Misuse, "axis = 2: an M1486 has axis 1 only") for wanted in SECOND_AXIS),
-        (command.StopAxes("drun"), Misuse, "no machine is called 'drun' .did you mean 'drum'.*; there are drum"),
-        (do.Write((("drun", "X", 1.0),)), Refusal, "write is not possible for this device"),
-        (command.ReadPoints(("drum.B99",)), Misuse, "'B99' is not a point of an M1486: there are position"),
-    ],
-)
-def test_what_an_m1486_does_not_do(drum: DeviceSubject, wanted: command.Command, kind: type[SteptwinError], message: str) -> None:
-    with pytest.raises(kind, match=message):
-        drum.do(wanted)
 
 
 # ---------------------------------------------------------------------- for asyncio

@@ -17,8 +17,6 @@ from steptwin.files.session import session_of
 from steptwin.files.world import World
 from steptwin.later import start
 from steptwin.machine import MILLISECOND, SECOND
-from steptwin.motion.divisions import profile_of
-from steptwin.motion.plain import read_plan
 from steptwin.subject import commands as command
 from steptwin.subject.commands import COMMANDS
 from steptwin.subject.contract import ConnectionPart, DrawingPart, ElementPart, SignalPart, SwitchPart, read_description
@@ -26,7 +24,7 @@ from steptwin.subject.describe import describe
 from steptwin.subject.dispatch import respond
 from steptwin.subject.events import Event
 from steptwin.subject.following import filter_of
-from steptwin.subject.payloads import FramePayload, InputPayload, PlanPayload
+from steptwin.subject.payloads import FramePayload, InputPayload
 from steptwin.subject.world import WorldSubject
 from steptwin.wire.crc import with_crc
 from steptwin.world import script as do
@@ -195,110 +193,6 @@ def test_an_answer_that_comes_at_once_is_in_the_result_of_a_request() -> None:
             "words": "read M1_POS_ACT = 0 mm",
         },
     ]
-
-
-# ---------------------------------------------------------------------- events
-
-
-def test_events_name_what_led_to_them() -> None:
-    subject = of(small())
-    subject.world.settle_all()
-    following = subject.follow(filter_of(), 99)
-    number = subject.do(do.Press("go")).number
-    pressed, *edges = following.take().events
-    assert (pressed.kind, pressed.cause) == ("button", number)
-    assert {edge.cause for edge in edges} == {pressed.number}
-    assert [edge.text for edge in edges] == ["go: 1", "IN4: 1"]
-
-
-def test_what_was_due_before_a_command_has_no_cause_in_it() -> None:
-    subject = of(small("[[script]]\nname = 's'\nsteps = [{ wait = '1 s' }, { set = { 'a.IN2' = 1 } }]\n"))
-    following = subject.follow(filter_of(["edge"]), 99)
-    subject.do(command.Advance(duration=SECOND))
-    subject.do(do.Set((("b", "IN2", 1.0),)))
-    first, second = (event for event in following.take().events if event.text == "IN2: 1")
-    assert first.cause is None
-    assert second.cause is not None
-
-
-def test_nobody_who_follows_costs_nothing() -> None:
-    subject = of(small())
-    assert subject.world.trace.watchers == []
-    following = subject.follow(filter_of(["frame"]), 9)
-    assert len(subject.world.trace.watchers) == 1
-    following.close()
-    assert subject.world.trace.watchers == []
-
-
-def test_frames_are_followed_on_connections_that_are_there_and_where_nothing_is_recorded() -> None:
-    world = feeder()
-    subject = of(world)
-    world.apply_input(Bytes("bus", "tcp-1", "rtu", READ_POSITION))
-    world.run(for_=0.5)
-    world.stop_recording()
-    following = subject.follow(filter_of(["frame"], ["bus"]), 99)
-    world.apply_input(Bytes("bus", "tcp-1", "rtu", READ_POSITION))
-    world.run(for_=0.5)
-    frames = [plain for event in following.take().events if (plain := event.payload.plain())["client"] == "tcp-1"]
-    assert frames[0] == {"client": "tcp-1", "direction": "in", "data": READ_POSITION.hex(), "words": "read M1_POS_ACT"}
-    assert [frame["direction"] for frame in frames] == ["in", "out"]
-    following.close()
-    world.apply_input(Bytes("bus", "tcp-1", "rtu", READ_POSITION))
-    assert following.take().events == []
-
-
-def test_bytes_that_belong_to_no_frame_are_counted_among_the_frames() -> None:
-    world = feeder()
-    following = of(world).follow(filter_of(["frame"], ["bus"]), 99)
-    world.apply_input(Bytes("bus", "tcp-1", "rtu", b"\x55\x55\x55"))
-    world.run(for_=5)
-    world.apply_input(Bytes("bus", "tcp-1", "rtu", READ_POSITION))
-    world.run(for_=0.5)
-    frames = [event.payload.plain() for event in following.take().events]
-    noise = [str(frame["words"]).split(maxsplit=1) for frame in frames if not frame["data"]]
-    assert sum(int(count) for count, _ in noise) == 3
-    assert {what for _, what in noise} <= {"byte that belongs to no frame", "bytes that belong to no frame"}
-
-
-def test_frames_of_chips_are_lines_and_characters() -> None:
-    text = "[[m1486]]\nname = 'drum'\nline = 'bus'\naddress = 7\n[[line]]\nname = 'bus'\nkind = 'm1486'\n"
-    world = World.from_toml(text)
-    following = of(world).follow(filter_of(["frame"]), 99)
-    world.apply_input(Bytes("bus", "tcp-1", "raw", b"X7\rU3\r"))
-    world.run(for_=1)
-    assert [event.payload.plain() for event in following.take().events] == [
-        {"client": "tcp-1", "direction": "in", "data": b"X7\r".hex(), "words": "X7  indeX 7"},
-        {"client": "tcp-1", "direction": "in", "data": b"U3\r".hex(), "words": "U3  Upload 3"},
-        {"client": "line", "direction": "out", "data": "00", "words": "U3 position, high byte = 0"},
-    ]
-
-
-def test_the_plans_of_a_run_give_every_position_the_controller_shows() -> None:
-    """Who watches computes positions itself, from the plain numbers and nothing else."""
-    world = feeder()
-    subject = of(world)
-    plans = {(e.machine, e.axis): e for e in subject.plans(filter_of())}
-    following = subject.follow(filter_of(["plan", "coordinate"]), 10_000)
-    axes = [(m.name, a) for m in subject.description.machines for a in m.datasheet.axes]
-    scales = {(name, str(a.number)): a.pulses_per_unit for name, a in axes if a.pulses_per_unit is not None}
-    origins: dict[tuple[str, str | None], int] = {}
-    for _ in range(200):
-        world.run(for_=0.05)
-        for event in following.take().events:
-            plain = json.loads(json.dumps(event.plain()))
-            key = event.machine, event.axis
-            origins[key] = plain["origin"]
-            if event.kind == "plan":
-                plans[key] = event
-        for (machine, axis), event in plans.items():
-            if machine != "table":
-                continue
-            assert isinstance(event.payload, PlanPayload)
-            plan = profile_of(read_plan(json.loads(json.dumps(event.plain()))["plan"]))
-            origin = origins.get((machine, axis), event.payload.origin or 0)
-            shown = (plan.count(world.now) + origin) / scales[machine, str(axis)]
-            assert shown == pytest.approx(world.read(f"{machine}.M{axis}.position"), abs=1e-9)
-    assert len({event.number for event in plans.values()}) > 1
 
 
 # ---------------------------------------------------------------------- whatever comes
