@@ -70,7 +70,7 @@ def _drivers(plant: Plant) -> dict[str, list[Connection]]:
 
 
 def unchanged_inputs(plant: Plant, since: Nanos) -> list[str]:
-    """The inputs of controllers that something drives, and that have had one level since a moment, as far as the trace is kept."""
+    """The inputs of controllers that something drives and that have had one level since a moment, as far as the trace is kept."""
     changed = {(record.machine, record.subject) for record in plant.trace.edges() if record.time > since}
     driven = dict.fromkeys(one.target for one in connections(plant.parts) if one.target.machine in plant.machines)
     return [str(pin) for pin in driven if (pin.machine, pin.pin) not in changed]
