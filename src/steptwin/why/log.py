@@ -78,10 +78,11 @@ class CauseLog:
         self._replaced: dict[str, Nanos] = {}
         """When the program of a controller was last replaced by a download."""
         self.noted = 0
-        self._inputs = 0
+        self.inputs = 0
         """Number of inputs that were applied."""
         for record in world.trace if self.is_whole else _plans(world):
             self._take(record)
+        world.trace.stop()  # it is noted here
         self._built = {group: len(records) for group, records in self.records.items()}
         world.trace.watchers.append(self._take)
         world.act_watchers.append(self._act)
@@ -98,8 +99,8 @@ class CauseLog:
     def run(self, inputs: Sequence[RecordedInput], end: Nanos) -> Iterator[None]:
         """Go on to the moment ``end``, in parts, with all inputs since the beginning of the log. Raises `Misuse` for inputs that
         do not fit."""
-        for is_input in in_parts(self.world, inputs[self._inputs :], end):
-            self._inputs += is_input
+        for is_input in in_parts(self.world, inputs[self.inputs :], end):
+            self.inputs += is_input
             yield
 
     def _count(self) -> None:

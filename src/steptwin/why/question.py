@@ -14,6 +14,7 @@ from steptwin.why.answer import MOST_LINKS, Answer, Link, since_before
 from steptwin.why.causes import Cause, Causes, nothing
 from steptwin.why.log import MOST_NOTED, CauseLog, in_parts
 from steptwin.why.sentences import statement
+from steptwin.why.states import StatesOnTheWay
 from steptwin.world import script as do
 from steptwin.world.condition import SignalCondition
 from steptwin.world.expression import parse_condition
@@ -67,6 +68,7 @@ class Why:
         self.end = end
         self.log = CauseLog(make(), most)
         self._causes = Causes(self.log)
+        self._on_the_way = StatesOnTheWay(self.log.world)
 
     def go_on(self, inputs: Iterable[RecordedInput], end: Nanos) -> None:
         """The present is a later one: what came from outside since."""
@@ -89,7 +91,9 @@ class Why:
             raise Misuse(outside_past(moment, begin, self.end))
         text = question.strip().removeprefix("why ").strip()
         text = text or self._only_program()
-        yield from self.log.run(self._inputs, self.end)
+        for _ in self.log.run(self._inputs, self.end):
+            self._on_the_way.pass_by(self.log.inputs)
+            yield
         self._causes = Causes(self.log)  # programs may be others by now
         if text in self.log.world.machines:
             return (yield from self._wait(text, moment))
@@ -178,16 +182,22 @@ class Why:
         return float(value), None
 
     def _from_run(self, text: str, at: Nanos, *, is_bare: bool) -> Found:
-        """As `_from_log`, from another run in which the signals are watched."""
-        world, turns = self._make(), list[tuple[Nanos, float]]()
-        watch = _values if is_bare else _truths
-        world.start("why", partial(watch, world, text, turns), is_external=True)
-        for _ in in_parts(world, self._inputs, at):
-            yield
-        if not turns:
-            raise Misuse(f"{text}: nothing is known of it at {at / SECOND:g} s")
-        time, value = turns[-1]
-        return value, time if len(turns) > 1 else None
+        """As `_from_log`, from another run in which the signals are watched: from state to state back to the last change."""
+        world, watch, end = self._make(), _values if is_bare else _truths, at
+        value: float | None = None
+        for state in self._on_the_way.until(at):
+            turns: list[tuple[Nanos, float]] = []
+            world.restore(state.snapshot)
+            world.start("why", partial(watch, world, text, turns), is_external=True)
+            for _ in in_parts(world, self._inputs[state.inputs :], end):
+                yield
+            if not turns:
+                raise Misuse(f"{text}: nothing is known of it at {at / SECOND:g} s")
+            value = turns[-1][1] if value is None else value
+            if len(turns) > 1:
+                return value, turns[-1][0]
+            end = state.snapshot.now
+        return value or 0.0, None
 
     def _changed(self, signals: Sequence[str], time: Nanos) -> Cause | None:
         """What made one of these signals change at a moment."""
@@ -214,8 +224,9 @@ class Why:
     def _moving(self, signal: str, at: Nanos) -> Asking:
         """Of a quantity that changes all the time."""
         world = self.log.world
-        other = self._make()
-        for _ in in_parts(other, self._inputs, at):
+        other, state = self._make(), next(self._on_the_way.until(at))
+        other.restore(state.snapshot)
+        for _ in in_parts(other, self._inputs[state.inputs :], at):
             yield
         state = f"{signal} is {other.read(signal):.6g} {world.signal(signal).unit}".rstrip()
         first = self._of_unrecorded(self._canonical(signal), at)
