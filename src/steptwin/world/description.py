@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
@@ -10,7 +9,7 @@ from typing import Any
 from steptwin.errors import Misuse
 from steptwin.world.element import AnyElement, ElementSpec
 from steptwin.world.elements import ELEMENTS
-from steptwin.world.faults import Fault, parse
+from steptwin.world.faults import Fault, FaultMistake, parse
 from steptwin.world.gateways import GATEWAY, read_gateways
 from steptwin.world.kinds import KINDS
 from steptwin.world.links import LINK_KEYS
@@ -157,8 +156,7 @@ def _faults(toml: TomlText) -> list[Fault | None]:
             continue
         try:
             found.append(parse(table, "[[fault]]"))
-        except Misuse as error:
-            key = re.search(r"(\w+) = ", str(error))
-            toml.wrong(("fault", n, key[1] if key else ""), "D003", str(error))
+        except FaultMistake as error:
+            toml.wrong(("fault", n, error.key), "D003", str(error))
             found.append(None)
     return found

@@ -114,7 +114,7 @@ def _check_stuck(part: BoardPart, fault: Fault) -> None:
 
 
 def _stick(active: ActiveFault, part: BoardPart, begins: bool, now: Nanos) -> str:
-    output, level = str(active.fault.get("output")), int(active.fault.get("level"))  # type: ignore[arg-type]
+    output, level = str(active.fault.get("output")), active.fault.whole("level") or 0
     part.board.hold(output.upper(), float(level) if begins else None)
     return f"{part.board.name}.{output} is stuck at {level}" if begins else f"{part.board.name}.{output} is free again"
 

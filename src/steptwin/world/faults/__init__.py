@@ -5,7 +5,7 @@ between a link and a port, `rig` lets a machine in its kernel have faults. `step
 """
 
 from steptwin.world.faults.active import ActiveFault, Faults
-from steptwin.world.faults.fault import EXAMPLE, GRAMMAR, Fault, parse, read, schema
+from steptwin.world.faults.fault import EXAMPLE, GRAMMAR, Fault, FaultMistake, parse, read, schema
 from steptwin.world.faults.kinds import KINDS
 from steptwin.world.faults.machine import AxisLoad, Body, FaultyMachine, rig
 from steptwin.world.faults.places import RequestRoute, check_place
@@ -21,6 +21,7 @@ __all__ = [
     "Body",
     "Fault",
     "FaultKind",
+    "FaultMistake",
     "Faults",
     "FaultyMachine",
     "FaultyPort",

@@ -65,32 +65,44 @@ def value_text(value: Value) -> str:
     )
 
 
+class FaultMistake(Misuse):
+    """A description of a fault is wrong. ``key``: of the wrong value; empty if none."""
+
+    def __init__(self, text: str, key: str = "") -> None:
+        super().__init__(text)
+        self.key = key
+
+
 def parse(mapping: Mapping[str, object], place: str = "fault") -> Fault:
-    """The fault in ``{"kind": "crc", "unit": 1, "nth": 3}``. `Misuse` names key, value, what is permitted, and ``place``."""
+    """The fault in ``{"kind": "crc", "unit": 1, "nth": 3}``. `FaultMistake` names key, value, range, and ``place``."""
     word = mapping.get("kind")
     kind = KINDS.get(word) if isinstance(word, str) else None
     if kind is None:
-        raise Misuse(f"{place}: kind = {word!r}: permitted are {', '.join(KINDS)}")
+        raise FaultMistake(f"{place}: kind = {word!r}: permitted are {', '.join(KINDS)}", "kind")
     name = mapping.get("name", "")
     if not isinstance(name, str) or " " in name or not name.isprintable():
-        raise Misuse(f"{place}: name = {name!r}: permitted is text that can be printed, without blanks")
+        raise FaultMistake(f"{place}: name = {name!r}: permitted is text that can be printed, without blanks", "name")
     place = f"{place} ({kind.name})"
     given: dict[str, Value] = {}
     for key, value in mapping.items():
         if key not in ("kind", "name"):
             parameter = kind.parameter(key)
             if parameter is None:
-                raise Misuse(f"{place}: there is no {key!r}: parameters are {', '.join(p.name for p in kind.parameters)}")
-            given[key] = check(parameter, value, f"{place}: {key}")
+                names = ", ".join(parameter.name for parameter in kind.parameters)
+                raise FaultMistake(f"{place}: there is no {key!r}: parameters are {names}", key)
+            try:
+                given[key] = check(parameter, value, f"{place}: {key}")
+            except Misuse as error:
+                raise FaultMistake(str(error), key) from None
     for parameter in kind.parameters:
         if parameter.is_required and parameter.name not in given:
-            raise Misuse(f"{place}: {parameter.name} is missing: {parameter.meaning[:1].lower()}{parameter.meaning[1:]}")
+            raise FaultMistake(f"{place}: {parameter.name} is missing: {parameter.meaning[:1].lower()}{parameter.meaning[1:]}")
     if "nth" in given and "every" in given:
-        raise Misuse(f"{place}: nth and every exclude each other")
+        raise FaultMistake(f"{place}: nth and every exclude each other", "every")
     fault = Fault(kind, given, name)
     begin, end = fault.get("from_s") or fault.get("at_s") or 0.0, fault.get("until_s")
     if isinstance(begin, float) and isinstance(end, float) and end < begin:
-        raise Misuse(f"{place}: until_s = {end:g} is before the fault begins at {begin:g} s")
+        raise FaultMistake(f"{place}: until_s = {end:g} is before the fault begins at {begin:g} s", "until_s")
     return fault
 
 
