@@ -18,6 +18,7 @@ from steptwin.errors import LineFailure
 from steptwin.subject import commands as command
 from steptwin.subject.contract import Description, Reading, Result
 from steptwin.subject.following import Filter, Following
+from steptwin.subject.jogs import Held, WorldJogs
 from steptwin.subject.world import WorldSubject
 
 
@@ -27,6 +28,7 @@ class GatewayWorld:
     def __init__(self, text: str) -> None:
         self.world = World.from_toml(text)
         self.inner = WorldSubject(self.world)
+        self.jogs = WorldJogs(self.inner)
         self.silent: set[str] = set()
         self.done: list[command.Command] = []
 
@@ -42,6 +44,9 @@ class GatewayWorld:
         if isinstance(wanted, command.State) and wanted.machine in self.silent:
             raise LineFailure("no answer")
         return self.inner.do(wanted)
+
+    async def begin_jog(self, wanted: command.Jog, /) -> Held:
+        return await self.jogs.begin(wanted)
 
     def follow(self, what: Filter, bound: int) -> Following:
         return self.inner.follow(what, bound)

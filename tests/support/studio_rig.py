@@ -18,12 +18,12 @@ from steptwin.errors import Misuse, Refusal
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.studio.hub import Hub, Moment, Surroundings
-from steptwin.studio.jogs import WorldJogs
 from steptwin.studio.looking import KeptPast
 from steptwin.studio.schema import schema
 from steptwin.studio.session import ViewerSession
 from steptwin.studio.shown import Shown
 from steptwin.studio.shownworld import ShownWorld
+from steptwin.subject.jogs import WorldJogs
 from steptwin.subject.world import WorldSubject
 from steptwin.world.programtexts import WorldPrograms, configuration_text
 

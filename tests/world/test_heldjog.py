@@ -14,9 +14,9 @@ from steptwin.later import start
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.mic488.status import AxisStatus
 from steptwin.motion.divisions import profile_of
-from steptwin.studio.jogs import Held, WorldJogs
 from steptwin.subject.commands import Enable, Home, Jog, StopAxes
 from steptwin.subject.following import filter_of
+from steptwin.subject.jogs import Held, WorldJogs
 from steptwin.subject.payloads import FramePayload, PlanPayload
 from steptwin.subject.world import WorldSubject
 from steptwin.world import script as do

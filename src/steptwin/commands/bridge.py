@@ -21,10 +21,11 @@ from steptwin.studio.connections import Computer, DeviceConnections
 from steptwin.studio.device import DeviceSurroundings
 from steptwin.studio.eventloop import result_of
 from steptwin.studio.shown import Shown
-from steptwin.subject.commands import Command
+from steptwin.subject.commands import Command, Jog
 from steptwin.subject.contract import Description, Reading, Result
 from steptwin.subject.events import Numbering
 from steptwin.subject.following import Filter, Following
+from steptwin.subject.jogs import Held
 from steptwin.textcodec import decode
 from steptwin.world.addresses import check_addresses
 
@@ -79,6 +80,9 @@ class _Devices:
 
     async def do(self, wanted: Command, /) -> Result:
         return await result_of(start(self._shown.do(wanted)))
+
+    async def begin_jog(self, wanted: Jog, /) -> Held:
+        return await result_of(start(self._shown.begin(wanted)))
 
     def follow(self, what: Filter, bound: int) -> Following:
         return self._shown.follow(what, bound)

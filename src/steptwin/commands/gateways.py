@@ -8,10 +8,12 @@ from pathlib import Path
 from steptwin.gateways import make_gateway
 from steptwin.gateways.contract import GatewaySubject
 from steptwin.live.server import EndPoint, Server
+from steptwin.live.world import LiveWorld
 from steptwin.live.world_control import WorldControl
-from steptwin.subject.commands import Command
+from steptwin.subject.commands import Command, Jog
 from steptwin.subject.contract import Description, Reading, Result
 from steptwin.subject.following import Filter, Following
+from steptwin.subject.jogs import Held, WorldJogs
 from steptwin.world.gateways import GatewaySpec
 
 
@@ -29,8 +31,9 @@ async def open_gateways(
 class LiveWorldSubject:
     """A live world for gateways: it answers at once."""
 
-    def __init__(self, control: WorldControl) -> None:
+    def __init__(self, control: WorldControl, live: LiveWorld) -> None:
         self._control = control
+        self._live = live
 
     @property
     def description(self) -> Description:
@@ -41,6 +44,11 @@ class LiveWorldSubject:
 
     async def do(self, wanted: Command, /) -> Result:
         return self._control.do(wanted)
+
+    async def begin_jog(self, wanted: Jog, /) -> Held:
+        if not isinstance(self._live.companion, WorldJogs):
+            self._live.companion = WorldJogs(self._live.subject, self._control.at_present)
+        return await self._live.companion.begin(wanted)
 
     def follow(self, what: Filter, bound: int) -> Following:
         return self._control.follow(what, bound)

@@ -43,12 +43,12 @@ from steptwin.live.twins import find_device
 from steptwin.studio.connections import Computer, DeviceConnections
 from steptwin.studio.device import DeviceSurroundings
 from steptwin.studio.hub import Hub, Moment, ProgramTexts, Surroundings
-from steptwin.studio.jogs import WorldJogs
 from steptwin.studio.service import Service
 from steptwin.studio.shown import Shown
 from steptwin.studio.shownworld import ShownWorld
 from steptwin.studio.work import DeviceWork
 from steptwin.subject.events import Numbering
+from steptwin.subject.jogs import WorldJogs
 from steptwin.textcodec import decode
 from steptwin.world.addresses import Address, is_loopback, parse_address
 from steptwin.world.history import History
@@ -168,7 +168,7 @@ class _Page:
             goes = not pace.is_paused and live.world.stopped is None
             return Moment(max(clock.now(), live.now) if goes and pace.speed != inf else live.now, goes, pace.speed)
 
-        jogs = WorldJogs(live.subject)
+        jogs = WorldJogs(live.subject, running.control.at_present)
         live.companion = jogs
         world = ShownWorld(running.control, live.subject.followers, jogs)
         shown = Shown(world, lambda: moment().time, live.subject.numbering)

@@ -279,7 +279,9 @@ async def _open(server: Server, live: LiveWorld, pace: Pace, options: UpOptions,
         await addition(Running(server, live, pace, control))
     if not options.is_closed:
         folder = Path() if options.world is None else options.world.parent
-        await open_gateways(server, live.world.spec.gateways, folder, LiveWorldSubject(control), listen_any=options.listen_any)
+        await open_gateways(
+            server, live.world.spec.gateways, folder, LiveWorldSubject(control, live), listen_any=options.listen_any
+        )
     if options.ready_file is not None:
         server.write_ready_file(options.ready_file)
 

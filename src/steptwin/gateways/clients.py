@@ -25,8 +25,12 @@ class GatewayClient:
 
     async def do(self, subject: GatewaySubject, wanted: Command) -> Result:
         """Raises `NotPermitted`, `Misuse`, `Refusal` and `LineFailure`."""
+        self.check(wanted)
+        return await subject.do(wanted)
+
+    def check(self, wanted: Command) -> None:
+        """Raises `NotPermitted`."""
         name = row_of(wanted).name
         needed = PERMITS[name].role
         if self.role < needed:
             raise NotPermitted(f"{name} is for the role {needed.title}; {self.name} has the role {self.role.title}")
-        return await subject.do(wanted)

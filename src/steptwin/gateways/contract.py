@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Protocol
 
-from steptwin.subject.commands import Command
+from steptwin.subject.commands import Command, Jog
 from steptwin.subject.contract import Description, Reading, Result
 from steptwin.subject.following import Filter, Following
+from steptwin.subject.jogs import Held
 
 
 class GatewaySubject(Protocol):
@@ -22,6 +23,10 @@ class GatewaySubject(Protocol):
 
     async def do(self, wanted: Command, /) -> Result:
         """Execute a command. Raises `SteptwinError` for a refusal or a failure of a line."""
+        ...
+
+    async def begin_jog(self, wanted: Jog, /) -> Held:
+        """A jog that goes on while it is extended (`Held.lasts_ns`). Raises as `do`."""
         ...
 
     def follow(self, what: Filter, bound: int) -> Following: ...

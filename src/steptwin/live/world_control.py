@@ -42,12 +42,12 @@ class WorldControl:
         return self.subject.description
 
     def read(self, *points: str) -> tuple[Reading, ...]:
-        return self._at_present(lambda: self.subject.read(*points))
+        return self.at_present(lambda: self.subject.read(*points))
 
     def do(self, wanted: command.Command) -> Result:
         if type(wanted) in self._of_pace:  # they bring the world to the present themselves
             return self.subject.do(wanted)
-        return self._at_present(lambda: self.subject.do(wanted))
+        return self.at_present(lambda: self.subject.do(wanted))
 
     async def answer(self, wanted: command.Command) -> Result:
         """As `do`, also for commands that are answered later. Awaits only `steptwin.later.Later`."""
@@ -60,10 +60,10 @@ class WorldControl:
         return self.subject.follow(what, bound)
 
     def plans(self, what: Filter) -> list[Event]:
-        return self._at_present(lambda: self.subject.plans(what))
+        return self.at_present(lambda: self.subject.plans(what))
 
-    def _at_present(self, action: Callable[[], T]) -> T:
-        """Apply a command at the present moment, and set the timer for its consequences."""
+    def at_present(self, action: Callable[[], T]) -> T:
+        """Do something at the present moment, and set the timer for its consequences."""
         self._cell.enter()
         try:
             return action()

@@ -15,13 +15,13 @@ from steptwin.errors import LineFailure, Refusal, SteptwinError
 from steptwin.machine import SECOND, Nanos
 from steptwin.studio.devicejog import DeviceHeld
 from steptwin.studio.eventloop import later
-from steptwin.studio.jogs import Held
 from steptwin.studio.shadow import Known, Shadow
 from steptwin.subject import commands as command
 from steptwin.subject.commands import Command, row_of
 from steptwin.subject.contract import UNKNOWN, Description, Reading, Result
 from steptwin.subject.events import Event
 from steptwin.subject.following import Filter, Followers
+from steptwin.subject.jogs import Held
 from steptwin.subject.payloads import StatusPayload
 from steptwin.world import script as steps
 

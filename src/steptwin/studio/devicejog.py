@@ -15,7 +15,7 @@ LEASE_NS: Nanos = 250 * MILLISECOND
 
 
 class DeviceHeld:
-    """See `steptwin.studio.jogs.Held`. ``report`` is called with an error at its end."""
+    """See `steptwin.subject.jogs.Held`. ``report`` is called with an error at its end."""
 
     lasts_ns = LEASE_NS
 

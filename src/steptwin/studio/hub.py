@@ -22,7 +22,6 @@ from steptwin.later import start
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.studio.calculations import Calculations
 from steptwin.studio.configurations import Configurations
-from steptwin.studio.jogs import Held, Jogs
 from steptwin.studio.looking import KeptPast
 from steptwin.studio.machines import Sheets
 from steptwin.studio.programs import ProgramTexts
@@ -36,6 +35,7 @@ from steptwin.subject.commands import COMMANDS, Command
 from steptwin.subject.contract import Description, Reading, Result
 from steptwin.subject.events import Event
 from steptwin.subject.following import Filter, Following, filter_of
+from steptwin.subject.jogs import Held, Jogs
 
 MOST_VIEWERS = 64
 MOST_LEASES = 32

@@ -9,12 +9,12 @@ from typing import Any, Protocol
 from steptwin.errors import Misuse, Refusal
 from steptwin.machine import Nanos
 from steptwin.nearmiss import NearMiss
-from steptwin.studio.jogs import Held
 from steptwin.subject import commands as command
 from steptwin.subject.commands import COMMANDS, Command, row_of
 from steptwin.subject.contract import UNKNOWN, Description, Reading, Result
 from steptwin.subject.events import Event, Numbering
 from steptwin.subject.following import Filter, Followers, Following
+from steptwin.subject.jogs import Held
 
 TIME = "time"
 
@@ -43,7 +43,7 @@ class WorldPart(ShownSubject, Protocol):
 
 
 class Shown:
-    """See `steptwin.studio.hub.Served` and `steptwin.studio.jogs.Jogs`.
+    """See `steptwin.studio.hub.Served` and `steptwin.subject.jogs.Jogs`.
 
     A command goes to the part whose machine or line it names; one that names none to ``world``, or to the only device.
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
-from steptwin.studio.jogs import Jogs
 from steptwin.subject import commands as command
 from steptwin.subject.commands import Command
 from steptwin.subject.contract import Description, Reading, Result
 from steptwin.subject.events import Event
 from steptwin.subject.following import Filter, Followers
+from steptwin.subject.jogs import Jogs
 
 
 class PlannedSubject(Protocol):

@@ -96,6 +96,31 @@ def test_a_client_moves_an_axis_and_sees_it_move(client: NodeClient, points: Poi
     assert all(began - 1000 < one <= time.time() * 1000 for one in times)
 
 
+def test_a_jog_lasts_as_long_as_its_lease(client: NodeClient) -> None:
+    assert call(client, "Enable", flag(True)) == "Good"
+    begin = read(client, "table.M1.position")
+    assert call(client, "Jog", double(-20.0), double(5.0)) == "Good"
+    until(lambda: read(client, "table.M1.position") < begin - 10.0, "it moves for longer than a jog of the controller lasts")
+    assert call(client, "Jog", double(-20.0), double(0.1)) == "Good"
+    until(lambda: read(client, "table.M1.velocity") == 0.0, "the lease ends")
+    assert call(client, "Jog", double(-20.0), double(5.0)) == "Good"
+    assert call(client, "Stop") == "Good"
+    until(lambda: read(client, "table.M1.velocity") == 0.0, "a stop ends it")
+    assert call(client, "Jog", double(0.0), double(1.0)) == call(client, "Jog", double(5.0), double(6.0)) == "BadInvalidArgument"
+
+
+def test_a_jog_ends_with_its_session(
+    client: NodeClient, points: Points, require_peer: Callable[[str], str], tmp_path: Path
+) -> None:
+    assert call(client, "Enable", flag(True)) == "Good"
+    with NodeClient(require_peer("node"), "opcua.js", tmp_path) as other:
+        other("connect", url=points["opcua"]["url"], folder=str(tmp_path / "other"))
+        assert call(other, "Jog", double(20.0), double(5.0)) == "Good"
+        assert call(client, "Jog", double(20.0), double(5.0)) == "BadInvalidState", "another client jogs it"
+        other("close")
+    until(lambda: read(client, "table.M1.velocity") == 0.0, "it stands")
+
+
 def test_refusals_have_status_codes(client: NodeClient) -> None:
     assert call(client, "MoveTo", double(1e12)) == "BadOutOfRange"
     assert call(client, "MoveTo", double("Infinity")) == call(client, "MoveTo", double("NaN")) == "BadOutOfRange"

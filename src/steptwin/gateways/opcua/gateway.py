@@ -39,6 +39,7 @@ class OpcUaGateway:
         self._server: Server | None = None
         self._sampler: Sampler | None = None
         self._notifications: Notifications | None = None
+        self._service: NodeService | None = None
         self._task: asyncio.Task[None] | None = None
 
     async def open(self, *, listen_any: bool) -> Mapping[str, object]:
@@ -63,7 +64,8 @@ class OpcUaGateway:
         for code in await inside.isession.add_references(builder.references):
             code.check()
         self._sampler = Sampler(self._subject, registers)
-        inside.service = service = NodeService(inside.aspace, self._subject, self._sampler, builder.points, builder.methods)
+        service = NodeService(inside.aspace, self._subject, self._sampler, builder.points, builder.methods)
+        inside.service = self._service = service
         await service.refresh_all()
         self._notifications = await Notifications.open(server, self._subject)
         try:
@@ -93,7 +95,7 @@ class OpcUaGateway:
             await asyncio.wait((self._task,))
         if self._server is not None:
             await self._server.stop()
-        for one in (self._sampler, self._notifications):
+        for one in (self._service, self._sampler, self._notifications):
             if one is not None:
                 one.close()
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from steptwin.gateways.opcua.leases import LEASE_S
 from steptwin.gateways.points import PointType
 from steptwin.subject import commands as command
 from steptwin.subject.commands import Command
@@ -13,7 +14,7 @@ from steptwin.subject.contract import MachinePart
 
 @dataclass(frozen=True, slots=True)
 class MethodArgument:
-    """``of``: the argument of the command, whose range it has (`steptwin.subject.controls`)."""
+    """``of``: the argument of the command, whose range it has (`steptwin.subject.controls`); of a lease empty."""
 
     name: str
     meaning: str
@@ -36,6 +37,7 @@ class MethodRow:
 _POSITION = MethodArgument("Position", "In the unit of the axis.", PointType.NUMBER, "to")
 _DISTANCE = MethodArgument("Distance", "In the unit of the axis.", PointType.NUMBER, "by")
 _VELOCITY = MethodArgument("Velocity", "In the unit of the axis per second, with its sign.", PointType.NUMBER, "velocity")
+_LEASE = MethodArgument("Lease", f"How long, s: {LEASE_S[0]:g} to {LEASE_S[1]:g}.", PointType.NUMBER, "")
 _ON = MethodArgument("On", "Whether the drive is to be on.", PointType.TRUTH, "on")
 
 AXIS_METHODS = (
@@ -43,6 +45,13 @@ AXIS_METHODS = (
     MethodRow("MoveTo", "Begins to move to a position.", "move", lambda m, a, to: command.Move(m, a, to=to), (_POSITION,)),
     MethodRow("MoveBy", "Begins to move by a distance.", "move", lambda m, a, by: command.Move(m, a, by=by), (_DISTANCE,)),
     MethodRow("Home", "Begins to home; the sign chooses the switch.", "home", command.Home, (_VELOCITY,)),
+    MethodRow(
+        "Jog",
+        "Moves at a velocity until the lease ends; another call in time makes it go on.",
+        "jog",
+        command.Jog,
+        (_VELOCITY, _LEASE),
+    ),
     MethodRow("Stop", "Stops it as fast as the controller does.", "stop", command.StopAxes),
 )
 PROGRAM_METHODS = (

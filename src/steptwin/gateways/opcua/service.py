@@ -11,8 +11,10 @@ from steptwin.datasheet import Argument, Limits
 from steptwin.gateways.clients import GatewayClient
 from steptwin.gateways.contract import GatewaySubject
 from steptwin.gateways.opcua.addressspace import BoundMethod, PointNode
+from steptwin.gateways.opcua.leases import JogLeases
 from steptwin.gateways.opcua.nodetypes import data_value, number_of
 from steptwin.gateways.sampling import Sample, Sampler
+from steptwin.subject.commands import Jog, StopAxes
 
 
 class NodeService:
@@ -32,6 +34,7 @@ class NodeService:
         self._points = points
         self._methods = methods
         self._of_node = {node.id: (machine, node) for machine, nodes in points.items() for node in nodes}
+        self._leases = JogLeases(subject)
         self._watched: dict[str, list[PointNode]] = {}
         """What has been subscribed to, by controller."""
 
@@ -96,7 +99,9 @@ class NodeService:
         await client.do(self._subject, point.write(number))
         await self._show(await self._sampler.take(machine), (there,))
 
-    async def call(self, client: GatewayClient, node: ua.NodeId, method: ua.NodeId, given: Sequence[ua.Variant]) -> None:
+    async def call(
+        self, client: GatewayClient, session: object, node: ua.NodeId, method: ua.NodeId, given: Sequence[ua.Variant]
+    ) -> None:
         bound = self._methods.get((node, method))
         if bound is None:
             raise ua.UaStatusCodeError(ua.StatusCodes.BadMethodInvalid)
@@ -109,9 +114,24 @@ class NodeService:
             number = number_of(variant, argument.type)
             if number is None:
                 raise ua.UaStatusCodeError(ua.StatusCodes.BadInvalidArgument)
-            _check_range(number, _argument(bound, argument.of).limits)
+            if argument.of:
+                _check_range(number, _argument(bound, argument.of).limits)
             values.append(number)
-        await client.do(self._subject, row.make(bound.part.name, bound.axis, *values))
+        own = [value for value, argument in zip(values, row.arguments, strict=True) if argument.of]
+        wanted = row.make(bound.part.name, bound.axis, *own)
+        if isinstance(wanted, Jog):
+            client.check(wanted)
+            await self._leases.jog(session, wanted, values[-1])
+            return
+        await client.do(self._subject, wanted)
+        if isinstance(wanted, StopAxes):
+            self._leases.stopped(wanted)
+
+    def leave(self, session: object) -> None:
+        self._leases.drop(session)
+
+    def close(self) -> None:
+        self._leases.close()
 
 
 def _argument(bound: BoundMethod, name: str) -> Argument:

@@ -54,8 +54,14 @@ class Service(Protocol):
         """Raises `ua.UaStatusCodeError` and `SteptwinError`."""
         ...
 
-    async def call(self, client: GatewayClient, node: ua.NodeId, method: ua.NodeId, given: Sequence[ua.Variant]) -> None:
+    async def call(
+        self, client: GatewayClient, session: object, node: ua.NodeId, method: ua.NodeId, given: Sequence[ua.Variant]
+    ) -> None:
         """As `write`."""
+        ...
+
+    def leave(self, session: object) -> None:
+        """A session ends."""
         ...
 
     def watch(self, nodes: Iterable[ua.NodeId]) -> None:
@@ -111,8 +117,12 @@ class GatewaySession(InternalSession):
 
     async def _call(self, one: ua.CallMethodRequest) -> ua.CallMethodResult:
         result = ua.CallMethodResult()
-        result.StatusCode = await _code(self._service.call(self._client, one.ObjectId, one.MethodId, one.InputArguments))
+        result.StatusCode = await _code(self._service.call(self._client, self, one.ObjectId, one.MethodId, one.InputArguments))
         return result
+
+    async def close_session(self, delete_subs: bool = True) -> None:
+        self._service.leave(self)
+        await super().close_session(delete_subs)
 
     async def create_monitored_items(self, params: ua.CreateMonitoredItemsParameters) -> list[ua.MonitoredItemCreateResult]:
         wanted = [one.ItemToMonitor.NodeId for one in params.ItemsToCreate]

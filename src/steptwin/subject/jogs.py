@@ -1,8 +1,9 @@
-"""Jogs held by viewers: the interface that a subject implements, and its implementation for worlds."""
+"""Jogs that clients hold: the interface that a subject implements, and its implementation for worlds."""
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Callable
+from typing import Any, Protocol, TypeAlias
 
 from steptwin.errors import Refusal
 from steptwin.machine import Nanos
@@ -33,7 +34,7 @@ class Held(Protocol):
         ...
 
     def drop(self) -> None:
-        """The connection of its viewer is lost."""
+        """The connection of its client is lost."""
         ...
 
     def cut(self) -> None:
@@ -47,15 +48,29 @@ class Jogs(Protocol):
         ...
 
 
-class WorldJogs:
-    """Those of a world, which ends them by itself: it is a companion of the world (`steptwin.live.world.Companion`)."""
+AtPresent: TypeAlias = Callable[[Callable[[], Any]], Any]
 
-    def __init__(self, subject: WorldSubject) -> None:
+
+def _at_once(action: Callable[[], Any]) -> Any:
+    return action()
+
+
+class WorldJogs:
+    """Those of a world, which ends them by itself: it is a companion of the world (`steptwin.live.world.Companion`).
+
+    ``at_present`` calls a function at the present moment of the world.
+    """
+
+    def __init__(self, subject: WorldSubject, at_present: AtPresent = _at_once) -> None:
         self._subject = subject
+        self._at_present = at_present
         self._held: list[_Held] = []
 
     async def begin(self, wanted: Jog) -> Held:
-        held = _Held(self._subject, self._subject.held_jog(wanted))
+        return self._at_present(lambda: self._begin(wanted))
+
+    def _begin(self, wanted: Jog) -> Held:
+        held = _Held(self._subject, self._subject.held_jog(wanted), self._at_present)
         held.extend()
         self._held.append(held)
         return held
@@ -72,10 +87,9 @@ class WorldJogs:
 
 
 class _Held:
-    """The moment of each call is the present one of the world."""
-
-    def __init__(self, subject: WorldSubject, jog: HeldJog) -> None:
+    def __init__(self, subject: WorldSubject, jog: HeldJog, at_present: AtPresent) -> None:
         self._subject = subject
+        self._at_present = at_present
         self.jog = jog
 
     @property
@@ -87,15 +101,15 @@ class _Held:
         return self.jog.over
 
     def extend(self) -> None:
-        self.give(self.jog.extend(self._subject.world.now))
+        self._at_present(lambda: self.give(self.jog.extend(self._subject.world.now)))
         if self.jog.over is not None:
             raise Refusal(f"the jog has ended: {self.jog.over}")
 
     def release(self) -> None:
-        self.give(self.jog.release(self._subject.world.now))
+        self._at_present(lambda: self.give(self.jog.release(self._subject.world.now)))
 
     def drop(self) -> None:
-        self.give(self.jog.drop(self._subject.world.now))
+        self._at_present(lambda: self.give(self.jog.drop(self._subject.world.now)))
 
     def cut(self) -> None:
         self.jog.cut()
