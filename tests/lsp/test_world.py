@@ -118,6 +118,14 @@ def test_completions() -> None:
     found = items(WORLD + "\n[[axis]]\nname = 'y'\npi")
     assert {"pitch", "drive"} <= set(found)
     assert "name" not in found
+    assert {"[[use]]", "[[supply]]", "[[follower.switch]]", "[[carriage.switch]]", "[gateway.opcua]"} <= set(items(WORLD + "\n["))
+    assert {"above", "to"} <= set(items(WORLD + "\n[[follower]]\nname = 'k'\n[[follower.switch]]\na"))
+    assert items(WORLD + "\n[gateway.prometheus]\nli") == ["listen"]
+    assert {"listen", "security"} <= set(items(WORLD + "\n[gateway.opcua]\n"))
+    assert items(WORLD + '\n[gateway.opcua]\nsecurity = "') == ["none", "sign", "encrypt"]
+    assert {"name", "file"} <= set(items(WORLD + "\n[[use]]\n"))
+    with_part = session(WORLD + '\n[[use]]\nfile = "', part_toml="")
+    assert items(WORLD + '\n[[use]]\nfile = "', with_part) == ["part.toml"]
     assert items(WORLD + '\n[[axis]]\nkind = "') == ["linear", "rotary"]
     assert "home_mode" in items("[[mic488]]\nname='t'\n[mic488.M1]\nho")
     assert items(WORLD + "\n[[axis]]\ninverted = ") == ["true", "false"]

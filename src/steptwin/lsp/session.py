@@ -13,7 +13,7 @@ from steptwin.errors import Misuse
 from steptwin.lsp.analysis import Analysis
 from steptwin.lsp.config import ConfigAnalysis
 from steptwin.lsp.documents import MOST_CHARACTERS, Document, TextChange
-from steptwin.lsp.files import Files, NoFiles, normal, suffix_of, with_suffix
+from steptwin.lsp.files import Files, NoFiles, normal, with_suffix
 from steptwin.lsp.languages import SUFFIXES, Language, language_of
 from steptwin.lsp.m1486.analysis import M1486Analysis
 from steptwin.lsp.machines import Chip, ControllerFiles, machines_of
@@ -321,7 +321,7 @@ class _Around:
 
     def beside(self, uri: str) -> Sequence[str]:
         files = self._session.files
-        return [file for suffix in SUFFIXES if suffix != suffix_of(uri) for file in files.beside(uri, suffix)]
+        return [file for suffix in SUFFIXES for file in files.beside(uri, suffix) if file != uri]
 
 
 def _same(a: tuple[object, ...], b: tuple[object, ...]) -> bool:

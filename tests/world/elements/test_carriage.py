@@ -208,3 +208,14 @@ def test_collisions_and_sensors_can_be_of_a_carriage() -> None:
     touched = [record.time / SECOND for record in found.trace.of("event") if record.subject == "collision"]
     assert touched[0] == pytest.approx(next(t for t, x in integrated(1.0) if x > 20.05), abs=2.1e-5)
     assert found.read("a.AIN1") == pytest.approx(2.0, abs=0.02)
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_a_collision_of_a_carriage_jams_its_axis(direction: int) -> None:
+    sign = ">" if direction > 0 else "<"
+    found = world(f'[[collision]]\nname = "frame"\nwhen = "tool.position {sign} {10 * direction}"\neffect = "jam"\n')
+    start(found, 20.0 * direction)
+    found.run(until=2.0)
+    touched = next(t for t, x in integrated(1.0) if x > 10.0)
+    assert found.axis["x"].position * direction == pytest.approx(drive(touched)[0], abs=2 / 640)
+    assert found.read("x.lost") != 0

@@ -9,6 +9,8 @@ from steptwin.diagnostics import Span
 from steptwin.lsp.answers import Completion, CompletionKind, Completions
 from steptwin.lsp.world.outline import Table, WorldOutline
 from steptwin.symbols import SymbolKind
+from steptwin.world.elements import ELEMENTS
+from steptwin.world.gateways import GATEWAY, GATEWAYS
 from steptwin.world.kind import AnyKind
 from steptwin.world.kinds import KINDS
 from steptwin.world.reader import Key
@@ -27,7 +29,13 @@ _STEP_NAMES = {
     "power_cycle": SymbolKind.CONTROLLER,
 }
 _STEP_AXES = ("move", "home", "wait_for", "turn", "couple")
-_FILES = {"config": (".cfg",), "program": (".prg", ".m1486"), "programs": (".prg",), "positions": (".csv",)}
+_FILES = {
+    "config": (".cfg",),
+    "program": (".prg", ".m1486"),
+    "programs": (".prg",),
+    "positions": (".csv",),
+    "file": (".toml",),
+}
 
 
 def keys_of(table: Table) -> Sequence[Key]:
@@ -35,6 +43,8 @@ def keys_of(table: Table) -> Sequence[Key]:
     if len(table.names) > 1 and table.names[0] in KINDS:
         kind = KINDS[table.names[0]]
         return kind.inner_keys(table.names[1]) if table.names[1] in kind.inner_tables else ()
+    if len(table.names) > 1 and table.names[0] == GATEWAY:
+        return GATEWAYS[table.names[1]].keys if table.names[1] in GATEWAYS else ()
     return all_keys().get(table.kind, ())
 
 
@@ -120,10 +130,19 @@ def _text(text: str, span: Span, mark: str, detail: str) -> Completion:
 
 
 def _tables(span: Span) -> Iterator[Completion]:
-    for name in (*all_keys(), "fault"):
-        yield Completion(written(name), CompletionKind.KEY, span, "table")
+    for text in dict.fromkeys((*map(written, (*all_keys(), "fault")), *_inner_tables())):
+        yield Completion(text, CompletionKind.KEY, span, "table")
     for kind in KINDS.values():
         yield from (Completion(f"[{kind.name}.{inner}]", CompletionKind.KEY, span, "table") for inner in kind.inner_tables)
+
+
+def _inner_tables() -> Iterator[str]:
+    """Tables in those of elements, which may have them from another one, and of gateways."""
+    for element in ELEMENTS.values():
+        for key, rows in element.inner.items():
+            name = f"[{element.name}.{key}]"
+            yield f"[{name}]" if rows.written.startswith("[[") else name
+    yield from (rows.written for rows in GATEWAYS.values())
 
 
 def _keys(table: Table, span: Span, present: frozenset[str]) -> Iterator[Completion]:

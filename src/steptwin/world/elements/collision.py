@@ -12,7 +12,10 @@ from steptwin.state import Plain
 from steptwin.world.board import Board
 from steptwin.world.condition import SignalCondition
 from steptwin.world.elements.axis import AXIS
+from steptwin.world.elements.carriage import CARRIAGE
+from steptwin.world.elements.follower import FOLLOWER
 from steptwin.world.elements.logic import STUCK_OUTPUT, BoardPart, BoardSpec, Joint, with_terminals
+from steptwin.world.elements.shaft import SHAFT
 from steptwin.world.expression import parse_condition
 from steptwin.world.kind import Terminals
 from steptwin.world.mechanics import Mechanism
@@ -149,9 +152,20 @@ def _make(spec: CollisionSpec, site: Site) -> Touch:
         found.watch(name)
         return found
 
-    condition = SignalCondition(spec.when, signal)
-    built = site.parts.built(AXIS)
-    return Touch(board, spec.effect == JAM, condition, {name: built[name].mechanism for name in spec.owners if name in built})
+    return Touch(board, spec.effect == JAM, SignalCondition(spec.when, signal), dict(_axes_of(spec, site)))
+
+
+def _axes_of(spec: CollisionSpec, site: Site) -> Iterator[tuple[str, Mechanism]]:
+    """The axes in the condition, and those that move what is in it."""
+    parts = site.parts
+    moved_by = {
+        **parts.built(AXIS),
+        **{name: carriage.axis for name, carriage in parts.built(CARRIAGE).items()},
+        **{name: shaft.axis for name, shaft in parts.built(SHAFT).items()},
+        **{name: follower.shaft.axis for name, follower in parts.built(FOLLOWER).items()},
+    }
+    for axis in (moved_by[owner] for owner in spec.owners if owner in moved_by):
+        yield axis.spec.name, axis.mechanism
 
 
 COLLISION = with_terminals(
@@ -159,7 +173,7 @@ COLLISION = with_terminals(
     CollisionSpec,
     (
         Key("when", text_value, "the condition under which parts touch, such as 'x.position > 300 and z.position < 50'"),
-        optional(word(REPORT, JAM), "effect", "report, or jam: the axes in the condition stand from then on", REPORT),
+        optional(word(REPORT, JAM), "effect", "report, or jam: the axes in the condition, or of what is in it, stand", REPORT),
         optional(OUTPUT_PIN, "reset", "output joined to RESET, which frees jammed axes"),
     ),
     make=_make,
