@@ -248,7 +248,9 @@ class Interpreter(Stateful):
         if self._resting is not None:
             self._settle(self._resting, now)
         self.now = now
-        if self.pending and not self.handling and not self.waiting:
+        if self.pending and self.waiting:
+            until = now  # HARDINT comes when the wait has ended
+        elif self.pending and not self.handling:
             at_end = now >= self.not_before
             event = next((e for e in self._pending_events() if at_end or not code.entries[e].hard), None)
             if event is not None:
