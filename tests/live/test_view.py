@@ -11,7 +11,7 @@ from rich.console import Console, Group
 from steptwin.files.world import World
 from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
-from steptwin.live.faces import banner
+from steptwin.live.display import banner
 from steptwin.live.output import Output
 from steptwin.live.server import EndPoint
 from steptwin.live.view import LiveView, page

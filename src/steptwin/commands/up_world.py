@@ -23,7 +23,7 @@ from steptwin.files.export.tracefile import Kept, Ring, TraceFile, read_kept
 from steptwin.files.world import World
 from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
-from steptwin.live.faces import Face, Lines, Notices, banner, remarks_on
+from steptwin.live.display import Display, Lines, Notices, banner, remarks_on
 from steptwin.live.lookback import Lookback
 from steptwin.live.output import Output
 from steptwin.live.pace import Pace, read_speed
@@ -177,7 +177,7 @@ async def _serve(
         live = LiveWorld(world)
         cell = Cell(live, Clock(begin=world.now))
         quiet = addition is not None
-        face = Notices(live, output, frames=options.log_frames) if quiet else _face(live, cell, output, options.log_frames)
+        face = Notices(live, output, frames=options.log_frames) if quiet else _display(live, cell, output, options.log_frames)
         live.show = face.notice
         server = Server(cell, face.notice)
         live.share_reads(cell)
@@ -199,7 +199,7 @@ async def _serve(
                 _keep(options, live, output, recorder, kept, reports)
 
 
-def _face(live: LiveWorld, cell: Cell, output: Output, log_frames: bool) -> Face:
+def _display(live: LiveWorld, cell: Cell, output: Output, log_frames: bool) -> Display:
     if not shows_live_view(output, log_frames=log_frames):
         return Lines(live, output, frames=log_frames)
     from steptwin.live.view import LiveView

@@ -14,7 +14,7 @@ from steptwin.world.records import describe, is_shown
 from steptwin.world.trace import TraceRecord
 
 
-class Face(Protocol):
+class Display(Protocol):
     """The output of a running world."""
 
     def notice(self, text: str) -> None:
