@@ -177,20 +177,20 @@ async def _serve(
         live = LiveWorld(world)
         cell = Cell(live, Clock(begin=world.now))
         quiet = addition is not None
-        face = Notices(live, output, frames=options.log_frames) if quiet else _display(live, cell, output, options.log_frames)
-        live.show = face.notice
-        server = Server(cell, face.notice)
+        display = Notices(live, output, frames=options.log_frames) if quiet else _display(live, cell, output, options.log_frames)
+        live.show = display.notice
+        server = Server(cell, display.notice)
         live.share_reads(cell)
-        pace = Pace(live, cell, face.notice, has_clients=any(line.is_open for line in world.spec.lines))
+        pace = Pace(live, cell, display.notice, has_clients=any(line.is_open for line in world.spec.lines))
         live.on_stop = server.end
         begun, recorder = False, None
         try:
             await _open(server, live, pace, options, addition)
             recorder = _recorder(live, kept)
             begun = True
-            face.begin(banner(world, server.end_points, remarks_on(world, listen_any=options.listen_any)), past)
+            display.begin(banner(world, server.end_points, remarks_on(world, listen_any=options.listen_any)), past)
             pace.begin(read_speed(options.speed, least=0))
-            await face.show(server)
+            await display.show(server)
             cell.enter()
         finally:
             pace.close()
