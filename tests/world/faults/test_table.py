@@ -126,6 +126,7 @@ def test_which_faults_elements_have() -> None:
         "collision": {"stuck-output"},
         "follower": {"worn-cam", "stuck-follower"},
         "gantry": {"stuck-output", "stiff-guides"},
+        "supply": {"stuck-output", "brown-out"},
     }
 
 
