@@ -229,6 +229,21 @@ bounce = "2 ms"
 from = "table.OUT1"
 to = "drum.B2"
 delay = "3 ms"
+[[shaft]]
+name = "main"
+axis = "x"
+ratio = 0.05
+[[follower]]
+name = "knife"
+shaft = "main"
+points = [[30, 0], [90, 12], [150, 12], [200, 0]]
+[[follower.switch]]
+above = 11.5
+to = "table.IN13"
+[[supply]]
+name = "rail"
+feeds = "drum"
+rise = "0 ms"
 [[button]]
 name = "start"
 to = "table.IN9"

@@ -56,7 +56,8 @@ def test_a_controller_for_threads_takes_all_that_one_for_asyncio_takes(monkeypat
     seen, lines = given(monkeypatch, AsyncMic488), given(monkeypatch, ThreadModbusLine)
     log: list[str] = []
     options: dict[str, Any] = {
-        "baud": 9600, "firmware": "1.40", "config": ControllerConfig(), "timeout_s": 0.7, "observe": True, "log": log.append,
+        "baud": 9600, "firmware": "1.40", "config": ControllerConfig(), "scales": (), "timeout_s": 0.7, "observe": True,
+        "log": log.append,
     }  # fmt: skip
     mic = Mic488(RTU, 11, **options)
     assert seen == [((RTU, 11), options)]

@@ -66,8 +66,7 @@ def test_numbers_for_the_other_clock() -> None:
         ("V300 is V150 on M1486B2x", None, "150"),
         ("A7000 is A1750 on M1486B2x", None, "1750"),
         ("S100 is S50 on M1486B2x", None, "50"),
-        ("P25000 is P12500 on M1486B2x", None, "12500"),
-    ]
+    ]  # P25000 is no parabolic acceleration, at any clock
     assert found("w3\nv301\na7001\n", "B2x", "B") == [
         ("W3 is W1.5 on M1486B", "rounded to a whole number", "2"),
         ("V301 is V602 on M1486B", None, "602"),
@@ -77,7 +76,7 @@ def test_numbers_for_the_other_clock() -> None:
 
 def test_numbers_that_have_none() -> None:
     assert found("v20\n", "B", "B2x") == [
-        ("V20 would have to be V10 on M1486B2x, which is out of range", None, None),
+        ("V20 would have to be V10 on M1486B2x: permitted is 16 to 20 000 step/s", None, None),
     ]
     assert found("t40\nw\nv\n", "B", "B2x") == [
         ("the internal variable means another time here", "its values must be converted", None),
