@@ -276,6 +276,20 @@ def test_the_next_motion_takes_what_stands_and_loses_what_falls() -> None:
     assert falling.read("x.lost") > 10_000
 
 
+def test_looking_ahead_changes_nothing() -> None:
+    """A sensor and a condition look at later moments, at which the current is reduced."""
+    sensor = '[[transducer]]\nname = "v"\nof = "x.position"\nto = "c.AIN1"\npoints = [[0, 0], [20000, 10]]\n'
+    text = TEXT.format(speed=32_000, motor=LIFT.format(hold=0.3), friction=0.1, axis="travel = [-100, 99999]")
+    plain, watched = World.from_toml(text), World.from_toml(text + sensor)
+    for found in (plain, watched):
+        start(found, 10_000)
+    watched.run(until="x.position < 5000 and time > 0.8", for_=2)
+    assert watched.read("x.position") == 4999.0
+    plain.run(until=watched.time)
+    assert plain.read("x.position") == 4999.0
+    assert events(plain, "fall") == events(watched, "fall") != []
+
+
 # ---------------------------------------------------------------------- detent
 
 

@@ -148,10 +148,11 @@ class Mechanism(Stateful):
     # ------------------------------------------------------------------ position
 
     def course(self, now: Nanos) -> Course:
-        """The course at ``now``, which is the kernel's moment or later."""
-        drive = self._drive
-        if drive.revision != self._revision or self._is_switched(drive, now):
-            self._renew(drive, now)
+        """The course at ``now``, which is the kernel's moment or later. What is looked at in advance changes nothing: a course is
+        renewed at the kernel's moment."""
+        drive, present = self._drive, self._kernel.now
+        if drive.revision != self._revision or self._is_switched(drive, present):
+            self._renew(drive, present)
         return self._course
 
     def _is_switched(self, drive: Drive, now: Nanos) -> bool:

@@ -1,0 +1,117 @@
+"""Worlds with random elements in them, restored at random moments: the same digest as without."""
+
+from __future__ import annotations
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from steptwin.files.world import World
+from steptwin.machine import SECOND
+
+BASE = """
+[[mic488]]
+name = "c"
+program = "p.prg"
+start = true
+[mic488.M1]
+unit = "mm"
+gear = 640.0
+acc = 900.0
+dec = 700.0
+vel = 90.0
+mot_resol = 3200
+[mic488.M2]
+unit = "mm"
+gear = 640.0
+acc = 900.0
+dec = 700.0
+vel = 90.0
+mot_resol = 3200
+[[axis]]
+name = "x"
+drive = "c.M1"
+pitch = 5.0
+travel = [-30.0, 90.0]
+backlash = 0.05
+[axis.motor]
+torque = [[0, 0.8], [900, 0.5], [1500, 0.2]]
+inertia = 0.00005
+friction = 0.05
+load = 0.1
+start_speed = 90
+when_off = "free"
+overruns = true
+detent = 0.03
+hold_current = 0.1
+hold_delay = "30 ms"
+resonance = [500, 700]
+resonance_growth = 30.0
+[[axis]]
+name = "y"
+drive = "c.M2"
+pitch = 5.0
+[axis.motor]
+torque = [[0, 0.8], [900, 0.5], [1500, 0.2]]
+"""
+PROGRAM = b"""M1 = ON
+M2 = ON
+AGAIN:
+PABS M1 80
+PABS M2 80
+OUT1 = ON
+WAITPOS
+DELAY 0.1
+PABS M2 0
+OUT1 = OFF
+PABS M1 0
+DELAY 0.4
+STOP M1
+DELAY 0.1
+M1 = OFF
+DELAY 0.05
+M1 = ON
+JUMP AGAIN
+"""
+PARTS = (
+    (
+        "[[shaft]]\nname = 's'\naxis = 'x'\nratio = 0.04\n[[shaft.cam]]\nfrom = 20\nuntil = 80\nto = 'c.IN1'\n"
+        "[[follower]]\nname = 'f'\nshaft = 's'\npoints = [[10, 0], [120, 9], [200, 4]]\n"
+        "[[follower.switch]]\nabove = 6\nto = 'c.IN2'\nbounce = '2 ms'\n"
+    ),
+    "[[carriage]]\nname = 't'\naxis = 'x'\nfrequency = 12\n[[carriage.switch]]\nabove = 50\nto = 'c.IN3'\n",
+    "[[brake]]\nname = 'b'\naxis = 'x'\ntorque = 0.4\nrelease = 'c.OUT1'\n",
+    "[[gantry]]\nname = 'g'\naxis = 'x'\nother = 'y'\nlimit = 3\nmass = 4\nfriction_force = 20\n",
+    "[[collision]]\nname = 'k'\nwhen = 'abs(x.position - y.position) > 6'\neffect = 'jam'\nreset = 'c.OUT1'\n",
+    "[[transducer]]\nname = 'v'\nof = 'x.position'\nto = 'c.AIN1'\npoints = [[0, 0], [80, 8]]\nresolution = 0.1\n",
+    (
+        "[[supply]]\nname = 'p'\nfeeds = 'c'\nrise = '20 ms'\n"
+        "[[fault]]\nkind = 'brown-out'\nelement = 'p'\nfrom_s = 0.9\nuntil_s = 1.0\n"
+    ),
+    "[[conveyor]]\nname = 'w'\nlength = 200\naxis = 'y'\nfeed_every = '300 ms'\n[[conveyor.sensor]]\nat = 60\nto = 'c.IN4'\n",
+    "[[cylinder]]\nname = 'z'\nextend = 'c.OUT1'\n[[cylinder.switch]]\nabove = 40\nto = 'c.IN5'\n",
+    (
+        "[[timer]]\nname = 'd'\ninput = 'c.OUT1'\nkind = 'on-delay'\ntime = '70 ms'\n"
+        "[[counter]]\nname = 'n'\nup = 'd.out'\npreset = 2\n"
+    ),
+    (
+        "[[relay]]\nname = 'r'\ncoil = 'c.OUT1'\npull_in = '9 ms'\ndrop_out = '5 ms'\n"
+        "[[wire]]\nfrom = 'r.no'\nto = 'c.IN6'\ndelay = '3 ms'\n"
+    ),
+)
+END_S = 2.5
+
+
+@settings(max_examples=25, deadline=None)
+@given(parts=st.sets(st.sampled_from(PARTS)), moment=st.integers(0, round(END_S * SECOND)))
+def test_what_is_restored_goes_on_alike(parts: set[str], moment: int) -> None:
+    text = BASE + "".join(part for part in PARTS if part in parts)
+    found, other = (World.from_toml(text, {"p.prg": PROGRAM}) for _ in range(2))
+    found.run(until=moment / SECOND)
+    snapshot = found.snapshot()
+    found.run(until=END_S)
+    other.restore(snapshot)
+    other.run(until=END_S)
+    assert other.trace.digest() == found.trace.digest()
+    found.restore(snapshot)
+    found.run(until=END_S)
+    assert other.trace.digest() == found.trace.digest()
