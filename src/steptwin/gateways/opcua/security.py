@@ -77,8 +77,14 @@ class Security(UserManager):
         checks = CertificateValidatorOptions.BASIC_VALIDATION | CertificateValidatorOptions.PEER_CLIENT
         trusted: TrustStore | None = None
         if options.trusted is not None:
-            trusted = TrustStore([self._folder / options.trusted], [])
-            await trusted.load()
+            where = self._folder / options.trusted
+            if not any(where.glob("*.pem")) and not any(where.glob("*.der")):
+                raise Misuse(f"[gateway.opcua]: trusted: {where} has no certificate (.pem, .der), so no client would be admitted")
+            trusted = TrustStore([where], [])
+            try:
+                await trusted.load()
+            except ValueError as error:
+                raise Misuse(f"[gateway.opcua]: trusted: {where} has a file that is no certificate: {error}") from None
             checks |= CertificateValidatorOptions.TRUSTED
         if options.certificate is not None:
             server.iserver.certificate_validator = CertificateValidator(checks, trusted)

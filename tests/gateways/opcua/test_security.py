@@ -1,0 +1,57 @@
+"""Options of the server that cannot be used."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+import pytest
+from asyncua.server.server import Server
+
+from steptwin.commands.certificate import make_certificate
+from steptwin.errors import Misuse
+from steptwin.gateways.opcua.security import Security
+from steptwin.world.description import read_world
+from steptwin.world.gateways import OpcUaSpec
+
+OWN = 'certificate = "certificate.pem"\nkey = "key.pem"\n'
+
+
+def security(folder: Path, keys: str, *, is_local: bool = True) -> Security:
+    (spec,) = read_world("hall.toml", f'[[mic488]]\nname = "table"\n[gateway.opcua]\n{keys}').gateways
+    assert isinstance(spec, OpcUaSpec)
+    return Security(spec, folder, is_local=is_local)
+
+
+def test_others_need_security_and_tokens(tmp_path: Path) -> None:
+    (tmp_path / "tokens").write_text("viewer screen 0123456789abcdef\n")
+    for keys in ("", 'tokens = "tokens"\n', f'security = "encrypt"\n{OWN}'):
+        with pytest.raises(Misuse, match="others can reach this address"):
+            security(tmp_path, keys, is_local=False)
+    security(tmp_path, f'tokens = "tokens"\nsecurity = "encrypt"\n{OWN}', is_local=False)
+
+
+def test_encryption_needs_a_certificate(tmp_path: Path) -> None:
+    with pytest.raises(Misuse, match="security = 'sign' needs certificate and key"):
+        security(tmp_path, 'security = "sign"\n')
+
+
+def test_a_folder_without_certificates_would_admit_nobody(tmp_path: Path) -> None:
+    make_certificate(tmp_path, [], 2)
+    wanted = security(tmp_path, f'trusted = "clients"\n{OWN}')
+    with pytest.raises(Misuse, match=r"trusted: .*clients has no certificate"):
+        asyncio.run(wanted.apply(Server()))
+    _, key = make_certificate(tmp_path / "clients", [], 2)
+    with pytest.raises(Misuse, match=r"clients has a file that is no certificate"):
+        asyncio.run(wanted.apply(Server()))
+    key.unlink()
+    server = Server()
+    asyncio.run(wanted.apply(server))
+    assert server.iserver.certificate_validator is not None
+
+
+def test_a_file_that_is_no_certificate(tmp_path: Path) -> None:
+    for name in ("certificate.pem", "key.pem"):
+        (tmp_path / name).write_text("text")
+    with pytest.raises(Misuse, match=r"\[gateway.opcua\]: certificate.pem, key.pem: "):
+        asyncio.run(security(tmp_path, OWN).apply(Server()))
