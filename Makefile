@@ -31,7 +31,8 @@ export UV_PYTHON_DOWNLOADS := never
 unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
 INSTALL := $(UV) pip install --quiet --python $(BIN)/python
 
-PEER_PACKAGES := chromium curl mbpoll libmodbus-dev gcc libc6-dev pkg-config make openssl prometheus ser2net
+PEER_PACKAGES := chromium curl mbpoll libmodbus-dev gcc libc6-dev pkg-config make mosquitto mosquitto-clients openssl postgresql \
+  prometheus ser2net tshark
 
 .DEFAULT_GOAL := help
 .PHONY: help run test golden soak extras page vsix lint format types imports bench mutants docs peers lock clean

@@ -11,7 +11,8 @@ from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.program_banks import load
 from steptwin.wbc.check import check
 from steptwin.wbc.positions import parse_positions
-from steptwin.world.kernel import Kernel, PinName, Wire
+from steptwin.world.kernel import Kernel
+from steptwin.world.wires import PinName, Wire
 
 COMPUTE = """
 n = 0

@@ -11,7 +11,7 @@ from pathlib import Path
 
 CORE = ("motion", "wire", "mic488", "m1486", "wbc", "world", "drivers")
 """Packages that are mutated; tests/<package> mirrors each of them."""
-USERS = ("commands", "files", "lsp", "subject")
+USERS = ("commands", "coverage", "debug", "explain", "files", "lsp", "subject", "why")
 """Packages above them whose tests run in one process and do not wait for real time."""
 FOLDERS = tuple(f"tests/{name}" for name in (*CORE, *USERS))
 

@@ -60,7 +60,19 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 STEPTWIN = str(Path(sys.executable).with_name("steptwin"))
 
 PEER_FIXTURES = {"require_peer", "require_library"}
-IN_WALL_TIME = ("cli", "dap", "editors", "live", "monitor", "peers", "studio", "test_docs_run.py", "test_other_systems.py")
+IN_WALL_TIME = (
+    "cli",
+    "dap",
+    "editors",
+    "gateways",
+    "history",
+    "live",
+    "monitor",
+    "peers",
+    "studio",
+    "test_docs_run.py",
+    "test_other_systems.py",
+)
 """Tests with processes of their own, on a machine that may have other work."""
 TESTS = Path(__file__).parent
 SOAK_TESTS = TESTS / "soak"

@@ -40,6 +40,7 @@ for package in PURE:
             importlib.import_module(module.name)
 
 from steptwin.wire.crc import crc16, table_crc16
+from steptwin.world.blueprint import Blueprint
 from steptwin.world.description import read_world
 from steptwin.world.plant import Plant
 
@@ -48,7 +49,7 @@ examples = pathlib.Path(EXAMPLES)
 text = (examples / "worlds/feeder.toml").read_text()
 files = {name: (examples / "worlds" / name).read_bytes() for name in read_world("feeder.toml", text).files()}
 
-plant = Plant(read_world("feeder.toml", text), files)
+plant = Plant(Blueprint(read_world("feeder.toml", text), files))
 plant.advance(20_000_000_000)
 plant.settle_all()
 print(plant.trace.digest())

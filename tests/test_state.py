@@ -9,21 +9,20 @@ from typing import Any, NamedTuple
 
 import pytest
 from toy import lamp
+from whole_world import READ, everything
 
 import steptwin
-from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.vision import Com1Port
 from steptwin.state import Stateful
 from steptwin.wire.crc import with_crc
-from steptwin.wire.gateway import Gateway, ScriptPort, TcpGatewayPort
+from steptwin.wire.gateway import ModbusGateway, ScriptPort, TcpGatewayPort
 from steptwin.wire.line import SerialLine
 from steptwin.wire.slave import RtuSlavePort, TcpSlavePort
 from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
 
-READ = with_crc(bytes.fromhex("01 03 27 24 00 04"))
 WRITE = with_crc(bytes.fromhex("01 10 00 64 00 02 04 12 34 56 78"))
 BROADCAST = with_crc(bytes.fromhex("00 06 00 05 00 63"))
 TCP_READ = bytes.fromhex("00 07 00 00 00 06 01 03 00 64 00 02")
@@ -47,7 +46,7 @@ class Ports(Stateful):
     def __init__(self) -> None:
         self.device = Mic488Device(ControllerConfig())
         units = TimedUnits({1: self.device}, LineTiming(SerialLine(38400)))
-        gateway = Gateway(units)
+        gateway = ModbusGateway(units)
         self.shared = (units, gateway)
         vision = RtuSlavePort({1: self.device})
         self.ports: tuple[Any, ...] = (
@@ -133,232 +132,11 @@ def test_what_comes_back_of_these_pieces() -> None:
     assert [entry for entry in ports.out if not isinstance(entry[1], tuple)] != []  # pauses
 
 
-WORLD = """
-[world]
-name = "everything"
-[[line]]
-name = "bus"
-timing = "real"
-[[line]]
-name = "chips"
-kind = "m1486"
-timing = "real"
-[[mic488]]
-name = "table"
-line = "bus"
-program = "p.prg"
-start = true
-[mic488.M1]
-unit = "mm"
-gear = 640.0
-acc = 200.0
-dec = 200.0
-vel = 60.0
-pos_ctrl_mode = "ENCODER"
-err_ctrl_mode = "ERRMODE0"
-[mic488.M2]
-limit_mode = "KL+KR"
-in_kl = "IN1"
-in_kr = "IN2"
-[[m1486]]
-name = "drum"
-line = "chips"
-address = 3
-[[axis]]
-name = "x"
-drive = "table.M1"
-unit = "mm"
-pitch = 5.0
-travel = [-50.0, 302.0]
-backlash = 0.02
-[axis.encoder]
-counts_per_rev = 400
-[axis.motor]
-torque = [[0, 1.0], [600, 0.5]]
-inertia = 1e-5
-friction = 0.05
-when_off = "free"
-[[carriage]]
-name = "slide"
-axis = "x"
-frequency = 15.0
-[[carriage.switch]]
-above = 19.99
-to = "table.IN7"
-[[brake]]
-name = "hold"
-axis = "x"
-torque = 0.6
-release = "seen.out"
-[[transducer]]
-name = "gap"
-of = "x.position"
-to = "table.AIN2"
-points = [[-50, 1.0], [302, 9.0]]
-[[collision]]
-name = "bump"
-when = "x.position > 10 and clamp.position > 1"
-[[axis]]
-name = "left"
-drive = "table.M3"
-pitch = 5.0
-[axis.motor]
-torque = [[0, 1.0], [600, 0.5]]
-[[axis]]
-name = "right"
-drive = "table.M4"
-pitch = 5.0
-[axis.motor]
-torque = [[0, 1.0], [600, 0.5]]
-[[gantry]]
-name = "beam"
-axis = "left"
-other = "right"
-limit = 0.01
-mass = 5.0
-[[axis]]
-name = "turret"
-drive = "drum.M1"
-kind = "rotary"
-[[axis.switch]]
-position = 90.0
-width = 5.0
-to = "table.IN6"
-bounce = "2 ms"
-[[wire]]
-from = "table.OUT1"
-to = "drum.B2"
-delay = "3 ms"
-[[shaft]]
-name = "main"
-axis = "x"
-ratio = 0.05
-[[follower]]
-name = "knife"
-shaft = "main"
-points = [[30, 0], [90, 12], [150, 12], [200, 0]]
-[[follower.switch]]
-above = 11.5
-to = "table.IN13"
-[[supply]]
-name = "rail"
-feeds = "drum"
-rise = "0 ms"
-[[button]]
-name = "start"
-to = "table.IN9"
-bounce = "5 ms"
-[[source]]
-to = "table.AIN1"
-kind = "sine"
-value = 5.0
-amplitude = 4.0
-[[lamp]]
-name = "busy"
-from = "table.OUT1"
-warms = "20 ms"
-[[gate]]
-name = "both"
-kind = "or"
-inputs = ["table.OUT1", "start-time.out"]
-[[latch]]
-name = "seen"
-set = "clamp.extended"
-[[wire]]
-from = "seen.out"
-to = "table.IN10"
-[[timer]]
-name = "start-time"
-kind = "pulse"
-time = "300 ms"
-input = "table.OUT1"
-[[counter]]
-name = "cycles"
-preset = 2
-up = "both.out"
-[[relay]]
-name = "power"
-coil = "both.out"
-pull_in = "7 ms"
-[[wire]]
-from = "power.no"
-to = "belt.run"
-[[cylinder]]
-name = "clamp"
-extend = "power.no"
-extend_time = "90 ms"
-[[conveyor]]
-name = "belt"
-length = 300.0
-speed = 500.0
-feed_every = "150 ms"
-[[conveyor.sensor]]
-at = 100.0
-to = "table.IN11"
-bounce = "2 ms"
-[[vacuum]]
-name = "cup"
-ejector = "clamp.extended"
-pick = "clamp.extended"
-from = "belt"
-pick_at = 80.0
-build_up = "40 ms"
-[[wire]]
-from = "cup.held"
-to = "table.IN12"
-[[fault]]
-kind = "jam"
-element = "clamp"
-from_s = 0.35
-until_s = 0.9
-[[fault]]
-kind = "burnt-out"
-element = "busy"
-from_s = 0.4
-until_s = 0.9
-[[fault]]
-kind = "lost-steps"
-axis = 1
-machine = "table"
-pulses = 300
-at_s = 0.7
-[[fault]]
-kind = "delay"
-for_ms = 40
-every = 2
-[[fault]]
-kind = "split"
-[[fault]]
-kind = "bounce"
-machine = "table"
-pin = "IN9"
-[[fault]]
-kind = "master-error"
-machine = "table"
-from_s = 0.5
-until_s = 1.5
-[[script]]
-name = "both"
-steps = [
-  { write = { "table.M2_EN" = 1, "table.M2_VEL_ABS" = 400.0, "table.M3_EN" = 1, "table.M3_VEL_ABS" = 90.0 } },
-  { send = "chips", text = "x3\\rv2000\\rf12800\\rr\\r" },
-  { press = "start", for = "300 ms" },
-]
-"""
-PROGRAM = b"M1 = ON\nA:\nPABS M1 20\nWAITPOS\nOUT1 = ON\nDELAY 0.05\nPABS M1 -3,5\nWAITPOS\nOUT1 = OFF\nJUMP A\n"
-
-
 @pytest.fixture(scope="module", autouse=True)
 def lamps() -> Iterator[None]:
     """An element that the source does not know."""
     with lamp.registered():
         yield
-
-
-def everything() -> World:
-    world = World.from_toml(WORLD, {"p.prg": PROGRAM})
-    world.line["bus"].send(READ)
-    return world
 
 
 @pytest.fixture(scope="module")

@@ -80,7 +80,8 @@ def test_whole_numbers_and_the_grid_of_m() -> None:
     result = move(distance=640000, velocity=2000, time=5.93)
     assert result.values["acceleration"] == round(result.exact or 0)
     assert result.notes[0].startswith("with values that the controller takes, time is 5.9")
-    assert "distance 100 microstep is taken as 96 microstep" in move(distance=100, velocity=200, acceleration=50).notes
+    wanted = "distance 100 min. microsteps is taken as 96 min. microsteps"
+    assert wanted in move(distance=100, velocity=200, acceleration=50).notes
     assert move(distance=100, velocity=200, acceleration=50, microstep=16, qualification=4).values["distance"] == 100
 
 

@@ -45,6 +45,7 @@ def invoke(*arguments: str) -> str:
 def test_a_running_world_in_somebodys_hands(up: Up) -> None:
     assert invoke("step") == "    0.002083 s  table      M1_EN: 1\nbar feeder paused at 0.002083334 s\n"
     assert invoke("step", "2s") == "bar feeder paused at 2.002083334 s\n"
+    assert invoke("step", "1ms", "--show", "note") == "bar feeder paused at 2.003083334 s\n"
     invoke("pin", "table.IN8=1")
     told = invoke("step", "--until", "start.pressed", "1min").splitlines()
     assert told[0].endswith("table      M1 is at its home position")

@@ -36,3 +36,12 @@ def test_links_are_those_of_the_options_or_the_usual_ones(
     assert CliRunner().invoke(app, ["serve", device, *option]).exit_code == 0
     links = served[0].links.items()
     assert {key: Path(value).name if key == "pty" else value for key, value in links if value is not None} == expected
+
+
+@pytest.mark.parametrize("device", ["mic488", "m1486"])
+def test_time_and_control_are_as_with_up(monkeypatch: pytest.MonkeyPatch, device: str) -> None:
+    started: list[Any] = []
+    monkeypatch.setattr("steptwin.commands.serve.up_with", lambda world, options: started.append(options))
+    words = ["serve", device, "--tcp", ANYWHERE, "--speed", "0.1", "--control", ANYWHERE]
+    assert CliRunner().invoke(app, words).exit_code == 0
+    assert (started[0].speed, started[0].control) == ("0.1", ANYWHERE)

@@ -40,12 +40,24 @@ def test_a_run_shows_what_a_program_does_with_its_statements(tmp_path: Path) -> 
         ["0.001000 s", "table", "M1 on", "1", "M1 = ON"],
         ["0.003000 s", "table", "OUT1 on", "3", "OUT1 = ON"],
         ["0.004000 s", "table", "M1 moves to 500 imp", "4", "PREL M1 500"],
-        ["0.005000 s", "table", "waits", "5", "WAIT IN3 = ON"],
+        ["0.005000 s", "table", "waits for IN3", "5", "WAIT IN3 = ON"],
         ["1.418214 s", "table", "M1 at 500 imp, position reached"],
         ["2.011000 s", "table", "OUT1 off", "6", "OUT1 = OFF"],
         ["2.012000 s", "table", "the program ends", "7", "END"],
         ["2.012000 s", "table", "M1 off", "7", "END"],
     ]
+
+
+def test_what_is_shown_can_be_chosen(tmp_path: Path) -> None:
+    def shown(names: tuple[str, ...] = (), kinds: tuple[str, ...] = ()) -> list[str]:
+        said: list[str] = []
+        assert run(WorldRun(world=machine(tmp_path), limit=5_000_000_000, names=names, kinds=kinds), said.append, said.append)
+        return [line.split()[2] for line in said if re.match(r" +[0-9.]+ s ", line)]
+
+    assert set(shown()) == {"table"}
+    assert shown(("other",)) == []
+    assert shown(kinds=("program",)) == shown()
+    assert shown(kinds=("note,fault",)) == []
 
 
 def test_watching_changes_nothing(tmp_path: Path) -> None:

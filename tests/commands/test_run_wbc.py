@@ -82,10 +82,10 @@ def test_everything_a_program_does_with_times_and_lines(play: Play) -> None:
     assert ran.told() == [
         ("0.001000", "M1 on", "1"),
         ("0.003000", "M1 moves to 50 mm", "3"),
-        ("0.004000", "waits", "4"),
+        ("0.004000", "waits for M1", "4"),
         ("0.603000", "M1 at 50 mm, position reached", ""),
         ("0.604000", "OUT3 on", "5"),
-        ("0.605000", "waits", "7"),
+        ("0.605000", "waits for IN1", "7"),
         ("2.000000", "IN1 on", ""),
         ("2.011000", "$R4 = 12.5", "8"),
         ("2.013000", "waits 0.25 s", "10"),
@@ -107,7 +107,7 @@ def test_an_interrupt_and_an_error(play: Play) -> None:
     assert ran.told() == [
         ("0.002000", "M2 on", "2"),
         ("0.003000", "M2 runs at 100 imp/s", "3"),
-        ("0.004000", "waits", "4"),
+        ("0.004000", "waits for OUT1", "4"),
         ("3.000000", "IN2 on", ""),
         ("3.010000", "interrupt of IN2", "6"),
         ("3.011000", "line 7: division by zero", "7"),

@@ -166,6 +166,15 @@ def test_a_world_with_two_controllers_and_a_breakpoint_in_each(client: DapClient
     assert go(client, "continue")["threadId"] == 2
     assert where(client, 2)[1] == 8
 
+    def why(question: str, thread: int) -> str:
+        return client.ask("evaluate", expression=f"why {question}", frameId=1000 * thread, context="repl")["result"]
+
+    assert why("out1", 1).startswith("m.out1 is ")
+    assert why("variable", 2).startswith("c.variable is ")
+    assert why("c", 1).startswith("c ")
+    with pytest.raises(Refused, match="n is a variable of m, of which no past is noted"):
+        why("n", 1)  # the other controller has a pin n
+
 
 def test_a_program_that_is_not_in_the_world_is_refused_and_another_launch_is_taken(client: DapClient, tmp_path: Path) -> None:
     (tmp_path / "m.prg").write_text(WBC)

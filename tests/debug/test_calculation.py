@@ -10,7 +10,7 @@ from debug_rig import BOTH, make
 from hypothesis import given
 from hypothesis import strategies as st
 
-from steptwin.debug.calculation import Calculation, HitCount, LogText
+from steptwin.debug.calculation import HitCount, LogText, ResolvedExpression
 from steptwin.errors import Misuse
 
 AXIS = '[[axis]]\nname = "x-slide"\ndrive = "m.M1"\npulses_per_unit = 100\nunit = "mm"\nstart = 12.5\ntravel = [0, 100]\n'
@@ -19,7 +19,7 @@ WORLD.run_to(10**7)
 
 
 def value(text: str) -> float:
-    return Calculation(WORLD, "m", text).value(WORLD.now)
+    return ResolvedExpression(WORLD, "m", text).value(WORLD.now)
 
 
 @pytest.mark.parametrize(
@@ -50,7 +50,7 @@ def test_values(text: str, result: float) -> None:
 
 
 def test_what_an_expression_depends_on() -> None:
-    local, own, other = (Calculation(WORLD, "m", text) for text in ("n + OUT1", "n > x-slide.position", "n > c.variable"))
+    local, own, other = (ResolvedExpression(WORLD, "m", text) for text in ("n + OUT1", "n > x-slide.position", "n > c.variable"))
     assert [one.is_local for one in (local, own, other)] == [True, False, False]
     assert [one.reads_others for one in (local, own, other)] == [False, False, True]
 
@@ -85,7 +85,7 @@ def test_what_has_no_value_has_a_reason(text: str, problem: str) -> None:
 
 
 def test_logs() -> None:
-    calculate = partial(Calculation, WORLD, "m")
+    calculate = partial(ResolvedExpression, WORLD, "m")
     assert LogText("n is {n}, then {n + 0.5}", calculate).shown(WORLD.now) == "n is 7, then 7.5"
     with pytest.raises(Misuse, match="only names of the program can be in it"):
         LogText("x is {x-slide.position}", calculate)

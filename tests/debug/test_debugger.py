@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from steptwin.debug.breakpoints import Breakpoint
 from steptwin.debug.debugger import Debugger
-from steptwin.debug.values import DataPoint, Events, LabelPoint, LinePoint, Stop, StopReason
+from steptwin.debug.values import DataPoint, Events, LabelPoint, LinePoint, Stopped, StopReason
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.world.plant import Plant
@@ -39,7 +39,7 @@ def state(world: Plant) -> str:
 
 def started(text: str | None = None, world: str = ONE) -> Debugger:
     debugger = Debugger(make(world=world) if text is None else make(text, world))
-    assert debugger.run_to_entry() == Stop(StopReason.ENTRY, ENTRY, "m")
+    assert debugger.run_to_entry() == Stopped(StopReason.ENTRY, ENTRY, "m")
     return debugger
 
 
@@ -166,7 +166,7 @@ def test_step_back_goes_through_the_same_statements_in_reverse() -> None:
         assert debugger.step_back("m").reason is StopReason.STEP
         assert (line(debugger), debugger.now) == known
         assert debugger.is_past
-    assert debugger.step_back("m") == Stop(StopReason.BEGIN, 0, text="no older moment is kept")
+    assert debugger.step_back("m") == Stopped(StopReason.BEGIN, 0, text="no older moment is kept")
     for known in lines:
         debugger.step_in("m")
         assert (line(debugger), debugger.now) == known
@@ -277,7 +277,7 @@ def test_a_label_and_an_interrupt() -> None:
 def test_a_data_breakpoint_stops_after_the_change() -> None:
     debugger = started()
     debugger.set_breakpoints([DataPoint(machine="m", name="n")])
-    assert debugger.run() == Stop(StopReason.DATA, MILLISECOND * 2, "m", "n: 0 → 1", (1,))
+    assert debugger.run() == Stopped(StopReason.DATA, MILLISECOND * 2, "m", "n: 0 → 1", (1,))
     debugger.set_breakpoints([DataPoint(machine="m", name="OUT1", condition="= 1")])
     stops = [debugger.run() for _ in range(2)]
     assert [stop.reason for stop in stops] == [StopReason.DATA] * 2

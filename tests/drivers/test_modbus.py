@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from steptwin.drivers.exchange import LineLost, SendNext
-from steptwin.drivers.modbus import LATE_NS, NOISE_NS, QUIET_NS, Query, RtuMaster, TcpMaster, bits, check_unit, words
+from steptwin.drivers.modbus import LATE_NS, NOISE_NS, QUIET_NS, ModbusQuery, RtuMaster, TcpMaster, bits, check_unit, words
 from steptwin.errors import Misuse
 from steptwin.machine import MICROSECOND, MILLISECOND, SECOND
 from steptwin.wire import mbap, rtu
@@ -42,7 +42,7 @@ def exception(function: int, code: int) -> bytes:
 
 def asked(request: ReadRequest | WriteCoilRequest | WriteRegisterRequest | WriteRegistersRequest = POSITION) -> RtuMaster:
     master = RtuMaster()
-    master.start(Query(1, request), 0, urgent=False)
+    master.start(ModbusQuery(1, request), 0, urgent=False)
     return master
 
 
@@ -51,7 +51,7 @@ def asked(request: ReadRequest | WriteCoilRequest | WriteRegisterRequest | Write
 
 @pytest.mark.parametrize(("frame", "request_"), GOLDEN.items())
 def test_golden_requests(frame: str, request_: ReadRequest | WriteCoilRequest) -> None:
-    assert RtuMaster().start(Query(1, request_), 0, urgent=False) == bytes.fromhex(frame)
+    assert RtuMaster().start(ModbusQuery(1, request_), 0, urgent=False) == bytes.fromhex(frame)
 
 
 ANSWERS = [
@@ -117,9 +117,9 @@ def test_a_write_is_answered_by_its_own_echo_only() -> None:
 # ---------------------------------------------------------------------- late answers
 
 
-def late(master: RtuMaster, request: ReadRequest = POSITION) -> Query:
+def late(master: RtuMaster, request: ReadRequest = POSITION) -> ModbusQuery:
     """An exchange whose answer has not come in time."""
-    query = Query(1, request)
+    query = ModbusQuery(1, request)
     master.start(query, 0, urgent=False)
     master.abandon(1000)
     return query
@@ -128,7 +128,7 @@ def late(master: RtuMaster, request: ReadRequest = POSITION) -> Query:
 def test_a_request_that_a_late_answer_could_seem_to_answer_is_preceded_by_a_marker() -> None:
     master = RtuMaster()
     late(master)
-    other = Query(1, ReadRequest(3, 10022, 2))
+    other = ModbusQuery(1, ReadRequest(3, 10022, 2))
     marker = master.start(other, 2000, urgent=False)
     assert marker == rtu.encode_frame(1, bytes.fromhex("03 00 00 00 01"))
     assert master.receive(registers(1, 2), 3000) is None  # the late answer
@@ -136,14 +136,14 @@ def test_a_request_that_a_late_answer_could_seem_to_answer_is_preceded_by_a_mark
     assert master.receive(registers(9), 4000) == SendNext(other.rtu_frame, may_wait=True)
     assert master.receive(registers(3, 4), 5000) == bytes.fromhex("03 04 00 03 00 04")
     # In step again: the next one needs no marker.
-    assert master.start(Query(1, POSITION), 6000, urgent=False) == Query(1, POSITION).rtu_frame
+    assert master.start(ModbusQuery(1, POSITION), 6000, urgent=False) == ModbusQuery(1, POSITION).rtu_frame
 
 
 def test_markers_differ_from_everything_owed() -> None:
     master = RtuMaster()
     late(master)
     late(master, ReadRequest(3, 0, 1))
-    marker = master.start(Query(1, ReadRequest(3, 10022, 2)), 2000, urgent=False)
+    marker = master.start(ModbusQuery(1, ReadRequest(3, 10022, 2)), 2000, urgent=False)
     assert marker == rtu.encode_frame(1, bytes.fromhex("03 00 00 00 03"))  # answers of 1 and 2 registers are owed
 
 
@@ -152,7 +152,8 @@ def test_a_repeated_request_needs_no_marker_but_leaves_an_answer_owed() -> None:
     query = late(master)
     assert master.start(query, 2000, urgent=False) == query.rtu_frame
     assert master.receive(registers(1, 2), 3000) is not None
-    assert master.start(Query(1, ReadRequest(3, 10022, 2)), 4000, urgent=False) != Query(1, ReadRequest(3, 10022, 2)).rtu_frame
+    query = ModbusQuery(1, ReadRequest(3, 10022, 2))
+    assert master.start(query, 4000, urgent=False) != query.rtu_frame
 
 
 @pytest.mark.parametrize(
@@ -162,26 +163,27 @@ def test_a_repeated_request_needs_no_marker_but_leaves_an_answer_owed() -> None:
 def test_another_function_cannot_be_confused_and_its_answer_settles_everything(request_: ReadRequest) -> None:
     master = RtuMaster()
     late(master)
-    query = Query(1, request_)
+    query = ModbusQuery(1, request_)
     assert master.start(query, 2000, urgent=False) == query.rtu_frame
     answer = rtu.encode_frame(1, b"\2\1\5") if request_ is INPUTS else query.rtu_frame
     assert master.receive(registers(1, 2) + answer, 3000) == answer[1:-2]
-    assert master.start(Query(1, ReadRequest(3, 10022, 2)), 4000, urgent=False) == Query(1, ReadRequest(3, 10022, 2)).rtu_frame
+    query = ModbusQuery(1, ReadRequest(3, 10022, 2))
+    assert master.start(query, 4000, urgent=False) == query.rtu_frame
 
 
 def test_another_unit_cannot_be_confused() -> None:
     master = RtuMaster()
     late(master)
-    query = Query(2, POSITION)
+    query = ModbusQuery(2, POSITION)
     assert master.start(query, 2000, urgent=False) == query.rtu_frame
 
 
 def test_a_stop_waits_for_no_marker() -> None:
     master = RtuMaster()
-    write = Query(1, WriteCoilRequest(2000, True))
+    write = ModbusQuery(1, WriteCoilRequest(2000, True))
     master.start(write, 0, urgent=False)
     master.abandon(1000)
-    stop = Query(1, WriteCoilRequest(2004, True))
+    stop = ModbusQuery(1, WriteCoilRequest(2004, True))
     assert master.start(stop, 2000, urgent=True) == stop.rtu_frame
     assert master.receive(write.rtu_frame, 3000) is None
     assert master.receive(stop.rtu_frame, 3000) == stop.pdu
@@ -190,7 +192,7 @@ def test_a_stop_waits_for_no_marker() -> None:
 def test_an_owed_answer_is_not_waited_for_for_ever() -> None:
     master = RtuMaster()
     late(master)
-    other = Query(1, ReadRequest(3, 10022, 2))
+    other = ModbusQuery(1, ReadRequest(3, 10022, 2))
     assert master.start(other, 1000 + LATE_NS, urgent=False) == other.rtu_frame
 
 
@@ -198,7 +200,7 @@ def test_a_new_connection_owes_nothing() -> None:
     master = RtuMaster()
     late(master)
     master.reset()
-    other = Query(1, ReadRequest(3, 10022, 2))
+    other = ModbusQuery(1, ReadRequest(3, 10022, 2))
     assert master.start(other, 2000, urgent=False) == other.rtu_frame
     assert master.free_ns == 0
 
@@ -227,12 +229,12 @@ def test_what_was_heard_of_an_answer_is_told() -> None:
 
 def test_an_adapter_that_echoes_is_noticed_at_the_first_read() -> None:
     master = asked()
-    sent = Query(1, POSITION).rtu_frame
+    sent = ModbusQuery(1, POSITION).rtu_frame
     assert master.receive(sent, 1) is None
     assert master.receive(registers(1, 2), 1) == bytes.fromhex("03 04 00 01 00 02")
     assert master.echo
     # From then on the echo of a write is not taken for its answer.
-    stop = Query(1, WriteCoilRequest(2004, True))
+    stop = ModbusQuery(1, WriteCoilRequest(2004, True))
     master.start(stop, 2, urgent=True)
     assert master.receive(stop.rtu_frame[:5], 3) is None
     assert master.receive(stop.rtu_frame[5:], 3) is None
@@ -241,14 +243,14 @@ def test_an_adapter_that_echoes_is_noticed_at_the_first_read() -> None:
 
 def test_without_echo_the_answer_of_a_write_is_its_answer() -> None:
     master = asked(WriteCoilRequest(2004, True))
-    assert master.receive(Query(1, WriteCoilRequest(2004, True)).rtu_frame, 1) is not None
+    assert master.receive(ModbusQuery(1, WriteCoilRequest(2004, True)).rtu_frame, 1) is not None
     assert not master.echo
 
 
 @pytest.mark.parametrize(("baud", "gap"), [(9600, 3_645_834), (38400, 1750 * MICROSECOND)])
 def test_real_lines_have_a_gap_before_a_frame_and_time_for_its_characters(baud: int, gap: int) -> None:
     master = RtuMaster(SerialLine(baud))
-    query = Query(1, ReadRequest(3, 10020, 16))
+    query = ModbusQuery(1, ReadRequest(3, 10020, 16))
     assert master.allowance_ns(query) == SerialLine(baud).duration(8 + 37)
     master.start(query, 0, urgent=False)
     master.receive(registers(*range(16)), 1000)
@@ -258,7 +260,7 @@ def test_real_lines_have_a_gap_before_a_frame_and_time_for_its_characters(baud: 
 def test_every_frame_is_shown_to_the_observer() -> None:
     seen: list[tuple[FrameDirection, bytes]] = []
     master = RtuMaster(on_frame=lambda now, direction, raw: seen.append((direction, raw)))
-    query = Query(1, POSITION)
+    query = ModbusQuery(1, POSITION)
     master.start(query, 0, urgent=False)
     master.receive(b"\xff" + registers(1, 2), 1)
     master.start(query, 2, urgent=False)
@@ -283,7 +285,7 @@ def answered(number: int, pdu: str, unit: int = 1) -> bytes:
 def tcp() -> Callable[[ReadRequest], TcpMaster]:
     def make(request: ReadRequest = POSITION) -> TcpMaster:
         master = TcpMaster("tcp://h:502")
-        assert master.start(Query(1, request), 0, urgent=False) == bytes.fromhex("00 01 00 00 00 06 01 03 27 24 00 02")
+        assert master.start(ModbusQuery(1, request), 0, urgent=False) == bytes.fromhex("00 01 00 00 00 06 01 03 27 24 00 02")
         return master
 
     return make
@@ -299,11 +301,11 @@ def test_tcp_whole_and_byte_by_byte(tcp: Callable[..., TcpMaster]) -> None:
 def test_tcp_late_answers_and_those_of_others_are_passed_over(tcp: Callable[..., TcpMaster]) -> None:
     master = tcp()
     master.abandon(1)
-    master.start(Query(1, POSITION), 2, urgent=False)
+    master.start(ModbusQuery(1, POSITION), 2, urgent=False)
     assert master.receive(answered(1, "03 04 00 01 00 02"), 3) is None
     assert master.receive(other := answered(2, "03 04 00 01 00 02", unit=7), 3) is None
     assert master.abandon(4) == other
-    master.start(Query(1, POSITION), 5, urgent=False)
+    master.start(ModbusQuery(1, POSITION), 5, urgent=False)
     assert master.receive(answered(3, "03 04 00 03 00 04"), 6) == bytes.fromhex("03 04 00 03 00 04")
 
 
@@ -324,7 +326,7 @@ def test_tcp_what_answers_something_else_is_passed_over_and_told(tcp: Callable[.
     master = tcp()
     assert master.receive(answered(1, pdu), 1) is None
     assert master.abandon(2) == answered(1, pdu)
-    master.start(Query(1, POSITION), 3, urgent=False)
+    master.start(ModbusQuery(1, POSITION), 3, urgent=False)
     assert master.abandon(4) == b""
 
 
@@ -341,7 +343,7 @@ def test_tcp_what_is_no_modbus_breaks_the_connection(tcp: Callable[..., TcpMaste
 
 def test_tcp_numbers_wrap_round() -> None:
     master = TcpMaster()
-    query = Query(1, POSITION)
+    query = ModbusQuery(1, POSITION)
     for _ in range(0xFFFF):
         master.start(query, 0, urgent=False)
     assert master.start(query, 0, urgent=False)[:2] == b"\0\0"
@@ -352,13 +354,13 @@ def test_tcp_numbers_wrap_round() -> None:
 
 def test_without_a_line_of_its_own_a_frame_takes_no_time() -> None:
     for master in (RtuMaster(), TcpMaster()):
-        assert master.allowance_ns(Query(1, POSITION)) == 0
+        assert master.allowance_ns(ModbusQuery(1, POSITION)) == 0
 
 
 @pytest.mark.parametrize("size", [1, 100])
 def test_tcp_an_answer_is_taken_once(size: int) -> None:
     master = TcpMaster()
-    master.start(Query(1, POSITION), 0, urgent=False)
+    master.start(ModbusQuery(1, POSITION), 0, urgent=False)
     frame = mbap.encode_frame(1, 1, encode_response(RegistersResponse((0, 0x4148))))
     found = [master.receive(frame[at : at + size], 0) for at in range(0, len(frame), size)]
     assert found[-1] == frame[7:]
@@ -387,7 +389,7 @@ def test_units() -> None:
 def test_tcp_an_answer_in_pieces_is_observed_too() -> None:
     heard: list[tuple[int, FrameDirection, bytes]] = []
     master = TcpMaster(on_frame=lambda now, way, data: heard.append((now, way, data)))
-    query = Query(1, ReadRequest(3, 0, 1))
+    query = ModbusQuery(1, ReadRequest(3, 0, 1))
     sent = master.start(query, 10, urgent=False)
     answer = sent[:4] + bytes.fromhex("0005 01 03 02 00 07")
     assert master.receive(answer[:5], 11) is None
@@ -397,7 +399,7 @@ def test_tcp_an_answer_in_pieces_is_observed_too() -> None:
 
 def test_rtu_noise_keeps_the_line_for_a_fifth_of_a_second_at_most() -> None:
     master = RtuMaster()
-    master.start(Query(1, ReadRequest(3, 0, 1)), 0, urgent=False)
+    master.start(ModbusQuery(1, ReadRequest(3, 0, 1)), 0, urgent=False)
     master.abandon(0)
     for now in range(0, SECOND, 5 * MILLISECOND):
         master.stray(b"x", now)

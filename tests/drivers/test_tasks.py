@@ -12,7 +12,7 @@ from line_rig import MemoryEndpoint, MemoryTransport
 from steptwin.drivers import LineLost, Mic488, NoAnswer, Overtaken
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.exchange import Job
-from steptwin.drivers.modbus import Query, words
+from steptwin.drivers.modbus import ModbusQuery, words
 from steptwin.errors import LineFailure, Misuse
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.wire.pdu import ReadRequest
@@ -236,7 +236,7 @@ def test_a_line_that_is_closed_while_it_waits_for_an_answer_gives_up_in_time_whe
         await line.open()
         wire.severed = True
         for _ in range(2):
-            asked = asyncio.create_task(line.exchange(Job(Query(1, ReadRequest(3, 0, 1)), TIMEOUT)))
+            asked = asyncio.create_task(line.exchange(Job(ModbusQuery(1, ReadRequest(3, 0, 1)), TIMEOUT)))
             await asyncio.sleep(0.01)
             await line.close()
             with pytest.raises(LineLost):
@@ -244,7 +244,7 @@ def test_a_line_that_is_closed_while_it_waits_for_an_answer_gives_up_in_time_whe
             await line.open()
         begin = line.now()
         with pytest.raises(NoAnswer):
-            await line.exchange(Job(Query(1, ReadRequest(3, 0, 1)), TIMEOUT))
+            await line.exchange(Job(ModbusQuery(1, ReadRequest(3, 0, 1)), TIMEOUT))
         assert line.now() - begin == pytest.approx(TIMEOUT, abs=INTERVAL)
 
     run_virtual(wire, main())

@@ -14,7 +14,7 @@ from line_rig import MemoryChannel, MemoryEndpoint
 from steptwin.drivers import LineLost, NoAnswer, Overtaken, Unconfirmed
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.exchange import Job
-from steptwin.drivers.modbus import Query, words
+from steptwin.drivers.modbus import ModbusQuery, words
 from steptwin.drivers.permission import Permission
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.wire.pdu import ReadRequest, WriteCoilRequest
@@ -111,11 +111,12 @@ def test_a_waiting_motion_is_not_begun_after_a_stop() -> None:
     stopped = [False]
     engine = line._engine
     permission = Permission(wire.clock, TIMEOUT, lambda: stopped[0])
-    motion: Job[Query, bytes] = Job(Query(1, WriteCoilRequest(2008, True)), TIMEOUT, most_attempts=3, permission=permission)
+    move = ModbusQuery(1, WriteCoilRequest(2008, True))
+    motion: Job[ModbusQuery, bytes] = Job(move, TIMEOUT, most_attempts=3, permission=permission)
     engine.submit(motion)
     stopped[0] = True
-    finish(line.exchange(Job(Query(1, M1_STOP), TIMEOUT, urgent=True)))
-    finish(line.exchange(Job(Query(1, ReadRequest(3, 0, 1)), TIMEOUT)))
+    finish(line.exchange(Job(ModbusQuery(1, M1_STOP), TIMEOUT, urgent=True)))
+    finish(line.exchange(Job(ModbusQuery(1, ReadRequest(3, 0, 1)), TIMEOUT)))
     with pytest.raises(Overtaken):
         motion.result()
     assert [frame[:4].hex() for _, frame in wire.sent[-2:]] == ["010507d4", "01030000"]
@@ -133,8 +134,8 @@ def test_a_line_that_cannot_be_opened_says_so_when_it_is_opened() -> None:
 
 def test_a_line_that_nobody_has_opened_is_opened_by_the_first_exchange() -> None:
     wire = Wire()
-    assert words(finish(thread_line(wire).exchange(Job(Query(1, ReadRequest(3, 0, 1)), TIMEOUT)))) == (0,)
-    assert words(run_virtual(wire, task_line(wire).exchange(Job(Query(1, ReadRequest(3, 0, 1)), TIMEOUT)))) == (0,)
+    assert words(finish(thread_line(wire).exchange(Job(ModbusQuery(1, ReadRequest(3, 0, 1)), TIMEOUT)))) == (0,)
+    assert words(run_virtual(wire, task_line(wire).exchange(Job(ModbusQuery(1, ReadRequest(3, 0, 1)), TIMEOUT)))) == (0,)
     assert wire.opened == 2
 
 
@@ -169,10 +170,10 @@ def test_a_port_is_given_back_when_its_line_is_closed_or_lost() -> None:
     finish(line.open())
     wire.gone = "unplugged"
     with pytest.raises(LineLost):
-        finish(line.exchange(Job(Query(1, ReadRequest(3, 0, 1)), TIMEOUT)))
+        finish(line.exchange(Job(ModbusQuery(1, ReadRequest(3, 0, 1)), TIMEOUT)))
     wire.gone = None
     endpoint.free = 1
-    finish(line.exchange(Job(Query(1, ReadRequest(3, 0, 1)), TIMEOUT)))
+    finish(line.exchange(Job(ModbusQuery(1, ReadRequest(3, 0, 1)), TIMEOUT)))
     assert endpoint.free == 0
 
 
@@ -191,7 +192,7 @@ def test_a_line_that_is_closed_during_an_exchange_ends_it() -> None:
 
     wire.before_read = close
     with pytest.raises(LineLost, match="the line memory was closed"):
-        finish(line.exchange(Job(Query(1, ReadRequest(3, 0, 1)), TIMEOUT)))
+        finish(line.exchange(Job(ModbusQuery(1, ReadRequest(3, 0, 1)), TIMEOUT)))
     assert waited == [True]
     assert not line._engine.busy
 
@@ -225,11 +226,11 @@ def test_what_is_refused_is_refused_at_once_whoever_else_waits() -> None:
     wire = Wire()
     line = thread_line(wire)
     finish(line.open())
-    finish(line.exchange(Job(Query(1, ReadRequest(3, 0, 1)), TIMEOUT)))
-    line._engine.submit(Job(Query(1, ReadRequest(3, 1, 1)), TIMEOUT))
+    finish(line.exchange(Job(ModbusQuery(1, ReadRequest(3, 0, 1)), TIMEOUT)))
+    line._engine.submit(Job(ModbusQuery(1, ReadRequest(3, 1, 1)), TIMEOUT))
     asked = wire.now
     with pytest.raises(Overtaken):
-        finish(line.exchange(Job(Query(1, M1_STOP), TIMEOUT, permission=Permission(wire.clock, TIMEOUT, lambda: True))))
+        finish(line.exchange(Job(ModbusQuery(1, M1_STOP), TIMEOUT, permission=Permission(wire.clock, TIMEOUT, lambda: True))))
     assert wire.now == asked
 
 

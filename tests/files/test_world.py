@@ -93,6 +93,18 @@ def test_a_moment_that_has_passed_is_refused() -> None:
     assert [(r.time, r.value) for r in world.trace.events("world")] == [(3 * SECOND, "now")]
 
 
+def test_a_branch_of_a_world_that_had_a_fault_goes_on_alike() -> None:
+    world = World.load(EXAMPLES[0].parent / "feeder.toml")
+    world.run(for_=1)
+    name = world.fault("stuck machine=table pin=IN3 value=1")
+    world.run(for_=1)
+    world.clear_fault(name)
+    other = world.branch()
+    for one in (world, other):
+        one.run(until=3)
+    assert other.trace.digest() == world.trace.digest()
+
+
 def test_a_branch_goes_its_own_way() -> None:
     world = moved(small(), 30.0)
     world.run(for_=0.5)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import copy
 import pickle
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +57,42 @@ def test_a_snapshot_can_be_pickled() -> None:
     world.restore(snapshot)
     world.run(for_=3)
     assert world.trace.digest() == end
+
+
+GO_ON = """
+import pickle, sys
+world, snapshot = pickle.load(sys.stdin.buffer)
+world.run(for_=3)
+first = world.trace.digest()
+if snapshot is not None:
+    world.restore(snapshot)
+    world.run(for_=3)
+sys.stdout.buffer.write(pickle.dumps((first, world.trace.digest(), world, world.snapshot())))
+"""
+
+
+def in_another_process(*what: object) -> Any:
+    """Of a new interpreter, which shares no memory and no imports with this one."""
+    found = subprocess.run([sys.executable, "-c", GO_ON], input=pickle.dumps(what), stdout=subprocess.PIPE, check=True)
+    return pickle.loads(found.stdout)
+
+
+@pytest.mark.parametrize("name", ["feeder.toml", "pick_and_place/pick_and_place.toml", "hoist/hoist.toml", "winder/winder.toml"])
+def test_worlds_and_snapshots_go_between_processes(name: str) -> None:
+    """There and back: both go on from where they are."""
+    world = World.load(EXAMPLES / name, seed=4)
+    world.run(for_=1.7)
+    there = world.snapshot()
+    first, again, came, ended = in_another_process(world, there)
+    world.run(for_=3)
+    assert first == again == came.trace.digest() == world.trace.digest()
+    assert session_of(came) == session_of(world)
+    for one in (came, world):
+        one.run(for_=1)
+    assert came.trace.digest() == world.trace.digest()
+    world.restore(ended)
+    world.run(for_=1)
+    assert world.trace.digest() == came.trace.digest()
 
 
 def test_without_a_trace_a_world_has_no_past_to_pickle() -> None:

@@ -22,7 +22,7 @@ def test_devices_and_gateways() -> None:
     ("text", "message"),
     [
         ("", "error D005: [[device]] is missing"),
-        (DEVICE, "error D005: [gateway.NAME] is missing"),
+        (DEVICE, "error D005: [gateway.NAME] or [history] is missing"),
         (DEVICE + DEVICE + GATEWAY, "cell.toml:5:1: error D006: there is a [[device]] named 'table' already"),
         (GATEWAY + "[[devise]]\n", "the file has no [devise] (did you mean 'device'?)"),
         (GATEWAY + '[device]\nname = "table"\n', "[device] stands once"),

@@ -50,7 +50,7 @@ def test_axes_have_position_and_velocity_with_their_unit() -> None:
     assert found["steptwin_axis_moving", ("table", "M1")] == 1.0
     assert found["steptwin_axis_enabled", ("table", "M2")] == 0.0
     assert found["steptwin_axis_status", ("table", "M1", "ok", "moving to position")] == 1.0
-    assert found["steptwin_axis_position", ("drum", "M1", "microstep")] == 0.0
+    assert found["steptwin_axis_position", ("drum", "M1", "min. microsteps")] == 0.0
     assert found["steptwin_time_seconds", ()] == 1.0
     assert found["steptwin_pin_level", ("table", "M1_EN")] == 1.0
 

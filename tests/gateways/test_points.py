@@ -7,6 +7,7 @@ import asyncio
 import pytest
 from gateway_rig import GatewayWorld
 
+from steptwin.errors import Misuse
 from steptwin.gateways.points import PointType, PointValue, points_of, registers_by_machine
 from steptwin.gateways.sampling import Sampler
 from steptwin.subject import commands as command
@@ -89,12 +90,22 @@ def test_registers_are_read_and_what_is_only_written_is_unknown() -> None:
     assert [found[f"registers.{name}"] for name in REGISTERS] == [77.0, 40.0, None]
 
 
-@pytest.mark.parametrize("wrong", ["tabel.M1_VMAX", "table.M9_VMAX", "table", "M1_VMAX"])
-def test_a_register_that_is_not_there(wrong: str) -> None:
-    with pytest.raises(KeyError, match=wrong):
-        registers_by_machine([wrong], GatewayWorld(TEXT).description)
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ("tabel.M1_VMAX", "[x]: registers: no controller is called 'tabel' (did you mean 'table'?); expected MACHINE.POINT"),
+        ("table.M1_VMAXX", "[x]: registers: no point is called 'table.M1_VMAXX' (did you mean 'M1_VMAX'?)"),
+        ("table.USER_REGISTR[5]", "[x]: registers: no point is called 'table.USER_REGISTR[5]' (did you mean 'USER_REGISTER'?)"),
+        ("table", "[x]: registers: no point is called 'table'"),
+        ("M1_VMAX", "[x]: registers: no controller is called 'M1_VMAX'; expected MACHINE.POINT"),
+    ],
+)
+def test_a_register_that_is_not_there(wrong: str, message: str) -> None:
+    with pytest.raises(Misuse) as found:
+        registers_by_machine("[x]", [wrong], GatewayWorld(TEXT).description)
+    assert str(found.value) == message
 
 
 def test_registers_by_machine() -> None:
-    found = registers_by_machine(["table.M1_VMAX", "drum.variable"], GatewayWorld(TEXT).description)
+    found = registers_by_machine("[x]", ["table.M1_VMAX", "drum.variable"], GatewayWorld(TEXT).description)
     assert found == {"table": ["M1_VMAX"], "drum": ["variable"]}

@@ -4,29 +4,17 @@ from __future__ import annotations
 
 import asyncio
 import json
-import os
-import socket
 import stat
-from collections.abc import Awaitable, Callable
-from inspect import signature
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from control_rig import Desk, answer_to, answers_to, misuse, ok, served, turns
 
-from steptwin.errors import LineFailure, Misuse, Refusal
-from steptwin.later import Later
-from steptwin.live import control, remote
+from steptwin.live import control
 from steptwin.live.control import ControlEndpoint
-from steptwin.live.remote import START, ask, running
-from steptwin.motion.profile import at_rest
-from steptwin.subject import commands as command
-from steptwin.subject.contract import Result
 from steptwin.subject.dispatch import FORM
-from steptwin.subject.events import Event
-from steptwin.subject.following import Filter, Followers, Following
-from steptwin.subject.payloads import EdgePayload, PlanPayload
-from steptwin.world import script as do
 from steptwin.world.addresses import Address
 
 TOKEN_FIRST = 'the first line of a connection is {"token": TOKEN}, with the token of this twin'
@@ -37,93 +25,6 @@ FORM_ERROR = {"error": {"code": "misuse", "message": FORM}}
 def own_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     return tmp_path / "steptwin"
-
-
-class Desk:
-    """A subject that is only asked: notes come back, one of them later, some are refused, one breaks it."""
-
-    def __init__(self) -> None:
-        self.later = Later[None]()
-        self.followers = Followers()
-        self.done = 0
-
-    def do(self, wanted: command.Command) -> Result:
-        self.done += 1
-        match wanted:
-            case do.Note("refuse"):
-                raise Misuse("not permitted: 7")
-            case do.Note("deny"):
-                raise Refusal("not now")
-            case do.Note("break"):
-                raise KeyError("x")
-            case do.Note(text):
-                return Result({"note": text}, 5, self.done)
-            case command.Pause():
-                return Result("x" * 1_000_000, 5, self.done)
-        return Result(None, 5, self.done)
-
-    async def answer(self, wanted: command.Command) -> Result:
-        if wanted == do.Note("later"):
-            self.later = Later[None]()
-            await self.later
-        return self.do(wanted)
-
-    def follow(self, what: Filter, bound: int) -> Following:
-        return self.followers.follow(what, bound)
-
-    def plans(self, what: Filter) -> list[Event]:
-        return [Event(0, 5, "a", PlanPayload("1", at_rest(0, 7), 0))]
-
-    def happen(self, count: int = 1) -> None:
-        for number in range(count):
-            self.followers.publish(Event(number, number, "a", EdgePayload("IN1", 1.0)))
-
-
-def ok(text: str, number: int = 1) -> dict[str, object]:
-    return {"ok": {"note": text}, "number": number, "time_ns": "5"}
-
-
-def misuse(text: str) -> dict[str, object]:
-    return {"error": {"code": "misuse", "message": text}}
-
-
-async def turns() -> None:
-    """Let the loop finish what it has begun with connections that come and go."""
-    for _ in range(5):
-        await asyncio.sleep(0)
-
-
-def served(play: Callable[..., Awaitable[Any]], name: str = "twin", address: Address | None = None) -> Any:
-    async def scene() -> Any:
-        desk = Desk()
-        endpoint = ControlEndpoint(name, desk, address)
-        await endpoint.open()
-        try:
-            return await (play(endpoint, desk) if len(signature(play).parameters) == 2 else play(endpoint))
-        finally:
-            await turns()
-            await endpoint.close()
-            await turns()
-
-    return asyncio.run(scene())
-
-
-async def answers_to(endpoint: ControlEndpoint, *parts: bytes) -> list[Any]:
-    """The answers to what a client sends before it sends no more."""
-    reader, writer = await asyncio.open_unix_connection(str(endpoint.path))
-    for part in parts:
-        writer.write(part)
-        await writer.drain()
-        await asyncio.sleep(0)
-    writer.write_eof()
-    answers = [json.loads(line) for line in (await reader.read()).splitlines()]
-    writer.close()
-    return answers
-
-
-async def answer_to(endpoint: ControlEndpoint, *parts: bytes) -> Any:
-    (answer,) = await answers_to(endpoint, *parts)
-    return answer
 
 
 @pytest.mark.parametrize(
@@ -384,13 +285,6 @@ def test_without_the_token_nothing_is_done(first: bytes) -> None:
     assert by_tcp(first, b'{"do": "note", "text": "a"}') == [misuse(TOKEN_FIRST)]
 
 
-def test_a_twin_without_local_sockets_is_found_by_its_announcement(monkeypatch: pytest.MonkeyPatch, own_directory: Path) -> None:
-    monkeypatch.setattr(control, "HAS_LOCAL_SOCKETS", False)
-    monkeypatch.setattr(remote, "HAS_LOCAL_SOCKETS", False)
-    assert asked(None, do.Note("a"), "one") == {"note": "a"}
-    assert list(own_directory.iterdir()) == []
-
-
 # ---------------------------------------------------------------------- coming and going
 
 
@@ -410,112 +304,7 @@ def test_who_never_asks_does_not_hold_up_the_end() -> None:
     assert asyncio.run(scene()) == [b""] * 3
 
 
-def test_only_its_user_can_open_it(own_directory: Path) -> None:
-    async def play(endpoint: ControlEndpoint) -> list[int]:
-        return [stat.S_IMODE(os.stat(path).st_mode) for path in (own_directory, endpoint.path)]
-
-    assert served(play) == [0o700, 0o600]
-
-
-def test_at_the_end_nothing_is_left(own_directory: Path) -> None:
-    async def play(endpoint: ControlEndpoint) -> None: ...
-
-    served(play)
-    assert list(own_directory.iterdir()) == []
-
-
-def test_a_name_has_one_twin() -> None:
-    async def play(endpoint: ControlEndpoint) -> Any:
-        second = ControlEndpoint("twin", Desk())
-        with pytest.raises(Misuse, match=rf"a twin named 'twin' is running already \(process {os.getpid()}\): give .* --name"):
-            await second.open()
-        await second.close()
-        return await answer_to(endpoint, b'{"do": "note", "text": "a"}\n')
-
-    assert served(play) == ok("a")
-
-
-def test_the_socket_of_a_killed_twin_is_replaced(own_directory: Path) -> None:
-    own_directory.mkdir(0o700)
-    with socket.socket(socket.AF_UNIX) as dead:
-        dead.bind(str(own_directory / "twin.control"))
-    assert running() == []
-    assert served(lambda endpoint: answer_to(endpoint, b'{"do": "note", "text": "a"}\n')) == ok("a")
-
-
-def test_a_twin_in_a_directory_that_others_can_write_is_not_believed(own_directory: Path) -> None:
-    own_directory.mkdir()
-    own_directory.chmod(0o777)
-    with pytest.raises(Misuse, match="can be written by other users, so a twin in it may be theirs"):
-        ask(None, do.Note("a"))
-
-
-def test_a_twin_in_a_directory_of_another_user_is_not_believed(own_directory: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    own_directory.mkdir(0o700)
-    owner = os.getuid()
-    monkeypatch.setattr(os, "getuid", lambda: owner + 1)
-    with pytest.raises(Misuse, match="belongs to another user"):
-        running()
-
-
-# ---------------------------------------------------------------------- asking
-
-
-def asked(name: str | None, wanted: command.Command, *names: str) -> Any:
-    """Ask while twins of these names are served."""
-
-    async def scene() -> Any:
-        endpoints = [ControlEndpoint(each, Desk()) for each in names]
-        for endpoint in endpoints:
-            await endpoint.open()
-        try:
-            return await asyncio.to_thread(ask, name, wanted)
-        finally:
-            await turns()
-            for endpoint in endpoints:
-                await endpoint.close()
-            await turns()
-
-    return asyncio.run(scene())
-
-
-def test_the_only_twin_is_asked() -> None:
-    assert asked(None, do.Note("a"), "one") == {"note": "a"}
-
-
-def test_a_twin_is_asked_by_name() -> None:
-    assert asked("two", do.Note("a"), "one", "two") == {"note": "a"}
-
-
-def test_what_the_twin_refuses() -> None:
-    with pytest.raises(Misuse, match="not permitted: 7"):
-        asked(None, do.Note("refuse"), "one")
-    with pytest.raises(Refusal, match="not now"):
-        asked(None, do.Note("deny"), "one")
-
-
-@pytest.mark.parametrize(
-    ("name", "names", "family", "text"),
-    [
-        (None, (), LineFailure, f"no twin is running: {START}"),
-        (None, ("one", "two"), Misuse, "several twins are running: name one: one, two"),
-        ("three", ("one", "two"), LineFailure, "no twin named 'three' is running; running: one, two"),
-        ("three", (), LineFailure, "no twin named 'three' is running; running: none"),
-    ],
-)
-def test_which_twin_is_not_clear(name: str | None, names: tuple[str, ...], family: type[Exception], text: str) -> None:
-    with pytest.raises(family) as failure:
-        asked(name, do.Note("a"), *names)
-    assert str(failure.value) == text
-
-
-def test_a_twin_that_hangs(own_directory: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    own_directory.mkdir(0o700)
-    with socket.socket(socket.AF_UNIX) as hanging:
-        hanging.bind(str(own_directory / "twin.control"))
-        hanging.listen()
-        with pytest.raises(LineFailure, match="the twin 'twin' does not answer: timed out"):
-            ask(None, do.Note("a"), timeout_s=0.02)
+# ---------------------------------------------------------------------- answers that come later
 
 
 def test_an_answer_that_comes_later_keeps_its_place() -> None:

@@ -10,14 +10,14 @@ import pytest
 from tests.live.test_pace import READ_POSITION, Rig, feeder
 
 from steptwin.errors import Misuse, Refusal
+from steptwin.eventloop import result_of
 from steptwin.files.session import session_of
 from steptwin.files.world import World
 from steptwin.live import lookback as module
 from steptwin.live.lookback import Look, Lookback
 from steptwin.live.world import PlacePort
 from steptwin.machine import SECOND, Nanos
-from steptwin.studio.eventloop import result_of
-from steptwin.subject.commands import ReadPoints, State, TakeSnapshot
+from steptwin.subject.commands import ReadPoints, ReadState, TakeSnapshot
 
 Run = Callable[..., Any]
 POINTS = ("x.position", "table.M1.position", "table.IN9", "drum.counter", "time")
@@ -38,7 +38,7 @@ class Back(Rig):
 
     def shown(self) -> tuple[Any, ...]:
         subject = self.control
-        return (subject.do(ReadPoints(POINTS)).value, subject.do(State("table")).value, subject.do(State("drum")).value)
+        return (subject.do(ReadPoints(POINTS)).value, subject.do(ReadState("table")).value, subject.do(ReadState("drum")).value)
 
     async def end(self) -> World:
         await self.lookback.close()
@@ -48,7 +48,7 @@ class Back(Rig):
 async def at(look: Look, moment: Nanos) -> tuple[Any, ...]:
     await result_of(look.go(moment))
     subject = look.subject
-    return (subject.do(ReadPoints(POINTS)).value, subject.do(State("table")).value, subject.do(State("drum")).value)
+    return (subject.do(ReadPoints(POINTS)).value, subject.do(ReadState("table")).value, subject.do(ReadState("drum")).value)
 
 
 def test_every_moment_is_as_it_was_seen_while_the_world_goes_on(run: Run) -> None:

@@ -141,7 +141,7 @@ def test_while_the_device_takes_nothing_nothing_is_read_and_what_is_said_unasked
     async def scene() -> list[tuple[bool, bool]]:
         cell, mic = make_cell()
         transport: Any = Transport()
-        line = serialport._Line(cell, RtuSlavePort({1: mic}), print)
+        line = serialport._SerialProtocol(cell, RtuSlavePort({1: mic}), print)
         line.connection_made(transport)
         seen = []
         for change in (line.pause_writing, line.resume_writing):

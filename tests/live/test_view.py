@@ -144,8 +144,8 @@ def test_a_chip_its_memory_and_its_lines(run: Run) -> None:
     world = World.from_toml(m1486_world(Whole(name="twin"), [7], {"variant": "B"}))
     shown = screen(run, world, 80, 30, b"s70\ra1000\rf6400\ru16\rr\r", kind="raw")
     assert shown[shown.index("chip7        2.0 s  ok") + 1] == "program has nothing to do"
-    assert "M1   6400 microstep   0 microstep/s  at rest" in shown
-    assert any("counter 6400 microstep" in line for line in shown)
+    assert "M1  6400 min. microsteps 0 min. microsteps/s  at rest" in shown
+    assert any("counter 6400 min. microsteps" in line for line in shown)
     assert any("chip7" not in line and "U16" in line for line in shown)
     assert any(line.startswith("B   1 2 3") for line in shown)
 

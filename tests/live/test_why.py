@@ -10,11 +10,11 @@ import pytest
 from tests.live.test_pace import Rig
 
 from steptwin.errors import Misuse, Refusal
+from steptwin.eventloop import result_of
 from steptwin.files.world import World
 from steptwin.later import start
 from steptwin.live import why as module
 from steptwin.live.lookback import Lookback
-from steptwin.studio.eventloop import result_of
 from steptwin.subject.commands import read_command
 from steptwin.why import kept
 

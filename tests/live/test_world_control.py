@@ -60,7 +60,7 @@ def test_a_command_is_done_at_the_present_moment_and_recorded(run: Run) -> None:
         rig.control.do(do.PowerCycle("table"))
         rig.control.do(do.Turn("table", 2, 12))
         assert rig.control.do(command.Encoders("table")).value[1] == {"axis": 2, "counts": 12, "turned_by": "drive"}
-        assert rig.control.do(command.State("drum")).value["kind"] == "m1486"
+        assert rig.control.do(command.ReadState("drum")).value["kind"] == "m1486"
         assert rig.control.do(do.SetFault(read_fault("busy unit=1"))).value == {"name": "busy"}
         rig.control.do(do.ClearFault("busy"))
         assert rig.control.do(command.ListFaults()).value == []
@@ -105,7 +105,7 @@ def test_who_follows_is_told_how_time_goes(run: Run) -> None:
 @pytest.mark.parametrize(
     ("wanted", "message"),
     [
-        (command.State("drumm"), r"no machine is called 'drumm' \(did you mean 'drum'\?\); there are table, drum"),
+        (command.ReadState("drumm"), r"no machine is called 'drumm' \(did you mean 'drum'\?\); there are table, drum"),
         (do.SetFault(read_fault("stuck machine=table pin=table.IN3")), r"name the machine as machine=NAME, and the pin alone"),
         (do.SetFault(read_fault("stall machine=table axis=9")), "axis = 9: permitted are 1 to 4"),
         (do.Press("strat"), "no button is called 'strat'"),

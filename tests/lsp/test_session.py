@@ -231,6 +231,29 @@ def test_completions_fit_what_is_being_typed() -> None:
     assert labels(made, "DELAY 1 ") == []
 
 
+def in_table(table: str, line: int, column: int) -> list[str]:
+    made = session("MOVEPTP @above\nMOVEPTP @below\nMOVEPTP @side\n", machine_csv=table)
+    made.open(CSV, "mic488-positions", 1, table)
+    analysis = made.analysis(CSV)
+    assert analysis is not None
+    start = sum(map(len, table.splitlines(keepends=True)[:line]))
+    return [item.insert or item.label for item in analysis.items(start + column).items]
+
+
+def test_completions_in_every_place_of_a_table() -> None:
+    table = "above;1;2;x;40\n;1;25;x;x\n\nb\nc;2;\n"
+    assert in_table(table, 0, 0) == ["BELOW", "SIDE"]
+    assert in_table(table, 1, 0) == ["BELOW", "SIDE"]
+    assert in_table(table, 0, 6) == ["x", "2"]
+    assert in_table(table, 1, 3) == ["x", "2"]
+    assert in_table(table, 4, 4) == ["x", "25", "2"]
+    row = "${1:x};${2:x};${3:x};${4:x}"
+    assert in_table(table, 2, 0) == [f"BELOW;{row}", f"SIDE;{row}", f"${{5:name}};{row}"]
+    assert in_table(table, 3, 1) == [f"BELOW;{row}", f"b;{row}"]
+    assert in_table("", 0, 0)[-1] == f"${{5:name}};{row}"
+    assert in_table("a;1;2;3;4;5", 0, 11) == []
+
+
 def test_a_completion_replaces_the_word_it_completes() -> None:
     made = session("x = 1\nPABS M1 POS")
     analysis = made.analysis(PRG)

@@ -118,10 +118,14 @@ def test_completions() -> None:
     found = items(WORLD + "\n[[axis]]\nname = 'y'\npi")
     assert {"pitch", "drive"} <= set(found)
     assert "name" not in found
-    assert {"[[use]]", "[[supply]]", "[[follower.switch]]", "[[carriage.switch]]", "[gateway.opcua]"} <= set(items(WORLD + "\n["))
+    assert {"[[use]]", "[[supply]]", "[[follower.switch]]", "[[carriage.switch]]", "[gateway.opcua]", "[gateway.mqtt]"} <= set(
+        items(WORLD + "\n[")
+    )
     assert {"above", "to"} <= set(items(WORLD + "\n[[follower]]\nname = 'k'\n[[follower.switch]]\na"))
     assert items(WORLD + "\n[gateway.prometheus]\nli") == ["listen"]
     assert {"listen", "security"} <= set(items(WORLD + "\n[gateway.opcua]\n"))
+    assert {"broker", "tls", "sparkplug"} <= set(items(WORLD + "\n[gateway.mqtt]\n"))
+    assert items(WORLD + '\n[gateway.mqtt]\nrole = "') == ["viewer", "operator", "engineer"]
     assert items(WORLD + '\n[gateway.opcua]\nsecurity = "') == ["none", "sign", "encrypt"]
     assert {"name", "file"} <= set(items(WORLD + "\n[[use]]\n"))
     with_part = session(WORLD + '\n[[use]]\nfile = "', part_toml="")
@@ -141,6 +145,38 @@ def test_completions() -> None:
     assert items(WORLD + '\n[[transducer]]\nto = "') == ["table.AIN1", "table.AIN2"]
     assert {"from", "until", "to", "bounce"} <= set(items(WORLD + "\n[[shaft.cam]]\n"))
     assert items("# [[axis]]\n[[mic488]]\n# ") == []
+
+
+def test_signals_are_completed_where_conditions_and_steps_name_them() -> None:
+    script = WORLD + "\n[[script]]\nsteps = [\n{ "
+    assert items(script + 'until = "')[:3] == ["table", "bus", "x"]
+    assert "time" in items(script + 'until = "t')
+    assert items(script + 'until = "x.position > 1 and x.') == ["x.position", "x.lost", "x.stalled"]
+    assert items(script + "expect = 'not bus.") == ["bus.idle"]
+    readable = items(script + 'until = "table.M1.st')
+    assert {"table.M1.status", "table.IN1", "table.OUT1", "table.AIN1"} <= set(readable)
+    writable = items(script + 'write = { "table.IN1" = 1, "table.')
+    assert {"table.M1_EN", "table.OUT1"} <= set(writable)
+    assert not {"table.M1.status", "table.IN1"} & set(writable)
+    settable = items(script + 'set = { "table.')
+    assert {"table.IN1", "table.AIN1"} <= set(settable)
+    assert not {"table.M1_EN", "table.OUT1"} & set(settable)
+    assert items(script + 'write = { "') == ["table"]
+    assert items(WORLD + '\n[[collision]]\nwhen = "x.') == ["x.position", "x.lost", "x.stalled"]
+    assert items(script + 'until = "nothing.') == []
+    assert items(script + 'note = "table.') == []
+    assert "within" not in items(script + 'until = "x.position > 1", ')  # a key follows, no signal
+
+
+def test_hovers_of_signals() -> None:
+    analysis = of(session())
+    for mark, text in {
+        "M1_EN": "`table.M1_EN`: ",
+        "M1.status ==": "5 = position error",
+        "position > 10": None,
+    }.items():
+        found = analysis.hover(WORLD.index(mark))
+        assert (found is None) if text is None else (found is not None and text in found.text), (mark, found)
 
 
 def test_hovers() -> None:

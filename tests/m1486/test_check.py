@@ -255,6 +255,10 @@ def test_g_counts_from_what_all_paths_lead_to(text: str, found: list[str]) -> No
     assert codes(text, B) == found
 
 
+def test_commands_that_do_not_concern_the_position_are_not_counted_as_followed() -> None:
+    assert codes("L200\n" + "W1\n" * 30 + "E\nB64\nR\nG640")[-1:] == ["M221"]
+
+
 def test_h_leads_to_0_of_what_the_counter_shows() -> None:
     """The counter shows 2^24 - 64, and the way to 0 is as long: after it G begins one round of 24 bits lower."""
     found = check("=64\nb128\nr\nh\nr\ng64", B).diagnostics

@@ -351,3 +351,15 @@ def test_mic_26_a_position_error_is_cleared_by_disabling_and_by_nothing_less() -
     assert rig.word("M_STATUS") == 1
     rig.coil(EN, False)
     assert (rig.status(), rig.word("M_STATUS"), rig.pins()["ERR"]) == (0, 0, 0.0)
+
+
+@pytest.mark.parametrize(("counts", "corrected"), [(4, False), (-4, False), (5, True), (-5, True)])
+def test_the_tolerance_itself_is_not_corrected(counts: int, corrected: bool) -> None:
+    """The shaft slips by counts of 8 pulses during a move; 4 are permitted."""
+    rig = encoder_rig()
+    rig.set("POS_ABS", 160.0)
+    turn(rig, counts)
+    rig.until(1, REACHED)
+    rig.wait(3.0)
+    assert rig.status() == REACHED
+    assert (motor(rig) == 160) is not corrected

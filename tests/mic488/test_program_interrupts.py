@@ -80,6 +80,22 @@ def test_hardint_waits_for_the_end_of_the_statement() -> None:
     assert [pin for pin in (edge.pin for edge in rig.edges) if pin != "OUT8"] == ["OUT1", "OUT1", "OUT1", "OUT1", "OUT7"]
 
 
+@pytest.mark.parametrize("wait", ["DELAY 0.1", "WAIT IN2 = ON", "M1 = ON\nPABS M1 1\nWAITPOS", "PULSE(OUT3, 0.1)"])
+def test_hardint_during_a_wait_is_not_left_behind_by_a_program_that_runs_ahead(wait: str) -> None:
+    text = f"CFGINT_IN1 = RIS\n{wait}\nWHILE 1 = 1\n$I1 = $I1 + 1\nENDWHILE\n{HANDLER.format(label='HARDINT_IN1')}"
+    ahead, slow = rigs = [started(text) for _ in range(2)]
+    for rig in rigs:
+        rig.wait(0.0203)
+        rig.pin("IN1", 1.0)
+        rig.wait(0.0504)
+        rig.pin("IN2", 1.0)
+    ahead.wait(0.8)  # the kernel advances it to its next change
+    for _ in range(800):
+        slow.wait(0.001)
+    assert ahead.changes("OUT1") == slow.changes("OUT1")
+    assert len(ahead.changes("OUT1")) >= 2
+
+
 @pytest.mark.parametrize(
     ("mode", "expected"), [("RIS", [1, 1, 2, 2]), ("FALL", [0, 1, 1, 2]), ("RIS_FALL", [1, 2, 3, 4]), ("INT_OFF", [0] * 4)]
 )

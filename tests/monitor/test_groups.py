@@ -10,7 +10,7 @@ import pytest
 from steptwin.errors import Misuse
 from steptwin.mic488.registermap import DataType, Type
 from steptwin.mic488.registers import FIRMWARES, register_map
-from steptwin.monitor import NoTextual, monitor
+from steptwin.monitor import monitor
 from steptwin.monitor.groups import groups_of, permitted, shown
 
 
@@ -34,7 +34,7 @@ def test_values_as_people_read_them() -> None:
 
 def test_without_textual_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "textual", None)
-    with pytest.raises(NoTextual, match=r"in a clone 'make extras' installs it, elsewhere 'pip install textual'"):
+    with pytest.raises(Misuse, match=r"in a clone 'make extras' installs it, elsewhere 'pip install textual'"):
         monitor(None, 5.0)
 
 

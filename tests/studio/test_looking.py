@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, TypeVar
 
 import pytest
 from tests.support.studio_rig import OPERATOR, VIEWER, Studio, Tab
@@ -10,6 +11,7 @@ from tests.support.studio_rig import OPERATOR, VIEWER, Studio, Tab
 from steptwin.errors import Refusal
 from steptwin.later import Later
 from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.studio import looking
 from steptwin.subject.debugcommands import (
     Branch,
     ClearBreakpoint,
@@ -21,9 +23,12 @@ from steptwin.subject.debugcommands import (
     StepProgram,
     StopOn,
 )
+from steptwin.subject.following import EventBatch, Filter
 from steptwin.subject.world import WorldSubject
 from steptwin.world.history import History, Past
 from steptwin.world.programtexts import WorldPrograms
+
+T = TypeVar("T")
 
 
 class Kept:
@@ -43,6 +48,21 @@ class Kept:
             raise Refusal("too many")
         self.open_looks += 1
         return _Look(self, Past(self.history), self._studio.subject)
+
+    def events(
+        self, begin: Nanos, end: Nanos, what: Filter, bound: int, at_begin: Callable[[WorldSubject], T]
+    ) -> Later[tuple[T, EventBatch]]:
+        past = Past(self.history)
+        for _ in past.go(begin):
+            pass
+        subject = WorldSubject(past.world)
+        found = at_begin(subject)
+        following = subject.follow(what, bound)
+        for _ in past.go_on(end):
+            pass
+        later = Later[tuple[T, EventBatch]]()
+        later.put((found, following.take()))
+        return later
 
 
 class _Look:
@@ -233,3 +253,32 @@ def test_where_no_past_is_kept_nothing_is_offered() -> None:
     tab = Studio().open()
     assert not {"look", "go_back"} & set(tab.messages[0]["hello"]["may"])
     assert tab.error("look", to_ns="0") == ("refusal", "look: no past is kept here")
+
+
+def test_what_happened_before_a_viewer_came_can_be_asked_for(studio: Studio) -> None:
+    tab = studio.open()
+    found = tab.ok("past_events", from_ns="0", to_ns=str(4 * SECOND), kinds=["plan", "edge"])
+    assert (found["from_ns"], found["to_ns"]) == ("0", str(4 * SECOND))
+    assert found["state"]["table"]["axes"][0]["enabled"] is False
+    assert [plan["plan"]["segments"] for plan in found["plans"]] == [[]] * len(found["plans"])
+    moves = [event for event in found["events"] if event["kind"] == "plan" and event["plan"]["segments"]]
+    assert [(event["time_ns"], event["axis"], event["plan"]["final"]) for event in moves] == [(str(SECOND), "1", 2000)]
+    assert {event["kind"] for event in found["events"]} == {"plan", "edge"}
+    assert tab.ok("read", points=["time"])[0]["value"] == 5.0, "the viewer still looks at the present"
+
+
+def test_how_much_of_the_past_is_read_at_once_is_limited(studio: Studio) -> None:
+    tab = studio.open()
+    studio.run(61_000)
+    for begin, end in ((0, 61 * SECOND), (2 * SECOND, SECOND)):
+        assert tab.error("past_events", from_ns=str(begin), to_ns=str(end)) == (
+            "misuse",
+            f"past_events from {begin / SECOND:g} s to {end / SECOND:g} s: permitted is up to 60 s in one answer",
+        )
+
+
+def test_of_too_many_events_the_last_ones_are_left(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(looking, "MOST_PAST_EVENTS", 1)
+    found = studio.open().ok("past_events", from_ns="0", to_ns=str(4 * SECOND))
+    assert (found["plans"], found["state"], len(found["events"])) == ([], {}, 1)
+    assert found["from_ns"] == found["events"][0]["time_ns"]

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from playwright.sync_api import Page, expect
-from studio_page import Studio, button
+from collections.abc import Callable
+
+import httpx
+from playwright.sync_api import Browser, expect
+from studio_page import Studio, button, enable, tab_to
 from tests.conftest import until
-
-
-def enable(page: Page, axis: str = "M1") -> None:
-    button(page, f"Enable {axis}").click()
-    expect(button(page, f"Enable {axis}")).to_have_attribute("aria-pressed", "true")
+from tests.studio.conftest import Process
 
 
 def test_an_axis_is_enabled_and_moved(studio: Studio) -> None:
@@ -37,6 +36,49 @@ def test_a_jog_lasts_as_long_as_it_is_held(studio: Studio) -> None:
     there = studio.at(1)
     expect(page.get_by_label("M1 position", exact=True)).to_have_text(f"{there:.2f}")
     assert studio.at(1) == there
+
+
+def test_a_program_that_is_in_the_way_of_a_jog_is_paused_there(start_studio: Callable[..., Process], browser: Browser) -> None:
+    studio = Studio(start_studio("--demo"), browser)
+    page = studio.page()
+    jog = button(page, "Jog M1 +")
+    jog.hover()
+    page.mouse.down()
+    expect(page.get_by_role("alert").last).to_contain_text("pause or stop it before an axis is jogged")
+    page.mouse.up()
+    expect(page.get_by_text("table runs its program; to jog:")).to_be_visible()
+    button(page, "Pause the program of table").click()
+    expect(page.get_by_text("table runs its program; to jog:")).to_have_count(0)
+    until(lambda: studio.stands(1), "the axis stands")
+    there = studio.at(1)
+    jog.hover()
+    page.mouse.down()
+    until(lambda: studio.at(1) > there, "the axis jogs")
+    page.mouse.up()
+    studio.close()
+    assert studio.complaints == []
+
+
+def test_a_jog_of_an_idle_world_begins_at_the_present(studio: Studio) -> None:
+    """Nothing has happened for a while: the axis is not put where it would be had it jogged since the last event."""
+    page = studio.page()
+    enable(page)
+    until(lambda: seconds(studio) > 6.0, "nothing happens for some seconds")
+    before = seconds(studio)
+    button(page, "Jog M1 +").hover()
+    page.mouse.down()
+    until(lambda: studio.at(1) > 1, "the axis jogs")
+    there, gone = studio.at(1), seconds(studio) - before
+    page.mouse.up()
+    assert there <= 40.0 * (gone + 0.5), "mm, at no more than 40 mm/s since the button was pressed"
+    assert gone < 5.0
+    until(lambda: studio.stands(1), "the axis stands")
+
+
+def seconds(studio: Studio) -> float:
+    """Of virtual time."""
+    answer = httpx.post(f"{studio.process.url}/api/do/read", json={"points": ["time"]}).json()
+    return answer["ok"][0]["value"]
 
 
 def test_closing_the_page_ends_a_jog(studio: Studio) -> None:
@@ -120,16 +162,6 @@ def test_everything_about_an_axis_can_be_done_with_the_keyboard(studio: Studio) 
     page.keyboard.up("Enter")
     until(lambda: studio.stands(1), "the axis stands")
     assert "Stop all" in names
-
-
-def tab_to(page: Page, name: str) -> list[str]:
-    """With the tab key until that has the focus; the names of what had it."""
-    names: list[str] = []
-    while name not in names:
-        page.keyboard.press("Tab")
-        names.append(page.evaluate("document.activeElement.ariaLabel ?? ''"))
-        assert len(names) < 100, names
-    return names
 
 
 def test_a_chip_has_what_its_data_sheet_has(studio: Studio) -> None:

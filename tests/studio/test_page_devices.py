@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import socket
 from collections.abc import Callable
 from pathlib import Path
@@ -12,8 +13,9 @@ import httpx
 import pytest
 from playwright.sync_api import expect
 from pymodbus.client import ModbusTcpClient
-from studio_page import PICTURES, Studio, button
+from studio_page import PICTURES, Studio, button, serious, show
 from tests.conftest import until
+from tests.peers.conftest import Master
 
 
 def test_a_device_is_found_checked_and_connected(studio: Studio, serve: Callable[..., Any], tmp_path: Path) -> None:
@@ -47,6 +49,70 @@ def test_a_device_is_found_checked_and_connected(studio: Studio, serve: Callable
     assert master.connect()
     assert master.read_holding_registers(10010, count=4, device_id=1).registers == [0, 0, 0, 0]  # nothing moves, all is off
     master.close()
+
+
+def test_a_device_at_a_serial_port_is_connected_moved_and_disconnected(studio: Studio, serve: Callable[..., Any]) -> None:
+    twin = serve()
+    page = studio.page(panel="Devices")
+    address = page.get_by_label("Address of the device")
+    address.fill(f"{twin.pty},unit=1")
+    address.press("Enter")
+    expect(button(page, "Disconnect mic488")).to_be_visible()
+    expect(page.get_by_role("banner").get_by_text("REAL")).to_be_visible()
+    in_tree = page.get_by_role("complementary", name="Controllers").get_by_role("region", name="mic488")
+    expect(in_tree).to_have_css("outline-style", "none")
+
+    show(page, "Axes")
+    client = ModbusTcpClient("127.0.0.1", port=twin.tcp_port)
+    assert client.connect()
+    master = Master(client)
+    assert master.status(1) == 0  # connecting has switched nothing on
+    enable = button(page, "Enable mic488 M1")
+    enable.click()
+    expect(enable).to_have_attribute("aria-pressed", "true")
+    assert master.status(1) != 0
+    jog = button(page, "Jog mic488 M1 +")
+    jog.hover()
+    page.mouse.down()
+    until(lambda: master.sample(1).velocity > 0, "the device moves")
+    expect(in_tree).to_have_css("outline-style", "solid")
+    expect(in_tree.get_by_role("img", name="moving").first).to_be_visible()
+    page.screenshot(path=PICTURES / "device-moving.png")
+    page.mouse.up()
+    until(lambda: master.sample(1).velocity == 0.0, "it stands after the button was let go")
+    expect(in_tree).to_have_css("outline-style", "none")
+    assert studio.stands(1), "the twin beside it has not been told anything"
+    assert studio.at(1) == 0.0
+    client.close()
+
+    show(page, "Devices")
+    button(page, "Disconnect mic488").click()
+    expect(page.get_by_text("No device is connected.")).to_be_visible()
+    expect(in_tree).to_have_count(0)
+    expect(page.get_by_role("banner").get_by_text("REAL")).to_have_count(0)
+
+
+def test_a_twin_is_put_beside_a_device(studio: Studio, serve: Callable[..., Any], tmp_path: Path) -> None:
+    config = tmp_path / "machine.cfg"
+    config.write_text("[Axis0]\nUnit=1\nGear=100\nAcc=400\nDec=400\nVel=40\n")
+    twin = serve("--config", str(config))
+    page = studio.page(panel="Devices", viewport={"width": 1280, "height": 1000}, bypass_csp=True)
+    address = page.get_by_label("Address of the device")
+    address.fill(f"tcp://127.0.0.1:{twin.tcp_port},config={config}")
+    address.press("Enter")
+    button(page, "Put a twin beside mic488").click()
+    beside = page.get_by_role("region", name="Twin beside mic488")
+    expect(beside).to_contain_text("no difference so far")
+    client = ModbusTcpClient("127.0.0.1", port=twin.tcp_port)
+    assert client.connect()
+    Master(client).reals(10052, 30.0)  # VMAX of M1, by a master that the studio does not know
+    expect(beside).to_contain_text("first difference")
+    expect(beside.get_by_role("row", name=re.compile("M1_VMAX"))).to_be_visible()
+    client.close()
+    assert serious(page) == []
+    page.screenshot(path=PICTURES / "devices-shadow.png")
+    button(page, "Remove the twin beside mic488").click()
+    expect(beside).to_have_count(0)
 
 
 @pytest.mark.parametrize("language", ["en-US", "pl-PL"])

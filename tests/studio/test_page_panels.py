@@ -5,23 +5,19 @@ The pictures of `test_pictures` are in build/studio.
 
 from __future__ import annotations
 
-import itertools
 import re
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import httpx
-from playwright.sync_api import Browser, Locator, Page, expect
-from studio_page import Studio, button, show
+from playwright.sync_api import Browser, expect
+from studio_page import Studio, button, downloaded, enable, number, show, virtual_time_ns
 from tests.conftest import until
 from tests.studio.conftest import Process
 
-
-def enable(page: Page, axis: str = "M1") -> None:
-    button(page, f"Enable {axis}").click()
-    expect(button(page, f"Enable {axis}")).to_have_attribute("aria-pressed", "true")
-
+from steptwin.world.elements import ELEMENTS
 
 # ---------------------------------------------------------------------- other panels
 
@@ -38,6 +34,18 @@ def test_overview_says_what_there_is_and_where_programs_connect(studio: Studio) 
     studio.master.move(1, 5.0)
     expect(region).to_contain_text("Alarms")
     expect(region.get_by_role("row", name=re.compile("motion is ignored|not enabled|ignored", re.IGNORECASE))).to_be_visible()
+
+
+def test_overview_counts_what_lines_carry(studio: Studio) -> None:
+    page = studio.page(panel="Overview")
+    bus = page.get_by_role("table", name="Lines").get_by_role("row", name=re.compile("^bus"))
+    expect(bus.get_by_role("cell").nth(4)).to_have_text("0")
+    for _ in range(3):
+        assert studio.master.client.read_holding_registers(9999, count=1, device_id=1).isError()
+    studio.master.words(10052, 2)
+    expect(bus.get_by_role("cell")).to_have_text(["modbus", "1", re.compile(r"\d+"), "4", "▲ 3", "0"])
+    ask(studio, "send", line="chips", text="x7\rf64\r")
+    expect(page.get_by_role("row", name=re.compile("^chips")).get_by_role("cell").nth(3)).to_have_text("2")
 
 
 def test_inputs_are_set_and_forced(studio: Studio) -> None:
@@ -213,51 +221,12 @@ def ask(studio: Studio, request: str, /, **fields: object) -> Any:
     return response.json()["ok"]
 
 
-def virtual_time_ns(studio: Studio) -> int:
-    return round(httpx.get(f"{studio.process.url}/api/points?names=time").json()["ok"][0]["value"] * 1e9)
-
-
 def seconds_text(time_ns: int) -> str:
     """As the page shows it: microseconds, cut off."""
     return f"{time_ns // 1000 / 1e6:.6f}"
 
 
-def test_the_scope_has_the_curve_of_a_move(studio: Studio) -> None:
-    page = studio.page()
-    enable(page)
-    show(page, "Scope")
-    page.get_by_label("Trigger signal").select_option("table.M1.position")
-    page.get_by_label("Trigger level").fill("10")
-    button(page, "Arm").click()
-    expect(page.get_by_text("waiting for the trigger")).to_be_visible()
-    studio.master.move(1, 20.0)
-    expect(page.get_by_text("triggered at")).to_be_visible()
-    expect(button(page, "Follow")).to_have_attribute("aria-pressed", "false")
-    until(lambda: studio.at(1) == 20.0, "the axis is at 20 mm")
-    button(page, "Follow").click()
-    rows = [line.split(",") for line in downloaded(page, "Save as CSV").decode().splitlines()]
-    assert rows[0][:2] == ["time [s]", '"M1 position [mm]"']
-    positions = [float(row[1]) for row in rows[1:] if row[1]]
-    assert (positions[0], positions[-1]) == (0.0, 20.0)
-    assert positions == sorted(positions)
-    moments = [(float(row[0]), float(row[1])) for row in rows[1:] if row[1]]
-    fastest = max((y1 - y0) / (t1 - t0) for (t0, y0), (t1, y1) in itertools.pairwise(moments))
-    assert 39.9 < fastest < 40.1  # mm/s, as the description has it
-    assert downloaded(page, "Save as PNG").startswith(b"\x89PNG")
-    assert b"$var real 64 ! table.M1.position $end" in downloaded(page, "Save as VCD")
-
-
-def number(output: Locator) -> float:
-    return float(output.inner_text().replace("−", "-"))
-
-
-def downloaded(page: Page, name: str) -> bytes:
-    with page.expect_download() as download:
-        button(page, name).click()
-    return download.value.path().read_bytes()
-
-
-def test_frames_are_shown_in_words_and_sent(studio: Studio) -> None:
+def test_frames_are_shown_in_words_and_sent(studio: Studio, tmp_path: Path, require_peer: Callable[[str], str]) -> None:
     page = studio.page(panel="Frames")
     frames = page.get_by_role("region", name="Frames of the lines")
     expect(frames).to_contain_text("No frames yet")
@@ -268,13 +237,20 @@ def test_frames_are_shown_in_words_and_sent(studio: Studio) -> None:
     page.get_by_label("Errors only").check()
     expect(frames.get_by_role("row")).to_have_count(2)
     page.get_by_label("Errors only").uncheck()
+    page.get_by_label("Show frames with").fill("←")
+    expect(frames.get_by_role("img", name="from the controller").first).to_be_visible()
+    expect(frames.get_by_role("img", name="to the controller")).to_have_count(0)
+    page.get_by_label("Show frames with").fill("")
     page.get_by_label("Function code and data (hex)").fill("05 07 D0 FF 00")
     button(page, "Send request").click()
     until(lambda: studio.master.status(1) == 1, "the request has enabled the drive")
     page.get_by_label("Function code and data (hex)").fill("05 7")
     button(page, "Send request").click()
     expect(page.get_by_role("alert").last).to_contain_text("pairs of hexadecimal digits")
-    assert downloaded(page, "Save as pcapng")[:4] == bytes.fromhex("0a0d0d0a")
+    (tmp_path / "frames.pcapng").write_bytes(downloaded(page, "Save as pcapng"))
+    command = [require_peer("tshark"), "-r", str(tmp_path / "frames.pcapng"), "-T", "fields", "-e", "modbus.func_code"]
+    decoded = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
+    assert decoded.count("3") >= 4
     assert b"read M1_POS_ACT = 0 mm" in downloaded(page, "Save as CSV")
 
 
@@ -362,6 +338,79 @@ stroke = 50.0
 from = "clamp.extended"
 to = "cell.IN1"
 """
+
+
+SYMBOLS = """
+[[line]]
+name = "bus"
+tcp = "127.0.0.1:0"
+[[mic488]]
+name = "cell"
+line = "bus"
+[[axis]]
+name = "z"
+drive = "cell.M1"
+pitch = 5.0
+[axis.motor]
+torque = [[0, 1.0]]
+inertia = 0.0001
+when_off = "free"
+[[gate]]
+name = "both"
+kind = "and"
+inputs = ["cell.OUT1", "cell.OUT2"]
+[[latch]]
+name = "kept"
+set = "both.out"
+[[timer]]
+name = "later"
+input = "both.out"
+kind = "on-delay"
+time = "1 s"
+[[counter]]
+name = "parts"
+up = "both.out"
+preset = 3
+[[relay]]
+name = "safety"
+coil = "both.out"
+[[brake]]
+name = "hold"
+axis = "z"
+torque = 0.5
+[[collision]]
+name = "crash"
+when = "z.position > 100"
+[[supply]]
+name = "power"
+feeds = "cell"
+[[transducer]]
+name = "gap"
+of = "z.position"
+to = "cell.AIN1"
+points = [[0, 1], [100, 9]]
+[[vacuum]]
+name = "cup"
+ejector = "cell.OUT3"
+[[load]]
+name = "box"
+axis = "z"
+mass = 2
+"""
+
+
+def test_every_element_is_drawn(start_studio: Callable[..., Process], browser: Browser, tmp_path: Path) -> None:
+    """By a track, or by a symbol of its kind: none has lamps only."""
+    (tmp_path / "symbols.toml").write_text(SYMBOLS)
+    studio = Studio(start_studio("--itself", str(tmp_path / "symbols.toml")), browser)
+    page = studio.page(panel="Machine")
+    expect(page.get_by_role("region", name="box, load")).to_be_visible()
+    drawn = {node.get_attribute("data-symbol") for node in page.locator("[data-symbol]").all()}
+    tracks = {"cylinder", "conveyor", "carriage", "gantry", "shaft", "follower"}
+    elsewhere = {"axis", "button", "wire", "source"}
+    assert drawn | tracks | elsewhere == set(ELEMENTS)
+    studio.close()
+    assert studio.complaints == []
 
 
 def test_elements_show_their_terminals_and_values(start_studio: Callable[..., Process], browser: Browser, tmp_path: Path) -> None:

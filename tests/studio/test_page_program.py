@@ -181,6 +181,54 @@ def test_positions_are_taught(studio: Studio) -> None:
     assert answer["text"] == "HOME;1;x;x;x\nPICK;12.5;x;x;x\n"
 
 
+def test_a_position_is_taught_in_the_panel_of_the_axes(studio: Studio) -> None:
+    studio.master.enable(1)
+    studio.master.move(1, 12.5)
+    page = studio.page(panel="Axes")
+    expect(page.get_by_label("M1 position", exact=True)).to_have_text("12.50")
+    page.get_by_text("Teach position").click()
+    teaching = page.get_by_role("group", name="Teach position of table")
+    for axis in ("M2", "M3", "M4"):
+        teaching.get_by_label(axis, exact=True).uncheck()
+
+    def teach(name: str) -> None:
+        teaching.get_by_label("Row", exact=True).fill(name)
+        button(page, "Take position").first.click()
+        expect(page.get_by_text(f"{name} is in table")).to_be_visible()
+
+    teach("PICK")
+    teach("PLACE")
+    button(page, "Open beside").click()
+    page.get_by_label("Panel", exact=True).last.select_option(label="Program")
+    choose(page, "table/positions-0.csv")
+    table = text_of(page, "cell.csv")
+    expect(table).to_contain_text("HOME;1;x;x;xPICK;12.5;x;x;xPLACE;12.5;x;x;x")
+    choose(page, "table/program-0.prg")
+    teach("THERE")  # into the open editor
+    expect(table).to_contain_text("PLACE;12.5;x;x;xTHERE;12.5;x;x;x")
+    button(page, "Download cell.csv into table").click()
+    expect(page.get_by_text("cell.csv is in table now.")).to_be_visible()
+
+
+def test_the_memory_that_a_text_takes_is_shown(studio: Studio) -> None:
+    page = studio.page(panel="Program")
+    memory = findings(page)
+    expect(memory).to_contain_text("Program bank 3 / 4000 statements")
+    expect(memory).to_contain_text("Statements in an image 48 bytes")
+    write(page, "$R4 = 7\nEND\n")
+    expect(memory.get_by_label("Program bank")).to_have_attribute("value", "2")
+    write(page, "$R4 = \n")
+    expect(memory).to_contain_text("Known for a text without errors.")
+    choose(page, "table/positions-0.csv")
+    expect(memory).to_contain_text("Position bank 2 /")
+    expect(memory).to_contain_text("Positions in an image 36 bytes")
+    choose(page, "drum/program.m1486")
+    expect(memory).to_contain_text("0 / 254 bytes")
+    text_of(page, "program").click()
+    page.keyboard.type("f640\nr\n")
+    expect(memory).to_contain_text("5 / 254 bytes")
+
+
 def test_a_chip_is_given_a_program_and_typed_to(studio: Studio) -> None:
     page = studio.page(panel="Program")
     choose(page, "drum/program.m1486")

@@ -27,7 +27,7 @@ EXAMPLES: list[tuple[dict[str, Any], command.Command]] = [
     ({"do": "read", "points": ["table.M1.position", "time"]}, command.ReadPoints(("table.M1.position", "time"))),
     ({"do": "pins"}, command.ReadPins()),
     ({"do": "pins", "machine": "a"}, command.ReadPins("a")),
-    ({"do": "state", "machine": "a"}, command.State("a")),
+    ({"do": "state", "machine": "a"}, command.ReadState("a")),
     ({"do": "encoders", "machine": "a"}, command.Encoders("a")),
     ({"do": "faults"}, command.ListFaults()),
     ({"do": "fault_kinds"}, command.ListFaultKinds()),
@@ -99,8 +99,8 @@ EXAMPLES: list[tuple[dict[str, Any], command.Command]] = [
     ({"do": "evaluate", "machine": "a", "expression": "n + 1"}, debug.Evaluate("a", "n + 1")),
     ({"do": "set_value", "machine": "a", "name": "n", "expression": "7"}, debug.SetValue("a", "n", "7")),
     ({"do": "program_source", "machine": "a", "program": "program"}, debug.ProgramSource("a", "program")),
-    ({"do": "why"}, debug.Why()),
-    ({"do": "why", "question": "OUT3 == 0", "at_ns": "5"}, debug.Why("OUT3 == 0", 5)),
+    ({"do": "why"}, debug.AskWhy()),
+    ({"do": "why", "question": "OUT3 == 0", "at_ns": "5"}, debug.AskWhy("OUT3 == 0", 5)),
 ]
 
 

@@ -14,8 +14,8 @@ from steptwin.subject.commands import (
     Enable,
     ListSnapshots,
     Move,
+    ReadState,
     RestoreSnapshot,
-    State,
     TakeSnapshot,
 )
 from steptwin.subject.following import filter_of
@@ -44,16 +44,16 @@ def test_what_happened_since_is_undone_and_goes_on_alike() -> None:
     world = World.from_toml(TEXT)
     subject = moving_in(world)
     assert subject.do(TakeSnapshot()).value == {"name": "1", "time_ns": "1000000000"}
-    before = subject.do(State("m")).value
+    before = subject.do(ReadState("m")).value
     subject.do(Advance(duration=SECOND))
-    after, digest = subject.do(State("m")).value, session_of(world).digest
+    after, digest = subject.do(ReadState("m")).value, session_of(world).digest
     subject.do(Set((("m", "IN3", 1.0),)))
     subject.do(Advance(duration=SECOND))
     result = subject.do(RestoreSnapshot("1"))
     assert (result.time, result.value["time_ns"], result.value["paused"]) == (SECOND, "1000000000", True)
-    assert subject.do(State("m")).value == before != after
+    assert subject.do(ReadState("m")).value == before != after
     subject.do(Advance(duration=SECOND))
-    assert subject.do(State("m")).value == after
+    assert subject.do(ReadState("m")).value == after
     # What was set since is no part of the session.
     assert session_of(world).digest == digest == session_of(world).replay().trace.digest()
 

@@ -13,7 +13,7 @@ import pytest
 from steptwin import World
 from steptwin.controllerstate import ProgramActivity, StatusLevel, read_state
 from steptwin.datasheet import FactType, plain
-from steptwin.subject.commands import Enable, Move, State
+from steptwin.subject.commands import Enable, Move, ReadState
 from steptwin.subject.schema import definitions
 from steptwin.subject.world import WorldSubject
 from steptwin.world.script import Send, Set
@@ -44,7 +44,7 @@ line = "chips"
 
 def state(subject: WorldSubject, name: str) -> dict[str, Any]:
     """As it goes over a wire."""
-    return json.loads(json.dumps(subject.do(State(name)).value))
+    return json.loads(json.dumps(subject.do(ReadState(name)).value))
 
 
 @pytest.mark.parametrize("path", WORLDS, ids=lambda path: path.stem)

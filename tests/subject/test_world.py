@@ -108,7 +108,7 @@ def test_a_description_survives_json_and_names_points_that_can_be_read() -> None
     assert (velocity.unit, velocity.limits) == (f"{axis.unit}/s", Limits(-fastest, fastest))
     to, by = takes["move", "drum", 1]
     assert (to.limits, by.limits) == (Limits(0, 16_000_000), Limits(-16_000_000, 16_000_000))
-    assert (to.unit, by.is_optional) == ("microstep", True)
+    assert (to.unit, by.is_optional) == ("min. microsteps", True)
     assert takes["program", "table", None][0].values == ("start", "pause", "stop")
     assert (takes["stop", "table", None], takes["stop", "table", 4]) == ((), ())
     assert ("home", "drum", 1) not in takes
@@ -255,7 +255,7 @@ DEEDS = st.one_of(
     st.builds(Download, st.just("table"), st.sampled_from(["program 0", "positions 1"]), st.sampled_from(TEXTS)),
     st.builds(Download, st.just("drum"), st.just("program"), st.sampled_from(TEXTS)),
     st.builds(command.ReadPins),
-    st.builds(command.State, st.sampled_from(["table", "drum"])),
+    st.builds(command.ReadState, st.sampled_from(["table", "drum"])),
     st.tuples(st.just("bus"), st.sampled_from([READ_POSITION, READ_POSITION[:3], b"\0"])),
     st.tuples(st.just("chips"), st.sampled_from([b"x3\rf640\rr\r", b"?\r"])),
 )
@@ -334,7 +334,7 @@ def test_an_m1486_is_commanded_by_what_its_host_types() -> None:
     subject.do(command.Jog("lift", 1, -6400.0))
     assert "v100\rg-\rr\r" in typed()
     subject.do(command.Advance(duration=SECOND))
-    assert subject.read("lift.velocity") == (("lift.velocity", -6400.0, "microstep/s", "good"),)
+    assert subject.read("lift.velocity") == (("lift.velocity", -6400.0, "min. microsteps/s", "good"),)
     subject.do(command.StopAxes("lift"))
     subject.do(command.Advance(until="idle"))
     assert subject.read("lift.moving")[0].value == 0.0
@@ -343,15 +343,15 @@ def test_an_m1486_is_commanded_by_what_its_host_types() -> None:
 @pytest.mark.parametrize(
     ("wanted", "message"),
     [
-        (command.Move("lift", 1, to=0.5), "position 0.5 microstep: a whole number is needed"),
+        (command.Move("lift", 1, to=0.5), "position 0.5 min. microsteps: a whole number is needed"),
         (
             command.Move("lift", 1, by=16_000_064.0),
-            r"microstep: F16000064 is out of range: permitted is 1 to",
+            r"microsteps: F16000064 is out of range: permitted is 1 to",
         ),
-        (command.Move("lift", 1, by=7.0), "distance 7 microstep: no multiple of"),
-        (command.Move("lift", 1, by=0.0), "distance 0 microstep: F0 is out of range: permitted is 1 to"),
+        (command.Move("lift", 1, by=7.0), "distance 7 min. microsteps: no multiple of"),
+        (command.Move("lift", 1, by=0.0), "distance 0 min. microsteps: F0 is out of range: permitted is 1 to"),
         (command.Move("lift", 2, by=640.0), "no axis 2: an M1486 has one, 1"),
-        (command.Jog("lift", 1, 640.0), "velocity 640 microstep/s, V10: V10 is out of range: permitted is 16 to"),
+        (command.Jog("lift", 1, 640.0), "velocity 640 min. microsteps/s, V10: V10 is out of range: permitted is 16 to"),
         (command.Home("lift", 1, 5.0), "'lift' is an M1486, which cannot do home; it can do move, jog, stop"),
         (command.Enable("lift", 1), "cannot do enable"),
     ],

@@ -18,6 +18,7 @@ from steptwin.drivers.m1486.talk import ChipRequest
 from steptwin.drivers.tasks import TaskLine
 from steptwin.drivers.threads import ThreadLine
 from steptwin.m1486 import chip as twin
+from steptwin.m1486.events import M1486Event
 from steptwin.m1486.line import SerialChain
 from steptwin.m1486.variants import variant
 
@@ -75,7 +76,7 @@ class ChipWire(VirtualWire):
         }
         self.chain = SerialChain(self.chips.values())
         self._port = self.chain.port()
-        self.happened: list[tuple[int, twin.M1486Event]] = []
+        self.happened: list[tuple[int, M1486Event]] = []
         for address, chip in self.chips.items():
             chip.advance(self.now)
             chip.on_event = lambda event, address=address: self.happened.append((address, event))

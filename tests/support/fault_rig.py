@@ -5,14 +5,15 @@ from __future__ import annotations
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488Device
-from steptwin.wire.gateway import Gateway, TcpGatewayPort
+from steptwin.wire.gateway import ModbusGateway, TcpGatewayPort
 from steptwin.wire.line import SerialLine
 from steptwin.wire.slave import RtuSlavePort, TcpSlavePort
 from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
 from steptwin.world.faults import ActiveFault, Faults, FaultyPort, LineProtocol, read, rig
-from steptwin.world.kernel import Kernel, PinName
+from steptwin.world.kernel import Kernel
 from steptwin.world.kinds.mic488.faults import Mic488Body
 from steptwin.world.trace import TraceRecord
+from steptwin.world.wires import PinName
 
 READ = bytes.fromhex("03 00 63 00 02")
 """Two user registers from 99 on; 100 holds 1234H."""
@@ -64,7 +65,7 @@ class FaultRig:
         self.records: list[TraceRecord] = []
         self.faults.sinks.append(self.records.append)
         if line is LineProtocol.TCP and is_timed:
-            self.inner = TcpGatewayPort(Gateway(TimedUnits(self.devices, LineTiming(SerialLine(9600)))))
+            self.inner = TcpGatewayPort(ModbusGateway(TimedUnits(self.devices, LineTiming(SerialLine(9600)))))
         elif line is LineProtocol.TCP:
             self.inner = TcpSlavePort(self.devices)
         elif is_timed:

@@ -15,8 +15,10 @@ from tests.conftest import STEPTWIN, until
 
 from steptwin import World
 from steptwin.errors import LineFailure
+from steptwin.gateways.contract import PastValues
 from steptwin.subject import commands as command
 from steptwin.subject.contract import Description, Reading, Result
+from steptwin.subject.events import Event
 from steptwin.subject.following import Filter, Following
 from steptwin.subject.jogs import Held, WorldJogs
 from steptwin.subject.world import WorldSubject
@@ -29,6 +31,7 @@ class GatewayWorld:
         self.world = World.from_toml(text)
         self.inner = WorldSubject(self.world)
         self.jogs = WorldJogs(self.inner)
+        self.past: PastValues | None = None
         self.silent: set[str] = set()
         self.done: list[command.Command] = []
 
@@ -41,7 +44,7 @@ class GatewayWorld:
 
     async def do(self, wanted: command.Command, /) -> Result:
         self.done.append(wanted)
-        if isinstance(wanted, command.State) and wanted.machine in self.silent:
+        if isinstance(wanted, command.ReadState) and wanted.machine in self.silent:
             raise LineFailure("no answer")
         return self.inner.do(wanted)
 
@@ -51,32 +54,42 @@ class GatewayWorld:
     def follow(self, what: Filter, bound: int) -> Following:
         return self.inner.follow(what, bound)
 
+    def plans(self, what: Filter) -> list[Event]:
+        return self.inner.plans(what)
+
 
 @contextmanager
-def served(text: str, folder: Path, *options: str) -> Generator[Mapping[str, Mapping[str, Any]]]:
+def served(text: str, folder: Path, *options: str, is_quiet: bool = True) -> Generator[Mapping[str, Mapping[str, Any]]]:
     """The end points of the description ``text`` by kind, while ``steptwin up`` serves it; it ends without an error."""
     (folder / "hall.toml").write_text(text)
-    with running(folder, "up", "hall.toml", *options) as found:
+    with running(folder, "up", "hall.toml", *options, is_quiet=is_quiet) as found:
         yield found
 
 
 @contextmanager
-def running(folder: Path, *arguments: str) -> Generator[Mapping[str, Mapping[str, Any]]]:
-    """The end points of ``steptwin`` with these arguments by kind, while it runs; it ends without an error."""
+def running(folder: Path, *arguments: str, is_quiet: bool = True) -> Generator[Mapping[str, Mapping[str, Any]]]:
+    """The end points of ``steptwin`` with these arguments by kind, while it runs; it ends without an error, and without a
+    notice of a gateway where it ``is_quiet``. What it tells is in the files ``output`` and ``errors``."""
     ready = folder / f"{arguments[0]}.json"
+    output, errors = (folder / "output").open("wb"), (folder / "errors").open("wb")
     environment = {**os.environ, "XDG_RUNTIME_DIR": str(folder), "XDG_STATE_HOME": str(folder)}
     process = subprocess.Popen(
         [STEPTWIN, *arguments, "--ready-file", str(ready)],
         cwd=folder,
         env=environment,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        encoding="utf-8",
+        stdout=output,
+        stderr=errors,
     )
     try:
         until(lambda: ready.exists() or process.poll() is not None, "it is ready")
-        yield {point["kind"]: point for point in json.loads(ready.read_text())["end_points"]}
+        assert process.poll() is None, (folder / "errors").read_text()
+        found = json.loads(ready.read_text())
+        yield {point["kind"]: {**point, "pid": found["pid"]} for point in found["end_points"]}
     finally:
         process.send_signal(signal.SIGINT)
-        _, errors = process.communicate(timeout=60)
-    assert (process.returncode, errors) == (0, "")
+        process.wait(60)
+        output.close()
+        errors.close()
+    told = (folder / "errors").read_text()
+    assert (process.returncode, told) == (0, "")
+    assert not is_quiet or "[gateway." not in (folder / "output").read_text()

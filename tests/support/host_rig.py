@@ -14,7 +14,7 @@ from line_rig import LATENCY, MemoryChannel, MemoryEndpoint, MemoryTransport, Vi
 from steptwin.drivers import AsyncMic488, Mic488
 from steptwin.drivers.exchange import Exchanger
 from steptwin.drivers.mic488.frames import FrameWords
-from steptwin.drivers.modbus import Query, RtuMaster, TcpMaster
+from steptwin.drivers.modbus import ModbusQuery, RtuMaster, TcpMaster
 from steptwin.drivers.tasks import TaskLine
 from steptwin.drivers.threads import ThreadLine
 from steptwin.machine import MILLISECOND
@@ -194,7 +194,7 @@ def fill(wire: Wire) -> None:
         wire.twin.user[number] = number
 
 
-def _exchanger(wire: Wire, interval: int, log: list[str] | None) -> tuple[Exchanger[Query, bytes], dict[str, object]]:
+def _exchanger(wire: Wire, interval: int, log: list[str] | None) -> tuple[Exchanger[ModbusQuery, bytes], dict[str, object]]:
     notes: dict[str, object] = {"tcp": wire.tcp}
     observer = None
     if log is not None:
@@ -206,14 +206,14 @@ def _exchanger(wire: Wire, interval: int, log: list[str] | None) -> tuple[Exchan
     return Exchanger(discipline, "memory", interval), notes
 
 
-def thread_line(wire: Wire, *, interval: int = INTERVAL, log: list[str] | None = None) -> ThreadLine[Query, bytes]:
+def thread_line(wire: Wire, *, interval: int = INTERVAL, log: list[str] | None = None) -> ThreadLine[ModbusQuery, bytes]:
     exchanger, notes = _exchanger(wire, interval, log)
     line = ThreadLine(MemoryEndpoint(wire), exchanger, clock=wire.clock, sleeping=wire.sleep)
     line.notes.update(notes)
     return line
 
 
-def task_line(wire: Wire, *, interval: int = INTERVAL, log: list[str] | None = None) -> TaskLine[Query, bytes]:
+def task_line(wire: Wire, *, interval: int = INTERVAL, log: list[str] | None = None) -> TaskLine[ModbusQuery, bytes]:
     exchanger, notes = _exchanger(wire, interval, log)
     line = TaskLine(MemoryEndpoint(wire), exchanger)
     line.notes.update(notes)
@@ -229,7 +229,7 @@ def driver(wire: Wire, unit: int = 1, *, log: list[str] | None = None, **options
     return mic
 
 
-def async_driver(line: TaskLine[Query, bytes], wire: Wire, unit: int = 1, **options: Any) -> AsyncMic488:
+def async_driver(line: TaskLine[ModbusQuery, bytes], wire: Wire, unit: int = 1, **options: Any) -> AsyncMic488:
     options.setdefault("config", wire.config)
     options.setdefault("firmware", wire.twin.firmware.name)
     return AsyncMic488(line, unit, **options)

@@ -22,7 +22,8 @@ from steptwin.wbc.check import check
 from steptwin.wbc.dialect import dialect_for
 from steptwin.wbc.positions import PositionTable, parse_positions
 from steptwin.world.contacts import PositionSwitch, place
-from steptwin.world.kernel import Kernel, PinName
+from steptwin.world.kernel import Kernel
+from steptwin.world.wires import PinName
 
 OFFSETS = {"1.23": 1000, "1.40": 10000, "1.70": 10000}
 

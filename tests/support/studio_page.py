@@ -8,6 +8,8 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+import httpx
+import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 from pymodbus.client import ModbusTcpClient
 from tests.peers.conftest import Master
@@ -65,3 +67,47 @@ def show(page: Page, panel: str) -> None:
 
 def button(page: Page, name: str) -> Locator:
     return page.get_by_role("button", name=name, exact=True)
+
+
+def serious(page: Page) -> list[str]:
+    """What axe finds wrong on a page that was opened with ``bypass_csp``; without axe-core the test is skipped."""
+    if not AXE.exists():
+        pytest.skip("axe-core is not installed; 'make types' installs it")
+    if page.evaluate("typeof axe === 'undefined'"):
+        page.add_script_tag(path=AXE)
+    page.wait_for_function("document.fonts.status === 'loaded'")
+    result = page.evaluate("() => axe.run(document, {resultTypes: ['violations']})")
+    return [
+        f"{violation['id']}: {violation['help']}: {'; '.join(str(node['target']) for node in violation['nodes'][:4])}"
+        for violation in result["violations"]
+        if violation["impact"] in ("serious", "critical")
+    ]
+
+
+def tab_to(page: Page, name: str) -> list[str]:
+    """With the tab key until that has the focus; the names of what had it."""
+    names: list[str] = []
+    while name not in names:
+        page.keyboard.press("Tab")
+        names.append(page.evaluate("document.activeElement.ariaLabel ?? ''"))
+        assert len(names) < 200, names
+    return names
+
+
+def enable(page: Page, axis: str = "M1") -> None:
+    button(page, f"Enable {axis}").click()
+    expect(button(page, f"Enable {axis}")).to_have_attribute("aria-pressed", "true")
+
+
+def virtual_time_ns(studio: Studio) -> int:
+    return round(httpx.get(f"{studio.process.url}/api/points?names=time").json()["ok"][0]["value"] * 1e9)
+
+
+def number(output: Locator) -> float:
+    return float(output.inner_text().replace("−", "-"))
+
+
+def downloaded(page: Page, name: str) -> bytes:
+    with page.expect_download() as download:
+        button(page, name).click()
+    return download.value.path().read_bytes()

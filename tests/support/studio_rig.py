@@ -14,15 +14,15 @@ from steptwin.access.audit import Audit
 from steptwin.access.control import Viewer
 from steptwin.access.roles import Role
 from steptwin.access.tokens import AccessGate, Token
+from steptwin.devices.composite import CompositeSubject
+from steptwin.devices.worldpart import WorldPart
 from steptwin.errors import Misuse, Refusal
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND, Nanos
-from steptwin.studio.hub import Hub, Moment, Surroundings
+from steptwin.studio.hub import Hub, PresentMoment, Surroundings
 from steptwin.studio.looking import KeptPast
 from steptwin.studio.schema import schema
 from steptwin.studio.session import ViewerSession
-from steptwin.studio.shown import Shown
-from steptwin.studio.shownworld import ShownWorld
 from steptwin.subject.jogs import WorldJogs
 from steptwin.subject.world import WorldSubject
 from steptwin.world.programtexts import WorldPrograms, configuration_text
@@ -133,7 +133,7 @@ class Studio:
         self.errors: list[Exception] = []
         gate = AccessGate(TOKENS) if tokens else AccessGate(open_to=Role.ENGINEER)
         around = Surroundings(
-            moment=lambda: Moment(self.world.now, running=True, speed=self.speed),
+            moment=lambda: PresentMoment(self.world.now, running=True, speed=self.speed),
             gate=gate,
             audit=Audit(lambda: "2026-01-01T00:00:00Z"),
             program="0",
@@ -144,8 +144,8 @@ class Studio:
             work=NoWork(),
             on_internal=self.errors.append,
         )
-        world = ShownWorld(self.subject, self.subject.followers, self.jogs)
-        shown = Shown(world, lambda: self.world.now, self.subject.numbering)
+        world = WorldPart(self.subject, self.subject.followers, self.jogs)
+        shown = CompositeSubject(world, lambda: self.world.now, self.subject.numbering)
         self.hub = Hub(shown, shown, around)
         self.now: Nanos = 5 * SECOND
         """Of the wall clock."""

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+
 import pytest
 from why_worlds import PROGRAM, WAITS
 
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND
-from steptwin.why import states
+from steptwin.why import courses, log, states
 from steptwin.why.question import Why
 from steptwin.world import script as do
+from steptwin.world.plant import Plant, RecordedInput
 
 COUNTS = "n = 0\n$I5 = 0\nMAIN:\n    n = n + 1\n    $I4 = n\n    DELAY 0.3\n    IF n = 7\n        $I5 = 1\n    ENDIF\nJUMP MAIN\n"
 WORLD = '[[mic488]]\nname = "m"\nprogram = "m.prg"\nstart = true\n'
@@ -46,3 +49,59 @@ def test_as_many_states_are_kept_as_may_be() -> None:
     assert moments == sorted(moments, reverse=True)
     assert moments[0] > 680 * SECOND
     assert moments[-1] == 0
+
+
+@pytest.fixture
+def runs(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """The ends of the parts of the past that are run again."""
+    found: list[int] = []
+
+    def in_parts(world: Plant, inputs: Sequence[RecordedInput], end: int) -> Iterator[bool]:
+        found.append(end)
+        return log.in_parts(world, inputs, end)
+
+    monkeypatch.setattr(courses, "in_parts", in_parts)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("first", "then", "lacking"),
+    [
+        ("m.USER_REGISTER[6]", "m.USER_REGISTER[6]", 0),
+        ("m.USER_REGISTER[6]", "m.USER_REGISTER[6] > 5", 0),
+        ("m.M1.status", "m.M1.status == 3 or m.M4.status == 3", 1),
+        ("time > 1.5", "time > 1.5", 0),
+    ],
+)
+def test_what_a_question_showed_is_remembered(first: str, then: str, lacking: int, runs: list[int]) -> None:
+    expected = counting().ask(then)
+    past = counting()
+    past.ask(first)
+    runs.clear()
+    assert past.ask(then) == expected
+    assert len(runs) == lacking
+
+
+def test_what_is_remembered_is_bounded(runs: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
+    past = counting()
+    monkeypatch.setattr(courses, "MOST_REMEMBERED", 5)
+    first = past.ask("m.USER_REGISTER[6]")
+    needed = len(runs)
+    assert needed > 5
+    assert past.ask("m.USER_REGISTER[6]") == first
+    assert len(runs) == 2 * needed
+
+
+def test_a_condition_of_a_pin_and_a_register() -> None:
+    world = World.from_toml(
+        WORLD + '[[button]]\nname = "go"\nto = "m.IN1"\n', {"m.prg": b"$I4 = 5\nWAIT IN1 = ON\nDELAY 0.5\n$I4 = 7\n"}
+    )
+    world.run(1.0)
+    world.apply_input(do.Press("go"))
+    world.run(for_=2.0)
+    past = world.past
+    assert past.ask("m.USER_REGISTER[4] == 5 and m.IN1", 1_200 * MILLISECOND).since == SECOND
+    assert past.ask("m.USER_REGISTER[4] == 5 and go", 1_200 * MILLISECOND).since == SECOND
+    last = past.ask("m.USER_REGISTER[4] == 5 and m.IN1").since
+    assert last is not None
+    assert 1_500 * MILLISECOND < last < 1_600 * MILLISECOND

@@ -7,7 +7,7 @@ import pytest
 
 from steptwin.wire import mbap
 from steptwin.wire.crc import with_crc
-from steptwin.wire.gateway import QUEUE_REQUESTS, Gateway, GatewayPort, ScriptPort, TcpGatewayPort
+from steptwin.wire.gateway import QUEUE_REQUESTS, GatewayPort, ModbusGateway, ScriptPort, TcpGatewayPort
 from steptwin.wire.line import SerialLine
 from steptwin.wire.rtu import BURSTY_GAP_NS
 from steptwin.wire.slave import FrameDirection
@@ -50,7 +50,7 @@ def bank(new_bank: NewBank) -> Any:
 
 
 def test_mic_32_a_request_takes_the_time_of_the_line_behind_the_gateway(bank: Any) -> None:
-    port = TcpGatewayPort(Gateway(TimedUnits({1: bank}, TIMING)))
+    port = TcpGatewayPort(ModbusGateway(TimedUnits({1: bank}, TIMING)))
     assert port.exchange(ask(7), 1000) == b""
     assert port.deadline() == 1000 + REQUEST_NS
     assert run(10**9, port) == [[(1000 + SENT, answered(7))]]
@@ -59,7 +59,7 @@ def test_mic_32_a_request_takes_the_time_of_the_line_behind_the_gateway(bank: An
 
 
 def test_mic_32_requests_wait_for_their_turn_in_the_order_in_which_they_came(bank: Any) -> None:
-    gateway = Gateway(TimedUnits({1: bank}, TIMING))
+    gateway = ModbusGateway(TimedUnits({1: bank}, TIMING))
     first, second = TcpGatewayPort(gateway), TcpGatewayPort(gateway)
     first.exchange(ask(1) + ask(2), 0)
     second.exchange(ask(3), 0)
@@ -71,7 +71,7 @@ def test_mic_32_requests_wait_for_their_turn_in_the_order_in_which_they_came(ban
 
 
 def test_mic_32_what_finds_the_queue_full_is_refused_as_busy(bank: Any) -> None:
-    gateway = Gateway(TimedUnits({1: bank}, TIMING))
+    gateway = ModbusGateway(TimedUnits({1: bank}, TIMING))
     first, second = TcpGatewayPort(gateway), TcpGatewayPort(gateway)
     refused = first.exchange(b"".join(ask(n) for n in range(QUEUE_REQUESTS + 1)), 0)
     assert refused == answered(QUEUE_REQUESTS, bytes.fromhex("83 06"))
@@ -83,7 +83,7 @@ def test_mic_32_what_finds_the_queue_full_is_refused_as_busy(bank: Any) -> None:
 
 def test_mic_32_a_gateway_waits_while_the_controller_serves_another_port(bank: Any) -> None:
     units = TimedUnits({1: bank}, TIMING)
-    port, serial = TcpGatewayPort(Gateway(units)), TimedRtuSlavePort(units)
+    port, serial = TcpGatewayPort(ModbusGateway(units)), TimedRtuSlavePort(units)
     serial.exchange(b"\x01" + READ + bytes.fromhex("94 0b"), 0)
     run(REQUEST_NS, serial)
     port.exchange(ask(1), REQUEST_NS)
@@ -94,7 +94,7 @@ def test_mic_32_a_gateway_waits_while_the_controller_serves_another_port(bank: A
 
 
 def test_requests_of_a_connection_that_is_gone_are_not_executed(bank: Any) -> None:
-    gateway = Gateway(TimedUnits({1: bank}, TIMING))
+    gateway = ModbusGateway(TimedUnits({1: bank}, TIMING))
     gone, port = TcpGatewayPort(gateway), TcpGatewayPort(gateway)
     gone.exchange(ask(1), 0)
     gone.close()
@@ -105,7 +105,7 @@ def test_requests_of_a_connection_that_is_gone_are_not_executed(bank: Any) -> No
 
 def test_mic_2_a_broadcast_is_executed_by_all_units_in_its_turn_and_not_answered(new_bank: NewBank) -> None:
     banks = {unit: new_bank() for unit in (1, 2)}
-    port = TcpGatewayPort(Gateway(TimedUnits(banks, TIMING)))
+    port = TcpGatewayPort(ModbusGateway(TimedUnits(banks, TIMING)))
     write = bytes.fromhex("06 00 05 00 63")
     port.exchange(ask(1, 0, write) + ask(2, 0) + ask(3), 0)
     ((_, told),) = run(10**9, port)[0]
@@ -116,7 +116,7 @@ def test_mic_2_a_broadcast_is_executed_by_all_units_in_its_turn_and_not_answered
 
 @pytest.mark.parametrize(("units", "asked", "code"), [([1], 2, 0x0B), ([1, 2], 255, 0x0B), ([1], 0, 0), ([1], 255, 0)])
 def test_mic_23_units_behind_a_gateway(new_bank: NewBank, units: list[int], asked: int, code: int) -> None:
-    port = TcpGatewayPort(Gateway(TimedUnits({unit: new_bank() for unit in units}, TIMING)))
+    port = TcpGatewayPort(ModbusGateway(TimedUnits({unit: new_bank() for unit in units}, TIMING)))
     now = port.exchange(ask(5, asked), 0)
     later = b"".join(told for _, told in run(10**9, port)[0])
     expected = answered(5, bytes((0x83, code)) if code else TOLD, asked)
@@ -124,7 +124,7 @@ def test_mic_23_units_behind_a_gateway(new_bank: NewBank, units: list[int], aske
 
 
 def test_requests_of_scripts_and_of_clients_share_the_line(bank: Any) -> None:
-    gateway = Gateway(TimedUnits({1: bank}, TIMING))
+    gateway = ModbusGateway(TimedUnits({1: bank}, TIMING))
     script, client = ScriptPort(gateway), TcpGatewayPort(gateway)
     frame = b"\x01" + READ + bytes.fromhex("94 0b")
     assert script.exchange(frame * 12 + frame[:4], 0) == b""
@@ -137,7 +137,7 @@ def test_requests_of_scripts_and_of_clients_share_the_line(bank: Any) -> None:
 
 def test_scripts_address_as_on_a_line(new_bank: NewBank) -> None:
     banks = {unit: new_bank() for unit in (1, 2)}
-    script = ScriptPort(Gateway(TimedUnits(banks, TIMING)))
+    script = ScriptPort(ModbusGateway(TimedUnits(banks, TIMING)))
     for text in ("00 06 00 05 00 63", "03 06 00 05 00 63", "00 03 00 05 00 01"):
         script.exchange(with_crc(bytes.fromhex(text)), 0)
     assert run(10**9, script) == [[]]
@@ -145,7 +145,7 @@ def test_scripts_address_as_on_a_line(new_bank: NewBank) -> None:
 
 
 def test_a_wrong_header_breaks_the_connection(bank: Any) -> None:
-    port = TcpGatewayPort(Gateway(TimedUnits({1: bank}, TIMING)))
+    port = TcpGatewayPort(ModbusGateway(TimedUnits({1: bank}, TIMING)))
     port.exchange(ask(1) + bytes.fromhex("00 01 00 01 00 06"), 0)
     assert port.broken == "MBAP protocol 1 is not 0"
     assert run(10**9, port) == [[(SENT, answered(1))]]
@@ -153,7 +153,7 @@ def test_a_wrong_header_breaks_the_connection(bank: Any) -> None:
 
 def test_an_observer_sees_requests_when_they_come_and_responses_when_they_leave(bank: Any) -> None:
     seen: list[tuple[int, FrameDirection, bytes]] = []
-    gateway = Gateway(TimedUnits({1: bank}, TIMING))
+    gateway = ModbusGateway(TimedUnits({1: bank}, TIMING))
     port = TcpGatewayPort(gateway, on_frame=lambda now, way, raw: seen.append((now, way, raw)))
     port.exchange(ask(1), 5)
     run(10**9, port)
@@ -161,14 +161,14 @@ def test_an_observer_sees_requests_when_they_come_and_responses_when_they_leave(
 
 
 def test_mic_15_a_frame_of_unknown_length_from_a_script_comes_after_the_gap(bank: Any) -> None:
-    script = ScriptPort(Gateway(TimedUnits({1: bank}, TIMING)))
+    script = ScriptPort(ModbusGateway(TimedUnits({1: bank}, TIMING)))
     script.exchange(with_crc(bytes.fromhex("01 41 01 02 03")), 1000)
     sent = 1000 + BURSTY_GAP_NS + LINE.duration(7) + TURN + LINE.duration(5)
     assert run(10**9, script) == [[(sent, with_crc(bytes.fromhex("01 C1 01")))]]
 
 
 def test_refusals_of_one_moment_leave_in_the_order_of_their_requests(bank: Any) -> None:
-    port = TcpGatewayPort(Gateway(TimedUnits({1: bank}, TIMING)))
+    port = TcpGatewayPort(ModbusGateway(TimedUnits({1: bank}, TIMING)))
     refused = bytes.fromhex("83 0B")
     assert port.exchange(ask(9, 2) + ask(3, 2), 0) == answered(9, refused, 2) + answered(3, refused, 2)
 
@@ -181,7 +181,7 @@ def test_a_snapshot_continues_as_the_original(new_bank: NewBank, kind: type[TcpG
     for _ in range(2):
         banks.append(new_bank())
         units.append(TimedUnits({1: banks[-1]}, TIMING))
-        gateways.append(Gateway(units[-1]))
+        gateways.append(ModbusGateway(units[-1]))
         ports.append(kind(gateways[-1]))
     ports[1].exchange(request, 0)  # replaced by the snapshot
     ports[0].exchange(request * 2 + request[:5], 0)
@@ -201,7 +201,7 @@ def test_a_snapshot_continues_as_the_original(new_bank: NewBank, kind: type[TcpG
 
 def test_an_observer_of_scripts_sees_requests_when_they_are_executed(bank: Any) -> None:
     seen: list[tuple[int, FrameDirection, bytes]] = []
-    script = ScriptPort(Gateway(TimedUnits({1: bank}, TIMING)), on_frame=lambda now, way, raw: seen.append((now, way, raw)))
+    script = ScriptPort(ModbusGateway(TimedUnits({1: bank}, TIMING)), on_frame=lambda now, way, raw: seen.append((now, way, raw)))
     request, response = with_crc(b"\x01" + READ), with_crc(b"\x01" + TOLD)
     script.exchange(request, 5)
     run(10**9, script)

@@ -462,3 +462,19 @@ def test_a_burst_is_answered_as_its_bytes_one_by_one(
         out += b"".join(sent for _, sent in port.to_send(5 + GAP))
         found.append((out, seen, [[body for _, body in bank.executed] for bank in banks.values()], port.unframed))
     assert found[0] == found[1]
+
+
+@pytest.mark.parametrize(
+    ("unit", "pdu", "exceptions"),
+    [
+        (1, "03 03 FC 00 02", 0),
+        (1, "03 03 FC 00 00", 1),  # no register
+        (1, "00", 1),  # function 80h answers it
+        (9, "03 03 FC 00 02", 1),  # nobody there
+    ],
+)
+def test_requests_and_exceptions_are_counted(new_bank: NewBank, unit: int, pdu: str, exceptions: int) -> None:
+    port = TcpSlavePort({1: new_bank()})
+    response = port.exchange(mbap.encode_frame(5, unit, bytes.fromhex(pdu)), 0)
+    assert (response[7] >= 0x80) is bool(exceptions)
+    assert (port.requests, port.exceptions) == (1, exceptions)

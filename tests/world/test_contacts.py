@@ -20,8 +20,9 @@ from steptwin.mic488.device import Mic488Device
 from steptwin.motion import MotionState, Profile, plan_position
 from steptwin.world.chance import Chance
 from steptwin.world.contacts import Button, Circuit, CountedPosition, Switch, Zone
-from steptwin.world.kernel import Kernel, PinName
+from steptwin.world.kernel import Kernel
 from steptwin.world.trace import TraceRecord
+from steptwin.world.wires import PinName
 
 LIMITS = st.one_of(st.none(), st.integers(-30, 30))
 

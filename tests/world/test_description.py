@@ -136,6 +136,7 @@ def wrong(text: str) -> str:
             TABLE + '[[source]]\nto = "table.AIN1"\nkind = "ramp"\nover = 1\nrepeat = 0\n',
             "w.toml:7:1: error D003: [source]: repeat: 0",
         ),
+        (TABLE + '[[source]]\nto = "table.AIN1"\nkind = "table"\n', "w.toml:3:1: error D009: a table needs points"),
         (
             TABLE + '[[source]]\nto = "table.AIN1"\nperiod = "0 s"\n',
             "w.toml:5:1: error D003: [source]: period: '0 s': must be more than",

@@ -305,7 +305,7 @@ def test_what_cannot_be_jogged_is_refused() -> None:
         rig.begin(Jog("drum", 1, 6400.0))
     with pytest.raises(Misuse, match="drum: no axis 2: an M1486 has one, 1"):
         chip().begin(Jog("drum", 2, 6400.0))
-    with pytest.raises(Misuse, match=r"velocity 1\.28006e\+06 microstep/s, V20001: "):
+    with pytest.raises(Misuse, match=r"velocity 1\.28006e\+06 min\. microsteps/s, V20001: "):
         chip().begin(Jog("drum", 1, 20001 * 64.0))
     with pytest.raises(Refusal, match="drum is on no line, so no commands can be sent to it"):
         Rig('[[m1486]]\nname = "drum"\n').begin(Jog("drum", 1, 6400.0))

@@ -17,7 +17,8 @@ from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.motion import MotionState, Profile, at_rest, plan_position, plan_velocity
 from steptwin.world.contacts import PositionSwitch, place
-from steptwin.world.kernel import MAX_ROUNDS_PER_INSTANT, Kernel, PinName, Wire
+from steptwin.world.kernel import MAX_ROUNDS_PER_INSTANT, Kernel
+from steptwin.world.wires import PinName, Wire
 
 ENABLE_M1 = bytes.fromhex("06 271E 0001")
 REAL_1000 = "0000 447A"

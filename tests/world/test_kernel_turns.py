@@ -90,7 +90,7 @@ def test_nothing_that_has_changed_is_missed(name: str) -> None:
             if world.stopped is not None:
                 break
             world.run(for_=0.0137)
-            kernels = [kernel for kernel in world.kernels if not kernel._flights]
+            kernels = [kernel for kernel in world.kernels if not kernel.wires.delayed]
             assert [missed(kernel) for kernel in kernels] == [[]] * len(kernels), world.now
 
 

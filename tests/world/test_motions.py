@@ -137,7 +137,10 @@ def test_it_can_be_restored_anywhere(moment_s: float, tmp_path: object) -> None:
         ('{ move = "a.M7", to = 1.0 }', "t.toml:32.*step 2: a.M7: a has M1, M2, M3, M4"),
         ('{ move = "b.M1", to = 1.0 }', "no machine is called 'b'"),
         ('{ mov = "a.M1", to = 1.0 }', r"has 'mov', 'to' \(did you mean 'move'\?\)"),
-        ('{ home = "a.M1" }', "velocity is missing"),
+        ('{ home = "a.M1" }', "step 2: home: give either velocity .* or seek"),
+        ('{ home = "a.M1", velocity = -5, seek = "-B8" }', "home: give either velocity .* or seek"),
+        ('{ home = "a.M1", seek = "-B8" }', "'a' is a MIC488, which knows its switches: home it with a velocity"),
+        ('{ home = "a.M1", seek = "B8" }', "'B8': expected a direction and an input, such as '-B8'"),
         ('{ home = "a.M1", velocity = 0 }', "its sign chooses the switch, so it must not be 0"),
         ('{ move = "a.M0", to = 1.0 }', "'a.M0': expected MACHINE.M1 to M4"),
         ('{ move = "a.M٣", to = 1.0 }', "expected MACHINE.M1 to M4"),
@@ -211,13 +214,88 @@ def test_what_a_chip_cannot_do_now_is_a_failure() -> None:
     found = chip('{ move = "c.M1", by = 7 }', '{ send = "chips", text = "f100000\\rr\\r" }', '{ move = "c.M1", by = 64 }')
     found.run(for_=20)
     first, second = (str(record.value) for record in found.failures)
-    assert first == "distance 7 microstep: no multiple of 64, the microstep of M1"
+    assert first == "distance 7 min. microsteps: no multiple of 64, the microstep of M1"
     assert second.startswith("c is not at rest (")
 
 
-def test_a_chip_that_has_no_home_or_line_says_so() -> None:
-    with pytest.raises(WorldError, match=r"step 3: 'c' is an M1486, which .* home"):
-        chip('{ home = "c.M1", velocity = 5 }')
+HOMED = """
+[[axis]]
+name = "x"
+drive = "c.M1"
+pitch = 5.0
+start = 4.0
+[[axis.switch]]
+below = 0.0
+to = "c.B8"
+contact = "NC"
+"""
+
+
+def homing(*steps: str, timing: str = "") -> World:
+    return World.from_toml(CHIP.format(steps=",\n  ".join(steps), timing=timing) + HOMED, name="t.toml")
+
+
+@pytest.mark.parametrize("timing", ["", 'timing = "real"'])
+def test_a_chip_seeks_its_switch_and_is_at_0(timing: str) -> None:
+    """4 mm are 160 full steps; it seeks with 500 of them each second, and ends on one of four."""
+    found = homing(
+        '{ home = "c.M1", seek = "-B8", within = "10 s" }',
+        '{ note = "there" }',
+        '{ expect = "c.counter == 0 and x.position <= 0 and x.position > -0.11 and not c.busy" }',
+        '{ move = "c.M1", by = 12800, within = "10 s" }',
+        '{ expect = "c.counter == 12800 and x.position > 4.8" }',
+        '{ home = "c.M1", seek = "- b8" }',
+        '{ home = "c.M1", seek = "-B8" }',
+        '{ note = "again" }',
+        timing=timing,
+    )
+    found.run(for_=5)
+    assert [str(record.value) for record in (*found.failures, *found.overdue)] == []
+    (there, _), _ = notes(found)
+    assert there > 160 / 500
+
+
+def test_a_seek_that_is_stopped_or_finds_nothing_is_a_failure() -> None:
+    found = homing('{ home = "c.M1", seek = "-B8" }', '{ note = "end" }')
+    found.at(0.2, Send("chips", b"k\r"))
+    found.run(for_=5)
+    assert [str(record.value) for record in found.failures] == ["c.valid and c.counter == 0 and c.B8 == 0"]
+    away = homing('{ home = "c.M1", seek = "+B8", within = "2 s" }', '{ note = "end" }')
+    away.run(for_=5)
+    assert [str(record.value) for record in away.overdue] == ["s waited in vain for not c.busy and chips.idle"]
+    assert len(away.failures) == 1
+    busy = homing('{ send = "chips", text = "g+\\rr\\r" }', '{ home = "c.M1", seek = "-B8", within = "1 s" }')
+    busy.run(for_=5)
+    assert str(busy.failures[0].value).startswith("c is not at rest (")
+
+
+@pytest.mark.parametrize(
+    ("step", "text"),
+    [
+        ('{ home = "c.M1", seek = "-B22" }', "step 3: seek 'B22': permitted are B1 to B21, such as '-B8'"),
+        ('{ home = "c.M1", seek = "-IN1" }', "step 3: seek 'IN1': permitted are B1 to B21"),
+        ('{ home = "c.M1", velocity = 5 }', "step 3: 'c' is an M1486, which does not know its switch: home it with seek"),
+        ('{ home = "c.M2", seek = "-B8" }', "step 3: c.M2: c has M1"),
+    ],
+)
+def test_a_seek_that_cannot_be_is_refused(step: str, text: str) -> None:
+    with pytest.raises(WorldError, match=f"t.toml:.*{text}"):
+        homing(step)
+
+
+@pytest.mark.parametrize("moment_s", [0.0, 0.05, 0.2, 0.4])
+def test_seeks_can_be_restored_anywhere(moment_s: float) -> None:
+    found, other = (homing('{ home = "c.M1", seek = "-B8" }', '{ note = "a" }', timing='timing = "real"') for _ in range(2))
+    found.run(until=moment_s)
+    snapshot = found.snapshot()
+    found.run(until=3.0)
+    other.restore(snapshot)
+    other.run(until=3.0)
+    assert other.trace.digest() == found.trace.digest()
+    assert len(notes(found)) == 1
+
+
+def test_a_chip_that_has_no_line_says_so() -> None:
     found = World.from_toml('[[m1486]]\nname = "c"\n[[script]]\nname = "s"\nsteps = [{ move = "c.M1", to = 64 }]\n')
     found.run(for_=1)
     assert [str(record.value) for record in found.failures] == ["c is on no line, so no commands can be sent to it"]

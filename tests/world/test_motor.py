@@ -2,46 +2,19 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-from math import cos, inf, pi, sin
+from math import inf, pi
 
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from motor_rig import INERTIA, PER_REV, accelerated, at_speed, final, motor
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND
-from steptwin.motion import MotionState, Profile, Segment, plan_position, plan_velocity
-from steptwin.motion.paths import Circular
+from steptwin.motion import MotionState, Segment, plan_position, plan_velocity
 from steptwin.motion.ramps import SpeedCurve, plan_endless
 from steptwin.world.course import Build, Course, MechanicalState
-from steptwin.world.motor import StepperMotor, _first_below_0, _first_not_below_0
-
-PER_REV = 3200
-INERTIA = 1e-4 * 2 * pi / PER_REV
-"""1e-4 kg·m², in N·m per pulse/s²."""
-LINEAR = ((0.0, 1.0), (32_000.0, 0.2))
-"""1 N·m at standstill, 0.2 at 10 rev/s."""
-
-
-def motor(
-    curve: tuple[tuple[float, float], ...] = LINEAR,
-    *,
-    inertia: float = INERTIA,
-    friction: float = 0.0,
-    load: float = 0.0,
-    start: float | None = None,
-) -> StepperMotor:
-    return StepperMotor(curve, inertia, friction, load, start)
-
-
-def final(build: Build, plan: Profile) -> MechanicalState:
-    return Course(build, plan, plan.start, MechanicalState(0, 0)).at(1000 * SECOND)
-
-
-def accelerated(rate: float, speed: float = 30_000.0) -> Profile:
-    return plan_position(MotionState(0, 0, 0.0, 0.0), 200_000, rate, 1000.0, speed)
-
+from steptwin.world.motor import FASTEST, Burden, StepperMotor, _first_below_0, _first_not_below_0
 
 # ---------------------------------------------------------------------- thresholds
 
@@ -238,14 +211,6 @@ def is_close(drive: StepperMotor, s: Segment, t: float) -> bool:
     return abs(abs(need) - torque) < 1e-3
 
 
-def at_speed(curve: tuple, speed: float) -> float:
-    """The curve, looked up in the plainest way."""
-    for (s0, t0), (s1, t1) in pairwise(curve):
-        if s0 <= speed <= s1:
-            return t0 + (t1 - t0) * (speed - s0) / (s1 - s0)
-    return curve[0][1] if speed < 0 else -1.0
-
-
 @pytest.mark.parametrize("curve", [(), ((1.0, 1.0),), ((0.0, 1.0), (0.0, 2.0)), ((0.0, -1.0),)])
 def test_curves_that_are_none_are_misuse(curve: tuple) -> None:
     with pytest.raises(Misuse, match="curve"):
@@ -314,123 +279,62 @@ def test_the_first_moment_at_which_nothing_is_below_0_is_that_of_a_dense_scan(pa
         assert all(least(u) <= 1e-6 for u in scan if u < found)
 
 
-# ---------------------------------------------------------------------- along an arc
-
-
-@settings(max_examples=60, deadline=None)
-@given(
-    radius=st.integers(2000, 20_000),
-    speed=st.floats(5000.0, 30_000.0),
-    inertia=st.floats(1e-7, 2e-5),
-    friction=st.floats(0.0, 0.2),
-    load=st.floats(-0.2, 0.2),
-    start=st.floats(100.0, 30_000.0),
-    sign=st.sampled_from([1, -1]),
-    part=st.floats(0.0, 0.9),
-)
-@example(radius=8000, speed=20_000.0, inertia=1e-5, friction=0.1, load=0.1, start=9000.0, sign=-1, part=0.3)
-def test_along_an_arc_it_is_looked_every_millisecond(
-    radius: int, speed: float, inertia: float, friction: float, load: float, start: float, sign: int, part: float
-) -> None:
-    """x = R cos φ with φ = w / R: velocity and acceleration by the derivatives of that, at whole milliseconds of a segment."""
-    way = plan_position(MotionState(0, 0, 0.0, 0.0), round(2 * pi * radius), 40_000.0, 40_000.0, speed)
-    profile = Circular(-radius, radius, 0.0, 4.0 / round(2 * pi * radius)).profile(way, 0, 0)
-    drive = StepperMotor(LINEAR, inertia, friction, load, start)
-    scale = 2 * pi / round(2 * pi * radius)
-    begin = 0.0
-    for s in profile.segments:
-        first = begin + part * (s.end_s - begin)
-        lost = caught = None
-        is_close = False
-        for n in range(int((s.end_s - first) / 0.001) + 1):
-            t = first + n * 0.001
-            w, dw, ddw = s.way.position(t), s.way.velocity(t), 2 * s.way.c2
-            velocity = -radius * sin(scale * w) * scale * dw
-            acceleration = -radius * scale * (cos(scale * w) * scale * dw * dw + sin(scale * w) * ddw)
-            need = abs(inertia * sign * acceleration + friction * sign * s.direction + load)
-            torque = at_speed(LINEAR, abs(velocity))
-            # At the ends of a segment the difference from which the acceleration comes reaches beyond it.
-            is_close |= abs(need - torque) < 2e-3 or abs(abs(velocity) - start) < 1.0
-            if lost is None and need > torque:
-                lost = t
-            if caught is None and need <= torque and abs(velocity) <= start:
-                caught = t
-        if not is_close:
-            assert drive.loses(s, first, s.end_s, sign) == lost
-            assert drive.catches(s, first, s.end_s, sign) == caught
-        begin = s.end_s
-
-
-def test_a_motor_on_an_arc_loses_the_field_where_the_curve_is_too_tight() -> None:
-    """R = 8000 at 20 000 pulses/s: 50 000 pulses/s² where the axis turns; 1 N·m is there at any speed."""
-    way = plan_position(MotionState(0, 0, 0.0, 0.0), 50_265, 20_000.0, 20_000.0, 20_000.0)
-    profile = Circular(-8000, 8000, 0.0, 4.0 / 50_265).profile(way, 0, 0)
-    for need, follows in ((0.99, True), (1.01, False)):
-        build = Build(period_p=64, motor=StepperMotor(((0.0, 1.0), (32_000.0, 1.0)), need / 50_000.0, 0.0, 0.0, 20_000.0))
-        course = Course(build, profile, 0, MechanicalState(0, 0))
-        assert (course.next_stall(0) is None) is follows, need
-        assert (course.at(1000 * SECOND) == MechanicalState(0, 0)) is follows or course.at(1000 * SECOND).behind % 64 == 0
-
-
-# ---------------------------------------------------------------------- motions without end
+# ---------------------------------------------------------------------- single values
 
 
 @pytest.mark.parametrize(
-    ("speed", "start", "lost", "caught"),
+    ("speed", "torque"),
     [
-        (15_999.0, 16_000.0, None, 0.5),
-        (16_000.0, 16_000.0, None, 0.5),
-        (16_001.0, 16_000.0, 0.5, None),
-        (8000.0, 7999.0, None, None),
-        (8000.0, 8000.0, None, 0.5),
+        (0.0, 1.0),
+        (3000.0, 0.85),
+        (6000.0, 0.7),
+        (6001.0, 0.7 - 0.5 / 26_000),
+        (19_000.0, 0.45),
+        (32_000.0, 0.2),
+        (32_000.1, -1.0),
     ],
 )
-@pytest.mark.parametrize("direction", [1, -1])
-def test_a_steady_motion_is_followed_or_not_from_its_beginning(
-    speed: float, start: float, lost: float | None, caught: float | None, direction: int
-) -> None:
-    """Friction of 0.6 N·m; the curve has that at 16 000 pulses/s. Above the start speed nothing is caught."""
-    plan = plan_velocity(MotionState(0, 0, 0.0, 0.0), direction * speed, 1e9, 1e9)
-    steady = plan.segments[-1]
-    assert steady.end_s == inf
-    drive = motor(friction=0.6, start=start)
-    assert drive.loses(steady, 0.5, inf, direction) == lost
-    assert drive.catches(steady, 0.5, inf, direction) == caught
+def test_torques_of_a_curve(speed: float, torque: float) -> None:
+    assert motor(((0.0, 1.0), (6000.0, 0.7), (32_000.0, 0.2))).torque(speed) == pytest.approx(torque)
 
 
-@pytest.mark.parametrize(("jump", "follows"), [(2000.0, True), (-2000.0, True), (2001.0, False), (-2001.0, False)])
-def test_a_jump_of_the_speed_is_followed_up_to_the_start_speed(jump: float, follows: bool) -> None:
-    assert motor(start=2000.0).follows(jump) is follows
-    assert motor().follows(jump)
-
-
-def test_a_rotor_that_would_be_caught_and_lost_at_once_stays_lost() -> None:
-    """Friction takes all there is at any speed: what is caught at rest in a turn is lost in the same moment."""
-    build = Build(period_p=64, motor=motor(((0.0, 0.5), (32_000.0, 0.5)), inertia=1e-9, friction=0.6))
-    plan = plan_velocity(MotionState(0, 0, 0.0, 0.0), 5000.0, 1000.0, 1000.0)
-    turned = plan_velocity(MotionState.of(plan, SECOND), -5000.0, 1000.0, 1000.0)
-    course = Course(build, turned, SECOND, MechanicalState(0, 0, stalled=True))
-    for moment in (SECOND, 2 * SECOND, 3 * SECOND, 9 * SECOND):
-        assert course.at(moment).stalled, moment
-        assert course.at(moment).rotor == 0
-    assert [piece.begin for piece in course.pieces] == sorted({piece.begin for piece in course.pieces})
+def test_a_curve_of_one_point_is_for_standstill() -> None:
+    assert (motor(((0.0, 1.0),)).torque(0.0), motor(((0.0, 1.0),)).torque(0.1)) == (1.0, -1.0)
 
 
 @pytest.mark.parametrize(
-    ("q", "end", "found"),
-    [
-        ((0.0, -1.0, 0.0), 2.0, 0.0),  # a line
-        ((0.0, -1e-10, -1.0), 1.0, 0.0),  # falls steeper and steeper
-        ((0.0, -1.0, 0.25), 8.0, 0.0),  # down to -1 at 2, and up again
-        ((0.0, -1.0, 0.25), 0.5, 0.0),  # not as far as the lowest point
-        ((1e-10, -1.0, 0.25), 8.0, 0.0),  # rounding apart, at the beginning
-        ((0.0, -1e-6, 0.25), 8.0, None),  # never lower than rounding
-        ((0.0, -1e-10, 0.0), 2.0, None),
-        ((0.0, -1e-10, -1e-10), 1.0, None),
-    ],
+    ("acceleration", "direction", "need"), [(1000.0, 1, 1.8), (-1000.0, 1, -0.2), (1000.0, -1, 1.2), (-1000.0, -1, -0.8)]
 )
-def test_what_falls_from_0_at_the_beginning_is_below_0_there(
-    q: tuple[float, float, float], end: float, found: float | None
-) -> None:
-    """Unless it falls by no more than rounding, 1e-9 here."""
-    assert _first_below_0(q, 0.0, end, 1e-9) == found
+def test_what_a_motion_needs(acceleration: float, direction: int, need: float) -> None:
+    """1 N·m for the acceleration, 0.3 of friction, 0.5 of load."""
+    assert motor(inertia=0.001, friction=0.3, load=0.5).needs(acceleration, direction) == pytest.approx(need)
+
+
+def test_burdens_add_up() -> None:
+    one, other = Burden(1.0, 2.0, 3.0), Burden(10.0, 20.0, 30.0)
+    assert one.plus(other) == Burden(11.0, 22.0, 33.0)
+    assert one.times(0.5) == Burden(0.5, 1.0, 1.5)
+
+
+def test_what_moves_freely_is_not_faster_than_can_be_calculated() -> None:
+    """Load, friction and brake together, against the limit of acceleration."""
+    body = motor(inertia=1.0, friction=0.25 * FASTEST, load=-0.25 * FASTEST)
+    body.check_free(0.5 * FASTEST)
+    with pytest.raises(Misuse, match="on so small an inertia accelerates by more than"):
+        body.check_free(0.500001 * FASTEST)
+    motor(inertia=0.0).check_free()
+    with pytest.raises(Misuse):
+        motor(inertia=0.0, load=1e-9).check_free()
+
+
+def test_a_rotor_is_caught_below_its_start_speed_or_at_rest() -> None:
+    assert (motor(start=2000.0).catch_p, motor().catch_p) == (2000.0, 0.0)
+
+
+def test_what_is_not_below_0_only_at_the_end_is_not_found_before_it() -> None:
+    """u − 1 from 0 to 1; with another parabola that is above 0 throughout."""
+    line = (-1.0, 1.0, 0.0)
+    assert _first_not_below_0([line], 0.0, 1.0, 1e-12) is None
+    assert _first_not_below_0([line, (5.0, 0.0, 0.0)], 0.0, 1.0, 1e-12) is None
+    assert _first_not_below_0([line], 0.0, 1.1, 1e-12) == 1.0
+    assert _first_not_below_0([line], 1.0, 2.0, 1e-12) == 1.0

@@ -411,3 +411,18 @@ def test_what_runs_on_needs_an_inertia() -> None:
     text = TEXT.format(speed=1000, motor="overruns = true", friction=0.1, axis="").replace("inertia = 0.00005\n", "")
     with pytest.raises(WorldError, match="what runs on needs an inertia or a mass"):
         World.from_toml(text)
+
+
+@pytest.mark.parametrize(
+    ("when_off", "inertia", "accepted"), [("holds", 0.0, True), ("holds", 1e-30, True), ("free", 1e-30, False)]
+)
+def test_only_what_moves_without_current_needs_an_inertia(when_off: str, inertia: float, accepted: bool) -> None:
+    text = (
+        '[[mic488]]\nname = "c"\n[[axis]]\nname = "x"\ndrive = "c.M1"\npitch = 5\n[axis.motor]\ntorque = [[0, 1.0]]\n'
+        f'load = 0.9\ninertia = {inertia}\nwhen_off = "{when_off}"\n'
+    )
+    if accepted:
+        assert World.from_toml(text).axis["x"].position == 0.0
+    else:
+        with pytest.raises(WorldError, match="on so small an inertia accelerates"):
+            World.from_toml(text)

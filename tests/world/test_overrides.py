@@ -74,3 +74,39 @@ def test_values_as_they_are_typed() -> None:
 def test_what_is_no_override_as_typed(text: str) -> None:
     with pytest.raises(Misuse, match=r"expected NAME\.KEY=VALUE, such as x\.pitch=4\.0"):
         read_overrides([text])
+
+
+PIECES: dict[str, Any] = {
+    "use": [{"name": "left", "with": {"width": 1}}, {"name": "right"}],
+    "axis": [{"name": "x"}, {"name": "y"}],
+    "line": [{"name": "x"}],
+}
+
+
+@pytest.mark.parametrize(
+    ("key", "place"),
+    [
+        ("left.width", ("use", 0, "with", "width")),
+        ("left.with.width", ("use", 0, "with", "width")),
+        ("right.width", ("use", 1, "with", "width")),
+        ("right.with.width", ("use", 1, "with", "width")),
+        ("use.right.file", ("use", 1, "file")),
+    ],
+)
+def test_parameters_of_pieces(key: str, place: tuple[str | int, ...]) -> None:
+    """The table of parameters may be left out, also where the description has none."""
+    found = deepcopy(PIECES)
+    assert override(found, {key: 7, "y.pitch": 2, "axis.x.pitch": 3}, "use") == {"y.pitch": 2, "axis.x.pitch": 3}
+    inner: Any = found
+    for part in place:
+        inner = inner[part]
+    assert inner == 7
+    assert found["axis"] == PIECES["axis"]
+
+
+def test_the_kind_of_table_may_be_left_out() -> None:
+    found = deepcopy(PIECES)
+    assert override(found, {"y.pitch": 2}) == {}
+    assert found["axis"] == [{"name": "x"}, {"name": "y", "pitch": 2}]
+    with pytest.raises(Misuse, match=r"^override 'x\.pitch': 'x' is in axis and line: begin with one of these$"):
+        override(found, {"x.pitch": 2})

@@ -18,6 +18,7 @@ from steptwin.world import plant
 from steptwin.world import script as do
 from steptwin.world.actions import Bytes, Leave, See
 from steptwin.world.faults import read
+from steptwin.world.lines import MOST_RECEIVED
 from steptwin.world.script import Steps
 
 
@@ -464,3 +465,23 @@ def test_programs_that_are_answered_at_one_moment_are_answered_in_the_same_order
     assert places == ["second/in", "second/out", "first/in", "first/out"]
     assert [record.subject for record in again.trace.frames()][2:] == places
     assert again.trace.digest() == world.trace.digest()
+
+
+def test_who_watches_actions_is_told_who_did_what() -> None:
+    world = small('[[script]]\nname = "s"\nsteps = [{ wait = "1 s" }, { press = "go" }]\n')
+    seen: list[tuple[int, str, object]] = []
+    world.act_watchers.append(lambda by, what: seen.append((world.now, by, what)))
+    world.apply_input(do.Set((("a", "IN5", 1.0),)))
+    world.run(for_=2)
+    assert seen == [(0, "", do.Set((("a", "IN5", 1.0),))), (SECOND, "s", do.Press("go"))]
+
+
+@pytest.mark.parametrize("count", [MOST_RECEIVED - 1, MOST_RECEIVED, MOST_RECEIVED + 1])
+def test_what_a_program_does_not_fetch_is_kept_up_to_a_limit(count: int) -> None:
+    world = World.from_toml('[[line]]\nname = "bus"\n[[mic488]]\nname = "a"\nline = "bus"\n')
+    there = world.lines["bus"].connect("somebody")
+    there.received.extend((n, b"x") for n in range(count))
+    kept = there.take(count)
+    assert len(kept) == min(count, MOST_RECEIVED)
+    assert kept[-1][0] == count - 1
+    assert there.take(count) == []

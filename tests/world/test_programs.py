@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import pytest
 
 from steptwin.errors import Misuse
@@ -88,6 +90,47 @@ def test_the_programs_of_a_world() -> None:
     assert first == [":5", "L2", "+1"]
 
 
+def test_what_comes_next_in_the_text() -> None:
+    """A branch has both ways; a JUMP goes on behind its call, RETURN and the dot nowhere; ENDIF only closes a block."""
+    programs = two().programs
+    assert programs["m"].after("program 0") == {
+        0: (1,), 1: (2,), 2: (3, 5), 3: (4,), 5: (6,), 6: (7,), 7: (8,), 8: (), 9: (10,), 10: (11,), 11: (),
+    }  # fmt: skip
+    chip = programs["c"].after("program")
+    assert {number: chip[number] for number in (0, 1, 2, 3, 5, 6, 7, 8)} == {
+        0: (1,), 1: (2,), 2: (3,), 3: (2, 4), 5: (6,), 6: (1,), 7: (8,), 8: (),
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "starts", "reached"),
+    [
+        ("m", "program 0", [0], range(12)),
+        ("m", "program 0", [1], range(1, 12)),
+        ("m", "program 0", [7], range(7, 12)),  # COUNT, and the interrupt at any time
+        ("m", "program 0", [], range(9, 12)),
+        ("c", "program", [0], range(9)),
+        ("c", "program", [3], range(1, 9)),  # the end of the loop, and J1 behind it
+        ("c", "program", [7], [7, 8]),
+        ("c", "program", [8], [8]),
+        ("c", "program", [], []),
+        ("c", "program", [8, 9], [8]),  # 9 is no command
+    ],
+)
+def test_what_is_reached(name: str, text: str, starts: list[int], reached: Iterable[int]) -> None:
+    assert sorted(two().programs[name].reached(text, starts)) == list(reached)
+
+
+def test_what_has_begun_before_anybody_could_look() -> None:
+    world = two()
+    mic, chip = world.programs["m"], world.programs["c"]
+    assert (mic.begun(0), chip.begun(0)) == ((), (0,))
+    assert (mic.statement_time, chip.statement_time) == (MILLISECOND, MILLISECOND)
+    assert chip.begun(1) == ()
+    world.run_to(3 * MILLISECOND)
+    assert (mic.begun(world.now), chip.begun(world.now)) == ((), ())
+
+
 def test_calls_come_back_and_loops_do_not() -> None:
     mic = two().programs["m"]
     assert mic.comes_back(Place("program 0", 3))  # JUMP COUNT
@@ -135,6 +178,13 @@ def test_variables_are_read_and_set() -> None:
         mic.set_variable("n", 1e39, world.now)
     with pytest.raises(Misuse, match="register3 = 65536: permitted are whole numbers from 0 to 65535"):
         chip.set_variable("register3", 65536, world.now)
+    for value in (0, 65535):
+        chip.set_variable("register8", value, world.now)
+        assert chip.variables(world.now)["register8"] == value
+    for value in (-1, 0.5):
+        with pytest.raises(Misuse, match=f"register3 = {value}: permitted are whole numbers from 0 to 65535"):
+            chip.set_variable("register3", value, world.now)
+    assert chip.variables(world.now)["register3"] == 77.0
     with pytest.raises(Misuse, match="no variable 'n': there are variable, register1"):
         chip.set_variable("n", 1, world.now)
 

@@ -281,3 +281,21 @@ def test_keys_of_the_description_are_in_the_configuration(more: str) -> None:
     axis = read_config(IniFile.of_text(source.text)).axes[0]
     gear, unit = (100.0, 3) if more else (1.0, 0)
     assert (axis.acc, axis.limit_mode, axis.in_kl, axis.gear, axis.unit) == (12.5, 1, 2, gear, unit)
+
+
+def test_a_text_runs_only_as_long_as_it_is_what_the_chip_has() -> None:
+    """A host types another program; and one whose text is not known runs in a chip without any."""
+    text = (
+        '[[line]]\nname = "l"\nkind = "m1486"\n[[m1486]]\nname = "one"\nline = "l"\naddress = 1\nprogram = "p"\n'
+        '[[m1486]]\nname = "two"\nline = "l"\naddress = 2\n'
+    )
+    there = World.from_toml(text, {"p": b"[\n@1\nw1000\nj1\n]\n"})
+    there.run(for_="1 s")
+    programs = WorldPrograms(there)
+    assert (programs.text("one", "program")["running"], programs.text("one", "program")["empty"]) == (True, False)
+    for number in (1, 2):
+        there.apply_input(do.Send("l", f"x{number}\rk\r\\\r[\r@1\rw2000\rj1\r]\r".encode()))
+        there.run(for_="1 s")
+    assert there.m1486["two"].chip.memory.begin is not None
+    found = [programs.text(name, "program") for name in ("one", "two")]
+    assert [(one["running"], one["empty"]) for one in found] == [(False, False), (False, True)]

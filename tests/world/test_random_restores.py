@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import re
+
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from steptwin.files.world import World
 from steptwin.machine import SECOND
+from steptwin.world.elements import ELEMENTS
 
 BASE = """
 [[mic488]]
@@ -77,6 +81,7 @@ PARTS = (
         "[[shaft]]\nname = 's'\naxis = 'x'\nratio = 0.04\n[[shaft.cam]]\nfrom = 20\nuntil = 80\nto = 'c.IN1'\n"
         "[[follower]]\nname = 'f'\nshaft = 's'\npoints = [[10, 0], [120, 9], [200, 4]]\n"
         "[[follower.switch]]\nabove = 6\nto = 'c.IN2'\nbounce = '2 ms'\n"
+        "[[fault]]\nkind = 'slipping-coupling'\nelement = 's'\nfrom_s = 0.6\nuntil_s = 0.8\n"
     ),
     "[[carriage]]\nname = 't'\naxis = 'x'\nfrequency = 12\n[[carriage.switch]]\nabove = 50\nto = 'c.IN3'\n",
     "[[brake]]\nname = 'b'\naxis = 'x'\ntorque = 0.4\nrelease = 'c.OUT1'\n",
@@ -97,7 +102,37 @@ PARTS = (
         "[[relay]]\nname = 'r'\ncoil = 'c.OUT1'\npull_in = '9 ms'\ndrop_out = '5 ms'\n"
         "[[wire]]\nfrom = 'r.no'\nto = 'c.IN6'\ndelay = '3 ms'\n"
     ),
+    (
+        "[[gate]]\nname = 'ga'\nkind = 'xor'\ninputs = ['c.OUT1', 'la.out']\n"
+        "[[latch]]\nname = 'la'\nset = 'c.OUT1'\nreset = 'ti.out'\n"
+        "[[timer]]\nname = 'ti'\ninput = 'ga.out'\nkind = 'pulse'\ntime = '110 ms'\n"
+        "[[fault]]\nkind = 'stuck-output'\nelement = 'la'\nlevel = 1\nfrom_s = 1.4\nuntil_s = 1.6\n"
+    ),
+    (
+        "[[conveyor]]\nname = 'q'\nlength = 120\nspeed = 150\nfeed_every = '250 ms'\n[[conveyor.sensor]]\nat = 80\nto = 'c.IN7'\n"
+        "[[vacuum]]\nname = 'u'\nejector = 'c.OUT1'\npick = 'c.OUT1'\nfrom = 'q'\npick_at = 90\n"
+        "[[fault]]\nkind = 'leak'\nelement = 'u'\nfrom_s = 0.7\nuntil_s = 0.9\n"
+    ),
+    (
+        "[[load]]\nname = 'm'\naxis = 'x'\nmass = 2\nforce = 12\nwhen = 'c.OUT1'\n"
+        "[[load]]\nname = 'i'\naxis = 'x'\nfriction_force = 60\nof = 'x.position'\npoints = [[10, 0.2], [60, 1]]\n"
+        "[[fault]]\nkind = 'other-load'\nelement = 'm'\nfactor = 4\nfrom_s = 1.1\n"
+    ),
+    "[[source]]\nto = 'c.AIN2'\nkind = 'sine'\nvalue = 5\namplitude = 2\nfrequency = 3\nperiod = '20 ms'\n",
+    (
+        "[[button]]\nname = 'e'\nto = 'c.IN8'\nbounce = '3 ms'\n"
+        "[[event]]\nevery = '370 ms'\nsteps = [{ press = 'e', for = '90 ms' }]\n"
+        "[[event]]\nwhen = 'x.position > 40 or c.IN8'\n"
+        "steps = [{ note = 'there' }, { wait = '33 ms' }, { set = { \"c.IN9\" = 1 } }]\n"
+    ),
+    (
+        "[[axis]]\nname = 'h'\ndrive = 'c.M3'\nkind = 'rotary'\n"
+        "[[axis.switch]]\nposition = 90\nwidth = 20\nto = 'c.IN10'\nbounce = '1 ms'\n"
+        "[axis.encoder]\ncounts_per_rev = 2000\nindex = true\noffset = 10\n"
+        '[[event]]\nat = \'20 ms\'\nsteps = [{ write = { "c.M3_EN" = 1 } }, { write = { "c.M3_POS_ABS" = 40000.0 } }]\n'
+    ),
 )
+"""Every element of the product is in one of them, or in the base."""
 END_S = 2.5
 
 
@@ -115,3 +150,21 @@ def test_what_is_restored_goes_on_alike(parts: set[str], moment: int) -> None:
     found.restore(snapshot)
     found.run(until=END_S)
     assert other.trace.digest() == found.trace.digest()
+
+
+def test_every_element_is_among_them() -> None:
+    there = {table for text in (BASE, *PARTS) for table in re.findall(r"^\[\[([a-z]+)\]\]", text, re.MULTILINE)}
+    assert set(ELEMENTS) <= there
+
+
+@pytest.mark.parametrize("number", range(len(PARTS)))
+def test_each_can_be_restored(number: int) -> None:
+    text = BASE + PARTS[number]
+    found, other = (World.from_toml(text, {"p.prg": PROGRAM}) for _ in range(2))
+    for moment in (0.71, 1.503):
+        found.run(until=moment)
+        snapshot = found.snapshot()
+        found.run(until=moment + 0.2)
+        other.restore(snapshot)
+        other.run(until=moment + 0.2)
+        assert other.trace.digest() == found.trace.digest()

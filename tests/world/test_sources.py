@@ -12,9 +12,10 @@ from mic488_rig import controller
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.device import Mic488Device
-from steptwin.world.kernel import Kernel, PinName
+from steptwin.world.kernel import Kernel
 from steptwin.world.sources import AnalogSource, ConstantWaveform, SineWaveform, TableWaveform, Waveform
 from steptwin.world.trace import TraceRecord
+from steptwin.world.wires import PinName
 
 POINTS = ((1.0, 1.0), (3.0, 5.0), (4.0, 2.0))
 

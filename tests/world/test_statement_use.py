@@ -8,19 +8,19 @@ from mic488_rig import loaded
 from steptwin.m1486.syntax import parse
 from steptwin.world.kinds.m1486.statement_use import use_of as use_of_chip
 from steptwin.world.kinds.mic488.statement_use import use_of
-from steptwin.world.programs import Operand, OperandKind, StatementUse
+from steptwin.world.programs import Resource, ResourceKind, StatementUse
 
 
-def axis(number: int | str) -> Operand:
-    return Operand(OperandKind.AXIS, str(number))
+def axis(number: int | str) -> Resource:
+    return Resource(ResourceKind.AXIS, str(number))
 
 
-def pin(name: str) -> Operand:
-    return Operand(OperandKind.PIN, name)
+def pin(name: str) -> Resource:
+    return Resource(ResourceKind.PIN, name)
 
 
-def value(name: str) -> Operand:
-    return Operand(OperandKind.VALUE, name)
+def value(name: str) -> Resource:
+    return Resource(ResourceKind.VALUE, name)
 
 
 ANY_AXIS, ANY_PIN = axis(""), pin("")

@@ -15,9 +15,10 @@ from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.world.course import Build
 from steptwin.world.faults import Faults, read, rig
-from steptwin.world.kernel import Kernel, PinName, Wire
+from steptwin.world.kernel import Kernel
 from steptwin.world.mechanics import Mechanism
 from steptwin.world.trace import Trace, TraceRecord
+from steptwin.world.wires import PinName, Wire
 
 GO = b"M\x0a"
 """100 pulses: 1000 p/s² for 316 ms up to 316 p/s, and as long down again."""

@@ -26,7 +26,7 @@ from steptwin.live.output import Output
 from steptwin.live.view import LiveView
 from steptwin.live.world import LiveWorld, PlacePort, announced
 from steptwin.live.world_frames import follow_frames
-from steptwin.subject.commands import Advance, Describe, Home, Move, ReadPins, State
+from steptwin.subject.commands import Advance, Describe, Home, Move, ReadPins, ReadState
 from steptwin.subject.world import WorldSubject
 from steptwin.wire.frameline import FrameLine
 from steptwin.world.reader import WorldError
@@ -134,7 +134,7 @@ def test_a_subject_describes_it_and_shows_its_state() -> None:
     (part,) = subject.description.machines
     assert (part.datasheet.kind, part.line, part.points) == ("toy", "bus", ("t.STOP", "t.BUSY", "t.position"))
     assert subject.do(Describe()).value["datasheets"][0]["axes"][0]["unit"] == "pulse"
-    state = subject.do(State("t")).value
+    state = subject.do(ReadState("t")).value
     assert (state["kind"], state["axes"][0]["position"], state["pins"]) == ("toy", 0, {"STOP": 0.0, "BUSY": 0.0})
     assert state["details"] == {"commands": 0}
     assert subject.do(ReadPins("t")).value == {"t.STOP": 0.0, "t.BUSY": 0.0}

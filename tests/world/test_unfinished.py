@@ -57,3 +57,11 @@ def test_inputs_that_never_changed() -> None:
     world.press("start", "100 ms")
     world.run(for_=1)
     assert unchanged_inputs(world, 0) == []
+
+
+def test_a_variable_is_no_pin_whatever_it_is_called() -> None:
+    """`program` is a point of the controller, too, which has nothing to do with the variable of the program."""
+    text = '[[mic488]]\nname = "a"\nprogram = "p"\nstart = true\n'
+    world = World.from_toml(text, {"p": b"program = 0\nWAIT program = 1\n"})
+    world.run(for_=1)
+    assert [tuple(one) for one in waiting(world)] == [("a", "p:2 WAIT program = 1")]

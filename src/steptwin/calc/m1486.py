@@ -1,7 +1,7 @@
 """Moves of an M1486: from S with A, from P on parabolic, to V; deceleration is the mirror image (M-6 to M-8).
 
 Speeds are the numbers that commands take, in full steps/s; a type for 24 MHz makes twice as many of them, and four times the
-acceleration. Distances are smallest microsteps, full step/64.
+acceleration. Distances are minimum microsteps, full step/64.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class M1486Model:
             permitted = spec.permitted(variant)
             is_range = isinstance(permitted, range)
             return MoveQuantity(
-                name=name, meaning=meaning, dimension=dimension, unit=spec.unit.replace("min. microsteps", "microstep"),
+                name=name, meaning=meaning, dimension=dimension, unit=spec.unit,
                 pulses=pulses, limits=Limits(permitted[0], permitted[-1]), choices=() if is_range else tuple(permitted),
                 default=default, code=letter, back="B" if letter == "F" else "", detail="" if letter == "F" else letter,
                 source=source,

@@ -1,6 +1,6 @@
 """Units of distance, and how many pulses they are: from the mechanics of an axis, or from its GEAR.
 
-The pulse is what the controller counts: the pulse (imp) of a MIC488, the smallest microstep (full step/64) of an M1486.
+The pulse is what the controller counts: the pulse (imp) of a MIC488, the minimum microstep (full step/64) of an M1486.
 """
 
 from __future__ import annotations

@@ -6,15 +6,12 @@ From Python: `steptwin.m1486.commands.TABLE`, `steptwin.wbc.statements.STATEMENT
 from __future__ import annotations
 
 import enum
-import json
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from steptwin.cli import completion
-from steptwin.cli.device import aligned
+from steptwin.cli.pages import PageFormat, PageSection, show
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
@@ -25,19 +22,6 @@ if TYPE_CHECKING:
 class CommandsOf(enum.StrEnum):
     M1486 = "m1486"
     MIC488 = "mic488"
-
-
-class PageFormat(enum.StrEnum):
-    TEXT = "text"
-    JSON = "json"
-    MD = "md"
-
-
-@dataclass(frozen=True)
-class PageSection:
-    title: str
-    columns: tuple[str, ...]
-    rows: Sequence[tuple[str, ...]]
 
 
 def commands(
@@ -61,15 +45,6 @@ def commands(
             raise Misuse("--firmware is for the MIC488 only")
         sections = _m1486(variant)
     show(sections, form)
-
-
-def show(sections: Sequence[PageSection], form: PageFormat) -> None:
-    """Print tables."""
-    if form is PageFormat.JSON:
-        data = {s.title: [dict(zip(s.columns, row, strict=True)) for row in s.rows] for s in sections}
-        typer.echo(json.dumps(data, ensure_ascii=False, indent=2))
-    else:
-        typer.echo("\n".join(_markdown(s) if form is PageFormat.MD else _text(s) for s in sections), nl=False)
 
 
 def _wbc(firmware: str | None) -> list[PageSection]:
@@ -166,7 +141,7 @@ def _uploads() -> PageSection:
 
 
 def _microsteps() -> PageSection:
-    from steptwin.m1486.microsteps import HIGHEST_SPEED, PAIRS, low_range_limit, microstep_size
+    from steptwin.m1486.microsteps import HIGHEST_SPEED, PAIRS, UNIT, low_range_limit, microstep_size
 
     rows = [
         (
@@ -177,7 +152,7 @@ def _microsteps() -> PageSection:
         )
         for m, qualifications in PAIRS.items()
     ]
-    columns = ("M", "microstep in min. microsteps", "division in force up to, step/s", "above, step/s")
+    columns = ("M", f"microstep in {UNIT}", "division in force up to, step/s", "above, step/s")
     return PageSection("Microsteps", columns, rows)
 
 
@@ -214,15 +189,3 @@ def _findings() -> PageSection:
 
     rows = [(f.code, f.severity.value, f.title, f.meaning) for f in TABLE]
     return PageSection("What the checker finds", ("code", "severity", "finding", "why"), rows)
-
-
-def _text(section: PageSection) -> str:
-    return f"{section.title}\n\n{aligned([section.columns, *section.rows])}\n"
-
-
-def _markdown(section: PageSection) -> str:
-    # Keys like * or \ are code on a page, where only | needs an escape; the first column names the row in every table.
-    pipes = [[cell.replace("|", "\\|") for cell in row] for row in section.rows]
-    rows = [(f"`{first}`", *(cell.replace("*", "\\*") for cell in others)) for first, *others in pipes]
-    lines = [section.columns, ("---",) * len(section.columns), *rows]
-    return f"## {section.title}\n\n" + "".join(f"| {' | '.join(line)} |\n" for line in lines)

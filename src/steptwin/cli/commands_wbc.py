@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from steptwin.cli.commands import PageSection
+from steptwin.cli.pages import PageSection
 
 if TYPE_CHECKING:
     from steptwin.wbc.dialect import Dialect

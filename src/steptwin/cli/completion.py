@@ -38,7 +38,7 @@ def devices(incomplete: str) -> list[str]:
 
 def pins(context: typer.Context, incomplete: str) -> list[str]:
     """``IN1=`` of the twin that ``--device`` names, or of the only one."""
-    from steptwin.cli.twin import levels_of, selected
+    from steptwin.cli.selected import levels_of, selected
 
     with contextlib.suppress(SteptwinError), selected(context.params.get("twin")) as there:
         several = len(there.controllers) > 1

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from steptwin.cli.device import table
-from steptwin.cli.twin import Json, Twin, selected
+from steptwin.cli.selected import selected
+from steptwin.cli.twin import Json, Twin
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:

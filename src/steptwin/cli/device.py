@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from steptwin.cli import completion
+from steptwin.columns import aligned
 from steptwin.errors import LineFailure, Misuse, Refusal
 
 if TYPE_CHECKING:
-    from steptwin.drivers.kind import AnyDriverKind, DeviceAddress, Values
+    from steptwin.drivers.kind import AnyDriverKind, DeviceAddress, ReadValues
 
 Device = Annotated[
     str | None,
@@ -129,12 +130,12 @@ def shown(value: object) -> str:
     return typed.shown(value)
 
 
-def values_table(values: Values) -> str:
+def values_table(values: ReadValues) -> str:
     """Names, values, and their units or meanings."""
     return table([(name, shown(one.value), one.unit or one.meaning) for name, one in values.items()])
 
 
-def values_data(values: Values) -> dict[str, Any]:
+def values_data(values: ReadValues) -> dict[str, Any]:
     """For JSON: ``value``, and where there is one ``unit`` or ``meaning``."""
     return {
         name: {
@@ -168,17 +169,7 @@ def table(rows: Sequence[Sequence[str]], head: Sequence[str] = ()) -> str:
     if not lines:
         return ""
     columns = list(zip(*lines, strict=True))
-    return aligned(lines, [n for n, column in enumerate(columns) if all(map(_is_number, column[bool(head) :]))])
-
-
-def aligned(lines: Sequence[Sequence[str]], right: Sequence[int] = ()) -> str:
-    """A table with left-aligned columns, except those named (from 0), which are right-aligned."""
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    cells = [
-        [cell.rjust(w) if n in right else cell.ljust(w) for n, (cell, w) in enumerate(zip(line, widths, strict=True))]
-        for line in lines
-    ]
-    return "\n".join("  ".join(line).rstrip() for line in cells)
+    return "\n".join(aligned(lines, [n for n, column in enumerate(columns) if all(map(_is_number, column[bool(head) :]))]))
 
 
 def _is_number(cell: str) -> bool:

@@ -1,4 +1,4 @@
-"""``steptwin explain``: what a program does, as far as its text tells.
+"""``steptwin explain``: what a program does, as far as its text shows.
 
 From Python: `steptwin.explain.mic488.explain`, `steptwin.explain.m1486.explain`.
 """

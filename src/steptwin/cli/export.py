@@ -45,7 +45,7 @@ def export(
     period: Annotated[str, typer.Option(metavar="TIME", help="Between two samples (csv, parquet).")] = "1ms",
     json: Json = False,
 ) -> None:
-    """Write a recorded trace as a timeline (html), a picture (png, svg), signals (vcd) or samples (csv, parquet)."""
+    """Write a recorded trace as timeline (html), picture (png, svg), signals (vcd), frames (pcapng) or samples (csv, parquet)."""
     from steptwin.files.export import bar, read_trace, write_trace
     from steptwin.files.timedinputs import parse_duration
 

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from steptwin.cli import completion
-from steptwin.cli.commands import PageFormat, PageSection, show
-from steptwin.cli.twin import Json, Twin, selected
+from steptwin.cli.pages import PageFormat, PageSection, show
+from steptwin.cli.selected import selected
+from steptwin.cli.twin import Json, Twin
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:

@@ -10,7 +10,9 @@ from typing import Annotated, Any
 
 import typer
 
-from steptwin.cli.twin import Json, Twin, ask_twin
+from steptwin.cli.selected import ask_twin
+from steptwin.cli.twin import Json, Twin
+from steptwin.cli.worldoptions import Of, Show
 
 
 def pause(twin: Twin = None, json: Json = False) -> None:
@@ -39,14 +41,24 @@ def step(
     until: Annotated[
         str | None, typer.Option(metavar="CONDITION", help="Until this is true, after TIME (else 1h) at the latest.")
     ] = None,
+    of: Of = None,
+    show: Show = None,
     twin: Twin = None,
     json: Json = False,
 ) -> None:
     """Advance a world by a time, to a condition or to its next event, show what happened, and pause."""
     from steptwin.files.timedinputs import parse_duration
-    from steptwin.subject.commands import Advance
+    from steptwin.subject.commands import Advance, Describe
+    from steptwin.subject.contract import read_description
     from steptwin.subject.events import read_event
+    from steptwin.subject.payloads import STEP_KINDS
+    from steptwin.world.records import ALL, read_selection
 
+    selection = ALL
+    if of or show:
+        world = read_description(ask_twin(twin, Describe()))
+        parts = (*world.machines, *world.axes, *world.elements, *world.lines)
+        selection = read_selection(of or (), show or (), (*(part.name for part in parts), *world.buttons), sorted(STEP_KINDS))
     wanted = Advance(None if duration is None else parse_duration(duration, "step"), until=until)
     events: list[dict[str, Any]] = []
     while True:
@@ -55,7 +67,9 @@ def step(
             events += there["events"]
         else:
             for event in there["events"]:
-                typer.echo(str(read_event(event)))
+                found = read_event(event)
+                if selection.takes(found.kind, found.machine, found.text):
+                    typer.echo(str(found))
             if there["missed"]:
                 typer.echo(f"... and {there['missed']} more", err=True)
         if "to_ns" not in there:

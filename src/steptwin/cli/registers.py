@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from steptwin.cli import completion
-from steptwin.cli.device import aligned
+from steptwin.columns import aligned
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
@@ -185,7 +185,7 @@ def _line(register: Register) -> tuple[str, ...]:
 
 def as_text(register_map: RegisterMap) -> str:
     """Aligned columns, one register a line."""
-    return aligned([_COLUMNS, *(_line(register) for register in register_map)]) + "\n"
+    return "\n".join((*aligned([_COLUMNS, *(_line(register) for register in register_map)]), ""))
 
 
 def _show(register_map: RegisterMap) -> None:

@@ -15,7 +15,7 @@ import typer
 from steptwin.cli import completion
 from steptwin.cli.device import Json, complain
 from steptwin.cli.optiongroups import OptionGroup, grouped
-from steptwin.cli.worldoptions import Coverage, WorldRunOptions
+from steptwin.cli.worldoptions import Coverage, ShownOptions, WorldRunOptions
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ class ChipProgramOptions(OptionGroup):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Run:
+class _RunOptions:
     """What applies to every file, and the groups of options of which a file has some. None: not given."""
 
     limit: Nanos | None
@@ -103,6 +103,7 @@ class _Run:
     wbc: WbcOptions
     chip: ChipProgramOptions
     world: WorldRunOptions
+    shown: ShownOptions
 
     def until_idle(self) -> bool:
         """Of a program. Raises `Misuse` for a condition, which only a world has."""
@@ -126,6 +127,7 @@ def run(
     wbc: WbcOptions,
     chip: ChipProgramOptions,
     world: WorldRunOptions,
+    shown: ShownOptions,
 ) -> None:
     """Run a program or a world in virtual time and print its moves, waits, outputs and uploads. A session is continued."""
     from steptwin.files.timedinputs import parse_duration, parse_inputs
@@ -142,7 +144,7 @@ def run(
     if json and why:
         raise Misuse("--why and --json both print on standard output: ask 'steptwin why' about a --session instead")
     changes = parse_inputs(",".join(inputs or []))
-    wanted = _Run(
+    wanted = _RunOptions(
         limit=limit,
         until=until,
         inputs=tuple(changes),
@@ -154,6 +156,7 @@ def run(
         wbc=wbc,
         chip=chip,
         world=world,
+        shown=shown,
     )
     if not runner(file, wanted):
         raise typer.Exit(1)
@@ -171,12 +174,12 @@ def _check_targets(trace: Path | None, session: Path | None) -> None:
         check_session_target(session)
 
 
-def _run_m1486(file: Path, given: _Run) -> bool:
+def _run_m1486(file: Path, given: _RunOptions) -> bool:
     from steptwin.commands.run_m1486 import M1486Run
     from steptwin.commands.run_m1486 import run as run_program
     from steptwin.m1486.variants import DEFAULT
 
-    for group in (given.wbc, given.world):
+    for group in (given.wbc, given.world, given.shown):
         group.refuse("M1486 programs")
     wanted = M1486Run(
         program=file,
@@ -195,14 +198,14 @@ def _run_m1486(file: Path, given: _Run) -> bool:
     return run_program(wanted, typer.echo, complain)
 
 
-def _run_wbc(file: Path, given: _Run) -> bool:
+def _run_wbc(file: Path, given: _RunOptions) -> bool:
     from steptwin.commands.run_wbc import WbcRun
     from steptwin.commands.run_wbc import run as run_program
     from steptwin.commands.travels import parse_travel
     from steptwin.files.timedinputs import parse_duration
     from steptwin.wbc.dialect import DEFAULT
 
-    for group in (given.chip, given.world):
+    for group in (given.chip, given.world, given.shown):
         group.refuse("WBC programs")
     wanted = WbcRun(
         program=file,
@@ -223,7 +226,7 @@ def _run_wbc(file: Path, given: _Run) -> bool:
     return run_program(wanted, typer.echo, complain)
 
 
-def _run_world(file: Path, given: _Run) -> bool:
+def _run_world(file: Path, given: _RunOptions) -> bool:
     from steptwin.commands.run_world import WorldRun
     from steptwin.commands.run_world import run as run_world
 
@@ -246,12 +249,14 @@ def _run_world(file: Path, given: _Run) -> bool:
         allow_outside=given.world.allow_outside,
         strict=given.world.strict,
         as_json=given.as_json,
+        names=tuple(given.shown.of or ()),
+        kinds=tuple(given.shown.show or ()),
     )
     return run_world(wanted, typer.echo, complain)
 
 
 #: What runs each kind of file; True when nothing went wrong.
-_RUNNERS: dict[str, Callable[[Path, _Run], bool]] = {
+_RUNNERS: dict[str, Callable[[Path, _RunOptions], bool]] = {
     ".m1486": _run_m1486,
     ".prg": _run_wbc,
     ".wbc": _run_wbc,

@@ -11,7 +11,7 @@ import typer
 
 from steptwin.cli import completion
 from steptwin.cli.optiongroups import GroupedCommand, OptionGroup, grouped
-from steptwin.cli.worldoptions import Faults, LogTraffic, ReadyFile
+from steptwin.cli.worldoptions import Control, Faults, LogTraffic, ReadyFile, Speed
 
 if TYPE_CHECKING:
     from steptwin.commands.serve import ServeOptions
@@ -88,6 +88,7 @@ class TwinOptions(OptionGroup):
     name: Annotated[
         str | None, typer.Option(help="Name under which 'steptwin pin' and its like find this twin. Default: its kind.")
     ] = None
+    speed: Speed = "1"
     state: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Directory of the non-volatile memory. Without it, memory ends with the twin."),
@@ -101,6 +102,7 @@ class TwinOptions(OptionGroup):
     fault: Faults = None
     seed: Annotated[int, typer.Option(help="Random seed for faults.")] = 0
     ready_file: ReadyFile = None
+    control: Control = None
     log_frames: LogTraffic = False
     listen_any: Annotated[
         bool,
@@ -125,6 +127,8 @@ class TwinOptions(OptionGroup):
             name=name,
             links=line.links if any(line.links.values()) else {"pty": _default_pty(name), **self._listening(ports)},
             baud=line.baud,
+            speed=self.speed,
+            control=self.control,
             state=self.state,
             trace=self.trace,
             line_timing=line.line_timing,

@@ -14,7 +14,6 @@ import typer
 from steptwin.cli import completion
 from steptwin.cli.optiongroups import OptionGroup, grouped
 from steptwin.cli.worldoptions import LiveOptions, ReadyFile, WorldRunOptions, up_options
-from steptwin.errors import Misuse
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,7 +76,9 @@ def studio(
     except ModuleNotFoundError as error:
         if error.name is None or error.name.partition(".")[0] not in ("fastapi", "uvicorn", "websockets", "starlette"):
             raise
-        raise Misuse("the studio needs the extra 'studio': pip install 'steptwin[studio]'") from None
+        from steptwin.extras import libraries_of, missing
+
+        raise missing("the studio", libraries_of("studio")) from None
     if page.device and world is None:
         for group in (live, options):
             group.refuse("devices without a world: give a MACHINE.toml too")

@@ -6,18 +6,15 @@ From Python: `steptwin.live.remote.RemoteSubject`.
 from __future__ import annotations
 
 import re
-from collections.abc import Generator, Sequence
-from contextlib import contextmanager
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from steptwin.cli import completion
+from steptwin.cli.selected import Selected, levels_of, selected
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
-    from steptwin.datasheet import Datasheet
-    from steptwin.live.remote import RemoteSubject
     from steptwin.subject.commands import Command
 
 Twin = Annotated[
@@ -31,61 +28,6 @@ Twin = Annotated[
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
-
-
-class Selected:
-    """A running twin, and the controller of it that was named, if one was."""
-
-    def __init__(self, subject: RemoteSubject, controller: str | None) -> None:
-        self.subject = subject
-        self._controller = controller
-        self.controllers = tuple(machine.name for machine in subject.description.machines)
-
-    def do(self, command: Command) -> Any:
-        return self.subject.do(command).value
-
-    @property
-    def shown(self) -> Sequence[str]:
-        """The selected controllers: the one named, or all."""
-        return self.controllers if self._controller is None else (self._controller,)
-
-    def one(self) -> str:
-        """The selected controller. Raises `Misuse` if the twin has several and none was named."""
-        if len(self.shown) != 1:
-            raise Misuse(
-                f"the twin has several controllers: name one with --device TWIN.CONTROLLER: {', '.join(self.controllers)}"
-            )
-        return self.shown[0]
-
-    def sheet(self, name: str) -> Datasheet:
-        """The data sheet of the controller called ``name``."""
-        return next(part.datasheet for part in self.subject.description.machines if part.name == name)
-
-    def called(self, name: str) -> str:
-        """The controller called ``name``; case does not matter. Raises `Misuse`."""
-        found = next((each for each in self.controllers if each.upper() == name.upper()), None)
-        if found is None:
-            raise Misuse(f"no controller {name!r}: there are {', '.join(self.controllers)}")
-        return found
-
-
-@contextmanager
-def selected(twin: str | None) -> Generator[Selected]:
-    """The twin that ``twin`` names and its controller. Raises `LineFailure` or `Misuse` if that is ambiguous."""
-    from steptwin.live.remote import RemoteSubject
-    from steptwin.live.twins import find_controller
-
-    name, controller = find_controller(twin)
-    with RemoteSubject(name) as subject:
-        yield Selected(subject, controller)
-
-
-def ask_twin(twin: str | None, command: Command) -> Any:
-    """The response of the twin that ``twin`` names to a command for the whole twin."""
-    from steptwin.live.remote import ask
-    from steptwin.live.twins import find_controller
-
-    return ask(find_controller(twin)[0], command)
 
 
 def pin(
@@ -114,13 +56,6 @@ def pin(
         _print_json(pins)
     elif pins:
         typer.echo("\n".join(f"{name:<6} {value:g}" for name, value in pins.items()))
-
-
-def levels_of(there: Selected) -> dict[str, float]:
-    """The selected pins, as CONTROLLER.PIN."""
-    from steptwin.subject.commands import ReadPins
-
-    return {name: level for machine in there.shown for name, level in there.do(ReadPins(machine)).items()}
 
 
 def _changes(there: Selected, wanted: dict[str, float]) -> list[Command]:
@@ -189,11 +124,11 @@ def power_cycle(twin: Twin = None) -> None:
 
 def state(twin: Twin = None, json: Json = False) -> None:
     """Show the state of a running twin."""
-    from steptwin.subject.commands import State
+    from steptwin.subject.commands import ReadState
 
     with selected(twin) as there:
         name = there.one()
-        found = there.do(State(name))
+        found = there.do(ReadState(name))
     if json:
         _print_json(found)
         return

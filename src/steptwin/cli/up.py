@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from steptwin.cli.commands import PageFormat, PageSection, show
 from steptwin.cli.optiongroups import grouped
-from steptwin.cli.worldoptions import Coverage, LiveOptions, ReadyFile, WorldRunOptions, up_options
+from steptwin.cli.pages import PageFormat, PageSection, show
+from steptwin.cli.worldoptions import Coverage, LiveOptions, ReadyFile, ShownOptions, WorldRunOptions, up_options
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND
 
@@ -35,6 +35,7 @@ def up(
     form: Annotated[PageFormat, typer.Option("--format", help="How to print the keys.")] = PageFormat.TEXT,
     live: LiveOptions,
     options: WorldRunOptions,
+    shown: ShownOptions,
 ) -> None:
     """Run a world in real time until Ctrl-C or until one of its scripts stops it; other programs connect to its lines.
 
@@ -48,22 +49,25 @@ def up(
     from steptwin.commands.up_world import up as run_up
 
     wanted = replace(up_options(world, ready_file, live, options), past=past, coverage=tuple(coverage or ()))
+    wanted = replace(wanted, names=tuple(shown.of or ()), kinds=tuple(shown.show or ()))
     if not run_up(wanted):
         raise typer.Exit(1)
 
 
 def sections() -> list[PageSection]:
     """The tables of a description, for people."""
+    from steptwin.world.gateways import GATEWAYS
     from steptwin.world.steptable import ACTIONS, REPEAT, STEPS
     from steptwin.world.tables import all_keys, written
 
+    tables = {written(name): keys for name, keys in all_keys().items()} | {rows.written: rows.keys for rows in GATEWAYS.values()}
     found = [
         PageSection(
-            written(name),
+            name,
             ("key", "meaning", "default"),
             [(key.name, key.meaning, "required" if key.is_required else _default(key)) for key in keys],
         )
-        for name, keys in all_keys().items()
+        for name, keys in tables.items()
     ]
     steps = [
         (action.main.name, action.main.meaning, ", ".join(f"{key.name}: {key.meaning}" for key in action.others))
@@ -74,11 +78,11 @@ def sections() -> list[PageSection]:
 
 
 def _default(key: Key) -> str:
-    from steptwin.world.values import positive_time, time_value
+    from steptwin.world.values import positive_time, time_value, whole_seconds
 
     value = key.default
     if value is None or value == ():
         return ""
-    if value and key.read in (positive_time, time_value):
+    if value and key.read in (positive_time, time_value, whole_seconds):
         return f"{value / MILLISECOND:g} ms"
     return str(value).lower() if isinstance(value, bool) else str(value)

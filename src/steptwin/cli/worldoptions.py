@@ -29,6 +29,22 @@ Coverage = Annotated[
         "'-' prints a table. Repeatable.",
     ),
 ]
+Of = Annotated[
+    list[str] | None,
+    typer.Option("--of", metavar="NAME,...", help="Show only what these controllers, elements, lines do; scripts: 'world'."),
+]
+Show = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--show", metavar="KIND,...", help="Show only these kinds: program, status, note, report, button, input, fault."
+    ),
+]
+Speed = Annotated[
+    str, typer.Option(help="Virtual seconds per second: 0.1, 1, 10; 'max' for worlds without external clients; 0 starts paused.")
+]
+Control = Annotated[
+    str | None, typer.Option(metavar="HOST:PORT", help="Also open the control endpoint on this loopback TCP address.")
+]
 LogTraffic = Annotated[
     bool, typer.Option("--log-frames", help="Print the traffic of every line with time, direction, bytes and meaning.")
 ]
@@ -80,15 +96,22 @@ class WorldRunOptions(OptionGroup):
 
 
 @dataclass(frozen=True, kw_only=True)
+class ShownOptions(OptionGroup):
+    """What is shown of what happens in a world."""
+
+    heading = "Options of what is shown of worlds"
+
+    of: Of = None
+    show: Show = None
+
+
+@dataclass(frozen=True, kw_only=True)
 class LiveOptions(OptionGroup):
     """Of a world in real time."""
 
     heading = "Options of real time"
 
-    speed: Annotated[
-        str,
-        typer.Option(help="Virtual seconds per second: 0.1, 1, 10; 'max' for worlds without external clients; 0 starts paused."),
-    ] = "1"
+    speed: Speed = "1"
     name: Annotated[str | None, typer.Option(help="Name by which --device finds it. Default: that of the file.")] = None
     trace: Annotated[
         str | None,
@@ -98,10 +121,7 @@ class LiveOptions(OptionGroup):
             "Default: that of the description.",
         ),
     ] = None
-    control: Annotated[
-        str | None,
-        typer.Option(metavar="HOST:PORT", help="Also open the control endpoint on this loopback TCP address."),
-    ] = None
+    control: Control = None
     listen_any: ListenAny = False
     log_frames: LogTraffic = False
 

@@ -10,20 +10,21 @@ from pathlib import Path
 
 from steptwin.commands.gateways import open_gateways
 from steptwin.commands.keptsettings import keep_settings
-from steptwin.commands.studio_devices import serve_without_world
+from steptwin.commands.without_world import serve_without_world
+from steptwin.devices.composite import CompositeSubject
+from steptwin.devices.connections import Computer, DeviceConnections
+from steptwin.devices.device import DeviceSurroundings
+from steptwin.eventloop import result_of
+from steptwin.gateways.contract import PastValues
 from steptwin.gateways.devicefile import DeviceFile, read_device_file
 from steptwin.inputfiles import read_bytes
 from steptwin.later import start
 from steptwin.live.server import Server
 from steptwin.live.twins import find_device
 from steptwin.machine import Nanos
-from steptwin.studio.connections import Computer, DeviceConnections
-from steptwin.studio.device import DeviceSurroundings
-from steptwin.studio.eventloop import result_of
-from steptwin.studio.shown import Shown
 from steptwin.subject.commands import Command, Jog
 from steptwin.subject.contract import Description, Reading, Result
-from steptwin.subject.events import Numbering
+from steptwin.subject.events import Event, Numbering
 from steptwin.subject.following import Filter, Following
 from steptwin.subject.jogs import Held
 from steptwin.textcodec import decode
@@ -51,13 +52,14 @@ async def _open(server: Server, wanted: DeviceFile, file: Path, *, listen_any: b
         server.notice(f"internal error, please report it: {type(error).__name__}: {error}")
 
     server.introduce(wanted.name, file=file)
-    shown = Shown(None, now, Numbering({}))
+    subject = CompositeSubject(None, now, Numbering({}))
     around = DeviceSurroundings(clock=now, keep=keep_settings, on_internal=report)
-    connections = DeviceConnections(shown, around, Computer(ports=_no_ports, find=find_device))
+    connections = DeviceConnections(subject, around, Computer(ports=_no_ports, find=find_device))
     server.join(connections)
     for device in wanted.devices:
         await connections.open(device.address, device.name)
-    await open_gateways(server, wanted.gateways, file.parent, _Devices(wanted.name, shown), listen_any=listen_any)
+    devices = _Devices(wanted.name, subject)
+    await open_gateways(server, wanted.gateways, wanted.history, file.parent, devices, listen_any=listen_any)
 
 
 def _no_ports() -> Sequence[dict[str, object]]:
@@ -67,22 +69,26 @@ def _no_ports() -> Sequence[dict[str, object]]:
 class _Devices:
     """Devices for gateways. See `steptwin.gateways.contract.GatewaySubject`."""
 
-    def __init__(self, name: str, shown: Shown) -> None:
+    def __init__(self, name: str, subject: CompositeSubject) -> None:
+        self.past: PastValues | None = None
         self._name = name
-        self._shown = shown
+        self._subject = subject
 
     @property
     def description(self) -> Description:
-        return replace(self._shown.description, name=self._name)
+        return replace(self._subject.description, name=self._name)
 
     def read(self, *points: str) -> tuple[Reading, ...]:
-        return self._shown.read(*points)
+        return self._subject.read(*points)
 
     async def do(self, wanted: Command, /) -> Result:
-        return await result_of(start(self._shown.do(wanted)))
+        return await result_of(start(self._subject.do(wanted)))
 
     async def begin_jog(self, wanted: Jog, /) -> Held:
-        return await result_of(start(self._shown.begin(wanted)))
+        return await result_of(start(self._subject.begin(wanted)))
 
     def follow(self, what: Filter, bound: int) -> Following:
-        return self._shown.follow(what, bound)
+        return self._subject.follow(what, bound)
+
+    def plans(self, what: Filter) -> list[Event]:
+        return self._subject.plans(what)

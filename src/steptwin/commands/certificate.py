@@ -10,6 +10,7 @@ from ipaddress import ip_address
 from pathlib import Path
 
 from steptwin.errors import Misuse
+from steptwin.extras import missing
 from steptwin.system import reason
 from steptwin.world.gateways import APPLICATION_URI
 
@@ -48,8 +49,8 @@ def _make(hosts: Iterable[str], days: int) -> tuple[bytes, bytes]:
         from cryptography.hazmat.primitives.asymmetric import rsa
         from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
         from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
-    except ImportError as error:
-        raise Misuse(f"certificates need {error.name}: pip install 'steptwin[opcua]'") from None
+    except ImportError:
+        raise missing("a certificate", ["cryptography"]) from None
 
     def names() -> Iterator[x509.GeneralName]:
         yield x509.UniformResourceIdentifier(APPLICATION_URI)

@@ -14,7 +14,7 @@ from steptwin.world.description import read_world
 
 Named: TypeAlias = Callable[[Path], str]
 """The name of a file in a description."""
-Describe: TypeAlias = Callable[[Named], str]
+DescribeNamed: TypeAlias = Callable[[Named], str]
 
 
 def print_world(text: str, name: str) -> None:
@@ -26,7 +26,7 @@ def print_world(text: str, name: str) -> None:
             sys.stderr.write(f"{file} is outside this folder: --save-world FILE copies it, 'up --allow-outside' reads it\n")
 
 
-def save_world(describe: Describe, where: Path) -> None:
+def save_world(describe: DescribeNamed, where: Path) -> None:
     """Write the description to a file, and copy the files it names beside it. Raises `Misuse` if another file is in the way."""
     check_folder(where)
     name = str(where)

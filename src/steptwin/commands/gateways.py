@@ -1,37 +1,70 @@
-"""Opens the gateways of a world or of devices, beside its lines."""
+"""Opens the gateways and the history of a world or of devices, beside its lines."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
 
+from steptwin.extras import libraries_of, missing
 from steptwin.gateways import make_gateway
-from steptwin.gateways.contract import GatewaySubject
+from steptwin.gateways.contract import GatewaySubject, PastValues
 from steptwin.live.server import EndPoint, Server
 from steptwin.live.world import LiveWorld
 from steptwin.live.world_control import WorldControl
 from steptwin.subject.commands import Command, Jog
 from steptwin.subject.contract import Description, Reading, Result
+from steptwin.subject.events import Event
 from steptwin.subject.following import Filter, Following
 from steptwin.subject.jogs import Held, WorldJogs
 from steptwin.world.gateways import GatewaySpec
+from steptwin.world.historytable import HISTORY, HistorySpec
+
+if TYPE_CHECKING:
+    from steptwin.history.keeper import HistoryKeeper
+
+
+class KeptSubject(GatewaySubject, Protocol):
+    """A subject that gets its history."""
+
+    past: PastValues | None
 
 
 async def open_gateways(
-    server: Server, specs: Iterable[GatewaySpec], folder: Path, subject: GatewaySubject, *, listen_any: bool
+    server: Server,
+    specs: Iterable[GatewaySpec],
+    history: HistorySpec | None,
+    folder: Path,
+    subject: KeptSubject,
+    *,
+    listen_any: bool,
 ) -> None:
     """Open those of a file in ``folder``. Raises `Misuse` or `LineFailure` for one that cannot be opened."""
+    if history is not None:
+        keeper = _make_keeper(history, subject, folder)
+        details = await keeper.open(listen_any=listen_any, notice=server.notice)
+        server.join(keeper, EndPoint(HISTORY, str(details["url"]), keeper.protocol, details))
+        subject.past = keeper.past
     for spec in specs:
         gateway = make_gateway(spec, subject, folder)
-        details = await gateway.open(listen_any=listen_any)
+        details = await gateway.open(listen_any=listen_any, notice=server.notice)
         place = str(details.get("url") or f"{details['host']}:{details['port']}")
         server.join(gateway, EndPoint(spec.kind, place, gateway.protocol, details))
+
+
+def _make_keeper(spec: HistorySpec, subject: GatewaySubject, folder: Path) -> HistoryKeeper:
+    try:
+        from steptwin.history.keeper import HistoryKeeper
+    except ImportError:
+        raise missing(f"[{HISTORY}]", libraries_of(HISTORY)) from None
+    return HistoryKeeper(spec, subject, folder)
 
 
 class LiveWorldSubject:
     """A live world for gateways: it answers at once."""
 
     def __init__(self, control: WorldControl, live: LiveWorld) -> None:
+        self.past: PastValues | None = None
         self._control = control
         self._live = live
 
@@ -52,3 +85,6 @@ class LiveWorldSubject:
 
     def follow(self, what: Filter, bound: int) -> Following:
         return self._control.follow(what, bound)
+
+    def plans(self, what: Filter) -> list[Event]:
+        return self._control.plans(what)

@@ -19,7 +19,7 @@ from steptwin.files import session as sessions
 from steptwin.files.beginning import begin_world, set_faults
 from steptwin.files.coverage import CoverageReports
 from steptwin.files.export import axis_views, bar, write_trace
-from steptwin.files.export.progress import Progress
+from steptwin.files.export.progress import TimeProgress
 from steptwin.files.timedinputs import TimedInput
 from steptwin.files.world import LONGEST_RUN_NS, World
 from steptwin.live.interrupts import FirstInterrupt
@@ -27,7 +27,7 @@ from steptwin.machine import SECOND, Nanos
 from steptwin.world import script as do
 from steptwin.world.kind import ProgramAct, ProgramReport
 from steptwin.world.overrides import Overrides
-from steptwin.world.records import describe, is_shown
+from steptwin.world.records import PROGRAM, Selection, describe, is_shown, named_in, read_selection
 from steptwin.world.references import check_step
 from steptwin.world.unfinished import unchanged_inputs, waiting
 
@@ -72,6 +72,9 @@ class WorldRun:
     strict: bool = False
     """Whether a wait that timed out counts as a failure."""
     as_json: bool = False
+    names: Sequence[str] = ()
+    """What is shown of what happens: of these controllers, elements and lines only (`steptwin.world.records.Selection`)."""
+    kinds: Sequence[str] = ()
 
 
 def run(options: WorldRun, out: Print, warn: Print) -> bool:
@@ -101,6 +104,7 @@ def _run_and_report(world: World, options: WorldRun, reports: CoverageReports, o
     before = filter(is_shown, world.trace) if began else ()  # what happens at power-on is part of the run
     known = Counter(record.machine for record in before)
     _arrange(world, options)
+    selection = read_selection(options.names, options.kinds, named_in(world.parts))
     usual = USUAL_LIMIT_NS if options.until is None else LONGEST_RUN_NS
     limit = options.limit if options.limit is not None else usual
     watches = {} if options.as_json else _watched(world)
@@ -120,8 +124,8 @@ def _run_and_report(world: World, options: WorldRun, reports: CoverageReports, o
     if options.as_json:
         _json(world, outcome, out)
     else:
-        _print_happened(world, outcome, watches, out)
-        _print_end(world, outcome, out)
+        _print_happened(world, outcome, watches, selection, out)
+        _print_end(world, outcome, selection, out)
     for text in tables:
         out(f"\n{text}")
     report_causes(world, options.questions, out)
@@ -140,7 +144,7 @@ def _watched(world: World) -> dict[str, ProgramReport]:
     return {name: watch for name, watch in found.items() if watch is not None}
 
 
-def _run(world: World, until: str | None, limit: Nanos, progress: Progress) -> str | None:
+def _run(world: World, until: str | None, limit: Nanos, progress: TimeProgress) -> str | None:
     """Run to the limit; returns the reason of an earlier end. The first Ctrl-C ends the run and keeps its results."""
 
     def watch(now: Nanos) -> None:
@@ -214,15 +218,19 @@ def _write_trace(world: World, where: Path) -> list[Path]:
 # ---------------------------------------------------------------------- output
 
 
-def _print_happened(world: World, outcome: WorldRunResult, watches: Mapping[str, ProgramReport], out: Print) -> None:
+def _print_happened(
+    world: World, outcome: WorldRunResult, watches: Mapping[str, ProgramReport], selection: Selection, out: Print
+) -> None:
     """Print in order of time what happened in the world, and what programs did with the statements that caused it."""
     shown: list[tuple[Nanos, str]] = []
     for record in filter(is_shown, world.trace):
         if outcome.known[record.machine]:
             outcome.known[record.machine] -= 1
-        else:
+        elif selection.shows(record):
             shown.append((record.time, describe(record)))
     for name, watch in watches.items():
+        if not selection.takes(PROGRAM, name):
+            continue
         shown += [(each.time, _with_statement(name, each)) for each in watch.happened]
     for _, text in sorted(shown, key=itemgetter(0)):
         out(text)
@@ -232,7 +240,7 @@ def _with_statement(controller: str, happening: ProgramAct) -> str:
     return f"{happening.time / SECOND:12.6f} s  {controller:<10} {happening.text:<34}  {happening.place}".rstrip()
 
 
-def _print_end(world: World, outcome: WorldRunResult, out: Print) -> None:
+def _print_end(world: World, outcome: WorldRunResult, selection: Selection, out: Print) -> None:
     out("")
     for name, axis in world.axis.items():
         lost = f"   {axis.lost} pulses lost" if axis.lost else ""
@@ -256,20 +264,21 @@ def _print_end(world: World, outcome: WorldRunResult, out: Print) -> None:
     if outcome.in_vain is not None:
         out(f"warning: {outcome.in_vain} did not come true in {(world.now - outcome.began) / SECOND:g} s")
     if outcome.reason is None or world.failures or world.overdue:
-        _print_unfinished(world, outcome.began, out)
+        _print_unfinished(world, outcome.began, selection, out)
     for path in outcome.written:
         out(f"wrote {path}")
     out(f"digest {outcome.digest}")
 
 
-def _print_unfinished(world: World, began: Nanos, out: Print) -> None:
+def _print_unfinished(world: World, began: Nanos, selection: Selection, out: Print) -> None:
     """What stands still: usually that is why something did not happen."""
-    waits = list(waiting(world))
+    waits = [one for one in waiting(world) if one.who not in world.machines or selection.takes_of(one.who)]
     for one in waits[:MOST_WAITS]:
         out(f"{one.who} waits for {one.what}")
     if len(waits) > MOST_WAITS:
         out(f"{len(waits) - MOST_WAITS} more wait")
-    if unchanged := unchanged_inputs(world, began):
+    unchanged = [pin for pin in unchanged_inputs(world, began) if selection.takes_of(pin.partition(".")[0])]
+    if unchanged:
         shown = ", ".join(unchanged[:MOST_WAITS])
         more = f" and {len(unchanged) - MOST_WAITS} more" if len(unchanged) > MOST_WAITS else ""
         out(f"inputs that never changed: {shown}{more}")

@@ -13,7 +13,7 @@ from steptwin.drivers.kinds import DRIVERS, clear_line
 from steptwin.errors import LineFailure, Misuse
 
 ANY = "any"
-Progress: TypeAlias = Callable[[str, int, str], AbstractContextManager[Callable[[int], object]]]
+SearchProgress: TypeAlias = Callable[[str, int, str], AbstractContextManager[Callable[[int], object]]]
 """Called with what is searched for, how many there are to try, and the format of their numbers; then with each number that is
 tried. An exception of it ends the search."""
 
@@ -63,7 +63,7 @@ def found_at(
     bauds: list[int] | None,
     timeout: float,
     *,
-    progress: Progress,
+    progress: SearchProgress,
     report: Callable[[str], object],
 ) -> list[FoundAt]:
     """The devices that respond at an address, of the first kind that does. An address that cannot be opened is reported and
@@ -89,7 +89,7 @@ def _searched(
     rates: list[int],
     numbers: list[int],
     timeout: float,
-    progress: Progress,
+    progress: SearchProgress,
 ) -> list[FoundAt]:
     for baud in rates:
         with progress(f"{_title(place, baud)} {search.title}", search.numbers or len(numbers), search.form) as step:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from steptwin.commands.descriptions import Describe, print_world, save_world
+from steptwin.commands.descriptions import DescribeNamed, print_world, save_world
 from steptwin.commands.up_world import UpOptions, up_with
 from steptwin.files.world import World
 from steptwin.inputfiles import read_bytes
@@ -26,6 +26,8 @@ class ServeOptions:
     links: Mapping[str, str | None] = field(default_factory=dict)
     """Its links, by keys of ``[[line]]``."""
     baud: int | None = None
+    speed: str = "1"
+    control: str | None = None
     state: Path | None = None
     trace: str | None = None
     line_timing: str = "off"
@@ -54,7 +56,7 @@ def check_links(options: ServeOptions, *others: str | None) -> None:
     check_addresses((*links, *others), listen_any=options.listen_any)
 
 
-def serve(options: ServeOptions, describe: Describe, text: str) -> None:
+def serve(options: ServeOptions, describe: DescribeNamed, text: str) -> None:
     """Run the description ``text``. Faults are not part of it; they are set as `up` sets those of its command line."""
     check_name(options.name)
     name = f"serve {options.name}"
@@ -71,6 +73,8 @@ def serve(options: ServeOptions, describe: Describe, text: str) -> None:
             world,
             UpOptions(
                 world=None,
+                speed=options.speed,
+                control=options.control,
                 name=options.name,
                 faults=options.faults,
                 trace=options.trace,

@@ -28,10 +28,14 @@ from steptwin.commands.auditfile import AuditFile
 from steptwin.commands.demo import demo_world
 from steptwin.commands.keptsettings import keep_settings, state_directory
 from steptwin.commands.recorded import recorded
-from steptwin.commands.studio_devices import serve_without_world
 from steptwin.commands.studio_recordings import WorldRecordings
 from steptwin.commands.studio_work import LineWork
 from steptwin.commands.up_world import Running, UpOptions, up, up_with
+from steptwin.commands.without_world import serve_without_world
+from steptwin.devices.composite import CompositeSubject
+from steptwin.devices.connections import Computer, DeviceConnections
+from steptwin.devices.device import DeviceSurroundings
+from steptwin.devices.worldpart import WorldPart
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.httpservice import Tls, listen
@@ -40,12 +44,8 @@ from steptwin.live.lookback import Lookback
 from steptwin.live.ports import serial_ports, twin_ports
 from steptwin.live.server import EndPoint, Server
 from steptwin.live.twins import find_device
-from steptwin.studio.connections import Computer, DeviceConnections
-from steptwin.studio.device import DeviceSurroundings
-from steptwin.studio.hub import Hub, Moment, ProgramTexts, Surroundings
-from steptwin.studio.service import Service
-from steptwin.studio.shown import Shown
-from steptwin.studio.shownworld import ShownWorld
+from steptwin.studio.hub import Hub, PresentMoment, ProgramTexts, Surroundings
+from steptwin.studio.service import StudioService
 from steptwin.studio.work import DeviceWork
 from steptwin.subject.events import Numbering
 from steptwin.subject.jogs import WorldJogs
@@ -163,15 +163,15 @@ class _Page:
         """Serve it in the event loop of the world of ``beside``, with the past of a world that has one already."""
         live, pace, server = running.live, running.pace, running.server
 
-        def moment() -> Moment:
+        def moment() -> PresentMoment:
             clock = server.cell.clock
             goes = not pace.is_paused and live.world.stopped is None
-            return Moment(max(clock.now(), live.now) if goes and pace.speed != inf else live.now, goes, pace.speed)
+            return PresentMoment(max(clock.now(), live.now) if goes and pace.speed != inf else live.now, goes, pace.speed)
 
         jogs = WorldJogs(live.subject, running.control.at_present)
         live.companion = jogs
-        world = ShownWorld(running.control, live.subject.followers, jogs)
-        shown = Shown(world, lambda: moment().time, live.subject.numbering)
+        world = WorldPart(running.control, live.subject.followers, jogs)
+        subject = CompositeSubject(world, lambda: moment().time, live.subject.numbering)
 
         def configuration(machine: str) -> SourceText | None:
             return configuration_text(live.world, machine) if machine in live.world.machines else None
@@ -183,26 +183,28 @@ class _Page:
         may_view = is_loopback(self._entrance.address.host)
         recordings = WorldRecordings(live, server.cell, folder, stem, beside.session, may_view=may_view)
         server.join(recordings)
-        await self._serve(server, shown, moment, WorldPrograms(live.world), configuration, lookback, recordings)
+        await self._serve(server, subject, moment, WorldPrograms(live.world), configuration, lookback, recordings, live.traffic)
 
     async def open_without_world(self, server: Server) -> None:
         """Serve it in the event loop of ``server``."""
         begin = time.monotonic_ns()
 
-        def moment() -> Moment:
-            return Moment(time.monotonic_ns() - begin, running=True, speed=1.0)
+        def moment() -> PresentMoment:
+            return PresentMoment(time.monotonic_ns() - begin, running=True, speed=1.0)
 
-        await self._serve(server, Shown(None, lambda: moment().time, Numbering({})), moment, _NoPrograms(), lambda machine: None)
+        subject = CompositeSubject(None, lambda: moment().time, Numbering({}))
+        await self._serve(server, subject, moment, _NoPrograms(), lambda machine: None)
 
     async def _serve(
         self,
         server: Server,
-        shown: Shown,
-        moment: Callable[[], Moment],
+        subject: CompositeSubject,
+        moment: Callable[[], PresentMoment],
         programs: ProgramTexts,
         configuration: Callable[[str], SourceText | None],
         lookback: Lookback | None = None,
         recordings: WorldRecordings | None = None,
+        traffic: Callable[[], Sequence[Mapping[str, object]]] | None = None,
     ) -> None:
         loop = asyncio.get_running_loop()
 
@@ -210,7 +212,7 @@ class _Page:
             loop.call_exception_handler({"message": "a request to the studio failed", "exception": error})
 
         of_devices = DeviceSurroundings(clock=time.monotonic_ns, keep=keep_settings, on_internal=report)
-        connections = DeviceConnections(shown, of_devices, Computer(ports=_ports, find=find_device))
+        connections = DeviceConnections(subject, of_devices, Computer(ports=_ports, find=find_device))
         work = DeviceWork(LineWork(), report)
         around = Surroundings(
             moment=moment,
@@ -223,9 +225,10 @@ class _Page:
             configuration=configuration,
             lookback=lookback,
             recordings=recordings,
+            traffic=traffic,
             on_internal=report,
         )
-        hub = Hub(shown, shown, around)
+        hub = Hub(subject, subject, around)
         try:
             for device in self._own.devices:
                 await connections.open(device)
@@ -237,7 +240,7 @@ class _Page:
         is_local = is_loopback(entrance.address.host)
         names = () if is_local else (socket.gethostname(), socket.getfqdn())
         origins = Origins(port, names, by_address=not is_local, has_tls=entrance.tls is not None)
-        service = Service(hub, self._listening, origins, entrance.tls)
+        service = StudioService(hub, self._listening, origins, entrance.tls)
         service.start()
         url = f"{'http' if entrance.tls is None else 'https'}://{Address(_reached(host), port)}/"
         details = {"host": host, "port": port, "url": url}
@@ -253,7 +256,7 @@ class _Page:
 class _Links:
     """Of viewers and of devices: when viewers have gone, jogs end, and then devices can be left."""
 
-    service: Service
+    service: StudioService
     work: DeviceWork
     connections: DeviceConnections
 
@@ -271,6 +274,10 @@ class _NoPrograms:
 
     def files(self) -> Mapping[str, bytes]:
         return {}
+
+    def memory(self, machine: str, place: str, text: str) -> Sequence[Mapping[str, object]]:
+        self.text(machine, place)
+        return ()
 
     def text(self, machine: str, place: str) -> Mapping[str, object]:
         raise Misuse(f"{machine} is a device: the texts of its programs are not known here")

@@ -18,13 +18,13 @@ from tempfile import TemporaryDirectory
 from typing import TypeAlias
 
 from steptwin.errors import LineFailure, Misuse, Refusal
+from steptwin.eventloop import later
 from steptwin.files import session as sessions
 from steptwin.files.beginning import SESSION_SUFFIX
 from steptwin.files.export import FORMATS
 from steptwin.files.savedsessions import SavedSession, path_of, read_saved, saved_sessions
 from steptwin.live.cell import Cell
 from steptwin.live.world import MOST_INPUT_BYTES, MOST_INPUTS, LiveWorld
-from steptwin.studio.eventloop import later
 from steptwin.world import history
 
 EXPORT_S = 300.0

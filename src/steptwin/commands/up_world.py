@@ -40,7 +40,7 @@ from steptwin.world.kind import LinkKind
 from steptwin.world.kinds import line_kinds
 from steptwin.world.lines import SCRIPTS
 from steptwin.world.overrides import Overrides
-from steptwin.world.records import is_shown
+from steptwin.world.records import is_shown, named_in, read_selection
 from steptwin.world.spec import LineSpec
 from steptwin.world.trace import TraceRecord
 
@@ -78,6 +78,9 @@ class UpOptions:
     """Whether a wait that timed out counts as a failure."""
     listen_any: bool = False
     log_frames: bool = False
+    names: Sequence[str] = ()
+    """What is shown: of these controllers, elements and lines only (`steptwin.world.records.Selection`)."""
+    kinds: Sequence[str] = ()
     allow_outside: bool = False
     """Files of the description may lie anywhere."""
     is_closed: bool = False
@@ -177,7 +180,7 @@ async def _serve(
         live = LiveWorld(world)
         cell = Cell(live, Clock(begin=world.now))
         quiet = addition is not None
-        display = Notices(live, output, frames=options.log_frames) if quiet else _display(live, cell, output, options.log_frames)
+        display = Notices(live, output, frames=options.log_frames) if quiet else _display(live, cell, output, options)
         live.show = display.notice
         server = Server(cell, display.notice)
         live.share_reads(cell)
@@ -199,12 +202,13 @@ async def _serve(
                 _keep(options, live, output, recorder, kept, reports)
 
 
-def _display(live: LiveWorld, cell: Cell, output: Output, log_frames: bool) -> Display:
-    if not shows_live_view(output, log_frames=log_frames):
-        return Lines(live, output, frames=log_frames)
+def _display(live: LiveWorld, cell: Cell, output: Output, options: UpOptions) -> Display:
+    selection = read_selection(options.names, options.kinds, named_in(live.world.parts))
+    if not shows_live_view(output, log_frames=options.log_frames):
+        return Lines(live, output, frames=options.log_frames, selection=selection)
     from steptwin.live.view import LiveView
 
-    return LiveView(live, cell, output)
+    return LiveView(live, cell, output, selection)
 
 
 def _recorder(live: LiveWorld, kept: Kept) -> TraceFile | None:
@@ -279,9 +283,8 @@ async def _open(server: Server, live: LiveWorld, pace: Pace, options: UpOptions,
         await addition(Running(server, live, pace, control))
     if not options.is_closed:
         folder = Path() if options.world is None else options.world.parent
-        await open_gateways(
-            server, live.world.spec.gateways, folder, LiveWorldSubject(control, live), listen_any=options.listen_any
-        )
+        spec, subject = live.world.spec, LiveWorldSubject(control, live)
+        await open_gateways(server, spec.gateways, spec.history, folder, subject, listen_any=options.listen_any)
     if options.ready_file is not None:
         server.write_ready_file(options.ready_file)
 

@@ -12,7 +12,7 @@ from steptwin.files import session as sessions
 from steptwin.files.why import why_of_session
 from steptwin.live.remote import ask
 from steptwin.live.twins import find_controller
-from steptwin.subject.debugcommands import Why
+from steptwin.subject.debugcommands import AskWhy
 
 LONGEST_S = 60.0
 """Time-out of an answer of a twin, s."""
@@ -32,4 +32,4 @@ def _of_session(path: Path, question: str, at: str | None) -> Mapping[str, Any]:
 def _of_twin(text: str, question: str, at: str | None) -> Mapping[str, Any]:
     twin, controller = find_controller(text)
     moment = None if at is None else duration(at)
-    return ask(twin, Why(question or controller or "", moment), timeout_s=LONGEST_S)
+    return ask(twin, AskWhy(question or controller or "", moment), timeout_s=LONGEST_S)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
+from steptwin.columns import aligned
 from steptwin.coverage.counts import Coverage, Summary
 from steptwin.coverage.missing import missing
 
@@ -16,8 +15,7 @@ def table(coverage: Coverage) -> str:
     rows = [(text.path, *_numbers(text.summary), missing(text)) for text in texts]
     if len(rows) != 1:
         rows.append(("all", *_numbers(coverage.summary), ""))
-    widths = [max(len(row[column]) for row in (HEAD, *rows)) for column in range(len(HEAD))]
-    return "\n".join(_line(row, widths) for row in (HEAD, *rows))
+    return "\n".join(aligned([HEAD, *rows], right=range(1, len(HEAD) - 1)))
 
 
 def _numbers(summary: Summary) -> tuple[str, ...]:
@@ -27,9 +25,3 @@ def _numbers(summary: Summary) -> tuple[str, ...]:
 def percent_text(summary: Summary) -> str:
     """With one decimal, rounded down: 100.0 is all."""
     return f"{int(summary.percent * 10) / 10:.1f}"
-
-
-def _line(row: Sequence[str], widths: Sequence[int]) -> str:
-    first, *numbers, last = row
-    cells = [number.rjust(width) for number, width in zip(numbers, widths[1:-1], strict=True)]
-    return "  ".join((first.ljust(widths[0]), *cells, last)).rstrip()

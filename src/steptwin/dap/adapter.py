@@ -17,16 +17,17 @@ from steptwin.dap.launch import Launch, open_world, read_launch
 from steptwin.dap.sources import Sources, texts_of
 from steptwin.dap.target import Target
 from steptwin.debug.breakpoints import AnyPoint
-from steptwin.debug.debugger import Debugger, Travel
-from steptwin.debug.values import Events, Location, SetPoint, Stop, StopReason, Value
+from steptwin.debug.debugger import Debugger, DebugTravel
+from steptwin.debug.values import Events, Location, SetPoint, ShownValue, Stopped, StopReason
 from steptwin.durations import duration
-from steptwin.errors import LineFailure, Misuse, SteptwinError
+from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
 from steptwin.files.world import World
 from steptwin.machine import SECOND
 from steptwin.subject.debugcommands import SCOPES
+from steptwin.why.answer import Answer
 
-Body: TypeAlias = Mapping[str, object]
-Send: TypeAlias = Callable[[str, Body], None]
+_Body: TypeAlias = Mapping[str, object]
+_SendEvent: TypeAlias = Callable[[str, _Body], None]
 """An event and its body."""
 Arguments: TypeAlias = Mapping[str, Any]
 
@@ -35,7 +36,7 @@ LOOK_S = 0.1
 FRAMES = 1000
 """Frames of a thread, at most: a frame has the number of its thread times this, and its depth."""
 _STOPS_USUALLY = (Events.PROGRAM_ERROR, Events.WRONG_DATA)
-CAPABILITIES: Body = {
+CAPABILITIES: _Body = {
     "supportsConfigurationDoneRequest": True,
     "supportsFunctionBreakpoints": True,
     "supportsConditionalBreakpoints": True,
@@ -73,14 +74,14 @@ _HELP = (
 class Adapter:
     """One session. ``send`` takes the events."""
 
-    def __init__(self, send: Send) -> None:
+    def __init__(self, send: _SendEvent) -> None:
         self._send = send
         self._debugger: Target | None = None
         self._world: World | None = None
         self._launch: Launch | None = None
         self._attached: AttachedTwin | None = None
         self._stops_on_entry = self._is_no_debug = False
-        self._travel: Travel | None = None
+        self._travel: DebugTravel | None = None
         self._sources = Sources(())
         self._lines: dict[Path, list[AnyPoint]] = {}
         """Breakpoints in lines, by file."""
@@ -101,7 +102,7 @@ class Adapter:
 
     # ------------------------------------------------------------------ requests
 
-    def answer(self, command: str, arguments: Arguments) -> Body:
+    def answer(self, command: str, arguments: Arguments) -> _Body:
         """The body of the response. Raises `SteptwinError` for what cannot be done."""
         handler = _HANDLERS.get(command)
         if handler is None:
@@ -129,12 +130,12 @@ class Adapter:
             raise Misuse("nothing was launched, and no twin was attached to")
         return self._debugger
 
-    def _initialize(self, arguments: Arguments) -> Body:
+    def _initialize(self, arguments: Arguments) -> _Body:
         self._first_line = 1 if arguments.get("linesStartAt1", True) else 0
         self._first_column = 1 if arguments.get("columnsStartAt1", True) else 0
         return CAPABILITIES
 
-    def _launch_world(self, arguments: Arguments) -> Body:
+    def _launch_world(self, arguments: Arguments) -> _Body:
         self._check_fresh("launch")
         asked = read_launch(arguments)
         world = open_world(asked, self._tell)
@@ -151,7 +152,7 @@ class Adapter:
         self._stops_on_entry, self._is_no_debug = asked.stop_on_entry, asked.no_debug
         return {}
 
-    def _attach(self, arguments: Arguments) -> Body:
+    def _attach(self, arguments: Arguments) -> _Body:
         self._check_fresh("attach")
         twin, stops = arguments.get("twin"), arguments.get("stopOnEntry", False)
         if twin is not None and not isinstance(twin, str):
@@ -165,12 +166,12 @@ class Adapter:
         if self._debugger is not None:
             raise Misuse(f"{command}: this session has something to debug already")
 
-    def _configuration_done(self, arguments: Arguments) -> Body:
+    def _configuration_done(self, arguments: Arguments) -> _Body:
         debugger = self._stopped()
         self._run(debugger.running_to_entry() if self._stops_on_entry else debugger.running())
         return {}
 
-    def _restart(self, arguments: Arguments) -> Body:
+    def _restart(self, arguments: Arguments) -> _Body:
         if self._world is None:
             raise Misuse("restart: a twin that runs has no beginning to go to; disconnect and attach again")
         if self.is_running:
@@ -180,7 +181,7 @@ class Adapter:
         debugger.branch()
         return self._configuration_done(arguments)
 
-    def _end(self, arguments: Arguments) -> Body:
+    def _end(self, arguments: Arguments) -> _Body:
         self._end_travel()
         if not self.has_ended:
             self.has_ended = True
@@ -195,7 +196,7 @@ class Adapter:
 
     # ------------------------------------------------------------------ breakpoints
 
-    def _set_lines(self, arguments: Arguments) -> Body:
+    def _set_lines(self, arguments: Arguments) -> _Body:
         path = self._sources.path(arguments["source"])
         texts = self._sources.of(path)
         wanted: Sequence[Arguments] = arguments.get("breakpoints") or ()
@@ -208,11 +209,11 @@ class Adapter:
         found = self._set_all(points)[:: len(texts)]
         return {"breakpoints": [self._point(one, arguments["source"]) for one in found]}
 
-    def _set_labels(self, arguments: Arguments) -> Body:
+    def _set_labels(self, arguments: Arguments) -> _Body:
         self._labels = [label_point(one) for one in arguments["breakpoints"]]
         return {"breakpoints": [self._point(one) for one in self._set_all(self._labels)]}
 
-    def _data_info(self, arguments: Arguments) -> Body:
+    def _data_info(self, arguments: Arguments) -> _Body:
         debugger = self._stopped()
         reference = arguments.get("variablesReference") or 0
         machine = self._machine_of_scope(reference) if reference else self._machine_of_frame(arguments.get("frameId"))
@@ -223,7 +224,7 @@ class Adapter:
             return {"dataId": None, "description": str(error)}
         return {"dataId": f"{machine}/{name}", "description": f"{name} of {machine}", "accessTypes": ["write"]}
 
-    def _set_data(self, arguments: Arguments) -> Body:
+    def _set_data(self, arguments: Arguments) -> _Body:
         self._data = [data_point(one) for one in arguments["breakpoints"]]
         return {"breakpoints": [self._point(one) for one in self._set_all(self._data)]}
 
@@ -237,7 +238,7 @@ class Adapter:
         by_point = dict(zip(everything, found, strict=True))
         return [by_point[point] for point in wanted]
 
-    def _point(self, found: SetPoint, source: object = None) -> Body:
+    def _point(self, found: SetPoint, source: object = None) -> _Body:
         body: dict[str, object] = {"id": found.number, "verified": found.is_set and not found.note}
         if message := found.problem or found.note:
             body["message"] = message
@@ -245,7 +246,7 @@ class Adapter:
             body |= {"line": found.line - 1 + self._first_line, "source": source}
         return body
 
-    def _set_events(self, arguments: Arguments) -> Body:
+    def _set_events(self, arguments: Arguments) -> _Body:
         known = {event.code: event for event in Events}
         unknown = [name for name in arguments["filters"] if name not in known]
         if unknown:
@@ -254,7 +255,7 @@ class Adapter:
             self._started().set_events([known[name] for name in arguments["filters"]])
         return {}
 
-    def _locations(self, arguments: Arguments) -> Body:
+    def _locations(self, arguments: Arguments) -> _Body:
         texts = self._sources.of(self._sources.path(arguments["source"]))
         first = arguments["line"] - self._first_line + 1
         last = arguments.get("endLine", arguments["line"]) - self._first_line + 1
@@ -265,13 +266,13 @@ class Adapter:
 
     # ------------------------------------------------------------------ running
 
-    def _run(self, travel: Travel) -> None:
+    def _run(self, travel: DebugTravel) -> None:
         self._travel = travel
 
-    def _starting(self, arguments: Arguments, *, name: str) -> Body:
+    def _starting(self, arguments: Arguments, *, name: str) -> _Body:
         debugger = self._stopped()
         machine = self._machine(arguments["threadId"])
-        travels: Mapping[str, Callable[[], Travel]] = {
+        travels: Mapping[str, Callable[[], DebugTravel]] = {
             "continue": debugger.running,
             "reverseContinue": debugger.running_back,
             "next": lambda: debugger.stepping_over(machine),
@@ -311,13 +312,13 @@ class Adapter:
             self._travel.close()
             self._travel = None
 
-    def _pause(self, arguments: Arguments) -> Body:
+    def _pause(self, arguments: Arguments) -> _Body:
         if self.is_running:
             self._end_travel()
             self._report(self._started().pause())
         return {}
 
-    def _report(self, stop: Stop) -> None:
+    def _report(self, stop: Stopped) -> None:
         debugger, asked = self._started(), self._launch
         if stop.reason is StopReason.IDLE and debugger.has_ended and not (asked is not None and asked.stop_at_end):
             self._tell(f"{stop.text} at {_seconds(stop.time)}")
@@ -341,7 +342,7 @@ class Adapter:
 
     # ------------------------------------------------------------------ what is shown
 
-    def _threads(self, arguments: Arguments) -> Body:
+    def _threads(self, arguments: Arguments) -> _Body:
         return {"threads": [{"id": number, "name": name} for number, name in enumerate(self._started().threads, start=1)]}
 
     def _machine(self, thread: object) -> str:
@@ -354,7 +355,7 @@ class Adapter:
         """Of the first controller where no frame is named."""
         return self._machine(1 if not isinstance(frame, int) else frame // FRAMES)
 
-    def _stack(self, arguments: Arguments) -> Body:
+    def _stack(self, arguments: Arguments) -> _Body:
         thread = arguments["threadId"]
         frames = self._stopped().stack(self._machine(thread))
         first = arguments.get("startFrame") or 0
@@ -365,7 +366,7 @@ class Adapter:
         ]
         return {"stackFrames": shown, "totalFrames": len(frames)}
 
-    def _placed(self, location: Location) -> Body:
+    def _placed(self, location: Location) -> _Body:
         line, column = self._first_line - 1, self._first_column - 1
         return {
             "source": self._sources.plain(location.machine, location.text),
@@ -375,13 +376,13 @@ class Adapter:
             "endColumn": location.end_column + column,
         }
 
-    def _loaded(self, arguments: Arguments) -> Body:
+    def _loaded(self, arguments: Arguments) -> _Body:
         return {"sources": self._sources.all()}
 
-    def _source(self, arguments: Arguments) -> Body:
+    def _source(self, arguments: Arguments) -> _Body:
         return {"content": self._sources.numbered(arguments["sourceReference"]).source.text}
 
-    def _scopes(self, arguments: Arguments) -> Body:
+    def _scopes(self, arguments: Arguments) -> _Body:
         thread = arguments["frameId"] // FRAMES
         self._machine(thread)
         return {
@@ -400,20 +401,20 @@ class Adapter:
             raise Misuse(f"variablesReference = {reference}: there is no such group of values")
         return SCOPES[number - 1]
 
-    def _variables(self, arguments: Arguments) -> Body:
+    def _variables(self, arguments: Arguments) -> _Body:
         reference = arguments["variablesReference"]
         found = self._stopped().scope(self._machine_of_scope(reference), self._scope_of(reference)).values
         first = arguments.get("start") or 0
         count = arguments.get("count") or len(found)
         return {"variables": [_variable(value) for value in found[first : first + count]]}
 
-    def _evaluate(self, arguments: Arguments) -> Body:
+    def _evaluate(self, arguments: Arguments) -> _Body:
         debugger, text = self._stopped(), arguments["expression"].strip()
         if arguments.get("context") == "repl":
             word, _, rest = text.partition(" ")
             if word == "why":
                 machine = self._machine_of_frame(arguments.get("frameId"))
-                return {"result": debugger.why(rest or machine).text(), "variablesReference": 0}
+                return {"result": _why(debugger, machine, rest.strip()).text(), "variablesReference": 0}
             if word == "help":
                 return {"result": _HELP, "variablesReference": 0}
             if word == "branch" and not rest:
@@ -425,11 +426,11 @@ class Adapter:
         value = debugger.evaluate(self._machine_of_frame(arguments.get("frameId")), text)
         return {"result": value.text, "variablesReference": 0}
 
-    def _set_variable(self, arguments: Arguments) -> Body:
+    def _set_variable(self, arguments: Arguments) -> _Body:
         machine = self._machine_of_scope(arguments["variablesReference"])
         return {"value": self._stopped().set_value(machine, arguments["name"], arguments["value"]).text}
 
-    def _set_expression(self, arguments: Arguments) -> Body:
+    def _set_expression(self, arguments: Arguments) -> _Body:
         machine = self._machine_of_frame(arguments.get("frameId"))
         return {"value": self._stopped().set_value(machine, arguments["expression"].strip(), arguments["value"]).text}
 
@@ -446,7 +447,7 @@ class Adapter:
 
 
 _RUNNING = ("continue", "reverseContinue", "next", "stepIn", "stepOut", "stepBack")
-_HANDLERS: Mapping[str, Callable[[Adapter, Arguments], Body]] = {
+_HANDLERS: Mapping[str, Callable[[Adapter, Arguments], _Body]] = {
     "initialize": Adapter._initialize,
     "launch": Adapter._launch_world,
     "attach": Adapter._attach,
@@ -474,7 +475,20 @@ _HANDLERS: Mapping[str, Callable[[Adapter, Arguments], Body]] = {
 }
 
 
-def _variable(value: Value) -> Body:
+def _why(debugger: Target, machine: str, question: str) -> Answer:
+    """A name alone is first one of the controller that is shown. Raises `Misuse`."""
+    if not question.isidentifier() or question in debugger.threads:
+        return debugger.why(question or machine)
+    try:
+        return debugger.why(f"{machine}.{question}")
+    except (Misuse, Refusal):
+        if any(value.name.lower() == question.lower() for value in debugger.scope(machine, SCOPES[0]).values):
+            hint = "a data breakpoint stops where it changes"
+            raise Misuse(f"{question} is a variable of {machine}, of which no past is noted: {hint}") from None
+        return debugger.why(question)
+
+
+def _variable(value: ShownValue) -> _Body:
     hint = {} if value.is_settable else {"presentationHint": {"attributes": ["readOnly"]}}
     return {"name": value.name, "value": value.text, "variablesReference": 0, "evaluateName": value.name, **hint}
 

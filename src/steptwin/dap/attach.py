@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from steptwin.debug.breakpoints import AnyPoint
-from steptwin.debug.debugger import Travel
+from steptwin.debug.debugger import DebugTravel
 from steptwin.debug.values import (
     DataPoint,
     Events,
@@ -16,10 +16,10 @@ from steptwin.debug.values import (
     Location,
     Scope,
     SetPoint,
+    ShownValue,
     StackFrame,
-    Stop,
+    Stopped,
     StopReason,
-    Value,
 )
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
@@ -143,14 +143,14 @@ class AttachedTwin:
     def scope(self, machine: str, name: str) -> Scope:
         return Scope(name, [_value(one) for one in self._ask(command.Values(machine, name))])
 
-    def evaluate(self, machine: str, text: str) -> Value:
+    def evaluate(self, machine: str, text: str) -> ShownValue:
         return _value(self._ask(command.Evaluate(machine, text)))
 
-    def set_value(self, machine: str, name: str, text: str) -> Value:
+    def set_value(self, machine: str, name: str, text: str) -> ShownValue:
         return _value(self._ask(command.SetValue(machine, name, text)))
 
     def why(self, question: str) -> Answer:
-        return read_answer(self._ask(command.Why(question, self.now)))
+        return read_answer(self._ask(command.AskWhy(question, self.now)))
 
     # ------------------------------------------------------------------ breakpoints
 
@@ -177,31 +177,31 @@ class AttachedTwin:
 
     # ------------------------------------------------------------------ time
 
-    def running(self) -> Travel:
+    def running(self) -> DebugTravel:
         if self._place()["going"]:
             return self._until_stopped()
         return self._after(command.RunProgram())
 
-    def running_to_entry(self) -> Travel:
+    def running_to_entry(self) -> DebugTravel:
         """A twin that runs has no entry: it is paused."""
         return self._at_once(self.pause())
 
-    def running_back(self) -> Travel:
+    def running_back(self) -> DebugTravel:
         return self._after(command.RunProgram(command.BACKWARDS))
 
-    def stepping_in(self, machine: str) -> Travel:
+    def stepping_in(self, machine: str) -> DebugTravel:
         return self._after(command.StepProgram(machine, "in"))
 
-    def stepping_over(self, machine: str) -> Travel:
+    def stepping_over(self, machine: str) -> DebugTravel:
         return self._after(command.StepProgram(machine, "over"))
 
-    def stepping_out(self, machine: str) -> Travel:
+    def stepping_out(self, machine: str) -> DebugTravel:
         return self._after(command.StepProgram(machine, "out"))
 
-    def stepping_back(self, machine: str) -> Travel:
+    def stepping_back(self, machine: str) -> DebugTravel:
         return self._after(command.StepProgram(machine, "back"))
 
-    def go(self, moment: Nanos) -> Stop:
+    def go(self, moment: Nanos) -> Stopped:
         self._drop()
         self._ask(command.LookAt(moment))
         while True:
@@ -215,9 +215,9 @@ class AttachedTwin:
         self._ask(command.Branch())
         self._drop()
 
-    def pause(self) -> Stop:
+    def pause(self) -> Stopped:
         self._ask(Pause())
-        return Stop(StopReason.PAUSE, self._drop())
+        return Stopped(StopReason.PAUSE, self._drop())
 
     def _drop(self) -> Nanos:
         """The place of the debugger, after all events up to now."""
@@ -226,22 +226,22 @@ class AttachedTwin:
             pass
         return now
 
-    def _after(self, wanted: Command) -> Travel:
+    def _after(self, wanted: Command) -> DebugTravel:
         self._drop()
         self._ask(wanted)
         return self._until_stopped()
 
-    def _until_stopped(self) -> Travel:
+    def _until_stopped(self) -> DebugTravel:
         while True:
             for stop in self._stops(PART_S):
                 return stop
             yield
 
-    def _at_once(self, stop: Stop) -> Travel:
+    def _at_once(self, stop: Stopped) -> DebugTravel:
         yield from ()
         return stop
 
-    def unasked(self) -> Travel | None:
+    def unasked(self) -> DebugTravel | None:
         """What another client has begun meanwhile; None for nothing."""
         for event in self._events(0.0):
             if isinstance(event.payload, StoppedPayload):
@@ -250,7 +250,7 @@ class AttachedTwin:
                 return self._until_stopped()
         return None
 
-    def _stops(self, timeout_s: float) -> Iterator[Stop]:
+    def _stops(self, timeout_s: float) -> Iterator[Stopped]:
         for event in self._events(timeout_s):
             if isinstance(event.payload, StoppedPayload):
                 yield self._stop(event, event.payload)
@@ -266,13 +266,13 @@ class AttachedTwin:
             else:
                 yield event
 
-    def _stop(self, event: Event, stopped: StoppedPayload) -> Stop:
+    def _stop(self, event: Event, stopped: StoppedPayload) -> Stopped:
         machine = event.machine if event.machine in self._texts else None
-        return Stop(StopReason(stopped.reason), event.time, machine, stopped.what, stopped.breakpoints)
+        return Stopped(StopReason(stopped.reason), event.time, machine, stopped.what, stopped.breakpoints)
 
 
-def _value(found: Mapping[str, Any]) -> Value:
-    return Value(found["name"], found["value"], found["number"], found["settable"])
+def _value(found: Mapping[str, Any]) -> ShownValue:
+    return ShownValue(found["name"], found["value"], found["number"], found["settable"])
 
 
 def _wanted(point: AnyPoint) -> command.SetBreakpoint:

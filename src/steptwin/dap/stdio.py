@@ -35,7 +35,7 @@ class _Session:
         self._waiting: SimpleQueue[dict[str, Any] | Misuse | None] = SimpleQueue()
         self._adapter = Adapter(self._event)
         self._is_over = False
-        """Nobody reads what is written."""
+        """The client no longer reads."""
 
     def run(self) -> None:
         """Serve until the editor disconnects or is gone; in both cases a twin is left as it was found."""

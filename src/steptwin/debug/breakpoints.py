@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import TypeAlias
 
-from steptwin.debug.calculation import Calculation, HitCount, LogText
+from steptwin.debug.calculation import HitCount, LogText, ResolvedExpression
 from steptwin.debug.values import DataPoint, LabelPoint, LinePoint, SetPoint
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
@@ -20,7 +20,7 @@ MOST_HITS = 1 << 16
 """Hits of one breakpoint that can be found again in the past; older ones are only counted."""
 
 AnyPoint: TypeAlias = LinePoint | LabelPoint | DataPoint
-Calculate: TypeAlias = Callable[[str, str], Calculation]
+ResolveExpression: TypeAlias = Callable[[str, str], ResolvedExpression]
 """The calculation for a controller of an expression. Raises `Misuse`."""
 
 
@@ -28,7 +28,7 @@ class Breakpoint:
     """A breakpoint at statements. Raises `Misuse` for a condition, hit count or log text that is none."""
 
     def __init__(
-        self, number: int, asked: LinePoint | LabelPoint, places: Mapping[str, Sequence[Place]], calculate: Calculate
+        self, number: int, asked: LinePoint | LabelPoint, places: Mapping[str, Sequence[Place]], calculate: ResolveExpression
     ) -> None:
         self.number = number
         self.asked = asked
@@ -91,7 +91,7 @@ class Breakpoint:
 class Watch:
     """A data breakpoint: what it looks at, and whether it is hit. Raises `Misuse` for a condition that is none."""
 
-    def __init__(self, number: int, asked: DataPoint, calculate: Calculate) -> None:
+    def __init__(self, number: int, asked: DataPoint, calculate: ResolveExpression) -> None:
         self.number = number
         self.machine = asked.machine
         self.name = asked.name
@@ -178,7 +178,7 @@ def _why_not_reached(programs: Programs, place: Place, standing: Plant | None, m
 class Breakpoints:
     """All breakpoints that are set. ``calculate`` is of the world in which they are looked for."""
 
-    def __init__(self, programs: Mapping[str, Programs], calculate: Calculate) -> None:
+    def __init__(self, programs: Mapping[str, Programs], calculate: ResolveExpression) -> None:
         self._programs = programs
         self._calculate = calculate
         self._all: list[Breakpoint] = []
@@ -188,8 +188,8 @@ class Breakpoints:
         self._next = 1
 
     def set(self, asked: Sequence[AnyPoint], standing: Plant | None = None) -> list[SetPoint]:
-        """Set these and no others. Those that were set before keep their number and their hits. ``standing``: where the programs
-        go on from, if nobody else can start them again."""
+        """Set these and no others. Those that were set before keep their number and their hits. ``standing``: the state
+        from which programs continue, if only the debugger can start them."""
         known: dict[AnyPoint, Breakpoint] = {point.asked: point for point in self._all}
         self._all, self.watches, self.at = [], [], {}
         return [self._set(one, known, standing) for one in asked]

@@ -14,7 +14,7 @@ from sys import float_info
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
-from steptwin.world.expression import Read, parse_expression, value_of
+from steptwin.world.expression import ReadAt, parse_expression, value_of
 from steptwin.world.plant import Plant
 from steptwin.world.quantities import unit_of_all
 from steptwin.world.signals import Idle, SignalOf
@@ -25,7 +25,7 @@ EXACT = 1e15
 _COUNTS: Mapping[str, Callable[[int, int], bool]] = {"=": eq, "==": eq, "<": lt, "<=": le, ">": gt, ">=": ge}
 
 
-class Calculation:
+class ResolvedExpression:
     """An expression whose names are resolved for a controller of a world."""
 
     def __init__(self, world: Plant, machine: str, text: str) -> None:
@@ -90,7 +90,7 @@ def _own_signal(world: Plant, machine: str, name: str) -> SignalOf | Idle:
         raise Misuse(f"{name!r} means nothing to {machine}: its variables are {known}") from None
 
 
-def _read_by_program(world: Plant, machine: str, name: str) -> Read:
+def _read_by_program(world: Plant, machine: str, name: str) -> ReadAt:
     """What a name means to the statement of a moment, or else to the controller."""
     programs = world.programs_of(machine)
 
@@ -111,16 +111,16 @@ def _checked(value: float) -> float:
 class LogText:
     """A text with expressions in braces: ``n is {n}``."""
 
-    def __init__(self, text: str, calculation: Callable[[str], Calculation]) -> None:
+    def __init__(self, text: str, calculation: Callable[[str], ResolvedExpression]) -> None:
         """Raises `Misuse` for what is no expression of the program, and for a brace without its partner."""
-        self._parts: list[str | Calculation] = []
+        self._parts: list[str | ResolvedExpression] = []
         for plain, inner, stray in re.findall(r"([^{}]+)|\{([^{}]*)\}|([{}])", text):
             if stray:
                 raise Misuse(f"log {text!r}: a brace has no partner")
             self._parts.append(plain or self._local(text, calculation(inner)))
 
     @staticmethod
-    def _local(text: str, calculation: Calculation) -> Calculation:
+    def _local(text: str, calculation: ResolvedExpression) -> ResolvedExpression:
         if not calculation.is_local:
             raise Misuse(f"log {text!r}: only names of the program can be in it")
         return calculation

@@ -16,13 +16,13 @@ from steptwin.debug.breakpoints import AnyPoint
 from steptwin.debug.calculation import number_text
 from steptwin.debug.observer import Logged
 from steptwin.debug.scout import Goal, Parts, Scout
-from steptwin.debug.values import Events, Location, Scope, SetPoint, StackFrame, Stop, StopReason, Value
+from steptwin.debug.values import Events, Location, Scope, SetPoint, ShownValue, StackFrame, Stopped, StopReason
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.subject.time import next_due
 from steptwin.why.answer import Answer
-from steptwin.why.kept import KeptPast
+from steptwin.why.kept import PastQuestions
 from steptwin.world.actions import ExternalInput
 from steptwin.world.history import History, outside_past
 from steptwin.world.plant import Plant, PlantSnapshot
@@ -37,7 +37,7 @@ MOST_OBSERVED_AT_ONCE = 1 << 12
 """A slice, which is executed without interruption, has so many statements of one program at first. It becomes twice as long where
 nothing is found, up to the second number, or to the third while every statement is observed."""
 
-Travel: TypeAlias = Generator[None, None, Stop]
+DebugTravel: TypeAlias = Generator[None, None, Stopped]
 """A run in parts: after each of them something else can be done, or the run be ended by `close`."""
 
 
@@ -75,7 +75,7 @@ class Debugger:
         self._is_own_history = history is None
         self._history = History(world) if history is None else history
         self._history.take()
-        self._why = KeptPast(self._history)
+        self._why = PastQuestions(self._history)
         self._scout = Scout(self._history)
         self._is_past = False
 
@@ -164,11 +164,11 @@ class Debugger:
         """A group of values, one of `steptwin.debug.scopes.SCOPES`. Raises `Misuse`."""
         return scopes.scope(self.view, machine, name)
 
-    def evaluate(self, machine: str, text: str) -> Value:
+    def evaluate(self, machine: str, text: str) -> ShownValue:
         """An expression (`steptwin.debug.calculation`). Raises `Misuse`."""
         return scopes.evaluate(self.view, machine, text)
 
-    def set_value(self, machine: str, name: str, text: str) -> Value:
+    def set_value(self, machine: str, name: str, text: str) -> ShownValue:
         """Give a variable, an input or a register the value of an expression. Raises `Misuse`, in the past in any case."""
         if self._is_past:
             ago = (self.present - self.now) / SECOND
@@ -176,7 +176,7 @@ class Debugger:
         value = scopes.evaluate(self._world, machine, text).number or 0.0
         self._apply_input(scopes.setting(self._world, machine, name, value))
         self._scout.changed(self.now)
-        return Value(name, number_text(value), value, is_settable=True)
+        return ShownValue(name, number_text(value), value, is_settable=True)
 
     def branch(self) -> None:
         """Have the world go on from here: what came later has not happened."""
@@ -224,42 +224,42 @@ class Debugger:
 
     # ------------------------------------------------------------------ forwards
 
-    def run(self, until: Nanos | None = None) -> Stop:
+    def run(self, until: Nanos | None = None) -> Stopped:
         """Go on to the next breakpoint or event, at most to a moment."""
         return _finished(self.running(until))
 
-    def step_in(self, machine: str) -> Stop:
+    def step_in(self, machine: str) -> Stopped:
         """To the next statement of a controller."""
         return _finished(self.stepping_in(machine))
 
-    def step_over(self, machine: str) -> Stop:
+    def step_over(self, machine: str) -> Stopped:
         """To the next statement that is not in a call or interrupt which begins here."""
         return _finished(self.stepping_over(machine))
 
-    def step_out(self, machine: str) -> Stop:
+    def step_out(self, machine: str) -> Stopped:
         """To the statement after the call in which the program is."""
         return _finished(self.stepping_out(machine))
 
-    def run_to_entry(self) -> Stop:
+    def run_to_entry(self) -> Stopped:
         """Before the first statement of any program."""
         return _finished(self.running_to_entry())
 
-    def running(self, until: Nanos | None = None) -> Travel:
+    def running(self, until: Nanos | None = None) -> DebugTravel:
         return self.forwards(Goal(), until)
 
-    def stepping_in(self, machine: str) -> Travel:
+    def stepping_in(self, machine: str) -> DebugTravel:
         return self.forwards(self.into(machine))
 
-    def stepping_over(self, machine: str) -> Travel:
+    def stepping_over(self, machine: str) -> DebugTravel:
         return self.forwards(self.over(machine))
 
-    def stepping_out(self, machine: str) -> Travel:
+    def stepping_out(self, machine: str) -> DebugTravel:
         return self.forwards(self.out(machine))
 
-    def running_to_entry(self) -> Travel:
+    def running_to_entry(self) -> DebugTravel:
         return self.forwards(Goal(self.threads, None, StopReason.ENTRY))
 
-    def forwards(self, goal: Goal, until: Nanos | None = None) -> Travel:
+    def forwards(self, goal: Goal, until: Nanos | None = None) -> DebugTravel:
         """Go on to the goal, or to what else is a reason to stop, at most to a moment."""
         start = self.now
         if not self._is_past:
@@ -271,7 +271,7 @@ class Debugger:
             end = self._slice_end(begin, begin + next(slices), until)
             if end is None:
                 yield from self._stand_at(begin)
-                return Stop(StopReason.IDLE, self.now, text=self._why_idle())
+                return Stopped(StopReason.IDLE, self.now, text=self._why_idle())
             stop = yield from self._scout.find(end, goal, start)
             if stop is not None:
                 yield from self._stand_at(stop.time)
@@ -280,7 +280,7 @@ class Debugger:
                 self._bring_world(end)
             yield
         yield from self._stand_at(self._scout.now)
-        return Stop(StopReason.LIMIT, self.now)
+        return Stopped(StopReason.LIMIT, self.now)
 
     def _slices(self, goal: Goal) -> Iterator[Nanos]:
         """The lengths of slices, one after the other."""
@@ -304,7 +304,7 @@ class Debugger:
 
     # ------------------------------------------------------------------ a world that goes on by itself
 
-    def look_ahead(self, until: Nanos, goal: Goal, after: Nanos) -> Stop | None:
+    def look_ahead(self, until: Nanos, goal: Goal, after: Nanos) -> Stopped | None:
         """The first reason to stop between the present and ``until``, after another moment; the world is brought to it, or to
         ``until``, before the next call."""
         scout = self._scout
@@ -326,34 +326,34 @@ class Debugger:
 
     # ------------------------------------------------------------------ backwards
 
-    def step_back(self, machine: str) -> Stop:
+    def step_back(self, machine: str) -> Stopped:
         """To the statement before, or to the beginning of the one in progress."""
         return _finished(self.stepping_back(machine))
 
-    def run_back(self) -> Stop:
+    def run_back(self) -> Stopped:
         """To the last breakpoint or event before this moment, or to the oldest moment that is kept."""
         return _finished(self.running_back())
 
-    def go(self, moment: Nanos) -> Stop:
+    def go(self, moment: Nanos) -> Stopped:
         """To a moment between `begin` and `present`. Raises `Misuse` for another one."""
         return _finished(self.going(moment))
 
-    def stepping_back(self, machine: str) -> Travel:
+    def stepping_back(self, machine: str) -> DebugTravel:
         return self._backwards(self.into(machine))
 
-    def running_back(self) -> Travel:
+    def running_back(self) -> DebugTravel:
         return self._backwards(Goal())
 
-    def going(self, moment: Nanos) -> Travel:
+    def going(self, moment: Nanos) -> DebugTravel:
         if not self.begin <= moment <= self.present:
             raise Misuse(outside_past(moment, self.begin, self.present))
         return self._going(moment)
 
-    def _going(self, moment: Nanos) -> Travel:
+    def _going(self, moment: Nanos) -> DebugTravel:
         yield from self._stand_at(moment)
-        return Stop(StopReason.PAUSE, self.now)
+        return Stopped(StopReason.PAUSE, self.now)
 
-    def _backwards(self, goal: Goal) -> Travel:
+    def _backwards(self, goal: Goal) -> DebugTravel:
         before = upper = self.now
         if not self._is_past:
             self._history.take()
@@ -367,14 +367,14 @@ class Debugger:
             upper = lower
             yield
         yield from self._stand_at(self.begin)
-        return Stop(StopReason.BEGIN, self.now, text="no older moment is kept")
+        return Stopped(StopReason.BEGIN, self.now, text="no older moment is kept")
 
     # ------------------------------------------------------------------ the two worlds
 
-    def pause(self) -> Stop:
+    def pause(self) -> Stopped:
         """Stand where the run that was ended has come to."""
         _finished(self._going(max(self.begin, min(self._scout.now, self.present))))
-        return Stop(StopReason.PAUSE, self.now)
+        return Stopped(StopReason.PAUSE, self.now)
 
     def _stand_at(self, moment: Nanos) -> Parts:
         """Look at a moment that has been, or run the world to one that comes."""

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 from steptwin.controllerstate import StateAxis, StateStatus, detail_text
 from steptwin.datasheet import Access
-from steptwin.debug.calculation import Calculation, number_text
-from steptwin.debug.values import Scope, Value
+from steptwin.debug.calculation import ResolvedExpression, number_text
+from steptwin.debug.values import Scope, ShownValue
 from steptwin.errors import Misuse
 from steptwin.machine import MotionController
 from steptwin.points import LivePoint
@@ -28,56 +28,56 @@ def scope(world: Plant, machine: str, name: str) -> Scope:
     return Scope(name, list(_VALUES[name](world, machine)))
 
 
-def _variables(world: Plant, machine: str) -> Iterator[Value]:
+def _variables(world: Plant, machine: str) -> Iterator[ShownValue]:
     for name, value in world.programs_of(machine).variables(world.now).items():
-        yield Value(name, number_text(value), value, is_settable=True)
+        yield ShownValue(name, number_text(value), value, is_settable=True)
 
 
-def _axes(world: Plant, machine: str) -> Iterator[Value]:
+def _axes(world: Plant, machine: str) -> Iterator[ShownValue]:
     for axis in world.kind(machine).state(world.machine(machine), world.now).axes:
         yield from _axis(axis)
 
 
-def _axis(axis: StateAxis) -> Iterator[Value]:
+def _axis(axis: StateAxis) -> Iterator[ShownValue]:
     yield _measured(f"{axis.name}.position", axis.position, axis.unit)
     yield _measured(f"{axis.name}.velocity", axis.velocity, f"{axis.unit}/s")
     moves = "" if axis.moving is None else ", moves" if axis.moving else ", at rest"
     yield _status(f"{axis.name}.status", axis.status, moves)
 
 
-def _status(name: str, status: StateStatus, more: str = "") -> Value:
-    return Value(name, f"{status.text}{more}", None if status.code is None else float(status.code))
+def _status(name: str, status: StateStatus, more: str = "") -> ShownValue:
+    return ShownValue(name, f"{status.text}{more}", None if status.code is None else float(status.code))
 
 
-def _measured(name: str, value: float | None, unit: str) -> Value:
-    return Value(name, "not known") if value is None else Value(name, f"{number_text(value)} {unit}".rstrip(), value)
+def _measured(name: str, value: float | None, unit: str) -> ShownValue:
+    return ShownValue(name, "not known") if value is None else ShownValue(name, f"{number_text(value)} {unit}".rstrip(), value)
 
 
-def _pins(world: Plant, machine: str) -> Iterator[Value]:
+def _pins(world: Plant, machine: str) -> Iterator[ShownValue]:
     kind, device = world.kind(machine), world.machine(machine)
     units = {pin.name: pin.unit for pin in kind.datasheet(device).pins}
     inputs = {*kind.terminals.digital_inputs, *kind.terminals.analog_inputs}
     for name, level in device.pins().items():
-        yield Value(name, f"{number_text(level)} {units.get(name, '')}".rstrip(), level, is_settable=name in inputs)
+        yield ShownValue(name, f"{number_text(level)} {units.get(name, '')}".rstrip(), level, is_settable=name in inputs)
 
 
-def _controller(world: Plant, machine: str) -> Iterator[Value]:
+def _controller(world: Plant, machine: str) -> Iterator[ShownValue]:
     state = world.kind(machine).state(world.machine(machine), world.now)
-    yield Value("time", f"{world.now / 1e9:.9f} s", world.now / 1e9)
+    yield ShownValue("time", f"{world.now / 1e9:.9f} s", world.now / 1e9)
     yield _status("status", state.status)
-    yield Value("program", state.program.text)
+    yield ShownValue("program", state.program.text)
     for name, detail in state.details.items():
-        yield Value(name, detail_text(detail))
+        yield ShownValue(name, detail_text(detail))
 
 
-def _registers(world: Plant, machine: str) -> Iterator[Value]:
+def _registers(world: Plant, machine: str) -> Iterator[ShownValue]:
     kind, device = world.kind(machine), world.machine(machine)
     for point in kind.datasheet(device).points:
         live = _live(kind, device, point.path)
         if live is not None and live.read is not None:
             value = float(live.read(world.now))
             settable = kind.registers is not None and point.access is not Access.READ
-            yield Value(point.path, f"{number_text(value)} {point.unit}".rstrip(), value, is_settable=settable)
+            yield ShownValue(point.path, f"{number_text(value)} {point.unit}".rstrip(), value, is_settable=settable)
 
 
 def _live(kind: AnyKind, device: MotionController, path: str) -> LivePoint | None:
@@ -88,7 +88,7 @@ def _live(kind: AnyKind, device: MotionController, path: str) -> LivePoint | Non
         return None
 
 
-def _parts(world: Plant, machine: str) -> Iterator[Value]:
+def _parts(world: Plant, machine: str) -> Iterator[ShownValue]:
     """Mechanics, by axis."""
     for axis in world.axes:
         name = f"{axis}.position"
@@ -100,12 +100,12 @@ _VALUES = {
 }  # fmt: skip
 
 
-def evaluate(world: Plant, machine: str, text: str) -> Value:
+def evaluate(world: Plant, machine: str, text: str) -> ShownValue:
     """The value of an expression. Raises `Misuse`."""
     world.touch(machine)
     name = text.strip()
-    number = Calculation(world, machine, name).value(world.now)
-    return Value(name, number_text(number), number, is_settable=False)
+    number = ResolvedExpression(world, machine, name).value(world.now)
+    return ShownValue(name, number_text(number), number, is_settable=False)
 
 
 def setting(world: Plant, machine: str, name: str, value: float) -> ExternalInput:

@@ -12,16 +12,16 @@ from operator import attrgetter
 from typing import NamedTuple, TypeAlias
 
 from steptwin.debug.breakpoints import Breakpoints
-from steptwin.debug.calculation import Calculation
+from steptwin.debug.calculation import ResolvedExpression
 from steptwin.debug.observer import Begun, Logged, Observer
-from steptwin.debug.values import LabelPoint, Stop, StopReason
+from steptwin.debug.values import LabelPoint, Stopped, StopReason
 from steptwin.machine import Nanos
 from steptwin.subject.time import next_due
 from steptwin.world.history import History, Past
 
 Parts: TypeAlias = Generator[None, None, None]
 """Of what can be interrupted."""
-Finding: TypeAlias = Generator[None, None, "Stop | None"]
+Finding: TypeAlias = Generator[None, None, "Stopped | None"]
 
 
 class Goal(NamedTuple):
@@ -38,7 +38,7 @@ class Goal(NamedTuple):
 class Candidate(NamedTuple):
     """A reason to stop; ``begun`` where conditions may be undecided."""
 
-    stop: Stop
+    stop: Stopped
     begun: Begun | None = None
 
 
@@ -49,7 +49,7 @@ class Scout:
         self._history = history
         self._past = Past(history)
         self.world = self._past.world
-        self.points = Breakpoints(history.world.programs, partial(Calculation, self.world))
+        self.points = Breakpoints(history.world.programs, partial(ResolvedExpression, self.world))
         for programs in self.world.programs.values():
             programs.execute_all(True, self.world.now)
         self._observer = Observer(self.world, self.points)
@@ -120,7 +120,7 @@ class Scout:
         yield from self.look_at(lower)
         self._observer.observe(goal.machines)
         self._observer.clear()
-        found: Stop | None = None
+        found: Stopped | None = None
         while (hit := (yield from self._go_ahead(upper))) is not None and hit.time < before:
             found = hit
         there = [one for one in self._candidates(goal) if begin <= one.stop.time < before]
@@ -168,7 +168,7 @@ class Scout:
             if self.now < self.present:
                 yield from self._past.go_on(min(moment, self.present))
             elif (stopped := self.world.run_to(moment)) is not None and self.now < moment:
-                return Stop(StopReason.WORLD, self.now, text=stopped)
+                return Stopped(StopReason.WORLD, self.now, text=stopped)
             if (hit := self._hit(before)) is not None:
                 return hit
             before = self._watched or []
@@ -179,14 +179,14 @@ class Scout:
         due = next_due(self.world)
         return end if due is None else min(max(due, self.now + 1), end)
 
-    def _hit(self, before: list[float | None]) -> Stop | None:
+    def _hit(self, before: list[float | None]) -> Stopped | None:
         """The first data breakpoint that is hit now, by values that were others before."""
         watches = self.points.watches
         self._watched = after = [watch.value(self.now) for watch in watches]
         for watch, old, new in zip(watches, before, after, strict=True):
             if watch.is_hit(old, new):
                 text = watch.text if watch.has_condition else f"{watch.name}: {old:.9g} → {new:.9g}"
-                return Stop(StopReason.DATA, self.now, watch.machine, text, (watch.number,))
+                return Stopped(StopReason.DATA, self.now, watch.machine, text, (watch.number,))
         return None
 
     # ------------------------------------------------------------------ reasons to stop
@@ -195,12 +195,12 @@ class Scout:
         """What was observed, each with the stop that it is a reason for; in the order of time."""
         found = [Candidate(_stop_at(begun), begun) for begun in self._observer.begun if begun.hit or begun.undecided]
         found += [
-            Candidate(Stop(goal.reason, begun.stand, begun.machine))
+            Candidate(Stopped(goal.reason, begun.stand, begun.machine))
             for begun in self._observer.begun
             if goal.reached(begun) and not begun.hit
         ]
         events = self._observer.happened
-        found += [Candidate(Stop(StopReason.EXCEPTION, event.time, event.machine, event.text)) for event in events]
+        found += [Candidate(Stopped(StopReason.EXCEPTION, event.time, event.machine, event.text)) for event in events]
         return sorted(found, key=lambda candidate: candidate.stop.time)
 
     def _first_stop(self, candidates: list[Candidate]) -> Finding:
@@ -235,8 +235,8 @@ class Scout:
         self._logged = max(self._logged, until)
 
 
-def _stop_at(begun: Begun) -> Stop:
+def _stop_at(begun: Begun) -> Stopped:
     points = begun.hit or begun.undecided
     is_label = all(isinstance(point.asked, LabelPoint) for point in points)
     reason = StopReason.FUNCTION if is_label else StopReason.BREAKPOINT
-    return Stop(reason, begun.stand, begun.machine, points=tuple(point.number for point in begun.hit))
+    return Stopped(reason, begun.stand, begun.machine, points=tuple(point.number for point in begun.hit))

@@ -33,7 +33,7 @@ class StopReason(enum.Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Stop:
+class Stopped:
     """Where a run came to a stand: at ``time``, before whatever happens next. ``machine``: the controller because of which."""
 
     reason: StopReason
@@ -128,7 +128,7 @@ class StackFrame(NamedTuple):
     location: Location
 
 
-class Value(NamedTuple):
+class ShownValue(NamedTuple):
     """``text`` is for people, with the unit. ``number`` None: it is no number, or not known."""
 
     name: str
@@ -141,4 +141,4 @@ class Scope(NamedTuple):
     """A group of values of a controller."""
 
     name: str
-    values: Sequence[Value]
+    values: Sequence[ShownValue]

@@ -73,7 +73,7 @@ class ReadValue(NamedTuple):
     meaning: str = ""
 
 
-Values: TypeAlias = Mapping[str, ReadValue]
+ReadValues: TypeAlias = Mapping[str, ReadValue]
 
 
 class DeviceOverview(NamedTuple):
@@ -179,7 +179,7 @@ class DeviceTerminal(Protocol):
         ...
 
     def answer(self, line: str, *, waits: bool) -> Iterable[str]:
-        """Do what a line says, and give what is to be shown. ``waits``: until the device has done it. Raises `SteptwinError`."""
+        """Execute a line and return the text to show. ``waits``: until the device has done it. Raises `SteptwinError`."""
         ...
 
     def close(self) -> None: ...
@@ -254,12 +254,12 @@ class DriverKind(Generic[D]):
     """The names of values, for completion."""
     usual: Sequence[str]
     """The names of values that are watched if none is given."""
-    reading: Callable[[Sequence[str]], Callable[[D], Values]]
+    reading: Callable[[Sequence[str]], Callable[[D], ReadValues]]
     """A function that reads values by name. Raises `Misuse`, as the function does, for what is no name."""
     followed: Callable[[Sequence[str], str | None], Sequence[str] | None]
     """The points of a running twin of a variant that have these names (none: the usual ones); None if a driver has to read
     them."""
-    writing: Callable[[Sequence[str]], Callable[[D], Values]]
+    writing: Callable[[Sequence[str]], Callable[[D], ReadValues]]
     """A function that writes NAME=VALUE one after the other, all of them checked before the first is sent, and gives the values
     that can be read again. Raises as ``reading``."""
     stop: Callable[[DeviceAddress, Log | None, Collection[int], bool], str | None]

@@ -27,7 +27,7 @@ HELD_BYTES = 2 * rtu.MAX_FRAME
 _EXCEPTION_FRAME = 5
 
 
-class Query:
+class ModbusQuery:
     """A Modbus request to a unit. ``describe`` gives its text; ``changes`` is false for reads only."""
 
     __slots__ = (
@@ -86,7 +86,7 @@ class Query:
 class _LateAnswer(NamedTuple):
     """A late answer that may still arrive."""
 
-    query: Query
+    query: ModbusQuery
     until: Nanos
 
 
@@ -114,8 +114,8 @@ class RtuMaster:
 
     def reset(self) -> None:
         self._late_answers: list[_LateAnswer] = []
-        self._asked: Query | None = None
-        self._then: Query | None = None  # what a marker was sent for
+        self._asked: ModbusQuery | None = None
+        self._then: ModbusQuery | None = None  # what a marker was sent for
         self._held = b""
         self.free_ns: Nanos = 0
         self._busy_until: Nanos = 0  # how long noise can keep the line
@@ -124,14 +124,14 @@ class RtuMaster:
     def wary(self) -> bool:
         return bool(self._late_answers)
 
-    def allowance_ns(self, request: Query) -> Nanos:
+    def allowance_ns(self, request: ModbusQuery) -> Nanos:
         return (
             0 if self._serial is None else self._serial.duration(len(request.rtu_frame) + max(request.rtu_size, _EXCEPTION_FRAME))
         )
 
     # ------------------------------------------------------------------ asking
 
-    def start(self, request: Query, now: Nanos, *, urgent: bool) -> bytes:
+    def start(self, request: ModbusQuery, now: Nanos, *, urgent: bool) -> bytes:
         self._held = b""
         self._then = None
         # A stop is sent at once; the answer of an earlier stop is equivalent.
@@ -140,23 +140,23 @@ class RtuMaster:
             request = self._marker(request.device)
         return self._send(request, now)
 
-    def _send(self, query: Query, now: Nanos) -> bytes:
+    def _send(self, query: ModbusQuery, now: Nanos) -> bytes:
         self._asked = query
         if self.on_frame is not None:
             self.on_frame(now, FrameDirection.IN, query.rtu_frame)
         return query.rtu_frame
 
-    def _could_be_confused(self, request: Query, now: Nanos) -> bool:
+    def _could_be_confused(self, request: ModbusQuery, now: Nanos) -> bool:
         self._late_answers = [owed for owed in self._late_answers if owed.until > now]
         return any(
             owed.query is not request and owed.query.device == request.device and owed.query.function == request.function
             for owed in self._late_answers
         )
 
-    def _marker(self, unit: int) -> Query:
+    def _marker(self, unit: int) -> ModbusQuery:
         taken = {owed.query.rtu_size for owed in self._late_answers if owed.query.function == pdu.READ_HOLDING_REGISTERS}
         count = next((n for n in range(1, pdu.MAX_REGISTERS) if 2 * n + 5 not in taken), pdu.MAX_REGISTERS)
-        return Query(
+        return ModbusQuery(
             unit, pdu.ReadRequest(pdu.READ_HOLDING_REGISTERS, 0, count), lambda _: "a read to find out what is still to come"
         )
 
@@ -189,7 +189,7 @@ class RtuMaster:
             raise pdu.ModbusException(asked.function, answer[1])
         return answer
 
-    def _found(self, asked: Query, held: bytes) -> bytes | None:
+    def _found(self, asked: ModbusQuery, held: bytes) -> bytes | None:
         """The answer to ``asked`` in the received bytes, possibly behind other bytes."""
         start = 0
         sent = asked.rtu_frame
@@ -214,7 +214,7 @@ class RtuMaster:
             start += 1
         return None
 
-    def _settle(self, asked: Query) -> None:
+    def _settle(self, asked: ModbusQuery) -> None:
         """Forget earlier requests to the device after ``asked`` was answered, unless this was the answer to one of them."""
         of_device = [owed for owed in self._late_answers if owed.query.device == asked.device]
         if self._then is not None or all(owed.query.function != asked.function for owed in of_device):
@@ -257,14 +257,14 @@ class TcpMaster:
         self.reset()
 
     def reset(self) -> None:
-        self._asked: Query | None = None
+        self._asked: ModbusQuery | None = None
         self._no_answer = b""  # what came instead of an answer
         self._framer = mbap.TcpFramer()
 
-    def allowance_ns(self, request: Query) -> Nanos:
+    def allowance_ns(self, request: ModbusQuery) -> Nanos:
         return 0
 
-    def start(self, request: Query, now: Nanos, *, urgent: bool) -> bytes:
+    def start(self, request: ModbusQuery, now: Nanos, *, urgent: bool) -> bytes:
         self._number = self._number + 1 & 0xFFFF
         self._number_bytes = self._number.to_bytes(2, "big")
         self._asked = request

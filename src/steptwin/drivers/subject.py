@@ -34,7 +34,7 @@ from steptwin.subject.payloads import Payload, SamplePayload
 PERIOD_S = 0.2
 PERIODS_S = (0.02, 60.0)
 DeviceAction: TypeAlias = Callable[[Any], Awaitable[object]]
-PointValue: TypeAlias = tuple[float | None, str]
+ValueAndUnit: TypeAlias = tuple[float | None, str]
 """The value of a point, None if unknown; and its unit."""
 
 
@@ -57,7 +57,7 @@ class DevicePart(Protocol):
         """The data sheet, with axes in the units of the driver."""
         ...
 
-    async def values(self, points: Sequence[str]) -> Mapping[str, PointValue]:
+    async def values(self, points: Sequence[str]) -> Mapping[str, ValueAndUnit]:
         """The values by name. Raises `Misuse` for an unknown point."""
         ...
 
@@ -157,7 +157,7 @@ class AsyncDeviceSubject:
             command.Describe: self._describe,
             command.ReadPoints: self._read,
             command.ReadPins: self._pins,
-            command.State: self._state,
+            command.ReadState: self._state,
             command.Time: self._time,
         }
         self.description = self._described()
@@ -178,7 +178,7 @@ class AsyncDeviceSubject:
         """Read points, in as few exchanges as possible."""
         paths = {point: self._path(point) for point in points if point != "time"}
         values = await self._device.values(tuple(dict.fromkeys(paths.values()))) if paths else {}
-        found: dict[str, PointValue] = {point: values[path] for point, path in paths.items()}
+        found: dict[str, ValueAndUnit] = {point: values[path] for point, path in paths.items()}
         found["time"] = self.now() / SECOND, "s"
         return tuple(Reading(point, *found[point], UNKNOWN if found[point][0] is None else GOOD) for point in points)
 
@@ -266,7 +266,7 @@ class AsyncDeviceSubject:
         pins = (f"{self.name}.{pin.name}" for pin in self._device.datasheet.pins)
         return {one.point: one.value for one in await self.read(*pins)}
 
-    async def _state(self, _: command.State) -> object:
+    async def _state(self, _: command.ReadState) -> object:
         return plain(await self._device.state())
 
     async def _time(self, _: command.Time) -> object:

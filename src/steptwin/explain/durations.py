@@ -44,7 +44,7 @@ def move_duration(axis: AxisConfig, distance_p: int) -> Nanos | None:
     return profile.end
 
 
-class _Axis(NamedTuple):
+class _KnownAxis(NamedTuple):
     """What is known of a drive: whether it is on and at rest, and the position it has or goes to [pulses]."""
 
     on: bool = False
@@ -53,14 +53,14 @@ class _Axis(NamedTuple):
     end: Nanos | None = None
     """Of the move in progress, counted from the beginning of the piece; None: not known. Not valid at rest."""
 
-    def joined(self, other: _Axis) -> _Axis:
+    def joined(self, other: _KnownAxis) -> _KnownAxis:
         same = self.position_p if self.position_p == other.position_p else None
-        return _Axis(self.on and other.on, self.at_rest and other.at_rest, same)
+        return _KnownAxis(self.on and other.on, self.at_rest and other.at_rest, same)
 
 
-_State = tuple[_Axis, ...]
-_UNKNOWN: _State = (_Axis(),) * len(AXES)
-_AT_START: _State = (_Axis(at_rest=True),) * len(AXES)
+_State = tuple[_KnownAxis, ...]
+_UNKNOWN: _State = (_KnownAxis(),) * len(AXES)
+_AT_START: _State = (_KnownAxis(at_rest=True),) * len(AXES)
 
 
 class Durations:
@@ -168,7 +168,7 @@ class Durations:
         value = step.value.value if isinstance(step.value, s.Literal) else None
         axis = state[number - 1]
         if key == "M":
-            axis = axis._replace(on=True) if value else _Axis(at_rest=value == 0)
+            axis = axis._replace(on=True) if value else _KnownAxis(at_rest=value == 0)
         else:
             known = None if value is None or self._config is None or not axis.at_rest else value
             gear = 1.0 if self._config is None else self._config.axes[number - 1].gear
@@ -202,8 +202,8 @@ class Durations:
             return False
         return self._positions is not None and index == int(index) and 0 <= index < len(self._positions.rows)
 
-    def _move(self, number: int, axis: _Axis, target_u: float | None, passed: Nanos, *, is_relative: bool) -> _Axis:
-        unknown = _Axis(on=axis.on)
+    def _move(self, number: int, axis: _KnownAxis, target_u: float | None, passed: Nanos, *, is_relative: bool) -> _KnownAxis:
+        unknown = _KnownAxis(on=axis.on)
         if target_u is None and is_relative:
             return unknown._replace(position_p=0)  # HOME ends there
         if target_u is None or self._config is None or number in self._changed or not axis.on:
@@ -215,7 +215,7 @@ class Durations:
         start = 0 if is_relative else axis.position_p
         duration = None if start is None or not axis.at_rest else move_duration(config, target - start)
         position = target if not is_relative else None if axis.position_p is None else axis.position_p + target
-        return _Axis(on=True, position_p=position, end=None if duration is None else passed + duration)
+        return _KnownAxis(on=True, position_p=position, end=None if duration is None else passed + duration)
 
 
 def _moments_lost(state: _State) -> _State:

@@ -67,7 +67,7 @@ def explain(
         statement_time=statement_time,
         statements=statements,
         blocks=blocks,
-        memory=_memory(executable, checked.positions, dialect),
+        memory=memory_of(executable, checked.positions, dialect),
         sections=_sections(names, statements),
         section_unit="bytes",
         usage={**usage, "positions": _positions(executable, checked.positions, statements, there)},
@@ -76,6 +76,7 @@ def explain(
         lost=interrupts.lost(source, executable, flow, there, statement_time),
         unreachable=[n for n in range(len(statements)) if n not in there and not isinstance(executable.steps[n], s.BLOCK_MARKS)],
         notes=notes,
+        interrupts_at="at any statement",
     )
 
 
@@ -111,20 +112,27 @@ def _names(executable: s.Executable) -> dict[int, list[str]]:
 # ---------------------------------------------------------------------- memory
 
 
-def _memory(executable: s.Executable, positions: PositionTable | None, dialect: Dialect) -> list[MemoryPart]:
-    rows = 0 if positions is None else len(positions.rows)
+def memory_of(executable: s.Executable, positions: PositionTable | None, dialect: Dialect) -> list[MemoryPart]:
+    """What a program takes of the memories of a controller."""
+    bank, image = position_memory(0 if positions is None else len(positions.rows), dialect)
     registers = {word for step in executable.steps for source in _operands(step) for word in _words(source)}
     return [
         MemoryPart("program bank", len(executable.steps), dialect.max_steps, "statements"),
-        MemoryPart("position bank", rows, dialect.max_positions, "positions"),
+        bank,
         MemoryPart("variables", len(executable.variables), dialect.max_variables, "variables"),
         MemoryPart("user registers used", len(registers), dialect.user_registers, "registers"),
         MemoryPart("statements in an image", STATEMENT_BYTES * len(executable.steps), None, "bytes"),
-        MemoryPart("positions in an image", POSITION_BYTES * rows, None, "bytes"),
+        image,
     ]
 
 
-def _words(source: s.Source) -> Iterable[int]:
+def position_memory(rows: int, dialect: Dialect) -> tuple[MemoryPart, MemoryPart]:
+    """What a table of positions takes: of its bank, and in an image."""
+    bank = MemoryPart("position bank", rows, dialect.max_positions, "positions")
+    return bank, MemoryPart("positions in an image", POSITION_BYTES * rows, None, "bytes")
+
+
+def _words(source: s.ValueSource) -> Iterable[int]:
     if isinstance(source, s.RegisterOperand) and source.row.key in _USER:
         return range(source.number, source.number + source.row.words)
     return ()
@@ -142,7 +150,7 @@ def _sections(names: Mapping[int, Sequence[str]], statements: Sequence[Explained
 # ---------------------------------------------------------------------- what it uses
 
 
-def _operands(step: s.ProgramStep) -> list[s.Source]:
+def _operands(step: s.ProgramStep) -> list[s.ValueSource]:
     return [*sources(step), *([step.target] if isinstance(step, s.SetStep) else [])]
 
 

@@ -62,13 +62,13 @@ def _way_out(executable: s.Executable, flow: ControlFlow) -> str:
     return f"{' or '.join(names)}, which can leave without RETURN" if names else ""
 
 
-def _changed(executable: s.Executable, numbers: Collection[int]) -> set[s.Source]:
+def _changed(executable: s.Executable, numbers: Collection[int]) -> set[s.ValueSource]:
     """What steps give a value to."""
     steps = (executable.steps[number] for number in numbers if number < len(executable.steps))
     return {step.target for step in steps if isinstance(step, s.SetStep)}
 
 
-def _reason(condition: s.StepCondition, changed: Collection[s.Source]) -> str | None:
+def _reason(condition: s.StepCondition, changed: Collection[s.ValueSource]) -> str | None:
     """Why the condition can stay false; None where something that goes on by itself can make it true."""
     if outcome(condition) is True:
         return None
@@ -93,11 +93,11 @@ def _reason(condition: s.StepCondition, changed: Collection[s.Source]) -> str | 
 _MIRRORED = {"<": ">", ">": "<", "<=": ">=", ">=": "<="}
 
 
-def _names(sides: Sequence[s.Source]) -> str:
+def _names(sides: Sequence[s.ValueSource]) -> str:
     return " and ".join(dict.fromkeys(side.name for side in sides if not isinstance(side, s.Literal)))
 
 
-def _of_loop(executable: s.Executable, flow: ControlFlow, loop: TextLoop, by_interrupts: Collection[s.Source]) -> str | None:
+def _of_loop(executable: s.Executable, flow: ControlFlow, loop: TextLoop, by_interrupts: Collection[s.ValueSource]) -> str | None:
     """Why a loop can repeat for ever: every way out of it depends only on what it does not change by itself."""
     steps = executable.steps
     done = executed(flow, loop)
@@ -105,7 +105,7 @@ def _of_loop(executable: s.Executable, flow: ControlFlow, loop: TextLoop, by_int
         return None
     changed = _changed(executable, done)
     outside: dict[str, None] = {}
-    own: list[s.Source] = []
+    own: list[s.ValueSource] = []
     for number in loop.exits:
         branch = steps[number]
         if not isinstance(branch, s.IfStep | s.WhileStep):

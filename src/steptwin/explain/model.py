@@ -126,6 +126,8 @@ class Explanation:
     lost: Sequence[LostInterrupt]
     unreachable: Sequence[int]
     notes: Sequence[str] = field(default_factory=tuple)
+    interrupts_at: str = ""
+    """When entries other than the first are executed, in a language whose entries are interrupts: ``at any statement``."""
 
     def lines(self, statements: Sequence[int]) -> list[int]:
         return sorted({self.statements[number].line for number in statements if number < len(self.statements)})

@@ -76,9 +76,9 @@ class _Column:
 
     def _rows(self, block: FlowBlock) -> Iterator[tuple[str, str]]:
         """Lines of text of a block, each with its class."""
-        is_interrupt = block.is_entry and block.first > 0 and self._explained.language == "wbc"
+        when = self._explained.interrupts_at if block.is_entry and block.first > 0 else ""
         if block.names:
-            yield f"{', '.join(block.names)}:{'  at any statement' if is_interrupt else ''}", "name"
+            yield f"{', '.join(block.names)}:{when and f'  {when}'}", "name"
         times = {
             piece.last: f"{duration_text(piece.duration)}{' + wait' if piece.wait else ''}"
             for piece in block.pieces

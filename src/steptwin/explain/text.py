@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 
+from steptwin.columns import aligned
 from steptwin.explain.model import Explanation, FlowBlock, FlowWay, Usage
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 
@@ -117,12 +118,10 @@ def _numbers(lines: Iterable[int]) -> str:
 
 
 def _table(heading: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
-    shown = [list(row) for row in rows]
+    shown = list(rows)
     if not shown:
         return []
-    table = [list(heading), *shown]
-    widths = [max(len(row[column]) for row in table) for column in range(len(heading))]
-    return ["  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in table]
+    return [f"  {line}" for line in aligned([heading, *shown])]
 
 
 def _count(number: int, what: str) -> str:

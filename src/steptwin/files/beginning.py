@@ -57,7 +57,7 @@ def begin_world(
             allow_outside=allow_outside,
             state=state,
         )
-        for warning in world.parts.warnings:
+        for warning in world.blueprint.warnings:
             warn(warning)
         return world
     if seed is not None:

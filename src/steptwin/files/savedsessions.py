@@ -16,7 +16,7 @@ from steptwin.system import reason
 MOST = 200
 """The newest ones."""
 HEAD_BYTES = 20_000
-"""In which a session says what it is, and when it ends."""
+"""The part of a session with its format and its end."""
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,79}")
 NAME_FORM = "1 to 80 letters, digits, '-', '_' and '.', the first no '-' and no '.'"
 _UNTIL = re.compile(rb'"until_ns": (\d{1,25})')

@@ -22,6 +22,7 @@ from steptwin.machine import SECOND, Nanos
 from steptwin.plaintypes import fitting
 from steptwin.world import script as do
 from steptwin.world.actions import ACTIONS, ExternalInput
+from steptwin.world.blueprint import Blueprint
 from steptwin.world.description import read_world
 from steptwin.world.faults import Fault, parse
 from steptwin.world.history import replay
@@ -58,8 +59,7 @@ class Session:
     def world(self, *, keep_trace: bool = True, keep_inputs: bool = True) -> World:
         """The world at its beginning. Raises `WorldError`, and `Misuse` where the firmware is not the description's."""
         world = World(
-            read_world(self.name, self.text, self.seed, self.overrides, given_files(self.files)),
-            self.files,
+            Blueprint(read_world(self.name, self.text, self.seed, self.overrides, given_files(self.files)), self.files),
             keep_trace=keep_trace,
             keep_inputs=keep_inputs,
             failing=self.failed_saves,

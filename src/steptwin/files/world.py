@@ -9,14 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Self, TypeAlias
 
 from steptwin.durations import duration
 from steptwin.errors import Misuse
-from steptwin.files.export.progress import Progress, silent
+from steptwin.files.export.progress import TimeProgress, silent
 from steptwin.files.memory import StateDirectory, StateFailure
 from steptwin.files.textfiles import read_text
 from steptwin.inputfiles import MOST_DESCRIPTION_BYTES, read_bytes, shown
@@ -24,12 +24,14 @@ from steptwin.machine import SECOND, Nanos
 from steptwin.why.answer import Answer
 from steptwin.why.question import Why
 from steptwin.world import script as do
-from steptwin.world.build import memory_file
+from steptwin.world.blueprint import Blueprint, memory_file
 from steptwin.world.description import describe, read_world
 from steptwin.world.faults import Fault
 from steptwin.world.faults import read as read_fault
 from steptwin.world.kind import ControllerKind, M, S, V
 from steptwin.world.kinds import M1486, MIC488
+from steptwin.world.kinds.m1486.view import M1486View
+from steptwin.world.kinds.mic488.view import Mic488View
 from steptwin.world.overrides import NO_OVERRIDES, Overrides
 from steptwin.world.pieces import given_files
 from steptwin.world.plant import Plant, PlantSnapshot
@@ -67,30 +69,41 @@ class World(Plant):
 
     def __init__(
         self,
-        spec: WorldSpec,
-        files: Mapping[str, bytes] | None = None,
+        blueprint: Blueprint,
         *,
         keep_trace: bool = True,
         keep_inputs: bool = True,
         state: StateDirectory | None = None,
         failing: Iterable[FailedSave] = (),
+        at: PlantSnapshot | None = None,
     ) -> None:
-        """``failing``: saves of memory that fail, as they did in the run that is replayed."""
+        """``failing``: saves of memory that fail, as they did in the run that is replayed. ``at``: as for `Plant`."""
         self._state = state
         self._failing = {(failed.time, failed.machine): failed.reason for failed in failing}
         self.failed_saves: list[FailedSave] = []
         """Failed saves so far, if inputs are kept: a replay repeats them."""
         keep = None if state is None and not self._failing else self._save
-        super().__init__(spec, files or {}, keep_trace=keep_trace, keep_inputs=keep_inputs, keep_memory=keep)
-        self.mic488 = self.views(MIC488)
+        super().__init__(blueprint, keep_trace=keep_trace, keep_inputs=keep_inputs, keep_memory=keep, at=at)
+
+    @cached_property
+    def mic488(self) -> Views[Mic488View]:
         """The MIC488 controllers by name."""
-        self.m1486 = self.views(M1486)
+        return self.views(MIC488)
+
+    @cached_property
+    def m1486(self) -> Views[M1486View]:
         """The M1486 chips by name."""
-        self.axis: Views[MechanicsView] = Views(
-            self, "axis", {name: MechanicsView(self, axis) for name, axis in self.axes.items()}
-        )
+        return self.views(M1486)
+
+    @cached_property
+    def axis(self) -> Views[MechanicsView]:
         """The mechanics by the names of their axes."""
-        self.line: Views[LineView] = Views(self, "line", {name: LineView(self, name) for name in self.lines})
+        return Views(self, "axis", {name: MechanicsView(self, axis) for name, axis in self.axes.items()})
+
+    @cached_property
+    def line(self) -> Views[LineView]:
+        """The lines by name."""
+        return Views(self, "line", {name: LineView(self, name) for name in self.lines})
 
     def views(self, kind: ControllerKind[S, M, V]) -> Views[V]:
         """The controllers of a kind by name."""
@@ -159,14 +172,14 @@ class World(Plant):
     ) -> Self:
         """A world that reads its non-volatile memories from a directory and keeps them there."""
         if where is None:
-            return cls(spec, files, keep_trace=keep_trace, keep_inputs=keep_inputs)
+            return cls(Blueprint(spec, files), keep_trace=keep_trace, keep_inputs=keep_inputs)
         with ExitStack() as opened:
             state = opened.enter_context(StateDirectory(where))
             for controller in spec.controllers:
                 image = state.load(controller.name)
                 if image is not None:
                     files[memory_file(controller.name)] = image
-            world = cls(spec, files, keep_trace=keep_trace, keep_inputs=keep_inputs, state=state)
+            world = cls(Blueprint(spec, files), keep_trace=keep_trace, keep_inputs=keep_inputs, state=state)
             opened.pop_all()
             return world
 
@@ -212,7 +225,7 @@ class World(Plant):
         """The present moment in seconds."""
         return self.now / SECOND
 
-    def run(self, until: float | str | None = None, *, for_: Duration | None = None, watch: Progress = silent) -> str | None:
+    def run(self, until: float | str | None = None, *, for_: Duration | None = None, watch: TimeProgress = silent) -> str | None:
         """Run ``for_`` a time, or ``until`` a moment (seconds) or a condition (text, such as ``"idle"``) for an hour at most.
 
         With both it is whichever comes first. Raises `Misuse` for a moment that has passed.
@@ -302,7 +315,7 @@ class World(Plant):
             raise Misuse("this world does not keep its inputs, so its past is not known: make it with keep_inputs=True")
         self.advance(self.now)
         self.settle_all()
-        return Why(lambda: type(self)(self.spec, self.files, failing=self.failed_saves), self.inputs, self.now)
+        return Why(lambda: type(self)(self.blueprint, failing=self.failed_saves), self.inputs, self.now)
 
     def why(self, question: str, at: Duration | None = None) -> Answer:
         """Why a signal has its value, a condition its truth, or a controller's program waits; now or at a moment.
@@ -323,11 +336,13 @@ class World(Plant):
 
         Scripts go along. Functions given to `at` and `when` do what they did: those that name this world act on this one.
         """
-        other = type(self)(
-            self.spec, self.files, keep_trace=self.trace.is_kept, keep_inputs=self.keeps_inputs, failing=self.failed_saves
+        return type(self)(
+            self.blueprint,
+            keep_trace=self.trace.is_kept,
+            keep_inputs=self.keeps_inputs,
+            failing=self.failed_saves,
+            at=self.snapshot() if snapshot is None else snapshot,
         )
-        other.restore(self.snapshot() if snapshot is None else snapshot)
-        return other
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For pickle and copy: the description and a snapshot. Functions given to `at`, `when` and `script` must be such as
@@ -337,9 +352,8 @@ class World(Plant):
 
 def _revived(kind: type[World], name: str, snapshot: PlantSnapshot, keep_inputs: bool) -> World:
     text, seed, overrides, files = snapshot.description
-    world = kind(read_world(name, text, seed, overrides, given_files(files)), files, keep_inputs=keep_inputs)
-    world.restore(snapshot)
-    return world
+    blueprint = Blueprint(read_world(name, text, seed, overrides, given_files(files)), files)
+    return kind(blueprint, keep_inputs=keep_inputs, at=snapshot)
 
 
 def read_beside(folder: Path, name: str, *, allow_outside: bool = False) -> bytes:

@@ -10,26 +10,27 @@ from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple, cast
 
-from steptwin.errors import Misuse
+from steptwin.extras import libraries_of, missing
 from steptwin.gateways.contract import Gateway, GatewaySubject
 from steptwin.tables import complete
 from steptwin.world.gateways import GATEWAYS, GatewaySpec
 
 
-class _Kind(NamedTuple):
+class _GatewayModule(NamedTuple):
     module: str
     """Imported when a description has such a gateway. Its ``make`` makes one."""
     extra: str
     """What installs its libraries."""
 
 
-KINDS: Mapping[str, _Kind] = complete(
+KINDS: Mapping[str, _GatewayModule] = complete(
     "gateway",
     GATEWAYS,
     "kind",
     {
-        "prometheus": _Kind("steptwin.gateways.prometheus", "metrics"),
-        "opcua": _Kind("steptwin.gateways.opcua.gateway", "opcua"),
+        "prometheus": _GatewayModule("steptwin.gateways.prometheus", "metrics"),
+        "opcua": _GatewayModule("steptwin.gateways.opcua.gateway", "opcua"),
+        "mqtt": _GatewayModule("steptwin.gateways.mqtt.gateway", "mqtt"),
     },
 )
 
@@ -40,7 +41,6 @@ def make_gateway(spec: GatewaySpec, subject: GatewaySubject, folder: Path) -> Ga
     kind = KINDS[spec.kind]
     try:
         make = cast("Callable[[GatewaySpec, GatewaySubject, Path], Gateway]", import_module(kind.module).make)
-    except ImportError as error:
-        where = f"[gateway.{spec.kind}]"
-        raise Misuse(f"{where} needs {error.name}: pip install 'steptwin[{kind.extra}]'") from None
+    except ImportError:
+        raise missing(f"[gateway.{spec.kind}]", libraries_of(kind.extra)) from None
     return make(spec, subject, folder)

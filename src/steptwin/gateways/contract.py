@@ -2,17 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Protocol
+from collections.abc import Callable, Mapping
+from datetime import datetime
+from typing import NamedTuple, Protocol
 
 from steptwin.subject.commands import Command, Jog
 from steptwin.subject.contract import Description, Reading, Result
+from steptwin.subject.events import Event
 from steptwin.subject.following import Filter, Following
 from steptwin.subject.jogs import Held
 
 
+class PastValue(NamedTuple):
+    """A value that held from a moment on; None: it was not known."""
+
+    at: datetime
+    value: float | str | None
+
+
+class PastValues(Protocol):
+    """The values that a history has kept."""
+
+    async def values(self, point: str, begin: datetime | None, end: datetime | None, most: int | None) -> list[PastValue]:
+        """Of ``MACHINE.POINT``, oldest first: the one that held at ``begin``, and the others up to ``end``; the first ``most``.
+
+        Raises `Misuse` for what has not been kept, `LineFailure`.
+        """
+        ...
+
+
 class GatewaySubject(Protocol):
     """What gateways see: a world, or devices. Answers of devices come later."""
+
+    @property
+    def past(self) -> PastValues | None:
+        """None where no history is kept."""
+        ...
 
     @property
     def description(self) -> Description: ...
@@ -31,6 +56,10 @@ class GatewaySubject(Protocol):
 
     def follow(self, what: Filter, bound: int) -> Following: ...
 
+    def plans(self, what: Filter) -> list[Event]:
+        """The present plans of the axes of twins that ``what`` selects."""
+        ...
+
 
 class Gateway(Protocol):
     """A gateway in the event loop of its subject."""
@@ -40,8 +69,10 @@ class Gateway(Protocol):
         """Its name for people."""
         ...
 
-    async def open(self, *, listen_any: bool) -> Mapping[str, object]:
-        """Listen; the end point for programs, with ``host``, ``port`` and, where there is one, ``url``.
+    async def open(self, *, listen_any: bool, notice: Callable[[str], None]) -> Mapping[str, object]:
+        """Listen, or connect; ``notice`` is called with what a user has to know later.
+
+        The end point for programs, with ``host``, ``port`` and, where there is one, ``url``.
 
         Raises `Misuse` for an address that is not permitted, `LineFailure` for one that cannot be used.
         """

@@ -1,4 +1,4 @@
-"""The file of ``steptwin bridge``: devices, and the gateways through which other programs see them."""
+"""The file of ``steptwin bridge``: devices, the gateways through which other programs see them, and their history."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from steptwin.world.gateways import GATEWAY, GatewaySpec, read_gateways
+from steptwin.world.historytable import HISTORY, HistorySpec, read_history
 from steptwin.world.reader import Key, TomlText, optional, read_table
 from steptwin.world.values import name_value, text_value
 
@@ -28,12 +29,13 @@ class DeviceFile:
     name: str
     devices: tuple[DeviceSpec, ...]
     gateways: tuple[GatewaySpec, ...]
+    history: HistorySpec | None
 
 
 def read_device_file(name: str, text: str) -> DeviceFile:
     """The file ``name`` with this text. Raises `WorldError` with everything that is wrong with it."""
     toml = TomlText(name, text)
-    known = (DEVICE, BRIDGE, GATEWAY)
+    known = (DEVICE, BRIDGE, GATEWAY, HISTORY)
     for key in toml.data:
         if key not in known:
             fix = toml.key_replacement((key,), key, list(known))
@@ -41,12 +43,12 @@ def read_device_file(name: str, text: str) -> DeviceFile:
                 (key,), "D004", f"the file has no [{key}]{toml.near(key, list(known))}", f"permitted: {', '.join(known)}", fix
             )
     whole = read_table(toml, (BRIDGE,), toml.data.get(BRIDGE, {}), BRIDGE_KEYS)
-    devices, gateways = tuple(_devices(toml)), tuple(read_gateways(toml))
-    for what, found in ((f"[[{DEVICE}]]", devices), (f"[{GATEWAY}.NAME]", gateways)):
-        if not found and not toml.findings:
+    devices, gateways, history = tuple(_devices(toml)), tuple(read_gateways(toml)), read_history(toml)
+    for what, is_there in ((f"[[{DEVICE}]]", devices), (f"[{GATEWAY}.NAME] or [{HISTORY}]", gateways or history)):
+        if not is_there and not toml.findings:
             toml.wrong((), "D005", f"{what} is missing")
     toml.check()
-    return DeviceFile(whole["name"], devices, gateways)
+    return DeviceFile(whole["name"], devices, gateways, history)
 
 
 def _devices(toml: TomlText) -> Iterator[DeviceSpec]:

@@ -19,7 +19,7 @@ from steptwin.subject import commands as command
 from steptwin.subject.contract import Description
 from steptwin.subject.following import Filter
 
-Sample: TypeAlias = tuple[tuple[str, ...], bool | float | None]
+MetricSample: TypeAlias = tuple[tuple[str, ...], bool | float | None]
 """Values of the labels, and the value; None where it is unknown."""
 
 PREFIX = "steptwin_"
@@ -63,7 +63,7 @@ class Metrics:
     async def _state(self, machine: str) -> Mapping[str, Any] | None:
         """None for a device that does not answer."""
         try:
-            return cast("Mapping[str, Any]", (await self._subject.do(command.State(machine))).value)
+            return cast("Mapping[str, Any]", (await self._subject.do(command.ReadState(machine))).value)
         except LineFailure:
             return None
 
@@ -102,7 +102,7 @@ def _of_controllers(states: Mapping[str, Mapping[str, Any]]) -> list[Metric]:
 def _of_axes(states: Mapping[str, Mapping[str, Any]]) -> list[Metric]:
     axes = [(name, axis) for name, one in states.items() for axis in one["axes"]]
 
-    def values(key: str, *labels: str) -> list[Sample]:
+    def values(key: str, *labels: str) -> list[MetricSample]:
         return [((name, axis["name"], *(axis[label] for label in labels)), axis[key]) for name, axis in axes]
 
     statuses = [((name, axis["name"], axis["status"]["level"], axis["status"]["text"]), True) for name, axis in axes]
@@ -117,7 +117,7 @@ def _of_axes(states: Mapping[str, Mapping[str, Any]]) -> list[Metric]:
     ]
 
 
-def _gauge(name: str, meaning: str, labels: tuple[str, ...], samples: Iterable[Sample]) -> Metric:
+def _gauge(name: str, meaning: str, labels: tuple[str, ...], samples: Iterable[MetricSample]) -> Metric:
     found = GaugeMetricFamily(PREFIX + name, meaning, labels=labels)
     for values, value in samples:
         if value is not None:

@@ -14,6 +14,8 @@ from typing import Any, TypeAlias
 
 from steptwin.controllerstate import StatusLevel
 from steptwin.datasheet import Access, AxisDescription, Detail, FactType, Limits, Pin, PinDirection
+from steptwin.errors import Misuse
+from steptwin.nearmiss import NearMiss
 from steptwin.subject.commands import Command
 from steptwin.subject.contract import Description, MachinePart
 from steptwin.world.script import Set, Write
@@ -48,6 +50,13 @@ class GatewayPoint:
     @property
     def name(self) -> str:
         return ".".join(self.path)
+
+    def shown(self, state: State) -> PointValue:
+        """Its value, of its type."""
+        value = self.read(state)
+        if value is None:
+            return None
+        return bool(value) if self.type is PointType.TRUTH else float(value) if self.type is PointType.NUMBER else value
 
 
 def points_of(part: MachinePart, description: Description, registers: Iterable[str] = ()) -> tuple[GatewayPoint, ...]:
@@ -200,7 +209,7 @@ def _register(part: MachinePart, name: str) -> GatewayPoint:
     machine = part.name
     return GatewayPoint(
         path=("registers", name),
-        meaning=f"{point.meaning}.",
+        meaning=f"{point.meaning.removesuffix('.')}.",
         type=PointType.TRUTH if point.type == "switch" else PointType.NUMBER,
         unit=point.unit,
         limits=point.limits,
@@ -209,17 +218,20 @@ def _register(part: MachinePart, name: str) -> GatewayPoint:
     )
 
 
-def registers_by_machine(names: Iterable[str], description: Description) -> dict[str, list[str]]:
-    """``MACHINE.POINT`` by machine. Raises `KeyError` with a name that is not there."""
+def registers_by_machine(table: str, names: Iterable[str], description: Description) -> dict[str, list[str]]:
+    """``MACHINE.POINT`` by machine, from the key ``registers`` of a table. Raises `Misuse` for a name that is not there."""
     parts = {part.name: part for part in description.machines}
     found: dict[str, list[str]] = {name: [] for name in parts}
     for name in names:
         machine, _, point = name.partition(".")
         if machine not in parts:
-            raise KeyError(name)
+            hint = NearMiss().hint(machine, parts)
+            raise Misuse(f"{table}: registers: no controller is called {machine!r}{hint}; expected MACHINE.POINT")
+        sheet = parts[machine].datasheet
         try:
-            parts[machine].datasheet.point(point.partition("[")[0])
+            sheet.point(point.partition("[")[0])
         except KeyError:
-            raise KeyError(name) from None
+            hint = NearMiss().hint(point.partition("[")[0], [one.path for one in sheet.points])
+            raise Misuse(f"{table}: registers: no point is called {name!r}{hint}") from None
         found[machine].append(point)
     return found

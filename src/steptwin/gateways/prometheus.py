@@ -18,24 +18,24 @@ from steptwin.gateways.contract import GatewaySubject
 from steptwin.gateways.metrics import PREFIX, Metrics
 from steptwin.httpservice import HttpService, listen
 from steptwin.world.addresses import Address, parse_address
-from steptwin.world.gateways import GatewaySpec
+from steptwin.world.gateways import ListeningSpec
 
-Send: TypeAlias = Callable[[MutableMapping[str, Any]], Awaitable[None]]
+_Send: TypeAlias = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 TEXT = "text/plain; charset=utf-8"
 
 
 class PrometheusGateway:
-    """Serves the metrics of ``subject`` where ``spec`` says. A `Gateway`."""
+    """Serves the metrics of ``subject`` at the address of ``spec``. A `Gateway`."""
 
     protocol = "metrics"
 
-    def __init__(self, spec: GatewaySpec, subject: GatewaySubject, folder: Path) -> None:
+    def __init__(self, spec: ListeningSpec, subject: GatewaySubject, folder: Path) -> None:
         self._spec = spec
         self._subject = subject
         self._metrics: Metrics | None = None
         self._service: HttpService | None = None
 
-    async def open(self, *, listen_any: bool) -> Mapping[str, object]:
+    async def open(self, *, listen_any: bool, notice: Callable[[str], None]) -> Mapping[str, object]:
         listening = listen(parse_address(self._spec.listen, listen_any=listen_any), is_fixed=True)
         self._metrics = Metrics(self._subject)
         self._service = HttpService(Pages(self._metrics), listening)
@@ -59,7 +59,7 @@ class Pages:
     def __init__(self, metrics: Metrics) -> None:
         self._metrics = metrics
 
-    async def __call__(self, scope: Mapping[str, Any], receive: object, send: Send) -> None:
+    async def __call__(self, scope: Mapping[str, Any], receive: object, send: _Send) -> None:
         if scope["type"] != "http":
             return
         if scope["method"] not in ("GET", "HEAD"):
@@ -106,7 +106,7 @@ def _registry(metrics: Iterable[Metric]) -> CollectorRegistry:
     return registry
 
 
-async def _answer(send: Send, scope: Mapping[str, Any], status: int, kind: str, body: bytes) -> None:
+async def _answer(send: _Send, scope: Mapping[str, Any], status: int, kind: str, body: bytes) -> None:
     headers = [(b"content-type", kind.encode()), (b"content-length", str(len(body)).encode())]
     await send({"type": "http.response.start", "status": status, "headers": headers})
     await send({"type": "http.response.body", "body": b"" if scope["method"] == "HEAD" else body})

@@ -48,7 +48,7 @@ class Sampler:
         if machine == CLOCK:
             return Sample(CLOCK, cast("State", (await self._subject.do(command.Time())).value), datetime.now(UTC))
         try:
-            state = cast("Mapping[str, Any]", (await self._subject.do(command.State(machine))).value)
+            state = cast("Mapping[str, Any]", (await self._subject.do(command.ReadState(machine))).value)
             registers = await self._read(machine)
         except LineFailure:
             return Sample(machine, None, datetime.now(UTC))

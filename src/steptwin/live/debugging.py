@@ -14,10 +14,10 @@ from time import perf_counter
 from typing import NamedTuple
 
 from steptwin.debug.breakpoints import AnyPoint
-from steptwin.debug.debugger import Debugger, Travel
+from steptwin.debug.debugger import Debugger, DebugTravel
 from steptwin.debug.observer import Logged
 from steptwin.debug.scout import Goal
-from steptwin.debug.values import DataPoint, Events, LabelPoint, LinePoint, SetPoint, Stop, StopReason, Value
+from steptwin.debug.values import DataPoint, Events, LabelPoint, LinePoint, SetPoint, ShownValue, Stopped, StopReason
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.live.cell import Cell
 from steptwin.live.lookback import PART_S, Lookback, take_back
@@ -89,12 +89,12 @@ class Debugging:
             self._set = dict(zip(self._breakpoints, found, strict=True))
 
     def _renew(self) -> None:
-        """`_set_all`, and say what has changed by it."""
+        """`_set_all`, and publish what has changed."""
         self._set_all()
         self._tell()
 
     def _tell(self) -> None:
-        """Say what time stops at, if that is not what was said last."""
+        """Publish what time stops at, unless it is unchanged."""
         said = BreakpointsPayload(tuple(self._plain(number) for number in self._breakpoints), self._events)
         if said != self._said:
             self._said = said
@@ -225,9 +225,9 @@ class _OpenDebugger:
         self._begin: Nanos | None = None
         """Where in the past that was, when it is about to."""
         self._goes = False
-        self._stop: Stop | None = None
+        self._stop: Stopped | None = None
         """Why time is about to stand."""
-        self._travel: Travel | None = None
+        self._travel: DebugTravel | None = None
         """A way through the past."""
         self.stopped: dict[str, object] | None = None
         """The payload of the present stop; None while time goes on."""
@@ -290,13 +290,13 @@ class _OpenDebugger:
             self._goes = False
             self._goal = Goal()
             self.debugger.stand()
-            self._say(self._stop or Stop(StopReason.PAUSE, self._live.now))
+            self._say(self._stop or Stopped(StopReason.PAUSE, self._live.now))
 
     def restored(self) -> None:
         self._end_travel()
         self.debugger.gone_back()
         self.debugger.stand()
-        self._say(Stop(StopReason.PAUSE, self._live.now))
+        self._say(Stopped(StopReason.PAUSE, self._live.now))
 
     # ------------------------------------------------------------------ commands
 
@@ -354,7 +354,7 @@ class _OpenDebugger:
             self._goal = goal
             self._pace.resume()
 
-    def _go(self, travel: Travel, then: Goal | None = None) -> None:
+    def _go(self, travel: DebugTravel, then: Goal | None = None) -> None:
         self._travel, self._then = travel, then
         self.stopped = None
         asyncio.get_running_loop().call_soon(self._part, travel)
@@ -364,7 +364,7 @@ class _OpenDebugger:
             self._travel.close()
             self._travel = self._begin = None
 
-    def _part(self, travel: Travel) -> None:
+    def _part(self, travel: DebugTravel) -> None:
         if travel is not self._travel:
             return
         until = perf_counter() + PART_S
@@ -381,7 +381,7 @@ class _OpenDebugger:
         else:
             asyncio.get_running_loop().call_later(PART_S, self._part, travel)
 
-    def _arrived(self, stop: Stop) -> None:
+    def _arrived(self, stop: Stopped) -> None:
         if stop.reason is StopReason.LIMIT and self._then is not None and not self.debugger.is_past:
             self._forwards(self._then)
         else:
@@ -431,7 +431,7 @@ class _OpenDebugger:
             for name, at in self.looked_at.stack(machine)
         ]
 
-    def _say(self, stop: Stop) -> None:
+    def _say(self, stop: Stopped) -> None:
         debugger = self.debugger
         frames = () if stop.machine is None else debugger.stack(stop.machine)
         at = frames[0].location if frames else None
@@ -463,5 +463,5 @@ def _point(wanted: command.SetBreakpoint) -> AnyPoint:
     return LinePoint(machine=machine, text=program, line=line, condition=condition, hits=hits, log=wanted.log)
 
 
-def _plain_value(value: Value) -> dict[str, object]:
+def _plain_value(value: ShownValue) -> dict[str, object]:
     return {"name": value.name, "value": value.text, "number": value.number, "settable": value.is_settable}

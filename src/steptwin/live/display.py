@@ -10,7 +10,7 @@ from steptwin.live.output import Output
 from steptwin.live.server import EndPoint, Server
 from steptwin.live.world import LiveWorld
 from steptwin.live.world_frames import follow_frames
-from steptwin.world.records import describe, is_shown
+from steptwin.world.records import ALL, Selection, describe
 from steptwin.world.trace import TraceRecord
 
 
@@ -33,9 +33,10 @@ class Display(Protocol):
 class Lines:
     """Prints records and notices as lines, and with ``frames`` every frame."""
 
-    def __init__(self, live: LiveWorld, output: Output, *, frames: bool) -> None:
+    def __init__(self, live: LiveWorld, output: Output, *, frames: bool, selection: Selection = ALL) -> None:
         self._live = live
         self._output = output
+        self._selection = selection
         if frames:
             follow_frames(live, lambda frame: output.line(str(frame)))
 
@@ -43,7 +44,7 @@ class Lines:
         self._output.line(text)
 
     def begin(self, head: Sequence[str], past: Sequence[TraceRecord] = ()) -> None:
-        for text in (*head, *map(describe, past)):
+        for text in (*head, *map(describe, filter(self._selection.shows, past))):
             self._output.line(text)
         self._live.world.trace.watchers.append(self._print)
 
@@ -51,7 +52,7 @@ class Lines:
         await server.until_ended()
 
     def _print(self, record: TraceRecord) -> None:
-        if is_shown(record):
+        if self._selection.shows(record):
             self._output.line(describe(record))
 
 

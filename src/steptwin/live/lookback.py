@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import replace
 from functools import partial
 from time import perf_counter
+from typing import Any, TypeVar
 
 from steptwin.errors import Refusal, SteptwinError
 from steptwin.later import Later
@@ -14,6 +15,7 @@ from steptwin.live.cell import Cell
 from steptwin.live.pace import Pace
 from steptwin.live.world import LiveWorld
 from steptwin.machine import Nanos
+from steptwin.subject.following import EventBatch, Filter
 from steptwin.subject.world import WorldSubject
 from steptwin.world.history import History, Past
 from steptwin.world.plant import PlantSnapshot
@@ -25,6 +27,7 @@ PART_S = 0.01
 """While a moment is looked for, clients of the world wait at most so long, and are served as long. [real time]"""
 MOST_LOOKS = 8
 """Worlds besides the one that goes on."""
+T = TypeVar("T")
 
 
 class Lookback:
@@ -59,6 +62,18 @@ class Lookback:
         """The oldest moment that can be looked at."""
         return self._history.begin
 
+    def events(
+        self, begin: Nanos, end: Nanos, what: Filter, bound: int, at_begin: Callable[[WorldSubject], T]
+    ) -> Later[tuple[T, EventBatch]]:
+        """The last ``bound`` events between two moments, and what ``at_begin`` finds at the first one.
+
+        Raises `Refusal` where there are too many viewers of the past, `Misuse` for moments that are not kept.
+        """
+        look = self.open()
+        later = look.events(begin, end, what, bound, at_begin)
+        later.then(look.close)
+        return later
+
     def open(self) -> Look:
         """For another viewer of the past. Raises `Refusal` where there are too many."""
         if self._looks >= MOST_LOOKS:
@@ -84,7 +99,7 @@ class Look:
         self._go_back = go_back
         self._closed = closed
         self._parts: Iterator[None] = iter(())
-        self._going: Later[None] | None = None
+        self._going: Later[Any] | None = None
         self.subject = WorldSubject(self._past.world)
         self.programs = WorldPrograms(self._past.world)
 
@@ -94,26 +109,48 @@ class Look:
 
     def go(self, moment: Nanos) -> Later[None]:
         """To another moment, instead of one to which it goes still. Raises `Misuse` for one that is not kept."""
+        return self._begin(self._past.go(moment))
+
+    def events(
+        self, begin: Nanos, end: Nanos, what: Filter, bound: int, at_begin: Callable[[WorldSubject], T]
+    ) -> Later[tuple[T, EventBatch]]:
+        """To ``end``; see `Lookback.events`."""
+        return self._begin(self._follow(begin, end, what, bound, at_begin))
+
+    def _follow(
+        self, begin: Nanos, end: Nanos, what: Filter, bound: int, at_begin: Callable[[WorldSubject], T]
+    ) -> Generator[None, None, tuple[T, EventBatch]]:
+        yield from self._past.go(begin)
+        found = at_begin(self.subject)
+        following = self.subject.follow(what, bound)
+        try:
+            yield from self._past.go_on(end)
+        finally:
+            following.close()
+        return found, following.take()
+
+    def _begin(self, parts: Iterator[None]) -> Later[Any]:
         if self._going is not None:
             self._going.fail(Refusal("another moment is looked for by now"))
-        self._going = later = Later[None]()
-        self._parts = self._past.go(moment)
+        self._going = later = Later[Any]()
+        self._parts = parts
         self._part(later)
         return later
 
-    def _part(self, later: Later[None]) -> None:
+    def _part(self, later: Later[Any]) -> None:
         if later.is_done:
             return
         until = perf_counter() + PART_S
         try:
-            for _ in self._parts:
-                if perf_counter() > until:
-                    asyncio.get_running_loop().call_later(PART_S, self._part, later)
-                    return
+            next(self._parts)
+            while perf_counter() < until:
+                next(self._parts)
+        except StopIteration as end:
+            later.put(end.value)
         except SteptwinError as error:
             later.fail(error)
         else:
-            later.put(None)
+            asyncio.get_running_loop().call_later(PART_S, self._part, later)
 
     def go_back(self) -> None:
         """The world itself goes back to this moment; time stands there. Raises `Refusal`."""

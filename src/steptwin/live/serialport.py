@@ -44,8 +44,8 @@ class SerialLink:
             raise LineFailure(f"cannot open serial port {self._device} at {self._baud} bit/s: {why}") from error
         return self._device
 
-    def _make_line(self) -> _Line:
-        return _Line(self._cell, self._make_port(), self._lost)
+    def _make_line(self) -> _SerialProtocol:
+        return _SerialProtocol(self._cell, self._make_port(), self._lost)
 
     def _lost(self, error: Exception | None) -> None:
         self._transport = None
@@ -72,7 +72,7 @@ class SerialLink:
             self._transport.abort()
 
 
-class _Line(asyncio.Protocol):
+class _SerialProtocol(asyncio.Protocol):
     """The protocol of the serial port. While the other end does not accept output, no input is read."""
 
     def __init__(self, cell: Cell, port: Port, lost: Callable[[Exception | None], None]) -> None:

@@ -19,7 +19,7 @@ from steptwin.live.world_frames import follow_frames
 from steptwin.machine import SECOND
 from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection
-from steptwin.world.records import describe, is_shown
+from steptwin.world.records import ALL, Selection, describe
 from steptwin.world.trace import TraceRecord
 
 REFRESH_S = 0.1
@@ -32,8 +32,9 @@ FEWEST_FRAMES = 4
 class LiveView:
     """Controllers, the last events and frames, ten times a second, on the terminal's second screen."""
 
-    def __init__(self, live: LiveWorld, cell: Cell, output: Output) -> None:
+    def __init__(self, live: LiveWorld, cell: Cell, output: Output, selection: Selection = ALL) -> None:
         self._live = live
+        self._selection = selection
         self._cell = cell
         self._output = output
         self._console = Console(file=output, force_terminal=True)  # type: ignore[arg-type]
@@ -48,13 +49,13 @@ class LiveView:
         self._events.append(f"{self._live.now / SECOND:12.6f} s  {text}")
 
     def _record(self, record: TraceRecord) -> None:
-        if is_shown(record):
+        if self._selection.shows(record):
             self._events.append(describe(record))
 
     def begin(self, head: Sequence[str], past: Sequence[TraceRecord] = ()) -> None:
         for text in head:
             self._output.line(text)
-        self._events.extend(map(describe, past))
+        self._events.extend(map(describe, filter(self._selection.shows, past)))
         title, *places, ending = head
         self._head = [Text(f"{title}   {ending}", style="bold"), *(Text(text, style="dim") for text in places)]
 

@@ -24,7 +24,7 @@ from steptwin.world.plant import WORLD
 BOUND = 10_000
 SETTLING_NS: Nanos = 100 * MILLISECOND
 """Time after an event within which its consequences, such as through the filter of an input, have happened, ns."""
-Value: TypeAlias = bool | int | float | None
+TwinValue: TypeAlias = bool | int | float | None
 
 
 class TwinWatch:
@@ -43,7 +43,7 @@ class TwinWatch:
         self._points = {path: points.get(path.upper()) for path in paths}
         self._computed = {path: at for path, point in self._points.items() if (at := _computed(point, found)) is not None}
         self._encoders = any(any(mark in path.upper() for mark in ("ENC_", ".ENCODER")) for path in self._points)
-        self._values: dict[str, tuple[Value, str]] = {}
+        self._values: dict[str, tuple[TwinValue, str]] = {}
         self._was_moving = False
         self._due: Nanos | None = None
         """The moment of the twin until which points are read every time; None: no more."""
@@ -78,7 +78,7 @@ class TwinWatch:
 
     # ------------------------------------------------------------------ values
 
-    def look(self) -> dict[str, tuple[Value, str]]:
+    def look(self) -> dict[str, tuple[TwinValue, str]]:
         """Values and units, by path."""
         if not self._speed:
             self._ask_time()  # first, so that what has happened by then is among the events
@@ -140,7 +140,7 @@ def _computed(point: Point | None, part: MachinePart) -> tuple[str, Callable[[Mo
     return None
 
 
-def _typed(point: Point | None, value: float | None) -> Value:
+def _typed(point: Point | None, value: float | None) -> TwinValue:
     """A value as bool or int if the point is of that type."""
     if value is None or point is None or not point.addresses:
         return value

@@ -10,8 +10,8 @@ from steptwin.errors import Refusal, SteptwinError
 from steptwin.later import Later
 from steptwin.live.lookback import PART_S
 from steptwin.live.world import LiveWorld
-from steptwin.subject.debugcommands import Why as Wanted
-from steptwin.why.kept import KeptPast
+from steptwin.subject.debugcommands import AskWhy as Wanted
+from steptwin.why.kept import PastQuestions
 from steptwin.why.question import Asking
 from steptwin.world.history import History
 
@@ -29,7 +29,7 @@ class LiveWhy:
         self._live = live
         self._waiting: list[tuple[Wanted, Later[object]]] = []
         self._asking: Asking | None = None
-        self._past: tuple[History, KeptPast] | None = None
+        self._past: tuple[History, PastQuestions] | None = None
         self._timer: asyncio.TimerHandle | None = None
 
     def ask(self, wanted: Wanted) -> Later[object]:
@@ -75,11 +75,11 @@ class LiveWhy:
         if self._asking is None:
             self._past = None
 
-    def _kept_past(self) -> KeptPast:
+    def _kept_past(self) -> PastQuestions:
         """Raises `Refusal` where no past is kept any more."""
         history = self._live.history
         if history is None:
             raise Refusal(NO_PAST)
         if self._past is None or self._past[0] is not history:
-            self._past = history, KeptPast(history)
+            self._past = history, PastQuestions(history)
         return self._past[1]

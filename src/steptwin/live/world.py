@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple, Protocol
@@ -192,6 +193,11 @@ class LiveWorld:
             return None
         return RecordedSession(self.now, len(self.world.inputs), self._recorded_bytes, is_full=False)
 
+    def traffic(self) -> list[dict[str, object]]:
+        """Of each line: the programs that are connected, and what has been sent, as JSON."""
+        connected = Counter(port.line for port in self.ports)
+        return [{"line": name, "clients": connected[name], **line.traffic._asdict()} for name, line in self.world.lines.items()]
+
     # ------------------------------------------------------------------ time
 
     def _changed(self, kernel: Kernel) -> None:
@@ -308,6 +314,7 @@ class PlacePort:
 
     def __init__(self, live: LiveWorld, line: str, place: str, kind: str) -> None:
         world = live.world
+        self.line = line
         self._live = live
         self._world = world
         self._direct: LineEndPoint | None = None

@@ -31,7 +31,7 @@ class WorldControl:
             {
                 **self._of_pace,
                 **Debugging(live, cell, pace).actions(),
-                debugcommands.Why: LiveWhy(live).ask,
+                debugcommands.AskWhy: LiveWhy(live).ask,
                 command.Time: lambda _: pace.where(),
                 command.EndPoints: lambda _: end_points(),
             }
@@ -52,7 +52,7 @@ class WorldControl:
     async def answer(self, wanted: command.Command) -> Result:
         """As `do`, also for commands that are answered later. Awaits only `steptwin.later.Later`."""
         result: Any = self.do(wanted)
-        if type(wanted) is debugcommands.Why:
+        if type(wanted) is debugcommands.AskWhy:
             return result._replace(value=await result.value)
         return result
 

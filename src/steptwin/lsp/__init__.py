@@ -6,20 +6,15 @@ text. `steptwin.lsp.server` puts the protocol around it, and alone knows its typ
 
 from __future__ import annotations
 
-from steptwin.errors import SteptwinError
-
-
-class NoPygls(SteptwinError):
-    """The library that speaks the protocol is missing."""
+from steptwin.extras import missing
 
 
 def serve_stdio() -> None:
-    """Serve an editor on standard input and output until it disconnects. Raises `NoPygls` with the command that installs it."""
+    """Serve an editor on standard input and output until it disconnects. Raises `Misuse` without pygls."""
     try:
         import pygls  # noqa: F401
     except ImportError as error:
-        installs = "in a clone 'make extras' installs it, elsewhere 'pip install pygls'"
-        raise NoPygls(f"the editor server needs pygls 2: {installs}") from error
+        raise missing("the editor server", ["pygls"]) from error
     from steptwin.lsp.server import serve_stdio as serve
 
     serve()

@@ -183,7 +183,7 @@ def callers_of(uri: str, analysis: Analysis) -> dict[str, Caller]:
 
 
 def calls(session: EditorSession, uri: str, key: str, *, incoming: bool) -> list[tuple[Caller, list[CallEdge]]]:
-    """Who calls the lines of a label, or whom they call, each with the places."""
+    """Callers of the lines of a label, or the labels that they call, each with the places."""
     analysis = session.analysis(uri)
     if analysis is None:
         return []

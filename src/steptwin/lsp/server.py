@@ -408,7 +408,10 @@ _HANDLERS: dict[str, tuple[Callable[[EditorServer, Any], Any], Any]] = {
     lsp.TEXT_DOCUMENT_DID_SAVE: (_did_save, lsp.SaveOptions(include_text=False)),
     lsp.WORKSPACE_DID_CHANGE_WATCHED_FILES: (_did_change_watched_files, None),
     lsp.TEXT_DOCUMENT_HOVER: (_hover, None),
-    lsp.TEXT_DOCUMENT_COMPLETION: (_completion, lsp.CompletionOptions(trigger_characters=["@", "$", "=", " ", "#", "[", '"'])),
+    lsp.TEXT_DOCUMENT_COMPLETION: (
+        _completion,
+        lsp.CompletionOptions(trigger_characters=list('@$= #[";')),
+    ),
     lsp.TEXT_DOCUMENT_SIGNATURE_HELP: (_signature_help, lsp.SignatureHelpOptions(trigger_characters=[" ", "(", ",", ";"])),
     lsp.TEXT_DOCUMENT_DEFINITION: (_definition, None),
     lsp.TEXT_DOCUMENT_REFERENCES: (_references, None),

@@ -34,6 +34,8 @@ _MEANINGS = (
 )
 _COLUMNS = ("name", "p1", "p2", "p3", "p4")
 _ALONE = "x"
+_MOST_VALUES = 8
+"""Most values of other rows that are offered."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,10 +106,46 @@ class TableAnalysis(Analysis):
         return Hover(cell, f"Row {number}{name}\n\n{what}")
 
     def items(self, place: int) -> Completions:
-        _, column, cell = self._cell_at(place)
-        if not 0 < column <= PARAMETERS or self.text[cell.start : place].strip():
+        line, column, cell = self._cell_at(place)
+        if column > PARAMETERS:
             return Completions(())
-        return Completions((Completion(_ALONE, CompletionKind.VALUE, cell, "leaves the axis or parameter alone"),))
+        typed = self.text[cell.start : place].strip()
+        if column == 0:
+            return Completions(tuple(self._names(cell, typed, is_alone=len(self._cells(line)) == 1)))
+        return Completions(tuple(self._values(line, column, cell, typed)))
+
+    def _names(self, cell: Span, typed: str, *, is_alone: bool) -> Iterator[Completion]:
+        """Names that programs use and no row has; in a line without values a whole row."""
+        there = {row.name.upper() for row in self._table.rows}
+        missing = sorted(() if self._used is None else self._used.names - there)
+        ends = ";".join(f"${{{n + 1}:{_ALONE}}}" for n in range(PARAMETERS))
+        for name in missing:
+            if name.startswith(typed.upper()):
+                insert = f"{name};{ends}" if is_alone else name
+                yield Completion(name, CompletionKind.POSITION, cell, "a program uses it", "", insert, is_alone, 1)
+        if is_alone:
+            shown = ";".join(_COLUMNS)
+            insert = f"{typed or '${5:name}'};{ends}"
+            label = f"{typed};{shown.partition(';')[2]}" if typed else shown
+            yield Completion(label, CompletionKind.SNIPPET, cell, "a row", "", insert, True, 2)
+
+    def _values(self, line: int, column: int, cell: Span, typed: str) -> Iterator[Completion]:
+        """``x``, and what other rows have in this column, the nearest first."""
+        if not typed:
+            yield Completion(_ALONE, CompletionKind.VALUE, cell, "leaves the axis or parameter alone", rank=1)
+        near = sorted((abs(there - line), there, number) for there, number in self._row_of_line.items() if there != line)
+        known = {"", self.text[cell.start : cell.end].strip()}
+        for _, there, number in near:
+            cells = self._cells(there)
+            value = self.text[cells[column].start : cells[column].end].strip() if column < len(cells) else ""
+            if value in known or value.lower() == _ALONE or not value.startswith(typed):
+                continue
+            known.add(value)
+            yield Completion(
+                value, CompletionKind.VALUE, cell, f"as row {number} {self._table.rows[number].name}".rstrip(), rank=2
+            )
+            if len(known) > _MOST_VALUES:
+                return
 
     def signature(self, place: int) -> Signature | None:
         _, column, _ = self._cell_at(place)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from steptwin.m1486.functions import CARRY, FUNCTIONS, USER_FLAGS
 from steptwin.m1486.lines import LINES, line_group
-from steptwin.m1486.microsteps import MICROSTEPS, QUALIFICATIONS
+from steptwin.m1486.microsteps import MICROSTEPS, QUALIFICATIONS, UNIT
 from steptwin.m1486.registers import REGISTERS, UPLOAD_RANGE
 from steptwin.m1486.variants import Variant
 
@@ -110,16 +110,16 @@ _ROWS: tuple[CommandSpec, ...] = (
     _C(".", "End of subroutine", ArgType.NONE, None, "Goes back to the command after the call.", _PROGRAM),
     # Motion control
     _C("B", "Backward", ArgType.NUMBER, _DISTANCE, "Sets distance and negative direction of the next move.",
-       _MOTION, "min. microsteps"),
+       _MOTION, UNIT),
     _C("D", "Direction", ArgType.NONE, None, "Reverses the direction of the next move.", _MOTION),
     _C("F", "Forward", ArgType.NUMBER, _DISTANCE, "Sets distance and positive direction of the next move.",
-       _MOTION, "min. microsteps"),
+       _MOTION, UNIT),
     _C("G", "Go absolute", ArgType.NUMBER, _DISTANCE, "Sets distance and direction from the present position to this one.",
-       _MOTION, "min. microsteps"),
+       _MOTION, UNIT),
     _C("G+", "Go positive", ArgType.NONE, None, "The next move runs in positive direction until Kill or LIMIT.", _MOTION),
     _C("G-", "Go negative", ArgType.NONE, None, "The next move runs in negative direction until Kill or LIMIT.", _MOTION),
     _C("H", "Home", ArgType.NONE, None, "Sets distance and direction from the present position to 0.", _MOTION),
-    _C("=", "Equal", ArgType.NUMBER, _DISTANCE, "Gives the position counter a value.", _MOTION, "min. microsteps"),
+    _C("=", "Equal", ArgType.NUMBER, _DISTANCE, "Gives the position counter a value.", _MOTION, UNIT),
     _C("C", "Clear position counter", ArgType.NUMBER, (CLEAR_POSITION,), "Sets the position counter to 0.", _MOTION),
     _C("A", "Acceleration", ArgType.NUMBER, range(1, 65_001), "Sets acceleration and deceleration.", _MOTION, "step/s²"),
     _C("S", "Start/stop", ArgType.NUMBER, range(16, 1_951), "Sets the speed at which a move starts and ends.",

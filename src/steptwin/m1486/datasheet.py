@@ -19,9 +19,9 @@ from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.commands import TABLE, ArgType, CommandSpec
 from steptwin.m1486.details import DETAILS
 from steptwin.m1486.events import EVENTS
-from steptwin.m1486.microsteps import FULL_STEP
+from steptwin.m1486.microsteps import FULL_STEP, UNIT
 from steptwin.m1486.pins import CONTROL_PINS, LINE_PINS, OUTPUT_PINS, WAVEFORM
-from steptwin.m1486.points import POINTS, UNIT
+from steptwin.m1486.points import POINTS
 from steptwin.m1486.variants import Variant
 
 MOTION_SECTION = "VII.2"

@@ -11,7 +11,7 @@ from steptwin.m1486.commands import TABLE
 from steptwin.m1486.drive import ChipDrive
 from steptwin.m1486.encoding import decode
 from steptwin.m1486.functions import CARRY, FUNCTIONS, USER_FLAGS
-from steptwin.m1486.points import UNIT
+from steptwin.m1486.microsteps import UNIT
 from steptwin.m1486.registers import GENERAL
 from steptwin.m1486.syntax import ChipCommand
 from steptwin.machine import Nanos

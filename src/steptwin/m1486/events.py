@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from steptwin.datasheet import EventDescription, EventSeverity, FactDescription, FactType
+from steptwin.m1486.microsteps import UNIT
 from steptwin.machine import Fact, Nanos
 
 EVENTS_KEPT = 1000
 """Number of events of a chip that are kept."""
-_UNIT = "microstep"
 
 
 def _fact(name: str, type: FactType = FactType.WHOLE, unit: str = "", *, is_optional: bool = False) -> FactDescription:  # noqa: A002
@@ -35,11 +35,11 @@ EVENTS: Mapping[str, EventDescription] = {
             "R has started a move; one without end has no distance.",
             _AXIS,
             _DIRECTION,
-            _fact("distance", unit=_UNIT, is_optional=True),
+            _fact("distance", unit=UNIT, is_optional=True),
         ),
         _event("seeks", "A seek has started.", _AXIS, _DIRECTION, _LINE),
         _event("stops", "A motion is being stopped by K or LIMIT.", _AXIS, _fact("why", FactType.TEXT)),
-        _event("stands", "A motion has ended.", _AXIS, _fact("counter", unit=_UNIT), _fact("is_valid", FactType.TRUTH)),
+        _event("stands", "A motion has ended.", _AXIS, _fact("counter", unit=UNIT), _fact("is_valid", FactType.TRUTH)),
         _event(
             "wait",
             "W waits for a time, O or Z for the level of a line.",

@@ -6,8 +6,9 @@ motor turns twice as fast with the same argument, and the limits double with it.
 
 from __future__ import annotations
 
-#: Minimum microsteps in a full step.
+#: Minimum microsteps in a full step, and their symbol as a unit.
 FULL_STEP = 64
+UNIT = "min. microsteps"
 
 #: Settings at power-on: the distance is that of F and B (chapter VII.2, Backward).
 DEFAULT_DISTANCE_U = 64_000

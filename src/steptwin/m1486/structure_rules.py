@@ -53,7 +53,7 @@ def label_problem(stream: CommandStream, index: int, label: int, variant: Varian
 def _overwritten(stream: CommandStream, index: int, target: int, variant: Variant) -> int:
     """How many bits back ``target`` lies if the ring has overwritten it when the command at ``index`` runs; otherwise 0 (M-12).
 
-    Inside a file that does not fit at all, that is the thing to say.
+    Of a file that does not fit at all, only that is reported.
     """
     number = stream.in_file[index]
     if number is not None and stream.files[number].bits > variant.memory_bits:

@@ -11,6 +11,8 @@ MASK = 0xFFFFFF
 #: Source of the operand of + - * /.
 NUMBER, FROM_LINES, FROM_REGISTER = range(3)
 
+_DEFAULTS = tuple(function.default for function in TABLE)
+
 
 class NumericUnit(Stateful):
     __slots__ = ("carry", "flags", "functions", "operand_source", "remainder", "variable")
@@ -26,7 +28,7 @@ class NumericUnit(Stateful):
         #: User flags from 80 on.
         self.flags = [False] * len(USER_FLAGS)
         #: Functions from 40 on.
-        self.functions = [function.default for function in TABLE]
+        self.functions = list(_DEFAULTS)
         self.operand_source = NUMBER
 
     def on(self, function: int) -> bool:

@@ -26,25 +26,20 @@ Getter: TypeAlias = Callable[[Any, Nanos], float]
 AxisAction: TypeAlias = Callable[[Axis, float, Nanos], None]
 
 
-def _nothing(*_: object) -> Any:
-    """The getter or setter of a register that cannot be read or written."""
-    raise NotImplementedError
-
-
 @dataclass(frozen=True, slots=True)
 class Bit:
-    """A coil or input."""
+    """A coil or input. A function that its row does not permit is None, here and below."""
 
-    read: BitGetter = _nothing
-    write: CoilAction = _nothing
+    read: BitGetter | None = None
+    write: CoilAction | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class DeviceBehaviour:
     """A holding register of the controller. ``quiet``: a write only keeps the value, nothing happens earlier or later for it."""
 
-    read: Getter = _nothing
-    write: RegisterAction = _nothing
+    read: Getter | None = None
+    write: RegisterAction | None = None
     quiet: bool = False
 
 
@@ -55,9 +50,9 @@ class AxisBehaviour:
     ``quiet`` as in `DeviceBehaviour`. ``waits``: in TRIGGER mode a write is kept for the trigger register (MIC-16).
     """
 
-    read: Getter = _nothing
-    read_p: Getter = _nothing
-    write: AxisAction = _nothing
+    read: Getter | None = None
+    read_p: Getter | None = None
+    write: AxisAction | None = None
     quiet: bool = False
     waits: bool = False
 
@@ -83,7 +78,7 @@ def checked(rows: Iterable[MapRow], given: Mapping[str, RegisterBehaviour]) -> M
 
 
 def _check(name: str, row: MapRow, function: object, *, wanted: bool) -> None:
-    if (function is _nothing) is wanted:
+    if (function is None) is wanted:
         problem = f"lacks its {name}" if wanted else f"has a {name} that its row does not permit"
         raise IncompleteTable(f"register {row.key} ({row.type.value}, reads {row.reads}, writes {row.writes}) {problem}")
 

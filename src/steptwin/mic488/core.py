@@ -89,8 +89,8 @@ class ControllerCore(Stateful):
     is wrong. ``programs`` and ``positions`` are the contents of the banks at power-on (`steptwin.mic488.program_banks.load` makes
     programs), ``statement_time`` is the time of one statement (WBC-6).
 
-    Hooks: ``store`` is called with the stored user registers when they are saved and returns when they are safe; an `OSError`
-    says that they are not, bytes say what was stored instead. ``changed`` is called whenever the
+    Hooks: ``store`` is called with the stored user registers when they are saved and returns when they are safe: None, or
+    what was stored instead; an `OSError` if they could not be stored. ``changed`` is called whenever the
     next deadline or an output may have changed, ``on_event`` for every event.
     """
 
@@ -209,7 +209,8 @@ class ControllerCore(Stateful):
             self.advance(until)
         else:
             self._run_instant(due, until)
-            self.advance(self.now)
+            if self._due is not None and self._due <= self.now:
+                self.advance(self.now)
         return self.now
 
     def _run_instant(self, at: Nanos, until: Nanos) -> None:

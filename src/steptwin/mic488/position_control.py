@@ -89,8 +89,9 @@ class PositionControl(Stateful):
 
     def watch(self, axis: ControlledAxis, now: Nanos) -> None:
         """Watch a motion that may lose steps. An encoder coupled to the drive without loss cannot disagree."""
-        wanted = axis.config.pos_ctrl_mode == self.ENCODER or axis.seeks_stop
-        if wanted and not axis.encoder.agrees and axis.profile.moving(now):
+        if axis.encoder.agrees:
+            return
+        if (axis.config.pos_ctrl_mode == self.ENCODER or axis.seeks_stop) and axis.profile.moving(now):
             self._expect_progress(axis, now)
             self.tick_ns = _next_tick(now)
 

@@ -144,5 +144,5 @@ def _uses_positions(steps: Sequence[s.ProgramStep]) -> bool:
     return bool(rows) or any(_is_row_0(source) for step in steps for source in sources(step))
 
 
-def _is_row_0(source: s.Source) -> bool:
+def _is_row_0(source: s.ValueSource) -> bool:
     return isinstance(source, s.RegisterOperand) and source.row.key in ROW_0

@@ -33,6 +33,9 @@ TIMER_PERIODS: Mapping[str, Nanos] = MappingProxyType({"TIMA": 10 * MILLISECOND,
 _ZEROS = ((0, 0),) * TIMERS
 _TIMER_MOST = int(TIMER.high)
 
+_OF_INPUTS = tuple((number, event.input - 1) for number, event in enumerate(EVENTS) if 0 < event.input <= INPUTS)
+"""Events of inputs: their numbers in `EVENTS`, and their inputs from 0."""
+
 STATUS_SINCE = "1.70"
 
 VISION = ("NEW", "NO", "X", "Y", "A")
@@ -60,8 +63,9 @@ class ProgramRegisters(Stateful):
         """By number in `VISION`; records are kept over starts of programs."""
 
     def begin(self, config: ControllerConfig, now: Nanos) -> None:
-        for number, event in enumerate(EVENTS):
-            self.switches[number] = config.inputs[event.input - 1].interrupt if 0 < event.input <= INPUTS else 0
+        self.switches = array("b", bytes(len(EVENTS)))
+        for number, of_input in _OF_INPUTS:
+            self.switches[number] = config.inputs[of_input].interrupt
         self.ticks = {}
         self.timers = dict.fromkeys(TIMER_PERIODS, ((0, now),) * TIMERS)
         self.lin_acc_u = None

@@ -24,7 +24,7 @@ from steptwin.wire.pdu import (
     WriteRegistersRequest,
 )
 
-Check: TypeAlias = Callable[[ControllerCore, float], float | None]
+WriteCheck: TypeAlias = Callable[[ControllerCore, float], float | None]
 """The value of the request → the stored value (pulses for REAL/DINT registers), None if it may not be written."""
 
 
@@ -147,7 +147,7 @@ class _ControlPlan:
         return pdu[:5]
 
 
-def _check(register: Register, data_type: DataType) -> Check:
+def _check(register: Register, data_type: DataType) -> WriteCheck:
     """The check of a written value (MIC-7), which returns the stored value."""
     permits = register.permits
     if register.type is not Type.VALUE:

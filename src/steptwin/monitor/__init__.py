@@ -7,20 +7,16 @@ from __future__ import annotations
 
 import sys
 
-from steptwin.errors import Misuse, SteptwinError
-
-
-class NoTextual(SteptwinError):
-    """The library textual is missing."""
+from steptwin.errors import Misuse
+from steptwin.extras import missing
 
 
 def monitor(device: str | None, hz: float) -> None:
-    """Run the monitor until the user ends it. Raises `Misuse`, or `NoTextual` with the command that installs it."""
+    """Run the monitor until the user ends it. Raises `Misuse`."""
     try:
         import textual  # noqa: F401
     except ImportError as error:
-        installs = "in a clone 'make extras' installs it, elsewhere 'pip install textual'"
-        raise NoTextual(f"the monitor needs textual: {installs}") from error
+        raise missing("the monitor", ["textual"]) from error
     from steptwin.monitor.app import Monitor
     from steptwin.monitor.session import session_at
 

@@ -16,7 +16,7 @@ from steptwin.errors import Misuse, SteptwinError
 from steptwin.live.twins import controller_of, find_device
 from steptwin.mic488.registermap import RegisterMap
 from steptwin.mic488.registers import register_map
-from steptwin.monitor.values import FollowedValues, MonitorSource, PolledValues, Values
+from steptwin.monitor.values import FollowedValues, MonitorSource, MonitorValues, PolledValues
 
 AGAIN_S = 1.0
 """Interval of attempts to reach a controller that does not respond, s."""
@@ -32,7 +32,7 @@ class Picture:
     """The result of the last reading. ``trouble``: why there was no answer; the other values are then previous ones."""
 
     status: Mic488Status | None = None
-    values: Values = field(default_factory=dict)
+    values: MonitorValues = field(default_factory=dict)
     trouble: str | None = None
 
 

@@ -13,7 +13,7 @@ from steptwin.live.watching import TwinWatch
 from steptwin.mic488.registers import AXES, INPUTS, OUTPUTS
 from steptwin.mic488.values import RegisterValue
 
-Values: TypeAlias = Mapping[str, tuple[RegisterValue, str]]
+MonitorValues: TypeAlias = Mapping[str, tuple[RegisterValue, str]]
 """Value and unit of registers by name."""
 
 
@@ -21,7 +21,7 @@ class MonitorReading(NamedTuple):
     """The known values at a moment."""
 
     status: Mic488Status
-    values: Values
+    values: MonitorValues
 
 
 class MonitorSource(Protocol):
@@ -103,7 +103,7 @@ _STATUS = (*_of_axes("POS_ACT"), *_of_axes("VEL_ACT"), *_of_axes("STATUS"), *_IN
 """The registers of `Mic488Status`; firmware before 1.70 has no M_STATUS."""
 
 
-def _status(found: Values) -> Mic488Status:
+def _status(found: MonitorValues) -> Mic488Status:
     def numbers(names: Sequence[str]) -> list[float]:
         return [float(found[name][0]) for name in names]
 

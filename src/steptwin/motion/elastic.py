@@ -66,7 +66,7 @@ class DriveStretch(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Stretch:
+class ResponseStretch:
     """The mass in one stretch of its drive. ``cosine_p`` and ``sine_p``: amplitudes of its oscillation at the beginning."""
 
     spring: Spring
@@ -75,11 +75,11 @@ class Stretch:
     sine_p: float
 
     @staticmethod
-    def of(spring: Spring, drive: DriveStretch, x: float, v: float) -> Stretch:
+    def of(spring: Spring, drive: DriveStretch, x: float, v: float) -> ResponseStretch:
         """With the mass at ``x`` pulses with ``v`` pulses/s at the beginning."""
         even, slope = _forced(spring, drive.a, drive.j)
         a = x - drive.p - even
-        return Stretch(spring, drive, a, (v - drive.v - slope + spring.rate * a) / spring.damped)
+        return ResponseStretch(spring, drive, a, (v - drive.v - slope + spring.rate * a) / spring.damped)
 
     @property
     def amplitude(self) -> float:
@@ -127,7 +127,7 @@ class Response:
 
     def __init__(self, spring: Spring, drives: Iterable[DriveStretch], x: float, v: float) -> None:
         """The mass is at ``x`` with ``v`` when the first stretch begins. The last one has no end."""
-        self.stretches: list[Stretch] = []
+        self.stretches: list[ResponseStretch] = []
         before: DriveStretch | None = None
         for drive in drives:
             if self.stretches and before is not None:
@@ -135,7 +135,7 @@ class Response:
                 x, v = last.at(drive.begin)
                 v += 2.0 * spring.rate * (drive.p - before.at(drive.begin)[0])
             before = drive
-            found = Stretch.of(spring, drive, x, v)
+            found = ResponseStretch.of(spring, drive, x, v)
             if self.stretches and drive.begin <= self.stretches[-1].drive.begin:
                 self.stretches.pop()
             self.stretches.append(found)
@@ -143,7 +143,7 @@ class Response:
 
     def _let_settle(self) -> None:
         """Leave oscillations out from when on they are over."""
-        found: list[Stretch] = []
+        found: list[ResponseStretch] = []
         for number, stretch in enumerate(self.stretches):
             end = self.stretches[number + 1].drive.begin if number + 1 < len(self.stretches) else None
             over = stretch.settled()
@@ -155,13 +155,13 @@ class Response:
             s = (over - stretch.drive.begin) / SECOND
             p, v = stretch.drive.at(over)
             found.append(
-                Stretch(
+                ResponseStretch(
                     stretch.spring, DriveStretch(over, p, v, stretch.drive.a + stretch.drive.j * s, stretch.drive.j), 0.0, 0.0
                 )
             )
         self.stretches = found
 
-    def stretch(self, now: Nanos) -> Stretch:
+    def stretch(self, now: Nanos) -> ResponseStretch:
         return self.stretches[max(bisect_right(self.stretches, now, key=lambda one: one.drive.begin) - 1, 0)]
 
     def at(self, now: Nanos) -> tuple[float, float]:
@@ -176,7 +176,7 @@ class Response:
         """When its stretches begin."""
         return (stretch.drive.begin for stretch in self.stretches)
 
-    def _parts(self, after: Nanos) -> Iterator[tuple[Stretch, Nanos, Nanos]]:
+    def _parts(self, after: Nanos) -> Iterator[tuple[ResponseStretch, Nanos, Nanos]]:
         """Each stretch that ends after a moment, with its beginning, not before that moment, and its end."""
         for number, stretch in enumerate(self.stretches):
             last = number + 1 == len(self.stretches)

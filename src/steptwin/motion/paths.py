@@ -1,7 +1,8 @@
 """Straight lines and circular arcs of two axes: a path profile drives both, and each follows a profile of its own.
 
-The *way* is a profile of the position along the path, in any unit of length; it only goes forward. A course says where one
-axis is at every position of the way. Axes along a line follow ordinary profiles; along an arc they follow an `ArcProfile`.
+The *way* is a profile of the position along the path, in any unit of length; it only goes forward. A course gives
+the place of one axis at every position of the way. Axes along a line follow ordinary profiles; along an arc they follow an
+`ArcProfile`.
 
 Suffixes as in `steptwin.motion.profile`; ``_q`` quarter turns, counted from +X towards +Y; ``w`` positions of the way.
 """

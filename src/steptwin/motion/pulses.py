@@ -27,7 +27,7 @@ _FEW = 12
 _STEPS: Reals = np.arange(_BLOCK, dtype=np.float64)
 
 
-class _Run(NamedTuple):
+class _PulseRun(NamedTuple):
     """Pulses ``first``, ``first + step``, … (relative to the base), ``size`` of them, within one segment."""
 
     segment: int
@@ -58,7 +58,7 @@ def pulse_runs(profile: Profile, after: Nanos, until: Nanos) -> list[tuple[int, 
 def step_times(train: StepTrain, after: Nanos, until: Nanos) -> PulseTimes:
     """Moments of all STEP pulses of ``train`` with ``after`` < time <= ``until``, in order (int64 ns)."""
     profile = train.profile
-    runs: list[_Run] = []
+    runs: list[_PulseRun] = []
     for segment, first, step, size in _runs(profile, after, until):
         last = first + step * (size - 1)
         for begin, end, grid in train.stretches():
@@ -70,18 +70,18 @@ def step_times(train: StepTrain, after: Nanos, until: Nanos) -> PulseTimes:
                 high = min(high, (end - begin) * step)
             low, high = -(-low // grid), high // grid
             if low <= high:
-                runs.append(_Run(segment, (origin + low * grid) * step, grid * step, high - low + 1))
+                runs.append(_PulseRun(segment, (origin + low * grid) * step, grid * step, high - low + 1))
     return _times(profile, runs)
 
 
-def _runs(profile: Profile, after: Nanos, until: Nanos) -> list[_Run]:
+def _runs(profile: Profile, after: Nanos, until: Nanos) -> list[_PulseRun]:
     """All pulses of the window, segment by segment."""
     after = max(after, profile.start)
     if until <= after:
         return []
     first = profile.count(after) - profile.base
     last = profile.count(until) - profile.base
-    runs: list[_Run] = []
+    runs: list[_PulseRun] = []
     begin: float = 0
     for i, (s, end) in enumerate(zip(profile.segments, profile.ends, strict=True)):
         if begin <= until - profile.start and after - profile.start < end:
@@ -89,12 +89,12 @@ def _runs(profile: Profile, after: Nanos, until: Nanos) -> list[_Run]:
             high = last if until - profile.start < end else profile.counts[i + 1]
             size = (high - low) * s.direction
             if size > 0:
-                runs.append(_Run(i, low + s.direction, s.direction, size))
+                runs.append(_PulseRun(i, low + s.direction, s.direction, size))
         begin = end
     return runs
 
 
-def _times(profile: Profile, runs: list[_Run]) -> PulseTimes:
+def _times(profile: Profile, runs: list[_PulseRun]) -> PulseTimes:
     out = np.empty(sum(run.size for run in runs), dtype=np.int64)
     done = 0
     for run in runs:
@@ -103,7 +103,7 @@ def _times(profile: Profile, runs: list[_Run]) -> PulseTimes:
     return out
 
 
-def _fill(profile: Profile, run: _Run, out: PulseTimes) -> None:
+def _fill(profile: Profile, run: _PulseRun, out: PulseTimes) -> None:
     """Moments of the pulses of ``run``. The profile itself gives the first and the last, to which limits may apply."""
     index, first, step, size = run
     if size <= _FEW:

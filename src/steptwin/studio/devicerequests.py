@@ -74,7 +74,7 @@ _SHADOW = members(
         "registers": {**_list(_DIFFERENCE), "description": "Those that differ now."},
         "compared": {**_WHOLE, "description": "Registers that are compared at rest."},
         "first": {**_or_null(_DIFFERENCE), "description": "The first difference of all."},
-        "problems": {**_list(_TEXT), "description": "What the twin could not be told."},
+        "problems": {**_list(_TEXT), "description": "Commands that the twin refused."},
     }
 )
 _MACHINE = Field("machine", TEXT, "Of a device.")

@@ -19,7 +19,7 @@ from steptwin.access.tokens import AccessGate
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.machine import Nanos
 from steptwin.studio.requests import REQUESTS
-from steptwin.studio.viewers import HELLO_S, PATIENCE_S, REFUSED, SILENT, Receive, Scope, Send
+from steptwin.studio.viewers import HELLO_S, PATIENCE_S, REFUSED, SILENT, AsgiReceive, AsgiScope, AsgiSend
 from steptwin.subject.dispatch import failure, fields_of, read_message
 from steptwin.subject.fields import read_fields
 
@@ -54,7 +54,7 @@ class Editors:
         self._thread: threading.Thread | None = None
         self._count = 0
 
-    async def serve(self, scope: Scope, receive: Receive, send: Send) -> None:
+    async def serve(self, scope: AsgiScope, receive: AsgiReceive, send: AsgiSend) -> None:
         """One connection, from its beginning to its end."""
         await receive()  # that it wants to connect
         await send({"type": "websocket.accept"})
@@ -81,7 +81,7 @@ class Editors:
         if self._count >= MOST_EDITORS:
             raise Refusal(f"there are {MOST_EDITORS} editors already, the most possible")
 
-    async def _converse(self, receive: Receive, send: Send, abort: Callable[[], None]) -> None:
+    async def _converse(self, receive: AsgiReceive, send: AsgiSend, abort: Callable[[], None]) -> None:
         loop = asyncio.get_running_loop()
         outgoing: asyncio.Queue[str] = asyncio.Queue(MOST_WAITING)
 
@@ -152,7 +152,7 @@ def _receive(there: Conversation, text: str) -> int:
     return there.documents
 
 
-async def _write(outgoing: asyncio.Queue[str], send: Send, abort: Callable[[], None]) -> None:
+async def _write(outgoing: asyncio.Queue[str], send: AsgiSend, abort: Callable[[], None]) -> None:
     try:
         while True:
             text = await outgoing.get()
@@ -162,7 +162,7 @@ async def _write(outgoing: asyncio.Queue[str], send: Send, abort: Callable[[], N
         abort()
 
 
-async def _end(send: Send, code: int, error: Exception) -> None:
+async def _end(send: AsgiSend, code: int, error: Exception) -> None:
     with contextlib.suppress(OSError):
         await send({"type": "websocket.send", "text": json.dumps(failure(error))})
         await send({"type": "websocket.close", "code": code})

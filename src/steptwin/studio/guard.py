@@ -10,7 +10,7 @@ from steptwin.access.origin import Origins
 from steptwin.access.rate import RateLimits
 from steptwin.errors import Refusal
 from steptwin.machine import Nanos
-from steptwin.studio.viewers import Receive, Scope, Send
+from steptwin.studio.viewers import AsgiReceive, AsgiScope, AsgiSend
 from steptwin.subject.dispatch import failure
 
 RATE, BURST = 100.0, 400.0
@@ -26,7 +26,7 @@ HEADERS = (
     (b"cross-origin-opener-policy", b"same-origin"),
     (b"cross-origin-resource-policy", b"same-origin"),
 )
-ServeSocket: TypeAlias = Callable[[Scope, Receive, Send], Awaitable[None]]
+ServeSocket: TypeAlias = Callable[[AsgiScope, AsgiReceive, AsgiSend], Awaitable[None]]
 """Serves one WebSocket from its beginning to its end."""
 
 
@@ -48,7 +48,7 @@ class Guard:
         self._on_internal = on_internal
         self._limits = RateLimits(RATE, BURST)
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+    async def __call__(self, scope: AsgiScope, receive: AsgiReceive, send: AsgiSend) -> None:
         headers = {key: value.decode("latin-1") for key, value in scope.get("headers", ())}
         is_socket = scope["type"] == "websocket"
         refuse = _refuse_socket if is_socket else _refuse
@@ -71,7 +71,7 @@ class Guard:
             except Exception as error:  # noqa: BLE001  it is reported here only
                 self._on_internal(error)
 
-    async def _pass(self, scope: Scope, receive: Receive, send: Send) -> None:
+    async def _pass(self, scope: AsgiScope, receive: AsgiReceive, send: AsgiSend) -> None:
         has_begun = False
 
         async def guarded(message: Any) -> None:
@@ -89,14 +89,14 @@ class Guard:
                 await _refuse(send, receive, 500, error)
 
 
-async def _refuse(send: Send, receive: Receive, status: int, error: Exception) -> None:
+async def _refuse(send: AsgiSend, receive: AsgiReceive, status: int, error: Exception) -> None:
     body = json.dumps(failure(error)).encode()
     headers = [(b"content-type", b"application/json"), (b"content-length", str(len(body)).encode()), *HEADERS]
     await send({"type": "http.response.start", "status": status, "headers": headers})
     await send({"type": "http.response.body", "body": body})
 
 
-async def _refuse_socket(send: Send, receive: Receive, status: int, error: Exception) -> None:
+async def _refuse_socket(send: AsgiSend, receive: AsgiReceive, status: int, error: Exception) -> None:
     """Before the connection is accepted: the answer to its request."""
     await receive()
     body = json.dumps(failure(error)).encode()

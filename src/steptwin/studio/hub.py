@@ -48,7 +48,7 @@ IDLE_NS: Nanos = 60 * SECOND
 """Control that was taken over REST ends after this time without a request."""
 
 
-class Moment(NamedTuple):
+class PresentMoment(NamedTuple):
     """The present moment of a subject and the speed of its time; ``speed`` infinite: as fast as possible."""
 
     time: Nanos
@@ -175,7 +175,7 @@ class Shared:
 class Surroundings:
     """What a hub is given besides its subject."""
 
-    moment: Callable[[], Moment]
+    moment: Callable[[], PresentMoment]
     gate: AccessGate
     audit: Audit
     program: str
@@ -188,6 +188,8 @@ class Surroundings:
     lookback: KeptPast | None = None
     """The past, where one is kept."""
     recordings: Recordings | None = None
+    """Of the world, where there is one."""
+    traffic: Callable[[], Sequence[Mapping[str, object]]] | None = None
     """Of the world, where there is one."""
     on_internal: Callable[[Exception], object] = lambda error: None
 
@@ -243,6 +245,12 @@ class Hub:
             raise Refusal("nothing is recorded here: there is no world")
         return self.around.recordings
 
+    def traffic(self) -> dict[str, object]:
+        """Raises `Refusal` where there is no world."""
+        if self.around.traffic is None:
+            raise Refusal("traffic is counted on lines of a world: there is no world")
+        return {"time_ns": str(self.around.moment().time), "lines": self.around.traffic()}
+
     # ------------------------------------------------------------------ viewers
 
     def number(self) -> int:
@@ -272,6 +280,8 @@ class Hub:
             missing |= OF_THE_PAST
         if self.around.recordings is None:
             missing |= OF_RECORDINGS
+        if self.around.traffic is None:
+            missing |= {"traffic"}
         own = [name for name in REQUESTS if name not in missing]
         return [name for name in (*of_subject, *own) if permit_of(name).role <= role]
 
@@ -296,7 +306,7 @@ class Hub:
         return None if found is None else {"viewer": found.number, "name": found.name}
 
     def asked(self, viewer: Viewer, now: Nanos) -> None:
-        """Somebody without a connection has asked something."""
+        """A request without a connection (REST)."""
         self._asked[viewer.number] = now
 
     # ------------------------------------------------------------------ jogs

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from typing import Protocol
+from collections.abc import Callable, Mapping
+from typing import Protocol, TypeVar
 
+from steptwin.devices.worldpart import PlannedSubject, present_of
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.later import Later
-from steptwin.machine import Nanos
+from steptwin.machine import SECOND, Nanos
 from steptwin.studio.programs import ProgramTexts
-from steptwin.studio.shownworld import PlannedSubject, present_of
 from steptwin.studio.watches import Watched
-from steptwin.subject.commands import Command, Encoders, ListFaults, ReadPins, ReadPoints, State
+from steptwin.subject.commands import Command, Encoders, ListFaults, ReadPins, ReadPoints, ReadState
 from steptwin.subject.contract import Result
-from steptwin.subject.following import filter_of
+from steptwin.subject.following import EventBatch, Filter, filter_of
 
-OF_A_MOMENT = frozenset({ReadPoints, ReadPins, State, Encoders, ListFaults})
+T = TypeVar("T")
+MOST_PAST_EVENTS = 10_000
+LONGEST_PAST: Nanos = 60 * SECOND
+"""Limits of an answer to `past_events`: events, ns."""
+OF_A_MOMENT = frozenset({ReadPoints, ReadPins, ReadState, Encoders, ListFaults})
 """Commands whose answer is about a moment."""
 
 
@@ -49,6 +53,15 @@ class KeptPast(Protocol):
 
     def open(self) -> PastMoment:
         """For one more viewer. Raises `Refusal` where there are too many."""
+        ...
+
+    def events(
+        self, begin: Nanos, end: Nanos, what: Filter, bound: int, at_begin: Callable[[PlannedSubject], T]
+    ) -> Later[tuple[T, EventBatch]]:
+        """The last ``bound`` events between two moments, and what ``at_begin`` finds at the first one.
+
+        Raises `Refusal` where there are too many viewers of the past, `Misuse` for moments that are not kept.
+        """
         ...
 
 
@@ -118,6 +131,21 @@ class Looking:
         (await self._there()).go_back()
         self.leave()
 
+    async def events(self, begin: Nanos, end: Nanos, kinds: tuple[str, ...] | None) -> dict[str, object]:
+        """What happened between two moments, whichever is shown. Raises `Misuse`, and `Refusal` if no past is kept."""
+        lookback = self._lookback
+        if lookback is None:
+            raise Refusal("past_events: no past is kept here")
+        begin = max(begin, lookback.begin)
+        if not begin <= end <= begin + LONGEST_PAST:
+            span = f"permitted is up to {LONGEST_PAST // SECOND} s in one answer"
+            raise Misuse(f"past_events from {begin / SECOND:g} s to {end / SECOND:g} s: {span}")
+        present, batch = await lookback.events(begin, end, filter_of(kinds), MOST_PAST_EVENTS, _present)
+        if batch.missed:  # what held at the begin says nothing of the first event that is left
+            begin, present = batch.events[0].time, {"state": {}, "faults": [], "plans": []}
+        events = [event.plain() for event in batch.events]
+        return {"from_ns": str(begin), "to_ns": str(end), **present, "events": events}
+
     # ------------------------------------------------------------------ what the viewer is sent
 
     def message(self, may: list[str]) -> dict[str, object] | None:
@@ -126,9 +154,8 @@ class Looking:
         look, lookback = self._look, self._lookback
         if look is None or lookback is None:
             return None
-        plans = [plan.plain() for plan in look.subject.plans(filter_of(["plan"]))]
         moments = {"time_ns": str(look.now), "from_ns": str(lookback.begin)}
-        return {**moments, "may": may, **present_of(look.subject), "plans": plans}
+        return {**moments, "may": may, **_present(look.subject)}
 
     def take(self, watches: Mapping[int, Watched]) -> dict[int, str]:
         """Values of the moment by watch, as JSON."""
@@ -139,6 +166,11 @@ class Looking:
         look = self._look
         points = () if look is None else watched.values.points
         return json.dumps([[index, _value(look, point)] for index, point in enumerate(points)], separators=(",", ":"))
+
+
+def _present(subject: PlannedSubject) -> dict[str, object]:
+    plans = [plan.plain() for plan in subject.plans(filter_of(["plan"]))]
+    return {**present_of(subject), "plans": plans}
 
 
 def _value(look: PastMoment | None, point: str) -> float | None:

@@ -15,6 +15,10 @@ class ProgramTexts(Protocol):
         """Raises `Misuse` where there is none."""
         ...
 
+    def memory(self, machine: str, place: str, text: str) -> Sequence[Mapping[str, object]]:
+        """What a text takes of the memory at a place; empty for one with errors. Raises `Misuse` where there is no place."""
+        ...
+
     def files(self) -> Mapping[str, bytes]:
         """For editors: texts, and what belongs together, by address."""
         ...

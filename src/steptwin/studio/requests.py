@@ -24,7 +24,8 @@ from steptwin.studio.shapes import MOMENT
 from steptwin.studio.toolrequests import TOOLS, ToolRequest
 from steptwin.studio.workrequests import WORKS, WorkRequest
 from steptwin.subject.commands import COMMANDS, CommandRow
-from steptwin.subject.fields import FLAG, NAMES, TEXT, TIME, Field, Schema, number, read_fields, whole
+from steptwin.subject.fields import FLAG, NAMES, PROGRAM, TEXT, TIME, Field, Schema, choices, number, read_fields, whole
+from steptwin.subject.payloads import KINDS
 from steptwin.subject.shapes import members
 from steptwin.world.programtexts import LANGUAGES
 
@@ -102,8 +103,31 @@ class ShowMoment:
 
 
 @dataclass(frozen=True, slots=True)
+class ReadPastEvents:
+    """What happened between two moments of the past."""
+
+    begin: Nanos
+    end: Nanos
+    kinds: tuple[str, ...] | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class GoBack:
     """Returns the world itself to the moment that is shown."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReadMemory:
+    """Requests what a text takes of the memory at a place."""
+
+    machine: str
+    place: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class ReadTraffic:
+    """Requests how much each line has carried."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,8 +181,11 @@ StudioRequest: TypeAlias = (
     | LetGo
     | StopAll
     | ShowMoment
+    | ReadPastEvents
     | GoBack
     | ReadAudit
+    | ReadTraffic
+    | ReadMemory
     | ListPrograms
     | ReadProgram
     | ToolRequest
@@ -201,6 +228,18 @@ _FINDING: Schema = members(
         "code": _TEXT,
         "message": _TEXT,
         "hint": {"anyOf": [_TEXT, {"type": "null"}]},
+    }
+)
+
+_EVENT: Schema = {"$ref": "#/$defs/(event)"}
+_MOST: Schema = {"anyOf": [_WHOLE, {"type": "null"}], "description": "Null: the memory of the other parts limits it."}
+_LINE = members(
+    {
+        "line": _TEXT,
+        "clients": {**_WHOLE, "description": "Network connections, and serial ports and pseudo terminals that are open."},
+        "requests": {**_WHOLE, "description": "Whole requests; of characters, lines."},
+        "errors": {**_WHOLE, "description": "Exceptions and lost requests; of characters, those lost on the wire."},
+        "unframed": {**_WHOLE, "description": "Bytes that belonged to no frame."},
     }
 )
 
@@ -253,7 +292,7 @@ _ROWS = (
         "take_control",
         TakeControl,
         TAKE,
-        "Hold control. Whoever acts while nobody holds it takes it, too.",
+        "Take control. A viewer that acts while control is free takes it, too.",
         NOTHING,
         (Field("over", FLAG, "Also from a viewer who holds it.", False),),
     ),
@@ -284,6 +323,28 @@ _ROWS = (
         is_of_connection=True,
     ),
     RequestRow(
+        "past_events",
+        ReadPastEvents,
+        LOOK,
+        "What happened between two moments of the past, at most a minute apart. plans, state and faults are those of the first "
+        "moment. Of more than 10000 events the last ones, without these; from_ns is then the moment of the first event.",
+        members(
+            {
+                "from_ns": MOMENT,
+                "to_ns": MOMENT,
+                "state": {"type": "object", "additionalProperties": {"$ref": "#/$defs/(state)"}, "description": "As in hello."},
+                "faults": {"type": "array", "items": {"type": "object"}},
+                "plans": {"type": "array", "items": _EVENT},
+                "events": {"type": "array", "items": _EVENT},
+            }
+        ),
+        (
+            Field("from_ns", TIME, "The first moment, or the begin of the past that is kept.", unit="ns", attribute="begin"),
+            Field("to_ns", TIME, "The last moment.", unit="ns", attribute="end"),
+            Field("kinds", choices(KINDS, "kind of event"), "Kinds of events, as for follow.", None),
+        ),
+    ),
+    RequestRow(
         "go_back",
         GoBack,
         ACT,
@@ -305,6 +366,18 @@ _ROWS = (
         "One of these texts, with what the checker of its language finds in it.",
         members({**_PROGRAM, "text": _TEXT, "diagnostics": {"type": "array", "items": _FINDING}}),
         (Field("machine", TEXT, "Of a controller."), Field("place", TEXT, "As in the answer to programs.")),
+    ),
+    RequestRow(
+        "program_memory",
+        ReadMemory,
+        LOOK,
+        "What a text would take of the program memory at a place, and what is permitted. Empty for a text with errors.",
+        {"type": "array", "items": members({"what": _TEXT, "used": _WHOLE, "most": _MOST, "unit": _TEXT})},
+        (
+            Field("machine", TEXT, "Of a controller."),
+            Field("place", TEXT, "As in the answer to programs."),
+            Field("text", PROGRAM, "The text; it is not downloaded."),
+        ),
     ),
     RequestRow(
         "ports",
@@ -333,6 +406,13 @@ _ROWS = (
         (Field("machine", TEXT, "Of a device."),),
     ),
     RequestRow(
+        "traffic",
+        ReadTraffic,
+        LOOK,
+        "How much each line of the world has carried since its beginning. Counted at present, also while the past is looked at.",
+        members({"time_ns": MOMENT, "lines": {"type": "array", "items": _LINE}}),
+    ),
+    RequestRow(
         "audit",
         ReadAudit,
         SERVICE._replace(control=False),
@@ -358,7 +438,7 @@ _ROWS = (
 REQUESTS: Mapping[str, RequestRow] = {row.name: row for row in (*_ROWS, *TOOLS, *WORKS, *RECORDINGS, *OF_DEVICES)}
 ALL: Mapping[str, RequestRow | CommandRow] = {**COMMANDS, **REQUESTS}
 """Every request by name."""
-OF_THE_PAST = frozenset({"look", "go_back"})
+OF_THE_PAST = frozenset({"look", "go_back", "past_events"})
 """What needs a past that is kept."""
 OF_RECORDINGS = frozenset(row.name for row in RECORDINGS)
 """What needs a world."""

@@ -16,16 +16,16 @@ from steptwin import __version__
 from steptwin.access.control import Viewer
 from steptwin.access.roles import Role
 from steptwin.errors import Misuse, Refusal, SteptwinError
+from steptwin.eventloop import result_of
 from steptwin.later import start
 from steptwin.machine import Nanos
-from steptwin.studio.eventloop import result_of
 from steptwin.studio.hub import Hub
 from steptwin.studio.requests import ALL, OF_CONNECTION, permit_of
 from steptwin.studio.session import ViewerSession
 from steptwin.subject.dispatch import LONGEST_REQUEST, Message, failure
 from steptwin.subject.schema import definitions, request_schema
 
-Endpoint: TypeAlias = Callable[[Request], Awaitable[Response]]
+_RestEndpoint: TypeAlias = Callable[[Request], Awaitable[Response]]
 
 DONE, MISUSE, NO_TOKEN, FORBIDDEN, REFUSED, TOO_LONG, TOO_MANY, INTERNAL, FAILED = 200, 400, 401, 403, 409, 413, 429, 500, 502
 STATUS: Mapping[str, int] = {"misuse": MISUSE, "refusal": REFUSED, "failure": FAILED, "internal": INTERNAL}
@@ -122,7 +122,7 @@ class Rest:
 
     # ------------------------------------------------------------------ routes
 
-    def _command(self, name: str) -> Endpoint:
+    def _command(self, name: str) -> _RestEndpoint:
         async def do(request: Request) -> Response:
             try:
                 fields = await _fields(request)

@@ -31,7 +31,7 @@ class _Protocol(WebSocketsSansIOProtocol):
         super().connection_made(transport)
 
 
-class Service:
+class StudioService:
     """Serves ``hub`` at ``listening`` until it is closed. A `Link` of a server."""
 
     def __init__(self, hub: Hub, listening: socket.socket, origins: Origins, tls: Tls | None = None) -> None:

@@ -106,8 +106,10 @@ class ViewerSession:
             ask.StopAll: lambda _: hub.stop_all(),
             ask.ShowMoment: self._look_at,
             ask.GoBack: self._go_back,
+            ask.ReadPastEvents: lambda wanted: self._looking.events(wanted.begin, wanted.end, wanted.kinds),
             ask.ListPrograms: self._list_programs,
             ask.ReadProgram: self._read_program,
+            ask.ReadMemory: self._read_memory,
             ask.ListPorts: lambda _: hub.around.connections.ports(),
             ask.Connect: self._connect,
             ask.Disconnect: lambda wanted: hub.around.connections.disconnect(wanted.machine),
@@ -136,6 +138,7 @@ class ViewerSession:
             work.ReadWork: lambda _: hub.around.work.plain(),
             device.ReadShadow: lambda wanted: hub.around.connections.shadow_of(wanted.machine, wanted.after),
             work.CancelWork: lambda _: hub.around.work.cancel(),
+            ask.ReadTraffic: lambda wanted: hub.traffic(),
             ask.ReadAudit: lambda wanted: [entry.plain() for entry in hub.around.audit.last(wanted.most)],
         }
         return complete("request", [row.kind for row in REQUESTS.values() if row.kind not in self._asking], "action", actions)
@@ -298,6 +301,9 @@ class ViewerSession:
 
     async def _read_program(self, wanted: ask.ReadProgram) -> object:
         return (await self._programs()).text(wanted.machine, wanted.place)
+
+    async def _read_memory(self, wanted: ask.ReadMemory) -> object:
+        return (await self._programs()).memory(wanted.machine, wanted.place, wanted.text)
 
     # ------------------------------------------------------------------ what it is sent
 

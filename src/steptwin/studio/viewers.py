@@ -18,9 +18,9 @@ from steptwin.studio.hub import Hub
 from steptwin.studio.session import ViewerSession
 from steptwin.subject.dispatch import Message, failure
 
-Scope: TypeAlias = MutableMapping[str, Any]
-Receive: TypeAlias = Callable[[], Awaitable[MutableMapping[str, Any]]]
-Send: TypeAlias = Callable[[MutableMapping[str, Any]], Awaitable[None]]
+AsgiScope: TypeAlias = MutableMapping[str, Any]
+AsgiReceive: TypeAlias = Callable[[], Awaitable[MutableMapping[str, Any]]]
+AsgiSend: TypeAlias = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 
 PATH = "/ws"
 TICK_S = 1 / 30
@@ -41,7 +41,7 @@ class Viewers:
         self._connections: set[_Connection] = set()
         self._ticking: asyncio.Task[None] | None = None
 
-    async def serve(self, scope: Scope, receive: Receive, send: Send) -> None:
+    async def serve(self, scope: AsgiScope, receive: AsgiReceive, send: AsgiSend) -> None:
         """One connection, from its beginning to its end."""
         await receive()  # that it wants to connect
         await send({"type": "websocket.accept"})
@@ -80,7 +80,7 @@ class Viewers:
 class _Connection:
     """A connection. Answers are sent in order; a separate task sends messages, so that only that task waits for a slow reader."""
 
-    def __init__(self, session: ViewerSession, send: Send, clock: Callable[[], Nanos], abort: Callable[[], None]) -> None:
+    def __init__(self, session: ViewerSession, send: AsgiSend, clock: Callable[[], Nanos], abort: Callable[[], None]) -> None:
         self._session = session
         self._send = send
         self._clock = clock
@@ -90,7 +90,7 @@ class _Connection:
         """Later answers that are not sent yet."""
         self._writing: asyncio.Task[None] | None = None
 
-    async def serve(self, receive: Receive) -> None:
+    async def serve(self, receive: AsgiReceive) -> None:
         loop = asyncio.get_running_loop()
         silent = loop.call_later(HELLO_S, self._abort)
         self._writing = asyncio.create_task(self._write())
@@ -156,6 +156,6 @@ def _text(message: Message) -> str:
     return json.dumps(message, separators=(",", ":"))
 
 
-def _peer(scope: Scope) -> str:
+def _peer(scope: AsgiScope) -> str:
     client = scope.get("client")
     return str(client[0]) if client else "local"

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from steptwin.errors import Refusal, SteptwinError
+from steptwin.eventloop import later, result_of
 from steptwin.later import Later
-from steptwin.studio.eventloop import later, result_of
 
 
 class Cancelled(Exception):

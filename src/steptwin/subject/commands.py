@@ -67,7 +67,7 @@ class ReadPins:
 
 
 @dataclass(frozen=True, slots=True)
-class State:
+class ReadState:
     """The present state of a machine: status, program, axes, pins, details (`steptwin.controllerstate`)."""
 
     machine: str
@@ -197,7 +197,7 @@ Command: TypeAlias = (
     | Describe
     | ReadPoints
     | ReadPins
-    | State
+    | ReadState
     | Encoders
     | ListFaults
     | ListFaultKinds
@@ -252,7 +252,7 @@ _ROWS = (
         '{"MACHINE.PIN": LEVEL, ...}',
         (Field("machine", TEXT, "The name of a machine; all of them without.", None),),
     ),
-    CommandRow("state", State, "The present state of a machine.", "the state, alike for all kinds", (MACHINE,)),
+    CommandRow("state", ReadState, "The present state of a machine.", "the state, alike for all kinds", (MACHINE,)),
     CommandRow("encoders", Encoders, "The encoders of a machine.", "a list of axis, counts, turned_by", (MACHINE,)),
     CommandRow("faults", ListFaults, "The faults that are set.", "a list of name, fault, seen (occasions), happened (how often)"),
     CommandRow(

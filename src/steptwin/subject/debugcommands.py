@@ -148,7 +148,7 @@ class ProgramSource:
 
 
 @dataclass(frozen=True, slots=True)
-class Why:
+class AskWhy:
     """Why a signal has its value, a condition its truth, or a program waits."""
 
     question: str = ""
@@ -170,7 +170,7 @@ DebugCommand: TypeAlias = (
     | Evaluate
     | SetValue
     | ProgramSource
-    | Why
+    | AskWhy
 )
 
 _PLACE = "time_ns, present_ns, begin_ns (the oldest moment that can be gone to), past, going (whether time goes on)"
@@ -285,7 +285,7 @@ ROWS = (
     ),
     CommandRow(
         "why",
-        Why,
+        AskWhy,
         "The chain of causes of a value, of a condition or of a wait, from the past that is kept.",
         "question, at_ns, state (what is true), since_ns (null: it has not changed), links: a list of time_ns, subject and text,"
         " from the effect to its causes; complete, known_from_ns, cut (whether the"

@@ -69,7 +69,7 @@ class WorldSubject:
             command.Describe: lambda _: self.description.plain(),
             command.ReadPoints: lambda wanted: [reading._asdict() for reading in self.read(*wanted.points)],
             command.ReadPins: self._pins,
-            command.State: self._state,
+            command.ReadState: self._state,
             command.Encoders: self._encoders,
             command.ListFaults: lambda _: self._faults(),
             command.ListFaultKinds: lambda _: [kind.plain() for kind in rows()],
@@ -169,7 +169,7 @@ class WorldSubject:
         self.world.touch(name)
         return machine.pins()
 
-    def _state(self, wanted: command.State) -> object:
+    def _state(self, wanted: command.ReadState) -> object:
         machine = self.world.machine(wanted.machine)
         self.world.touch(wanted.machine)
         return plain(self.world.kind(wanted.machine).state(machine, self.world.now))

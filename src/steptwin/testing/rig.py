@@ -44,7 +44,7 @@ WITHIN_S = 10.0
 """How long `Rig.until` waits, where no other limit is given."""
 
 
-Time: TypeAlias = VirtualTime | RealTime | WallTime
+RigTime: TypeAlias = VirtualTime | RealTime | WallTime
 
 
 Observe: TypeAlias = Callable[[World, Path], object]
@@ -73,7 +73,7 @@ class TwinEvent(NamedTuple):
 class Rig:
     """Base of the rigs. What is marked as *the twin's* skips the test where a device replaces it (``--device``)."""
 
-    def __init__(self, name: str, time: Time, device: str | None, directory: Path) -> None:
+    def __init__(self, name: str, time: RigTime, device: str | None, directory: Path) -> None:
         self._name = name
         self._time = time
         self._device = device
@@ -134,7 +134,15 @@ class LineRig(Rig):
     """A rig of one controller on a line, alone in a world; ``live`` is None where it is a device. ``machine`` is its name."""
 
     def __init__(
-        self, name: str, time: Time, device: str | None, directory: Path, *, live: LiveWorld | None, machine: str, twin_only: bool
+        self,
+        name: str,
+        time: RigTime,
+        device: str | None,
+        directory: Path,
+        *,
+        live: LiveWorld | None,
+        machine: str,
+        twin_only: bool,
     ) -> None:
         super().__init__(name, time, device, directory)
         self._live = live
@@ -206,7 +214,7 @@ class LineRig(Rig):
     def state(self) -> ControllerState:
         """Its status, program, axes, pins and details at present. The twin's."""
         __tracebackhide__ = True
-        return read_state(self._do("state", command.State(self._machine)))
+        return read_state(self._do("state", command.ReadState(self._machine)))
 
     @property
     def pins(self) -> Mapping[str, float]:

@@ -76,8 +76,8 @@ class WorldAxis(NamedTuple):
 class WorldRig(Rig):
     """A running world, new for each test. ``driver`` talks to one of its controllers, ``address`` is for a program under test.
 
-    With ``--device NAME=ADDRESS`` drivers and addresses are those of real controllers, by the names of the world; what is said
-    to be *the twin's* skips the test then.
+    With ``--device NAME=ADDRESS`` drivers and addresses are those of real controllers, by the names of the world; members
+    marked *the twin's* skip the test then.
     """
 
     def __init__(self, options: WorldOptions, devices: Mapping[str, str], base: Path, observe: Observe) -> None:

@@ -40,7 +40,7 @@ class CheckRequest(NamedTuple):
 
 
 R = TypeVar("R")
-Steps: TypeAlias = Generator[CheckRequest, bytes, R]
+CheckSteps: TypeAlias = Generator[CheckRequest, bytes, R]
 """Yields what to send, gets what came."""
 
 
@@ -84,7 +84,7 @@ class Check(Generic[T]):
 
     id: str
     what: str
-    steps: Callable[[T], Steps[None]]
+    steps: Callable[[T], CheckSteps[None]]
     need: CheckNeed = CheckNeed.READ
     unless: Callable[[T], str | None] = lambda talk: None
 

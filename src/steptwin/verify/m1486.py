@@ -6,7 +6,7 @@ from steptwin.drivers.m1486.talk import LETTERS
 from steptwin.errors import LineFailure
 from steptwin.m1486.receiver import CR, EMPTY, NO_ROOM, THREE_FREE
 from steptwin.m1486.variants import Store, Variant
-from steptwin.verify.check import Check, CheckNeed, CheckRequest, NotRestored, Probes, Steps, Undecided
+from steptwin.verify.check import Check, CheckNeed, CheckRequest, CheckSteps, NotRestored, Probes, Undecided
 
 INVALID_COMMAND = "%"
 """A character that is in no command: its line is wrong data (M-11)."""
@@ -35,7 +35,7 @@ class ChipTalk:
         self.has_report = False
         """Function 57."""
 
-    def hello(self) -> Steps[None]:
+    def hello(self) -> CheckSteps[None]:
         """Select the chip, and find out whether it echoes and reports. Raises `LineFailure` if it does not respond."""
         yield CheckRequest(b"\r", SELECT_S)
         if self.address is not None:
@@ -49,7 +49,7 @@ class ChipTalk:
         if LETTERS.isdisjoint(came):
             raise LineFailure("the chip does not respond: it may move, wait or run a program")
 
-    def sent(self, text: str, *, answers: int = 1) -> Steps[bytes]:
+    def sent(self, text: str, *, answers: int = 1) -> CheckSteps[bytes]:
         """What came for characters, without their echo; ``answers``: the number of bytes expected."""
         data = text.encode("ascii")
         echo = data if self.has_echo else b""
@@ -61,14 +61,14 @@ class ChipTalk:
     def without_report(self, came: bytes) -> bytes:
         return came.translate(None, bytes((EMPTY, THREE_FREE))) if self.has_report else came
 
-    def upload(self, number: int) -> Steps[int]:
+    def upload(self, number: int) -> CheckSteps[int]:
         """One byte of U. Raises `Undecided`."""
         came = self.without_report((yield from self.sent(f"u{number}\r")))
         if len(came) != 1:
             raise Undecided(f"U{number} was answered by {_text(came)}")
         return came[0]
 
-    def expect(self, what: str, text: str, *wanted: int) -> Steps[None]:
+    def expect(self, what: str, text: str, *wanted: int) -> CheckSteps[None]:
         came = self.without_report((yield from self.sent(text, answers=len(wanted))))
         self.probes.equal(what, _text(bytes(wanted)), _text(came))
 
@@ -82,36 +82,36 @@ def _mixed(talk: ChipTalk) -> str | None:
     return "needs function 41 (echo) and 57 (report) OFF" if talk.has_echo or talk.has_report else None
 
 
-def _comments(talk: ChipTalk) -> Steps[None]:
+def _comments(talk: ChipTalk) -> CheckSteps[None]:
     letter = talk.variant.type_letter
     yield from talk.expect("U20 with a comment behind it", f"u{_TYPE}{COMMENT}\r", letter)
     yield from talk.expect("a comment alone", f"{COMMENT}\r")
     yield from talk.expect("U20 with LF behind it", f"u{_TYPE}\n\r", letter)
 
 
-def _blanks(talk: ChipTalk) -> Steps[None]:
+def _blanks(talk: ChipTalk) -> CheckSteps[None]:
     yield from talk.expect("U20 with blanks in it", " u 2 0 \r", talk.variant.type_letter)
 
 
-def _wrong_data(talk: ChipTalk) -> Steps[None]:
+def _wrong_data(talk: ChipTalk) -> CheckSteps[None]:
     yield from talk.expect("an unknown letter", f"{INVALID_COMMAND}\r")
     yield from talk.expect("a number out of range", "u21\r")
     yield from talk.expect("U20 after them", f"u{_TYPE}\r", talk.variant.type_letter)
 
 
-def _identity(talk: ChipTalk) -> Steps[None]:
+def _identity(talk: ChipTalk) -> CheckSteps[None]:
     interface = yield from talk.upload(_INTERFACE)
     talk.probes.holds("U15", "00H, 01H or 02H", _text(bytes((interface,))), interface in (0, 1, 2))
     yield from talk.expect("U16", f"u{_SERIES}\r", 1)
     yield from talk.expect(f"U20 of a type {talk.variant.name}", f"u{_TYPE}\r", talk.variant.type_letter)
 
 
-def _reserved_bytes(talk: ChipTalk) -> Steps[None]:
+def _reserved_bytes(talk: ChipTalk) -> CheckSteps[None]:
     for number in range(_RESERVED, _FLAGS):
         yield from talk.expect(f"U{number}", f"u{number}\r", 0)
 
 
-def _two_uploads(talk: ChipTalk) -> Steps[None]:
+def _two_uploads(talk: ChipTalk) -> CheckSteps[None]:
     yield from talk.expect("U20 and U16 in immediate succession", f"u{_TYPE}\ru{_SERIES}\r", talk.variant.type_letter, 1)
 
 
@@ -120,7 +120,7 @@ def _room(talk: ChipTalk) -> int:
     return talk.variant.input_bits // 8
 
 
-def _long_line(talk: ChipTalk) -> Steps[None]:
+def _long_line(talk: ChipTalk) -> CheckSteps[None]:
     inverted = ~ord(INVALID_COMMAND) & 0xFF
     room = _room(talk)
     yield from talk.expect(
@@ -130,14 +130,14 @@ def _long_line(talk: ChipTalk) -> Steps[None]:
     yield from talk.expect("U20 after it", f"u{_TYPE}\r", talk.variant.type_letter)
 
 
-def _last_three(talk: ChipTalk) -> Steps[None]:
+def _last_three(talk: ChipTalk) -> CheckSteps[None]:
     room = _room(talk)
     text = INVALID_COMMAND * (room - 3)
     yield from talk.expect(f"a line of {room - 2} characters with its CR", f"{text}\r", ~CR & 0xFF)
     yield from talk.expect("U20 after it", f"u{_TYPE}\r", talk.variant.type_letter)
 
 
-def _bit_order(talk: ChipTalk) -> Steps[None]:
+def _bit_order(talk: ChipTalk) -> CheckSteps[None]:
     before = yield from talk.upload(_FLAGS)
     talk.probes.unrestored["flag 80"] = f"flag 80 = {before & 1}"
     for text, bit in (("t80", 1), ("c80", 0)):

@@ -8,7 +8,7 @@ from steptwin.drivers.mic488.motion import MOVING
 from steptwin.mic488.encoding import real_to_words, words_to_real
 from steptwin.mic488.registers import AXES
 from steptwin.mic488.status import AxisStatus
-from steptwin.verify.check import Check, CheckNeed, CheckRequest, Steps, Undecided
+from steptwin.verify.check import Check, CheckNeed, CheckRequest, CheckSteps, Undecided
 from steptwin.verify.modbus import ModbusTalk, read, write, write_one
 from steptwin.wire import pdu, rtu
 from steptwin.wire.crc import with_crc
@@ -35,7 +35,7 @@ def _tcp_only(talk: ModbusTalk) -> str | None:
 # ---------------------------------------------------------------------- reads, and writes that are to be refused
 
 
-def _refusals(talk: ModbusTalk) -> Steps[None]:
+def _refusals(talk: ModbusTalk) -> CheckSteps[None]:
     yield from talk.expect_refusal("function 07, which it does not have", b"\x07", FUNCTION)
     yield from talk.expect_refusal(f"read of register {NOWHERE}", read(NOWHERE, 1), ADDRESS)
     yield from talk.expect_refusal("read of no register", read(talk.at("DATA_TYPE"), 0), VALUE)
@@ -49,11 +49,11 @@ def _refusals(talk: ModbusTalk) -> Steps[None]:
     yield from talk.expect_answer("the same read, right", good[1:-2])
 
 
-def _broadcast_read(talk: ModbusTalk) -> Steps[None]:
+def _broadcast_read(talk: ModbusTalk) -> CheckSteps[None]:
     yield from talk.expect_silence("read addressed to unit 0", rtu.encode_frame(rtu.BROADCAST, read(talk.at("DATA_TYPE"), 1)))
 
 
-def _holes(talk: ModbusTalk) -> Steps[None]:
+def _holes(talk: ModbusTalk) -> CheckSteps[None]:
     used = {address for register in talk.registers for address in range(register.address, register.last + 1)}
     first = talk.at("DATA_TYPE")
     hole = next(address for address in range(first, first + 1000) if address not in used)
@@ -63,7 +63,7 @@ def _holes(talk: ModbusTalk) -> Steps[None]:
     yield from talk.expect_refusal("read of M4_STATUS and the write-only register after it", read(last, 2), ADDRESS)
 
 
-def _halves(talk: ModbusTalk) -> Steps[None]:
+def _halves(talk: ModbusTalk) -> CheckSteps[None]:
     address = talk.at("ACC", 1)
     both = yield from talk.words(address, 2)
     for name, offset in (("first", 0), ("second", 1)):
@@ -81,7 +81,7 @@ def _halves(talk: ModbusTalk) -> Steps[None]:
     yield from talk.keep("M1_ACC", address, before)
 
 
-def _after_noise(talk: ModbusTalk) -> Steps[None]:
+def _after_noise(talk: ModbusTalk) -> CheckSteps[None]:
     request = rtu.encode_frame(talk.unit, read(talk.at("DATA_TYPE"), 1))
     yield CheckRequest(b"\xff\x00\xff", 0.1)
     yield from talk.expect_answer("a request 0.1 s behind noise", request[1:-2])
@@ -93,18 +93,18 @@ def _after_noise(talk: ModbusTalk) -> Steps[None]:
     yield from talk.expect_answer("the next request", request[1:-2])
 
 
-def _program_state(talk: ModbusTalk) -> Steps[None]:
+def _program_state(talk: ModbusTalk) -> CheckSteps[None]:
     (state,) = yield from talk.words(talk.at("PROGRAM_CTRL"), 1)
     talk.probes.holds("PROGRAM_CTRL", "0, 1 or 2", str(state), state in (0, 1, 2))
 
 
-def _tcp_units(talk: ModbusTalk) -> Steps[None]:
+def _tcp_units(talk: ModbusTalk) -> CheckSteps[None]:
     request = read(talk.at("DATA_TYPE"), 1)
     for unit in (0, 255):
         yield from talk.expect_answer(f"read addressed to unit {unit}", request, unit=unit)
 
 
-def _quantities(talk: ModbusTalk) -> Steps[None]:
+def _quantities(talk: ModbusTalk) -> CheckSteps[None]:
     first = talk.at("DATA_TYPE")
     user = talk.at("USER_REGISTER")
     yield from talk.expect_answer("read of 125 registers", read(user, pdu.MAX_REGISTERS))
@@ -121,7 +121,7 @@ def _quantities(talk: ModbusTalk) -> Steps[None]:
     yield from talk.expect_answer("read of one register", read(first, 1))
 
 
-def _in_succession(talk: ModbusTalk) -> Steps[None]:
+def _in_succession(talk: ModbusTalk) -> CheckSteps[None]:
     answered = 0
     for _ in range(QUICK):
         answer = yield from talk.ask(read(INPUTS, 8, pdu.READ_DISCRETE_INPUTS), at_once=True)
@@ -132,7 +132,7 @@ def _in_succession(talk: ModbusTalk) -> Steps[None]:
 # ---------------------------------------------------------------------- writes that are put back
 
 
-def _several_registers(talk: ModbusTalk) -> Steps[None]:
+def _several_registers(talk: ModbusTalk) -> CheckSteps[None]:
     yield from talk.at_rest()
     address = talk.at("DATA_TYPE")
     before = yield from talk.remember("DATA_TYPE and PROG_BANK_SEL", address, 2)
@@ -145,7 +145,7 @@ def _several_registers(talk: ModbusTalk) -> Steps[None]:
     yield from _back_one_by_one(talk, "DATA_TYPE and PROG_BANK_SEL", address, before)
 
 
-def _back_one_by_one(talk: ModbusTalk, name: str, address: int, before: tuple[int, ...]) -> Steps[None]:
+def _back_one_by_one(talk: ModbusTalk, name: str, address: int, before: tuple[int, ...]) -> CheckSteps[None]:
     """For registers of one word, of which a controller might not take several in one request."""
     for offset, word in enumerate(before):
         yield from talk.ask(write_one(address + offset, word))
@@ -155,7 +155,7 @@ def _back_one_by_one(talk: ModbusTalk, name: str, address: int, before: tuple[in
         yield from talk.put_back(name, address, before)
 
 
-def _bad_values(talk: ModbusTalk) -> Steps[None]:
+def _bad_values(talk: ModbusTalk) -> CheckSteps[None]:
     yield from talk.at_rest()
     (data_type,) = yield from talk.remember("DATA_TYPE", talk.at("DATA_TYPE"), 1)
     yield from talk.expect_refusal("DATA_TYPE = 2", write_one(talk.at("DATA_TYPE"), 2), VALUE)
@@ -171,7 +171,7 @@ def _bad_values(talk: ModbusTalk) -> Steps[None]:
     yield from talk.put_back("M1_ACC", address, before)
 
 
-def _in_both_types(talk: ModbusTalk, *keys: str) -> Steps[list[tuple[float, int]]]:
+def _in_both_types(talk: ModbusTalk, *keys: str) -> CheckSteps[list[tuple[float, int]]]:
     """Parameters of M1 with DATA_TYPE 0 (units) and 1 (pulses)."""
     address = talk.at("DATA_TYPE")
     (before,) = yield from talk.remember("DATA_TYPE", address, 1)
@@ -192,7 +192,7 @@ def _in_both_types(talk: ModbusTalk, *keys: str) -> Steps[list[tuple[float, int]
     return found
 
 
-def _data_type(talk: ModbusTalk) -> Steps[None]:
+def _data_type(talk: ModbusTalk) -> CheckSteps[None]:
     yield from talk.at_rest()
     (acc_u, acc), (vmax_u, vmax) = yield from _in_both_types(talk, "ACC", "VMAX")
     # GEAR, the pulses per unit, cannot be read; it is the same for all parameters of the axis. Both are rounded to whole pulses.
@@ -202,14 +202,14 @@ def _data_type(talk: ModbusTalk) -> Steps[None]:
     talk.probes.holds(f"M1_ACC, {acc_u:g} with DATA_TYPE 0, with DATA_TYPE 1", expected, str(acc), is_right)
 
 
-def _mask_bits(talk: ModbusTalk) -> Steps[None]:
+def _mask_bits(talk: ModbusTalk) -> CheckSteps[None]:
     yield from talk.at_rest()
     before = yield from talk.words(talk.at("STATUS", 1), AXES)
     yield from talk.expect_answer("M_STOP = 00F0 hex", write_one(talk.at("M_STOP"), 0xF0))
     talk.probes.equal("status of the axes afterwards", before, (yield from talk.words(talk.at("STATUS", 1), AXES)))
 
 
-def _banks(talk: ModbusTalk) -> Steps[None]:
+def _banks(talk: ModbusTalk) -> CheckSteps[None]:
     yield from talk.at_rest()
     for key in ("PROG_BANK_SEL", "POS_BANK_SEL"):
         address = talk.at(key)
@@ -222,7 +222,7 @@ def _banks(talk: ModbusTalk) -> Steps[None]:
         yield from talk.put_back(key, address, before)
 
 
-def _small_values(talk: ModbusTalk) -> Steps[None]:
+def _small_values(talk: ModbusTalk) -> CheckSteps[None]:
     yield from talk.at_rest()
     address, acc = talk.at("DATA_TYPE"), talk.at("ACC", 1)
     (data_type,) = yield from talk.words(address, 1)
@@ -243,7 +243,7 @@ def _small_values(talk: ModbusTalk) -> Steps[None]:
 # ---------------------------------------------------------------------- motions
 
 
-def _status(talk: ModbusTalk) -> Steps[int]:
+def _status(talk: ModbusTalk) -> CheckSteps[int]:
     (status,) = yield from talk.words(talk.at("STATUS", talk.axis), 1)
     return status
 
@@ -252,7 +252,7 @@ def _move_by(talk: ModbusTalk) -> bytes:
     return write(talk.at("POS_REL", talk.axis), *real_to_words(talk.distance_u))
 
 
-def _needs_real(talk: ModbusTalk) -> Steps[None]:
+def _needs_real(talk: ModbusTalk) -> CheckSteps[None]:
     yield from talk.at_rest()
     (data_type,) = yield from talk.words(talk.at("DATA_TYPE"), 1)
     (mode,) = yield from talk.words(talk.at("AXIS_CTR_MODE"), 1)
@@ -260,7 +260,7 @@ def _needs_real(talk: ModbusTalk) -> Steps[None]:
         raise Undecided("needs DATA_TYPE 0 and AXIS_CTR_MODE 0")
 
 
-def _move_while_off(talk: ModbusTalk) -> Steps[None]:
+def _move_while_off(talk: ModbusTalk) -> CheckSteps[None]:
     yield from _needs_real(talk)
     if (yield from _status(talk)) != AxisStatus.OFF:
         raise Undecided(f"needs M{talk.axis} disabled")
@@ -272,7 +272,7 @@ def _move_while_off(talk: ModbusTalk) -> Steps[None]:
     talk.probes.equal("position", before, (yield from talk.words(position, 2)))
 
 
-def _stop_without_ramp(talk: ModbusTalk) -> Steps[None]:
+def _stop_without_ramp(talk: ModbusTalk) -> CheckSteps[None]:
     yield from _needs_real(talk)
     if (yield from _status(talk)) == AxisStatus.OFF:
         raise Undecided(f"needs M{talk.axis} enabled")

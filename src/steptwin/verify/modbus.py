@@ -9,7 +9,7 @@ from steptwin.drivers.mic488.motion import MOVING
 from steptwin.errors import LineFailure
 from steptwin.mic488.registermap import RegisterMap
 from steptwin.mic488.registers import AXES
-from steptwin.verify.check import CheckRequest, NotRestored, Probes, Steps, Undecided
+from steptwin.verify.check import CheckRequest, CheckSteps, NotRestored, Probes, Undecided
 from steptwin.wire import pdu, rtu
 from steptwin.wire.crc import crc16
 
@@ -88,7 +88,7 @@ class ModbusTalk:
 
     # ------------------------------------------------------------------ exchanges
 
-    def hello(self) -> Steps[None]:
+    def hello(self) -> CheckSteps[None]:
         """The first exchange, which finds adapters with an echo. Raises `LineFailure` if no controller responds."""
         request = read(self.at("DATA_TYPE"), 1)
         received = b""
@@ -99,7 +99,7 @@ class ModbusTalk:
         if not (yield from self.ask(request)).pdu:
             raise LineFailure(f"unit {self.unit} does not respond")
 
-    def ask(self, request: bytes, *, unit: int | None = None, at_once: bool = False) -> Steps[ModbusAnswer]:
+    def ask(self, request: bytes, *, unit: int | None = None, at_once: bool = False) -> CheckSteps[ModbusAnswer]:
         to = self.unit if unit is None else unit
         if not self.framed:
             return (yield from self.raw(rtu.encode_frame(to, request), at_once=at_once))
@@ -108,13 +108,13 @@ class ModbusTalk:
         whole = yield CheckRequest(head + request, self.wait_s, lambda came: _tcp_answer(came, self._number) is not None, at_once)
         return ModbusAnswer(_tcp_answer(whole, self._number) or b"")
 
-    def raw(self, frame: bytes, *, at_once: bool = False) -> Steps[ModbusAnswer]:
+    def raw(self, frame: bytes, *, at_once: bool = False) -> CheckSteps[ModbusAnswer]:
         """Bytes of any kind on a serial line; the answer of this controller to them."""
         skip = len(frame) if self.has_echo else 0
         came = yield CheckRequest(frame, self.wait_s, lambda come: _frame(come[skip:], self.unit) != b"", at_once)
         return ModbusAnswer(_frame(came[skip:], self.unit)[1:-2])
 
-    def words(self, address: int, count: int) -> Steps[tuple[int, ...]]:
+    def words(self, address: int, count: int) -> CheckSteps[tuple[int, ...]]:
         """Registers that can be read. Raises `Undecided`."""
         for _ in range(TRIES):
             if (answer := (yield from self.ask(read(address, count)))).pdu:
@@ -125,21 +125,21 @@ class ModbusTalk:
 
     # ------------------------------------------------------------------ comparisons
 
-    def expect_refusal(self, what: str, request: bytes, code: int) -> Steps[None]:
+    def expect_refusal(self, what: str, request: bytes, code: int) -> CheckSteps[None]:
         answer = yield from self.ask(request)
         self.probes.holds(what, refused(code), str(answer), answer.refusal == code)
 
-    def expect_answer(self, what: str, request: bytes, *, unit: int | None = None) -> Steps[None]:
+    def expect_answer(self, what: str, request: bytes, *, unit: int | None = None) -> CheckSteps[None]:
         answer = yield from self.ask(request, unit=unit)
         self.probes.holds(what, "an answer", str(answer), bool(answer.pdu) and answer.refusal is None)
 
-    def expect_silence(self, what: str, frame: bytes) -> Steps[None]:
+    def expect_silence(self, what: str, frame: bytes) -> CheckSteps[None]:
         answer = yield from self.raw(frame)
         self.probes.holds(what, "silence", str(answer), not answer.pdu)
 
     # ------------------------------------------------------------------ changes that are put back
 
-    def at_rest(self) -> Steps[None]:
+    def at_rest(self) -> CheckSteps[None]:
         """Raises `Undecided` unless no axis moves and no program runs."""
         status = yield from self.words(self.at("STATUS", 1), AXES)
         moving = [f"M{n} (status {code})" for n, code in enumerate(status, 1) if code in MOVING]
@@ -149,20 +149,20 @@ class ModbusTalk:
         if program:
             raise Undecided("a program runs or is paused")
 
-    def remember(self, name: str, address: int, count: int) -> Steps[tuple[int, ...]]:
+    def remember(self, name: str, address: int, count: int) -> CheckSteps[tuple[int, ...]]:
         """The present value of what is about to be changed."""
         words = yield from self.words(address, count)
         self.probes.unrestored[name] = f"{name} (address {address}) = {' '.join(f'{word:04X}' for word in words)} hex"
         return words
 
-    def keep(self, name: str, address: int, words: tuple[int, ...]) -> Steps[None]:
+    def keep(self, name: str, address: int, words: tuple[int, ...]) -> CheckSteps[None]:
         """Write what was remembered only if it has changed. Raises `NotRestored`."""
         if (yield from self.ask(read(address, len(words)))).pdu[2:] == struct.pack(f">{len(words)}H", *words):
             del self.probes.unrestored[name]
         else:
             yield from self.put_back(name, address, words)
 
-    def put_back(self, name: str, address: int, words: tuple[int, ...]) -> Steps[None]:
+    def put_back(self, name: str, address: int, words: tuple[int, ...]) -> CheckSteps[None]:
         """Write what was remembered, and read it. Raises `NotRestored`."""
         for _ in range(TRIES):
             request = write(address, *words) if len(words) > 1 else write_one(address, *words)

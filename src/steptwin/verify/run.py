@@ -9,7 +9,7 @@ from typing import TypeVar
 from steptwin.drivers.kind import DeviceAddress
 from steptwin.drivers.place import Channel
 from steptwin.errors import LineFailure
-from steptwin.verify.check import CheckNeed, CheckResult, NotRestored, Steps
+from steptwin.verify.check import CheckNeed, CheckResult, CheckSteps, NotRestored
 from steptwin.verify.kind import ReadyChecks
 from steptwin.verify.kinds import checked_kind
 from steptwin.verify.report import Report
@@ -70,7 +70,7 @@ def _over(
         channel.close()
 
 
-def carry_out(channel: Channel, steps: Steps[R]) -> R:
+def carry_out(channel: Channel, steps: CheckSteps[R]) -> R:
     """What the steps return."""
     try:
         send = next(steps)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol, TypeVar
 
-from steptwin.verify.check import Check, CheckNeed, CheckOutcome, CheckResult, NotRestored, Probes, Steps, Undecided
+from steptwin.verify.check import Check, CheckNeed, CheckOutcome, CheckResult, CheckSteps, NotRestored, Probes, Undecided
 
 _NEEDED = {
     CheckNeed.WRITE: "writes settings and puts them back: permit it with --write",
@@ -18,7 +18,7 @@ class Talk(Protocol):
 
     probes: Probes
 
-    def hello(self) -> Steps[None]: ...
+    def hello(self) -> CheckSteps[None]: ...
 
 
 T = TypeVar("T", bound=Talk)
@@ -33,7 +33,7 @@ def check_all(
     *,
     progress: Progress = lambda id_, number, count: None,
     is_cancelled: Callable[[], bool] = lambda: False,
-) -> Steps[list[CheckResult]]:
+) -> CheckSteps[list[CheckResult]]:
     """The results of the checks that are permitted. Cancelled, it ends between two checks.
 
     Raises `LineFailure`; a message names what could not be put back.
@@ -48,7 +48,7 @@ def check_all(
     return results
 
 
-def _checked(talk: T, check: Check[T], permitted: frozenset[CheckNeed]) -> Steps[CheckResult]:
+def _checked(talk: T, check: Check[T], permitted: frozenset[CheckNeed]) -> CheckSteps[CheckResult]:
     why = _NEEDED[check.need] if check.need not in permitted else check.unless(talk)
     if why is not None:
         return CheckResult(check.id, CheckOutcome.NOT_CHECKED, check.what, why=why)

@@ -45,7 +45,7 @@ class _Compiler:
 
     # -- values
 
-    def _cell(self, source: s.Source) -> int | None:
+    def _cell(self, source: s.ValueSource) -> int | None:
         """The cell of a variable or constant; None for a register."""
         return None if isinstance(source, s.RegisterOperand) else self._cell_of(source)
 
@@ -61,14 +61,14 @@ class _Compiler:
     def _reader(self, register: s.RegisterOperand) -> RegisterReader:
         return self._registers[register.row.key].read(register.number)
 
-    def value(self, source: s.Source) -> ValueCode:
+    def value(self, source: s.ValueSource) -> ValueCode:
         if isinstance(source, s.RegisterOperand):
             read = self._reader(source)
             return lambda m, cells: read(m.controller, m.now)
         cell = self._cell_of(source)
         return lambda m, cells: cells[cell]
 
-    def _calculated(self, value: s.Source | s.Operation | s.FunctionOperation) -> ValueCode:
+    def _calculated(self, value: s.ValueSource | s.Operation | s.FunctionOperation) -> ValueCode:
         if isinstance(value, s.Operation):
             apply = OPERATIONS[value.operator]
             left, right = self.value(value.left), self.value(value.right)
@@ -147,13 +147,13 @@ class _Compiler:
             return [WatchedValue(_side(left, right), tendencies[0] if len(tendencies) == 1 else None)]
         return [WatchedValue(self._seen(source), t) for source in sources(step) if (t := self._tendency(source)) is not None]
 
-    def _tendency(self, source: s.Source) -> Tendency | None:
+    def _tendency(self, source: s.ValueSource) -> Tendency | None:
         if not isinstance(source, s.RegisterOperand):
             return None
         tendency = self._registers[source.row.key].tendency
         return None if tendency is None else tendency(source.number)
 
-    def _seen(self, source: s.Source) -> Seen:
+    def _seen(self, source: s.ValueSource) -> Seen:
         if isinstance(source, s.RegisterOperand):
             read = self._reader(source)
             return lambda controller, cells, at: read(controller, at)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from steptwin.tables import complete
 from steptwin.wbc.real import COMPARISONS, real
 from steptwin.wbc.registers import Domain
-from steptwin.wbc.steps import Literal, RegisterOperand, Source, StepCondition
+from steptwin.wbc.steps import Literal, RegisterOperand, StepCondition, ValueSource
 
 _MIRRORED = complete("comparison", COMPARISONS, "mirror image", {"=": "=", "<": ">", ">": "<", "<=": ">=", ">=": "<="})
 
@@ -27,5 +27,5 @@ def outcome(condition: StepCondition) -> bool | None:
     return at_low if at_low == at_high else None
 
 
-def _domain(source: Source) -> Domain | None:
+def _domain(source: ValueSource) -> Domain | None:
     return source.row.reads if isinstance(source, RegisterOperand) else None

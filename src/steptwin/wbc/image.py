@@ -181,7 +181,7 @@ class _Record:
             raise _NotEncodable(f"the comparison {condition.sign}")
         return self.value(condition.left) + condition.sign.encode("ascii") + self.value(condition.right)
 
-    def value(self, source: s.Source) -> bytes:
+    def value(self, source: s.ValueSource) -> bytes:
         if isinstance(source, s.Literal):
             whole = source.value == int(source.value)
             return bytes((WHOLE if whole else FRACTION,)) + _REAL.pack(source.value)

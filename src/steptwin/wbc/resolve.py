@@ -215,7 +215,7 @@ class _Resolver:
         self._check_time("DELAY", statement.operands[0], seconds)
         return None if seconds is None else s.DelayStep(statement.start, statement.end, seconds)
 
-    def _check_time(self, keyword: str, operand: OperandNode, seconds: s.Source | None) -> None:
+    def _check_time(self, keyword: str, operand: OperandNode, seconds: s.ValueSource | None) -> None:
         """Warn of hundreds of seconds, which are probably milliseconds, unless they are whole minutes."""
         if not isinstance(seconds, s.Literal) or seconds.value < _LOOKS_LIKE_MS or seconds.value % 60 == 0:
             return
@@ -343,7 +343,7 @@ class _Resolver:
         elif names_no_axis(statement.keyword, values):
             self._report(f.NO_AXIS.at(statement.operands[0], f"{name} names no axis: nothing moves", "give p1…p4 a number"))
 
-    def _value(self, operand: OperandNode, *, is_row: bool = False) -> s.Source | None:
+    def _value(self, operand: OperandNode, *, is_row: bool = False) -> s.ValueSource | None:
         return self._scope.value(operand, is_row=is_row) if isinstance(operand, Identifier | DecimalNumber) else None
 
     def _report(self, diagnostic: Diagnostic) -> None:

@@ -13,7 +13,7 @@ from steptwin.wbc.foreign_words import VALUES
 from steptwin.wbc.positions import PositionTable
 from steptwin.wbc.registers import PREDEFINED, REAL_MAX, REGISTERS, ROWS, VALUE_NAMES, RegisterRow, parts
 from steptwin.wbc.statements import FUNCTIONS, KEYWORDS, NOT_SUPPORTED
-from steptwin.wbc.steps import AssignmentTarget, Literal, RegisterOperand, Source, Variable
+from steptwin.wbc.steps import AssignmentTarget, Literal, RegisterOperand, ValueSource, Variable
 from steptwin.wbc.tree import Assign, Broken, ConstantDefinition, DecimalNumber, Identifier, ProgramTree, ValueNode
 
 _STATUS_SINCE = "1.70"
@@ -31,7 +31,7 @@ class ProgramScope:
         self._near = NearMiss()
         self._near_registers = NearMiss()
         self._broken: set[str] = set()
-        self.known: dict[str, Source] = {}
+        self.known: dict[str, ValueSource] = {}
         self.constants: dict[str, Identifier] = {}
         self.variables: dict[str, Identifier] = {}
         """First assignment of every variable, in order."""
@@ -126,7 +126,7 @@ class ProgramScope:
 
     # -- using
 
-    def value(self, node: ValueNode, other: ValueNode | None = None, *, is_row: bool = False) -> Source | None:
+    def value(self, node: ValueNode, other: ValueNode | None = None, *, is_row: bool = False) -> ValueSource | None:
         """The value of a number or name; None after reporting an error.
 
         ``other`` is what it is compared with or assigned to, which determines the possible names. ``is_row``: a row of the
@@ -172,7 +172,7 @@ class ProgramScope:
         family = parts(name.key)
         return family[0].key if family is not None else None
 
-    def _look_up(self, name: Identifier, other: ValueNode | None = None, *, is_row: bool = False) -> Source | None:
+    def _look_up(self, name: Identifier, other: ValueNode | None = None, *, is_row: bool = False) -> ValueSource | None:
         """Registers and predefined names enter ``known`` when they are first used; anything else is a mistake."""
         key = name.key
         found = parts(key)

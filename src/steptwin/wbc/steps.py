@@ -41,7 +41,7 @@ class RegisterOperand:
         return f"{self.row.name}{self.number}" if self.row.last or self.row.words else self.row.name
 
 
-Source: TypeAlias = Literal | Variable | RegisterOperand
+ValueSource: TypeAlias = Literal | Variable | RegisterOperand
 AssignmentTarget: TypeAlias = Variable | RegisterOperand
 
 
@@ -49,16 +49,16 @@ AssignmentTarget: TypeAlias = Variable | RegisterOperand
 class StepCondition:
     """``sign`` is one of ``= < > <= >=``."""
 
-    left: Source
+    left: ValueSource
     sign: str
-    right: Source
+    right: ValueSource
 
 
 @dataclass(frozen=True, slots=True)
 class Operation:
-    left: Source
+    left: ValueSource
     operator: str
-    right: Source
+    right: ValueSource
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +66,7 @@ class FunctionOperation:
     """``name`` is in upper case."""
 
     name: str
-    arguments: tuple[Source, ...]
+    arguments: tuple[ValueSource, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +78,7 @@ class ProgramStep:
 @dataclass(frozen=True, slots=True)
 class SetStep(ProgramStep):
     target: AssignmentTarget
-    value: Source | Operation | FunctionOperation
+    value: ValueSource | Operation | FunctionOperation
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +130,7 @@ class WaitStep(ProgramStep):
 class DelayStep(ProgramStep):
     """At least `SHORTEST_DELAY_S` (WBC-7)."""
 
-    seconds: Source
+    seconds: ValueSource
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,7 +159,7 @@ class MotionStep(ProgramStep):
 
     keyword: str
     axis: int
-    value: Source
+    value: ValueSource
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,7 +175,7 @@ class RowMotionStep(ProgramStep):
     """A motion with the parameters of a row of the position table; ``row`` gives its index from 0."""
 
     keyword: str
-    row: Source
+    row: ValueSource
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,7 +188,7 @@ class PulseStep(ProgramStep):
     """``output`` counts from 1."""
 
     output: int
-    seconds: Source
+    seconds: ValueSource
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,6 @@
 """The syntax tree of a WBC program, line by line, with the place of every word.
 
-``start`` and ``end`` are character offsets of the source. Nodes compare by what they say, not by where they stand:
+``start`` and ``end`` are character offsets of the source. Nodes are compared by content, not by place:
 two programs are equal when they differ in nothing but blanks.
 """
 

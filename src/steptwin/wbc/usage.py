@@ -38,23 +38,23 @@ class Setup:
     most_speed_p: float = inf
 
 
-def sources(step: s.ProgramStep) -> Iterable[s.Source]:
+def sources(step: s.ProgramStep) -> Iterable[s.ValueSource]:
     """Everything a step reads."""
     return _SOURCES[type(step)](step)
 
 
-def _of_value(step: s.SetStep) -> tuple[s.Source, ...]:
+def _of_value(step: s.SetStep) -> tuple[s.ValueSource, ...]:
     value = step.value
     if isinstance(value, s.Operation):
         return value.left, value.right
     return value.arguments if isinstance(value, s.FunctionOperation) else (value,)
 
 
-def _of_condition(step: s.IfStep | s.WhileStep | s.WaitStep) -> tuple[s.Source, ...]:
+def _of_condition(step: s.IfStep | s.WhileStep | s.WaitStep) -> tuple[s.ValueSource, ...]:
     return step.condition.left, step.condition.right
 
 
-_SOURCES: Mapping[type[s.ProgramStep], Callable[[Any], tuple[s.Source, ...]]] = complete(
+_SOURCES: Mapping[type[s.ProgramStep], Callable[[Any], tuple[s.ValueSource, ...]]] = complete(
     "step",
     s.STEPS,
     "sources",
@@ -137,7 +137,7 @@ def homing_sides(steps: Sequence[s.ProgramStep]) -> dict[int, frozenset[int]]:
     return sides
 
 
-def _signs(source: s.Source, steps: Sequence[s.ProgramStep]) -> frozenset[int]:
+def _signs(source: s.ValueSource, steps: Sequence[s.ProgramStep]) -> frozenset[int]:
     """Signs a value can have; 0 where that is not known, none for the number 0."""
     if isinstance(source, s.Literal):
         return frozenset({1 if source.value > 0 else -1}) if source.value else frozenset()

@@ -10,7 +10,7 @@ from steptwin.machine import SECOND, Nanos
 MOST_LINKS = 8
 
 
-class Link(NamedTuple):
+class ChainLink(NamedTuple):
     """One cause. ``subject``: the controller, element, line or script it happened to."""
 
     time: Nanos
@@ -25,7 +25,7 @@ class Answer(NamedTuple):
     at: Nanos
     state: str
     since: Nanos | None
-    links: tuple[Link, ...]
+    links: tuple[ChainLink, ...]
     is_complete: bool
     """Whether the chain has been followed to its end."""
     known_from: Nanos = 0
@@ -61,7 +61,7 @@ class Answer(NamedTuple):
 
 def read_answer(plain: Mapping[str, Any]) -> Answer:
     """An answer from its plain data."""
-    links = tuple(Link(int(link["time_ns"]), link["subject"], link["text"]) for link in plain["links"])
+    links = tuple(ChainLink(int(link["time_ns"]), link["subject"], link["text"]) for link in plain["links"])
     since = None if plain["since_ns"] is None else int(plain["since_ns"])
     known_from = int(plain["known_from_ns"])
     return Answer(

@@ -9,17 +9,17 @@ from typing import NamedTuple, TypeAlias
 
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion.divisions import profile_of
-from steptwin.why.answer import Link, since_before
+from steptwin.why.answer import ChainLink, since_before
 from steptwin.why.log import Act, CauseLog, Change
 from steptwin.why.sentences import Frames, statement, words_of
 from steptwin.world import script as do
 from steptwin.world.actions import Download, See, SetVariable
 from steptwin.world.elements import ELEMENTS
 from steptwin.world.elements.logic import BoardPart
-from steptwin.world.kernel import PinName
 from steptwin.world.lines import SCRIPTS
-from steptwin.world.programs import Operand, OperandKind, Place, StatementUse
+from steptwin.world.programs import Place, Resource, ResourceKind, StatementUse
 from steptwin.world.trace import TraceRecord
+from steptwin.world.wires import PinName
 
 MOST_LOOKED_BACK = 20_000
 """Limit of the statements among which the one that decided is looked for."""
@@ -28,19 +28,19 @@ MOST_LOOKED_BACK = 20_000
 class Cause(NamedTuple):
     """A link, and what finds the cause of it."""
 
-    link: Link
+    link: ChainLink
     before: Callable[[], Cause | None]
 
 
-Found: TypeAlias = "Cause | None"
+FoundCause: TypeAlias = "Cause | None"
 
 
-def nothing() -> Found:
+def nothing() -> FoundCause:
     """The end of a chain: what comes from outside or holds from the beginning."""
     return None
 
 
-def unknown() -> Found:
+def unknown() -> FoundCause:
     """The end of a chain whose cause was before the log."""
     return None
 
@@ -66,11 +66,11 @@ class Causes:
         owner = signal.partition(".")[0]
         if self._log.is_first(signal, change):
             text = f"{signal} is {change.value:g} {since_before(self._log.begin)}{how}"
-            return Cause(Link(change.time, owner, text), self._at_begin)
+            return Cause(ChainLink(change.time, owner, text), self._at_begin)
         text = f"{signal} became {change.value:g}{how}"
-        return Cause(Link(change.time, owner, text), partial(self._of_change, signal, change))
+        return Cause(ChainLink(change.time, owner, text), partial(self._of_change, signal, change))
 
-    def last(self, signals: Sequence[str], until: Nanos, how: str = "") -> Found:
+    def last(self, signals: Sequence[str], until: Nanos, how: str = "") -> FoundCause:
         """The last change among signals by a moment."""
         found = [(change, signal) for signal in signals if (change := self._log.last_change(signal, until))]
         if not found:
@@ -78,7 +78,7 @@ class Causes:
         change, signal = max(found, key=lambda one: (one[0].time, one[0].position))
         return self.change(signal, change, how)
 
-    def _of_change(self, signal: str, change: Change) -> Found:
+    def _of_change(self, signal: str, change: Change) -> FoundCause:
         owner, _, terminal = signal.partition(".")
         fault = self._fault(owner, change.time, None if owner in self._parts else terminal)
         if fault is not None:
@@ -92,16 +92,16 @@ class Causes:
             return self.motion(drive[0], drive[1].removeprefix("M"), change.time, owner)
         return self._operated(owner, change)
 
-    def _fault(self, owner: str, time: Nanos, named: str | None = None) -> Found:
+    def _fault(self, owner: str, time: Nanos, named: str | None = None) -> FoundCause:
         """A fault that began or ended at a moment at a controller or element; one that names a terminal, if that is given."""
         for group in (self._log.group(owner), -1):
             for _, record in self._log.at(group, time):
                 if record.kind == "fault" and record.machine == owner and (named is None or named in str(record.value).split()):
-                    link = Link(record.time, record.machine, f"fault {record.subject}: {record.value}")
+                    link = ChainLink(record.time, record.machine, f"fault {record.subject}: {record.value}")
                     return Cause(link, partial(self._of_fault, record))
         return None
 
-    def _of_fault(self, record: TraceRecord) -> Found:
+    def _of_fault(self, record: TraceRecord) -> FoundCause:
         for act in self._log.acts_at(record.time):
             match act.what:
                 case do.SetFault(fault) if record.subject.startswith(fault.name or fault.kind.name):
@@ -110,7 +110,7 @@ class Causes:
                     return _acted(act)
         return None
 
-    def _of_element(self, name: str, change: Change) -> Found:
+    def _of_element(self, name: str, change: Change) -> FoundCause:
         """What changed an output of an element: an input at the same moment, or one before, as much earlier as it delays."""
         part = self._parts[name]
         sources = [source for terminal in _inputs(part) for source in self._sources(PinName(name, terminal))]
@@ -149,7 +149,7 @@ class Causes:
         """The signal of a pin or terminal."""
         return str(pin) if pin.machine in self._world.machines else f"{pin.machine}.{pin.pin.lower()}"
 
-    def _of_pin(self, pin: PinName, change: Change) -> Found:
+    def _of_pin(self, pin: PinName, change: Change) -> FoundCause:
         wire = self._world.parts.kernel_of[pin.machine].wire_to(pin)
         if wire is not None:
             found = self._before(self._name(wire.source), change, change.time - wire.delay)
@@ -166,10 +166,10 @@ class Causes:
         path = self._world.parts.driven.get(pin)
         if path is not None:
             where = self._world.spec.text.where(path)
-            return Cause(Link(change.time, pin.machine, f"[[{path[0]}]] in {where} drives {pin}"), nothing)
-        return self.in_machine(pin.machine, change, Operand(OperandKind.PIN, pin.pin))
+            return Cause(ChainLink(change.time, pin.machine, f"[[{path[0]}]] in {where} drives {pin}"), nothing)
+        return self.in_machine(pin.machine, change, Resource(ResourceKind.PIN, pin.pin))
 
-    def _operated(self, name: str, change: Change) -> Found:
+    def _operated(self, name: str, change: Change) -> FoundCause:
         """Who pressed a button."""
         for act in self._log.acts_at(change.time):
             match act.what:
@@ -190,7 +190,7 @@ class Causes:
 
     # ------------------------------------------------------------------ controllers
 
-    def at_moment(self, machine: str, time: Nanos, wanted: Operand | None) -> Found:
+    def at_moment(self, machine: str, time: Nanos, wanted: Resource | None) -> FoundCause:
         """What changed something of a controller that no record shows."""
         group = self._log.group(machine)
         found = self.in_machine(machine, Change(time, 0.0, group, len(self._log.records[group])), wanted)
@@ -198,7 +198,7 @@ class Causes:
             return self.motion(machine, wanted.name, time)
         return found
 
-    def in_machine(self, machine: str, change: Change, wanted: Operand | None) -> Found:
+    def in_machine(self, machine: str, change: Change, wanted: Resource | None) -> FoundCause:
         """What changed something of a controller at a moment; ``wanted``: what, if that is known."""
         index = self._statement_at(machine, change, wanted)
         since = -1 if index is None else self._log.executed[machine][index].position
@@ -212,7 +212,7 @@ class Causes:
             return _acted(act)
         return self._asked_before(machine, change) or self._inside(machine, change, wanted)
 
-    def _statement_at(self, machine: str, change: Change, wanted: Operand | None) -> int | None:
+    def _statement_at(self, machine: str, change: Change, wanted: Resource | None) -> int | None:
         """The number of the statement that was executed at the moment of a change, before it, and changes what is wanted."""
         executed = self._log.executed.get(machine, [])
         for index in range(self._log.last_executed(machine, change.time), -1, -1):
@@ -222,7 +222,7 @@ class Causes:
                 return index if _matches(self.use(machine, index).writes, wanted) else None
         return None
 
-    def _from_outside(self, machine: str, change: Change, since: int) -> Found:
+    def _from_outside(self, machine: str, change: Change, since: int) -> FoundCause:
         """A request or another action that reached a controller at the moment of a change, after the position ``since``."""
         on = self._world.parts.line_of.get(machine)
         for position, record in self._log.at(change.group, change.time):
@@ -236,9 +236,9 @@ class Causes:
                 return self._input(record)
         return None
 
-    def _inside(self, machine: str, change: Change, wanted: Operand | None) -> Found:
+    def _inside(self, machine: str, change: Change, wanted: Resource | None) -> FoundCause:
         """What the controller did by itself: because of an input, or because what an earlier statement began has ended."""
-        after: Callable[[], Found] = partial(self._earlier, machine, change.time, wanted)
+        after: Callable[[], FoundCause] = partial(self._earlier, machine, change.time, wanted)
         event: TraceRecord | None = None
         for position, record in self._log.at(change.group, change.time):
             if position >= change.position or record.machine != machine:
@@ -249,10 +249,10 @@ class Causes:
             elif record.kind == "event":
                 event = record
         if event is not None:
-            return Cause(Link(change.time, machine, str(event.value)), after)
+            return Cause(ChainLink(change.time, machine, str(event.value)), after)
         return self._fault(machine, change.time) or after()
 
-    def _asked_before(self, machine: str, change: Change) -> Found:
+    def _asked_before(self, machine: str, change: Change) -> FoundCause:
         """A request on a line with timing, which is answered later than it came."""
         on = self._world.parts.line_of.get(machine)
         if on is None or not on[0].is_timed:
@@ -264,7 +264,7 @@ class Causes:
                 return self._frame(record) if self._frames.reaches(record, on[1]) else None
         return None
 
-    def _earlier(self, machine: str, time: Nanos, wanted: Operand | None) -> Found:
+    def _earlier(self, machine: str, time: Nanos, wanted: Resource | None) -> FoundCause:
         """The last statement before a moment that changes something: what it began has ended."""
         if wanted is None:
             return None
@@ -283,9 +283,9 @@ class Causes:
         sender, before = f"client {place}", nothing
         if place == SCRIPTS:
             sender, before = "request", partial(self._requested, record)
-        return Cause(Link(record.time, record.machine, f"{sender}: {self._frames.meaning(record)}"), before)
+        return Cause(ChainLink(record.time, record.machine, f"{sender}: {self._frames.meaning(record)}"), before)
 
-    def _requested(self, record: TraceRecord) -> Found:
+    def _requested(self, record: TraceRecord) -> FoundCause:
         """The step that made a request, which a line with timing carries later."""
         members = {name for name, (line, _) in self._world.parts.line_of.items() if line.name == record.machine}
         for act in self._log.acts_before(record.time, MOST_LOOKED_BACK):
@@ -297,11 +297,11 @@ class Causes:
         act = next(self._log.acts_at(record.time), None)
         if act is not None:
             return _acted(act)
-        return Cause(Link(record.time, record.machine, f"from outside: {record.subject} {record.value}"), nothing)
+        return Cause(ChainLink(record.time, record.machine, f"from outside: {record.subject} {record.value}"), nothing)
 
     # ------------------------------------------------------------------ motions
 
-    def motion(self, machine: str, axis: str, until: Nanos, mechanics: str = "") -> Found:
+    def motion(self, machine: str, axis: str, until: Nanos, mechanics: str = "") -> FoundCause:
         """The motion of an axis at a moment; of all axes the one that ends last, if ``axis`` is empty."""
         plan = max(self._log.plans_in_force(machine, axis, until), key=self._end, default=None)
         if plan is None:
@@ -312,16 +312,16 @@ class Causes:
         shown = f"{mechanics} ({name})" if mechanics else name
         is_before = not self._log.is_whole and plan.time == self._log.begin
         if is_before and profile.start < plan.time and profile.segments:
-            return Cause(Link(profile.start, machine, f"{shown} began to move"), unknown)
+            return Cause(ChainLink(profile.start, machine, f"{shown} began to move"), unknown)
         if is_before and not profile.segments:
             return None
         if not profile.segments:
-            link = Link(plan.time, machine, f"{shown} stopped")
+            link = ChainLink(plan.time, machine, f"{shown} stopped")
         elif profile.end is not None and profile.end <= until:
-            link = Link(profile.end, machine, f"the motion of {shown} ended, which began at {plan.time / SECOND:.6f} s")
+            link = ChainLink(profile.end, machine, f"the motion of {shown} ended, which began at {plan.time / SECOND:.6f} s")
         else:
-            link = Link(plan.time, machine, f"{shown} began to move")
-        return Cause(link, partial(self.in_machine, machine, plan, Operand(OperandKind.AXIS, record.subject)))
+            link = ChainLink(plan.time, machine, f"{shown} began to move")
+        return Cause(link, partial(self.in_machine, machine, plan, Resource(ResourceKind.AXIS, record.subject)))
 
     def _end(self, plan: Change) -> tuple[float, Nanos]:
         """When the motion of a plan ends, which may be never; of several at once, the one planned last."""
@@ -348,10 +348,10 @@ class Causes:
         executed = self._log.executed[machine][index]
         text = statement(self._log, executed)
         if self._log.is_in_progress(executed):
-            return Cause(Link(executed.time, machine, f"{text} was in execution before"), unknown)
-        return Cause(Link(executed.time, machine, f"{text} was executed"), partial(self._of_statement, machine, index))
+            return Cause(ChainLink(executed.time, machine, f"{text} was in execution before"), unknown)
+        return Cause(ChainLink(executed.time, machine, f"{text} was executed"), partial(self._of_statement, machine, index))
 
-    def _of_statement(self, machine: str, index: int) -> Found:
+    def _of_statement(self, machine: str, index: int) -> FoundCause:
         """The wait or condition that let a statement be executed."""
         executed = self._log.executed[machine]
         number = executed[index].place.number
@@ -370,40 +370,40 @@ class Causes:
         executed, use = self._log.executed[machine][index], self.use(machine, index)
         if use.is_loop:  # its condition is written where it begins
             executed = executed._replace(place=executed.place._replace(number=use.governs.start - 1))
-        link = Link(time, machine, f"{statement(self._log, executed)} {how}")
+        link = ChainLink(time, machine, f"{statement(self._log, executed)} {how}")
         return Cause(link, partial(self._of_decision, machine, index, time))
 
-    def _of_decision(self, machine: str, index: int, time: Nanos) -> Found:
-        found = [cause for operand in self.use(machine, index).reads if (cause := self.operand(machine, operand, time, index))]
+    def _of_decision(self, machine: str, index: int, time: Nanos) -> FoundCause:
+        found = [cause for resource in self.use(machine, index).reads if (cause := self.resource(machine, resource, time, index))]
         return max(found, key=lambda cause: cause.link.time) if found else self._of_statement(machine, index)
 
-    def operand(self, machine: str, operand: Operand, time: Nanos, index: int) -> Found:
+    def resource(self, machine: str, resource: Resource, time: Nanos, index: int) -> FoundCause:
         """The last change of what a statement reads."""
-        match operand.kind:
-            case OperandKind.PIN:
+        match resource.kind:
+            case ResourceKind.PIN:
                 every = [name for name in self._log.changes if name.startswith(f"{machine}.")]
-                return self.last([f"{machine}.{operand.name}"] if operand.name else every, time)
-            case OperandKind.AXIS:
-                return self.motion(machine, operand.name, time)
-            case OperandKind.VALUE:
+                return self.last([f"{machine}.{resource.name}"] if resource.name else every, time)
+            case ResourceKind.AXIS:
+                return self.motion(machine, resource.name, time)
+            case ResourceKind.VALUE:
                 for earlier in range(index - 1, max(-1, index - MOST_LOOKED_BACK), -1):
-                    if operand in self.use(machine, earlier).writes:
+                    if resource in self.use(machine, earlier).writes:
                         return self.statement(machine, earlier)
         return None
 
-    def _started(self, machine: str) -> Found:
+    def _started(self, machine: str) -> FoundCause:
         """The statement that was executed first."""
         if not self._log.is_whole:
             return None
         executed = self._log.executed[machine]
-        return Cause(Link(executed[0].time, machine, "the program started"), nothing)
+        return Cause(ChainLink(executed[0].time, machine, "the program started"), nothing)
 
 
 def _inputs(part: BoardPart) -> list[str]:
     return [terminal for terminal in part.board.levels if terminal not in part.board.outputs]
 
 
-def _matches(writes: Sequence[Operand], wanted: Operand | None) -> bool:
+def _matches(writes: Sequence[Resource], wanted: Resource | None) -> bool:
     """Whether a statement changes what is wanted. An empty name is any of its kind."""
     if wanted is None:
         return bool(writes)
@@ -412,7 +412,7 @@ def _matches(writes: Sequence[Operand], wanted: Operand | None) -> bool:
 
 def _acted(act: Act) -> Cause:
     by = f"script {act.script}" if act.script else "from outside"
-    return Cause(Link(act.time, act.script or "outside", f"{by}: {words_of(act.what)}"), nothing)
+    return Cause(ChainLink(act.time, act.script or "outside", f"{by}: {words_of(act.what)}"), nothing)
 
 
 def _sets(act: Act, pin: PinName) -> bool:

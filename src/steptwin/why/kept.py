@@ -21,7 +21,7 @@ MOST_NOTED = 500_000
 """Limit of the records and statements that are noted: some 100 MB."""
 
 
-class KeptPast:
+class PastQuestions:
     """Answers questions about the past in ``history``."""
 
     def __init__(self, history: History) -> None:
@@ -82,7 +82,6 @@ class _Known:
 
 
 def _second_world(world: Plant, snapshot: PlantSnapshot) -> Plant:
-    second = Plant(world.spec, world.files, keep_trace=False, keep_inputs=False)
-    second.restore(snapshot)
+    second = Plant(world.blueprint, keep_trace=False, keep_inputs=False, at=snapshot)
     second.trace.stop()
     return second

@@ -168,6 +168,12 @@ class CauseLog:
             index -= 1
         return changes[index - 1] if index else None
 
+    def changes_in(self, signal: str, after: Nanos, until: Nanos) -> Iterator[Change]:
+        """The changes of a signal after a moment until another."""
+        changes = self.changes.get(signal, [])
+        first, last = (bisect_right(changes, moment, key=lambda change: change.time) for moment in (after, until))
+        return (change for change in changes[first:last] if not self.is_first(signal, change))
+
     def is_first(self, signal: str, change: Change) -> bool:
         """Whether a signal has a level because the world began with it."""
         is_same = change is self.changes[signal][0] and change.value == self.first_levels.get(signal, 0.0)

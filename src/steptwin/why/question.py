@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
-from steptwin.why.answer import MOST_LINKS, Answer, Link, since_before
+from steptwin.why.answer import MOST_LINKS, Answer, ChainLink, since_before
 from steptwin.why.causes import Cause, Causes, nothing
+from steptwin.why.courses import Courses, watch_truth, watch_value
 from steptwin.why.log import MOST_NOTED, CauseLog, in_parts
 from steptwin.why.sentences import statement
-from steptwin.why.states import StatesOnTheWay
-from steptwin.world import script as do
-from steptwin.world.condition import SignalCondition
+from steptwin.why.states import Interval, StatesOnTheWay
+from steptwin.world.condition import Signal, SignalCondition
 from steptwin.world.expression import parse_condition
 from steptwin.world.history import outside_past
 from steptwin.world.plant import Plant, RecordedInput
-from steptwin.world.programs import Operand, OperandKind
+from steptwin.world.programs import Resource, ResourceKind
 
 MOST_STATES = 5
 """Limit of the signals whose present levels are shown of what a program waits for."""
@@ -29,15 +30,14 @@ _AXIS = re.compile(r"M(\d+)[._]", re.IGNORECASE)
 
 Asking: TypeAlias = Generator[None, None, Answer]
 """In parts: after each of them something else can be done, or the question be given up by `close`."""
-Found: TypeAlias = Generator[None, None, tuple[float, Nanos | None]]
+FoundValue: TypeAlias = Generator[None, None, tuple[float, Nanos | None]]
 
 
 @dataclass(frozen=True, slots=True)
 class _Level:
-    """A signal whose changes were noted. As `steptwin.world.condition.Signal`."""
+    """A signal whose course is known. As `steptwin.world.condition.Signal`."""
 
-    log: CauseLog
-    name: str
+    level: Callable[[Nanos], float]
     unit: str
     continuous: bool = False
 
@@ -45,7 +45,7 @@ class _Level:
         return ()
 
     def value(self, now: Nanos) -> float:
-        return self.log.level(self.name, now)
+        return self.level(now)
 
     def turns(self, now: Nanos) -> Iterator[Nanos]:
         yield from ()
@@ -58,8 +58,9 @@ class Why:
     """Answers questions about the past of a world.
 
     ``make`` gives the world at its beginning, or where its past is known from; ``inputs`` are what came from outside since then,
-    ``end`` is the present, in ns. The past is run again when the first question is asked, and once more for a question about what
-    is in no trace, such as a register. ``most``: limit of what is noted of it.
+    ``end`` is the present, in ns. The past is run again when the first question is asked, and from the last change on once more
+    for a question about what is in no trace, such as a register; what that showed is remembered. ``most``: limit of what is
+    noted.
     """
 
     def __init__(self, make: Callable[[], Plant], inputs: Iterable[RecordedInput], end: Nanos, most: int = MOST_NOTED) -> None:
@@ -69,6 +70,8 @@ class Why:
         self.log = CauseLog(make(), most)
         self._causes = Causes(self.log)
         self._on_the_way = StatesOnTheWay(self.log.world)
+        self._courses = Courses(make, self._inputs)
+        self._points: dict[str, list[str]] = {}
 
     def go_on(self, inputs: Iterable[RecordedInput], end: Nanos) -> None:
         """The present is a later one: what came from outside since."""
@@ -118,7 +121,7 @@ class Why:
         if all(self.log.is_recorded(name) for name in canonical.values()):
             value, since = self._from_log(asked, canonical, at, is_bare=is_bare)
         else:
-            value, since = yield from self._from_run(asked, at, is_bare=is_bare)
+            value, since = yield from self._from_run(asked, canonical, at, is_bare=is_bare)
         state = f"{asked} is {value:g}" if is_bare else f"{asked} is {'true' if value else 'false'}"
         first = None if since is None else self._changed(tuple(canonical.values()), since)
         return (yield from self._answer(text, at, state, since, first))
@@ -170,7 +173,7 @@ class Why:
         if is_bare:
             (name,) = canonical.values()
             return log.level(name, at), log.since(name, at)
-        condition = SignalCondition(text, lambda name: _Level(log, canonical[name], self._unit(name)))
+        condition = SignalCondition(text, lambda name: _Level(partial(log.level, canonical[name]), self._unit(name)))
         changes = [
             change for name in canonical.values() for change in log.changes.get(name, []) if not log.is_first(name, change)
         ]
@@ -181,23 +184,55 @@ class Why:
                 return float(value), time
         return float(value), None
 
-    def _from_run(self, text: str, at: Nanos, *, is_bare: bool) -> Found:
-        """As `_from_log`, from another run in which the signals are watched: from state to state back to the last change."""
-        world, watch, end = self._make(), _values if is_bare else _truths, at
+    def _from_run(self, text: str, canonical: dict[str, str], at: Nanos, *, is_bare: bool) -> FoundValue:
+        """As `_from_log`, from courses that are in no trace: from interval to interval back to the last change."""
+        log, courses, machines = self.log, self._courses, self.log.world.machines
+        courses.begin()
+        if any(log.world.signal(name).continuous for name in canonical if not log.has(name)):
+            recorded, watched = dict[str, str](), {text: text}
+            watch, is_followed = watch_truth, True
+        else:
+            recorded = {name: full for name, full in canonical.items() if log.is_recorded(full)}
+            named = {name: full for name, full in canonical.items() if name not in recorded}
+            watched = {name: full if full.partition(".")[0] in machines else name for name, full in named.items()}
+            watch, is_followed = watch_value, is_bare
         value: float | None = None
-        for state in self._on_the_way.until(at):
-            turns: list[tuple[Nanos, float]] = []
-            world.restore(state.snapshot)
-            world.start("why", partial(watch, world, text, turns), is_external=True)
-            for _ in in_parts(world, self._inputs[state.inputs :], end):
-                yield
-            if not turns:
-                raise Misuse(f"{text}: nothing is known of it at {at / SECOND:g} s")
-            value = turns[-1][1] if value is None else value
-            if len(turns) > 1:
-                return value, turns[-1][0]
-            end = state.snapshot.now
+        for interval in self._on_the_way.intervals(at, self.end):
+            # What has not changed lately may never have changed: a further question may be about another axis.
+            others = () if value is None or watch is watch_truth else self._others(watched.values())
+            yield from courses.bring(watched.values(), others, watch, interval, at)
+
+            def level(moment: Nanos, interval: Interval = interval) -> float:
+                if is_followed:
+                    return courses.level(watched[text], interval, moment)
+                signals = partial(self._level_in, interval, recorded, watched)
+                return float(SignalCondition(text, signals).holds(moment))
+
+            value = level(at) if value is None else value
+            times = {time for full in watched.values() for time in courses.changes(full, interval, at)}
+            for full in recorded.values():
+                times |= {change.time for change in log.changes_in(full, interval.state.snapshot.now, min(at, interval.end))}
+            for time in sorted(times, reverse=True):
+                if is_followed or level(time - 1) != value:
+                    return value, time
         return value or 0.0, None
+
+    def _level_in(self, interval: Interval, recorded: Mapping[str, str], watched: Mapping[str, str], name: str) -> Signal:
+        """A signal of a condition in an interval."""
+        if name in recorded:
+            return _Level(partial(self.log.level, recorded[name]), self._unit(name))
+        return _Level(partial(self._courses.level, watched[name], interval), self._unit(name))
+
+    def _others(self, watched: Iterable[str]) -> Sequence[str]:
+        """The points with the last parts of these signals, of the same controllers: those of the other axes."""
+        world, found = self.log.world, list[str]()
+        for name in watched:
+            owner, _, path = name.partition(".")
+            if owner in world.machines:
+                if owner not in self._points:
+                    self._points[owner] = list(_points_of(world, owner))
+                found += [f"{owner}.{other}" for other in self._points[owner] if other.split(".")[-1] == path.split(".")[-1]]
+        return found
 
     def _changed(self, signals: Sequence[str], time: Nanos) -> Cause | None:
         """What made one of these signals change at a moment."""
@@ -218,7 +253,7 @@ class Why:
             lanes = [name for name in self.log.changes if name == owner or name.startswith(f"{owner}.")]
             return causes.last(lanes, time)
         axis = _AXIS.match(rest)
-        wanted = None if axis is None else Operand(OperandKind.AXIS, axis[1])
+        wanted = None if axis is None else Resource(ResourceKind.AXIS, axis[1])
         return causes.at_moment(owner, time, wanted)
 
     def _moving(self, signal: str, at: Nanos) -> Asking:
@@ -247,26 +282,26 @@ class Why:
         if not use.waits or at - here.time <= log.world.programs[machine].statement_time:
             state = f"{machine} does not wait: {text}"
             return (yield from self._answer(machine, at, state, since, causes.statement(machine, index)))
-        links = [link for operand in use.reads for link in self._awaited(machine, operand, at)]
+        links = [link for resource in use.reads for link in self._awaited(machine, resource, at)]
         if not use.reads:
-            links.append(Link(here.time, machine, "it waits for a time only"))
-        found = [cause for operand in use.reads if (cause := causes.operand(machine, operand, at, index))]
+            links.append(ChainLink(here.time, machine, "it waits for a time only"))
+        found = [cause for resource in use.reads if (cause := causes.resource(machine, resource, at, index))]
         changed = [cause for cause in found if cause.link.time > here.time]
         first = max(changed, key=lambda cause: cause.link.time, default=None) or causes.statement(machine, index)
         answer = yield from self._answer(machine, at, f"{machine} waits at {text}", since, first)
         return answer._replace(links=tuple(dict.fromkeys((*links, *answer.links)))[:MOST_LINKS])
 
-    def _awaited(self, machine: str, operand: Operand, at: Nanos) -> Iterator[Link]:
+    def _awaited(self, machine: str, resource: Resource, at: Nanos) -> Iterator[ChainLink]:
         """The present state of what a statement waits for, and of what that depends on."""
-        if operand.kind is OperandKind.PIN and operand.name:
-            yield from self._states(f"{machine}.{operand.name}", at)
-        elif operand.kind is OperandKind.AXIS:
-            motion = self._causes.motion(machine, operand.name, at)
-            yield Link(at, machine, f"no axis has moved until {at / SECOND:g} s") if motion is None else motion.link
+        if resource.kind is ResourceKind.PIN and resource.name:
+            yield from self._states(f"{machine}.{resource.name}", at)
+        elif resource.kind is ResourceKind.AXIS:
+            motion = self._causes.motion(machine, resource.name, at)
+            yield ChainLink(at, machine, f"no axis has moved until {at / SECOND:g} s") if motion is None else motion.link
         else:
-            yield Link(at, machine, f"it depends on {operand.name or 'any pin'}")
+            yield ChainLink(at, machine, f"it depends on {resource.name or 'any pin'}")
 
-    def _states(self, signal: str, at: Nanos) -> Iterator[Link]:
+    def _states(self, signal: str, at: Nanos) -> Iterator[ChainLink]:
         """The level of a signal and, one after the other, of the signals that drive it."""
         waiting, seen = [signal], set[str]()
         while waiting and len(seen) < MOST_STATES:
@@ -279,12 +314,12 @@ class Why:
             waiting += drivers
             when = since_before(self.log.begin) if since is None else f"since {since / SECOND:.6f} s"
             driven = f", driven by {' and '.join(drivers)}" if drivers else ""
-            yield Link(at, name.partition(".")[0], f"{name} is {self.log.level(name, at):g} {when}{driven}")
+            yield ChainLink(at, name.partition(".")[0], f"{name} is {self.log.level(name, at):g} {when}{driven}")
 
     # ------------------------------------------------------------------ the chain
 
     def _answer(self, question: str, at: Nanos, state: str, since: Nanos | None, first: Cause | None) -> Asking:
-        links: list[Link] = []
+        links: list[ChainLink] = []
         cause, last = first, None
         while cause is not None and len(links) < MOST_LINKS and cause.link not in links:
             links.append(cause.link)
@@ -295,22 +330,11 @@ class Why:
         return Answer(question, at, state, since, tuple(links), is_followed and not is_cut, self.log.begin, is_cut)
 
 
-def _truths(world: Plant, text: str, turns: list[tuple[Nanos, float]]) -> do.Steps:
-    """Notes when a condition becomes true and false."""
-    negated = f"not ({text})"
-    is_true = world.holds(world.condition(text))
-    turns.append((world.now, float(is_true)))
-    while True:
-        yield do.Until(negated if is_true else text)
-        is_true = not is_true
-        turns.append((world.now, float(is_true)))
-
-
-def _values(world: Plant, name: str, turns: list[tuple[Nanos, float]]) -> do.Steps:
-    """Notes when a signal takes another value."""
-    value = world.read(name)
-    turns.append((world.now, value))
-    while True:
-        yield do.Until(f"{name} != {value!r}")
-        value = world.read(name)
-        turns.append((world.now, value))
+def _points_of(world: Plant, owner: str) -> Iterator[str]:
+    """The points of a controller that have a value and keep it between events, but for rows of them."""
+    kind, machine = world.kind(owner), world.machine(owner)
+    for point in kind.datasheet(machine).points:
+        with suppress(Misuse):
+            found = kind.point(machine, point.path)
+            if found is not None and found.read is not None and found.turns is None and not found.is_kept:
+                yield point.path

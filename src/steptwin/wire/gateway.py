@@ -17,7 +17,7 @@ from steptwin.machine import Nanos
 from steptwin.state import Plain, Stateful
 from steptwin.wire import mbap, rtu
 from steptwin.wire.crc import with_crc
-from steptwin.wire.pdu import DEVICE_BUSY, GATEWAY_TARGET_FAILED, exception_pdu
+from steptwin.wire.pdu import DEVICE_BUSY, GATEWAY_TARGET_FAILED, REFUSED, exception_pdu
 from steptwin.wire.slave import FrameDirection, FrameObserver, SlavePort, tcp_response
 from steptwin.wire.timed import TimedUnits
 
@@ -38,7 +38,7 @@ class _Waiting(NamedTuple):
     pdu: bytes
 
 
-class Gateway(Stateful):
+class ModbusGateway(Stateful):
     """The line behind any number of ports, and the order of their requests."""
 
     __slots__ = ("_count", "_free", "_waiting_ports", "units")
@@ -109,7 +109,7 @@ class GatewayPort(SlavePort, ABC):
     __slots__ = ("__weakref__", "_gateway", "_responses", "waiting")
     FIXED = frozenset({"__weakref__", "_gateway"}) | SlavePort.FIXED
 
-    def __init__(self, gateway: Gateway, *, on_frame: FrameObserver | None = None) -> None:
+    def __init__(self, gateway: ModbusGateway, *, on_frame: FrameObserver | None = None) -> None:
         super().__init__(on_frame)
         self._gateway = gateway
         self._responses: list[tuple[Nanos, bytes]] = []
@@ -153,6 +153,7 @@ class GatewayPort(SlavePort, ABC):
         """The request ``raw`` is executed at ``moment``."""
 
     def _request(self, raw: bytes, now: Nanos) -> None:
+        self.requests += 1
         units, pdu = self._addressed(raw)
         if not units:
             if not self.is_broadcast(raw):
@@ -162,6 +163,8 @@ class GatewayPort(SlavePort, ABC):
 
     def respond(self, raw: bytes, pdu: bytes, moment: Nanos) -> None:
         """The answer ``pdu`` to the request ``raw`` leaves at ``moment``."""
+        if pdu[0] >= REFUSED:
+            self.exceptions += 1
         insort(self._responses, (moment, self._response(raw, pdu)), key=lambda response: response[0])
 
     def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
@@ -187,7 +190,7 @@ class TcpGatewayPort(GatewayPort):
 
     __slots__ = ("_framer",)
 
-    def __init__(self, gateway: Gateway, *, on_frame: FrameObserver | None = None) -> None:
+    def __init__(self, gateway: ModbusGateway, *, on_frame: FrameObserver | None = None) -> None:
         super().__init__(gateway, on_frame=on_frame)
         self._framer = mbap.TcpFramer()
 
@@ -230,7 +233,7 @@ class ScriptPort(GatewayPort):
     broken = None
     __slots__ = ("_framer",)
 
-    def __init__(self, gateway: Gateway, *, on_frame: FrameObserver | None = None) -> None:
+    def __init__(self, gateway: ModbusGateway, *, on_frame: FrameObserver | None = None) -> None:
         super().__init__(gateway, on_frame=on_frame)
         self._framer = rtu.RtuFramer(gateway.units.devices)
 

@@ -52,11 +52,20 @@ PAUSE_REPORT_NS: Nanos = SECOND
 class SlavePort(Stateful):
     """Base of the ports with devices behind them."""
 
-    __slots__ = ("on_frame",)
-    FIXED = frozenset({"on_frame"})
+    __slots__ = ("exceptions", "on_frame", "requests")
+    FIXED = frozenset({"exceptions", "on_frame", "requests"})
 
     def __init__(self, on_frame: FrameObserver | None) -> None:
         self.on_frame = on_frame
+        self.requests = 0
+        """Number of whole requests received so far, also of foreign units. Counters are no state: a restore leaves them."""
+        self.exceptions = 0
+        """Number of answers with an exception."""
+
+    @property
+    def lost(self) -> int:
+        """Number of requests lost because the controller was busy."""
+        return 0
 
     @property
     def unframed(self) -> int:
@@ -176,6 +185,9 @@ class RtuSlavePort(SlavePort):
                 wanted = 8 if function <= 6 else 9 + data[6] if function == WRITE_MULTIPLE_REGISTERS else 0
                 if size == wanted and function > 0 and size <= rtu.MAX_FRAME and crc16(data) == 0:
                     response = data[:1] + device.execute(data[1:-2], now)
+                    self.requests += 1
+                    if response[1] >= REFUSED:
+                        self.exceptions += 1
                     response += crc16(response).to_bytes(2, "little")
                     if self.on_frame is not None:
                         self.on_frame(now, FrameDirection.IN, data)
@@ -188,6 +200,9 @@ class RtuSlavePort(SlavePort):
         responses = []
         for frame in frames:
             response = execute_frame(self._devices, frame, now)
+            self.requests += 1
+            if response and response[1] >= REFUSED:
+                self.exceptions += 1
             if self.on_frame is not None:
                 self.on_frame(now, FrameDirection.IN, frame.raw)
                 if response:
@@ -239,6 +254,9 @@ class TcpSlavePort(SlavePort):
             device = self._devices.get(data[6])
             if device is not None and self.on_frame is None:
                 pdu = device.execute(data[7:], now)
+                self.requests += 1
+                if pdu[0] >= REFUSED:
+                    self.exceptions += 1
                 return data[:5] + _LENGTHS[len(pdu)] + data[6:7] + pdu
         frames = framer.feed(data)
         self.broken = framer.broken
@@ -254,6 +272,9 @@ class TcpSlavePort(SlavePort):
             response = b""
         else:
             response = tcp_response(raw, exception_pdu(pdu[0], GATEWAY_TARGET_FAILED))
+        self.requests += 1
+        if response and response[7] >= REFUSED:
+            self.exceptions += 1
         if self.on_frame is not None:
             self.on_frame(now, FrameDirection.IN, raw)
             if response:

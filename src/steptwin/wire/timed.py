@@ -142,6 +142,10 @@ class TimedRtuSlavePort(SlavePort):
         """Number of bytes received so far that belonged to no frame."""
         return self._framer.unframed
 
+    @property
+    def lost(self) -> int:
+        return self.dropped
+
     def exchange(self, data: bytes, now: Nanos) -> bytes:
         self._receive(data, now)
         return b"".join([response for _, response in self.to_send(now)])
@@ -166,6 +170,8 @@ class TimedRtuSlavePort(SlavePort):
         while self._responses and self._responses[0][0] <= now:
             moment, response = self._responses.popleft()
             out.append((moment, response))
+            if response[1] >= REFUSED:
+                self.exceptions += 1
             if self.on_frame is not None:
                 self.on_frame(moment, FrameDirection.OUT, response)
         return out
@@ -198,6 +204,7 @@ class TimedRtuSlavePort(SlavePort):
 
     def _arrive(self, moment: Nanos) -> None:
         _, frame = self._arriving.popleft()
+        self.requests += 1
         if self.on_frame is not None:
             self.on_frame(moment, FrameDirection.IN, frame.raw)
         for unit in self._units.addressed(frame.unit, frame.raw[1]):

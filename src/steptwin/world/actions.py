@@ -11,12 +11,13 @@ from steptwin.errors import Misuse
 from steptwin.tables import complete
 from steptwin.wire.rtu import encode_frame
 from steptwin.world import script as do
-from steptwin.world.kernel import Kernel, PinName
+from steptwin.world.kernel import Kernel
 from steptwin.world.kind import lacks
 from steptwin.world.lines import SCRIPTS
 from steptwin.world.master import ANSWER_NS
 from steptwin.world.programtexts import Destination, name_of_text
 from steptwin.world.trace import TraceRecord
+from steptwin.world.wires import PinName
 
 if TYPE_CHECKING:
     from steptwin.world.plant import Plant

@@ -10,7 +10,7 @@ from steptwin.state import Stateful
 
 
 class BeltDrive(Protocol):
-    """The drive of a belt: a `steptwin.world.contacts.Carriage`."""
+    """The drive of a belt: a `steptwin.world.contacts.MovingPart`."""
 
     def version(self) -> object: ...
     def place(self, now: Nanos) -> int: ...
@@ -44,7 +44,7 @@ class ConstantDrive(Stateful):
         return self._base + (self._speed * (now - self._begin) // self._divisor if self.runs else 0)
 
     def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
-        """As `Carriage.reaches`."""
+        """As `MovingPart.reaches`."""
         if not self.runs or direction < 0 or position <= self.place(after):
             return None
         way = (position - self._base) * self._divisor

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from hashlib import blake2b
 
 from steptwin.state import Stateful
@@ -9,6 +10,13 @@ from steptwin.state import Stateful
 _MASK = (1 << 64) - 1
 _STEP = 0x9E3779B97F4A7C15
 _WHOLE = 1 << 53
+_REMEMBERED = 512
+"""Streams whose beginnings are remembered, since worlds of one description have the same."""
+
+
+@lru_cache(maxsize=_REMEMBERED)
+def _beginning(seed: int, name: str) -> int:
+    return int.from_bytes(blake2b(f"{seed}/{name}".encode(), digest_size=8).digest(), "big")
 
 
 class Chance(Stateful):
@@ -19,7 +27,7 @@ class Chance(Stateful):
     __slots__ = ("_state",)
 
     def __init__(self, seed: int, name: str) -> None:
-        self._state = int.from_bytes(blake2b(f"{seed}/{name}".encode(), digest_size=8).digest(), "big")
+        self._state = _beginning(seed, name)
 
     def draw(self) -> int:
         """A number from 0 to 2^64 − 1."""

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from steptwin.diagnostics import Diagnostic, in_order
 from steptwin.errors import Misuse
+from steptwin.world.blueprint import Blueprint
 from steptwin.world.description import describe
 from steptwin.world.pieces import is_piece
 from steptwin.world.plant import Plant
@@ -36,7 +37,7 @@ def diagnose(name: str, text: str, read: Callable[[str], bytes]) -> Sequence[Dia
                 _ = files.get(file) or keep(file)
             except Misuse as error:
                 spec.text.wrong(key, "D009", str(error))
-        Plant(spec, files, keep_trace=False, keep_inputs=False)
+        Plant(Blueprint(spec, files), keep_trace=False, keep_inputs=False)
     except WorldError as error:
         return [_short(finding) for finding in error.findings]
     return [_short(finding) for finding in in_order(spec.text.findings)]

@@ -9,13 +9,14 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 from math import inf, nextafter
 from typing import Any, NamedTuple, Protocol, TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.points import FARTHEST_NS
-from steptwin.world.expression import Comparison, comparisons, parse_condition, truth_of
+from steptwin.world.expression import REMEMBERED, Comparison, Truth, comparisons, parse_condition, truth_of
 from steptwin.world.quantities import Quantity, SignalName, Sum, next_change
 
 
@@ -53,6 +54,12 @@ class _Crossing(NamedTuple):
     until: Nanos
 
 
+@lru_cache(maxsize=REMEMBERED)
+def _in_units(text: str, units: tuple[tuple[str, str], ...]) -> Truth:
+    """A condition with its numbers in the units of its names. Raises `Misuse` for a number in another one."""
+    return parse_condition(text).in_unit("", dict(units).__getitem__)
+
+
 class SignalCondition:
     """A condition with its signals."""
 
@@ -65,7 +72,7 @@ class SignalCondition:
         self._signals = {name: signals(name) for name in node.names()}
         self._brought = tuple(self._signals.values())
         try:
-            node = node.in_unit("", lambda name: self._signals[name].unit)
+            node = _in_units(text, tuple((name, signal.unit) for name, signal in self._signals.items()))
         except Misuse as error:
             raise Misuse(f"condition {text!r}: {error}") from None
         self._test = truth_of(node, {name: signal.value for name, signal in self._signals.items()})

@@ -14,12 +14,16 @@ from typing import ClassVar, Protocol
 from steptwin.errors import Misuse
 from steptwin.machine import Drive, Nanos
 from steptwin.motion.divisions import profile_of
-from steptwin.state import Stateful
+from steptwin.state import Plain, Stateful
 from steptwin.world.chance import Chance
-from steptwin.world.kernel import Kernel, PinName
+from steptwin.world.kernel import Kernel
+from steptwin.world.wires import PinName
+
+_RESTORED = object()
+"""The version of a carriage whose next change was restored, not computed."""
 
 
-class Carriage(Protocol):
+class MovingPart(Protocol):
     """The moving part that actuates switches."""
 
     def version(self) -> object:
@@ -135,6 +139,11 @@ class Circuit:
     def machine(self) -> str:
         """The subject of the records of its contacts."""
         return self._kernel.owner(self.target.machine)
+
+    @property
+    def is_blank(self) -> bool:
+        """Whether the state of its contacts is restored later."""
+        return self._kernel.is_blank
 
     def close(self) -> None:
         """Set the input to the present state of its contacts."""
@@ -259,7 +268,7 @@ class Switch(Contact):
     def __init__(
         self,
         circuit: Circuit,
-        carriage: Carriage,
+        carriage: MovingPart,
         zone: Zone,
         now: Nanos,
         *,
@@ -272,19 +281,20 @@ class Switch(Contact):
         chance = chance or Chance(0, str(circuit.target))
         super().__init__(circuit, normally_closed=normally_closed, bounce_ns=bounce_ns, bounces=bounces, chance=chance, lane=lane)
         self._carriage = carriage
-        self._version: object = carriage.version()
+        self._version: object = None
+        """Of the carriage when its next change was computed; None before, `_RESTORED` after a restored snapshot."""
         self.zone = zone
-        self.on = zone.on(carriage.place(now), was_on=False)
+        self.on = not circuit.is_blank and zone.on(carriage.place(now), was_on=False)
         self.rest_at(self.on is not normally_closed)
-        self._predict(carriage.place(now), now)
 
     def update(self, now: Nanos) -> None:
         if self._bouncing:
             self.bounce(now)
         version = self._carriage.version()
-        if version == self._version and (self._due is None or self._due > now):
-            return
+        is_same = version == self._version or self._version is _RESTORED
         self._version = version
+        if is_same and (self._due is None or self._due > now):
+            return
         place = self._carriage.place(now)
         self.on = self.zone.on(place, was_on=self.on)
         self.change(self.on is not self.normally_closed, now)
@@ -295,6 +305,11 @@ class Switch(Contact):
         down = None if below is None else self._carriage.reaches(below, now, -1)
         up = None if above is None else self._carriage.reaches(above, now, 1)
         self._due = up if down is None else down if up is None else min(up, down)
+
+    def set_state(self, plain: Plain) -> None:
+        """As `Stateful.set_state`. Its next change is restored with it: in a snapshot everything has settled."""
+        super().set_state(plain)
+        self._version = _RESTORED
 
     def deadline(self) -> Nanos | None:
         due = self.bounce_due()

@@ -1,5 +1,5 @@
-"""Commands for controllers, in the units of their data sheets. What a master sends for them is for each kind of controller to say
-(`steptwin.world.kind.ControllerKind.control`)."""
+"""Commands for controllers, in the units of their data sheets. Each kind of controller determines what a master sends for
+them (`steptwin.world.kind.ControllerKind.control`)."""
 
 from __future__ import annotations
 
@@ -39,6 +39,17 @@ class Home:
     machine: str
     axis: int
     velocity: float
+
+
+@dataclass(frozen=True, slots=True)
+class Seek:
+    """Begin to home a controller that does not know its switch: move in ``direction`` (1 or -1) until the input ``pin`` ends it,
+    which is then the position 0."""
+
+    machine: str
+    axis: int
+    direction: int
+    pin: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ from steptwin.world.element import AnyElement, ElementSpec
 from steptwin.world.elements import ELEMENTS
 from steptwin.world.faults import Fault, FaultMistake, parse
 from steptwin.world.gateways import GATEWAY, read_gateways
+from steptwin.world.historytable import read_history
 from steptwin.world.kinds import KINDS
 from steptwin.world.links import LINK_KEYS
 from steptwin.world.names import check_names
@@ -70,6 +71,7 @@ def describe(
         elements={element.name: tuple(_elements(toml, element)) for element in ELEMENTS.values()},
         scripts=(*_events(toml), *_scripts(toml)),
         gateways=tuple(read_gateways(toml)),
+        history=read_history(toml),
         faults=tuple(_faults(toml)),
         text=toml,
         overrides=dict(overrides),

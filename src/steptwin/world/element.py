@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeAlias, TypeVar, 
 
 from steptwin.tables import IncompleteTable
 from steptwin.world.faults.table import FaultKind, Layer
-from steptwin.world.reader import TomlText
+from steptwin.world.reader import Row, Table, TomlText
 from steptwin.world.sense import TableRows
 from steptwin.world.tomlplaces import Path
 
@@ -22,11 +22,6 @@ if TYPE_CHECKING:
     from steptwin.world.signals import SignalOf
     from steptwin.world.site import Site
     from steptwin.world.spec import WorldSpec
-
-Row: TypeAlias = Mapping[str, Any]
-"""The values of a table by attribute, each read and checked, with the ``path`` of the table."""
-Table: TypeAlias = Mapping[str, Any]
-"""The table as written in the text."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,16 +82,15 @@ class Element(Generic[S, B]):
     """Subjects of the edges that it records in traces."""
     faults: tuple[FaultKind, ...] = ()
     """Its faults (`Layer.ELEMENT`), which act on the built object."""
+    is_named: bool = field(init=False)
+    """Whether its table has a ``name``."""
 
     def named(self, specs: Sequence[ElementSpec]) -> Sequence[NamedSpec]:
         """``specs`` as named ones; empty for a kind without names."""
         return cast("Sequence[NamedSpec]", specs) if self.is_named else ()
 
-    @property
-    def is_named(self) -> bool:
-        return any(key.name == "name" for key in self.rows.keys)
-
     def __post_init__(self) -> None:
+        object.__setattr__(self, "is_named", any(key.name == "name" for key in self.rows.keys))
         where = f"element {self.name}"
         attributes = {*self.rows.attributes, *(self.inner_attributes.get(key, key) for key in self.inner), "path"}
         having = {one.name for one in fields(self.spec)}

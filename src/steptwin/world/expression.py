@@ -17,6 +17,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from operator import eq, ge, gt, le, lt, ne
 from typing import TypeAlias
 
@@ -45,6 +46,8 @@ MOST_NESTED = 64
 MOST_OPERATIONS = 200
 """Limit of the signs + - * / % of an expression, because they are evaluated recursively."""
 LONGEST = 20_000
+REMEMBERED = 512
+"""Conditions whose parts are remembered by their text, since worlds of one description have the same."""
 """Limit of the characters of an expression."""
 
 _COMPARE: Mapping[str, Callable[[float, float], bool]] = {"==": eq, "!=": ne, "<=": le, ">=": ge, "<": lt, ">": gt}
@@ -57,7 +60,7 @@ _TOKEN = re.compile(
     r"|(?P<sign>&&|\|\||[=!<>]=|<>|[-+*/%<>=()])|(?P<wrong>\S))"
 )
 
-Read: TypeAlias = Callable[[Nanos], float]
+ReadAt: TypeAlias = Callable[[Nanos], float]
 """The value of a name at a moment."""
 
 
@@ -129,6 +132,7 @@ class Junction:
 Truth: TypeAlias = Comparison | Not | Junction
 
 
+@lru_cache(maxsize=REMEMBERED)
 def parse_condition(text: str) -> Truth:
     """Parse what is true or false. Raises `Misuse` with the column, the found and the expected token."""
     return _Parser(text, "condition").condition()
@@ -150,7 +154,7 @@ def comparisons(node: Truth) -> Iterator[Comparison]:
             yield from comparisons(part)
 
 
-def truth_of(node: Truth, reads: Mapping[str, Read], check: Callable[[float], float] | None = None) -> Callable[[Nanos], bool]:
+def truth_of(node: Truth, reads: Mapping[str, ReadAt], check: Callable[[float], float] | None = None) -> Callable[[Nanos], bool]:
     """Whether a condition holds at a moment, as a function, because conditions are evaluated far more often than made.
 
     ``reads``: the values of its names. ``check`` is applied to each calculated number before it is compared.
@@ -167,7 +171,7 @@ def truth_of(node: Truth, reads: Mapping[str, Read], check: Callable[[float], fl
     return lambda now: any(part(now) for part in parts)
 
 
-def value_of(node: Quantity, reads: Mapping[str, Read], check: Callable[[float], float] | None = None) -> Read:
+def value_of(node: Quantity, reads: Mapping[str, ReadAt], check: Callable[[float], float] | None = None) -> ReadAt:
     """The value of an expression at a moment, as `truth_of`."""
     match node:
         case SignalName(name):

@@ -7,15 +7,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from steptwin.machine import MILLISECOND, Nanos
+from steptwin.errors import Misuse
+from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.world.reader import Key, TomlText, optional, read_table
 from steptwin.world.sense import TableRows, check_sense
 from steptwin.world.tomlplaces import Path
-from steptwin.world.values import address_value, positive_time, text_value, texts, word
+from steptwin.world.values import address_value, flag, positive_time, text_value, texts, whole, whole_seconds, word
 
 GATEWAY = "gateway"
+ROLES = ("viewer", "operator", "engineer")
+"""Of `steptwin.access.roles`, which is above this."""
+UNNAMED = ("world", "devices")
+"""Names of worlds and device files that have been given none."""
 APPLICATION_URI = "urn:steptwin:opcua"
 """Of the OPC UA server; its certificate has it, too (OPC 10000-6, 6.2.2)."""
 
@@ -25,13 +30,20 @@ class GatewaySpec:
     """A gateway as its table describes it; each kind with further keys has a class of its own."""
 
     kind: str
-    listen: str
-    """HOST:PORT where it is reached."""
+    listen: str | None = None
+    """HOST:PORT where it is reached; None for one that only connects to others."""
     path: Path = ()
+    file: str = ""
+    """The name of the file with the description."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class OpcUaSpec(GatewaySpec):
+class ListeningSpec(GatewaySpec):
+    listen: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OpcUaSpec(ListeningSpec):
     """Files are relative to the description."""
 
     interval: Nanos
@@ -49,7 +61,49 @@ class OpcUaSpec(GatewaySpec):
     """A file with tokens (`steptwin.access.tokens`), which are passwords of users."""
 
 
-class _Kind(NamedTuple):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SparkplugSpec:
+    """Sparkplug B: ``group`` and ``node`` are ids of topics, ``host`` the primary host that is waited for, None without."""
+
+    group: str
+    node: str
+    host: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MqttSpec(GatewaySpec):
+    """Files are relative to the description."""
+
+    broker: str
+    """HOST:PORT."""
+    topic: str
+    """With what topics begin."""
+    interval: Nanos
+    """How often values are looked at, ns."""
+    registers: tuple[str, ...]
+    """Further points to show: ``MACHINE.POINT``."""
+    keep_alive: Nanos
+    """After how long a broker that is silent is given up, ns."""
+    store: int
+    """How many events, of Sparkplug values, are kept while the broker is away."""
+    user: str | None
+    password_file: str | None
+    password_variable: str | None
+    """Of the environment."""
+    tls: bool
+    ca: str | None
+    certificate: str | None
+    key: str | None
+    """Of this client, both PEM."""
+    tokens: str | None
+    """A file with tokens (`steptwin.access.tokens`), which commands have."""
+    role: str | None
+    """Of commands without a token; None: engineer where broker and clients are on this computer, otherwise viewer."""
+    discovery: str | None
+    sparkplug: SparkplugSpec | None
+
+
+class _GatewayReader(NamedTuple):
     rows: TableRows
     make: Callable[..., GatewaySpec]
 
@@ -59,9 +113,43 @@ def _rows(kind: str, listen: str, *keys: Key, need: Mapping[str, str] | None = N
     return TableRows(written=f"[{GATEWAY}.{kind}]", keys=(where, *keys), need=need or {})
 
 
-_KINDS: Mapping[str, _Kind] = {
-    "prometheus": _Kind(_rows("prometheus", "127.0.0.1:9488"), GatewaySpec),
-    "opcua": _Kind(
+def _broker(value: Any) -> str:
+    if address_value(value).endswith(":0"):
+        raise Misuse(f"{value!r}: the port of a broker is 1 to 65535, usually 1883")
+    return value
+
+
+def _topic(value: Any) -> str:
+    if any(sign in text_value(value) for sign in "+#\0") or value.startswith(("/", "$")) or value.endswith("/"):
+        raise Misuse(f"{value!r}: a topic has no + and #, and begins and ends without /")
+    return value
+
+
+def _id(value: Any) -> str:
+    if any(sign in text_value(value) for sign in "+/#\0"):
+        raise Misuse(f"{value!r}: an id of Sparkplug has no +, / and #")
+    return value
+
+
+_SPARKPLUG_KEYS = {"group": True, "node": True, "host": False}
+"""And whether they are required."""
+
+
+def _sparkplug(value: Any) -> SparkplugSpec:
+    if not isinstance(value, Mapping):
+        raise Misuse(f"{value!r}: expected {{ group = ..., node = ... }}")
+    for name in value:
+        if name not in _SPARKPLUG_KEYS:
+            raise Misuse(f"there is no {name!r}; permitted are {', '.join(_SPARKPLUG_KEYS)}")
+    for name, is_required in _SPARKPLUG_KEYS.items():
+        if is_required and name not in value:
+            raise Misuse(f"{name} is missing: expected {{ group = ..., node = ... }}")
+    return SparkplugSpec(**{name: _id(given) for name, given in value.items()})
+
+
+_KINDS: Mapping[str, _GatewayReader] = {
+    "prometheus": _GatewayReader(_rows("prometheus", "127.0.0.1:9488"), ListeningSpec),
+    "opcua": _GatewayReader(
         _rows(
             "opcua",
             "127.0.0.1:4840",
@@ -75,6 +163,44 @@ _KINDS: Mapping[str, _Kind] = {
             need={"certificate": "key", "key": "certificate", "trusted": "certificate"},
         ),
         OpcUaSpec,
+    ),
+    "mqtt": _GatewayReader(
+        TableRows(
+            written=f"[{GATEWAY}.mqtt]",
+            keys=(
+                optional(_broker, "broker", "HOST:PORT of the broker", "127.0.0.1:1883"),
+                optional(_topic, "topic", "with what topics begin; the name of the world follows", "steptwin"),
+                optional(positive_time, "interval", "how often values are looked at", 100 * MILLISECOND),
+                optional(texts, "registers", "further points to show: MACHINE.POINT, such as table.USER_REGISTER[5]", ()),
+                optional(whole_seconds, "keep_alive", "after how long a broker that is silent is given up", 15 * SECOND),
+                optional(whole(1, 1_000_000), "store", "events, with sparkplug values, that are kept while it is away", 4096),
+                optional(text_value, "user", "name of the user for the broker"),
+                optional(text_value, "password_file", "file with the password"),
+                optional(text_value, "password_variable", "variable of the environment with the password"),
+                optional(flag, "tls", "whether the connection is encrypted", False),
+                optional(text_value, "ca", "file with the authorities of the broker's certificate, PEM; the system's without"),
+                optional(text_value, "certificate", "file with the certificate of this client, PEM"),
+                optional(text_value, "key", "file with its key, PEM"),
+                optional(text_value, "tokens", "file with lines ROLE NAME TOKEN; commands have a token"),
+                optional(word(*ROLES), "role", "role of commands without a token"),
+                optional(word("homeassistant"), "discovery", "what is told of the topics so that it shows them by itself"),
+                optional(_sparkplug, "sparkplug", "{ group, node, host }: Sparkplug B instead of JSON; host is the primary host"),
+            ),
+            need={
+                "ca": "tls",
+                "certificate": "key",
+                "key": "certificate",
+                "password_file": "user",
+                "password_variable": "user",
+            },
+            exclude=(
+                ("password_file", "password_variable"),
+                ("sparkplug", "topic"),
+                ("sparkplug", "discovery"),
+                ("sparkplug", "tokens"),
+            ),
+        ),
+        MqttSpec,
     ),
 }
 
@@ -94,7 +220,7 @@ def read_gateways(text: TomlText) -> Iterator[GatewaySpec]:
             rows = GATEWAYS[kind]
             values = read_table(text, path, table, rows.keys)
             check_sense(text, path, rows, table)
-            yield _KINDS[kind].make(kind=kind, path=path, **values)
+            yield _KINDS[kind].make(kind=kind, path=path, file=text.source.name, **values)
         else:
             fix = text.key_replacement(path, kind, list(GATEWAYS))
             near = text.near(kind, list(GATEWAYS))

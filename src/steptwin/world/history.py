@@ -65,7 +65,7 @@ def outside_past(moment: Nanos, begin: Nanos, end: Nanos) -> str:
     return f"{duration_text(moment)}: the past is kept from {duration_text(begin)} to {duration_text(end)}"
 
 
-class _State(NamedTuple):
+class PastState(NamedTuple):
     snapshot: PlantSnapshot
     inputs: int
     """Number of inputs before it."""
@@ -82,7 +82,7 @@ class History:
         self.branch = 0
         """Counts how often the world has gone back; each time, the past after that moment is replaced."""
         self._most = max(LEAST_STATES, min(MOST_STATES, MOST_CONTROLLER_STATES // max(1, len(world.machines))))
-        self._states: list[_State] = []
+        self._states: list[PastState] = []
         self._inputs: deque[RecordedInput] = deque()
         self._bytes = 0
         self._dropped = 0
@@ -112,7 +112,7 @@ class History:
         """Take a snapshot, unless there is one of this moment."""
         if self._states and self._states[-1].snapshot.now == self.world.now:
             return
-        self._states.append(_State(self.world.snapshot(with_inputs=False), self.inputs_so_far))
+        self._states.append(PastState(self.world.snapshot(with_inputs=False), self.inputs_so_far))
         if len(self._states) > self._most:
             del self._states[self._least_missed()]
 
@@ -146,7 +146,7 @@ class History:
         self.branch += 1
         self.take()
 
-    def state_at(self, moment: Nanos) -> tuple[PlantSnapshot, int]:
+    def state_at(self, moment: Nanos) -> PastState:
         """The newest snapshot at or before a moment, and the number of inputs before it. Raises `Misuse` if there is none."""
         index = bisect_right(self._states, moment, key=lambda state: state.snapshot.now)
         if not index:
@@ -177,13 +177,13 @@ class Past:
     def __init__(self, history: History) -> None:
         self._history = history
         world = history.world
-        self.world = Plant(world.spec, world.files, keep_trace=world.trace.is_kept, keep_inputs=False)
+        self.world = Plant(world.blueprint, keep_trace=world.trace.is_kept, keep_inputs=False)
         if not world.trace.is_recorded:
             self.world.stop_recording()
         self._branch = -1
         self._inputs = 0
         """Number of inputs applied to it."""
-        self._near: deque[_State] = deque(maxlen=MOST_NEAR)
+        self._near: deque[PastState] = deque(maxlen=MOST_NEAR)
         """Snapshots on the way to the last moment, because those of the history may be far apart."""
 
     def forget(self) -> None:
@@ -224,7 +224,7 @@ class Past:
         for _ in self.go_on(moment):
             if kept + SLICE_NS <= self.world.now < moment:
                 kept = self.world.now
-                self._near.append(_State(self.world.snapshot(with_inputs=False), self._inputs))
+                self._near.append(PastState(self.world.snapshot(with_inputs=False), self._inputs))
             yield
 
     def go_on(self, moment: Nanos) -> Iterator[None]:
@@ -233,9 +233,9 @@ class Past:
             self._inputs += is_input
             yield
 
-    def _state_at(self, moment: Nanos) -> _State:
+    def _state_at(self, moment: Nanos) -> PastState:
         """The newest snapshot at or before a moment whose inputs are kept. Raises `Misuse` if there is none."""
-        kept = _State(*self._history.state_at(moment))
+        kept = self._history.state_at(moment)
         near = [
             state
             for state in self._near

@@ -6,10 +6,8 @@ advanced only when an event concerns it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
-from itertools import chain
 from typing import Any, NamedTuple, Protocol
 
 from steptwin.errors import Misuse, Runaway, TimeReversal
@@ -17,8 +15,9 @@ from steptwin.machine import Drive, Fact, MotionController, Nanos, PinEdge
 from steptwin.state import Plain
 from steptwin.world.board import Board
 from steptwin.world.recordedplans import RecordedPlans
-from steptwin.world.trace import Recorder, TraceRecord
+from steptwin.world.trace import RecordSink, TraceRecord
 from steptwin.world.turns import Dues, Turns
+from steptwin.world.wires import DelayedLevel, PinName, Wire, Wires
 
 MAX_ROUNDS_PER_INSTANT = 1000
 """Signals propagate in zero time; more rounds than this at one moment mean a feedback loop of wires."""
@@ -40,47 +39,11 @@ class KernelPart(Protocol):
     def set_state(self, plain: Plain) -> None: ...
 
 
-class PinName(NamedTuple):
-    """A pin of a machine, or a terminal of an element."""
-
-    machine: str
-    pin: str
-
-    def __str__(self) -> str:
-        return f"{self.machine}.{self.pin}"
-
-
 class Source(NamedTuple):
     """A machine, a line or an element of a kernel, on which a value depends."""
 
     kernel: Kernel
     name: str
-
-
-@dataclass(frozen=True, slots=True)
-class Wire:
-    """A wire from an output to an input. ``inverted``: the level is inverted; ``delay``: propagation delay, ns."""
-
-    source: PinName
-    target: PinName
-    inverted: bool = False
-    delay: Nanos = 0
-
-    def __post_init__(self) -> None:
-        if self.delay < 0:
-            raise Misuse(f"wire to {self.target}: a delay of {self.delay} ns is negative")
-
-    def transmitted(self, level: float) -> float:
-        """The level at the target for a level of the source."""
-        return (0.0 if level else 1.0) if self.inverted else level
-
-
-class DelayedLevel(NamedTuple):
-    """A level that reaches the end of a wire with delay at ``arrival``."""
-
-    arrival: Nanos
-    target: PinName
-    level: float
 
 
 class KernelState(NamedTuple):
@@ -90,7 +53,7 @@ class KernelState(NamedTuple):
     machines: tuple[Any, ...]
     parts: tuple[Plain, ...]
     levels: Mapping[PinName, float]
-    flights: tuple[DelayedLevel, ...]
+    delayed: tuple[DelayedLevel, ...]
 
 
 class Kernel:
@@ -105,7 +68,11 @@ class Kernel:
     ``record`` gets the first level of each driven input, every edge of an output and of an input, and every new plan of an axis.
     """
 
-    def __init__(self, now: Nanos = 0, record: Recorder | None = None) -> None:
+    def __init__(
+        self, now: Nanos = 0, record: RecordSink | None = None, *, is_checked: bool = False, is_blank: bool = False
+    ) -> None:
+        """``is_checked``: its wires join what exists, because they do so in another kernel of the same description. ``is_blank``:
+        `restore` comes next, with all levels; until then it drives and records nothing."""
         self.now = now
         self.machines: dict[str, MotionController] = {}
         self.boards: dict[str, Board] = {}
@@ -121,19 +88,23 @@ class Kernel:
         """Called with the kernel after each of its events and after each change from outside."""
         self._changed: set[str] = set()
         """The machines, lines and elements that were looked at since the last `take_changed`."""
+        self._is_checked, self.is_blank = is_checked, is_blank
         self._record = record
-        self._wires: dict[PinName, list[Wire]] = {}
+        self.wires = Wires(self.drive)
         self._levels: dict[PinName, float] = {}
         """The level last driven to each input."""
         self._recorded: dict[PinName, tuple[Nanos, float]] = {}
         """The last recorded edge of each driven input."""
-        self._flights: list[DelayedLevel] = []
         self._plans: list[RecordedPlans] = []
         """The plans of each machine that were recorded last."""
         self._names: list[str] = []
         """The names of the machines, by number."""
-        self._concerned: dict[str, list[tuple[Callable[[int], None], int]]] = {}
-        """What has to be looked at when something with this name has changed: the machine, and parts that watch it."""
+        self._pin_names: dict[str, tuple[str, ...]] = {}
+        """Of machines and elements whose pins were asked for."""
+        self._numbers: dict[str, int] = {}
+        """The numbers of the machines, by name."""
+        self._watching: dict[str, list[int]] = {}
+        """The parts that watch a machine, a line or an element, by its name."""
         self._sources: dict[str, Source] = {}
         """The machines, and the lines and elements with a part that computes their signals."""
         self._part_names: list[str | None] = []
@@ -155,15 +126,16 @@ class Kernel:
         """Add a machine and set its ``changed`` hook. Raises `TimeReversal` if its time is after the kernel's."""
         if name in self.machines:
             raise Misuse(f"there is a machine {name!r} already")
-        machine.advance(self.now)
+        if not self.is_blank:
+            machine.advance(self.now)
         self.machines[name] = machine
-        self._concerned.setdefault(name, []).append((self._machine_turns.add, len(self._names)))
+        self._numbers[name] = len(self._names)
         self._names.append(name)
         self._sources[name] = Source(self, name)
         self._plans.append(RecordedPlans(name, machine))
         machine.changed = partial(self.mark, name)
         self._join()
-        if len(self._names) == 1 and not self.parts and not self._wires:
+        if len(self._names) == 1 and not self.parts and not self.wires:
             self._alone = name, self._plans[0]
         self.mark(name)
 
@@ -198,11 +170,13 @@ class Kernel:
         self._part_names.append(name)
         if name is not None:
             self._sources[name] = Source(self, name)
-        for watched in () if watches is None else dict.fromkeys(watches):
-            self._concerned.setdefault(watched, []).append((self._part_turns.add, number))
         if watches is None:
             self._watching_all.append(number)
-        self._part_turns.add(number)
+        else:
+            for watched in dict.fromkeys(watches):
+                self._watching.setdefault(watched, []).append(number)
+        if not self.is_blank:
+            self._part_turns.add(number)
         self.stale = True
         if self.on_change is not None:
             self.on_change(self)
@@ -219,29 +193,27 @@ class Kernel:
         self.check(wire.source)
         self.check(wire.target)
         self._join()
-        self.drive(wire.target, wire.transmitted(self._level(wire.source)))
-        self._wires.setdefault(wire.source, []).append(wire)
+        if not self.is_blank:
+            self.drive(wire.target, wire.transmitted(self._level(wire.source)))
+        self.wires.add(wire)
         self.mark(wire.target.machine)
-
-    def wires(self) -> Iterator[Wire]:
-        """All wires."""
-        return chain.from_iterable(self._wires.values())
 
     def wire_to(self, target: PinName) -> Wire | None:
         """The wire that drives an input, if one does."""
-        return next((wire for wire in self.wires() if wire.target == target), None)
+        return next((wire for wire in self.wires if wire.target == target), None)
 
     def check(self, name: PinName) -> None:
         """Raises `Misuse` if the machine or its pin does not exist."""
+        if self._is_checked:
+            return
         if name.machine not in self.machines and name.machine not in self.boards:
             raise Misuse(f"no machine {name.machine!r}: there are {', '.join(self.machines) or 'none'}")
-        pins = self._pins_of(name.machine)
+        pins = self._pin_names.get(name.machine)
+        if pins is None:
+            board = self.boards.get(name.machine)
+            pins = self._pin_names[name.machine] = tuple(self.machines[name.machine].pins() if board is None else board.levels)
         if name.pin not in pins:
             raise Misuse(f"{name.machine!r} has no pin {name.pin!r}: pins are {', '.join(pins)}")
-
-    def _pins_of(self, name: str) -> Mapping[str, float]:
-        board = self.boards.get(name)
-        return self.machines[name].pins() if board is None else board.levels
 
     def _level(self, name: PinName) -> float:
         board = self.boards.get(name.machine)
@@ -262,16 +234,19 @@ class Kernel:
 
     def mark(self, name: str | None = None) -> None:
         """Register a change of a machine, a line or an element, or of anything: the signals have to settle."""
-        if self._alone is not None:
-            pass  # it is looked at whenever the kernel settles
+        if self._alone is not None or self.is_blank:
+            pass  # it is looked at whenever the kernel settles, all of it after `restore`
         elif name is None:
             for number in range(len(self._names)):
                 self._machine_turns.add(number)
             for number in range(len(self.parts)):
                 self._part_turns.add(number)
         else:
-            for add, number in self._concerned.get(name, ()):
-                add(number)
+            of_machine = self._numbers.get(name)
+            if of_machine is not None:
+                self._machine_turns.add(of_machine)
+            for number in self._watching.get(name, ()):
+                self._part_turns.add(number)
         self.stale = True
         if self.on_change is not None:
             self.on_change(self)
@@ -281,7 +256,7 @@ class Kernel:
     def drive(self, target: PinName, level: float) -> None:
         """Drive an input to a level now; an unchanged level has no effect."""
         before = self._levels.get(target)
-        if before == level:
+        if before == level or self.is_blank:
             return
         self._levels[target] = level
         self.set_input(target, level, is_first=before is None)
@@ -319,20 +294,12 @@ class Kernel:
     def put(self, element: str, output: str, level: float) -> None:
         """An output of an element has another level now, or its first one."""
         self.report(self.owner(element), "edge", f"{element}.{output.lower()}", level)
-        for wire in self._wires.get(PinName(element, output), ()):
-            self._send(wire, level)
+        self.wires.transmit(PinName(element, output), level, self.now)
         self.mark(element)
-
-    def _send(self, wire: Wire, value: float) -> None:
-        level = wire.transmitted(value)
-        if wire.delay:
-            self._flights.append(DelayedLevel(self.now + wire.delay, wire.target, level))
-        else:
-            self.drive(wire.target, level)
 
     def report(self, machine: str, kind: str, subject: str, value: object, *facts: Fact) -> None:
         """Record an event of a machine at the present moment."""
-        if self._record is not None:
+        if self._record is not None and not self.is_blank:
             self._record(TraceRecord(self.now, machine, kind, subject, value, facts))
 
     # ------------------------------------------------------------------ time
@@ -359,8 +326,8 @@ class Kernel:
             self._advance_machines(now)
             for number in self._part_dues.take(self.now):
                 self._part_turns.add(number)
-            if self._flights:
-                self._arrive()
+            if self.wires.delayed:
+                self.wires.arrive(self.now)
             self.settle()
 
     def _advance_machines(self, now: Nanos) -> None:
@@ -379,11 +346,12 @@ class Kernel:
 
     def _nothing_else_until(self, now: Nanos) -> Nanos:
         """The last moment, at most ``now``, before anything is due besides a machine that is due now."""
-        dues = [self._machine_dues.first(), self._part_dues.first(), *(flight.arrival for flight in self._flights)]
+        dues = [self._machine_dues.first(), self._part_dues.first(), self.wires.next_arrival()]
         return min((due - 1 for due in dues if due is not None and due <= now), default=now)
 
     def _advance_alone(self, name: str, plans: RecordedPlans, now: Nanos) -> None:
         machine, due = self.machines[name], self._due
+        self._changed.add(name)
         while due is not None and due <= now:
             self.now = machine.advance_to_change(now)
             self._settle_alone(name, plans)
@@ -397,7 +365,6 @@ class Kernel:
         if self._record is not None:
             plans.report(self._record, self.now)
         self._due = machine.deadline()
-        self._changed.add(name)
         self.stale = False
 
     def deadline(self) -> Nanos | None:
@@ -409,6 +376,7 @@ class Kernel:
     def settle(self) -> None:
         """Propagate edges along wires and update parts until nothing changes; then find the next deadline."""
         if self._alone is not None:
+            self._changed.add(self._alone[0])
             self._settle_alone(*self._alone)
         else:
             self._settle_joined()
@@ -458,7 +426,7 @@ class Kernel:
         due, of_parts = self._machine_dues.first(), self._part_dues.first()
         if due is None or (of_parts is not None and of_parts < due):
             due = of_parts
-        arrival = min(self._flights).arrival if self._flights else None
+        arrival = self.wires.next_arrival() if self.wires.delayed else None
         self._due = arrival if due is None or (arrival is not None and arrival < due) else due
 
     def _edge(self, name: str, edge: PinEdge) -> None:
@@ -469,15 +437,7 @@ class Kernel:
                 self._recorded[pin] = edge.time, edge.value
         for observer in self.observers:
             observer(name, edge)
-        for wire in self._wires.get(pin, ()):
-            self._send(wire, edge.value)
-
-    def _arrive(self) -> None:
-        """Drive the targets of delayed levels that are due."""
-        arrived = [flight for flight in self._flights if flight.arrival <= self.now]
-        self._flights = [flight for flight in self._flights if flight.arrival > self.now]
-        for flight in arrived:
-            self.drive(flight.target, flight.level)
+        self.wires.transmit(pin, edge.value, self.now)
 
     # ------------------------------------------------------------------ snapshots
 
@@ -490,19 +450,19 @@ class Kernel:
             tuple(machine.snapshot() for machine in self.machines.values()),
             tuple(part.copy_state() for part in self.parts),
             self._levels.copy(),
-            tuple(self._flights),
+            tuple(self.wires.delayed),
         )
 
     def restore(self, state: KernelState) -> None:
         """Restore the state of a kernel with the same machines and parts."""
-        self.now = state.now
+        self.now, self.is_blank = state.now, False
         for machine, its_state in zip(self.machines.values(), state.machines, strict=True):
             machine.restore(its_state)
         for part, its_state in zip(self.parts, state.parts, strict=True):
             part.set_state(its_state)
         self._levels = dict(state.levels)
         self._recorded.clear()
-        self._flights = list(state.flights)
+        self.wires.delayed = list(state.delayed)
         for plans in self._plans:
             plans.mark_reported()
         self.mark()

@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeAlias,
 from steptwin.errors import Misuse
 from steptwin.machine import MachineEvent, MotionController, Nanos
 from steptwin.textcodec import decode
-from steptwin.world.kernel import Kernel, PinName
+from steptwin.world.kernel import Kernel
 from steptwin.world.mechanics import EncoderReader
-from steptwin.world.reader import Key, TomlText
+from steptwin.world.reader import Key, Row, Table, TomlText
 from steptwin.world.scale import DriveScale
 from steptwin.world.spec import ControllerSpec, LineSpec, WorldSpec
 from steptwin.world.values import ANALOG_INPUT, DIGITAL_INPUT, OUTPUT
+from steptwin.world.wires import PinName
 
 if TYPE_CHECKING:
     from steptwin.controllerstate import ControllerState
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from steptwin.diagnostics import Diagnostic, SourceText
     from steptwin.points import LivePoint
     from steptwin.wire.frameline import FrameLine
-    from steptwin.world.control import ControllerCommand, Jog
+    from steptwin.world.control import ControllerCommand, Jog, Seek
     from steptwin.world.elements.axis import AxisSpec
     from steptwin.world.faults import AxisLoad, Body, Faults
     from steptwin.world.heldjog import HeldJog
@@ -34,21 +35,18 @@ if TYPE_CHECKING:
     from steptwin.world.programs import Programs
     from steptwin.world.programtexts import Destination, Downloading, ProgramText
     from steptwin.world.script import Step
-    from steptwin.world.trace import Recorder
+    from steptwin.world.trace import RecordSink
 
 S = TypeVar("S", bound=ControllerSpec)
 M = TypeVar("M", bound=MotionController)
 V = TypeVar("V")
 
-Row: TypeAlias = dict[str, Any]
-"""The values of a table that were read by its keys, by attribute, with ``path``."""
-
-Values: TypeAlias = tuple[tuple[str, float], ...]
+NewValues: TypeAlias = tuple[tuple[str, float], ...]
 """Registers by name, and the values to write."""
 
 
 class BuildContext(Protocol):
-    """The files and machines that a description refers to, while a controller is built."""
+    """The description and the files that it refers to, while those of a controller are read."""
 
     spec: WorldSpec
 
@@ -131,7 +129,7 @@ class EncoderInputs(Generic[M]):
 class NamedRegisters(Generic[M]):
     """Registers that scripts write by name."""
 
-    requests: Callable[[M, Values], tuple[bytes, ...]]
+    requests: Callable[[M, NewValues], tuple[bytes, ...]]
     """The PDUs that write values by name. Raises `Misuse` for what a register does not take."""
     dialect: Callable[[M], Hashable]
     """What requests depend on besides names and values."""
@@ -166,12 +164,13 @@ class ControllerKind(Generic[S, M, V]):
     """The keys of a nested table."""
     exclusive: tuple[tuple[str, str], ...] = ()
     """Pairs of keys that exclude each other."""
-    read: Callable[[TomlText, Row, Mapping[str, Any]], S]
+    read: Callable[[TomlText, Row, Table], S]
     """The spec of a table; what is wrong is reported to the text. The mapping is the table itself."""
     files: Callable[[S], Iterable[tuple[str, str]]]
     """Names of the files that a spec refers to, and the keys that do."""
-    build: Callable[[S, bytes | None, BuildContext], M]
-    """The machine at time 0, with the saved content of its non-volatile memory, if any. Raises `Misuse`."""
+    build: Callable[[S, BuildContext], Callable[[bytes | None], M]]
+    """Reads and checks its files. Gives what makes its machine at time 0, with the saved content of the non-volatile memory, if
+    any, for each world of the description: machines share only what none of them changes. Both raise `Misuse`."""
     watch_events: Callable[[M, Callable[[MachineEvent], None]], None]
     """Call a function with every event of the machine from now on."""
     keep_memory: Callable[[M, bytes | None, Callable[[bytes], None]], None]
@@ -199,9 +198,12 @@ class ControllerKind(Generic[S, M, V]):
     point: Callable[[M, str], LivePoint | None]
     """The point of its data sheet that a name or an address means: what conditions, scripts and programs outside read of it. None
     where there is none; raises `Misuse` for what is half a value."""
-    motion_ends: Callable[[str, str | None], MotionEnds] | None = None
-    """Conditions on an axis, which has that name in conditions, of a controller on a line with that name; None where its state
-    does not show how a motion ended."""
+    motion_ends: Callable[[str, str | None, Seek | None], MotionEnds] | None = None
+    """Conditions on an axis, which has that name in conditions, of a controller on a line with that name, or at the end of a
+    seek; None where its state does not show how a motion ended."""
+    seek: Callable[[M, str | None, Seek], Step] | None = None
+    """The step that begins a seek, of a controller that does not know its switch; arguments and exceptions as those of
+    ``control``."""
     control: Mapping[type[ControllerCommand], Callable[[M, str | None, Any], Step]]
     """The steps by which its master does the commands for controllers that it can do. The text is the name of its line; the
     machine is at the present. Raises `Misuse`, and `Refusal` for what cannot be done now."""
@@ -280,7 +282,7 @@ class LineKind:
     """Keys of ``[[line]]`` that open it for programs outside, and what they open."""
     keys: frozenset[str] = frozenset()
     """Other keys of ``[[line]]`` that not all kinds have."""
-    make: Callable[[LineSpec, Sequence[Member], Kernel, Recorder, Faults], Line]
+    make: Callable[[LineSpec, Sequence[Member], Kernel, RecordSink, Faults], Line]
     """The line with its members, at least one. Raises `Misuse` if they do not fit together."""
     words: Callable[[Any, str, Callable[[FrameLine], None]], LineWords]
     """What goes over a line that was made, in words for a function; the text is put before the name of a place."""

@@ -9,17 +9,17 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Collection, Mapping
 from functools import partial
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos, Port, SendingPort
+from steptwin.machine import Nanos, Port, is_sending
 from steptwin.state import Plain, Stateful
 from steptwin.wire.slave import FrameDirection, FrameObserver, SlaveDevice, SlavePort
 from steptwin.world.faults import Faults, FaultyPort, FaultySendingPort
 from steptwin.world.faults import LineProtocol as FaultLine
 from steptwin.world.kernel import Kernel
 from steptwin.world.master import Master
-from steptwin.world.trace import Recorder, TraceRecord
+from steptwin.world.trace import RecordSink, TraceRecord
 
 SCRIPTS = "script"
 """The place of the world's own scripts on every line."""
@@ -38,6 +38,19 @@ class FrameFollower(Protocol):
     def unframed(self, now: Nanos, place: str, count: int) -> None:
         """Take the number of bytes that belong to no frame."""
         ...
+
+
+class LineTraffic(NamedTuple):
+    """Numbers of what the programs on a line have sent since the beginning; no state, so a restore leaves them."""
+
+    requests: int = 0
+    errors: int = 0
+    """Answers with an exception, and requests lost because the controller was busy; of characters, those lost on the wire."""
+    unframed: int = 0
+    """Bytes that belonged to no frame."""
+
+    def plus(self, other: LineTraffic) -> LineTraffic:
+        return LineTraffic(self.requests + other.requests, self.errors + other.errors, self.unframed + other.unframed)
 
 
 class LineWords(FrameFollower, Protocol):
@@ -89,8 +102,10 @@ class LineEndPoint(Stateful):
 class Line(Stateful, ABC):
     """Base class of lines; a part of its kernel."""
 
-    __slots__ = ("_busy", "_faults", "_followers", "_kernel", "_record", "name", "places")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_busy", "_faults", "_followers", "_kernel", "_record", "name", "places"})
+    __slots__ = ("_before", "_busy", "_faults", "_followers", "_kernel", "_record", "name", "places")
+    FIXED: ClassVar[frozenset[str]] = frozenset(
+        {"_before", "_busy", "_faults", "_followers", "_kernel", "_record", "name", "places"}
+    )
 
     kinds: ClassVar[tuple[str, ...]]
     """Kinds of places; the first is that of scripts."""
@@ -98,13 +113,15 @@ class Line(Stateful, ABC):
     is_shared: ClassVar[bool] = False
     """Whether every program on it receives all that is sent, requested or not."""
 
-    def __init__(self, kernel: Kernel, name: str, record: Recorder | None, faults: Faults) -> None:
+    def __init__(self, kernel: Kernel, name: str, record: RecordSink | None, faults: Faults) -> None:
         self._kernel = kernel
         self._record = record
         self._faults = faults
         self.name = name
         self.places: dict[str, LineEndPoint] = {}
         self._followers: list[FrameFollower] = []
+        self._before = LineTraffic()
+        """Of programs that have disconnected."""
         self._busy: dict[str, LineEndPoint] = {}
         """Places that may send without a request, or later."""
 
@@ -157,7 +174,7 @@ class Line(Stateful, ABC):
             raise Misuse(f"line {self.name!r} takes no connection of kind {kind!r}: permitted are {', '.join(self.kinds)}")
         port = self._port(place, kind)
         framed = self._framed(port)
-        if isinstance(port, SendingPort):
+        if is_sending(port):
             faulty: FaultyPort = FaultySendingPort(
                 port, place, self._faults, self.fault_kinds[kind], line_name=self.name, is_read=place != SCRIPTS
             )
@@ -186,7 +203,22 @@ class Line(Stateful, ABC):
         self._busy.pop(place, None)
         if found is not None:
             found.is_connected = False
+            self._before = self._before.plus(self._traffic_of(found))
             found.port.close()
+
+    @property
+    def traffic(self) -> LineTraffic:
+        """Of all programs, scripts included."""
+        traffic = self._before
+        for place in self.places.values():
+            traffic = traffic.plus(self._traffic_of(place))
+        return traffic
+
+    def _traffic_of(self, place: LineEndPoint) -> LineTraffic:
+        framed = place.framed
+        if framed is None:
+            return LineTraffic()
+        return LineTraffic(framed.requests, framed.exceptions + framed.lost, framed.unframed)
 
     def _count_unframed(self, name: str, place: LineEndPoint, now: Nanos) -> None:
         """Report bytes that belonged to no frame."""

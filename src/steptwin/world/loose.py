@@ -54,21 +54,21 @@ class Looseness(Stateful):
         *,
         is_new: bool,
         burden: Burden,
-        blocked: bool,
+        stands: bool,
     ) -> tuple[Profile | None, MechanicalState]:
         """The motion of a rotor that its field does not hold from now on, None where it does; and its place as that begins.
 
         ``before``: its course until now. ``is_new``: the drive has another plan. ``burden``: what it moves besides
-        its motor's own.
+        its motor's own. ``stands``: something holds it from now on.
         """
         plan, motor = profile_of(drive.plan), self._motor
         led = profile_of(before.plan) if before.free is None else before.free
-        moves = before.leads(now) and not blocked
+        moves = before.leads(now) and not stands
         speed = led.velocity(now) if moves else 0.0
         if drive.is_energised and not self.has_current:
             self._on_since = now
         self.has_current, due, self.due = drive.is_energised, self.due, None
-        runs_on = self._overruns and self.has_current and not is_new and not blocked and due is not None and now < due
+        runs_on = self._overruns and self.has_current and not is_new and not stands and due is not None and now < due
         self._overruns = runs_on
         if runs_on:
             self.due = due
@@ -81,18 +81,31 @@ class Looseness(Stateful):
             if motor.overruns and moves and not state.stalled:
                 found = self._overrun(plan, led, motion, state, now)
             if found is None:
-                self._watch(plan, now)
+                self._watch(plan, motion, now)
             return found, state
         self.is_free = True
         if motion.detent is not None and speed == 0.0 and motion.detent.torque > motion.friction + abs(motion.load):
             state = self._at_full_step(state, motion.detent)
         base = (state.rotor - self._build.zero) * self._build.sign
-        if blocked:
+        if stands:
             return at_rest(now, base), state
         found = motion.profile(now, base, led.phase(now) if moves else 0.0, speed)
         if not is_weak:
             self.due = slow_from(found, now, motor.catch_p)
         return found, state
+
+    def settles(self, course: Course, before: Burden, after: Burden, now: Nanos) -> bool:
+        """Whether a free rotor, whose load changes from ``before`` to ``after``, swings by less than a full step about this
+        place, to which both drive it. Places being whole pulses, it would never come to rest."""
+        speed = 0.0 if course.free is None else course.free.velocity(now)
+        if speed == 0.0:
+            return False
+        direction = 1 if speed > 0.0 else -1
+        one, other = (self._free_motion(course.at(now), burden) for burden in (before, after))
+        drives_to, drives_back = -direction * one.load - one.friction, direction * other.load - other.friction
+        braking = direction * other.load + other.friction
+        swing = 0.5 * other.inertia * speed * speed
+        return drives_to > 0.0 and drives_back > 0.0 and swing < braking * self._build.period_p / 4
 
     def _free_motion(self, state: MechanicalState, burden: Burden) -> FreeMotion:
         build, motor = self._build, self._motor
@@ -100,7 +113,7 @@ class Looseness(Stateful):
         ends = sorted((stop - away - build.zero) * build.sign for stop in (build.low, build.high) if stop is not None)
         return FreeMotion(
             inertia=motor.inertia + burden.inertia,
-            load=motor.load * build.sign,
+            load=(motor.load + burden.load) * build.sign,
             friction=motor.friction + burden.friction,
             low=ends[0] if ends else None,
             high=ends[-1] if ends else None,
@@ -109,21 +122,22 @@ class Looseness(Stateful):
 
     def _is_weak(self, plan: Profile, motion: FreeMotion, now: Nanos) -> bool:
         """Whether there is no current, or too little for the load."""
-        if not self._build.is_free:
-            return False
-        reduced, motor = self._reduced(plan), self._motor
-        is_reduced = reduced is not None and reduced <= now
-        return not self.has_current or (is_reduced and abs(motion.load) > motor.hold * motor.holding + motion.friction)
+        weak_from = self._weak_from(plan, motion)
+        return self._build.is_free and (not self.has_current or (weak_from is not None and weak_from <= now))
 
-    def _reduced(self, plan: Profile) -> Nanos | None:
-        """From when on the current is reduced."""
-        if self._motor.hold == 1.0 or not self._build.is_free or plan.end is None:
+    def _weak_from(self, plan: Profile, motion: FreeMotion) -> Nanos | None:
+        """From when on a field at rest has too little torque for the load: at once, or when the current is reduced."""
+        if not self._build.is_free or plan.end is None:
             return None
-        return max(plan.end, self._on_since) + self._motor.hold_ns
+        motor, needed = self._motor, abs(motion.load) - motion.friction
+        rests = max(plan.end, self._on_since)
+        if needed > motor.holding:
+            return rests
+        return rests + motor.hold_ns if needed > motor.hold * motor.holding else None
 
-    def _watch(self, plan: Profile, now: Nanos) -> None:
+    def _watch(self, plan: Profile, motion: FreeMotion, now: Nanos) -> None:
         """Find when something happens to a rotor that is held."""
-        dues = [self._reduced(plan)]
+        dues = [self._weak_from(plan, motion)]
         if self._motor.overruns and plan.end is not None and _speed_into(plan, plan.end):
             dues.append(plan.end)
         self.due = min((due for due in dues if due is not None and due > now), default=None)

@@ -77,6 +77,8 @@ class Mechanism(Stateful):
         "_blockers",
         "_brake",
         "_burden",
+        "_burdens",
+        "_changed",
         "_changes",
         "_coupled",
         "_course",
@@ -119,7 +121,12 @@ class Mechanism(Stateful):
         """What blocks the rotor."""
         self._brake = 0.0
         """Torque of the brake, N·m."""
+        self._burdens: dict[str, Burden] = {}
+        """Further loads, by the names of their elements."""
         self._burden = NO_BURDEN
+        """All of them together."""
+        self._changed: tuple[int, Burden] | None = None
+        """Where the rotor was when they changed, and what it carried until then."""
         self._loose = None if build.motor is None or not build.is_loose else Looseness(build, build.motor, kernel.now)
         """None for a rotor that always goes with its field, or stands."""
         self._falls = False
@@ -226,8 +233,8 @@ class Mechanism(Stateful):
             self._kernel.report(self.machine, "event", "stall", text, *facts)
         self._stall_due = self._course.next_stall(now)
 
-    def _renew(self, drive: Drive, now: Nanos, state: MechanicalState | None = None) -> None:
-        """Compute a new course after a change of the drive's plan or of the mechanics."""
+    def _renew(self, drive: Drive, now: Nanos, state: MechanicalState | None = None, *, rests: bool = False) -> None:
+        """Compute a new course after a change of the drive's plan or of the mechanics. ``rests``: a free rotor stands now."""
         before, plan = self._course, drive.plan
         if state is None:
             if self._simple:
@@ -245,7 +252,7 @@ class Mechanism(Stateful):
         free = None
         if self._loose is not None:
             free, state = self._loose.motion(
-                drive, before, state, now, is_new=is_new, burden=self._carried, blocked=self._blocked
+                drive, before, state, now, is_new=is_new, burden=self._carried, stands=self._blocked or rests
             )
         vibration = before.vibration(now)
         self._course = Course(self._loaded(), plan, now, state, blocked=self._blocked, jump=jump, free=free, vibration=vibration)
@@ -262,16 +269,15 @@ class Mechanism(Stateful):
     @property
     def _carried(self) -> Burden:
         """What the motor moves besides its own: a further load, and the friction of the brake."""
-        return self._burden._replace(friction=self._burden.friction + self._brake)
+        return self._burden.plus(Burden(0.0, self._brake))
 
     def _loaded(self) -> Build:
         """What a powered motor has to move."""
         motor, more = self.build.motor, self._carried
         if motor is None or more == NO_BURDEN:
             return self.build
-        return replace(
-            self.build, motor=replace(motor, inertia=motor.inertia + more.inertia, friction=motor.friction + more.friction)
-        )
+        own = Burden(motor.inertia, motor.friction, motor.load).plus(more)
+        return replace(self.build, motor=replace(motor, inertia=own.inertia, friction=own.friction, load=own.load))
 
     def _watch_fall(self, now: Nanos, free: Profile | None) -> None:
         """Report that a rotor that its field does not hold begins to move, and that it rests again."""
@@ -293,13 +299,22 @@ class Mechanism(Stateful):
         self._renew(self._drive, now, state)
         self._kernel.mark(self.machine)
 
-    def burden(self, more: Burden, now: Nanos) -> None:
-        """Let a further load act on the rotor, in place of the one before."""
-        if more == self._burden:
+    def burden(self, by: str, more: Burden, now: Nanos) -> None:
+        """Let the element ``by`` load the rotor with ``more``, in place of what it did before."""
+        if more == self._burdens.get(by, NO_BURDEN):
             return
-        state = self.at(now)
-        self._burden = more
-        self._renew(self._drive, now, state)
+        course, before = self.course(now), self._carried
+        self._burdens[by] = more
+        self._burden = NO_BURDEN
+        for one in self._burdens.values():
+            self._burden = self._burden.plus(one)
+        state = course.at(now)
+        rests = False
+        if self._loose is not None:
+            last, self._changed = self._changed, (state.rotor, before)
+            is_again = last is not None and last[1] == self._carried and 4 * abs(last[0] - state.rotor) <= self.build.period_p
+            rests = is_again and self._loose.settles(course, before, self._carried, now)
+        self._renew(self._drive, now, state, rests=rests)
         self._kernel.mark(self.machine)
 
     def pulls(self, now: Nanos) -> bool:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 from steptwin.errors import Misuse
-from steptwin.world.kind import MotionEnds, lacks
+from steptwin.world.control import Home, Seek
+from steptwin.world.kind import AnyKind, MotionEnds, lacks
 
 if TYPE_CHECKING:
     from steptwin.world.control import ControllerCommand
@@ -13,21 +15,37 @@ if TYPE_CHECKING:
     from steptwin.world.script import Step
 
 
-def ordered(plant: Plant, command: ControllerCommand) -> Step:
+def ordered(plant: Plant, command: ControllerCommand | Seek) -> Step:
     """The step by which the master of a controller does a command now. Raises `Misuse` and `Refusal`."""
     name = command.machine
     kind, machine = plant.kind(name), plant.machine(name)
-    make = kind.control.get(type(command))
+    make = _maker(kind, command)
     if make is None:
-        raise lacks(name, kind, f"command {type(command).__name__.lower()}")
+        raise _lacks(name, kind, command)
     plant.touch(name)
     machine.advance(plant.now)
     on = plant.parts.line_of.get(name)
     return make(machine, None if on is None else on[0].name, command)
 
 
-def motion_ends(plant: Plant, name: str, axis: int) -> MotionEnds:
-    """The conditions on an axis (from 1). Raises `Misuse` for one that is not there, or does not show how its motions end."""
+def _maker(kind: AnyKind, command: ControllerCommand | Seek) -> Callable[[Any, str | None, Any], Step] | None:
+    return kind.seek if isinstance(command, Seek) else kind.control.get(type(command))
+
+
+def _lacks(name: str, kind: AnyKind, command: ControllerCommand | Seek) -> Misuse:
+    if isinstance(command, Seek):
+        return Misuse(f"{name!r} is {kind.title}, which knows its switches: home it with a velocity, not with seek")
+    if isinstance(command, Home) and kind.seek is not None:
+        what = f"{name!r} is {kind.title}, which does not know its switch"
+        return Misuse(f"{what}: home it with seek, such as '-B8', not with a velocity")
+    return lacks(name, kind, f"command {type(command).__name__.lower()}")
+
+
+def motion_ends(plant: Plant, name: str, axis: int, seek: Seek | None = None) -> MotionEnds:
+    """The conditions on an axis (from 1), or at the end of a seek of it.
+
+    Raises `Misuse` for one that is not there, or does not show how its motions end.
+    """
     kind = plant.kind(name)
     if kind.motion_ends is None:
         raise lacks(name, kind, "status of motions: send its commands, and wait for a condition")
@@ -35,4 +53,4 @@ def motion_ends(plant: Plant, name: str, axis: int) -> MotionEnds:
     if not 1 <= axis <= axes:
         raise Misuse(f"{name}.M{axis}: {name} has {', '.join(f'M{number}' for number in range(1, axes + 1))}")
     on = plant.parts.line_of.get(name)
-    return kind.motion_ends(f"{name}.M{axis}", None if on is None else on[0].name)
+    return kind.motion_ends(f"{name}.M{axis}", None if on is None else on[0].name, seek)

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple, TypeAlias
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.motion import Segment
-from steptwin.world.resonance import Part, Resonance
+from steptwin.world.resonance import MotionPart, Resonance
 
 FASTEST = 1e15
 """Limit of accelerations without current, pulses/s², far above all that is built, so that no product overflows."""
@@ -35,10 +35,17 @@ _SLACK = 1e-12
 
 
 class Burden(NamedTuple):
-    """A further load of a motor: inertia, N·m per pulse/s², and friction, N·m."""
+    """A further load of a motor: inertia, N·m per pulse/s², friction, N·m, and a constant torque as that of its own load, N·m."""
 
     inertia: float
     friction: float
+    load: float = 0.0
+
+    def times(self, share: float) -> Burden:
+        return Burden(self.inertia * share, self.friction * share, self.load * share)
+
+    def plus(self, other: Burden) -> Burden:
+        return Burden(self.inertia + other.inertia, self.friction + other.friction, self.load + other.load)
 
 
 NO_BURDEN = Burden(0.0, 0.0)
@@ -113,19 +120,19 @@ class StepperMotor:
         """Torque of the field at rest, with the whole current."""
         return self.curve[0][1]
 
-    def parts(self, s: Any, begin_s: float, end_s: float, sign: int) -> Iterator[Part]:
+    def parts(self, s: Any, begin_s: float, end_s: float, sign: int) -> Iterator[MotionPart]:
         """What a segment is for its resonance, between passages of the band and of corners of the curve."""
         band = () if self.resonance is None else (self.resonance.low, self.resonance.high)
         if not isinstance(s, Segment):
             for t, speed, need in self._looks(s, begin_s, end_s, sign):
-                yield Part(t, min(t + LOOK_S, end_s), speed, self._use(speed, need))
+                yield MotionPart(t, min(t + LOOK_S, end_s), speed, self._use(speed, need))
             return
         begins = [begin_s, *self._corners(s, begin_s, end_s, *band)] if end_s < inf else [begin_s]
         for t0, t1 in zip(begins, [*begins[1:], end_s], strict=True):
             middle = 0.5 * (t0 + t1) if t1 < inf else t0
             u, speed = middle - s.anchor_s, abs(s.velocity(middle))
             need = self.needs(sign * (2.0 * s.c2 + 6.0 * s.c3 * u), sign * s.direction)
-            yield Part(t0, t1, speed, self._use(speed, need))
+            yield MotionPart(t0, t1, speed, self._use(speed, need))
 
     def _use(self, speed: float, need: float) -> float:
         """The share of its torque that is needed, at most 1."""

@@ -13,13 +13,14 @@ from steptwin.world.elements import ELEMENTS
 from steptwin.world.elements.axis import AXIS, BuiltAxis
 from steptwin.world.elements.button import BUTTON
 from steptwin.world.faults import Faults
-from steptwin.world.kernel import Kernel, PinName
+from steptwin.world.kernel import Kernel
 from steptwin.world.kind import AnyKind, Terminals
 from steptwin.world.lines import Line
 from steptwin.world.signals import SignalOf
 from steptwin.world.spec import WorldSpec
 from steptwin.world.tomlplaces import Path
-from steptwin.world.trace import Recorder
+from steptwin.world.trace import RecordSink
+from steptwin.world.wires import PinName
 
 
 @dataclass(slots=True)
@@ -28,7 +29,7 @@ class WorldParts:
 
     spec: WorldSpec
     faults: Faults
-    record: Recorder
+    record: RecordSink
     kernels: list[Kernel] = field(default_factory=list)
     kernel_of: dict[str, Kernel] = field(default_factory=dict)
     """Of machines, lines and elements with terminals."""
@@ -48,8 +49,6 @@ class WorldParts:
     """Built elements with names: by the name of the kind, then by their own."""
     supplied: dict[str, str] = field(default_factory=dict)
     """The power supplies of machines that have one."""
-    warnings: list[str] = field(default_factory=list)
-    """Warnings about the files that the description names."""
 
     def built(self, element: Element[S, B]) -> Mapping[str, B]:
         """The built elements of a kind, by name."""

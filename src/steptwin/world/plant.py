@@ -20,13 +20,14 @@ from steptwin.machine import MotionController, Nanos
 from steptwin.nearmiss import NearMiss
 from steptwin.world import script as do
 from steptwin.world.actions import ExternalInput, act
-from steptwin.world.build import Files, Keep, build
+from steptwin.world.blueprint import Blueprint, FileContents
+from steptwin.world.build import Keep, build
 from steptwin.world.condition import SignalCondition
 from steptwin.world.contacts import Button
 from steptwin.world.elements.axis import BuiltAxis
 from steptwin.world.faults import Fault
 from steptwin.world.kernel import Kernel, KernelState
-from steptwin.world.kind import AnyKind, EncoderInputs, NamedRegisters, Values, Vision, lacks
+from steptwin.world.kind import AnyKind, EncoderInputs, NamedRegisters, NewValues, Vision, lacks
 from steptwin.world.lines import Line
 from steptwin.world.names import Unknown
 from steptwin.world.overrides import Overrides
@@ -39,7 +40,7 @@ from steptwin.world.rigging import Rigging
 from steptwin.world.running import Script
 from steptwin.world.scripts import MOST_STEPS_PER_INSTANT, Scripts, ScriptsState
 from steptwin.world.signals import Idle, SignalOf, find_signal
-from steptwin.world.spec import ScriptSpec, WorldSpec
+from steptwin.world.spec import ScriptSpec
 from steptwin.world.trace import Mark, Trace, TraceRecord
 
 WORLD = "world"
@@ -61,11 +62,13 @@ class RecordedInput(NamedTuple):
 class PlantSnapshot:
     """The complete state of a world at a moment."""
 
-    description: tuple[str, int, Overrides, Files]
+    description: tuple[str, int, Overrides, FileContents]
     now: Nanos
     kernels: tuple[KernelState, ...]
     faults: tuple[tuple[Fault, str, Nanos], ...]
     """The faults that were set, with their names and moments."""
+    rigged: tuple[str, ...]
+    """The machines that were prepared for faults."""
     faults_state: Any
     scripts: ScriptsState
     inputs: tuple[RecordedInput, ...]
@@ -83,18 +86,20 @@ class Plant:
 
     def __init__(
         self,
-        spec: WorldSpec,
-        files: Files,
+        blueprint: Blueprint,
         *,
         keep_trace: bool = True,
         keep_inputs: bool = True,
         keep_memory: Keep | None = None,
+        at: PlantSnapshot | None = None,
     ) -> None:
+        """The world of a description at time 0, or ``at`` a snapshot of one with the same description."""
+        self.blueprint, spec = blueprint, blueprint.spec
         names = [*(controller.name for controller in spec.controllers), *(line.name for line in spec.lines), WORLD]
         self.spec = spec
-        self.files = files
+        self.files = blueprint.files
         self.trace = Trace(names, keep=keep_trace)
-        self.parts: WorldParts = build(spec, files, self.trace.add, keep_memory)
+        self.parts: WorldParts = build(blueprint, self.trace.add, keep_memory, is_blank=at is not None)
         self.now: Nanos = 0
         self.stopped: str | None = None
         """The reason a script gave for ending the run; None if none did."""
@@ -123,9 +128,15 @@ class Plant:
         self._scheduled: dict[str, Script] = {}
         """Scheduled steps that can be cancelled, by name."""
         self.rigging = Rigging(self.parts)
-        check_faults(self, spec.faults)
-        check_scripts(self, spec.scripts)
+        if at is None:
+            check_faults(self, spec.faults)
+        if not blueprint.is_checked:
+            check_scripts(self, spec.scripts)
         spec.text.check()
+        blueprint.is_checked = True
+        if at is not None:
+            self.restore(at)
+            return
         for line in spec.scripts:
             self._begin(line)
 
@@ -313,12 +324,12 @@ class Plant:
         return kind.vision
 
     @staticmethod
-    def by_machine(step: do.Write) -> Iterator[tuple[str, Values]]:
+    def by_machine(step: do.Write) -> Iterator[tuple[str, NewValues]]:
         """The values that a step writes, grouped by machine."""
         for name, group in groupby(step.values, key=itemgetter(0)):
             yield name, tuple((register, value) for _, register, value in group)
 
-    def requests(self, name: str, values: Values) -> tuple[bytes, ...]:
+    def requests(self, name: str, values: NewValues) -> tuple[bytes, ...]:
         """The PDUs that write ``values`` to a machine. Raises `Misuse` for values that a register does not accept."""
         registers, machine = self.registers(name), self.parts.machines[name]
         key = (self.parts.kind_of[name].name, registers.dialect(machine), values)
@@ -444,6 +455,7 @@ class Plant:
             self.now,
             tuple(kernel.snapshot() for kernel in self.kernels),
             tuple((active.fault, active.name, active.since) for active in self.parts.faults.active),
+            tuple(self.parts.faults.machines),
             self.parts.faults.copy_state(),
             self._scripts.state(),
             tuple(self.inputs) if with_inputs else (),
@@ -455,7 +467,7 @@ class Plant:
             tuple(self.downloaded.items()),
         )
 
-    def _description(self) -> tuple[str, int, Overrides, Files]:
+    def _description(self) -> tuple[str, int, Overrides, FileContents]:
         return self.spec.text.source.text, self.spec.seed, self.spec.overrides, self.files
 
     def restore(self, snapshot: PlantSnapshot) -> None:
@@ -469,7 +481,7 @@ class Plant:
         self.now = snapshot.now
         self.stopped = None
         self.trace.rewind(snapshot.trace)
-        self.rigging.put_back(snapshot.faults, snapshot.faults_state)
+        self.rigging.put_back(snapshot.faults, snapshot.rigged, snapshot.faults_state)
         for kernel, state in zip(self.kernels, snapshot.kernels, strict=True):
             kernel.restore(state)
         self.inputs, self.is_settled = list(snapshot.inputs), snapshot.is_settled

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 from steptwin.diagnostics import SourceText
 from steptwin.machine import Nanos
 from steptwin.statements import StatementHook
-from steptwin.world.trace import Recorder, TraceRecord
+from steptwin.world.trace import RecordSink, TraceRecord
 
 if TYPE_CHECKING:
     from steptwin.world.plant import Plant
@@ -43,7 +43,7 @@ class Frame(NamedTuple):
     place: Place
 
 
-class OperandKind(enum.Enum):
+class ResourceKind(enum.Enum):
     """What a statement reads or changes."""
 
     PIN = "pin"
@@ -53,16 +53,16 @@ class OperandKind(enum.Enum):
     """A variable or register of the program."""
 
 
-class Operand(NamedTuple):
-    kind: OperandKind
+class Resource(NamedTuple):
+    kind: ResourceKind
     name: str
 
 
 class StatementUse(NamedTuple):
     """What a statement reads and changes, and which statements depend on it."""
 
-    reads: tuple[Operand, ...] = ()
-    writes: tuple[Operand, ...] = ()
+    reads: tuple[Resource, ...] = ()
+    writes: tuple[Resource, ...] = ()
     waits: bool = False
     """Whether the program goes on only when what it reads permits it, or, if it reads nothing, after a time."""
     governs: range = range(0)
@@ -152,7 +152,7 @@ class Programs(Protocol):
 class StatementFollower:
     """Reports each statement that a program of the world executes as a record of kind ``statement``, until `close`."""
 
-    def __init__(self, plant: Plant, report: Recorder) -> None:
+    def __init__(self, plant: Plant, report: RecordSink) -> None:
         self._hooks: list[tuple[Programs, StatementHook]] = []
         for name, programs in plant.programs.items():
             hook = _reporting(name, programs, report)
@@ -165,7 +165,7 @@ class StatementFollower:
         self._hooks.clear()
 
 
-def _reporting(name: str, programs: Programs, report: Recorder) -> StatementHook:
+def _reporting(name: str, programs: Programs, report: RecordSink) -> StatementHook:
     def hook(now: Nanos, number: int) -> None:
         place = programs.place(number)
         if place is not None:

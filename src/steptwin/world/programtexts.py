@@ -13,6 +13,7 @@ from steptwin.machine import Nanos
 from steptwin.world.script import Step
 
 if TYPE_CHECKING:
+    from steptwin.explain.model import MemoryPart
     from steptwin.world.plant import Plant
     from steptwin.world.spec import WorldSpec
 
@@ -44,6 +45,8 @@ class ProgramText:
     source: SourceText
     check: Callable[[], Sequence[Diagnostic]]
     """What the checker of its language finds, in the order of the text."""
+    memory: Callable[[str], Sequence[MemoryPart]]
+    """What another text would take of the memory at this place; empty for one with errors."""
     is_empty: bool = False
     """Whether nothing is there; the text is empty then."""
     is_running: bool = False
@@ -138,6 +141,10 @@ class WorldPrograms:
         text = text_at(self._plant, machine, place)
         findings = [{key: row[key] for key in FINDING} for row in to_json(text.source, text.check())]
         return {**_plain(machine, text), "text": text.source.text, "diagnostics": findings}
+
+    def memory(self, machine: str, place: str, text: str) -> Sequence[Mapping[str, object]]:
+        """What a text takes of the memory at a place; empty for one with errors. Raises `Misuse`."""
+        return [part._asdict() for part in text_at(self._plant, machine, place).memory(text)]
 
     def files(self) -> Mapping[str, bytes]:
         """What an editor server needs by address: texts, configurations, and a description of their controllers."""

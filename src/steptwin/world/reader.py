@@ -6,7 +6,7 @@ import re
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 from steptwin.diagnostics import Diagnostic, Fix, Severity, SourceText, Span, in_order, render
 from steptwin.errors import Misuse, SourceErrors
@@ -14,6 +14,8 @@ from steptwin.nearmiss import NearMiss
 from steptwin.world.names import Unknown
 from steptwin.world.tomlplaces import Path, UnsupportedToml, find_places
 from steptwin.world.values import Word
+
+T = TypeVar("T")
 
 _MISSING: Any = object()
 MOST_FINDINGS = 100
@@ -24,6 +26,12 @@ _WHOLE = range(-(1 << 63), 1 << 63)
 
 FILE_ERRORS = "D010"
 """A file that the description names has errors."""
+
+
+Table: TypeAlias = Mapping[str, Any]
+"""A table as written in the text."""
+Row: TypeAlias = Mapping[str, Any]
+"""The values of a table by attribute, each read and checked, with the ``path`` of the table."""
 
 
 class WorldError(SourceErrors):
@@ -129,6 +137,19 @@ class TomlText:
             path = path[:-1]
         self.wrong_at(self._spans.get(path, Span(0, 0)), code, message, hint, fix)
 
+    def unless_wrong(self, path: Path, action: Callable[[], T]) -> T | None:
+        """What ``action`` gives for the table at ``path``; None if that has an error already, or now. Errors are reported at the
+        path."""
+        if self.is_wrong(path):
+            return None
+        try:
+            return action()
+        except SourceErrors as error:
+            self.wrong_file(path, error)
+        except Misuse as error:
+            self.wrong_reference(path, error)
+        return None
+
     def wrong_file(self, path: Path, error: SourceErrors) -> None:
         """A file that the table at ``path`` names has errors, which have places of their own."""
         if str(error) not in self._in_files:
@@ -181,7 +202,7 @@ class TomlText:
 
     def is_wrong(self, path: Path) -> bool:
         """Whether something is wrong with the value at ``path`` or in it."""
-        return any(wrong[: len(path)] == path for wrong in self._wrong)
+        return bool(self._wrong) and any(wrong[: len(path)] == path for wrong in self._wrong)
 
     def is_any_wrong(self, *kinds: str) -> bool:
         """Whether something is wrong with tables of these kinds."""
@@ -269,6 +290,26 @@ def optional(read: Callable[[Any], Any], name: str, meaning: str, default: Any =
     return Key(name, read, meaning, default, attribute)
 
 
+COMMON_WORDS: Mapping[str, tuple[str, ...]] = {
+    "lead": ("pitch",),
+    "screw": ("pitch",),
+    "limits": ("travel",),
+    "range": ("travel",),
+    "stops": ("travel",),
+    "play": ("backlash",),
+    "motor": ("drive",),
+    "position": ("at", "start"),
+    "input": ("to", "in"),
+    "pin": ("to",),
+    "output": ("extend", "run", "release", "coil", "from"),
+    "velocity": ("speed", "vel"),
+    "weight": ("force", "mass"),
+    "delay": ("time",),
+    "condition": ("when", "until"),
+}
+"""What people call keys that have other names here."""
+
+
 def read_table(text: TomlText, path: Path, value: object, keys: Sequence[Key], also: Iterable[str] = ()) -> dict[str, Any]:
     """The values of a table by attribute; errors are added to ``text``. Keys in ``also`` are read elsewhere."""
     values: dict[str, Any] = {key.attribute or key.name: key.default for key in keys if not key.is_required}
@@ -288,7 +329,8 @@ def read_table(text: TomlText, path: Path, value: object, keys: Sequence[Key], a
                 fix = text.replacement((*path, name), str(given), meant)
                 text.wrong((*path, name), "D003", f"{what}: {name}: {error}", key.meaning, fix)
         elif name not in also:
-            near = text.near(name, permitted)
+            usual = next((key for key in COMMON_WORDS.get(name.lower(), ()) if key in permitted), None)
+            near = text.near(name, permitted) if usual is None else f" (did you mean {usual!r}?)"
             fix = text.key_replacement((*path, name), name, permitted)
             text.wrong((*path, name), "D004", f"{what} has no {name!r}{near}", f"permitted: {_listed(known, also)}", fix)
     for key in keys:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from steptwin.machine import MotionController, Nanos
 from steptwin.motion import Profile
 from steptwin.motion.divisions import profile_of
-from steptwin.world.trace import Recorder, TraceRecord
+from steptwin.world.trace import RecordSink, TraceRecord
 
 
 class RecordedPlans:
@@ -20,7 +20,7 @@ class RecordedPlans:
         self._profiles: list[Profile | None] = [None] * len(self._drives)
         self._origins = [0] * len(self._drives)
 
-    def report(self, record: Recorder, now: Nanos) -> None:
+    def report(self, record: RecordSink, now: Nanos) -> None:
         """Record new plans and changes of coordinates. A plan that only continues the rest at the same position is not new."""
         for i, number, drive in self._drives:
             origin = drive.offset_p

@@ -1,17 +1,95 @@
-"""Records of a trace in words."""
+"""Records of a trace in words, and which of them are shown."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from steptwin.errors import Misuse
 from steptwin.machine import SECOND
+from steptwin.nearmiss import NearMiss
+from steptwin.world.parts import WorldParts
 from steptwin.world.trace import TraceRecord
 
 _NAMED = ("note", "expectation", "overdue")
 """Events whose texts need their code in front."""
+PROGRAM = "program"
+SHOWN = {
+    PROGRAM: "what a program of a MIC488 does",
+    "status": "what controllers and elements report, and the commands of an M1486",
+    "note": "notes of scripts",
+    "report": "expectations that failed, and waits that timed out",
+    "button": "buttons",
+    "input": "inputs from outside",
+    "fault": "faults",
+}
+"""Kinds of what is shown to a user."""
+WORLD = "world"
+"""Who reports what scripts do."""
+MOST_NAMED = 20
 
 
 def is_shown(record: TraceRecord) -> bool:
     """Whether a record is shown to a user. Requests are not: they are as frequent as frames."""
     return record.kind in ("event", "fault", "input") and record.subject != "request"
+
+
+def shown_kind(record: TraceRecord) -> str:
+    """The kind, one of `SHOWN`, of a record that is shown."""
+    if record.kind == "input" and record.value in ("pressed", "released"):
+        return "button"
+    if record.kind != "event":
+        return record.kind
+    return {"note": "note", "expectation": "report", "overdue": "report"}.get(record.subject, "status")
+
+
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """What a user wants to see: of some controllers, elements and lines, and some kinds; None: all."""
+
+    names: frozenset[str] | None = None
+    kinds: frozenset[str] | None = None
+
+    def takes(self, kind: str, name: str, text: str = "", facts: Iterable[object] = ()) -> bool:
+        """Whether something of a kind is wanted that ``name`` reports. An element is meant, too, where the text begins with its
+        name, or a fact is it."""
+        return (self.kinds is None or kind in self.kinds) and self.takes_of(name, text, facts)
+
+    def takes_of(self, name: str, text: str = "", facts: Iterable[object] = ()) -> bool:
+        if self.names is None or name in self.names:
+            return True
+        about = (text.partition(" ")[0].rstrip(":"), *(fact for fact in facts if isinstance(fact, str)))
+        return any(one in self.names or one.partition(".")[0] in self.names for one in about)
+
+    def shows(self, record: TraceRecord) -> bool:
+        if not is_shown(record):
+            return False
+        text = record.subject if record.kind != "event" else str(record.value)
+        return self.takes(shown_kind(record), record.machine, text, (value for _, value in record.facts))
+
+
+ALL = Selection()
+
+
+def read_selection(
+    names: Sequence[str], kinds: Sequence[str], there: Iterable[str], known: Sequence[str] = tuple(SHOWN)
+) -> Selection:
+    """From texts with names and kinds, between commas. ``there``: what there is in the world. Raises `Misuse`."""
+    return Selection(_chosen("--of", names, [*there, WORLD]), _chosen("--show", kinds, known))
+
+
+def _chosen(option: str, texts: Sequence[str], known: Sequence[str]) -> frozenset[str] | None:
+    wanted = [one.strip() for text in texts for one in text.split(",") if one.strip()]
+    for one in wanted:
+        if one not in known:
+            shown = ", ".join(known[:MOST_NAMED]) + (f" and {len(known) - MOST_NAMED} more" if len(known) > MOST_NAMED else "")
+            raise Misuse(f"{option} {one}{NearMiss().hint(one, known)}: there are {shown}")
+    return frozenset(wanted) or None
+
+
+def named_in(parts: WorldParts) -> Iterable[str]:
+    """The names of what reports anything in a world."""
+    return (*parts.machines, *parts.lines, *parts.element_names)
 
 
 def describe(record: TraceRecord) -> str:

@@ -11,6 +11,7 @@ from steptwin.errors import Misuse, Refusal
 from steptwin.tables import complete
 from steptwin.world import script as do
 from steptwin.world.actions import Bytes, Download, ExternalInput, Leave, See, SetVariable
+from steptwin.world.control import Seek
 from steptwin.world.faults import Fault
 from steptwin.world.motions import motion_ends, ordered
 from steptwin.world.spec import ScriptSpec
@@ -107,9 +108,12 @@ def _condition(plant: Plant, step: do.Until | do.Expect) -> None:
 
 
 def _order(plant: Plant, step: do.Order) -> None:
-    motion_ends(plant, step.command.machine, step.command.axis)
+    command = step.command
+    motion_ends(plant, command.machine, command.axis)
     with suppress(Refusal):  # what cannot be done now may be possible later
-        check_step(plant, ordered(plant, step.command))
+        check_step(plant, ordered(plant, command))
+    if isinstance(command, Seek):
+        plant.condition(motion_ends(plant, command.machine, command.axis, command).reached)
 
 
 def _motion(plant: Plant, step: do.UntilOver | do.ExpectReached) -> None:

@@ -30,7 +30,7 @@ class Resonance(NamedTuple):
     least: float
 
 
-class Part(NamedTuple):
+class MotionPart(NamedTuple):
     """A part of a motion, s from the beginning of its profile: speed (pulses/s), and the share of the torque that it needs."""
 
     begin_s: float
@@ -62,7 +62,7 @@ def limit(use: float) -> float:
     return sqrt(max(2.0 * barrier / stiffness, 0.0)) / QUARTER
 
 
-def spells(of: Resonance, parts: Iterable[Part], amplitude: float) -> Iterator[tuple[Spell, float | None]]:
+def spells(of: Resonance, parts: Iterable[MotionPart], amplitude: float) -> Iterator[tuple[Spell, float | None]]:
     """The vibration through parts of a motion, with the moment at which the rotor loses the field, which ends them."""
     for part in parts:
         grows = of.low < part.speed < of.high

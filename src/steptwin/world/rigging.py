@@ -34,11 +34,12 @@ class Rigging:
         self.check(fault)
         self._plan.faults.add(fault, now)
 
-    def put_back(self, faults: Iterable[tuple[Fault, str, Nanos]], state: Any) -> None:
-        """Restore the faults of a snapshot, with name and moment; machines remain prepared for later ones."""
+    def put_back(self, faults: Iterable[tuple[Fault, str, Nanos]], rigged: Iterable[str], state: Any) -> None:
+        """Restore the faults of a snapshot, with name and moment, and prepare the machines that it has prepared; others remain
+        prepared for later ones."""
         kept, there = list(faults), self._plan.faults
-        for fault, _, _ in kept:
-            self._prepare(fault)
+        for name in rigged:
+            self.rig(name)
         there.active = tuple(ActiveFault(fault, name, there.seed, since) for fault, name, since in kept)
         there.set_state(state)
 

@@ -87,7 +87,7 @@ class SentValues:
         return other
 
 
-Place: TypeAlias = "tuple[tuple[int, int], ...] | SentValues"
+ScriptProgress: TypeAlias = "tuple[tuple[int, int], ...] | SentValues"
 """The progress of a script: its place in a `Walk`, or the values sent to its generator."""
 
 
@@ -98,7 +98,7 @@ class ScriptState(NamedTuple):
     name: str
     make: Callable[[], do.Steps | do.Walk]
     is_external: bool
-    place: Place
+    place: ScriptProgress
     waiting: ScriptWait | None
 
 
@@ -143,7 +143,7 @@ class Script:
 
     def state(self) -> ScriptState:
         steps = self._steps
-        place: Place = steps.place if isinstance(steps, do.Walk) else self._sent.copy()
+        place: ScriptProgress = steps.place if isinstance(steps, do.Walk) else self._sent.copy()
         return ScriptState(self.number, self.name, self.make, self.is_external, place, self.waiting)
 
     @classmethod

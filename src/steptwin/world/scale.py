@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from math import floor
-from typing import TYPE_CHECKING
+from functools import lru_cache
+from typing import TYPE_CHECKING, NamedTuple
 
 from steptwin.errors import Misuse
 from steptwin.motion.trig import PI
@@ -27,6 +27,12 @@ TURNS: Mapping[str, Fraction] = {"rev": Fraction(1), "degree": Fraction(1, 360)}
 """In revolutions."""
 
 
+@lru_cache(maxsize=4096)
+def exact_fraction(units: float) -> Fraction:
+    """A number as it is written."""
+    return Fraction(str(units))
+
+
 @dataclass(frozen=True, slots=True)
 class Scale:
     """Pulses of the drive per unit of the axis, and per revolution of its motor."""
@@ -38,10 +44,12 @@ class Scale:
 
     def nearest(self, units: float) -> int:
         """The pulse nearest to a position."""
-        return floor(self.pulses(units) + Fraction(1, 2))
+        scale, exact = self.pulses_per_unit, exact_fraction(units)
+        below = scale.denominator * exact.denominator
+        return (2 * scale.numerator * exact.numerator + below) // (2 * below)
 
     def pulses(self, units: float) -> Fraction:
-        return Fraction(str(units)) * self.pulses_per_unit
+        return exact_fraction(units) * self.pulses_per_unit
 
     @property
     def period_p(self) -> int:
@@ -82,9 +90,9 @@ def _per_unit(spec: AxisSpec, drive: DriveScale) -> tuple[str, Fraction]:
     usual = "degree" if is_rotary else "mm"
     unit = usual if spec.unit is None else spec.unit
     if spec.pulses_per_unit is not None:
-        return unit, Fraction(str(spec.pulses_per_unit))
+        return unit, exact_fraction(spec.pulses_per_unit)
     if spec.pitch is not None:
-        return unit, Fraction(drive.pulses_per_rev) / Fraction(str(spec.pitch))
+        return unit, Fraction(drive.pulses_per_rev) / exact_fraction(spec.pitch)
     if drive.unit is not None and (spec.pulses_per_rev is None or not is_rotary):
         configured = drive.unit
         wanted = configured if spec.unit is None and not is_rotary else unit
@@ -106,23 +114,39 @@ def _arm(scale: Scale, what: str) -> float:
     return float(scale.pulses_per_rev / scale.pulses_per_unit * metres) / (2.0 * PI)
 
 
-def burden_of(mass: float, friction_force: float, scale: Scale, what: str) -> Burden:
-    """What ``mass`` (kg) and ``friction_force`` (N) are for a motor. Raises `Misuse` for a unit that is no length."""
-    arm = _arm(scale, what)
-    return Burden(mass * arm * arm * 2.0 * PI / float(scale.pulses_per_rev), friction_force * arm)
+class Loading(NamedTuple):
+    """What a motor moves: at the motor in kg·m² and N·m, on a linear axis also in kg and N."""
+
+    inertia: float = 0.0
+    mass: float = 0.0
+    friction: float = 0.0
+    friction_force: float = 0.0
+    load: float = 0.0
+    force: float = 0.0
 
 
-def motor_of(motor: MotorSpec, kind: str, scale: Scale) -> StepperMotor:
+def burden_of(loading: Loading, scale: Scale, what: str) -> Burden:
+    """What that is for a motor, in pulses. Raises `Misuse` for masses and forces on an axis whose unit is no length."""
+    has_forces = loading.mass or loading.force or loading.friction_force
+    arm = _arm(scale, what) if has_forces else 0.0
+    inertia = loading.inertia + loading.mass * arm * arm
+    return Burden(
+        inertia=inertia * 2.0 * PI / float(scale.pulses_per_rev),
+        friction=loading.friction + loading.friction_force * arm,
+        load=loading.load + loading.force * arm,
+    )
+
+
+def motor_of(motor: MotorSpec, scale: Scale) -> StepperMotor:
     """Torques at the motor; speeds and accelerations in pulses. Raises `Misuse` for masses and forces without a length."""
     per_rev = float(scale.pulses_per_rev)
-    has_forces = kind == "linear" and (motor.mass or motor.force or motor.friction_force)
-    arm = _arm(scale, "motor") if has_forces else 0.0
-    inertia = motor.inertia + motor.mass * arm * arm
+    loading = Loading(motor.inertia, motor.mass, motor.friction, motor.friction_force, motor.load, motor.force)
+    own = burden_of(loading, scale, "motor")
     return StepperMotor(
         curve=tuple((speed / 60.0 * per_rev, torque) for speed, torque in motor.torque),
-        inertia=inertia * 2.0 * PI / per_rev,
-        friction=motor.friction + motor.friction_force * arm,
-        load=motor.load + motor.force * arm,
+        inertia=own.inertia,
+        friction=own.friction,
+        load=own.load,
         start_p=None if motor.start_speed is None else motor.start_speed / 60.0 * per_rev,
         detent=motor.detent,
         hold=motor.hold_current,

@@ -14,7 +14,7 @@ from typing import Any, TypeAlias, cast
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
-from steptwin.world.control import Home, Move
+from steptwin.world.control import Home, Move, Seek
 from steptwin.world.faults import Fault
 
 COUPLINGS = ("drive", "free", "blocked")
@@ -185,7 +185,7 @@ class Call:
 class Order:
     """Command an axis as the master of its controller does, and wait for the answer."""
 
-    command: Move | Home
+    command: Move | Home | Seek
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,10 +202,11 @@ class UntilOver:
 
 @dataclass(frozen=True, slots=True)
 class ExpectReached:
-    """Expect that the last motion of an axis (from 1) has come to its target."""
+    """Expect that the last motion of an axis (from 1) has come to its target; ``seek``: to the end of this one."""
 
     machine: str
     axis: int
+    seek: Seek | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -243,7 +243,7 @@ class Scripts:
         return ScriptWait(None if step.within is None else self._plant.now + step.within, over), None
 
     def _expect_reached(self, step: do.ExpectReached, script: Script) -> StepResult:
-        self._plant.expect(motion_ends(self._plant, step.machine, step.axis).reached)
+        self._plant.expect(motion_ends(self._plant, step.machine, step.axis, step.seek).reached)
         return None, None
 
     def _stop(self, step: do.Stop, script: Script) -> StepResult:

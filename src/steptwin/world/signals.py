@@ -148,7 +148,7 @@ def _of_machine(kind: AnyKind, machine: MotionController, source: Source, rest: 
     if pin in machine.pins():
         found = next(found for found in kind.datasheet(machine).pins if found.name == pin)
         return SignalOf((source,), lambda now: machine.pin(pin), unit=found.unit, check=partial(kind.refuse_taken, machine, pin))
-    point = kind.point(machine, rest)
+    point = kind.point(machine, rest) if rest else None
     if point is None:
         raise _unknown([point.path for point in kind.datasheet(machine).points], rest, name, ", and pins")
     return SignalOf((source,), point.read, point.turns, point.version, point.point.unit, is_kept=point.is_kept)

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from steptwin.errors import Misuse, SourceErrors
+from steptwin.errors import Misuse
 from steptwin.machine import MotionController
 from steptwin.world.chance import Chance
 from steptwin.world.contacts import Circuit
-from steptwin.world.kernel import Kernel, PinName, Wire
+from steptwin.world.kernel import Kernel
 from steptwin.world.kind import AnyKind
 from steptwin.world.names import Unknown
-from steptwin.world.spec import WorldSpec
 from steptwin.world.tomlplaces import Path
 from steptwin.world.values import DIGITAL_INPUT, OUTPUT
+from steptwin.world.wires import PinName, Wire
 
 if TYPE_CHECKING:
+    from steptwin.world.blueprint import Blueprint
     from steptwin.world.board import Board
-    from steptwin.world.element import AnyElement, ElementSpec
+    from steptwin.world.element import AnyElement, NamedSpec
     from steptwin.world.parts import WorldParts
 
 Terminal = tuple[str, str]
@@ -28,22 +29,12 @@ Terminal = tuple[str, str]
 class Site:
     """The context for building an element. Every method raises `Misuse` for a name that does not exist or does not fit."""
 
-    def __init__(self, spec: WorldSpec, parts: WorldParts) -> None:
-        self.spec = spec
+    def __init__(self, blueprint: Blueprint, parts: WorldParts) -> None:
+        self.blueprint = blueprint
+        self.spec = blueprint.spec
         self.parts = parts
         self._joins: dict[PinName, str | None] = {}
         """``join`` of each input with contacts."""
-
-    def unless_wrong(self, path: Path, action: Callable[[], None]) -> None:
-        """Execute ``action`` for the table at ``path``, unless that has an error already; errors are reported at the path."""
-        if self.spec.text.is_wrong(path):
-            return
-        try:
-            action()
-        except SourceErrors as error:
-            self.spec.text.wrong_file(path, error)
-        except Misuse as error:
-            self.spec.text.wrong_reference(path, error)
 
     # ------------------------------------------------------------------ machines and kernels
 
@@ -73,9 +64,9 @@ class Site:
             raise Unknown(name, f"nothing is called {name!r}")
         return found
 
-    def kernel_of(self, element: AnyElement, spec: ElementSpec) -> Kernel:
-        """The kernel that an element is in: that of the first thing it refers to."""
-        return self.kernel(next(iter(element.refers(spec, self.spec))).one)
+    def kernel_of(self, element: AnyElement, spec: NamedSpec) -> Kernel:
+        """The kernel that an element is in: its own, or that of the first thing it refers to."""
+        return self.kernel(next(iter(element.refers(spec, self.spec))).one if element.terminals is None else spec.name)
 
     # ------------------------------------------------------------------ terminals
 
@@ -83,14 +74,21 @@ class Site:
         """The terminals of the element ``name``."""
         return self.kernel(name).boards[name]
 
-    def join(self, source: Terminal, target: Terminal, path: Path) -> None:
-        """Join an output to an input that nothing else drives, without delay. ``path`` is the key that names the source."""
-        pin = self.terminal(source, OUTPUT)
-        self.kernel(source[0]).connect(Wire(pin, self.input(target, path)))
+    def join(self, wire: Wire, path: Path) -> None:
+        """Join an output to an input that nothing else drives. ``path``: the table of the wire, or the key of its source."""
+        kernel = self.kernel(wire.source.machine)
+        if self.blueprint.is_checked:
+            self.parts.driven[wire.target] = path
+        else:
+            self.terminal(wire.source, OUTPUT)
+            self.input(wire.target, path)
+        kernel.connect(wire)
 
     def terminal(self, name: Terminal, kind: str) -> PinName:
         """A terminal of a machine or an element; ``kind`` is one of those of `steptwin.world.values`."""
         pin = PinName(*name)
+        if self.blueprint.is_checked:
+            return pin
         of_element = self.parts.terminals.get(pin.machine)
         if of_element is not None:
             of_element.check(pin, kind)
@@ -103,7 +101,7 @@ class Site:
     def input(self, name: Terminal, path: Path, kind: str = DIGITAL_INPUT) -> PinName:
         """An input, reserved for one driver."""
         target = PinName(*name)
-        if target in self.parts.driven:
+        if target in self.parts.driven and not self.blueprint.is_checked:
             raise Misuse(f"{target} is driven already, from {self.spec.text.where(self.parts.driven[target])}")
         self.terminal(name, kind)
         self.parts.driven[target] = path

@@ -10,7 +10,8 @@ from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion.trig import sine
 from steptwin.state import Stateful
-from steptwin.world.kernel import Kernel, PinName
+from steptwin.world.kernel import Kernel
+from steptwin.world.wires import PinName
 
 LOWEST_V, HIGHEST_V = 0.0, 10.0
 RESOLUTION_V = 0.001

@@ -15,6 +15,7 @@ from steptwin.world.script import Step
 if TYPE_CHECKING:
     from steptwin.world.element import Element, ElementSpec
     from steptwin.world.gateways import GatewaySpec
+    from steptwin.world.historytable import HistorySpec
     from steptwin.world.kind import AnyKind
 
 S = TypeVar("S", bound="ElementSpec")
@@ -77,6 +78,7 @@ class WorldSpec:
     """The elements by the names of their tables."""
     scripts: tuple[ScriptSpec, ...]
     gateways: tuple[GatewaySpec, ...]
+    history: HistorySpec | None
     faults: tuple[Fault | None, ...]
     """None for one with errors, which are in ``text``."""
     text: TomlText

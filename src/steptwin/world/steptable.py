@@ -8,7 +8,7 @@ from typing import Any
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
-from steptwin.world.control import Home, Move
+from steptwin.world.control import Home, Move, Seek
 from steptwin.world.expression import parse_condition
 from steptwin.world.faults import Fault
 from steptwin.world.faults import parse as parse_fault
@@ -71,6 +71,14 @@ def _home_velocity(value: Any) -> float:
     return found
 
 
+def _sought(value: Any) -> tuple[int, str]:
+    """The direction, 1 or -1, and the input."""
+    text = value.strip() if isinstance(value, str) else ""
+    if text[:1] not in ("+", "-") or not text[1:].strip():
+        raise Misuse(f"{value!r}: expected a direction and an input, such as '-B8'")
+    return (1 if text[0] == "+" else -1), text[1:].strip().upper()
+
+
 def _characters(value: Any) -> bytes:
     if not isinstance(value, str) or not value:
         raise Misuse(f"{value!r}: expected characters")
@@ -84,18 +92,23 @@ def _turn(axis: tuple[str, int], counts: int) -> Turn:
     return Turn(*axis, counts)
 
 
-def _motion(command: Move | Home, within: Nanos | None) -> Repeat:
+def _motion(command: Move | Home | Seek, within: Nanos | None) -> Repeat:
     """The motion that is commanded, to its end: a status from before does not count."""
     place = command.machine, command.axis
-    return Repeat(1, (Order(command), UntilOver(*place, within), ExpectReached(*place)), is_one=True)
+    reached = ExpectReached(*place, command if isinstance(command, Seek) else None)
+    return Repeat(1, (Order(command), UntilOver(*place, within), reached), is_one=True)
 
 
 def _move(axis: tuple[str, int], to: float | None, by: float | None, within: Nanos | None) -> Repeat:
     return _motion(Move(*axis, to, by), within)
 
 
-def _home(axis: tuple[str, int], velocity: float, within: Nanos | None) -> Repeat:
-    return _motion(Home(*axis, velocity), within)
+def _home(axis: tuple[str, int], velocity: float | None, seek: tuple[int, str] | None, within: Nanos | None) -> Repeat:
+    if velocity is not None and seek is None:
+        return _motion(Home(*axis, velocity), within)
+    if seek is not None and velocity is None:
+        return _motion(Seek(*axis, *seek), within)
+    raise Misuse("home: give either velocity (its sign chooses the switch of a MIC488) or seek (the input of an M1486)")
 
 
 def _wait_for(axis: tuple[str, int], within: Nanos | None) -> Repeat:
@@ -144,7 +157,8 @@ ACTIONS: Mapping[str, StepKind] = dict(
         _action(
             Key("home", _turned, "MACHINE.M1 to M4: homes it, waits for the end and expects it there"),
             _home,
-            Key("velocity", _home_velocity, "its sign chooses the switch"),
+            Key("velocity", _home_velocity, "of a MIC488; its sign chooses the switch", None),
+            Key("seek", _sought, "of an M1486: direction and input, such as '-B8'; it is then at 0", None),
             _WITHIN,
         ),
         _action(

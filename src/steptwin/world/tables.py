@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 from steptwin.durations import duration
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.world.elements import ELEMENTS
+from steptwin.world.historytable import HISTORY, HISTORY_TABLE
 from steptwin.world.kinds import KINDS, line_kinds
 from steptwin.world.links import LINK_KEYS
 from steptwin.world.pieces import USE, USES
@@ -96,8 +98,14 @@ EVENT = TableRows(written="[[event]]", keys=KEYS["event"], need={"once": "when"}
 SCRIPT = TableRows(written="[[script]]", keys=KEYS["script"])
 
 
-def tables() -> dict[str, TableRows]:
-    """Every table, in the order of a description: its name and seed, lines, controllers, what is around them, scripts."""
+def tables() -> Mapping[str, TableRows]:
+    """Every table, in the order of a description: its name and seed, lines, controllers, elements, scripts, history."""
+    return _tables_with(tuple(map(id, (*KINDS.values(), *ELEMENTS.values()))))
+
+
+@lru_cache(maxsize=4)
+def _tables_with(registered: tuple[int, ...]) -> Mapping[str, TableRows]:
+    """As `tables`, until something else is registered."""
     found = {
         "world": TableRows(written="[world]", keys=KEYS["world"]),
         USE: USES,
@@ -107,7 +115,7 @@ def tables() -> dict[str, TableRows]:
         found[kind.name] = TableRows(written=f"[[{kind.name}]]", keys=kind.keys, exclude=kind.exclusive)
     for element in ELEMENTS.values():
         found |= {element.name: element.rows, **element.inner}
-    return found | {"event": EVENT, "script": SCRIPT}
+    return found | {"event": EVENT, "script": SCRIPT, HISTORY: HISTORY_TABLE}
 
 
 def _line_keys() -> tuple[Key, ...]:

@@ -45,7 +45,7 @@ class TraceRecord(NamedTuple):
     """The content of the event's text as fields, for programs. It is not part of the digest, which has the text."""
 
 
-Recorder: TypeAlias = Callable[[TraceRecord], None]
+RecordSink: TypeAlias = Callable[[TraceRecord], None]
 """Receives each record as it happens: the `add` of a `Trace`, or another receiver."""
 
 
@@ -60,7 +60,7 @@ class Trace:
         self.is_recorded = True
         """Whether there is a digest."""
         self._streams: dict[str, _Stream] = {name: _Stream() for name in machines}
-        self.watchers: list[Recorder] = []
+        self.watchers: list[RecordSink] = []
         """Called with every record."""
 
     @property

@@ -10,7 +10,7 @@ from steptwin.state import Stateful
 
 
 class Travel(Stateful):
-    """A position from 0 to `full`, which can actuate switches (`steptwin.world.contacts.Carriage`).
+    """A position from 0 to `full`, which can actuate switches (`steptwin.world.contacts.MovingPart`).
 
     The full travel takes ``forth`` ns to the upper end and ``back`` ns to the lower one. It has forth × back places, so
     that both speeds are whole numbers of places per nanosecond.
@@ -48,16 +48,16 @@ class Travel(Stateful):
         return self._back if direction > 0 else self._forth
 
     def place(self, now: Nanos) -> int:
-        """As `Carriage.place`."""
+        """As `MovingPart.place`."""
         moved = self._direction * self._speed(self._direction) * (now - self._begin)
         return min(max(self._place + moved, 0), self.full)
 
     def version(self) -> object:
-        """As `Carriage.version`."""
+        """As `MovingPart.version`."""
         return self._changes
 
     def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
-        """As `Carriage.reaches`."""
+        """As `MovingPart.reaches`."""
         way = (position - self._place) * direction
         if direction != self._direction or (position - self.place(after)) * direction <= 0 or not 0 <= position <= self.full:
             return None

@@ -9,7 +9,7 @@ from steptwin.diagnostics import visible
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.world.plant import Plant
-from steptwin.world.programs import Operand, OperandKind, Place
+from steptwin.world.programs import Place, Resource, ResourceKind
 from steptwin.world.wiring import Connection, connections
 
 
@@ -29,7 +29,7 @@ def waiting(plant: Plant) -> Iterator[Waiting]:
             continue
         use = programs.use(stack[0].place)
         if use.waits and use.reads:
-            states = ", ".join(filter(None, (_state(plant, name, operand, drivers) for operand in use.reads)))
+            states = ", ".join(state for resource in use.reads for state in _states(plant, name, resource, drivers))
             where = _statement(plant, name, stack[0].place)
             yield Waiting(name, f"{where}: {states}" if states else where)
     events = {script.name for script in plant.spec.scripts if script.when is not None or script.every is not None}
@@ -46,20 +46,29 @@ def _statement(plant: Plant, machine: str, place: Place) -> str:
     return f"{source.name}:{found.line} {visible(source.text[found.start : found.end].strip())}"
 
 
-def _state(plant: Plant, machine: str, operand: Operand, drivers: dict[str, list[Connection]]) -> str:
-    """The present level of a pin that a statement reads, and what drives it."""
-    if operand.kind is not OperandKind.PIN or not operand.name:
-        return ""
-    pin = f"{machine}.{operand.name}"
+def _states(plant: Plant, machine: str, resource: Resource, drivers: dict[str, list[Connection]]) -> Iterator[str]:
+    """The present level of a pin that a statement reads, and what drives it; where the axes are that it waits for."""
+    if resource.kind is ResourceKind.AXIS:
+        for axis in plant.kind(machine).state(plant.machine(machine), plant.now).axes:
+            if axis.moving and resource.name in ("", str(axis.number)):
+                place = "" if axis.position is None else f" at {axis.position:g} {axis.unit}"
+                yield f"{machine}.{axis.name} moves{place}"
+    elif resource.kind is ResourceKind.PIN and resource.name:
+        yield from _level(plant, machine, resource.name, drivers)
+
+
+def _level(plant: Plant, machine: str, name: str, drivers: dict[str, list[Connection]]) -> Iterator[str]:
+    pin = f"{machine}.{name}"
     try:
         level = plant.read(pin)
     except Misuse:
-        return ""
+        return
     terminals = plant.kind(machine).terminals
-    if operand.name not in (*terminals.digital_inputs, *terminals.analog_inputs):
-        return f"{pin} is {level:g}"
-    by = " and ".join(one.source for one in drivers.get(pin, ())) or "nothing"
-    return f"{pin} is {level:g}, driven by {by}"
+    if name not in (*terminals.digital_inputs, *terminals.analog_inputs):
+        yield f"{pin} is {level:g}"
+    else:
+        by = " and ".join(one.source for one in drivers.get(pin, ())) or "nothing"
+        yield f"{pin} is {level:g}, driven by {by}"
 
 
 def _drivers(plant: Plant) -> dict[str, list[Connection]]:

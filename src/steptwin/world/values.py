@@ -11,6 +11,7 @@ from typing import Any
 
 from steptwin.durations import duration
 from steptwin.errors import Misuse
+from steptwin.machine import SECOND
 from steptwin.nearmiss import NearMiss
 from steptwin.world.addresses import parse_address
 
@@ -45,6 +46,10 @@ def name_value(value: Any) -> str:
     return value
 
 
+_NUMERIC = re.compile(r"\s*[-+]?[0-9.]+\s*[A-Za-z/²µ%·]*\s*\Z")
+"""A number as text, perhaps with a unit."""
+
+
 def flag(value: Any) -> bool:
     if not isinstance(value, bool):
         raise Misuse(f"{value!r}: expected true or false")
@@ -56,7 +61,8 @@ def number(least: float | None = None, most: float | None = None, *, above: bool
 
     def read(value: Any) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float) or (isinstance(value, float) and isnan(value)):
-            raise Misuse(f"{value!r}: expected a number")
+            is_quoted = isinstance(value, str) and _NUMERIC.match(value) is not None
+            raise Misuse(f"{value!r}: expected a number{', without quotes and unit' if is_quoted else ''}")
         if abs(value) > MOST:
             raise Misuse(f"{value!r}: permitted are numbers from {-MOST:g} to {MOST:g}")
         low = least is not None and (value <= least if above else value < least)
@@ -106,6 +112,14 @@ def positive_time(value: Any) -> int:
     found = duration(value)
     if found == 0:
         raise Misuse(f"{value!r}: must be more than 0")
+    return found
+
+
+def whole_seconds(value: Any) -> int:
+    """ns, of a time in seconds from 1 s to an hour."""
+    found = duration(value)
+    if not SECOND <= found <= 3600 * SECOND or found % SECOND:
+        raise Misuse(f"{value!r}: permitted are whole seconds from 1s to 3600s")
     return found
 
 

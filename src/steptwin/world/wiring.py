@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from steptwin.machine import Nanos
 from steptwin.world.element import NamedSpec
-from steptwin.world.kernel import PinName
 from steptwin.world.parts import WorldParts
+from steptwin.world.wires import PinName
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,7 @@ class Connection:
 
 def connections(parts: WorldParts) -> Iterator[Connection]:
     """The connections in the order in which the description has them."""
-    wires = {wire.target: wire for kernel in parts.kernels for wire in kernel.wires()}
+    wires = {wire.target: wire for kernel in parts.kernels for wire in kernel.wires}
     for target, path in parts.driven.items():
         circuit, wire = parts.circuits.get(target), wires.get(target)
         if wire is not None:

@@ -1,3 +1,4 @@
+import { MEANINGS } from "./meanings";
 import { language } from "./texts.svelte";
 
 /** Words of data sheets, which are English, in Polish: values of enumerations, and names of types. What is not here stays as it is. */
@@ -23,8 +24,8 @@ export const POLISH: Readonly<Record<string, string>> = {
   DINT: "DINT",
   DIRECT: "DIRECT",
   TRIGGER: "TRIGGER",
-  microstep: "mikrokrok",
-  "microstep/s": "mikrokrok/s",
+  "min. microsteps": "min. mikrokroki",
+  "min. microsteps/s": "min. mikrokroki/s",
   "holding register": "rejestr",
   coil: "cewka",
   input: "wejście",
@@ -32,5 +33,5 @@ export const POLISH: Readonly<Record<string, string>> = {
 };
 
 export function inWords(words: string): string {
-  return language() === "pl" ? (POLISH[words] ?? words) : words;
+  return language() === "pl" ? (POLISH[words] ?? MEANINGS[words] ?? words) : words;
 }

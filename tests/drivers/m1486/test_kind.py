@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import NoReturn
+
 import pytest
 from chip_rig import KNOWN, ChipWire, chip_driver, typed
-from line_rig import at_every_address
+from line_rig import at_every_address, run_virtual
 
+from steptwin.drivers.exchange import LineLost
 from steptwin.drivers.kind import DeviceAddress, DeviceMotion, EndedMotion, FoundDevice, WantedMoves
+from steptwin.drivers.m1486 import kind
 from steptwin.drivers.m1486.jog import LINK_S
 from steptwin.drivers.m1486.kind import LOST, M1486_DRIVER
 from steptwin.drivers.m1486.sync import M1486
-from steptwin.errors import Misuse
+from steptwin.errors import Misuse, Refusal
 
 ADDRESS = DeviceAddress("memory", "m1486", 7, 4800, 1.0)
 
@@ -189,6 +194,45 @@ def test_bytes_of_other_protocols_are_ended_by_a_line_end(monkeypatch: pytest.Mo
     del wire.sent[:]
     M1486_DRIVER.clear("memory", 38400)  # at the rate of the chips, too
     assert typed(wire) == 2 * once
+
+
+def test_a_chip_as_a_subject(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the studio connects; a twin beside a chip is impossible, for its position is unknown while it moves."""
+    wire = ChipWire("C", addresses=(7,))
+    at_every_address(monkeypatch, wire)
+    assert M1486_DRIVER.line is not None
+    assert M1486_DRIVER.part is not None
+    connect, part_of = M1486_DRIVER.line, M1486_DRIVER.part
+
+    async def main() -> tuple[int | None, str, str]:
+        line = connect("memory", 4800)
+        await line.open()
+        try:
+            part = await part_of(replace(ADDRESS, variant=None), line)
+            with pytest.raises(Refusal) as refused:
+                await part.twin("beside")
+            return part.address, part.unit_of("position"), str(refused.value)
+        finally:
+            await line.close()
+
+    address, unit, refused = run_virtual(wire, main())
+    assert (address, unit) == (7, "min. microsteps")
+    assert refused == "memory: no twin beside an M1486, whose position is unknown while it moves (M-28)"
+
+
+def test_a_server_of_modbus_tcp_has_no_chips(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It closes the connection when it receives characters; a serial port that is lost is a failure."""
+
+    def lost(*arguments: object, **options: object) -> NoReturn:
+        raise LineLost("closed by the other end")
+
+    at_every_address(monkeypatch, ChipWire(addresses=(7,)))
+    monkeypatch.setattr(kind, "scan_chips", lost)
+    search = M1486_DRIVER.search
+    assert search is not None
+    assert search.find("tcp://memory:1", 4800, range(16), 0.1, lambda number: None) == []
+    with pytest.raises(LineLost):
+        search.find("memory", 4800, range(16), 0.1, lambda number: None)
 
 
 def test_what_it_takes() -> None:

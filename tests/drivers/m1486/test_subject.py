@@ -49,17 +49,17 @@ def test_the_state_of_an_m1486_is_known_at_rest(drum: DeviceSubject, rig: Rig) -
     """Every upload that a state has is that of the twin; levels are unknown, because reading them takes the internal variable."""
     twin = WorldSubject(rig.world)
     drum.do(do.Send("chips", b"t41\r"))
-    found, there = (read_state(subject.do(command.State("drum")).value) for subject in (drum, twin))
+    found, there = (read_state(subject.do(command.ReadState("drum")).value) for subject in (drum, twin))
     known = ("counter", "counter_valid", "variable", "flags_on", "functions_on")
     assert {name: value for name, value in found.details.items() if value is not None} == {n: there.details[n] for n in known}
     assert found.details.keys() == there.details.keys()
     assert (found.kind, found.variant, found.program.state) == (there.kind, there.variant, ProgramActivity.STOPPED)
     assert found.pins == dict.fromkeys(there.pins)
     drum.do(command.Move("drum", 1, by=5000.0))
-    found = read_state(drum.do(command.State("drum")).value)
+    found = read_state(drum.do(command.ReadState("drum")).value)
     assert (found.program.state, found.axes[0].position, found.axes[0].moving) == (None, None, None)
     rig.time.sleep(60.0)
-    found = read_state(drum.do(command.State("drum")).value)
+    found = read_state(drum.do(command.ReadState("drum")).value)
     assert (found.axes[0].position, found.axes[0].velocity, found.axes[0].moving) == (5000.0, 0.0, False)
 
 

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import pytest
-from host_rig import Wire, driver
+from host_rig import Wire, driver, run_virtual
 from line_rig import at_every_address
 from mic488_rig import loaded
 
 from steptwin.drivers.kind import DeviceAddress, EndedMotion, FoundDevice, WantedMoves
 from steptwin.drivers.mic488.kind import MIC488_DRIVER, RUNS_ON, of_mic488, unit_of
 from steptwin.drivers.mic488.sync import Mic488
-from steptwin.errors import Misuse
+from steptwin.errors import Misuse, Refusal
+from steptwin.files.world import World
+from steptwin.mic488.configtext import config_text
+from steptwin.mic488.registers import FIRMWARES
+from steptwin.subject.devicetwin import DeviceTwin
 
 ADDRESS = DeviceAddress("memory", "mic488", None, 38400, 0.3, "1.70")
 
@@ -188,6 +195,55 @@ def test_controllers_on_a_line_are_found(monkeypatch: pytest.MonkeyPatch) -> Non
     assert found == [FoundDevice(2, "1.70", "MIC488, firmware 1.70"), FoundDevice(5, "1.70", "MIC488, firmware 1.70")]
     assert asked == [1, 2, 5]
     assert (MIC488_DRIVER.search.disturbs, MIC488_DRIVER.search.numbers) == (True, None)
+
+
+def test_a_controller_as_a_subject(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """What the studio connects: it observes, and a twin beside it begins in the state in which the controller is."""
+    wire = Wire(units=(2,))
+    mic = driver(wire, 2)
+    mic.enable(2, 4)
+    mic.axis(2).set_ramp(velocity=12.5)
+    mic.user.words.write(7, 99)
+    mic.set("DATA_TYPE", 1)
+    at_every_address(monkeypatch, wire)
+    config = tmp_path / "table.cfg"
+    config.write_text(config_text(wire.config, FIRMWARES["1.70"]))
+    address = DeviceAddress("memory", "mic488", 2, 38400, 0.25, "1.70", str(config), (("mm", 100.0),) * 4)
+    assert MIC488_DRIVER.line is not None
+    assert MIC488_DRIVER.part is not None
+    connect, part_of = MIC488_DRIVER.line, MIC488_DRIVER.part
+
+    async def twin_of(address: DeviceAddress) -> DeviceTwin:
+        line = connect("memory", 38400)
+        await line.open()
+        try:
+            part = await part_of(address, line)
+            assert part.address == 2
+            assert part.unit_of("M2.position") == "mm"
+            return await part.twin("beside")
+        finally:
+            await line.close()
+
+    twin = run_virtual(wire, twin_of(address))
+    assert mic.get("DATA_TYPE") == {"DATA_TYPE": 1}
+    assert twin.enabled == [2, 4]
+    assert twin.values[0] == ("DATA_TYPE", 1.0)
+    assert dict(twin.values)["M2_VMAX"] == 12.5
+    assert dict(twin.values)["USER_REGISTER[7]"] == 99.0
+    assert not [name for name in dict(twin.values) if name.startswith("USER") and name != "USER_REGISTER[7]"]
+    assert set(twin.compared) < set(dict(twin.values))
+    assert "M2_VMAX" in twin.compared
+    assert "M2_POS_ACT" not in twin.compared
+    world = World.from_toml(twin.text, twin.files)
+    assert list(world.mic488) == ["beside"]
+    assert world.lines[twin.line].units == (2,)
+    assert world.mic488["beside"].device.config.axes == wire.config.axes
+    # No configuration, and a motion.
+    for changed, message in ((replace(address, config=None), "connect it with config=FILE"), (address, "M2 runs")):
+        if changed is address:
+            mic.axis(2).move_by(100.0)
+        with pytest.raises(Refusal, match=message):
+            run_virtual(wire, twin_of(changed))
 
 
 def test_the_slave_address_is_1_if_none_is_given() -> None:

@@ -11,7 +11,7 @@ from host_rig import Wire, driver
 from line_rig import at_every_address
 from mic488_rig import loaded
 
-from steptwin.drivers.kind import DeviceAddress, ReadValue, Values
+from steptwin.drivers.kind import DeviceAddress, ReadValue, ReadValues
 from steptwin.drivers.mic488.addresses import ValueAddress, places
 from steptwin.drivers.mic488.kind import MIC488_DRIVER
 from steptwin.drivers.mic488.named import expanded
@@ -24,7 +24,7 @@ ADDRESS = DeviceAddress("memory", "mic488", 1, 38400, 0.3)
 overview, followed, names, writing = MIC488_DRIVER.info, MIC488_DRIVER.followed, MIC488_DRIVER.names, MIC488_DRIVER.writing
 
 
-def read(mic: Mic488, wanted: Sequence[str]) -> Values:
+def read(mic: Mic488, wanted: Sequence[str]) -> ReadValues:
     return MIC488_DRIVER.reading(wanted)(mic)
 
 

@@ -7,8 +7,9 @@ import dataclasses
 import pytest
 from host_rig import Wire, driver
 
+from steptwin.drivers.mic488 import session
 from steptwin.drivers.mic488.session import (
-    Difference,
+    SessionDifference,
     SessionStep,
     carry_out,
     carry_out_one,
@@ -133,4 +134,56 @@ def test_a_motion_that_did_not_arrive_is_a_result() -> None:
 
 
 def test_differences_are_shown_as_they_are_written() -> None:
-    assert str(Difference(2, "get X", "X", "5 °C", None)) == 'step 2, get X: X: "5 °C" | nothing'
+    assert str(SessionDifference(2, "get X", "X", "5 °C", None)) == 'step 2, get X: X: "5 °C" | nothing'
+
+
+@pytest.mark.parametrize("seconds", ["0", "3600", "0.25"])
+def test_a_sleep(seconds: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    slept: list[float] = []
+    mic = driver(Wire())
+    with monkeypatch.context() as patched:
+        patched.setattr(session.time, "sleep", slept.append)
+        assert carry_out_one(mic, f"sleep {seconds}") == {}
+    assert slept == [float(seconds)]
+
+
+@pytest.mark.parametrize("line", ["sleep 3600.1", "sleep -0.1", "sleep nan", "sleep 1 2", "sleep x", "sleep"])
+def test_what_is_no_sleep(line: str) -> None:
+    with pytest.raises(Misuse, match=f"^{line!r}: expected seconds from 0 to 3600$"):
+        carry_out_one(driver(Wire()), line)
+
+
+def test_times_count_from_the_beginning_of_the_session(monkeypatch: pytest.MonkeyPatch) -> None:
+    mic, clock = driver(Wire()), iter([100.0, 100.25, 107.5])
+    steps = steps_of("get M1_STATUS\nget M2_STATUS", register_map())
+    with monkeypatch.context() as patched:
+        patched.setattr(session.time, "monotonic", lambda: next(clock))
+        assert [step.at_s for step in carry_out(mic, steps)] == [0.25, 7.5]
+    (_, line) = to_text([SessionStep("get X", 1.23456789, {"X": "5 °C"})], {"device": "a"})
+    assert line == '{"line": "get X", "at_s": 1.2346, "result": {"X": "5 °C"}}'
+
+
+@pytest.mark.parametrize(
+    ("one", "two", "tolerance", "alike"),
+    [
+        (1.0, 1.5, 0.5, True),
+        (1.0, 1.5, 0.49, False),
+        (1.5, 1, 0.5, True),
+        (True, 1, 0.0, True),
+        (True, 0, 1.0, False),
+        ("a", "a", 0.0, True),
+        ("a", "b", 9.0, False),
+        (1.0, None, 9.0, False),
+        (None, 1.0, 9.0, False),
+    ],
+)
+def test_values_that_are_alike(one: object, two: object, tolerance: float, alike: bool) -> None:
+    found = differences([SessionStep("get X", 0.0, {"X": one})], [SessionStep("get X", 0.0, {"X": two})], tolerance=tolerance)
+    assert (found == []) is alike
+
+
+@pytest.mark.parametrize(("time_s", "differ"), [(None, False), (0.5, False), (0.49, True)])
+def test_times_that_are_alike(time_s: float | None, differ: bool) -> None:
+    for at_s in (1.5, 0.5):
+        found = differences([SessionStep("wait", 1.0)], [SessionStep("wait", at_s)], time_s=time_s)
+        assert bool(found) is differ

@@ -14,7 +14,7 @@ from world_rig import Run
 from steptwin.errors import Misuse
 from steptwin.files import export
 from steptwin.files.export import FORMATS, bar, write_trace
-from steptwin.files.export.progress import Progress
+from steptwin.files.export.progress import TimeProgress
 from steptwin.files.export.recording import sort_out
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion import MotionState, plan_position
@@ -104,7 +104,7 @@ def test_progress_goes_from_the_beginning_to_the_end(mic488: Run, tmp_path: Path
     told: dict[str, list[Nanos]] = {}
 
     @contextmanager
-    def watch(what: str, begin: Nanos, until: Nanos) -> Generator[Progress]:
+    def watch(what: str, begin: Nanos, until: Nanos) -> Generator[TimeProgress]:
         assert (begin, until) == (SECOND, mic488.until)
         told[what] = []
         yield told[what].append

@@ -1,5 +1,4 @@
 // A client of OPC UA that takes requests as lines of JSON and answers each with one line.
-const fs = require("node:fs");
 const readline = require("node:readline");
 const {
   AttributeIds,
@@ -57,6 +56,12 @@ const actions = {
     const found = await session.call({ objectId: object, methodId: method, inputArguments: given.map(variant) });
     return found.statusCode.name;
   },
+  async history({ node, start, end }) {
+    const found = await session.readHistoryValue(node, new Date(start), new Date(end));
+    const values = found.historyData?.dataValues ?? [];
+    const plainest = (one) => [one.sourceTimestamp.toISOString(), one.value?.value ?? null, one.statusCode.name];
+    return { status: found.statusCode.name, more: !!found.continuationPoint?.length, values: values.map(plainest) };
+  },
   async subscribe({ node, period }) {
     subscription ??= await session.createSubscription2({
       requestedPublishingInterval: period,
@@ -111,7 +116,7 @@ lines.on("line", (line) => {
     } catch (error) {
       answer = { error: String(error.message ?? error) };
     }
-    fs.writeSync(1, `@${JSON.stringify(answer)}\n`);
+    await new Promise((written) => process.stdout.write(`@${JSON.stringify(answer)}\n`, written));
     if (request.do === "close") process.exit(0);
   });
 });

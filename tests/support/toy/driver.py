@@ -17,7 +17,7 @@ from steptwin.drivers.kind import (
     FoundDevice,
     Log,
     ReadValue,
-    Values,
+    ReadValues,
     WantedMoves,
 )
 from steptwin.drivers.kinds import DRIVERS, register
@@ -68,14 +68,14 @@ def _info(toy: ToyDriver, address: DeviceAddress) -> DeviceOverview:
     return DeviceOverview({"device": toy.place, "position": position}, [f"toy at {toy.place}"], [("position", position, UNIT)])
 
 
-def _reading(names: Sequence[str]) -> Callable[[ToyDriver], Values]:
+def _reading(names: Sequence[str]) -> Callable[[ToyDriver], ReadValues]:
     for name in names:
         if name.upper() != "POSITION":
             raise Misuse(f"{name!r} is not a value of a toy: permitted is POSITION")
     return lambda toy: {"POSITION": ReadValue(toy.position(), UNIT)}
 
 
-def _writing(changes: Sequence[str]) -> Callable[[ToyDriver], Values]:
+def _writing(changes: Sequence[str]) -> Callable[[ToyDriver], ReadValues]:
     raise Misuse(f"{changes[0]!r}: nothing of a toy can be set")
 
 

@@ -19,13 +19,13 @@ from steptwin.world import script as do
 from steptwin.world.control import Move, StopAxes
 from steptwin.world.faults import AxisLoad, Faults
 from steptwin.world.kernel import Kernel
-from steptwin.world.kind import BuildContext, ControllerKind, LineKind, LineUnit, LinkKind, Member, Row, Terminals
+from steptwin.world.kind import BuildContext, ControllerKind, LineKind, LineUnit, LinkKind, Member, Terminals
 from steptwin.world.kinds import KINDS, register
 from steptwin.world.lanes import AxisLane, plain_view
-from steptwin.world.reader import Key, TomlText, optional
+from steptwin.world.reader import Key, Row, TomlText, optional
 from steptwin.world.scale import FULL_STEPS, DriveScale
 from steptwin.world.spec import ControllerSpec, LineSpec
-from steptwin.world.trace import Recorder, TraceRecord
+from steptwin.world.trace import RecordSink, TraceRecord
 from steptwin.world.values import name_value, whole
 from steptwin.world.views import MachineView
 from toy.faults import ToyBody
@@ -74,7 +74,7 @@ class ToyWords:
         return self._units
 
 
-def _make_line(spec: LineSpec, members: Sequence[Member], kernel: Kernel, record: Recorder, faults: Faults) -> ToyLine:
+def _make_line(spec: LineSpec, members: Sequence[Member], kernel: Kernel, record: RecordSink, faults: Faults) -> ToyLine:
     if len(members) != 1:
         raise Misuse("a toy is alone on its line")
     return ToyLine(kernel, spec.name, members[0].machine, faults, record)
@@ -84,8 +84,8 @@ def _read(text: TomlText, row: Row, table: Mapping[str, Any]) -> ToySpec:
     return ToySpec(**row)
 
 
-def _build(spec: ToySpec, memory: bytes | None, context: BuildContext) -> Toy:
-    return Toy()
+def _build(spec: ToySpec, context: BuildContext) -> Callable[[bytes | None], Toy]:
+    return lambda memory: Toy()
 
 
 def _watch_events(toy: Toy, call: Callable[[MachineEvent], None]) -> None:

@@ -9,17 +9,18 @@ from typing import ClassVar
 
 from steptwin.machine import Nanos
 from steptwin.state import Stateful
-from steptwin.world.element import Element, NamedSpec, Reference, Row, Table
+from steptwin.world.element import Element, NamedSpec, Reference
 from steptwin.world.elements import forget, register
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.table import ElementEffect
-from steptwin.world.kernel import Kernel, PinName
-from steptwin.world.reader import Key, TomlText, optional
+from steptwin.world.kernel import Kernel
+from steptwin.world.reader import Key, Row, Table, TomlText, optional
 from steptwin.world.sense import TableRows
 from steptwin.world.signals import SignalOf
 from steptwin.world.site import Site, Terminal
 from steptwin.world.spec import WorldSpec
 from steptwin.world.values import OUTPUT, flag, name_value, pin_name, time_value
+from steptwin.world.wires import PinName
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

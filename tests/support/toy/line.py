@@ -12,7 +12,7 @@ from steptwin.world.faults import Faults
 from steptwin.world.faults import LineProtocol as FaultLine
 from steptwin.world.kernel import Kernel
 from steptwin.world.lines import Line, LineEndPoint
-from steptwin.world.trace import Recorder
+from steptwin.world.trace import RecordSink
 from toy.machine import Toy
 
 
@@ -56,7 +56,9 @@ class ToyLine(Line):
     baud = 9600
     is_timed = False
 
-    def __init__(self, kernel: Kernel, name: str, toy: Toy, faults: Faults | None = None, record: Recorder | None = None) -> None:
+    def __init__(
+        self, kernel: Kernel, name: str, toy: Toy, faults: Faults | None = None, record: RecordSink | None = None
+    ) -> None:
         super().__init__(kernel, name, record, Faults() if faults is None else faults)
         self._toy = toy
 

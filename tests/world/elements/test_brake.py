@@ -326,7 +326,7 @@ def test_the_trace_has_the_fall() -> None:
         ("inertia = 0.00003\nmass = 25.0", "inertia = 1e-300", "N·m on so small an inertia accelerates"),
         ("torque = 0.5", "torqe = 0.5", r"\[brake\] has no 'torqe' \(did you mean 'torque'\?\)"),
         ("torque = 0.5\n", "", "torque is missing"),
-        ('axis = "z"', 'axis = "y"', "nothing is called 'y'"),
+        ('axis = "z"', 'axis = "y"', "no axis is called 'y'"),
         ('when_off = "free"', 'when_off = "fre"', r"'fre' \(did you mean 'free'\?\): permitted are holds, free"),
         ('when_off = "free"', 'when_off = "holds"', "a brake needs an .*when_off = 'free'"),
         ("inertia = 0.00003\nmass = 25.0", "", "needs an inertia or a mass"),

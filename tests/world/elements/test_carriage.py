@@ -164,7 +164,7 @@ def test_a_slack_belt_swings_slower() -> None:
         (("frequency = 10.0", "frequncy = 10.0"), r"\[carriage\] has no 'frequncy' \(did you mean 'frequency'\?\)"),
         (("frequency = 10.0", "frequency = 0"), "permitted are numbers from 0.1 to 10000"),
         (("damping = 0.1", "damping = 1"), "permitted are numbers from 0.001 to 0.99"),
-        (('axis = "x"', 'axis = "y"'), "nothing is called 'y'"),
+        (('axis = "x"', 'axis = "y"'), "no axis is called 'y'"),
         (("above = 20.05", "abov = 20.05"), r"has no 'abov' \(did you mean 'above'\?\)"),
         (('to = "a.IN3"', 'to = "a.IN33"'), "IN33"),
         (
@@ -219,3 +219,23 @@ def test_a_collision_of_a_carriage_jams_its_axis(direction: int) -> None:
     touched = next(t for t, x in integrated(1.0) if x > 10.0)
     assert found.axis["x"].position * direction == pytest.approx(drive(touched)[0], abs=2 / 640)
     assert found.read("x.lost") != 0
+
+
+def test_the_moments_at_which_it_may_settle_are_after_the_present_one() -> None:
+    found = world()
+    start(found)
+    found.run(until=0.1)
+    settled = found.signal("tool.settled")
+    settled.bring(found.now)
+    moments = sorted(settled.turns(found.now))
+    assert moments
+    assert moments[0] > found.now
+    for n, moment in enumerate(moments):
+        assert sorted(settled.turns(moment - 1)) == moments[n:]
+        assert sorted(settled.turns(moment)) == moments[n + 1 :]
+    found.advance(moments[-1] - 1)
+    settled.bring(found.now)
+    assert settled.value(found.now) == 0.0
+    found.advance(moments[-1])
+    settled.bring(found.now)
+    assert settled.value(found.now) == 1.0

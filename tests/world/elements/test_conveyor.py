@@ -243,11 +243,11 @@ def test_a_belt_is_longer_than_a_step_of_its_drive() -> None:
     [
         ("speed = 125.0", "", "a conveyor needs one of speed and axis"),
         ("speed = 125.0", 'speed = 125.0\naxis = "x"', "a conveyor needs one of speed and axis"),
-        ("speed = 125.0", 'axis = "x"', "nothing is called 'x'"),
+        ("speed = 125.0", 'axis = "x"', "no axis is called 'x'"),
         ("at = 300.0", "at = 400.5", "at = 400.5 is beyond length = 400"),
         ("at = 300.0", "", r"\[conveyor.sensor\]: at is missing"),
         ("workpiece = 40.0", 'next = "belt"', "belt is followed by itself"),
-        ("workpiece = 40.0", 'next = "other"', "nothing is called 'other'"),
+        ("workpiece = 40.0", 'next = "other"', "no conveyor is called 'other'"),
         ("workpiece = 40.0", 'next = "a"', "no conveyor is called 'a'"),
         ('to = "a.IN1"', 'to = "a.AIN1"', "a.AIN1 is not a digital input"),
     ],

@@ -148,7 +148,7 @@ def test_its_faults() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (('shaft = "main"', 'shaft = "mian"'), r"nothing is called 'mian' \(did you mean 'main'\?\)"),
+        (('shaft = "main"', 'shaft = "mian"'), r"no shaft is called 'mian' \(did you mean 'main'\?\)"),
         (('shaft = "main"', 'shaft = "x"'), "no shaft is called 'x'"),
         (("points =", "point ="), r"\[follower\] has no 'point' \(did you mean 'points'\?\)"),
         (("[200, 0]", "[360, 0]"), "a cam has at least two, from 0 to below 360 degrees"),

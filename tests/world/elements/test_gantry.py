@@ -147,7 +147,7 @@ def test_stiff_guides_stall_both() -> None:
     ("change", "message"),
     [
         (('other = "yb"', 'other = "ya"'), "other = 'ya' is its axis already: a gantry has two"),
-        (('other = "yb"', 'other = "yc"'), "nothing is called 'yc'"),
+        (('other = "yb"', 'other = "yc"'), "no axis is called 'yc'"),
         (("limit = 2.0", "limt = 2.0"), r"\[gantry\] has no 'limt' \(did you mean 'limit'\?\)"),
         (("limit = 2.0", "limit = 0"), "permitted are numbers above 0"),
         (('effect = "jam"', 'effect = "jamm"'), r"'jamm' \(did you mean 'jam'\?\): permitted are report, jam"),

@@ -116,6 +116,55 @@ def test_levels_are_those_of_the_angle() -> None:
             assert world.read("a.IN2") == float(not (here > 350 or here < 15)), n
 
 
+SLIPS = '[[fault]]\nname = "slip"\nkind = "slipping-coupling"\nelement = "cams"\nfrom_s = 0.50001\nuntil_s = 0.60001\n'
+
+
+def test_a_coupling_that_slips_costs_the_way_of_its_axis() -> None:
+    whole, world = run(to=250.0), run(TEXT + SLIPS, to=250.0)
+    # 0.1 s at 200 mm/s: 20 mm, which are 216 degrees of the shaft.
+    assert float(whole.read("cams.angle")) - float(world.read("cams.angle")) == pytest.approx(216.0, abs=1e-9)
+    before = [edge for edge in edges(whole, "cams.switch1") if edge[0] < 0.5 * SECOND]
+    assert [edge for edge in edges(world, "cams.switch1") if edge[0] < 0.5 * SECOND] == before != []
+    # From 0.6 s on what comes is what comes without the fault, 0.1 s later: the velocity is the same until 1.25 s.
+    late = [(time + SECOND // 10, level) for time, level in edges(whole, "cams.switch1") if 0.5 < time / SECOND < 1.14]
+    found = [edge for edge in edges(world, "cams.switch1") if 0.6 < edge[0] / SECOND < 1.24]
+    assert [level for _, level in found] == [level for _, level in late] != []
+    assert [time for time, _ in found] == pytest.approx([time for time, _ in late], abs=1)
+
+
+def test_a_shaft_stands_while_its_coupling_slips() -> None:
+    world = World.from_toml(TEXT + SLIPS.replace("until_s = 0.60001\n", ""))
+    world.mic488["a"].write("M1_EN", 1)
+    world.mic488["a"].write("M1_POS_ABS", 250.0)
+    world.run(until=0.50001)
+    angle_then = world.read("cams.angle")
+    world.run(until=3.0)
+    assert world.read("cams.angle") == angle_then != 20.0
+    assert [edge for edge in edges(world, "cams.switch1") if edge[0] > 0.5 * SECOND] == []
+
+
+def test_its_coupling_tells_how_far_it_slipped() -> None:
+    world = run(TEXT + SLIPS, to=250.0)
+    told = [record.value for record in world.trace if record.kind == "fault"]
+    assert told == ["the coupling of cams slips", "the coupling of cams grips, 216 degrees behind"]
+
+
+@pytest.mark.parametrize("moment_s", [0.45, 0.55, 0.65])
+def test_a_slipping_coupling_is_restored(moment_s: float) -> None:
+    text = TEXT + SLIPS
+    world = World.from_toml(text)
+    world.mic488["a"].write("M1_EN", 1)
+    world.mic488["a"].write("M1_POS_ABS", 250.0)
+    world.run(until=moment_s)
+    snapshot = world.snapshot()
+    world.run(until=3.0)
+    other = World.from_toml(text)
+    other.restore(snapshot)
+    other.run(until=3.0)
+    assert other.trace.digest() == world.trace.digest()
+    assert other.read("cams.angle") == world.read("cams.angle")
+
+
 @pytest.mark.parametrize("moment_s", [0.0, 0.2, 0.7, 1.1])
 def test_snapshots_and_sessions_have_it(moment_s: float, tmp_path: object) -> None:
     text = TEXT + '[[script]]\nname = "s"\nsteps = [{ write = { "a.M1_EN" = 1, "a.M1_POS_ABS" = 150.0 } }, { until = "a.IN1" }]\n'
@@ -137,7 +186,7 @@ def test_snapshots_and_sessions_have_it(moment_s: float, tmp_path: object) -> No
     [
         ("ratio = 0.03", "ratio = 0", "t.toml:18.*permitted are numbers other than 0"),
         ("ratio = 0.03", "ratoi = 0.03", r"has no 'ratoi' \(did you mean 'ratio'\?\)"),
-        ('axis = "x"', 'axis = "y"', "nothing is called 'y'"),
+        ('axis = "x"', 'axis = "y"', "no axis is called 'y'"),
         ("until = 135", "until = 90", "t.toml:22.*the cam has no width"),
         ("until = 135", "until = 400", "permitted are numbers from 0 to 360"),
         ('to = "a.IN2"', 'to = "a.IN1"', "a.IN1 is driven already"),

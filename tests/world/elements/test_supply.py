@@ -10,6 +10,7 @@ from steptwin.errors import Misuse
 from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
 from steptwin.machine import SECOND
+from steptwin.world.elements.supply import Ramp
 from steptwin.world.reader import WorldError
 
 TEXT = """
@@ -210,3 +211,43 @@ def test_it_can_be_restored_anywhere(moment_s: float, tmp_path: Path) -> None:
     assert len(edges(found, "logic.good")) == 3
     save(session_of(found), place)
     assert load(place).replay().trace.digest() == found.trace.digest()
+
+
+@pytest.mark.parametrize(
+    ("ramp", "volts"),
+    [
+        (Ramp(100, 3.0, 24.0, 0.5), [3.0, 3.5, 4.0]),
+        (Ramp(100, 24.0, 3.0, 0.5), [24.0, 23.5, 23.0]),
+        (Ramp(100, 3.0, 24.0, 0.0), [24.0, 24.0, 24.0]),
+        (Ramp(100, 3.0, 3.0, 0.5), [3.0, 3.0, 3.0]),
+    ],
+)
+def test_the_voltage_of_a_ramp(ramp: Ramp, volts: list[float]) -> None:
+    assert [ramp.at(now) for now in (100, 101, 102)] == volts
+    assert ramp.at(10_000) == ramp.target
+
+
+@pytest.mark.parametrize(
+    ("ramp", "end"),
+    [
+        (Ramp(100, 3.0, 24.0, 0.5), 142),
+        (Ramp(100, 24.0, 3.0, 0.5), 142),
+        (Ramp(100, 3.0, 24.0, 0.4), 153),  # 52.5 ns
+        (Ramp(100, 3.0, 24.0, 0.0), 100),
+    ],
+)
+def test_the_end_of_a_ramp(ramp: Ramp, end: int) -> None:
+    assert ramp.end == end
+    assert ramp.at(end) == ramp.target
+    assert end == 100 or ramp.at(end - 1) != ramp.target
+
+
+@pytest.mark.parametrize("level", [0.0, 3.0, 3.1, 10.0, 10.25, 18.0, 23.9, 24.0, 25.0])
+@pytest.mark.parametrize("after", [100, 101, 114, 141, 142, 150])
+@pytest.mark.parametrize(("first", "target"), [(3.0, 24.0), (24.0, 3.0), (3.0, 3.0)])
+def test_when_a_ramp_crosses_a_level(first: float, target: float, after: int, level: float) -> None:
+    """The first nanosecond in which it is at or above, or below it, as a walk finds it."""
+    ramp = Ramp(100, first, target, 0.5)
+    high = ramp.at(after) >= level
+    expected = next((now for now in range(after + 1, 200) if (ramp.at(now) >= level) is not high), None)
+    assert ramp.crosses(level, after) == expected

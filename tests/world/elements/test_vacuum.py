@@ -186,7 +186,7 @@ def test_a_workpiece_that_passes_too_quickly_is_not_held() -> None:
     [
         ("threshold = 60.0", "threshold = 90.0", "threshold = 90 kPa is not below vacuum = 80 kPa"),
         ("vacuum = 80.0", "vacuum = 102.0", "permitted are numbers above 0 to 101"),
-        ('from = "infeed"', 'from = "belt"', "nothing is called 'belt'"),
+        ('from = "infeed"', 'from = "belt"', "no conveyor is called 'belt'"),
         ('onto = "outfeed"', 'onto = "a"', "no conveyor is called 'a'"),
     ],
 )

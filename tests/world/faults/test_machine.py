@@ -17,8 +17,9 @@ from steptwin.mic488.status import AxisStatus
 from steptwin.world import script as do
 from steptwin.world.contacts import PositionSwitch, place
 from steptwin.world.faults import Faults, read, rig
-from steptwin.world.kernel import Kernel, PinName
+from steptwin.world.kernel import Kernel
 from steptwin.world.kinds.mic488.faults import Mic488Body
+from steptwin.world.wires import PinName
 
 SAVE, LOAD, ZERO = (bytes((5, 0x08, n, 0xFF, 0x00)) for n in (0x35, 0x34, 0x36))
 """USER_REG_SAVE 2101, USER_REG_READ 2100, USER_REG_ZERO 2102."""

@@ -54,8 +54,8 @@ def test_shared_parameters_say_which_kinds_have_them() -> None:
     ]
     assert {parameter.name: of for parameter, of in found}["from_s"] == (
         "each byte, each delivery, each answer, each request, each change, each save, stuck, master-error, "
-        "stuck-output, welded-contact, open-coil, no-air, jam, belt-stop, leak, worn-brake, stuck-brake, stuck-follower, "
-        "worn-cam, slack-belt, broken-wire, drift, stiff-guides, brown-out"
+        "stuck-output, welded-contact, open-coil, no-air, jam, belt-stop, leak, worn-brake, stuck-brake, slipping-coupling, "
+        "stuck-follower, worn-cam, slack-belt, broken-wire, drift, stiff-guides, brown-out, other-load"
     )
     assert len({parameter for parameter, _ in found}) == len(found)
     for parameter, of in found:
@@ -124,9 +124,11 @@ def test_which_faults_elements_have() -> None:
         "carriage": {"slack-belt"},
         "transducer": {"broken-wire", "drift"},
         "collision": {"stuck-output"},
+        "shaft": {"slipping-coupling"},
         "follower": {"worn-cam", "stuck-follower"},
         "gantry": {"stuck-output", "stiff-guides"},
         "supply": {"stuck-output", "brown-out"},
+        "load": {"other-load"},
     }
 
 

@@ -195,7 +195,7 @@ class AsyncM1486(AsyncChip):
 
     async def run_block(self, commands: Iterable[str], timeout_s: float | None = None) -> ChipMoveEnd:
         """Have commands done one after the other, as a file in ``[ ]`` that nothing of runs before it is there whole, and wait
-        until the last one is done. The chip says so by an upload that is typed as the last of them (manual chapter II, Memory):
+        until the last one is done. An upload that is typed as the last of them reports it (manual chapter II, Memory):
         without it the block was cut short (``ChipReason.CUT``), as by a command that is wrong data when it comes to be done.
 
         Not for E types, which would keep it in their EEPROM. ``timeout_s``: by default a minute. Raises `Misuse` for commands

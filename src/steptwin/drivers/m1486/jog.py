@@ -35,8 +35,8 @@ PATIENCE_NS: Nanos = 2 * SECOND
 class AsyncM1486Jog:
     """A jog at ``velocity`` (units/s): ``async with jog: while pressed(): await jog.hold()``.
 
-    `hold` waits for the end of the present move and begins the next one; False when the motor was stopped otherwise, which `end`
-    says. After the last `hold` the motor moves `reach` at most. V is that of the jog while it lasts, and is put back where it
+    `hold` waits for the end of the present move and begins the next one; False when the motor was stopped otherwise: see
+    `end`. After the last `hold` the motor moves `reach` at most. V is that of the jog while it lasts, and is put back where it
     was known. Raises `Misuse` for a velocity that V cannot have, `Refusal` for E types, which write every command into their
     EEPROM.
     """

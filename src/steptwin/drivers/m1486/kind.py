@@ -175,7 +175,7 @@ def _home(texts: Sequence[str]) -> DeviceMotion[M1486]:
     return DeviceMotion((1,), _seek(texts).begin, end, must_wait="the command sets the position at the end of the seek")
 
 
-class _Jog:
+class _ChipJog:
     """See `steptwin.drivers.kind.DeviceHeldJog`."""
 
     def __init__(self, chip: M1486, velocity: float) -> None:
@@ -248,7 +248,7 @@ M1486_DRIVER: DriverKind[M1486] = DriverKind(
     move=_move,
     home=_home,
     seek=_seek,
-    jog=lambda chip, axis, velocity, hold_s: _Jog(chip, velocity),
+    jog=lambda chip, axis, velocity, hold_s: _ChipJog(chip, velocity),
     wait=_wait,
     halt=lambda chip, axes: chip.stop(),
     terminal=ChipConversation,

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from steptwin.drivers.kind import DeviceAddress, DeviceOverview, ReadValue, Values
+from steptwin.drivers.kind import DeviceAddress, DeviceOverview, ReadValue, ReadValues
 from steptwin.drivers.m1486.sync import M1486
 from steptwin.drivers.typed import changes_of, number_of, shown
 from steptwin.errors import Misuse
+from steptwin.m1486.microsteps import UNIT
 
 NAMES = ("POSITION", "COUNTER", "VARIABLE", "FLAGS", "FUNCTIONS", "TYPE", "INTERFACE", "SERIES")
 USUAL = ("POSITION", "VARIABLE", "FLAGS")
@@ -29,7 +30,7 @@ _SWITCHES = {"ON": True, "TRUE": True, "1": True, "OFF": False, "FALSE": False, 
 SETTABLE = "POSITION, VARIABLE, B1…B21, FLAG80…FLAG86, F40…F63, S, A, V, P, M, Q, N"
 
 
-def reading(names: Sequence[str]) -> Callable[[M1486], Values]:
+def reading(names: Sequence[str]) -> Callable[[M1486], ReadValues]:
     """See `steptwin.drivers.kind.DriverKind`."""
     wanted = [name.upper() for name in names]
     for name in wanted:
@@ -38,11 +39,11 @@ def reading(names: Sequence[str]) -> Callable[[M1486], Values]:
     return lambda chip: _read(chip, wanted)
 
 
-def _read(chip: M1486, wanted: Sequence[str]) -> Values:
+def _read(chip: M1486, wanted: Sequence[str]) -> ReadValues:
     status = chip.status()
     known = {
         "POSITION": ReadValue(status.position if status.is_position_valid else None, status.unit),
-        "COUNTER": ReadValue(status.counter_u, "min. microsteps"),
+        "COUNTER": ReadValue(status.counter_u, UNIT),
         "VARIABLE": ReadValue(status.variable),
         "FLAGS": ReadValue(_on(status.flags)),
         "FUNCTIONS": ReadValue(_on(status.functions)),
@@ -68,7 +69,7 @@ def overview(chip: M1486, address: DeviceAddress) -> DeviceOverview:
     which = "" if chip.address is None else f", chip {chip.address:X}"
     head = (
         f"{found['TYPE']}{which} at {chip.place}, {found['INTERFACE']}, series {found['SERIES']}",
-        f"position {shown(found['POSITION'])} {chip.unit} ({found['COUNTER']} min. microsteps)",
+        f"position {shown(found['POSITION'])} {chip.unit} ({found['COUNTER']} {UNIT})",
         f"internal variable {found['VARIABLE']}; flags ON: {found['FLAGS']}",
         f"functions ON: {found['FUNCTIONS']}",
     )
@@ -77,11 +78,11 @@ def overview(chip: M1486, address: DeviceAddress) -> DeviceOverview:
     )
 
 
-def writing(changes: Sequence[str]) -> Callable[[M1486], Values]:
+def writing(changes: Sequence[str]) -> Callable[[M1486], ReadValues]:
     """See `steptwin.drivers.kind.DriverKind`. Nothing is read again."""
     actions = [_action(*change) for change in changes_of(changes, "VARIABLE=7 or B6=off")]
 
-    def write(chip: M1486) -> Values:
+    def write(chip: M1486) -> ReadValues:
         for action in actions:
             action(chip)
         return {}

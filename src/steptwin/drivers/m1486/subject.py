@@ -18,7 +18,7 @@ from steptwin.drivers.m1486.driver import AsyncM1486
 from steptwin.drivers.m1486.failures import Busy, PositionUnknown
 from steptwin.drivers.m1486.jog import AsyncM1486Jog
 from steptwin.drivers.m1486.talk import ChipRequest
-from steptwin.drivers.subject import DeviceAction, PointValue
+from steptwin.drivers.subject import DeviceAction, ValueAndUnit
 from steptwin.errors import Misuse, Refusal
 from steptwin.m1486.datasheet import axis, datasheet_of
 from steptwin.m1486.microsteps import FULL_STEP
@@ -65,7 +65,7 @@ class M1486Part:
 
     # ------------------------------------------------------------------ points
 
-    async def values(self, points: Sequence[str]) -> Mapping[str, PointValue]:
+    async def values(self, points: Sequence[str]) -> Mapping[str, ValueAndUnit]:
         """Counter, variable and uploads are known at rest. Levels of lines are unknown, because reading them would overwrite
         the internal variable, which a program may need."""
         units = {point: self.unit_of(point) for point in points}

@@ -174,7 +174,7 @@ class ChipUnit:
             self.notes.was_awake = True
             self._written()
             return
-        # Nobody else is left deaf because of a chip that is not there.
+        # A chip that is missing must not leave the others without selection.
         await self._blind(rest if self.address is None else f"{rest}{SELECT_ALL}", PAUSES_NS[0])
         raise NoEcho(self.place, self.name, failure) from failure
 
@@ -208,7 +208,7 @@ class ChipUnit:
 
     async def _still_echoes(self) -> bool:
         if self.address is not None:
-            # Nobody echoes the selection where the chip selected before is off.
+            # The selection has no echo if the chip selected before is off.
             await self._blind(SELECT_ALL, PAUSES_NS[0])
         for _ in range(TRIES):
             try:

@@ -19,7 +19,7 @@ from steptwin.drivers.mic488.program import AsyncMic488Program
 from steptwin.drivers.mic488.unit import Unit, axis_mask, check_axis
 from steptwin.drivers.mic488.user import AsyncUserRegisters
 from steptwin.drivers.mic488.waiting import wait_for
-from steptwin.drivers.modbus import Query, check_unit, words
+from steptwin.drivers.modbus import ModbusQuery, check_unit, words
 from steptwin.errors import Misuse
 from steptwin.inputfiles import read_bytes
 from steptwin.machine import SECOND
@@ -71,7 +71,7 @@ class AsyncMic488:
 
     def __init__(
         self,
-        where: str | DriverLine[Query, bytes],
+        where: str | DriverLine[ModbusQuery, bytes],
         unit: int = 1,
         *,
         baud: int = 38400,
@@ -85,7 +85,7 @@ class AsyncMic488:
         if not 0.0 < timeout_s <= 60.0:
             raise Misuse(f"a time-out of {timeout_s:g} s is outside 0 to 60 s")
         self._own = isinstance(where, str)
-        self.line: DriverLine[Query, bytes] = self._own_line(where, baud, log) if isinstance(where, str) else where
+        self.line: DriverLine[ModbusQuery, bytes] = self._own_line(where, baud, log) if isinstance(where, str) else where
         check_unit(unit, tcp=bool(self.line.notes.get("tcp")))
         self._firmware = firmware
         self._observe = observe
@@ -98,7 +98,7 @@ class AsyncMic488:
         self.program = AsyncMic488Program(self._unit)
         self.user = AsyncUserRegisters(self._unit)
 
-    def _own_line(self, address: str, baud: int, log: Callable[[str], object] | None) -> DriverLine[Query, bytes]:
+    def _own_line(self, address: str, baud: int, log: Callable[[str], object] | None) -> DriverLine[ModbusQuery, bytes]:
         return AsyncModbusLine(address, baud=baud, log=log)
 
     def __repr__(self) -> str:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from steptwin.drivers.exchange import Job, LineLost
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.mic488.failures import ModbusRefusal, NoMic488
-from steptwin.drivers.modbus import Query, words
+from steptwin.drivers.modbus import ModbusQuery, words
 from steptwin.errors import LineFailure, Refusal
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.mic488.registermap import RegisterMap
@@ -32,7 +32,7 @@ class Found(NamedTuple):
     firmware: str | None
 
 
-async def firmware_of(line: DriverLine[Query, bytes], unit: int, timeout_ns: Nanos) -> str:
+async def firmware_of(line: DriverLine[ModbusQuery, bytes], unit: int, timeout_ns: Nanos) -> str:
     """The firmware whose addresses a controller has: ``1.70`` (which may be 1.40) or ``1.23``.
 
     A real controller may be silent where another refuses, so a missing answer counts as a refusal if the other address map is
@@ -47,7 +47,7 @@ async def firmware_of(line: DriverLine[Query, bytes], unit: int, timeout_ns: Nan
         registers = register_map(name)
         first, last = registers.of("DATA_TYPE"), registers.of("STATUS", AXES)
         request = pdu.ReadRequest(pdu.READ_HOLDING_REGISTERS, first.address, last.last - first.address + 1)
-        query = Query(unit, request, lambda _: f"read the control registers of firmware {name}")
+        query = ModbusQuery(unit, request, lambda _: f"read the control registers of firmware {name}")
         try:
             answer = await line.exchange(Job(query, timeout_ns, most_attempts=PROBE_TRIES))
         except pdu.ModbusException as exception:
@@ -86,7 +86,7 @@ def _plausible(registers: RegisterMap, start: int, content: tuple[int, ...]) -> 
 
 
 async def scan(
-    line: DriverLine[Query, bytes],
+    line: DriverLine[ModbusQuery, bytes],
     units: Iterable[int],
     *,
     timeout_ns: Nanos = SCAN_NS,
@@ -99,7 +99,7 @@ async def scan(
         if progress is not None:
             progress(unit)
         try:
-            await line.exchange(Job(Query(unit, inputs), timeout_ns))
+            await line.exchange(Job(ModbusQuery(unit, inputs), timeout_ns))
         except pdu.ModbusException as exception:
             if exception.code in _GATEWAY_CODES:
                 continue

@@ -155,7 +155,7 @@ def _home(texts: Sequence[str]) -> DeviceMotion[Mic488]:
     return DeviceMotion(tuple(velocities), begin)
 
 
-class _Jog:
+class _AxisJog:
     """See `steptwin.drivers.kind.DeviceHeldJog`."""
 
     def __init__(self, axis: Mic488Axis, velocity_u: float, hold_s: float) -> None:
@@ -184,8 +184,8 @@ class _Jog:
         return _ended(rest if end is None else dataclasses.replace(end, position_u=rest.position_u))
 
 
-def _jog(mic: Mic488, axis: int, velocity_u: float, hold_s: float) -> _Jog:
-    return _Jog(mic.axis(axis), velocity_u, hold_s)
+def _jog(mic: Mic488, axis: int, velocity_u: float, hold_s: float) -> _AxisJog:
+    return _AxisJog(mic.axis(axis), velocity_u, hold_s)
 
 
 def _wait(mic: Mic488, axes: Collection[int], timeout_s: float | None) -> Sequence[EndedMotion]:

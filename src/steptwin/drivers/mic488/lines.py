@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from steptwin.drivers.exchange import Exchanger
 from steptwin.drivers.mic488.frames import FrameWords
-from steptwin.drivers.modbus import Query, RtuMaster, TcpMaster
+from steptwin.drivers.modbus import ModbusQuery, RtuMaster, TcpMaster
 from steptwin.drivers.place import LineAddress, parse_line_address
 from steptwin.drivers.tasks import TaskLine
 from steptwin.drivers.threads import ThreadLine
@@ -19,7 +19,7 @@ FRAMES_PER_SECOND = 100.0
 
 def modbus_exchanger(
     place: LineAddress, frames_per_second: float | None, log: Callable[[str], object] | None
-) -> tuple[Exchanger[Query, bytes], dict[str, object]]:
+) -> tuple[Exchanger[ModbusQuery, bytes], dict[str, object]]:
     """The exchanger of a Modbus line, and the notes of its drivers. ``frames_per_second`` to each device; None: any."""
     if frames_per_second is not None and frames_per_second <= 0.0:
         raise Misuse(f"{frames_per_second:g} frames per second: must be above 0")
@@ -36,7 +36,7 @@ def modbus_exchanger(
     return Exchanger(discipline, where, interval), notes
 
 
-class AsyncModbusLine(TaskLine[Query, bytes]):
+class AsyncModbusLine(TaskLine[ModbusQuery, bytes]):
     """A Modbus line for tasks, at an address. ``async with`` opens and closes it."""
 
     def __init__(
@@ -53,7 +53,7 @@ class AsyncModbusLine(TaskLine[Query, bytes]):
         self.notes.update(notes)
 
 
-class ThreadModbusLine(ThreadLine[Query, bytes]):
+class ThreadModbusLine(ThreadLine[ModbusQuery, bytes]):
     """The same for threads, used by `steptwin.drivers.mic488.sync.ModbusLine`."""
 
     def __init__(

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from fnmatch import fnmatchcase
 from typing import Any
 
-from steptwin.drivers.kind import ReadValue, Values
+from steptwin.drivers.kind import ReadValue, ReadValues
 from steptwin.drivers.mic488.addresses import SPACES, ValueAddress, places, read_places
 from steptwin.drivers.mic488.sync import Mic488
 from steptwin.drivers.typed import changes_of
@@ -28,12 +28,12 @@ def map_of(mic: Mic488) -> RegisterMap:
     return register_map(mic.firmware)
 
 
-def reading(wanted: Sequence[str]) -> Callable[[Mic488], Values]:
+def reading(wanted: Sequence[str]) -> Callable[[Mic488], ReadValues]:
     """See `steptwin.drivers.kind.DriverKind`."""
     return lambda mic: read(mic, wanted)
 
 
-def read(mic: Mic488, wanted: Sequence[str]) -> Values:
+def read(mic: Mic488, wanted: Sequence[str]) -> ReadValues:
     """Values by name and by address. Raises `Misuse` for what is neither."""
     found = expanded(map_of(mic), wanted)
     by_name = _named(mic, [one for one in found if isinstance(one, str)])
@@ -79,11 +79,11 @@ def expanded(registers: RegisterMap, wanted: Sequence[str]) -> list[str | ValueA
     return list(found)
 
 
-def writing(changes: Sequence[str]) -> Callable[[Mic488], Values]:
+def writing(changes: Sequence[str]) -> Callable[[Mic488], ReadValues]:
     """See `steptwin.drivers.kind.DriverKind`. Gives the registers that hold what is written."""
     given = changes_of(changes, "M1_ACC=50")
 
-    def write(mic: Mic488) -> Values:
+    def write(mic: Mic488) -> ReadValues:
         registers = map_of(mic)
         wanted = {name: _value_of(_register(registers, name), text, change) for name, text, change in given}
         for name, value in wanted.items():  # all of them before the first is written

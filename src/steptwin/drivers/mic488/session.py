@@ -186,7 +186,7 @@ def from_text(text: str, name: str) -> list[SessionStep]:
 
 
 @dataclass(frozen=True, slots=True)
-class Difference:
+class SessionDifference:
     """A difference between two recordings of the same session. ``step`` counts from 1."""
 
     step: int
@@ -205,7 +205,7 @@ def _said(value: Any) -> str:
 
 def differences(
     one: list[SessionStep], two: list[SessionStep], *, tolerance: float = 0.0, time_s: float | None = None
-) -> list[Difference]:
+) -> list[SessionDifference]:
     """Values that differ by more than ``tolerance``; with ``time_s`` also steps whose times differ by more than that.
 
     Raises `Misuse` for recordings of different sessions.
@@ -218,9 +218,9 @@ def differences(
         for what in flat_a | flat_b:
             first, second = flat_a.get(what), flat_b.get(what)
             if not _alike(first, second, tolerance):
-                found.append(Difference(number, a.line, what, first, second))
+                found.append(SessionDifference(number, a.line, what, first, second))
         if time_s is not None and abs(a.at_s - b.at_s) > time_s:
-            found.append(Difference(number, a.line, "time in s", a.at_s, b.at_s))
+            found.append(SessionDifference(number, a.line, "time in s", a.at_s, b.at_s))
     return found
 
 

@@ -15,8 +15,8 @@ from steptwin.drivers.mic488.jog import AsyncMic488Jog
 from steptwin.drivers.mic488.motion import MOVING, status_text
 from steptwin.drivers.mic488.program import ProgramState
 from steptwin.drivers.mic488.snapshot import COUNTERS
-from steptwin.drivers.modbus import Query
-from steptwin.drivers.subject import DeviceAction, PointValue
+from steptwin.drivers.modbus import ModbusQuery
+from steptwin.drivers.subject import DeviceAction, ValueAndUnit
 from steptwin.errors import Misuse, Refusal
 from steptwin.inputfiles import read_bytes
 from steptwin.mic488.datasheet import datasheet_of
@@ -55,7 +55,7 @@ class Mic488Part:
         self._last: Mic488Status | None = None
 
     @property
-    def line(self) -> DriverLine[Query, bytes]:
+    def line(self) -> DriverLine[ModbusQuery, bytes]:
         return self._mic.line
 
     @property
@@ -72,7 +72,7 @@ class Mic488Part:
 
     # ------------------------------------------------------------------ points
 
-    async def values(self, points: Sequence[str]) -> Mapping[str, PointValue]:
+    async def values(self, points: Sequence[str]) -> Mapping[str, ValueAndUnit]:
         """The values of the data sheet that a register shows; the others are unknown."""
         registers = {point: self._register(point) for point in points}
         names = tuple(dict.fromkeys(name for name in registers.values() if name is not None))

@@ -20,7 +20,7 @@ from steptwin.drivers.mic488.motion import MoveEnd
 from steptwin.drivers.mic488.program import AsyncMic488Program
 from steptwin.drivers.mic488.subject import Mic488Part
 from steptwin.drivers.mic488.user import AsyncUserRegisters, AsyncUserView, Number
-from steptwin.drivers.modbus import Query
+from steptwin.drivers.modbus import ModbusQuery
 from steptwin.drivers.subject import PERIOD_S, AsyncDeviceSubject, DeviceSubject
 from steptwin.drivers.threads import ThreadLine
 from steptwin.mic488.config import ControllerConfig
@@ -178,7 +178,7 @@ class UserRegisters(Blocking):
 
 
 class _ThreadMic488(AsyncMic488):
-    def _own_line(self, address: str, baud: int, log: Callable[[str], object] | None) -> DriverLine[Query, bytes]:
+    def _own_line(self, address: str, baud: int, log: Callable[[str], object] | None) -> DriverLine[ModbusQuery, bytes]:
         return ThreadModbusLine(address, baud=baud, log=log)
 
 
@@ -189,7 +189,7 @@ class Mic488(Blocking):
 
     def __init__(
         self,
-        where: str | ModbusLine | ThreadLine[Query, bytes],
+        where: str | ModbusLine | ThreadLine[ModbusQuery, bytes],
         unit: int = 1,
         *,
         baud: int = 38400,

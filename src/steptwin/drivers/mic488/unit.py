@@ -13,7 +13,7 @@ from steptwin.drivers.exchange import Job, SentLate
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.mic488.failures import ModbusRefusal, NotReady, unconfirmed
 from steptwin.drivers.mic488.frames import FrameWords
-from steptwin.drivers.modbus import Query, bits, words
+from steptwin.drivers.modbus import ModbusQuery, bits, words
 from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Misuse
 from steptwin.machine import SECOND, Nanos
@@ -76,7 +76,7 @@ class Unit:
 
     def __init__(
         self,
-        line: DriverLine[Query, bytes],
+        line: DriverLine[ModbusQuery, bytes],
         number: int,
         registers: RegisterMap,
         config: ControllerConfig | None,
@@ -101,7 +101,7 @@ class Unit:
         frames = self.line.notes.get("frames")
         if isinstance(frames, FrameWords):
             frames.know(self.number, self.wording)
-        self._queries: dict[tuple[int, int, int], Query] = {}
+        self._queries: dict[tuple[int, int, int], ModbusQuery] = {}
         self._plans: dict[tuple[RegisterItem, ...], list[Block]] = {}
         keys = ("DATA_TYPE", "PROGRAM_CTRL", "AXIS_CTR_MODE")
         self._control_items = [RegisterItem(registers.of(key)) for key in keys]
@@ -110,7 +110,7 @@ class Unit:
             self._control_items.append(RegisterItem(registers.of("M_STATUS")))
         self._control_items += self.axis_items("STATUS")
         (self._control_block,) = plan(registers, self._control_items)
-        self._control_query = Query(self.number, self._control_block.request, lambda _: "read the control registers")
+        self._control_query = ModbusQuery(self.number, self._control_block.request, lambda _: "read the control registers")
 
     @property
     def place(self) -> str:
@@ -143,13 +143,13 @@ class Unit:
         if permission is None and moves(self.registers, request):
             permission = self.permission()
         return await self._exchange(
-            Query(self.number, request, self.wording.request), urgent, permission, timeout_ns, most_attempts
+            ModbusQuery(self.number, request, self.wording.request), urgent, permission, timeout_ns, most_attempts
         )
 
     async def _exchange(
-        self, query: Query, urgent: bool, permission: Permission | None, timeout_ns: Nanos | None, most_attempts: int
+        self, query: ModbusQuery, urgent: bool, permission: Permission | None, timeout_ns: Nanos | None, most_attempts: int
     ) -> bytes:
-        job: Job[Query, bytes] = Job(
+        job: Job[ModbusQuery, bytes] = Job(
             query, timeout_ns or self.timeout_ns, most_attempts=most_attempts, urgent=urgent, permission=permission
         )
         try:
@@ -164,7 +164,7 @@ class Unit:
         if query is None:
             if len(self._queries) >= QUERIES_KEPT:
                 self._queries.clear()
-            query = self._queries[key] = Query(self.number, pdu.ReadRequest(function, address, count), self.wording.request)
+            query = self._queries[key] = ModbusQuery(self.number, pdu.ReadRequest(function, address, count), self.wording.request)
         return await self._exchange(query, False, None, None, self.tries)
 
     # ------------------------------------------------------------------ values

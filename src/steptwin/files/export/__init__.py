@@ -6,6 +6,7 @@
 | ``html`` | a timeline to look through in a browser | |
 | ``png``, ``svg`` | a picture | matplotlib (extra ``plots``) |
 | ``vcd`` | what a logic analyser would have seen; for GTKWave | numpy (extra ``numbers``) |
+| ``pcapng`` | the frames of lines; for Wireshark | |
 | ``csv`` | samples of positions, velocities and levels | numpy (extra ``numbers``) |
 | ``parquet`` | the same | pyarrow (extra ``parquet``) |
 """
@@ -20,8 +21,9 @@ from typing import NamedTuple
 
 from steptwin.calc import Calculation
 from steptwin.errors import Misuse
+from steptwin.extras import missing
 from steptwin.files.export.axes import axis_views, controller_views
-from steptwin.files.export.progress import Progress, Watch, bar, unwatched
+from steptwin.files.export.progress import ShowExport, TimeProgress, bar, unwatched
 from steptwin.files.export.recording import Recording, sort_out
 from steptwin.files.export.records import SavedTrace, read_records, write_records
 from steptwin.files.textfiles import check_writable
@@ -53,7 +55,7 @@ NO_VIEWS: AxisViews = {}
 
 class _Options(NamedTuple):
     period: Nanos
-    progress: Progress
+    progress: TimeProgress
     window: bool
     """Whether everything up to the end is shown."""
     texts: bool
@@ -88,6 +90,13 @@ def _vcd(recording: Recording, path: Path, options: _Options) -> None:
         write_vcd(recording, file, options.progress, texts=options.texts)
 
 
+def _pcapng(recording: Recording, path: Path, options: _Options) -> None:
+    from steptwin.files.export.pcapng import write_pcapng
+
+    with path.open("wb") as file:
+        write_pcapng(recording, file, options.progress)
+
+
 def _csv(recording: Recording, path: Path, options: _Options) -> None:
     from steptwin.files.export.tables import write_csv
 
@@ -119,6 +128,7 @@ FORMATS: Mapping[str, Exporter] = {
     "png": Exporter("a picture", ("matplotlib",), "plots", _png),
     "svg": Exporter("a picture", ("matplotlib",), "plots", _svg),
     "vcd": Exporter("signals for GTKWave", ("numpy",), "numbers", _vcd),
+    "pcapng": Exporter("frames for Wireshark", (), "", _pcapng),
     "csv": Exporter("samples", ("numpy",), "numbers", _csv),
     "parquet": Exporter("samples", ("numpy", "pyarrow"), "parquet", _parquet),
 }
@@ -139,7 +149,7 @@ def write_trace(
     machines: Collection[str] | None = None,
     period: Nanos = MILLISECOND,
     texts: bool = True,
-    watch: Watch = unwatched,
+    watch: ShowExport = unwatched,
 ) -> list[Path]:
     """Write ``trace`` to a file, whose suffix selects its format, or into a directory, as ``trace.jsonl`` and so on; what was
     written.
@@ -234,10 +244,7 @@ def _check(name: str) -> None:
     if found is None:
         raise Misuse(f"no format {name!r}: formats are {', '.join(FORMATS)}")
     if found.missing:
-        raise Misuse(
-            f"{name} needs {' and '.join(found.missing)}, which {'is' if len(found.missing) == 1 else 'are'} not installed: "
-            f"in a clone 'make extras' installs them, elsewhere 'pip install {' '.join(found.missing)}'"
-        )
+        raise missing(name, found.missing)
 
 
 def read_trace(where: Path | str) -> SavedTrace:

@@ -18,7 +18,7 @@ from matplotlib.textpath import TextPath
 from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
 
 from steptwin.files.export.polyline import curve
-from steptwin.files.export.progress import Progress
+from steptwin.files.export.progress import TimeProgress
 from steptwin.files.export.recording import AxisTrack, PinTrack, Recording
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion.divisions import profile_of
@@ -68,7 +68,7 @@ class _PlotRow(NamedTuple):
     moments: Sequence[Nanos] = ()
 
 
-def write_plot(recording: Recording, path: Path, form: str, progress: Progress) -> None:
+def write_plot(recording: Recording, path: Path, form: str, progress: TimeProgress) -> None:
     """``form`` is png or svg."""
     begin, until = recording.begin, recording.until
     moving = [track for track in recording.axes if _moves(track, recording)]

@@ -9,10 +9,10 @@ from typing import TypeAlias
 
 from steptwin.machine import Nanos
 
-Progress: TypeAlias = Callable[[Nanos], None]
-"""Called with the moment (ns) that an export has reached."""
+TimeProgress: TypeAlias = Callable[[Nanos], None]
+"""Called with the moment (ns) that a run or an export has reached."""
 
-Watch: TypeAlias = Callable[[str, Nanos, Nanos], AbstractContextManager[Progress]]
+ShowExport: TypeAlias = Callable[[str, Nanos, Nanos], AbstractContextManager[TimeProgress]]
 """Called with a title, begin and end of the work; gives the function that reports progress."""
 
 
@@ -21,12 +21,12 @@ def silent(_: Nanos) -> None:
 
 
 @contextmanager
-def unwatched(_what: str, _begin: Nanos, _until: Nanos) -> Generator[Progress]:
+def unwatched(_what: str, _begin: Nanos, _until: Nanos) -> Generator[TimeProgress]:
     yield silent
 
 
 @contextmanager
-def bar(what: str, begin: Nanos, until: Nanos) -> Generator[Progress]:
+def bar(what: str, begin: Nanos, until: Nanos) -> Generator[TimeProgress]:
     """A bar on standard error, if that is a terminal."""
     if not sys.stderr.isatty():
         yield silent

@@ -15,7 +15,7 @@ from typing import IO, Any, NamedTuple
 
 from steptwin.durations import LONGEST_NS as LATEST_NS
 from steptwin.errors import Misuse
-from steptwin.files.export.progress import Progress
+from steptwin.files.export.progress import TimeProgress
 from steptwin.machine import Nanos
 from steptwin.motion import Profile
 from steptwin.motion.divisions import StepTrain
@@ -43,7 +43,7 @@ class SavedTrace(NamedTuple):
     title: str
 
 
-def write_records(trace: Trace, views: AxisViews, file: IO[str], progress: Progress, *, title: str, until: Nanos) -> None:
+def write_records(trace: Trace, views: AxisViews, file: IO[str], progress: TimeProgress, *, title: str, until: Nanos) -> None:
     file.write(_line({**_head_of(trace, views, title), "until_ns": until, "digest": trace.digest()}))
     for i, record in enumerate(trace):
         file.write(record_line(record))

@@ -15,7 +15,7 @@ from typing import IO, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from steptwin.files.export.progress import Progress
+from steptwin.files.export.progress import TimeProgress
 from steptwin.files.export.recording import AxisTrack, PinTrack, Recording
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion.divisions import profile_of
@@ -69,7 +69,7 @@ def _levels(pin: PinTrack, times: PulseTimes) -> NDArray[Any]:
     return levels[np.searchsorted(pin.times, times, side="right")]
 
 
-def write_csv(recording: Recording, file: IO[str], period: Nanos, progress: Progress) -> None:
+def write_csv(recording: Recording, file: IO[str], period: Nanos, progress: TimeProgress) -> None:
     """Numbers have as many digits as give them back exactly."""
     names: list[str] | None = None
     for done, columns in samples(recording, period):
@@ -81,7 +81,7 @@ def write_csv(recording: Recording, file: IO[str], period: Nanos, progress: Prog
         progress(done)
 
 
-def write_parquet(recording: Recording, path: Path, period: Nanos, progress: Progress) -> None:
+def write_parquet(recording: Recording, path: Path, period: Nanos, progress: TimeProgress) -> None:
     import pyarrow as pa
     from pyarrow import parquet
 

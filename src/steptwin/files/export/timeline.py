@@ -13,7 +13,7 @@ from importlib.resources import files
 from typing import IO
 
 from steptwin.files.export.polyline import PolylinePiece, pieces_of
-from steptwin.files.export.progress import Progress
+from steptwin.files.export.progress import TimeProgress
 from steptwin.files.export.recording import AxisTrack, PinTrack, Recording
 from steptwin.machine import Nanos
 from steptwin.motion.divisions import Plan, StepTrain, profile_of
@@ -25,7 +25,7 @@ _MOST_BYTES = 64
 """Of a frame in the page."""
 
 
-def write_timeline(recording: Recording, file: IO[str], progress: Progress) -> None:
+def write_timeline(recording: Recording, file: IO[str], progress: TimeProgress) -> None:
     names = recording.title or ", ".join(recording.machines[:4]) + (" …" if len(recording.machines) > 4 else "")
     data = {
         "begin": recording.begin,
@@ -53,7 +53,7 @@ def _part(name: str) -> str:
 # ---------------------------------------------------------------------- axes
 
 
-def _axis(track: AxisTrack, recording: Recording, progress: Progress, number: int) -> dict[str, object]:
+def _axis(track: AxisTrack, recording: Recording, progress: TimeProgress, number: int) -> dict[str, object]:
     """The coordinate; if they can differ, ``counted`` is the count since power-on, and ``true`` the position of the load."""
     progress(recording.begin + (recording.until - recording.begin) * (number + 1) // (len(recording.axes) + 1))
     coordinate, load = track.coordinate(), track.true()

@@ -18,7 +18,7 @@ import numpy as np
 
 from steptwin import __version__
 from steptwin.files.export.polyline import curve
-from steptwin.files.export.progress import Progress
+from steptwin.files.export.progress import TimeProgress
 from steptwin.files.export.recording import AxisTrack, PinTrack, Recording
 from steptwin.files.export.vcdtext import Times, Tokens, changes_text
 from steptwin.machine import MILLISECOND, Nanos
@@ -37,7 +37,7 @@ _Quiet: TypeAlias = list[tuple[Nanos, bytes]]
 """Single changes: moments and tokens."""
 
 
-def write_vcd(recording: Recording, file: IO[bytes], progress: Progress, *, texts: bool = True) -> None:
+def write_vcd(recording: Recording, file: IO[bytes], progress: TimeProgress, *, texts: bool = True) -> None:
     """Without ``texts`` there are no signals of type string, an extension of GTKWave that sigrok does not read."""
     dump = _Dump(recording if texts else replace(recording, marks=recording.of("statement")))
     file.write(dump.header())

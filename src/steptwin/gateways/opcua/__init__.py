@@ -1,6 +1,6 @@
 """``[gateway.opcua]``: an OPC UA server, with what clients of machine tools and robots expect of an axis (docs/gateways.md).
 
-`addressspace` has the nodes, `methods` what clients call, `session` what they read and write, `notifications` the events,
+`addressspace` has the nodes, `session` what they read and write, `notifications` the events,
 `security` users and certificates.
 What the library (asyncua) cannot do is not announced: conditions of alarms are variables and events.
 """

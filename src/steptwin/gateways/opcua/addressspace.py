@@ -12,7 +12,7 @@ from typing import Any
 
 from asyncua import ua
 
-from steptwin.gateways.opcua.methods import METHODS, MethodArgument, MethodRow, methods_of
+from steptwin.gateways.methods import METHODS, MethodArgument, MethodRow, methods_of
 from steptwin.gateways.opcua.nodetypes import VARIANTS, ZEROS, engineering_unit, standard, value_range
 from steptwin.gateways.points import CLOCK, CLOCK_POINTS, GatewayPoint, PointType, points_of
 from steptwin.subject.contract import Description, MachinePart
@@ -53,9 +53,11 @@ def node_id(path: Any) -> ua.NodeId:
 
 
 class AddressSpaceBuilder:
-    """Collects the nodes of ``description``; ``registers``: the names of further points to show, by controller."""
+    """Collects the nodes of ``description``; ``registers``: the names of further points to show, by controller.
+    ``is_kept``: whether there is a history of them."""
 
-    def __init__(self, description: Description, registers: Mapping[str, Iterable[str]]) -> None:
+    def __init__(self, description: Description, registers: Mapping[str, Iterable[str]], *, is_kept: bool = False) -> None:
+        self._is_kept = is_kept
         self.items: list[ua.AddNodesItem] = []
         self.references: list[ua.AddReferencesItem] = []
         self.points: dict[str, tuple[PointNode, ...]] = {}
@@ -71,6 +73,10 @@ class AddressSpaceBuilder:
             self.points[CLOCK] = tuple(self._point(CLOCK, point, is_of_axis=False) for point in CLOCK_POINTS)
         for part in description.machines:
             self._controller(part, registers.get(part.name, ()))
+
+    def nodes(self) -> dict[ua.NodeId, tuple[str, PointNode]]:
+        """The variables, with the controller (or the clock) of each."""
+        return {node.id: (machine, node) for machine, nodes in self.points.items() for node in nodes}
 
     # ------------------------------------------------------------------ types
 
@@ -148,6 +154,8 @@ class AddressSpaceBuilder:
         access = ua.AccessLevel.CurrentRead.mask
         if point.write is not None:
             access |= ua.AccessLevel.CurrentWrite.mask
+        if self._is_kept:
+            access |= ua.AccessLevel.HistoryRead.mask
         self.items[-1].NodeClass = ua.NodeClass.Variable
         begin = ua.Variant(ZEROS[point.type], VARIANTS[point.type])
         self.items[-1].NodeAttributes = _variable(name, point.meaning, begin, access=access)

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from asyncua.server.server import Server
 
 from steptwin import __version__
-from steptwin.errors import LineFailure, Misuse
+from steptwin.errors import LineFailure
 from steptwin.gateways.contract import GatewaySubject
 from steptwin.gateways.opcua.addressspace import NAMESPACE, NAMESPACE_URI, AddressSpaceBuilder
 from steptwin.gateways.opcua.notifications import Notifications
+from steptwin.gateways.opcua.past import PastNodes
 from steptwin.gateways.opcua.security import Security
 from steptwin.gateways.opcua.service import NodeService
 from steptwin.gateways.opcua.session import GatewayServer
@@ -28,7 +29,7 @@ PRODUCT_URI = "urn:steptwin"
 
 
 class OpcUaGateway:
-    """Serves ``subject`` where ``spec`` says. A `Gateway`."""
+    """Serves ``subject`` at the address of ``spec``. A `Gateway`."""
 
     protocol = "OPC UA"
 
@@ -42,7 +43,7 @@ class OpcUaGateway:
         self._service: NodeService | None = None
         self._task: asyncio.Task[None] | None = None
 
-    async def open(self, *, listen_any: bool) -> Mapping[str, object]:
+    async def open(self, *, listen_any: bool, notice: Callable[[str], None]) -> Mapping[str, object]:
         address = parse_address(self._spec.listen, listen_any=listen_any)
         security = Security(self._spec, self._folder, is_local=is_loopback(address.host))
         registers = self._registers()
@@ -58,12 +59,14 @@ class OpcUaGateway:
         if await server.register_namespace(NAMESPACE_URI) != NAMESPACE:
             raise AssertionError
         await security.apply(server)
-        builder = AddressSpaceBuilder(self._subject.description, registers)
+        builder = AddressSpaceBuilder(self._subject.description, registers, is_kept=self._subject.past is not None)
         for result in await inside.isession.add_nodes(builder.items):
             result.StatusCode.check()
         for code in await inside.isession.add_references(builder.references):
             code.check()
         self._sampler = Sampler(self._subject, registers)
+        if self._subject.past is not None:
+            inside.history_manager.set_storage(PastNodes(self._subject.past, builder.nodes()))
         service = NodeService(inside.aspace, self._subject, self._sampler, builder.points, builder.methods)
         inside.service = self._service = service
         await service.refresh_all()
@@ -78,10 +81,7 @@ class OpcUaGateway:
         return {"host": address.host, "port": port, "url": f"opc.tcp://{Address(address.host, port)}/"}
 
     def _registers(self) -> dict[str, list[str]]:
-        try:
-            return registers_by_machine(self._spec.registers, self._subject.description)
-        except KeyError as error:
-            raise Misuse(f"[gateway.opcua]: registers: no point is called {error.args[0]!r}") from None
+        return registers_by_machine("[gateway.opcua]", self._spec.registers, self._subject.description)
 
     async def _publish(self, service: NodeService, notifications: Notifications) -> None:
         while True:

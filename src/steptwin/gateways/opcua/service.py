@@ -10,8 +10,8 @@ from asyncua.server.address_space import AddressSpace
 from steptwin.datasheet import Argument, Limits
 from steptwin.gateways.clients import GatewayClient
 from steptwin.gateways.contract import GatewaySubject
+from steptwin.gateways.leases import JogLeases
 from steptwin.gateways.opcua.addressspace import BoundMethod, PointNode
-from steptwin.gateways.opcua.leases import JogLeases
 from steptwin.gateways.opcua.nodetypes import data_value, number_of
 from steptwin.gateways.sampling import Sample, Sampler
 from steptwin.subject.commands import Jog, StopAxes
@@ -69,7 +69,7 @@ class NodeService:
             await self._show(sample, self._watched.get(sample.machine, ()))
 
     def _forget(self) -> None:
-        """What nobody subscribes to any longer."""
+        """Nodes that have no subscription any more."""
         for machine, nodes in list(self._watched.items()):
             kept = [node for node in nodes if self._space[node.id].attributes[ua.AttributeIds.Value].datachange_callbacks]
             if kept:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 from asyncua import ua
@@ -43,7 +43,7 @@ class GatewayUser(User):
 ANONYMOUS = User(role=UserRole.Anonymous)
 
 
-class Service(Protocol):
+class SessionRequests(Protocol):
     """What sessions ask of the gateway."""
 
     async def refresh(self, nodes: Iterable[ua.NodeId]) -> None:
@@ -72,7 +72,7 @@ class Service(Protocol):
 class GatewayServer(InternalServer):
     """The library's server with sessions of this gateway."""
 
-    service: Service
+    service: SessionRequests
 
     def create_session(
         self,
@@ -97,6 +97,18 @@ class GatewaySession(InternalSession):
     async def read(self, params: ua.ReadParameters) -> list[ua.DataValue]:
         await self._service.refresh(one.NodeId for one in params.NodesToRead if one.AttributeId == ua.AttributeIds.Value)
         return await super().read(params)
+
+    async def history_read(self, params: ua.HistoryReadParameters) -> list[ua.HistoryReadResult]:
+        """Node by node: the library lets one that has no history fail the whole request."""
+        return [await self._history(replace(params, NodesToRead=[one])) for one in params.NodesToRead]
+
+    async def _history(self, params: ua.HistoryReadParameters) -> ua.HistoryReadResult:
+        try:
+            (result,) = await super().history_read(params)
+        except ua.UaStatusCodeError as error:
+            result = ua.HistoryReadResult()
+            result.StatusCode = ua.StatusCode(error.code)
+        return result
 
     async def write(self, params: ua.WriteParameters) -> list[ua.StatusCode]:
         return [await _code(self._write(one)) for one in params.NodesToWrite]

@@ -5,14 +5,12 @@ from __future__ import annotations
 from steptwin.m1486.commands import CommandSpec, When, find, grouped, range_text, rows, takes_variable
 from steptwin.m1486.functions import CARRY, default, function
 from steptwin.m1486.lines import SEEK_ENDS_LOW, SHARED_PINS, Interface
-from steptwin.m1486.microsteps import FULL_STEP
+from steptwin.m1486.microsteps import FULL_STEP, UNIT
 from steptwin.m1486.registers import REGISTERS
 from steptwin.m1486.structure import stored_bits
 from steptwin.m1486.syntax import ChipCommand
 from steptwin.m1486.variants import Variant
 from steptwin.symbols import SymbolKind, Use
-
-STEPS = "min. microsteps"
 
 
 def spec_of(command: ChipCommand, variant: Variant) -> CommandSpec | None:
@@ -34,7 +32,7 @@ def command_text(command: ChipCommand, variant: Variant) -> str:
     takes = range_text(spec, variant)
     if takes != "nothing":
         lines.append(f"Takes {takes}.")
-    if command.number is not None and spec.unit == STEPS:
+    if command.number is not None and spec.unit == UNIT:
         lines.append(f"{grouped(command.number)} minimum microsteps are {_full_steps(command.number)}.")
     bits = stored_bits(command)
     memory = f"{bits} bits of command memory" if bits else "no command memory"
@@ -61,7 +59,7 @@ def _full_steps(number: int) -> str:
 def steps_hint(command: ChipCommand, variant: Variant) -> str:
     """A distance in full steps, where that is easier to read."""
     spec = find(command.key, command.number, variant)
-    if spec is None or spec.unit != STEPS or command.number is None:
+    if spec is None or spec.unit != UNIT or command.number is None:
         return ""
     return _full_steps(command.number)
 

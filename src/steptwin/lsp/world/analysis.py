@@ -15,7 +15,8 @@ from steptwin.lsp.answers import Completions, DocumentLink, Fold, Hover, Outline
 from steptwin.lsp.files import name_of, relative
 from steptwin.lsp.positions import LineIndex
 from steptwin.lsp.world.items import ItemBuilder, keys_of
-from steptwin.lsp.world.outline import Table, WorldOutline
+from steptwin.lsp.world.outline import TableOutline, WorldOutline
+from steptwin.lsp.world.signals import WorldSignals
 from steptwin.symbols import Symbol, SymbolKind, SymbolRole, Use
 from steptwin.world.check import diagnose
 from steptwin.world.elements import ELEMENTS
@@ -91,8 +92,12 @@ class WorldAnalysis(Analysis):
             return Hover(table.span, f"`{'.'.join(table.names)}`\n\n{keys}") if keys else None
         found = _KEY.match(self.text, self.lines.starts[line], self.lines.ends[line])
         key = None if found is None else next((key for key in keys_of(table) if key.name == found[1]), None)
-        if found is None or key is None:
-            return None
+        if found is None or key is None or key.name == "when":
+            of_signal = WorldSignals(self._outline, self._controllers).hover(
+                self.lines.line(line), self.lines.starts[line], place
+            )
+            if of_signal is not None or found is None or key is None:
+                return of_signal
         span = Span(found.start(1), max(self.lines.ends[line], found.end(1)))
         needed = " It is needed." if key.is_required else ""
         return Hover(span, f"`{key.name}` of `{'.'.join(table.names)}`\n\n{key.meaning[0].upper()}{key.meaning[1:]}.{needed}")
@@ -105,7 +110,7 @@ class WorldAnalysis(Analysis):
         files = [name_of(uri) for uri in self._around.beside(self.uri)]
         return ItemBuilder(self._outline, self._controllers, files).items(before, place, present)
 
-    def _present(self, table: Table, without: int) -> Iterator[str]:
+    def _present(self, table: TableOutline, without: int) -> Iterator[str]:
         """The keys of a table, except those of one line."""
         for number in range(table.first + 1, table.last + 1):
             found = _KEY.match(self.text, self.lines.starts[number], self.lines.ends[number])
@@ -142,7 +147,7 @@ class WorldAnalysis(Analysis):
     def outline(self) -> Sequence[OutlineItem]:
         return [self._section(table) for table in self._outline.tables]
 
-    def _section(self, table: Table) -> OutlineItem:
+    def _section(self, table: TableOutline) -> OutlineItem:
         span = Span(table.span.start, max(table.span.end, self.lines.ends[table.last]))
         first = bisect_left(self._defined, span.start, key=_start)
         inside = [use for use in self._defined[first : first + 1] if use.span.start <= span.end]

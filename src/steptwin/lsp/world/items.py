@@ -7,7 +7,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from steptwin.diagnostics import Span
 from steptwin.lsp.answers import Completion, CompletionKind, Completions
-from steptwin.lsp.world.outline import Table, WorldOutline
+from steptwin.lsp.world.outline import TableOutline, WorldOutline
+from steptwin.lsp.world.signals import WorldSignals
 from steptwin.symbols import SymbolKind
 from steptwin.world.elements import ELEMENTS
 from steptwin.world.gateways import GATEWAY, GATEWAYS
@@ -38,7 +39,7 @@ _FILES = {
 }
 
 
-def keys_of(table: Table) -> Sequence[Key]:
+def keys_of(table: TableOutline) -> Sequence[Key]:
     """The permitted keys of a table."""
     if len(table.names) > 1 and table.names[0] in KINDS:
         kind = KINDS[table.names[0]]
@@ -63,6 +64,9 @@ class ItemBuilder:
         table = self._outline.table_at(place)
         if table is None:
             return Completions(())
+        signals = WorldSignals(self._outline, self._controllers).items(before, place)
+        if signals is not None:
+            return Completions(tuple(signals))
         if table.kind in ("event", "script") and (steps := self._step(before, place)) is not None:
             return Completions(tuple(steps))
         found = _KEY.match(before)
@@ -85,7 +89,7 @@ class ItemBuilder:
             return None
         return self._names(_STEP_NAMES[found[1]], Span(place - len(found[3]), place), "")
 
-    def _values(self, table: Table, name: str, quote: str, span: Span) -> Iterator[Completion]:
+    def _values(self, table: TableOutline, name: str, quote: str, span: Span) -> Iterator[Completion]:
         mark = "" if quote else '"'
         key = next((key for key in keys_of(table) if key.name == name), None)
         if key is None:
@@ -145,7 +149,7 @@ def _inner_tables() -> Iterator[str]:
     yield from (rows.written for rows in GATEWAYS.values())
 
 
-def _keys(table: Table, span: Span, present: frozenset[str]) -> Iterator[Completion]:
+def _keys(table: TableOutline, span: Span, present: frozenset[str]) -> Iterator[Completion]:
     for key in keys_of(table):
         if key.name not in present:
             detail = f"{key.meaning} (needed)" if key.is_required else key.meaning

@@ -27,7 +27,7 @@ NAMING = referring_keys(tables())
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class TableOutline:
     """``[axis.motor]`` is ``("axis", "motor")``. ``first`` is the line of its header, ``last`` the last of its content."""
 
     names: tuple[str, ...]
@@ -48,22 +48,22 @@ class WorldOutline:
         self._lines = lines
 
     @cached_property
-    def tables(self) -> Sequence[Table]:
+    def tables(self) -> Sequence[TableOutline]:
         headers: list[tuple[tuple[str, ...], Span, int]] = []
         for number, start in enumerate(self._lines.starts):
             found = _HEADER.match(self._lines.text, start, self._lines.ends[number])
             if found is not None and found[2].strip() and number not in self._inside:
                 names = tuple(part.strip() for part in found[2].split("."))
                 headers.append((names, Span(found.start(1), found.end()), number))
-        tables: list[Table] = []
+        tables: list[TableOutline] = []
         for at, (names, span, first) in enumerate(headers):
             last = headers[at + 1][2] - 1 if at + 1 < len(headers) else len(self._lines.starts) - 1
             while last > first and not self._lines.line(last).strip():
                 last -= 1
-            tables.append(Table(names, span, first, last))
+            tables.append(TableOutline(names, span, first, last))
         return tables
 
-    def table_at(self, place: int) -> Table | None:
+    def table_at(self, place: int) -> TableOutline | None:
         """The table whose lines a place is in."""
         line = self._lines.line_of(place)
         return next((table for table in reversed(self.tables) if table.first <= line), None)

@@ -19,6 +19,7 @@ from steptwin.world.elements.follower import FOLLOWER
 from steptwin.world.elements.gantry import GANTRY
 from steptwin.world.elements.gate import GATE
 from steptwin.world.elements.latch import LATCH
+from steptwin.world.elements.load import LOAD
 from steptwin.world.elements.relay import RELAY
 from steptwin.world.elements.shaft import SHAFT
 from steptwin.world.elements.source import SOURCE
@@ -81,5 +82,6 @@ for _one in (
     COLLISION,
     GANTRY,
     SUPPLY,
+    LOAD,
 ):
     register(_one)

@@ -10,15 +10,16 @@ from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.motion.divisions import profile_of
 from steptwin.points import turns_of
+from steptwin.world.contacts import Zone
 from steptwin.world.course import Build
-from steptwin.world.element import Element, NamedSpec, Reference, Row, Table
+from steptwin.world.element import Element, NamedSpec, Reference
 from steptwin.world.elements.encoder import ENCODER, EncoderSpec, fit_encoder, read_encoder
 from steptwin.world.elements.motor import MOTOR, MotorSpec, read_motor
 from steptwin.world.elements.switch import SWITCH, SwitchSpec, lane_of, put_switch, read_switches, zone_of
 from steptwin.world.kernel import Kernel, Source
 from steptwin.world.mechanics import Mechanism
 from steptwin.world.names import Unknown
-from steptwin.world.reader import Key, TomlText, optional
+from steptwin.world.reader import Key, Row, Table, TomlText, optional
 from steptwin.world.scale import Scale, motor_of, scale_of
 from steptwin.world.sense import TableRows
 from steptwin.world.signals import SignalOf
@@ -90,6 +91,19 @@ def _refers(spec: AxisSpec, world: WorldSpec) -> Iterator[Reference]:
 
 
 def _build(spec: AxisSpec, site: Site) -> BuiltAxis:
+    machine = spec.drive[0]
+    kernel = site.kernel(machine)
+    number, scale, build = site.blueprint.once(spec.path, lambda: _checked(spec, site))
+    mechanism = Mechanism(kernel, machine, number, build, spec.name)
+    kernel.add_part(mechanism, (machine,), spec.name)
+    fitted = BuiltAxis(spec, kernel, mechanism, scale)
+    for n, switch in enumerate(spec.switches, start=1):
+        site.spec.text.unless_wrong(switch.path, partial(_put_switch, fitted, switch, lane_of(spec.name, n), site))
+    return fitted
+
+
+def _checked(spec: AxisSpec, site: Site) -> tuple[int, Scale, Build]:
+    """The number of its drive, its scale and its mechanics. Raises `Misuse`."""
     machine, drive = spec.drive
     number = axis_number(drive)
     axes = len(site.machine(machine).axes)
@@ -98,7 +112,6 @@ def _build(spec: AxisSpec, site: Site) -> BuiltAxis:
     taken = [axis.spec.name for axis in site.parts.built(AXIS).values() if axis.spec.drive == spec.drive]
     if taken:
         raise Misuse(f"drive = '{machine}.{drive}' moves {taken[0]!r} already")
-    kernel = site.kernel(machine)
     scale = scale_of(spec, site.kind(machine).scale(spec, site.machine(machine), number))
     pulses = scale.nearest
     build = Build(
@@ -108,23 +121,21 @@ def _build(spec: AxisSpec, site: Site) -> BuiltAxis:
         high=None if spec.travel is None else pulses(spec.travel[1]),
         play=pulses(spec.backlash),
         period_p=scale.period_p,
-        motor=None if spec.motor is None else motor_of(spec.motor, spec.kind, scale),
+        motor=None if spec.motor is None else motor_of(spec.motor, scale),
         is_free=spec.motor is not None and spec.motor.when_off == "free",
     )
     if build.is_free and build.motor is not None:
         build.motor.check_free()
-    mechanism = Mechanism(kernel, machine, number, build, spec.name)
-    kernel.add_part(mechanism, (machine,), spec.name)
-    fitted = BuiltAxis(spec, kernel, mechanism, scale)
-    for n, switch in enumerate(spec.switches, start=1):
-        site.unless_wrong(switch.path, partial(_put_switch, fitted, switch, lane_of(spec.name, n), site))
-    return fitted
+    return number, scale, build
 
 
 def _put_switch(axis: BuiltAxis, spec: SwitchSpec, lane: str, site: Site) -> None:
-    usual = axis.scale.turn if axis.spec.kind == "rotary" else None
-    period = usual if spec.period is None else axis.scale.pulses(spec.period)
-    put_switch(axis.kernel, axis.mechanism, axis.spec.drive[0], zone_of(spec, axis.scale.nearest, period), spec, lane, site)
+    def zone() -> Zone:
+        usual = axis.scale.turn if axis.spec.kind == "rotary" else None
+        period = usual if spec.period is None else axis.scale.pulses(spec.period)
+        return zone_of(spec, axis.scale.nearest, period)
+
+    put_switch(axis.kernel, axis.mechanism, axis.spec.drive[0], site.blueprint.once(spec.path, zone), spec, lane, site)
 
 
 def _connect(spec: AxisSpec, fitted: BuiltAxis, site: Site) -> None:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 from steptwin.machine import Nanos
 from steptwin.world.contacts import Button
-from steptwin.world.element import Element, NamedSpec, Reference, Row, Table
+from steptwin.world.element import Element, NamedSpec, Reference
 from steptwin.world.elements.contact import CONTACT_KEYS
 from steptwin.world.kernel import Kernel
-from steptwin.world.reader import Key, TomlText
+from steptwin.world.reader import Key, Row, Table, TomlText
 from steptwin.world.sense import TableRows
 from steptwin.world.signals import SignalOf
 from steptwin.world.site import Site, Terminal

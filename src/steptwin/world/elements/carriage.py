@@ -16,13 +16,13 @@ from steptwin.motion.elastic import DriveStretch, Response, Spring
 from steptwin.state import Plain, Stateful
 from steptwin.world.course import Course
 from steptwin.world.drawing import rail
-from steptwin.world.element import Element, NamedSpec, Reference, Row, Table
+from steptwin.world.element import Element, NamedSpec, Reference
 from steptwin.world.elements.axis import AXIS, BuiltAxis, find_axis
 from steptwin.world.elements.switch import SWITCH, SwitchSpec, lane_of, put_switch, read_switches, zone_of
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.table import ElementEffect
 from steptwin.world.faults.table import number as parameter
-from steptwin.world.reader import Key, TomlText, optional
+from steptwin.world.reader import Key, Row, Table, TomlText, optional
 from steptwin.world.sense import TableRows
 from steptwin.world.signals import SignalOf
 from steptwin.world.site import Site
@@ -203,7 +203,7 @@ def _build(spec: CarriageSpec, site: Site) -> Carriage:
     mechanism = carriage.axis.mechanism
     carriage.axis.kernel.add_part(carriage, (mechanism.machine, spec.axis), spec.name)
     for n, switch in enumerate(spec.switches, start=1):
-        site.unless_wrong(switch.path, partial(_put_switch, carriage, switch, lane_of(spec.name, n), site))
+        site.spec.text.unless_wrong(switch.path, partial(_put_switch, carriage, switch, lane_of(spec.name, n), site))
     return carriage
 
 

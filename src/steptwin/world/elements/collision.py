@@ -6,7 +6,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.state import Plain
 from steptwin.world.board import Board
@@ -15,12 +14,12 @@ from steptwin.world.elements.axis import AXIS
 from steptwin.world.elements.carriage import CARRIAGE
 from steptwin.world.elements.follower import FOLLOWER
 from steptwin.world.elements.logic import STUCK_OUTPUT, BoardPart, BoardSpec, Joint, with_terminals
+from steptwin.world.elements.quantity import TIME, check_condition, condition_of, owners_of
 from steptwin.world.elements.shaft import SHAFT
-from steptwin.world.expression import parse_condition
 from steptwin.world.kind import Terminals
 from steptwin.world.mechanics import Mechanism
 from steptwin.world.reader import Key, TomlText, optional
-from steptwin.world.signals import Idle, SignalOf, find_signal
+from steptwin.world.signals import SignalOf
 from steptwin.world.site import Site, Terminal
 from steptwin.world.spec import WorldSpec
 from steptwin.world.values import OUTPUT_PIN, text_value, word
@@ -46,20 +45,14 @@ class CollisionSpec(BoardSpec):
 
     @property
     def owners(self) -> tuple[str, ...]:
-        """Machines and elements whose signals are in the condition; none for one that is wrong."""
-        try:
-            return tuple(dict.fromkeys(name.partition(".")[0] for name in parse_condition(self.when).names()))
-        except Misuse:
-            return ()
+        """Machines and elements whose signals are in the condition."""
+        return owners_of(self.when)
 
     def others(self, world: WorldSpec) -> Iterator[tuple[str, str]]:
-        yield from (("when", owner) for owner in self.owners if owner != "time")
+        yield from (("when", owner) for owner in self.owners if owner != TIME)
 
     def check(self, text: TomlText) -> None:
-        try:
-            parse_condition(self.when)
-        except Misuse as error:
-            text.wrong((*self.path, "when"), "D003", str(error))
+        check_condition(text, self.path, self.when)
 
 
 class Touch(BoardPart):
@@ -144,15 +137,7 @@ class Touch(BoardPart):
 
 def _make(spec: CollisionSpec, site: Site) -> Touch:
     board = site.board(spec.name)
-
-    def signal(name: str) -> SignalOf | Idle:
-        found = find_signal(site.parts, name)
-        if any(source.kernel is not board.kernel for source in found.bring(board.kernel.now)):
-            raise Misuse(f"when: {name!r} is no quantity of a machine or an element")
-        found.watch(name)
-        return found
-
-    return Touch(board, spec.effect == JAM, SignalCondition(spec.when, signal), dict(_axes_of(spec, site)))
+    return Touch(board, spec.effect == JAM, condition_of(spec.when, board, site), dict(_axes_of(spec, site)))
 
 
 def _axes_of(spec: CollisionSpec, site: Site) -> Iterator[tuple[str, Mechanism]]:

@@ -20,7 +20,7 @@ from steptwin.world.board import Board
 from steptwin.world.chance import Chance
 from steptwin.world.contacts import Circuit, Contact
 from steptwin.world.drawing import BELT, Drawing, SensorZone
-from steptwin.world.element import Reference, Table
+from steptwin.world.element import Reference
 from steptwin.world.elements.axis import find_axis
 from steptwin.world.elements.contact import CONTACT_KEYS
 from steptwin.world.elements.logic import BoardPart, BoardSpec, Inner, Joint, with_terminals
@@ -28,7 +28,8 @@ from steptwin.world.faults import ActiveFault, Fault, FaultKind, Layer, Occasion
 from steptwin.world.faults.table import ElementEffect
 from steptwin.world.kind import Terminals
 from steptwin.world.names import Unknown
-from steptwin.world.reader import Key, TomlText, optional, read_table
+from steptwin.world.reader import Key, Table, TomlText, optional, read_table
+from steptwin.world.scale import exact_fraction
 from steptwin.world.sense import TableRows, check_sense
 from steptwin.world.signals import SignalOf
 from steptwin.world.site import Site, Terminal
@@ -178,7 +179,7 @@ class Conveyor(BoardPart):
 
     def places(self, mm: float) -> int:
         """The length in places of the belt."""
-        return floor(Fraction(str(mm)) * self.per_mm + Fraction(1, 2))
+        return floor(exact_fraction(mm) * self.per_mm + Fraction(1, 2))
 
     def version(self) -> object:
         """Another value whenever predictions no longer hold."""
@@ -316,11 +317,11 @@ def _stop(active: ActiveFault, conveyor: Conveyor, begins: bool, now: Nanos) -> 
 def _make(spec: ConveyorSpec, site: Site) -> Conveyor:
     board = site.board(spec.name)
     if spec.axis is None:
-        own = ConstantDrive(Fraction(str(spec.speed)), board.kernel.now)
+        own = ConstantDrive(exact_fraction(spec.speed), board.kernel.now)
         conveyor = Conveyor(board, spec, own, Fraction(PICOMETRES), own)
     else:
         axis = find_axis(spec.axis, site)
-        per_mm = axis.scale.pulses_per_unit / Fraction(str(spec.mm_per_unit))
+        per_mm = axis.scale.pulses_per_unit / exact_fraction(spec.mm_per_unit)
         conveyor = Conveyor(board, spec, axis.mechanism, per_mm, None, (axis.mechanism.machine,))
     if conveyor.places(spec.length) < 1:
         raise Misuse(
@@ -365,7 +366,7 @@ def _lane(spec: ConveyorSpec, number: int) -> str:
 
 def _put_sensors(spec: ConveyorSpec, conveyor: Conveyor, site: Site) -> None:
     for n, sensor in enumerate(spec.sensors, start=1):
-        site.unless_wrong(sensor.path, partial(_put_sensor, conveyor, sensor, _lane(spec, n), site))
+        site.spec.text.unless_wrong(sensor.path, partial(_put_sensor, conveyor, sensor, _lane(spec, n), site))
 
 
 def _put_sensor(conveyor: Conveyor, spec: SensorSpec, lane: str, site: Site) -> None:

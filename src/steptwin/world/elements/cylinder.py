@@ -19,6 +19,7 @@ from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.table import ElementEffect
 from steptwin.world.kind import Terminals
 from steptwin.world.reader import TomlText, optional
+from steptwin.world.scale import exact_fraction
 from steptwin.world.signals import SignalOf
 from steptwin.world.site import Site, Terminal
 from steptwin.world.travel import Travel
@@ -137,7 +138,7 @@ class Cylinder(BoardPart):
 
     def places(self, units: float) -> int:
         """The place of its travel nearest to a position in units."""
-        exact = Fraction(str(units)) / Fraction(str(self._spec.stroke)) * self.travel.full
+        exact = exact_fraction(units) / exact_fraction(self._spec.stroke) * self.travel.full
         return floor(exact + Fraction(1, 2))
 
 
@@ -164,7 +165,7 @@ def _refers_of_switches(spec: CylinderSpec) -> Iterator[Reference]:
 
 def _put_switches(spec: CylinderSpec, cylinder: Cylinder, site: Site) -> None:
     for n, switch in enumerate(spec.switches, start=1):
-        site.unless_wrong(switch.path, partial(_put_switch, cylinder, switch, lane_of(spec.name, n), site))
+        site.spec.text.unless_wrong(switch.path, partial(_put_switch, cylinder, switch, lane_of(spec.name, n), site))
 
 
 def _put_switch(cylinder: Cylinder, spec: SwitchSpec, lane: str, site: Site) -> None:

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 from steptwin.errors import Misuse
 from steptwin.world.contacts import Switch, Zone
-from steptwin.world.element import Table
 from steptwin.world.kind import EncoderInputs
 from steptwin.world.mechanics import EncoderBuild, RotorMark
 from steptwin.world.names import Unknown
-from steptwin.world.reader import TomlText, optional, read_table
+from steptwin.world.reader import Table, TomlText, optional, read_table
+from steptwin.world.scale import exact_fraction
 from steptwin.world.sense import TableRows, check_sense
 from steptwin.world.site import Site
 from steptwin.world.tomlplaces import Path
@@ -104,11 +104,11 @@ def _counts(spec: EncoderSpec, turned: BuiltAxis, encoders: EncoderInputs[Any], 
     """Counts per pulse of what turns it; None: as the controller is configured."""
     counts: Fraction | None = None
     if spec.counts_per_unit is not None:
-        counts = Fraction(str(spec.counts_per_unit)) / turned.scale.pulses_per_unit
+        counts = exact_fraction(spec.counts_per_unit) / turned.scale.pulses_per_unit
     elif spec.counts_per_rev is not None:
         counts = Fraction(spec.counts_per_rev, turned.scale.pulses_per_rev)
     if spec.slip:
         if counts is None:
             counts = encoders.counts_per_pulse(machine, number)
-        counts *= 1 - Fraction(str(spec.slip))
+        counts *= 1 - exact_fraction(spec.slip)
     return counts

@@ -14,14 +14,15 @@ from steptwin.machine import Nanos
 from steptwin.state import Stateful
 from steptwin.world.cam import Cam
 from steptwin.world.drawing import ROD, Drawing
-from steptwin.world.element import Element, NamedSpec, Reference, Row, Table
+from steptwin.world.element import Element, NamedSpec, Reference
 from steptwin.world.elements.axis import AXIS, turns_of_axis
 from steptwin.world.elements.shaft import SHAFT, TURN, GearedShaft
 from steptwin.world.elements.switch import SWITCH, SwitchSpec, lane_of, put_switch, read_switches, zone_of
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.table import ElementEffect, number
 from steptwin.world.names import Unknown
-from steptwin.world.reader import Key, TomlText, optional
+from steptwin.world.reader import Key, Row, Table, TomlText, optional
+from steptwin.world.scale import exact_fraction
 from steptwin.world.sense import TableRows
 from steptwin.world.signals import SignalOf
 from steptwin.world.site import Site
@@ -50,12 +51,10 @@ class Follower(Stateful):
     __slots__ = ("_cam", "_held", "_share", "shaft", "spec")
     FIXED: ClassVar[frozenset[str]] = frozenset({"_cam", "shaft", "spec"})
 
-    def __init__(self, spec: FollowerSpec, shaft: GearedShaft) -> None:
+    def __init__(self, spec: FollowerSpec, shaft: GearedShaft, cam: Cam) -> None:
         self.spec = spec
         self.shaft = shaft
-        turn = abs(shaft.pulses_per_turn)
-        found = ((shaft.place(angle), Fraction(str(lift))) for angle, lift in spec.points)
-        self._cam = Cam(((place - floor(place / turn) * turn, lift) for place, lift in found), turn)
+        self._cam = cam
         self._held: Fraction | None = None
         """Fault: the place at which it is stuck."""
         self._share = Fraction(1)
@@ -73,23 +72,24 @@ class Follower(Stateful):
     # ------------------------------------------------------------------ the carriage of switches
 
     def version(self) -> object:
-        return self.shaft.axis.mechanism.version(), self._held, self._share
+        return self.shaft.version(), self._held, self._share
 
     def lift(self, now: Nanos) -> Fraction:
-        return self._cam.lift(self.shaft.axis.mechanism.place(now)) * self._share if self._held is None else self._held
+        return self._cam.lift(self.shaft.place(now)) * self._share if self._held is None else self._held
 
     def place(self, now: Nanos) -> int:
+        if self._held is None and self._share == 1:
+            return self._cam.nearest(self.shaft.place(now), PLACES)
         return floor(self.lift(now) * PLACES + Fraction(1, 2))
 
     def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
         if self._held is not None or self._share == 0:
             return None
-        mechanism = self.shaft.axis.mechanism
         level = Fraction(2 * position - direction, 2 * PLACES) / self._share
-        here, found = mechanism.place(after), []
+        here, found = self.shaft.place(after), []
         for way in (1, -1):
             place = self._cam.next(level, here, direction, way)
-            if place is not None and (due := mechanism.reaches(place, after, way)) is not None:
+            if place is not None and (due := self.shaft.reaches(place, after, way)) is not None:
                 found.append(due)
         return min(found, default=None)
 
@@ -110,12 +110,11 @@ class Follower(Stateful):
 
     def _corners(self, begin: Nanos, end: Nanos | None) -> Iterator[Nanos]:
         """When its axis, which goes one way from ``begin`` to ``end``, passes points of the cam, in one revolution."""
-        mechanism = self.shaft.axis.mechanism
-        here = mechanism.place(begin)
+        here = self.shaft.place(begin)
         for way in (1, -1):
             now = begin
             for place in self._cam.corners(here, way):
-                due = mechanism.reaches(place, now, way)
+                due = self.shaft.reaches(place, now, way)
                 if due is None or (end is not None and due >= end):
                     break
                 if due > now + 1:
@@ -128,7 +127,7 @@ class Follower(Stateful):
         self.shaft.axis.kernel.mark(self.spec.name)
 
     def wear(self, share: float) -> None:
-        self._share = Fraction(str(share))
+        self._share = exact_fraction(share)
         self.shaft.axis.kernel.mark(self.spec.name)
 
     @property
@@ -180,14 +179,20 @@ def _build(spec: FollowerSpec, site: Site) -> Follower:
     shaft = site.parts.built(SHAFT).get(spec.shaft)
     if shaft is None:
         raise Unknown(spec.shaft, f"no shaft is called {spec.shaft!r}")
-    if abs(shaft.pulses_per_turn) < 2 * len(spec.points):
-        raise Misuse(f"points: a turn of {spec.shaft!r} has {float(abs(shaft.pulses_per_turn)):g} imp, too few for so many")
-    follower = Follower(spec, shaft)
+    follower = Follower(spec, shaft, site.blueprint.once(spec.path, lambda: _cam(spec, shaft)))
     kernel = shaft.axis.kernel
-    kernel.add_part(follower, (shaft.axis.mechanism.machine, shaft.axis.spec.name, spec.name), spec.name)
+    kernel.add_part(follower, (shaft.axis.mechanism.machine, shaft.axis.spec.name, spec.shaft, spec.name), spec.name)
     for n, switch in enumerate(spec.switches, start=1):
-        site.unless_wrong(switch.path, partial(_put_switch, follower, switch, lane_of(spec.name, n), site))
+        site.spec.text.unless_wrong(switch.path, partial(_put_switch, follower, switch, lane_of(spec.name, n), site))
     return follower
+
+
+def _cam(spec: FollowerSpec, shaft: GearedShaft) -> Cam:
+    turn = abs(shaft.pulses_per_turn)
+    if turn < 2 * len(spec.points):
+        raise Misuse(f"points: a turn of {spec.shaft!r} has {float(turn):g} imp, too few for so many")
+    found = ((shaft.place_of(angle), exact_fraction(lift)) for angle, lift in spec.points)
+    return Cam(((place - floor(place / turn) * turn, lift) for place, lift in found), turn)
 
 
 def _put_switch(follower: Follower, spec: SwitchSpec, lane: str, site: Site) -> None:
@@ -195,12 +200,12 @@ def _put_switch(follower: Follower, spec: SwitchSpec, lane: str, site: Site) -> 
         raise Misuse(f"period = {spec.period:g}: a follower moves between two ends, its switches have one zone")
 
     def places(units: float) -> int:
-        return floor(Fraction(str(units)) * PLACES + Fraction(1, 2))
+        return floor(exact_fraction(units) * PLACES + Fraction(1, 2))
 
-    zone = zone_of(spec, places)
+    zone = site.blueprint.once(spec.path, lambda: zone_of(spec, places))
     mechanism = follower.shaft.axis.mechanism
     kernel = follower.shaft.axis.kernel
-    put_switch(kernel, follower, (mechanism.machine, follower.spec.name), zone, spec, lane, site)
+    put_switch(kernel, follower, (mechanism.machine, follower.spec.shaft, follower.spec.name), zone, spec, lane, site)
 
 
 def _signals(follower: Follower) -> Mapping[str, SignalOf]:

@@ -18,9 +18,8 @@ from steptwin.world.elements.logic import STUCK_OUTPUT, BoardSpec, Joint, with_t
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.table import ElementEffect, number
 from steptwin.world.kind import Terminals
-from steptwin.world.motor import Burden
 from steptwin.world.reader import Key, TomlText, optional
-from steptwin.world.scale import burden_of
+from steptwin.world.scale import Loading, burden_of
 from steptwin.world.signals import SignalOf, find_signal
 from steptwin.world.site import Site, Terminal
 from steptwin.world.spec import WorldSpec
@@ -72,7 +71,8 @@ class Gantry(Touch):
     def __init__(self, board: Board, spec: GantrySpec, condition: SignalCondition, ends: tuple[BuiltAxis, BuiltAxis]) -> None:
         super().__init__(board, spec.effect == JAM, condition, {end.spec.name: end.mechanism for end in ends})
         self._ends = ends
-        self._loads = tuple(burden_of(spec.mass, spec.friction_force, end.scale, "gantry") for end in ends)
+        beam = Loading(mass=spec.mass, friction_force=spec.friction_force)
+        self._loads = tuple(burden_of(beam, end.scale, "gantry") for end in ends)
         """The whole beam, for each motor."""
         self._pulling = (True, True)
         self._looked_at: Nanos = -1
@@ -99,7 +99,8 @@ class Gantry(Touch):
         self._pulling = pulls[0] and not failed[0], pulls[1] and not failed[1]
         shares = (0.5, 0.5) if self._pulling[0] is self._pulling[1] else tuple(map(float, self._pulling))
         for end, whole, share in zip(self._ends, self._loads, shares, strict=True):
-            end.mechanism.burden(Burden(whole.inertia * share, whole.friction * share * self.is_stiff), now)
+            held = whole.times(share)
+            end.mechanism.burden(self.board.name, held._replace(friction=held.friction * self.is_stiff), now)
         super().update(now)
 
     def deadline(self) -> Nanos | None:

@@ -14,17 +14,18 @@ from steptwin.machine import Nanos
 from steptwin.state import Stateful
 from steptwin.world.board import Board
 from steptwin.world.drawing import Drawing
-from steptwin.world.element import Element, NamedSpec, Reference, Row, Table
+from steptwin.world.element import Element, NamedSpec, Reference
 from steptwin.world.faults import ActiveFault, Fault, FaultKind, Layer, Occasion
 from steptwin.world.faults.table import ElementEffect, Parameter, ParameterForm, whole
 from steptwin.world.kind import Terminals
-from steptwin.world.reader import Key, TomlText
+from steptwin.world.reader import Key, Row, Table, TomlText
 from steptwin.world.sense import TableRows
 from steptwin.world.signals import SignalOf
 from steptwin.world.site import Site, Terminal
 from steptwin.world.spec import WorldSpec
 from steptwin.world.tomlplaces import Path
 from steptwin.world.values import name_value
+from steptwin.world.wires import PinName, Wire
 
 
 class Joint(NamedTuple):
@@ -103,6 +104,12 @@ class Inner(Generic[S, P]):
     lanes: Callable[[S], tuple[str, ...]]
 
 
+def _wires(spec: BoardSpec) -> Iterator[tuple[Wire, Path]]:
+    """To its inputs, with the keys that name their sources."""
+    for joint in spec.joints:
+        yield Wire(PinName(*joint.source), PinName(spec.name, joint.input)), (*spec.path, joint.key)
+
+
 # ---------------------------------------------------------------------- faults
 
 
@@ -172,8 +179,8 @@ def with_terminals(
     def build(found: S, site: Site) -> P:
         part = make(found, site)
         part.board.kernel.add_part(part, part.watches, found.name)
-        for joint in found.joints:
-            site.join(joint.source, (found.name, joint.input), (*found.path, joint.key))
+        for wire, path in site.blueprint.once((*found.path, "wires"), lambda: tuple(_wires(found))):
+            site.join(wire, path)
         if inner is not None:
             inner.build(found, part, site)
         return part

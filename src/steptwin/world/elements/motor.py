@@ -7,8 +7,7 @@ from typing import Any
 
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, Nanos
-from steptwin.world.element import Table
-from steptwin.world.reader import Key, TomlText, optional, read_table
+from steptwin.world.reader import Key, Table, TomlText, optional, read_table
 from steptwin.world.sense import TableRows, check_sense
 from steptwin.world.tomlplaces import Path
 from steptwin.world.values import flag, number, pair, points, time_value, whole, word

@@ -7,17 +7,21 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
 from math import floor
-from typing import Any
+from typing import Any, ClassVar
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.state import Stateful
 from steptwin.world.contacts import Zone
 from steptwin.world.drawing import DIAL, Drawing, SensorZone
-from steptwin.world.element import Element, NamedSpec, Reference, Row, Table
+from steptwin.world.element import Element, NamedSpec, Reference
 from steptwin.world.elements.axis import AXIS, BuiltAxis, find_axis, turns_of_axis
 from steptwin.world.elements.contact import CONTACT_KEYS
 from steptwin.world.elements.switch import lane_of, put_switch
-from steptwin.world.reader import Key, TomlText, optional, read_table
+from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
+from steptwin.world.faults.table import ElementEffect
+from steptwin.world.reader import Key, Row, Table, TomlText, optional, read_table
+from steptwin.world.scale import exact_fraction
 from steptwin.world.sense import TableRows, check_sense
 from steptwin.world.signals import SignalOf
 from steptwin.world.site import Site, Terminal
@@ -67,28 +71,75 @@ class ShaftSpec(NamedSpec):
     cams: tuple[CamSpec, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class GearedShaft:
-    spec: ShaftSpec
-    axis: BuiltAxis
+class GearedShaft(Stateful):
+    """Turns with its axis, a moving part for cams: its place is in whole pulses of the axis."""
+
+    __slots__ = ("_behind", "_held", "axis", "spec")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"axis", "spec"})
+
+    def __init__(self, spec: ShaftSpec, axis: BuiltAxis) -> None:
+        self.spec = spec
+        self.axis = axis
+        self._held: int | None = None
+        """Fault: the place at which it stands while its coupling slips."""
+        self._behind = 0
+        """Pulses of the axis that slipping has cost it; negative: it is ahead."""
+
+    # ------------------------------------------------------------------ part of a kernel
+
+    def update(self, now: Nanos) -> None:
+        """Its motion is that of its axis: the kernel looks again at what depends on it."""
+
+    def deadline(self) -> Nanos | None:
+        """None: its motion is that of its axis."""
+        return None
+
+    # ------------------------------------------------------------------ the moving part of cams
+
+    def version(self) -> object:
+        return self.axis.mechanism.version(), self._held, self._behind
+
+    def place(self, now: Nanos) -> int:
+        return self.axis.mechanism.place(now) - self._behind if self._held is None else self._held
+
+    def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
+        if self._held is not None:
+            return None
+        return self.axis.mechanism.reaches(position + self._behind, after, direction)
+
+    def slip(self, slips: bool, now: Nanos) -> None:
+        """Let the coupling slip, or grip again where the shaft is then."""
+        if slips:
+            self._held = self.place(now)
+        elif self._held is not None:
+            self._behind = self.axis.mechanism.place(now) - self._held
+            self._held = None
+        self.axis.kernel.mark(self.spec.name)
+
+    @property
+    def behind(self) -> float:
+        """Degrees."""
+        return float(self._behind / self.pulses_per_turn * TURN)
+
+    # ------------------------------------------------------------------ gear
 
     @property
     def pulses_per_turn(self) -> Fraction:
         """Of the axis; negative where the shaft turns backwards."""
-        return self.axis.scale.pulses_per_unit / Fraction(str(self.spec.ratio))
+        return self.axis.scale.pulses_per_unit / exact_fraction(self.spec.ratio)
 
-    def place(self, degrees: float) -> Fraction:
-        """The place of the axis at an angle of the first turn."""
-        return (Fraction(str(degrees)) - Fraction(str(self.spec.offset))) / TURN * self.pulses_per_turn
+    def place_of(self, degrees: float) -> Fraction:
+        """The place, not always whole, at an angle of the first turn."""
+        return (exact_fraction(degrees) - exact_fraction(self.spec.offset)) / TURN * self.pulses_per_turn
 
     def angle(self, now: Nanos) -> float:
         """Degrees, more than 360 after more than a turn."""
-        return float(self.axis.mechanism.place(now) / self.pulses_per_turn * TURN + Fraction(str(self.spec.offset)))
+        return float(self.place(now) / self.pulses_per_turn * TURN + exact_fraction(self.spec.offset))
 
     def zone(self, cam: CamSpec) -> Zone:
-        """Where the axis is while a cam is on."""
+        """Places while a cam is on."""
         end = cam.end if cam.end > cam.begin else cam.end + TURN
-        low, high = sorted((self.place(cam.begin), self.place(end)))
+        low, high = sorted((self.place_of(cam.begin), self.place_of(end)))
         half = Fraction(1, 2)
         return Zone(floor(low + half), floor(high + half), 0, abs(self.pulses_per_turn))
 
@@ -119,19 +170,28 @@ def _refers(spec: ShaftSpec, world: WorldSpec) -> Iterator[Reference]:
 
 def _build(spec: ShaftSpec, site: Site) -> GearedShaft:
     shaft = GearedShaft(spec, find_axis(spec.axis, site))
+    mechanism = shaft.axis.mechanism
+    shaft.axis.kernel.add_part(shaft, (mechanism.machine, spec.axis, spec.name), spec.name)
     for n, cam in enumerate(spec.cams, start=1):
-        site.unless_wrong(cam.path, partial(_put_cam, shaft, cam, lane_of(spec.name, n), site))
+        site.spec.text.unless_wrong(cam.path, partial(_put_cam, shaft, cam, lane_of(spec.name, n), site))
     return shaft
 
 
 def _put_cam(shaft: GearedShaft, cam: CamSpec, lane: str, site: Site) -> None:
-    mechanism = shaft.axis.mechanism
-    put_switch(shaft.axis.kernel, mechanism, mechanism.machine, shaft.zone(cam), cam, lane, site)
+    moved_by = shaft.axis.mechanism.machine, shaft.spec.name
+    put_switch(shaft.axis.kernel, shaft, moved_by, shaft.zone(cam), cam, lane, site)
 
 
 def _signals(shaft: GearedShaft) -> Mapping[str, SignalOf]:
     turning = partial(turns_of_axis, shaft.axis)
-    return {"angle": SignalOf((shaft.axis.source,), shaft.angle, turning, shaft.axis.mechanism.version, "degree")}
+    source = (shaft.axis.kernel.source(shaft.spec.name),)
+    return {"angle": SignalOf(source, shaft.angle, turning, shaft.version, "degree")}
+
+
+def _slip(active: ActiveFault, shaft: GearedShaft, begins: bool, now: Nanos) -> str:
+    shaft.slip(begins, now)
+    name = shaft.spec.name
+    return f"the coupling of {name} slips" if begins else f"the coupling of {name} grips, {shaft.behind:g} degrees behind"
 
 
 def _ratio(value: Any) -> float:
@@ -147,7 +207,7 @@ SHAFT: Element[ShaftSpec, GearedShaft] = Element(
     rows=TableRows(
         written="[[shaft]]",
         keys=(
-            Key("name", name_value, "how conditions name it"),
+            Key("name", name_value, "how conditions and faults name it"),
             Key("axis", NameOf("axis"), "the axis that turns it"),
             Key("ratio", _ratio, "turns of the shaft per unit of the axis; negative: backwards"),
             optional(number(), "offset", "degrees of the shaft while the axis is at 0", 0.0),
@@ -161,4 +221,13 @@ SHAFT: Element[ShaftSpec, GearedShaft] = Element(
     signals=_signals,
     drawing=lambda shaft: Drawing(DIAL, float(TURN), ("angle",), sensors=tuple(one.zone for one in shaft.spec.cams)),
     lanes=lambda spec: tuple(lane_of(spec.name, n) for n in range(1, len(spec.cams) + 1)),
+    faults=(
+        FaultKind(
+            "slipping-coupling",
+            Layer.ELEMENT,
+            Occasion.ALWAYS,
+            "A shaft stands while its axis turns; afterwards it goes on from where it stands.",
+            effect=ElementEffect(_slip),
+        ),
+    ),
 )

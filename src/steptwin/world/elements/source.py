@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, SECOND, Nanos
-from steptwin.world.element import Element, ElementSpec, Reference, Row, Table
-from steptwin.world.reader import Key, TomlText, optional
+from steptwin.world.element import Element, ElementSpec, Reference
+from steptwin.world.reader import Key, Row, Table, TomlText, optional
 from steptwin.world.sense import TableRows
 from steptwin.world.site import Site, Terminal
 from steptwin.world.sources import AnalogSource, ConstantWaveform, SineWaveform, TableWaveform, Waveform

@@ -8,12 +8,11 @@ from fractions import Fraction
 from typing import Protocol
 
 from steptwin.machine import Nanos
-from steptwin.world.contacts import Carriage, Switch, Zone
+from steptwin.world.contacts import MovingPart, Switch, Zone
 from steptwin.world.drawing import SensorZone
-from steptwin.world.element import Table
 from steptwin.world.elements.contact import CONTACT_KEYS
 from steptwin.world.kernel import Kernel
-from steptwin.world.reader import Key, TomlText, optional, read_table
+from steptwin.world.reader import Key, Table, TomlText, optional, read_table
 from steptwin.world.sense import TableRows, check_sense
 from steptwin.world.site import Site, Terminal
 from steptwin.world.tomlplaces import Path
@@ -103,7 +102,7 @@ class ContactSpec(Protocol):
 
 
 def put_switch(
-    kernel: Kernel, carriage: Carriage, moved_by: str | tuple[str, ...], zone: Zone, spec: ContactSpec, lane: str, site: Site
+    kernel: Kernel, carriage: MovingPart, moved_by: str | tuple[str, ...], zone: Zone, spec: ContactSpec, lane: str, site: Site
 ) -> None:
     """Put a switch where a carriage, which the machines or elements ``moved_by`` move, runs over it."""
     circuit = site.circuit(kernel, spec.target, (*spec.path, "to"), spec.join)

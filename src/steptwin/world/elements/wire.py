@@ -6,13 +6,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from steptwin.machine import Nanos
-from steptwin.world.element import Element, ElementSpec, Reference, Row, Table
-from steptwin.world.kernel import Wire
-from steptwin.world.reader import Key, TomlText, optional
+from steptwin.world.element import Element, ElementSpec, Reference
+from steptwin.world.reader import Key, Row, Table, TomlText, optional
 from steptwin.world.sense import TableRows
 from steptwin.world.site import Site, Terminal
 from steptwin.world.spec import WorldSpec
-from steptwin.world.values import INPUT_PIN, OUTPUT, OUTPUT_PIN, flag, time_value
+from steptwin.world.values import INPUT_PIN, OUTPUT_PIN, flag, time_value
+from steptwin.world.wires import PinName, Wire
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,10 +32,8 @@ def _refers(spec: WireSpec, world: WorldSpec) -> Iterator[Reference]:
 
 
 def _build(spec: WireSpec, site: Site) -> Wire:
-    kernel = site.kernel(spec.source[0])
-    source = site.terminal(spec.source, OUTPUT)
-    wire = Wire(source, site.input(spec.target, spec.path), spec.inverted, spec.delay)
-    kernel.connect(wire)
+    wire = site.blueprint.once(spec.path, lambda: Wire(PinName(*spec.source), PinName(*spec.target), spec.inverted, spec.delay))
+    site.join(wire, spec.path)
     return wire
 
 

@@ -11,7 +11,7 @@ from steptwin.state import Stateful
 from steptwin.world.chance import Chance
 from steptwin.world.faults.fault import Fault
 from steptwin.world.faults.table import Layer
-from steptwin.world.trace import Recorder, TraceRecord
+from steptwin.world.trace import RecordSink, TraceRecord
 
 if TYPE_CHECKING:
     from steptwin.world.faults.element import FaultyElement
@@ -148,7 +148,7 @@ class Faults(Stateful):
     def __init__(self, seed: int = 0) -> None:
         self.seed = seed
         self.active: tuple[ActiveFault, ...] = ()
-        self.sinks: list[Recorder] = []
+        self.sinks: list[RecordSink] = []
         self.machines: dict[str, FaultyMachine] = {}
         """Machines prepared for faults of physics."""
         self.elements: dict[str, FaultyElement] = {}

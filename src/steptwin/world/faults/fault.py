@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from steptwin.errors import Misuse
 from steptwin.world.faults.kinds import KINDS
-from steptwin.world.faults.table import FaultKind, Parameter, ParameterForm, RequestEffect, Value, check
+from steptwin.world.faults.table import FaultKind, FaultValue, Parameter, ParameterForm, RequestEffect, check
 
 GRAMMAR = "KIND [NAME=VALUE ...]"
 EXAMPLE = "crc unit=1 nth=3"
@@ -18,10 +18,10 @@ class Fault:
     """``given`` are the parameters that were given; ``name`` distinguishes it from others of its kind; empty: none."""
 
     kind: FaultKind
-    given: Mapping[str, Value]
+    given: Mapping[str, FaultValue]
     name: str = ""
 
-    def get(self, name: str) -> Value | None:
+    def get(self, name: str) -> FaultValue | None:
         """A parameter, else its default, else None."""
         value = self.given.get(name)
         if value is None:
@@ -53,7 +53,7 @@ class Fault:
         return " ".join(parts)
 
 
-def value_text(value: Value) -> str:
+def value_text(value: FaultValue) -> str:
     if isinstance(value, tuple):
         return str(value[0]) if value[0] == value[1] else f"{value[0]}-{value[1]}"
     return (
@@ -83,7 +83,7 @@ def parse(mapping: Mapping[str, object], place: str = "fault") -> Fault:
     if not isinstance(name, str) or " " in name or not name.isprintable():
         raise FaultMistake(f"{place}: name = {name!r}: permitted is text that can be printed, without blanks", "name")
     place = f"{place} ({kind.name})"
-    given: dict[str, Value] = {}
+    given: dict[str, FaultValue] = {}
     for key, value in mapping.items():
         if key not in ("kind", "name"):
             parameter = kind.parameter(key)

@@ -13,8 +13,9 @@ from steptwin.world.faults.active import ActiveFault, Faults
 from steptwin.world.faults.fault import Fault
 from steptwin.world.faults.kinds_frames import NEVER_SENT
 from steptwin.world.faults.table import ChangeEffect, FaultKind, Occasion, SaveEffect
-from steptwin.world.kernel import Kernel, PinName
+from steptwin.world.kernel import Kernel
 from steptwin.world.trace import TraceRecord
+from steptwin.world.wires import PinName
 
 
 class AxisLoad(Protocol):

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 FaultReporter: TypeAlias = "Callable[[ActiveFault, str], None]"
 """A fault has happened, and what it did."""
 
-Value: TypeAlias = int | float | str | tuple[int, int]
+FaultValue: TypeAlias = int | float | str | tuple[int, int]
 """Of a parameter. A range is (first, last)."""
 
 
@@ -85,7 +85,7 @@ class Parameter:
     least: float | None = None
     most: float | None = None
     words: tuple[str, ...] = ()
-    default: Value | None = None
+    default: FaultValue | None = None
     otherwise: str = ""
     is_required: bool = False
 
@@ -351,7 +351,7 @@ def _check_effect(kind: FaultKind) -> None:
         raise IncompleteTable(f"fault {kind.name} lacks what it does to answers")
 
 
-def check(parameter: Parameter, value: object, where: str) -> Value:
+def check(parameter: Parameter, value: object, where: str) -> FaultValue:
     """``value`` if the parameter takes it. `Misuse` names it, ``where`` and what is permitted."""
     form = parameter.form
     if isinstance(value, int) and abs(value) >= LARGEST_WHOLE:

@@ -1,6 +1,6 @@
 // Made from docs/studio.schema.json by `npm run protocol`; not to be changed by hand.
 
-export type Request = DescribeRequest | ReadRequest | PinsRequest | StateRequest | EncodersRequest | FaultsRequest | FaultKindsRequest | TimeRequest | EndPointsRequest | FollowRequest | UnfollowRequest | SetRequest | PressRequest | ReleaseRequest | WriteRequest | SendRequest | RequestRequest | PowerCycleRequest | TurnRequest | CoupleRequest | FaultRequest | ClearFaultRequest | ExpectRequest | NoteRequest | SeeRequest | EnableRequest | MoveRequest | HomeRequest | JogRequest | StopRequest | ProgramRequest | DownloadRequest | PauseRequest | ResumeRequest | StepRequest | SnapshotRequest | SnapshotsRequest | RestoreRequest | DropSnapshotRequest | SaveRequest | DebugRequest | BreakpointRequest | ClearBreakpointRequest | BreakpointsRequest | StopOnRequest | StepProgramRequest | RunRequest | LookAtRequest | BranchRequest | StackRequest | ValuesRequest | EvaluateRequest | SetValueRequest | ProgramSourceRequest | WhyRequest | HelloRequest | ResyncRequest | WatchRequest | UnwatchRequest | TakeControlRequest | ReleaseControlRequest | RenewRequest | LetGoRequest | StopAllRequest | LookRequest | GoBackRequest | ProgramsRequest | ProgramTextRequest | PortsRequest | ConnectRequest | DisconnectRequest | AuditRequest | CalculatorRequest | CalculateRequest | GearRequest | ConfigurationRequest | EditConfigurationRequest | ScanRequest | VerifyRequest | WorkRequest | CancelWorkRequest | RecordingsRequest | SaveRecordingRequest | ViewRecordingRequest | SettingsRequest | ShadowRequest | ShadowStateRequest;
+export type Request = DescribeRequest | ReadRequest | PinsRequest | StateRequest | EncodersRequest | FaultsRequest | FaultKindsRequest | TimeRequest | EndPointsRequest | FollowRequest | UnfollowRequest | SetRequest | PressRequest | ReleaseRequest | WriteRequest | SendRequest | RequestRequest | PowerCycleRequest | TurnRequest | CoupleRequest | FaultRequest | ClearFaultRequest | ExpectRequest | NoteRequest | SeeRequest | EnableRequest | MoveRequest | HomeRequest | JogRequest | StopRequest | ProgramRequest | DownloadRequest | PauseRequest | ResumeRequest | StepRequest | SnapshotRequest | SnapshotsRequest | RestoreRequest | DropSnapshotRequest | SaveRequest | DebugRequest | BreakpointRequest | ClearBreakpointRequest | BreakpointsRequest | StopOnRequest | StepProgramRequest | RunRequest | LookAtRequest | BranchRequest | StackRequest | ValuesRequest | EvaluateRequest | SetValueRequest | ProgramSourceRequest | WhyRequest | HelloRequest | ResyncRequest | WatchRequest | UnwatchRequest | TakeControlRequest | ReleaseControlRequest | RenewRequest | LetGoRequest | StopAllRequest | LookRequest | PastEventsRequest | GoBackRequest | ProgramsRequest | ProgramTextRequest | ProgramMemoryRequest | PortsRequest | ConnectRequest | DisconnectRequest | TrafficRequest | AuditRequest | CalculatorRequest | CalculateRequest | GearRequest | ConfigurationRequest | EditConfigurationRequest | ScanRequest | VerifyRequest | WorkRequest | CancelWorkRequest | RecordingsRequest | SaveRecordingRequest | ViewRecordingRequest | SettingsRequest | ShadowRequest | ShadowStateRequest;
 
 /** Every request has exactly one. */
 export type Answer = {
@@ -1216,7 +1216,7 @@ export type UnwatchRequest = {
   watch: number;
 };
 
-/** Hold control. Whoever acts while nobody holds it takes it, too. */
+/** Take control. A viewer that acts while control is free takes it, too. */
 export type TakeControlRequest = {
   do: "take_control";
   /** Comes back with the answer. */
@@ -1272,6 +1272,20 @@ export type LookRequest = {
   to_ns?: string | number | null;
 };
 
+/** What happened between two moments of the past, at most a minute apart. plans, state and faults are those of the first moment. Of more than 10000 events the last ones, without these; from_ns is then the moment of the first event. */
+export type PastEventsRequest = {
+  do: "past_events";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The first moment, or the begin of the past that is kept. [ns] */
+  from_ns: string | number;
+  /** The last moment. [ns] */
+  to_ns: string | number;
+  /** Kinds of events, as for follow. */
+  kinds?: ("plan" | "coordinate" | "sample" | "load" | "free" | "edge" | "frame" | "statement" | "status" | "note" | "report" | "button" | "input" | "fault" | "pace" | "restored" | "stopped" | "log" | "breakpoints")[] | null;
+};
+
 /** The world itself goes back to the moment that this viewer looks at; time stands there. What happened since is undone. */
 export type GoBackRequest = {
   do: "go_back";
@@ -1298,6 +1312,20 @@ export type ProgramTextRequest = {
   machine: string;
   /** As in the answer to programs. */
   place: string;
+};
+
+/** What a text would take of the program memory at a place, and what is permitted. Empty for a text with errors. */
+export type ProgramMemoryRequest = {
+  do: "program_memory";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Of a controller. */
+  machine: string;
+  /** As in the answer to programs. */
+  place: string;
+  /** The text; it is not downloaded. */
+  text: string;
 };
 
 /** The serial ports of the computer on which the studio runs, and the pseudo terminals of running twins. */
@@ -1328,6 +1356,14 @@ export type DisconnectRequest = {
   version?: 1;
   /** Of a device. */
   machine: string;
+};
+
+/** How much each line of the world has carried since its beginning. Counted at present, also while the past is looked at. */
+export type TrafficRequest = {
+  do: "traffic";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
 };
 
 /** Who did what, the newest last. */
@@ -1566,6 +1602,18 @@ export type LookAnswer = {
   from_ns: string;
 } | null;
 
+export type PastEventsAnswer = {
+  /** Virtual time, as decimal text [ns] */
+  from_ns: string;
+  /** Virtual time, as decimal text [ns] */
+  to_ns: string;
+  /** As in hello. */
+  state: Record<string, State>;
+  faults: Record<string, unknown>[];
+  plans: SubjectEvent[];
+  events: SubjectEvent[];
+};
+
 export type GoBackAnswer = null;
 
 export type ProgramsAnswer = ({
@@ -1611,6 +1659,14 @@ export type ProgramTextAnswer = {
   })[];
 };
 
+export type ProgramMemoryAnswer = ({
+  what: string;
+  used: number;
+  /** Null: the memory of the other parts limits it. */
+  most: number | null;
+  unit: string;
+})[];
+
 export type PortsAnswer = {
   address: string;
   what: string;
@@ -1621,6 +1677,22 @@ export type ConnectAnswer = {
 };
 
 export type DisconnectAnswer = null;
+
+export type TrafficAnswer = {
+  /** Virtual time, as decimal text [ns] */
+  time_ns: string;
+  lines: {
+    line: string;
+    /** Network connections, and serial ports and pseudo terminals that are open. */
+    clients: number;
+    /** Whole requests; of characters, lines. */
+    requests: number;
+    /** Exceptions and lost requests; of characters, those lost on the wire. */
+    errors: number;
+    /** Bytes that belonged to no frame. */
+    unframed: number;
+  }[];
+};
 
 export type AuditAnswer = ({
   /** Wall clock, ISO 8601. */
@@ -1950,7 +2022,7 @@ export type ShadowStateAnswer = {
     device: number;
     twin: number;
   } | null;
-  /** What the twin could not be told. */
+  /** Commands that the twin refused. */
   problems: string[];
 } | null;
 
@@ -2164,12 +2236,15 @@ export interface Requests {
   let_go: { request: LetGoRequest; answer: LetGoAnswer };
   stop_all: { request: StopAllRequest; answer: StopAllAnswer };
   look: { request: LookRequest; answer: LookAnswer };
+  past_events: { request: PastEventsRequest; answer: PastEventsAnswer };
   go_back: { request: GoBackRequest; answer: GoBackAnswer };
   programs: { request: ProgramsRequest; answer: ProgramsAnswer };
   program_text: { request: ProgramTextRequest; answer: ProgramTextAnswer };
+  program_memory: { request: ProgramMemoryRequest; answer: ProgramMemoryAnswer };
   ports: { request: PortsRequest; answer: PortsAnswer };
   connect: { request: ConnectRequest; answer: ConnectAnswer };
   disconnect: { request: DisconnectRequest; answer: DisconnectAnswer };
+  traffic: { request: TrafficRequest; answer: TrafficAnswer };
   audit: { request: AuditRequest; answer: AuditAnswer };
   calculator: { request: CalculatorRequest; answer: CalculatorAnswer };
   calculate: { request: CalculateRequest; answer: CalculateAnswer };

@@ -46,6 +46,16 @@ export class AxisState {
     this.revision++;
   }
 
+  /** What was before: plans and coordinates in their order, the first of them from the begin. */
+  takeEarlier(events: readonly (OfKind<"plan"> | OfKind<"coordinate">)[]): void {
+    const earlier = new AxisState(this.model);
+    for (const event of events) earlier.take(event);
+    const first = this.stretches[0]?.from_ns;
+    const found = earlier.stretches.filter(({ from_ns }) => first === undefined || from_ns < first);
+    this.stretches.unshift(...found.slice(Math.max(0, found.length + this.stretches.length - KEPT)));
+    this.revision++;
+  }
+
   /** Time has gone back to `time_ns`: what was later has not happened. */
   forgetAfter(time_ns: bigint): void {
     cut(this.stretches, ({ from_ns }) => from_ns > time_ns);
@@ -106,11 +116,18 @@ export class AxisState {
   /** What held at a moment; null where there are samples only, or nothing yet. */
   stretchAt(now_ns: bigint): Stretch | null {
     if (this.past?.from_ns === now_ns) return this.past;
-    for (let index = this.stretches.length - 1; index >= 0; index--) {
-      const stretch = this.stretches[index] as Stretch;
-      if (stretch.from_ns <= now_ns || index === 0) return stretch;
+    return this.stretches[this.indexAt(now_ns)] ?? null;
+  }
+
+  /** Of the stretch that held at a moment; the first one before there was any. */
+  indexAt(time_ns: bigint): number {
+    let [low, high] = [0, this.stretches.length];
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if ((this.stretches[middle] as Stretch).from_ns <= time_ns) low = middle + 1;
+      else high = middle;
     }
-    return null;
+    return Math.max(0, low - 1);
   }
 
   private plan(time_ns: bigint, plan: Plan, origin: number | null): void {

@@ -25,6 +25,22 @@ export class Edges {
     }
   }
 
+  /** What was before, in its order. */
+  takeEarlier(edges: Iterable<readonly [pin: string, time_ns: bigint, level: number | null]>): void {
+    const earlier = new Edges();
+    for (const [pin, time_ns, level] of edges) earlier.take(pin, time_ns, level);
+    for (const [pin, { times, levels }] of earlier.pins) {
+      const kept = this.pins.get(pin);
+      const first = kept?.times[0];
+      const count = first === undefined ? times.length : times.filter((time_ns) => time_ns < first).length;
+      const from = Math.max(0, count + (kept?.times.length ?? 0) - KEPT);
+      this.pins.set(pin, {
+        times: [...times.slice(from, count), ...(kept?.times ?? [])],
+        levels: [...levels.slice(from, count), ...(kept?.levels ?? [])],
+      });
+    }
+  }
+
   /** Time has gone back to `time_ns`: what was later has not happened. */
   forgetAfter(time_ns: bigint): void {
     for (const kept of this.pins.values()) {

@@ -13,6 +13,7 @@ import { AxisState } from "./axis.svelte";
 import { WorldClock, type Pace } from "./clock";
 import { Edges } from "./edges";
 import { EventLog } from "./events.svelte";
+import { EarlierEvents, type PastEvents } from "./history";
 import { Lookback, plansOf, type Past } from "./lookback.svelte";
 import { modelOf, type AxisModel, type MachineModel, type Model } from "./model";
 import { levelsOf, Pins } from "./pins.svelte";
@@ -63,6 +64,8 @@ export type Listener = (events: readonly SubjectEvent[]) => void;
 export interface Notice {
   text: string;
   kind: "error" | "done";
+  /** Of a text that is not in the language of the page. */
+  lang?: "en";
 }
 
 const NOTICE_MS = 8000;
@@ -97,6 +100,10 @@ export class Studio {
     present: () => this.present(),
     report: (error) => this.report(error),
   });
+  readonly earlier = new EarlierEvents(
+    (name, fields, within_ms) => this.ask(name, fields, within_ms),
+    (part) => this.takeEarlier(part),
+  );
   private readonly listeners = new Set<Listener>();
   private readonly followings = new Set<Following>();
   private readonly connection: Connection;
@@ -170,7 +177,7 @@ export class Studio {
   }
 
   report(error: unknown): void {
-    this.show({ text: error instanceof RequestError ? error.message : String(error), kind: "error" });
+    this.show({ text: error instanceof RequestError ? error.message : String(error), kind: "error", lang: "en" });
   }
 
   show(notice: Notice): void {
@@ -240,6 +247,7 @@ export class Studio {
     if (!hello.virtual) this.askPins();
     if (!isNewConnection) return;
     this.lookback.forget();
+    this.earlier.begin(BigInt(hello.time_ns));
     for (const following of this.followings) this.beginFollowing(following);
     this.watches.renew();
   }
@@ -319,6 +327,19 @@ export class Studio {
     }
     this.log.take(events);
     for (const listener of this.listeners) listener(events);
+  }
+
+  private takeEarlier({ from_ns, state, plans, events }: PastEvents): void {
+    const all = [...plans, ...events];
+    for (const axis of this.axes.values()) {
+      const { machine, number } = axis.model;
+      const own = all.filter((event) => event.kind === "plan" || event.kind === "coordinate");
+      axis.takeEarlier(own.filter((event) => event.machine === machine && event.axis === String(number)));
+    }
+    const first = levelsOf(state).map(([pin, level]) => [pin, BigInt(from_ns), level] as const);
+    const edges = events.filter((event) => event.kind === "edge");
+    const later = edges.map((event) => [`${event.machine}.${event.pin}`, BigInt(event.time_ns), event.level] as const);
+    this.edges.takeEarlier([...first, ...later]);
   }
 
   private showPast(past: Past | null): void {

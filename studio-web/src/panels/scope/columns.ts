@@ -1,4 +1,4 @@
-import type { AxisState } from "../../lib/state/axis.svelte";
+import type { AxisState, Stretch } from "../../lib/state/axis.svelte";
 
 /** What a curve does in each column of a picture: its first and last value there and its extremes. NaN without any. */
 export class Columns {
@@ -74,10 +74,12 @@ function fillFromPlans(
   const scale = axis.model.pulses_per_unit ?? 1;
   const perColumn = Number(span_ns) / columns.width;
   const until = Math.min(Number(span_ns), Number(now_ns - from_ns));
-  for (const [index, { from_ns: begin_ns, course, origin }] of axis.stretches.entries()) {
+  for (let index = axis.indexAt(from_ns); index < axis.stretches.length; index++) {
+    const { from_ns: begin_ns, course, origin } = axis.stretches[index] as Stretch;
     const next = axis.stretches[index + 1];
     const begin = Math.max(0, Number(begin_ns - from_ns));
     const end = Math.min(until, next === undefined ? Infinity : Number(next.from_ns - from_ns));
+    if (begin > until) return;
     if (end < begin) continue;
     const start = Number(course.start_ns - from_ns);
     const value = (at: number): number => {
@@ -91,8 +93,9 @@ function fillFromPlans(
     for (let column = Math.floor(begin / perColumn) + 1; column * perColumn < end; column++) {
       while (corner < corners.length && (corners[corner] as number) <= column * perColumn)
         put(corners[corner++] as number);
-      columns.add(column - 1, value(column * perColumn));
-      columns.add(column, value(column * perColumn));
+      const there = value(column * perColumn);
+      columns.add(column - 1, there);
+      columns.add(column, there);
     }
     while (corner < corners.length) put(corners[corner++] as number);
     put(end);
@@ -118,5 +121,26 @@ function fillFromSamples(columns: Columns, axis: AxisState, from_ns: bigint, spa
     }
     if (at >= 0) columns.add(Math.floor(at / perColumn), position);
     before = [at, position];
+  }
+}
+
+/** Values looked at in each column of a curve that has no plan of its own. */
+const LOOKS = 8n;
+
+/** Fills columns with what changes too quickly to be followed: with the values at some moments of each. */
+export function fillFrom(
+  columns: Columns,
+  value: (time_ns: bigint) => number,
+  from_ns: bigint,
+  span_ns: bigint,
+  now_ns: bigint,
+): void {
+  columns.clear();
+  const looks = BigInt(columns.width) * LOOKS;
+  for (let look = 0n; look < looks; look++) {
+    const at = from_ns + (span_ns * look) / looks;
+    if (at > now_ns) return;
+    const found = value(at);
+    if (!Number.isNaN(found)) columns.add(Number(look / LOOKS), found);
   }
 }

@@ -1,8 +1,13 @@
+import type { Pen } from "../../lib/drawing/pen";
+import type { Surface } from "../../lib/drawing/surface";
+import { inWords } from "../../text";
 import { shortNumber, shownNumber } from "../../lib/state/numbers";
 import type { Severity } from "../../lib/state/severity";
-import type { Studio } from "../../lib/state/studio.svelte";
-import { Columns, fill } from "./columns";
-import { isCurve, tracksOf, type Signal } from "./signals";
+import { Columns, fill, fillFrom } from "./columns";
+import { drawFrames, drawStatements } from "./lanes";
+import { trace } from "./polyline";
+import { isCurve, isLane, isPassed, tracksOf, type Signal } from "./signals";
+import { valueAt, type Sources } from "./values";
 import { bounds, digitsOf, ticks, type View } from "./view";
 
 /** Pixels. */
@@ -11,7 +16,7 @@ const RIGHT = 10;
 const BOTTOM = 20;
 const MARKS = 12;
 const LANE = 20;
-const GAP = 6;
+const GAP = 14;
 const LEAST_TRACK = 60;
 
 /** Lines that are told apart without colour. */
@@ -49,17 +54,19 @@ export const styleOf = (index: number): { trace: number; dash: readonly number[]
   dash: DASHES[Math.floor(index / 2) % DASHES.length] as readonly number[],
 });
 
-/** The picture of the scope, on a canvas. */
+/** The picture of the scope. */
 export class Picture {
   private columns: Columns[] = [];
   private readonly kept = new Map<string, [number, number]>();
-  private readonly ctx: CanvasRenderingContext2D;
+  private readonly ctx: Pen;
+  /** The width of the curves. */
+  private inner = 10;
 
   constructor(
-    private readonly canvas: HTMLCanvasElement,
-    private readonly studio: Studio,
+    private readonly surface: Surface,
+    private readonly sources: Sources,
   ) {
-    this.ctx = canvas.getContext("2d") as CanvasRenderingContext2D;
+    this.ctx = surface.pen;
   }
 
   /** The fraction of the width of the curves at a place of the pointer; below 0 and above 1 beside them. */
@@ -67,19 +74,10 @@ export class Picture {
     return (x - LEFT) / this.inner;
   }
 
-  private get inner(): number {
-    return Math.max(10, this.canvas.clientWidth - LEFT - RIGHT);
-  }
-
   draw(scene: Scene, colours: Colours): void {
-    const { ctx, canvas } = this;
-    const ratio = window.devicePixelRatio || 1;
-    const [width, height] = [canvas.clientWidth, canvas.clientHeight];
-    if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
-      canvas.width = Math.round(width * ratio);
-      canvas.height = Math.round(height * ratio);
-    }
-    ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
+    const { ctx } = this;
+    const [width, height] = this.surface.size;
+    this.inner = Math.max(10, width - LEFT - RIGHT);
     ctx.fillStyle = colours.paper;
     ctx.fillRect(0, 0, width, height);
     ctx.font = "11px 'IBM Plex Mono', 'DejaVu Sans Mono', monospace";
@@ -88,7 +86,7 @@ export class Picture {
     const bottom = height - BOTTOM;
     this.time(scene.view, bottom, colours);
     this.marks(scene, colours);
-    const lanes = scene.signals.filter(({ kind }) => kind === "level");
+    const lanes = scene.signals.filter(isLane);
     const tracks = tracksOf(scene.signals);
     const room = bottom - MARKS - lanes.length * LANE;
     const each = tracks.length ? Math.max(LEAST_TRACK, room / tracks.length) : 0;
@@ -104,6 +102,7 @@ export class Picture {
     this.cursor(scene, scene.moment, "◀", bottom, colours.warn, []);
     this.cursor(scene, scene.cursors.a, "A", bottom, colours.accent, []);
     this.cursor(scene, scene.cursors.b, "B", bottom, colours.accent, [5, 3]);
+    this.surface.show(width, height);
   }
 
   private x({ view }: Scene, time_ns: bigint): number {
@@ -180,7 +179,7 @@ export class Picture {
     }
     ctx.textAlign = "left";
     ctx.fillStyle = colours.ink;
-    ctx.fillText(unit, LEFT + 5, top + 8);
+    ctx.fillText(inWords(unit), LEFT + 5, top + 8);
     if (scene.trigger?.track === unit) {
       ctx.strokeStyle = colours.warn;
       ctx.setLineDash([3, 3]);
@@ -194,10 +193,12 @@ export class Picture {
     ctx.lineWidth = 1.5;
     ctx.lineJoin = "round";
     for (const [signal, columns] of filled) {
-      const { trace, dash } = styleOf(scene.signals.indexOf(signal));
-      ctx.strokeStyle = colours.traces[trace] as string;
-      ctx.setLineDash([...dash]);
-      this.curve(columns, y);
+      const style = styleOf(scene.signals.indexOf(signal));
+      ctx.strokeStyle = colours.traces[style.trace] as string;
+      ctx.setLineDash([...style.dash]);
+      ctx.beginPath();
+      trace(columns, LEFT, y, ctx);
+      ctx.stroke();
     }
     ctx.restore();
   }
@@ -218,13 +219,18 @@ export class Picture {
     if (columns?.width !== width) this.columns[index] = columns = new Columns(width);
     const { from_ns, span_ns } = scene.view;
     if (isCurve(signal)) {
-      fill(columns, this.studio.axis(signal.axis), signal.kind, from_ns, span_ns, scene.now_ns);
+      fill(columns, this.sources.axis(signal.axis), signal.kind, from_ns, span_ns, scene.now_ns);
+      return columns;
+    }
+    if (signal.kind === "current") {
+      fillFrom(columns, (at) => valueAt(this.sources, signal, at), from_ns, span_ns, scene.now_ns);
       return columns;
     }
     const found = columns;
     found.clear();
+    if (isPassed(signal)) return found;
     const until = from_ns + span_ns < scene.now_ns ? from_ns + span_ns : scene.now_ns;
-    this.studio.edges.stretches(signal.pin, from_ns, until, (begin, end, level) => {
+    this.sources.edges.stretches(signal.pin, from_ns, until, (begin, end, level) => {
       if (Number.isNaN(level)) return;
       const [first, last] = [begin, end].map((at) => (Number(at - from_ns) / Number(span_ns)) * width) as [
         number,
@@ -235,44 +241,30 @@ export class Picture {
     return found;
   }
 
-  private curve({ first, last, low, high, width }: Columns, y: (value: number) => number): void {
-    const { ctx } = this;
-    ctx.beginPath();
-    let isDown = false;
-    for (let column = 0; column < width; column++) {
-      const value = first[column] as number;
-      if (Number.isNaN(value)) {
-        isDown = false;
-        continue;
-      }
-      const x = LEFT + column;
-      if (isDown) ctx.lineTo(x, y(value));
-      else ctx.moveTo(x, y(value));
-      isDown = true;
-      if (low[column] !== high[column]) {
-        ctx.lineTo(x, y(low[column] as number));
-        ctx.lineTo(x, y(high[column] as number));
-        ctx.lineTo(x, y(last[column] as number));
-      }
-    }
-    ctx.stroke();
-  }
-
   private lane(scene: Scene, signal: Signal, top: number, colours: Colours): void {
-    if (isCurve(signal)) return;
     const { ctx } = this;
     const colour = colours.traces[styleOf(scene.signals.indexOf(signal)).trace] as string;
     const [low, high] = [top + LANE - 5, top + 4];
     ctx.textAlign = "right";
     ctx.fillStyle = colours.ink;
-    ctx.fillText(signal.label.length > 8 ? `…${signal.label.slice(-7)}` : signal.label, LEFT - 5, top + LANE / 2);
+    const name = isPassed(signal) ? signal.source : signal.label;
+    ctx.fillText(name.length > 8 ? `…${name.slice(-7)}` : name, LEFT - 5, top + LANE / 2);
     ctx.strokeStyle = colour;
     ctx.lineWidth = 1.5;
     const { from_ns, span_ns } = scene.view;
     const until = from_ns + span_ns < scene.now_ns ? from_ns + span_ns : scene.now_ns;
+    if (isPassed(signal)) {
+      const { passed } = this.sources;
+      const x = (time_ns: bigint) => this.x(scene, time_ns);
+      const lane = { left: LEFT, right: LEFT + this.inner, high, low, from_ns, to_ns: until, x };
+      if (signal.kind === "frames") drawFrames(ctx, lane, passed, signal.source, colour, colours.danger);
+      else drawStatements(ctx, lane, passed, signal.source, colour, colours.ink);
+      return;
+    }
+    if (signal.kind !== "level") return;
     let before: number | null = null;
     ctx.beginPath();
-    this.studio.edges.stretches(signal.pin, from_ns, until, (begin, end, level) => {
+    this.sources.edges.stretches(signal.pin, from_ns, until, (begin, end, level) => {
       const [x0, x1] = [this.x(scene, begin), this.x(scene, end)];
       if (Number.isNaN(level)) {
         before = null;

@@ -19,15 +19,46 @@ export interface PinSignal extends Common {
   pin: string;
 }
 
-export type Signal = CurveSignal | PinSignal;
+/** The current of a phase of a motor, in % of its greatest value; `pin` has the number of its waveform. */
+export interface CurrentSignal extends Common {
+  kind: "current";
+  axis: AxisModel;
+  pin: string;
+  phase: 1 | 2;
+}
+
+/** A lane of what passes: the frames of a line, the lines of a program that a controller executes. */
+export interface PassedSignal extends Common {
+  kind: "frames" | "statements";
+  source: string;
+}
+
+export type Signal = CurveSignal | CurrentSignal | PinSignal | PassedSignal;
 
 export const isCurve = (signal: Signal): signal is CurveSignal =>
   signal.kind === "position" || signal.kind === "velocity";
 
+export const isPassed = (signal: Signal): signal is PassedSignal =>
+  signal.kind === "frames" || signal.kind === "statements";
+
+/** Of a height of its own; all others share axes of values. */
+export const isLane = (signal: Signal): boolean => signal.kind === "level" || isPassed(signal);
+
+/** The pin of a chip that tells the waveform of its phase currents. */
+const WAVEFORM = "N";
+type Words = Quantity | "current" | "frames" | "statements";
+
+const passed = (kind: PassedSignal["kind"], source: string): Omit<PassedSignal, "label"> => ({
+  id: `${source}.${kind}`,
+  unit: "",
+  kind,
+  source,
+});
+
 /** All that can be shown, in the order of the model. */
-export function signalsOf(model: Model, words: (quantity: Quantity) => string): Signal[] {
+export function signalsOf(model: Model, words: (what: Words) => string): Signal[] {
   const several = model.machines.length > 1;
-  return model.machines.flatMap((machine): Signal[] => {
+  const ofMachines = model.machines.flatMap((machine): Signal[] => {
     const curves = machine.axes.flatMap((axis): Signal[] =>
       (["position", "velocity"] as const).map((kind) => ({
         id: `${axis.id}.${kind}`,
@@ -37,13 +68,34 @@ export function signalsOf(model: Model, words: (quantity: Quantity) => string): 
         axis,
       })),
     );
+    const pin = `${machine.name}.${WAVEFORM}`;
+    const drives = machine.sheet.pins.some(({ name }) => name === WAVEFORM) ? machine.axes : [];
+    const currents = drives.flatMap((axis): Signal[] =>
+      ([1, 2] as const).map((phase) => ({
+        id: `${axis.id}.current${phase}`,
+        label: `${axis.label} ${words("current")} ${phase}`,
+        unit: "%",
+        kind: "current",
+        axis,
+        pin,
+        phase,
+      })),
+    );
+    const statements: Signal[] = machine.isReal
+      ? []
+      : [{ ...passed("statements", machine.name), label: `${machine.name} ${words("statements")}` }];
     const pins = machine.sheet.pins.map((pin): Signal => {
       const label = several ? `${machine.name} ${pin.name}` : pin.name;
       const common = { id: `${machine.name}.${pin.name}`, label, unit: pin.unit, pin: `${machine.name}.${pin.name}` };
       return { ...common, kind: pin.unit === "V" ? "voltage" : "level" };
     });
-    return [...curves, ...pins];
+    return [...curves, ...currents, ...pins, ...statements];
   });
+  const frames = model.lines.map(({ name }): Signal => ({
+    ...passed("frames", name),
+    label: `${name} ${words("frames")}`,
+  }));
+  return [...ofMachines, ...frames];
 }
 
 /** Shown at first: positions of the axes that drive something, or of the first four. */
@@ -57,7 +109,7 @@ export function usual(signals: readonly Signal[]): string[] {
 export function tracksOf(signals: readonly Signal[]): { unit: string; signals: Signal[] }[] {
   const tracks = new Map<string, Signal[]>();
   for (const signal of signals) {
-    if (signal.kind === "level") continue;
+    if (isLane(signal)) continue;
     const kept = tracks.get(signal.unit);
     if (kept === undefined) tracks.set(signal.unit, [signal]);
     else kept.push(signal);

@@ -58,6 +58,7 @@ M1486: ControllerKind[M1486Spec, M1486Chip, M1486View] = ControllerKind(
     point=points.live_point,
     control=control.CONTROL,
     motion_ends=control.motion_ends,
+    seek=control.seek,
     held_jog=M1486HeldJog,
     state=state_of,
     texts=memory.texts,

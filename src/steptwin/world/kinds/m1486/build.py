@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 
 from steptwin.diagnostics import Severity, SourceText, render
 from steptwin.errors import SourceErrors
@@ -15,32 +16,42 @@ from steptwin.world.kind import BuildContext, text_of
 from steptwin.world.kinds.m1486.table import M1486Spec
 
 
-def build(spec: M1486Spec, memory: bytes | None, context: BuildContext) -> M1486Chip:
+def build(spec: M1486Spec, context: BuildContext) -> Callable[[bytes | None], M1486Chip]:
+    """As `steptwin.world.kind.ControllerKind.build`."""
     kind = variant(spec.variant)
-    image = _image(spec, kind, memory, context)
+    program = _program(spec, kind, context)
     timed = any(line.name == spec.line and line.timing != "off" for line in context.spec.lines)
     baud = spec.baud
     if baud is None:
         baud = next((line.baud for line in context.spec.lines if line.name == spec.line), None)
-    return M1486Chip(
-        kind,
-        address=spec.address,
-        interface=interface(spec.interface),
-        baud=baud,
-        statement_ns=spec.statement_time,
-        is_timed=timed,
-        image=image,
-    )
+
+    def make(memory: bytes | None) -> M1486Chip:
+        kept = memory if memory is not None and kind.store is Store.EEPROM else b""
+        return M1486Chip(
+            kind,
+            address=spec.address,
+            interface=interface(spec.interface),
+            baud=baud,
+            statement_ns=spec.statement_time,
+            is_timed=timed,
+            image=kept if program is None else program,
+        )
+
+    return make
 
 
-def _image(spec: M1486Spec, kind: Variant, memory: bytes | None, context: BuildContext) -> bytes:
-    """The stored file of a chip: its program, or else what its EEPROM has kept."""
+def _program(spec: M1486Spec, kind: Variant, context: BuildContext) -> bytes | None:
+    """The image of its program; None without one."""
     if spec.program is None:
-        return memory if memory is not None and kind.store is Store.EEPROM else b""
+        return None
     source = SourceText(spec.program, text_of(context, spec.program))
-    checked = check(source.text, kind, interface(spec.interface))
+    checked = _checked(source.text, kind, interface(spec.interface))
     context.accept(source, checked.diagnostics)
     return image_of(checked.program, kind)
+
+
+_checked = lru_cache(maxsize=16)(check)
+"""For the next world with the same program."""
 
 
 def sound(source: SourceText, kind: Variant, drive: Interface) -> CheckedChipProgram:

@@ -2,26 +2,40 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
 from steptwin.errors import Misuse, Refusal
 from steptwin.m1486.chip import M1486Chip
-from steptwin.m1486.microsteps import FULL_STEP
-from steptwin.m1486.points import UNIT
+from steptwin.m1486.lines import LINES, SEEK_ENDS_LOW
+from steptwin.m1486.microsteps import FULL_STEP, UNIT
 from steptwin.m1486.present import program_words
 from steptwin.m1486.ranges import out_of_range
 from steptwin.m1486.syntax import ChipCommand
 from steptwin.world import script as do
-from steptwin.world.control import ControllerCommand, Jog, Move, StopAxes
+from steptwin.world.control import ControllerCommand, Jog, Move, Seek, StopAxes
 from steptwin.world.kind import MotionEnds
 
+_LINE = re.compile(r"B([1-9][0-9]?)\Z")
 
-def motion_ends(axis: str, line: str | None) -> MotionEnds:
-    """What was typed has been executed, and no move was stopped before its end."""
+
+def motion_ends(axis: str, line: str | None, seek: Seek | None) -> MotionEnds:
+    """What was typed has been executed, and no move was stopped before its end; a seek has come to its line."""
     name = axis.partition(".")[0]
     pending = "" if line is None else f" and {line}.idle"
-    return MotionEnds(f"not {name}.busy{pending}", f"{name}.valid")
+    sought = ""
+    if seek is not None:
+        sought = f" and {name}.counter == 0 and {name}.{seek.pin} == {0 if _line_number(seek.pin) in SEEK_ENDS_LOW else 1}"
+    return MotionEnds(f"not {name}.busy{pending}", f"{name}.valid{sought}")
+
+
+def _line_number(pin: str) -> int:
+    """Of a line of the chip that can be sought. Raises `Misuse`."""
+    found = _LINE.match(pin)
+    if found is None or int(found[1]) not in LINES:
+        raise Misuse(f"seek {pin!r}: permitted are B{LINES[0]} to B{LINES[-1]}, such as '-B8'")
+    return int(found[1])
 
 
 def _typed(chip: M1486Chip, line: str | None, command: Any, *texts: str) -> do.Send:
@@ -71,6 +85,12 @@ def _move(chip: M1486Chip, line: str | None, command: Move) -> do.Send:
     return _typed(chip, line, command, text, "r")
 
 
+def seek(chip: M1486Chip, line: str | None, command: Seek) -> do.Send:
+    """At start/stop speed until the line has its end level; then the counter is 0."""
+    _refuse_busy(chip, command.machine)
+    return _typed(chip, line, command, f"{')' if command.direction > 0 else '('}{_line_number(command.pin)}", "c100")
+
+
 def _jog(chip: M1486Chip, line: str | None, command: Jog) -> do.Send:
     """V is in full steps/s; a type for 24 MHz makes twice as many of them."""
     _refuse_busy(chip, command.machine)
@@ -89,4 +109,4 @@ CONTROL: Mapping[type[ControllerCommand], Callable[[M1486Chip, str | None, Any],
     Jog: _jog,
     StopAxes: _stop,
 }
-"""It has no enable, which line is home is not known, and programs begin at labels: for that characters go to its line."""
+"""It has no enable, its home is a line that is not known (`seek`), and programs begin at labels: characters go to its line."""

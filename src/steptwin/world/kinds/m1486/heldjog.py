@@ -8,8 +8,7 @@ from __future__ import annotations
 from steptwin.errors import Misuse, Refusal
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.drive import speed_curve
-from steptwin.m1486.microsteps import FULL_STEP
-from steptwin.m1486.points import UNIT
+from steptwin.m1486.microsteps import FULL_STEP, UNIT
 from steptwin.m1486.present import program_words
 from steptwin.m1486.ranges import out_of_range
 from steptwin.m1486.syntax import ChipCommand

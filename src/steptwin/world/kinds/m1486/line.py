@@ -15,24 +15,26 @@ from steptwin.world.faults import Faults
 from steptwin.world.faults import LineProtocol as FaultLine
 from steptwin.world.kernel import Kernel
 from steptwin.world.kind import Member
-from steptwin.world.lines import SCRIPTS, Line, LineEndPoint
+from steptwin.world.lines import SCRIPTS, Line, LineEndPoint, LineTraffic
 from steptwin.world.spec import LineSpec
-from steptwin.world.trace import Recorder
+from steptwin.world.trace import RecordSink
 
 
 class ChipLine(Line):
     """M1486 chips on one serial line. All chips receive all programs, and all programs receive all chips."""
 
-    __slots__ = ("chain",)
-    FIXED: ClassVar[frozenset[str]] = Line.FIXED
+    __slots__ = ("_commands", "chain")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_commands"}) | Line.FIXED
 
     kinds = ("raw",)
     fault_kinds: ClassVar[Mapping[str, FaultLine]] = {"raw": FaultLine.CHARACTERS}
     is_shared = True
 
-    def __init__(self, kernel: Kernel, name: str, record: Recorder | None, faults: Faults, chips: list[M1486Chip]) -> None:
+    def __init__(self, kernel: Kernel, name: str, record: RecordSink | None, faults: Faults, chips: list[M1486Chip]) -> None:
         super().__init__(kernel, name, record, faults)
         self.chain = SerialChain(chips)
+        self._commands = 0
+        """Number of lines that programs have sent."""
         self.connect(SCRIPTS)
 
     @property
@@ -53,7 +55,12 @@ class ChipLine(Line):
     def exchange(self, place: str, found: LineEndPoint, data: bytes, now: Nanos) -> bytes:
         if data:
             self._report(now, place, FrameDirection.IN, data)
+            self._commands += data.count(b"\r")
         return super().exchange(place, found, data, now)
+
+    @property
+    def traffic(self) -> LineTraffic:
+        return LineTraffic(self._commands, self.chain.collisions)
 
     def _came(self, place: str, found: LineEndPoint, pieces: list[tuple[Nanos, bytes]]) -> None:
         if place == SCRIPTS:  # output is recorded here; scripts do not read it
@@ -71,7 +78,7 @@ class ChipLine(Line):
         place.inner.pending = list(pending)
 
 
-def make(spec: LineSpec, members: Sequence[Member], kernel: Kernel, record: Recorder, faults: Faults) -> ChipLine:
+def make(spec: LineSpec, members: Sequence[Member], kernel: Kernel, record: RecordSink, faults: Faults) -> ChipLine:
     """The line of a description. Raises `Misuse` for addresses that are taken, and for strict timing."""
     if spec.timing == "strict":
         raise Misuse("timing = 'strict' is for lines of kind modbus: an M1486 has no time-out between characters")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 from steptwin.controllerstate import ProgramActivity
 from steptwin.diagnostics import SourceText
@@ -12,12 +13,17 @@ from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.eeprom import image_of, unpack
 from steptwin.m1486.memory import StoredFile
 from steptwin.m1486.present import program_words, state_of
-from steptwin.m1486.syntax import ParsedProgram
+from steptwin.m1486.structure import streams
+from steptwin.m1486.syntax import ParsedProgram, parse
+from steptwin.m1486.variants import Store
 from steptwin.world import script as do
 from steptwin.world.kind import TextContext, text_of
 from steptwin.world.kinds.m1486.build import sound
 from steptwin.world.kinds.m1486.table import M1486Spec
 from steptwin.world.programtexts import CHIP, Destination, Downloading, ProgramText
+
+if TYPE_CHECKING:
+    from steptwin.explain.model import MemoryPart
 
 PLACE = "program"
 _AT_WORK = (ProgramActivity.RUNNING, ProgramActivity.WAITING)
@@ -39,8 +45,29 @@ def texts(spec: M1486Spec, chip: M1486Chip, context: TextContext) -> tuple[Progr
     is_running = is_there and state_of(chip, chip.now).program.state in _AT_WORK
     findings = checked.diagnostics
     return (
-        ProgramText(place=PLACE, language=CHIP, source=source, check=lambda: findings, is_empty=is_empty, is_running=is_running),
+        ProgramText(
+            place=PLACE,
+            language=CHIP,
+            source=source,
+            check=lambda: findings,
+            memory=lambda text: _memory(chip, text),
+            is_empty=is_empty,
+            is_running=is_running,
+        ),
     )
+
+
+def _memory(chip: M1486Chip, text: str) -> Sequence[MemoryPart]:
+    """In whole bytes. What stands in no file is downloaded as one."""
+    from steptwin.explain.model import MemoryPart  # only on request
+
+    program, errors = parse(text)
+    stream = next((one for one in streams(program) if one.address in (None, chip.address)), None)
+    if errors or stream is None:
+        return []
+    bits = max((file.bits for file in stream.files), default=stream.bits)
+    store = "EEPROM" if chip.variant.store is Store.EEPROM else "command memory"
+    return [MemoryPart(store, -(-bits // 8), chip.variant.memory_bits // 8, "bytes")]
 
 
 def _is_in(chip: M1486Chip, file: StoredFile | None) -> bool:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from steptwin.m1486.lines import LINES
 from steptwin.m1486.syntax import ChipCommand
-from steptwin.world.programs import Operand, OperandKind, StatementUse
+from steptwin.world.programs import Resource, ResourceKind, StatementUse
 
-_AXIS = Operand(OperandKind.AXIS, "1")
-_ANY_PIN = Operand(OperandKind.PIN, "")
-_VARIABLE = Operand(OperandKind.VALUE, "variable")
+_AXIS = Resource(ResourceKind.AXIS, "1")
+_ANY_PIN = Resource(ResourceKind.PIN, "")
+_VARIABLE = Resource(ResourceKind.VALUE, "variable")
 _EVERYTHING = range(1 << 16)
 """A conditional jump decides about what comes after it, wherever that is."""
 
@@ -16,7 +16,7 @@ _EVERYTHING = range(1 << 16)
 def use_of(command: ChipCommand) -> StatementUse:
     """A move holds the program until its end."""
     key, line = command.key, command.number
-    pin = () if line not in LINES else (Operand(OperandKind.PIN, f"B{line}"),)
+    pin = () if line not in LINES else (Resource(ResourceKind.PIN, f"B{line}"),)
     match key:
         case "O" | "Z":
             return StatementUse(pin, waits=True)

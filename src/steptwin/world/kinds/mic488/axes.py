@@ -13,7 +13,7 @@ from steptwin.mic488.encoder import Coupling
 from steptwin.mic488.inputs import index_input
 from steptwin.world.kind import EncoderInputs
 from steptwin.world.lanes import AxisLane, plain_view
-from steptwin.world.scale import FULL_STEPS, DriveScale
+from steptwin.world.scale import FULL_STEPS, DriveScale, exact_fraction
 
 if TYPE_CHECKING:
     from steptwin.world.elements.axis import AxisSpec
@@ -26,7 +26,7 @@ def scale(spec: AxisSpec, device: Mic488Device, number: int) -> DriveScale:
         pulses_per_rev=axis.config.mot_resol if spec.pulses_per_rev is None else spec.pulses_per_rev,
         full_steps=FULL_STEPS if full_steps is None else full_steps,
         unit=axis.config.unit_name,
-        pulses_per_unit=Fraction(str(axis.gear)),
+        pulses_per_unit=exact_fraction(axis.gear),
         text=f"has axis {number} in {axis.config.unit_name}",
     )
 

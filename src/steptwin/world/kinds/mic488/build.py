@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import lru_cache
 
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
@@ -14,26 +15,35 @@ from steptwin.mic488.program_banks import LoadedProgram, load, setup_of
 from steptwin.mic488.registers import firmware
 from steptwin.wbc.check import check
 from steptwin.wbc.decompile import IMAGE, program_of
-from steptwin.wbc.dialect import dialect_for
+from steptwin.wbc.dialect import Dialect, dialect_for
 from steptwin.wbc.interpreter import STATEMENT_TIME
 from steptwin.wbc.positions import PositionTable, parse_positions
+from steptwin.wbc.usage import Setup
 from steptwin.world.kind import BuildContext, text_of
 from steptwin.world.kinds.mic488.table import Mic488Spec, config_of
 
+REMEMBERED = 16
+"""Programs and tables that are kept for the next world with the same."""
 
-def build(spec: Mic488Spec, memory: bytes | None, context: BuildContext) -> Mic488Device:
+
+def build(spec: Mic488Spec, context: BuildContext) -> Callable[[bytes | None], Mic488Device]:
+    """As `steptwin.world.kind.ControllerKind.build`."""
     config = _config(spec, context)
     programs, positions = _banks(spec, config, context)
     statement_time = STATEMENT_TIME if spec.statement_time is None else spec.statement_time
-    return Mic488Device(
-        config,
-        spec.firmware,
-        lenient=spec.lenient,
-        memory=memory,
-        programs=programs,
-        positions=positions,
-        statement_time=statement_time,
-    )
+
+    def make(memory: bytes | None) -> Mic488Device:
+        return Mic488Device(
+            config,
+            spec.firmware,
+            lenient=spec.lenient,
+            memory=memory,
+            programs=programs,
+            positions=positions,
+            statement_time=statement_time,
+        )
+
+    return make
 
 
 def configuration(spec: Mic488Spec, device: Mic488Device, context: BuildContext) -> SourceText:
@@ -62,10 +72,18 @@ def _banks(
     programs: dict[int, LoadedProgram] = {}
     for bank, name in spec.all_programs:
         table = table_for(bank, tables)
-        checked = check(sources[bank].text, table, setup_of(config), dialect_for(spec.firmware))
-        context.accept(sources[bank], checked.diagnostics)
-        programs[bank] = load(checked, name)
+        of = sources[bank].text, table, setup_of(config), dialect_for(spec.firmware)
+        context.accept(sources[bank], _checked(*of).diagnostics)
+        programs[bank] = _loaded(name, *of)
     return programs, tables
+
+
+_checked = lru_cache(maxsize=REMEMBERED)(check)
+
+
+@lru_cache(maxsize=REMEMBERED)
+def _loaded(name: str, text: str, table: PositionTable | None, setup: Setup, dialect: Dialect) -> LoadedProgram:
+    return load(_checked(text, table, setup, dialect), name)
 
 
 def table_for(bank: int, tables: Mapping[int, PositionTable]) -> PositionTable | None:
@@ -94,8 +112,11 @@ def _texts(spec: Mic488Spec, context: BuildContext) -> tuple[dict[int, SourceTex
     return sources, tables
 
 
+_parsed = lru_cache(maxsize=REMEMBERED)(parse_positions)
+
+
 def _positions(name: str, context: BuildContext) -> PositionTable:
     source = SourceText(name, text_of(context, name))
-    table, findings = parse_positions(source.text)
+    table, findings = _parsed(source.text)
     context.accept(source, findings)
     return table

@@ -12,14 +12,14 @@ from steptwin.mic488.encoding import DINT_MAX, DINT_MIN
 from steptwin.mic488.registers import AXES
 from steptwin.mic488.status import AxisStatus
 from steptwin.world import script as do
-from steptwin.world.control import ControllerCommand, ControlProgram, Enable, Home, Jog, Move, StopAxes
+from steptwin.world.control import ControllerCommand, ControlProgram, Enable, Home, Jog, Move, Seek, StopAxes
 from steptwin.world.kind import MotionEnds
 
 PROGRAM = {"stop": 0, "start": 1, "pause": 2}
 """PROGRAM_CTRL by action."""
 
 
-def motion_ends(axis: str, line: str | None) -> MotionEnds:
+def motion_ends(axis: str, line: str | None, seek: Seek | None) -> MotionEnds:
     """By the status, which is that of a motion as soon as the request that starts it has been answered."""
     busy = (AxisStatus.POSITION, AxisStatus.HOMING, AxisStatus.CORRECTION)
     over = " and ".join(f"{axis}.status != {status.value}" for status in busy)

@@ -10,7 +10,7 @@ from steptwin.machine import Nanos, Port
 from steptwin.mic488.config import BAUDS
 from steptwin.mic488.device import Mic488Device, pause_observer
 from steptwin.mic488.vision import Com1Port, uses_vision
-from steptwin.wire.gateway import Gateway, ScriptPort, TcpGatewayPort
+from steptwin.wire.gateway import ModbusGateway, ScriptPort, TcpGatewayPort
 from steptwin.wire.line import SerialLine
 from steptwin.wire.rtu import BURSTY_GAP_NS, UART_GAP_NS
 from steptwin.wire.slave import FrameDirection, FrameObserver, RtuSlavePort, SlaveDevice, SlavePort, TcpSlavePort
@@ -22,7 +22,7 @@ from steptwin.world.kind import Member
 from steptwin.world.lines import SCRIPTS, Line, LineEndPoint
 from steptwin.world.master import Master
 from steptwin.world.spec import LineSpec
-from steptwin.world.trace import Recorder
+from steptwin.world.trace import RecordSink
 
 SILENT_CHARACTERS = 4
 """Between an answer and the next request of a master: Modbus RTU asks for 3.5."""
@@ -42,7 +42,7 @@ class ModbusBus(Line):
         self,
         kernel: Kernel,
         name: str,
-        record: Recorder | None,
+        record: RecordSink | None,
         faults: Faults,
         *,
         devices: Mapping[int, Mic488Device],
@@ -59,10 +59,10 @@ class ModbusBus(Line):
         device = next(iter(devices.values()))
         sees = len(devices) == 1 and any(map(uses_vision, device.program.banks.programs.values()))
         self._seeing = device if sees else None
-        self._timed: tuple[TimedUnits, Gateway] | None = None
+        self._timed: tuple[TimedUnits, ModbusGateway] | None = None
         if timing is not None:
             units = TimedUnits(devices, timing)
-            self._timed = units, Gateway(units)
+            self._timed = units, ModbusGateway(units)
         self._master = Master(self._ask, 0 if timing is None else timing.line.duration(SILENT_CHARACTERS))
 
     @property
@@ -140,7 +140,7 @@ class ModbusBus(Line):
         return port.modbus if isinstance(port, Com1Port) else port
 
 
-def make(spec: LineSpec, members: Sequence[Member], kernel: Kernel, record: Recorder, faults: Faults) -> ModbusBus:
+def make(spec: LineSpec, members: Sequence[Member], kernel: Kernel, record: RecordSink, faults: Faults) -> ModbusBus:
     """The line of a description. Raises `Misuse` for units that are taken, and rates that no MIC488 has."""
     devices: dict[int, Mic488Device] = {}
     names: dict[int, str] = {}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 from steptwin.diagnostics import Diagnostic, Severity, SourceText, render
 from steptwin.errors import Refusal, SourceErrors
@@ -16,6 +17,9 @@ from steptwin.world.kind import TextContext
 from steptwin.world.kinds.mic488.build import table_for
 from steptwin.world.kinds.mic488.table import Mic488Spec
 from steptwin.world.programtexts import CSV, WBC, Destination, Downloading, ProgramText, bank_text
+
+if TYPE_CHECKING:
+    from steptwin.explain.model import MemoryPart
 
 PROGRAM, POSITIONS = "program", "positions"
 
@@ -36,6 +40,7 @@ def _programs(device: Mic488Device) -> Iterator[ProgramText]:
             language=WBC,
             source=source,
             check=lambda bank=bank, text=source.text: _checked(device, bank, text).diagnostics,
+            memory=lambda text, bank=bank: _program_memory(device, bank, text),
             is_empty=program is None,
             is_running=line is not None and control.state is ProgramState.RUNNING,
             line=line,
@@ -52,6 +57,7 @@ def _positions(spec: Mic488Spec, device: Mic488Device, context: TextContext) -> 
             language=CSV,
             source=source,
             check=lambda text=source.text: parse_positions(text)[1],
+            memory=lambda text: _position_memory(device, text),
             is_empty=table is None,
         )
 
@@ -75,6 +81,21 @@ def download(device: Mic488Device, to: Destination, source: SourceText) -> Downl
 def _checked(device: Mic488Device, bank: int, text: str) -> CheckedProgram:
     control = device.program
     return check(text, table_for(bank, control.banks.positions), setup_of(device.config), control.dialect)
+
+
+def _program_memory(device: Mic488Device, bank: int, text: str) -> Sequence[MemoryPart]:
+    from steptwin.explain.mic488 import memory_of  # only on request
+
+    checked = _checked(device, bank, text)
+    return [] if checked.executable is None else memory_of(checked.executable, checked.positions, device.program.dialect)
+
+
+def _position_memory(device: Mic488Device, text: str) -> Sequence[MemoryPart]:
+    from steptwin.explain.mic488 import position_memory
+
+    table, findings = parse_positions(text)
+    has_errors = any(finding.severity is Severity.ERROR for finding in findings)
+    return [] if has_errors else position_memory(len(table.rows), device.program.dialect)
 
 
 def _table(source: SourceText) -> PositionTable:

@@ -3,7 +3,7 @@ it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from typing import NamedTuple
 
@@ -12,6 +12,7 @@ from steptwin.machine import SECOND, Nanos, PinEdge
 from steptwin.mic488.axis import Axis
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.program_banks import LoadedProgram
+from steptwin.mic488.program_motion import finished
 from steptwin.mic488.program_registers import ACCESS
 from steptwin.mic488.registers import AXIS_STATUS_TEXTS
 from steptwin.mic488.status import AxisStatus
@@ -20,6 +21,8 @@ from steptwin.wbc import steps as s
 from steptwin.wbc.controller import RegisterReader
 from steptwin.wbc.real import real_text
 from steptwin.world.kernel import Kernel
+from steptwin.world.kinds.mic488.statement_use import use_of
+from steptwin.world.programs import ResourceKind
 
 
 class ProgramEvent(NamedTuple):
@@ -104,7 +107,18 @@ class ProgramWatch:
 
     def _waits(self, now: Nanos, number: int) -> None:
         if self.device.program.interpreter.waiting:
-            self._tell(now, "wait", "waits", number)
+            what = ", ".join(self._awaited(now, number))
+            self._tell(now, "wait", f"waits for {what}" if what else "waits", number)
+
+    def _awaited(self, now: Nanos, number: int) -> Iterable[str]:
+        """The inputs, axes and values that decide how long a statement waits."""
+        for resource in dict.fromkeys(use_of(self.program.steps, number).reads):
+            if resource.kind is not ResourceKind.AXIS:
+                yield resource.name or "inputs"
+            elif resource.name:
+                yield f"M{resource.name}"
+            else:
+                yield from (f"M{axis.number}" for axis in self.device.axes if not finished(axis, now))
 
     def _delays(self, now: Nanos, number: int) -> None:
         duration = self.device.program.interpreter.not_before - now

@@ -16,7 +16,7 @@ from steptwin.statements import StatementHook
 from steptwin.wbc.dialect import Dialect
 from steptwin.wbc.flow import flow_of
 from steptwin.wbc.scope import ProgramScope
-from steptwin.wbc.steps import BLOCK_MARKS, Literal, RegisterOperand, Source, Variable
+from steptwin.wbc.steps import BLOCK_MARKS, Literal, RegisterOperand, ValueSource, Variable
 from steptwin.wbc.syntax import parse
 from steptwin.wbc.tree import Identifier, ProgramTree
 from steptwin.world.kind import TextContext
@@ -152,7 +152,7 @@ class _Bank:
     def _tree(self) -> ProgramTree:
         return parse(self.program.source.text)[0]
 
-    def meaning(self, name: str, dialect: Dialect) -> Source | None:
+    def meaning(self, name: str, dialect: Dialect) -> ValueSource | None:
         """What a name in the text is; its place in the text does not matter."""
         key = name.upper()
         for index, variable in enumerate(self.program.variables):

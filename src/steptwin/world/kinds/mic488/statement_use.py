@@ -8,12 +8,12 @@ from typing import Any
 from steptwin.tables import complete
 from steptwin.wbc import steps as s
 from steptwin.wbc.usage import sources
-from steptwin.world.programs import Operand, OperandKind, StatementUse
+from steptwin.world.programs import Resource, ResourceKind, StatementUse
 
 _PINS = frozenset({"OUT", "IN", "AIN"})
 _OF_AXIS = frozenset({"M", "STATM", "VACTM", "POSM", "ACCM", "DECM", "VMAXM", "LIMLM", "LIMRM", "ENC", "XENC", "CFGINT_M"})
-_ANY_AXIS = Operand(OperandKind.AXIS, "")
-_ANY_PIN = Operand(OperandKind.PIN, "")
+_ANY_AXIS = Resource(ResourceKind.AXIS, "")
+_ANY_PIN = Resource(ResourceKind.PIN, "")
 
 
 def use_of(steps: Sequence[s.ProgramStep], number: int) -> StatementUse:
@@ -35,8 +35,8 @@ def _return_after(steps: Sequence[s.ProgramStep], number: int) -> int:
 def _interrupt(step: s.InterruptStep, number: int) -> StatementUse:
     event = step.event
     if event.input:
-        return StatementUse((Operand(OperandKind.PIN, f"IN{event.input}"),), waits=True)
-    return StatementUse((Operand(OperandKind.AXIS, str(event.axis)),) if event.axis else (), waits=True)
+        return StatementUse((Resource(ResourceKind.PIN, f"IN{event.input}"),), waits=True)
+    return StatementUse((Resource(ResourceKind.AXIS, str(event.axis)),) if event.axis else (), waits=True)
 
 
 def _end_of_while(step: s.EndWhileStep, number: int) -> StatementUse:
@@ -45,7 +45,7 @@ def _end_of_while(step: s.EndWhileStep, number: int) -> StatementUse:
 
 
 def _of_axis(step: s.MotionStep | s.HaltStep, number: int) -> StatementUse:
-    return StatementUse(writes=(Operand(OperandKind.AXIS, str(step.axis)),))
+    return StatementUse(writes=(Resource(ResourceKind.AXIS, str(step.axis)),))
 
 
 def _nothing(step: s.ProgramStep, number: int) -> StatementUse:
@@ -58,7 +58,7 @@ _USES: Mapping[type[s.ProgramStep], Callable[[Any, int], StatementUse]] = comple
     "use",
     {
         s.SetStep: lambda step, number: StatementUse(writes=tuple(_operands((step.target,)))),
-        s.PulseStep: lambda step, number: StatementUse(writes=(Operand(OperandKind.PIN, f"OUT{step.output}"),)),
+        s.PulseStep: lambda step, number: StatementUse(writes=(Resource(ResourceKind.PIN, f"OUT{step.output}"),)),
         **dict.fromkeys((s.MotionStep, s.HaltStep), _of_axis),
         s.RowMotionStep: lambda step, number: StatementUse(writes=(_ANY_AXIS,)),
         s.IfStep: lambda step, number: StatementUse(governs=range(number + 1, step.close)),
@@ -74,16 +74,16 @@ _USES: Mapping[type[s.ProgramStep], Callable[[Any, int], StatementUse]] = comple
 )
 
 
-def _operands(values: Iterable[s.Source]) -> Iterable[Operand]:
+def _operands(values: Iterable[s.ValueSource]) -> Iterable[Resource]:
     for value in values:
         match value:
             case s.Variable():
-                yield Operand(OperandKind.VALUE, value.name)
+                yield Resource(ResourceKind.VALUE, value.name)
             case s.RegisterOperand(row=row) if row.key in _PINS:
-                yield Operand(OperandKind.PIN, f"{row.key}{value.number}")
+                yield Resource(ResourceKind.PIN, f"{row.key}{value.number}")
             case s.RegisterOperand(row=row) if row.key in ("INPUTS", "OUTPUTS"):
                 yield _ANY_PIN
             case s.RegisterOperand(row=row) if row.key in _OF_AXIS:
-                yield Operand(OperandKind.AXIS, str(value.number))
+                yield Resource(ResourceKind.AXIS, str(value.number))
             case s.RegisterOperand():
-                yield Operand(OperandKind.VALUE, value.name)
+                yield Resource(ResourceKind.VALUE, value.name)

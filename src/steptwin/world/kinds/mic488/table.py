@@ -11,12 +11,11 @@ from steptwin.machine import Nanos
 from steptwin.mic488.config import AXIS_KEYS, INPUT_KEYS, INPUTS, NO_INPUT, ConfigKey, ControllerConfig
 from steptwin.mic488.registers import AXES, FIRMWARES
 from steptwin.wire.rtu import MAX_UNIT
-from steptwin.world.kind import Row
-from steptwin.world.reader import Key, Path, TomlText, optional, read_table
+from steptwin.world.reader import Key, Path, Row, TomlText, optional, read_table
 from steptwin.world.spec import ControllerSpec
 from steptwin.world.values import address_value, flag, name_value, text_value, time_value, whole, word
 
-Banks: TypeAlias = tuple[tuple[int, str], ...]
+BankFiles: TypeAlias = tuple[tuple[int, str], ...]
 """Numbers of banks and the files that are for them."""
 
 
@@ -26,8 +25,8 @@ class Mic488Spec(ControllerSpec):
     firmware: str
     config: str | None
     program: str | None
-    programs: Banks
-    positions: Banks
+    programs: BankFiles
+    positions: BankFiles
     start: bool
     statement_time: Nanos | None
     lenient: bool
@@ -38,7 +37,7 @@ class Mic488Spec(ControllerSpec):
     inputs: Mapping[int, Mapping[str, Any]]
 
     @property
-    def all_programs(self) -> Banks:
+    def all_programs(self) -> BankFiles:
         """``programs``, and ``program`` in bank 0."""
         return self.programs if self.program is None else ((0, self.program), *self.programs)
 

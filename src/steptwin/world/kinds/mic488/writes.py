@@ -6,10 +6,10 @@ from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.registermap import DataType
 from steptwin.mic488.values import encoded, named
 from steptwin.wire.pdu import MAX_WRITTEN_REGISTERS, ModbusRequest, WriteRegistersRequest, encode_request
-from steptwin.world.kind import Values
+from steptwin.world.kind import NewValues
 
 
-def encode_write(device: Mic488Device, values: Values) -> tuple[bytes, ...]:
+def encode_write(device: Mic488Device, values: NewValues) -> tuple[bytes, ...]:
     """The requests that write registers by name; neighbours go together. Raises `Misuse` for what one does not take."""
     requests: list[ModbusRequest] = []
     for register, value in values:

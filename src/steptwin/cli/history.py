@@ -1,0 +1,55 @@
+"""``steptwin history``: what has been kept of twins and devices.
+
+From Python: `steptwin.history.HistoryDatabase`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from steptwin.cli.device import Json
+
+
+def history(
+    database: Annotated[str, typer.Argument(metavar="DATABASE", help="FILE.db, sqlite:///FILE.db or postgresql://HOST/NAME.")],
+    points: Annotated[
+        list[str] | None, typer.Argument(metavar="[POINT]...", help="Such as table.M1.position or 'table.pins.*'.")
+    ] = None,
+    run: Annotated[int | None, typer.Option(help="Of this run; -1 is the last one.")] = None,
+    begin: Annotated[
+        str | None,
+        typer.Option("--from", metavar="TIME", help="A date, or a time since the begin of the run: '2026-03-01 14:30', '10 s'."),
+    ] = None,
+    end: Annotated[str | None, typer.Option("--to", metavar="TIME", help="As --from.")] = None,
+    every: Annotated[str | None, typer.Option(metavar="TIME", help="A value in so much time. Default: each one.")] = None,
+    other: Annotated[
+        int | None, typer.Option("--with", metavar="RUN", help="Compare with this run. Exit code 1: it differs.")
+    ] = None,
+    events: Annotated[bool, typer.Option("--events", help="What happened, instead of values.")] = False,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="A file: .csv, .parquet, or a picture, .png or .svg.")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Show, export and compare what a database has kept of twins and devices.
+
+    Without points: runs, and the points that there are. Dates are local time unless they have an offset.
+    """
+    from steptwin.commands.history import HistoryOptions, show
+
+    options = HistoryOptions(
+        points=tuple(points or ()),
+        run=run,
+        other=other,
+        begin=begin,
+        end=end,
+        every=every,
+        output=output,
+        events=events,
+        as_json=json,
+    )
+    if not show(database, options, typer.echo):
+        raise typer.Exit(1)

@@ -1,0 +1,49 @@
+"""`steptwin studio --device ...` and `steptwin bridge`: a server for devices, without a world and its virtual time."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Awaitable, Callable
+from contextlib import ExitStack
+from pathlib import Path
+
+from steptwin.live.cell import Cell
+from steptwin.live.clock import Clock
+from steptwin.live.output import Output
+from steptwin.live.server import Server, clear_ready_file
+from steptwin.machine import Nanos
+
+
+class _Nothing:
+    """A world without contents, for a cell. See `steptwin.live.cell.Advanceable`."""
+
+    stale = False
+
+    def __init__(self) -> None:
+        self.now: Nanos = 0
+
+    def advance(self, now: Nanos) -> None:
+        self.now = now
+
+    def deadline(self) -> Nanos | None:
+        return None
+
+
+async def serve_without_world(ready_file: Path | None, addition: Callable[[Server], Awaitable[None]]) -> None:
+    """Serve what ``addition`` opens until SIGINT, SIGTERM or SIGHUP."""
+    with ExitStack() as stack:
+        output = Output(sys.stdout)
+        stack.callback(output.close)
+        if ready_file is not None:
+            clear_ready_file(ready_file)
+        server = Server(Cell(_Nothing(), Clock()), output.line)
+        try:
+            await addition(server)
+            if ready_file is not None:
+                server.write_ready_file(ready_file)
+            for end_point in server.end_points:
+                output.line(f"  {end_point.protocol}  {end_point.place}")
+            output.line("Ctrl-C ends")
+            await server.until_ended()
+        finally:
+            await server.close()

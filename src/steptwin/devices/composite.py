@@ -1,0 +1,195 @@
+"""A world, devices behind drivers, or both, as one subject. Devices come and go."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Protocol
+
+from steptwin.devices.worldpart import WorldPart
+from steptwin.errors import Misuse, Refusal
+from steptwin.machine import Nanos
+from steptwin.nearmiss import NearMiss
+from steptwin.subject import commands as command
+from steptwin.subject.commands import COMMANDS, Command, row_of
+from steptwin.subject.contract import UNKNOWN, Description, Reading, Result
+from steptwin.subject.events import Event, Numbering
+from steptwin.subject.following import Filter, Followers, Following
+from steptwin.subject.jogs import Held
+
+TIME = "time"
+
+
+class SubjectPart(Protocol):
+    """A world, or a device; a part of a `CompositeSubject`."""
+
+    @property
+    def description(self) -> Description: ...
+    @property
+    def followers(self) -> Followers: ...
+    @property
+    def lost(self) -> str | None:
+        """Why nothing is known of it; None while it answers."""
+        ...
+
+    def read(self, *points: str) -> tuple[Reading, ...]: ...
+    async def do(self, wanted: Command, /) -> Result: ...
+    def plans(self, what: Filter) -> list[Event]: ...
+    async def begin_jog(self, wanted: command.Jog) -> Held: ...
+
+
+class CompositeSubject:
+    """Satisfies `steptwin.studio.hub.Served` and `steptwin.subject.jogs.Jogs`.
+
+    A command goes to the part whose machine or line it names; one that names none to ``world``, or to the only device.
+
+    ``clock`` and ``numbering`` are those of the world where there is one; all devices use them.
+    """
+
+    def __init__(self, world: WorldPart | None, clock: Callable[[], Nanos], numbering: Numbering) -> None:
+        self._world = world
+        self._parts: list[SubjectPart] = [] if world is None else [world]
+        self.now = clock
+        self.numbering = numbering
+        self._followings: list[Following] = []
+        self._gone: set[str] = set()
+        """Machines that were removed: values of them are unknown to viewers that still watch them."""
+        self._describe()
+
+    # ------------------------------------------------------------------ parts
+
+    def add(self, part: SubjectPart) -> None:
+        self._parts.append(part)
+        for following in self._followings:
+            part.followers.add(following)
+        self._describe()
+
+    def remove(self, part: SubjectPart) -> None:
+        self._parts.remove(part)
+        for following in self._followings:
+            part.followers.remove(following)
+        self._gone |= {machine.name for machine in part.description.machines}
+        self._describe()
+
+    def _describe(self) -> None:
+        all_of = [part.description for part in self._parts]
+        self._of_machine = {machine.name: part for part in self._parts for machine in part.description.machines}
+        self._of_line = {line.name: part for part in reversed(self._parts) for line in part.description.lines}
+        can = {name for one in all_of for name in one.commands}
+        machines = tuple(machine for one in all_of for machine in one.machines)
+        base = all_of[0] if self._world is not None else Description(", ".join(one.name for one in machines) or "no device", ())
+        self.description = replace(
+            base,
+            machines=machines,
+            lines=tuple({line.name: line for one in all_of for line in one.lines}.values()),
+            commands=tuple(name for name in COMMANDS if name in can),
+        )
+
+    def _part_called(self, machine: str) -> SubjectPart:
+        """Raises `Misuse`."""
+        part = self._of_machine.get(machine) or self._world
+        if part is None:
+            names = self._of_machine
+            known = f"there are {', '.join(names)}" if names else "no device is connected"
+            raise Misuse(f"no machine is called {machine!r}{NearMiss().hint(machine, names)}; {known}")
+        return part
+
+    def _part_of(self, wanted: Command) -> SubjectPart:
+        """Raises `Misuse`, and `Refusal` if no part can execute it."""
+        found: list[SubjectPart] = []
+        for field in row_of(wanted).fields:
+            value: Any = getattr(wanted, field.key)
+            if field.name == "machine" and value is not None:
+                found.append(self._part_called(value))
+            elif field.name == "line" and value in self._of_line:
+                found.append(self._of_line[value])
+            elif field.name == "values" and value is not None:
+                found += [self._part_called(machine) for machine, _, _ in value]
+        if len(set(map(id, found))) > 1:
+            raise Misuse(f"{row_of(wanted).name}: one controller at a time where there are devices")
+        if found:
+            return found[0]
+        if self._world is None and not self._parts:
+            raise Refusal(f"{row_of(wanted).name}: no device is connected")
+        if self._world is None and len(self._parts) > 1:
+            can = self.description.commands
+            name = row_of(wanted).name
+            why = ": name the machine" if name in can else f" is not possible here; possible are {', '.join(can)}"
+            raise Refusal(f"{name}{why}")
+        return self._parts[0]
+
+    # ------------------------------------------------------------------ as `Served`
+
+    @property
+    def lost(self) -> str | None:
+        return "; ".join(part.lost for part in self._parts if part.lost is not None) or None
+
+    def read(self, *points: str) -> tuple[Reading, ...]:
+        if len(self._parts) == 1 and not self._gone:
+            return self._parts[0].read(*points)
+        groups = self._by_part(points)
+        found = {one.point: one for part, own in groups for one in part.read(*own)}
+        return self._in_order(points, found)
+
+    def _by_part(self, points: Iterable[str]) -> list[tuple[SubjectPart, list[str]]]:
+        """Raises `Misuse`. Points of machines that are gone, and the time, are left out."""
+        groups: dict[int, tuple[SubjectPart, list[str]]] = {}
+        for point in points:
+            owner = point.partition(".")[0]
+            if point != TIME and (owner not in self._gone or owner in self._of_machine):
+                part = self._part_called(owner)
+                groups.setdefault(id(part), (part, []))[1].append(point)
+        return list(groups.values())
+
+    def _in_order(self, points: Sequence[str], found: Mapping[str, Reading]) -> tuple[Reading, ...]:
+        present = Reading(TIME, self.now() / 1e9, "s")
+        return tuple(present if point == TIME else found.get(point) or Reading(point, None, "", UNKNOWN) for point in points)
+
+    async def do(self, wanted: Command, /) -> Result:
+        match wanted:
+            case command.Describe() if self._world is None or len(self._parts) > 1:
+                return self.result_of(self.description.plain())
+            case command.Time() if self._world is None:
+                now = self.now()
+                at = {"time_ns": str(now), "time_s": now / 1e9}
+                return self.result_of({"world": self.description.name, **at, "paused": False, "speed": 1.0, "stopped": None})
+            case command.ReadPoints() if self._world is None or len(self._parts) > 1:
+                read = [(await part.do(command.ReadPoints(tuple(own)))).value for part, own in self._by_part(wanted.points)]
+                found = {one["point"]: Reading(**one) for own in read for one in own}
+                return self.result_of([one._asdict() for one in self._in_order(wanted.points, found)])
+            case command.ReadPins() if wanted.machine is None and len(self._parts) > 1:
+                levels = [(await part.do(wanted)).value for part in self._parts]
+                return self.result_of({pin: level for own in levels for pin, level in own.items()})
+            case _:
+                return await self._part_of(wanted).do(wanted)
+
+    def result_of(self, value: object) -> Result:
+        if self._world is not None:
+            return self._world.result_of(value)
+        now = self.now()
+        number = self.numbering.command(now)
+        self.numbering.done()
+        return Result(value, now, number)
+
+    def present(self) -> dict[str, Any]:
+        return {"state": {}, "faults": []} if self._world is None else dict(self._world.present())
+
+    def follow(self, what: Filter, bound: int) -> Following:
+        following = Following(what, bound, self._unfollow)
+        self._followings.append(following)
+        for part in self._parts:
+            part.followers.add(following)
+        return following
+
+    def _unfollow(self, following: Following) -> None:
+        self._followings.remove(following)
+        for part in self._parts:
+            part.followers.remove(following)
+
+    def plans(self, what: Filter) -> list[Event]:
+        return [event for part in self._parts for event in part.plans(what)]
+
+    # ------------------------------------------------------------------ as `Jogs`
+
+    async def begin(self, wanted: command.Jog) -> Held:
+        return await self._part_called(wanted.machine).begin_jog(wanted)

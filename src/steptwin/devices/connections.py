@@ -1,0 +1,161 @@
+"""Connections to devices: drivers by address, lines that several devices share, machines of the subject that come and go."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from steptwin.devices.composite import CompositeSubject
+from steptwin.devices.device import ConnectedDevice, DeviceSurroundings
+from steptwin.drivers.exchange import NoAnswer
+from steptwin.drivers.kind import DeviceAddress
+from steptwin.drivers.kinds import DRIVERS, others_there
+from steptwin.drivers.line import DriverLine
+from steptwin.drivers.subject import AsyncDeviceSubject, DevicePart
+from steptwin.errors import LineFailure, Misuse
+from steptwin.eventloop import later
+from steptwin.machine import Nanos
+from steptwin.nearmiss import NearMiss
+
+MOST_DEVICES = 32
+NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,39}")
+NAME_FORM = "1 to 40 letters, digits, '-' and '_', the first no digit"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Computer:
+    """What a computer has and knows. Both may block, and raise `SteptwinError`."""
+
+    ports: Callable[[], Sequence[Mapping[str, object]]]
+    """``address`` and ``what`` of serial ports."""
+    find: Callable[[str], DeviceAddress]
+    """The address in a text."""
+
+
+@dataclass(slots=True)
+class _SharedLine:
+    line: DriverLine[Any, Any]
+    users: int = 0
+
+
+@dataclass(slots=True)
+class _Connected:
+    device: ConnectedDevice
+    key: tuple[str, str, int]
+
+
+class DeviceConnections:
+    """See `steptwin.studio.hub.Connections`."""
+
+    def __init__(self, subject: CompositeSubject, around: DeviceSurroundings, computer: Computer) -> None:
+        self._subject = subject
+        self._around = around
+        self._computer = computer
+        self._lines: dict[tuple[str, str, int], _SharedLine] = {}
+        self._devices: dict[str, _Connected] = {}
+        self._turn = asyncio.Lock()
+
+    async def ports(self) -> Sequence[Mapping[str, object]]:
+        return await later(asyncio.to_thread(self._computer.ports))
+
+    async def connect(self, address: str, name: str | None) -> str:
+        return await later(self.open(address, name))
+
+    async def disconnect(self, machine: str) -> None:
+        await later(self._close(machine))
+
+    async def settings(self, machine: str) -> str:
+        return await later(self._connected(machine).device.settings())
+
+    async def shadow(self, machine: str, *, on: bool) -> None:
+        device = self._connected(machine).device
+        if on:
+            await later(device.begin_shadow())
+        else:
+            device.end_shadow()
+
+    def shadow_of(self, machine: str, after: Nanos) -> Mapping[str, object] | None:
+        return self._connected(machine).device.shadow_state(after)
+
+    def _connected(self, machine: str) -> _Connected:
+        """Raises `Misuse`."""
+        if machine not in self._devices:
+            known = f"there are {', '.join(self._devices)}" if self._devices else "there is none"
+            raise Misuse(f"no device is called {machine!r}{NearMiss().hint(machine, self._devices)}; {known}")
+        return self._devices[machine]
+
+    async def open(self, text: str, name: str | None = None) -> str:
+        """As `connect`, in the event loop."""
+        address = await asyncio.to_thread(self._computer.find, text)
+        async with self._turn:
+            if len(self._devices) >= MOST_DEVICES:
+                raise Misuse(f"{MOST_DEVICES} devices are connected already, which is the most")
+            name = self._free_name(address, name)
+            key = address.kind, address.place, address.baud
+            line = self._lines.get(key) or _SharedLine(_line_of(address))
+            try:
+                driver = await _device_at(address, line.line)
+            except BaseException:
+                if not line.users:
+                    await line.line.close()
+                raise
+            self._lines[key] = line
+            line.users += 1
+            subject = AsyncDeviceSubject(name, driver, clock=self._subject.now, numbering=self._subject.numbering)
+            device = ConnectedDevice(subject, driver, self._around)
+            self._devices[name] = _Connected(device, key)
+            self._subject.add(device)
+        return name
+
+    def _free_name(self, address: DeviceAddress, name: str | None) -> str:
+        taken = [machine.name for machine in self._subject.description.machines]
+        if name is not None:
+            if not NAME.fullmatch(name):
+                raise Misuse(f"name = {name!r}: permitted are {NAME_FORM}")
+            if name in taken:
+                raise Misuse(f"name = {name!r}: a machine is called that already")
+            return name
+        how, there = DRIVERS[address.kind].selection, address.number
+        usual = address.kind if there is None or there == how.usual else f"{address.kind}-{how.show(there)}"
+        number = 1
+        while (found := usual if number == 1 else f"{usual}-{number}") in taken:
+            number += 1
+        return found
+
+    async def _close(self, machine: str) -> None:
+        async with self._turn:
+            connected = self._connected(machine)
+            del self._devices[machine]
+            await connected.device.close()
+            self._subject.remove(connected.device)
+            line = self._lines[connected.key]
+            line.users -= 1
+            if not line.users:
+                del self._lines[connected.key]
+                await line.line.close()
+
+    async def close(self) -> None:
+        """All of them. Jogs end; other motions and programs of devices go on."""
+        for machine in list(self._devices):
+            await self._close(machine)
+
+
+def _line_of(address: DeviceAddress) -> DriverLine[Any, Any]:
+    kind = DRIVERS[address.kind]
+    if kind.line is None:
+        raise Misuse(f"{kind.title} cannot be connected: its driver is for commands only")
+    return kind.line(address.place, address.baud)
+
+
+async def _device_at(address: DeviceAddress, line: DriverLine[Any, Any]) -> DevicePart:
+    """Open the driver, which moves nothing. Raises `Misuse`, `Refusal`, `LineFailure`."""
+    kind = DRIVERS[address.kind]
+    if kind.part is None:
+        raise Misuse(f"{kind.title} cannot be connected: its driver is for commands only")
+    try:
+        return await kind.part(address, line)
+    except NoAnswer as error:
+        raise LineFailure(f"{error}{others_there(kind)}") from error

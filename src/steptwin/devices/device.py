@@ -1,0 +1,314 @@
+"""A device behind its driver as a part of a subject: polled for watched values, reconnected after its line was lost.
+
+Nothing that moves is repeated or kept for later: while the line is lost, and behind a stop, commands are refused.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from steptwin.devices.jog import LeasedJog
+from steptwin.devices.shadow import Known, Shadow
+from steptwin.drivers.subject import AsyncDeviceSubject, DevicePart
+from steptwin.errors import LineFailure, Refusal, SteptwinError
+from steptwin.eventloop import later
+from steptwin.machine import SECOND, Nanos
+from steptwin.subject import commands as command
+from steptwin.subject.commands import Command, row_of
+from steptwin.subject.contract import UNKNOWN, Description, Reading, Result
+from steptwin.subject.events import Event
+from steptwin.subject.following import Filter, Followers
+from steptwin.subject.jogs import Held
+from steptwin.subject.payloads import StatusPayload
+from steptwin.world import script as steps
+
+POLL_S = 0.1
+"""A device is polled at most this often, and at most half of the time."""
+WATCHED_NS: Nanos = 2 * SECOND
+"""A point that was not read for so long is asked for no more."""
+RECONNECT_S = (0.5, 5.0)
+"""Pause after the first failure, doubled after each further one, up to the second."""
+PATIENCE_NS: Nanos = 5 * SECOND
+"""A command that has waited longer for those before it is not sent."""
+REGISTERS_NS: Nanos = 5 * SECOND
+"""Settings of a device with a twin beside it are compared so often, at rest."""
+JOG_WAIT_S = 2.0
+"""For the jog before of the same axis to end."""
+LOOKS = (command.ReadPoints, command.ReadPins, command.Describe, command.Time, command.Encoders, command.ReadState)
+WRITES = (steps.Write, steps.Request, steps.Send)
+"""What may change settings."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DeviceSurroundings:
+    clock: Callable[[], Nanos]
+    """The wall clock, which never goes back."""
+    keep: Callable[[str, str], str]
+    """Keeps the settings of a machine, a text of JSON; where they are. Raises `SteptwinError`."""
+    on_internal: Callable[[Exception], object]
+
+
+class ConnectedDevice:
+    """Satisfies `steptwin.devices.composite.SubjectPart`. Its line is open."""
+
+    def __init__(self, subject: AsyncDeviceSubject, device: DevicePart, around: DeviceSurroundings) -> None:
+        self._subject = subject
+        self._device = device
+        self._around = around
+        self.lost: str | None = None
+        self._known: dict[str, Reading] = {}
+        self._watched: dict[str, Nanos] = {}
+        """Points, and when they were read last."""
+        self._turn = asyncio.Lock()
+        self._stops = 0
+        self._is_kept = False
+        self._jogs: dict[int, LeasedJog] = {}
+        self._jog_turns: dict[int, asyncio.Lock] = {}
+        self._wanted = asyncio.Event()
+        self._shadow: Shadow | None = None
+        self._registers_due: Nanos = 0
+        self._polling = asyncio.get_running_loop().create_task(self._poll())
+
+    @property
+    def name(self) -> str:
+        return self._subject.name
+
+    @property
+    def description(self) -> Description:
+        return self._subject.description
+
+    @property
+    def followers(self) -> Followers:
+        return self._subject.followers
+
+    def plans(self, what: Filter) -> list[Event]:
+        return [event for event in self._subject.samples() if what.wants(event)]
+
+    def read(self, *points: str) -> tuple[Reading, ...]:
+        """The values of the last poll; asks for them from now on."""
+        now = self._around.clock()
+        units = {point: "" if point in self._known else self._subject.unit_of(point) for point in points}
+        self._watched |= dict.fromkeys(points, now)
+        return tuple(self._known.get(point) or Reading(point, None, unit, UNKNOWN) for point, unit in units.items())
+
+    # ------------------------------------------------------------------ polling
+
+    async def _poll(self) -> None:
+        pause_s = RECONNECT_S[0]
+        loop = asyncio.get_running_loop()
+        while True:
+            begun = loop.time()
+            try:
+                await self._look()
+            except LineFailure as failure:
+                self._lose(str(failure))
+                await asyncio.sleep(pause_s)
+                pause_s = min(2.0 * pause_s, RECONNECT_S[1])
+                continue
+            except SteptwinError as refusal:  # another controller is there, or none
+                self._lose(str(refusal))
+                await asyncio.sleep(RECONNECT_S[1])
+                continue
+            except Exception as error:  # noqa: BLE001  the others go on, and so does this one
+                self._around.on_internal(error)
+                await asyncio.sleep(RECONNECT_S[1])
+                continue
+            pause_s = RECONNECT_S[0]
+            spent_s = loop.time() - begun
+            self._wanted.clear()
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(max(POLL_S, spent_s)):
+                    await self._wanted.wait()
+
+    async def _look(self) -> None:
+        """Poll watched values; a lost device is polled in any case."""
+        oldest = self._around.clock() - WATCHED_NS
+        self._watched = {point: at for point, at in self._watched.items() if at > oldest}
+        if self._jogs and not self._device.answers_in_motion:
+            return
+        points = tuple(self._watched)
+        if self.lost is not None:
+            await self._device.reconnect()
+            self._find()
+        await self._subject.poll()
+        found = await self._subject.read(*points) if points else ()
+        self._known = {one.point: one for one in found}
+        if self._shadow is not None:
+            await self._compare(self._shadow)
+
+    def _lose(self, why: str) -> None:
+        self._known.clear()
+        if self.lost is None:
+            self._subject.forget()
+            self._subject.publish(StatusPayload("line-lost", f"connection lost: {why}"))
+        self.lost = f"{self.name}: {why}"
+
+    def _find(self) -> None:
+        self.lost = None
+        self._subject.publish(StatusPayload("line-found", "connected again"))
+
+    # ------------------------------------------------------------------ commands
+
+    async def do(self, wanted: Command, /) -> Result:
+        """Waits for a `Later`."""
+        return await later(self._do(wanted))
+
+    async def _do(self, wanted: Command) -> Result:
+        try:
+            if _is_stop(wanted):
+                self._stops += 1
+                return await self._execute(wanted)
+            if self.lost is not None:
+                raise LineFailure(f"{row_of(wanted).name} was not sent: the connection is lost ({self.lost})")
+            if type(wanted) in LOOKS:
+                return await self._subject.do(wanted)
+            return await self._in_turn(wanted)
+        finally:
+            self._wanted.set()  # what it has changed is looked at soon
+
+    async def _in_turn(self, wanted: Command) -> Result:
+        """One after the other, in the order in which they came."""
+        stops, asked = self._stops, self._around.clock()
+        async with self._turn:
+            self._refuse_late(wanted, stops, asked)
+            if type(wanted) in WRITES and not self._is_kept:
+                await self._keep_settings()
+                self._refuse_late(wanted, stops, asked)  # that took its time, and a write may begin a motion
+            result = await self._execute(wanted)
+            if type(wanted) is command.Move:
+                self._look_away()
+            return result
+
+    async def _execute(self, wanted: Command) -> Result:
+        """Also by the twin beside it."""
+        begun = self._around.clock()
+        result = await self._subject.do(wanted)
+        if self._shadow is not None:
+            self._shadow.did(wanted, begun, self._around.clock())
+        return result
+
+    def _refuse_late(self, wanted: Command, stops: int, asked: Nanos) -> None:
+        """Refuse what a stop has overtaken, and what was asked for too long ago."""
+        if self._stops != stops:
+            raise Refusal(f"{row_of(wanted).name} was not sent: a stop was requested meanwhile")
+        if self._around.clock() - asked > PATIENCE_NS:
+            raise Refusal(f"{row_of(wanted).name} was not sent: it has waited more than {PATIENCE_NS // SECOND} s; repeat it")
+
+    def _look_away(self) -> None:
+        """The last values of a device that does not answer while it moves are out of date."""
+        if not self._device.answers_in_motion:
+            self._known.clear()
+            self._subject.forget()
+
+    async def _keep_settings(self) -> None:
+        """Done once, before the first write. Raises `SteptwinError` where they cannot be kept; then nothing is written."""
+        where = self._around.keep(self.name, await self._device.settings_text())
+        self._is_kept = True
+        self._subject.publish(StatusPayload("settings-kept", f"settings before the first write are in {where}"))
+
+    async def settings(self) -> str:
+        """What can be read and written, as JSON. Raises `LineFailure`."""
+        async with self._turn:
+            return await self._device.settings_text()
+
+    # ------------------------------------------------------------------ the twin beside it
+
+    async def begin_shadow(self) -> None:
+        """Put a twin beside it, in place of one that is there. Raises `Refusal`, `LineFailure`."""
+        async with self._turn:
+            if self._jogs:
+                raise Refusal(f"{self.name}: a twin can be made at rest: an axis is jogged")
+            twin = await self._device.twin(self.name)
+            now = self._around.clock()
+            self._shadow = Shadow(self.name, self._subject.description.machines[0].datasheet, twin, now)
+            self._registers_due = now + REGISTERS_NS
+        self._wanted.set()
+
+    def end_shadow(self) -> None:
+        self._shadow = None
+
+    def shadow_state(self, after: Nanos) -> Mapping[str, object] | None:
+        return None if self._shadow is None else self._shadow.plain(after)
+
+    async def _compare(self, shadow: Shadow) -> None:
+        """Not while a command is executed, of which the twin knows nothing yet."""
+        async with self._turn:
+            begun = self._around.clock()
+            known = await self._read_known(shadow.points)
+            is_at_rest = shadow.compare(known, begun, self._around.clock())
+            if is_at_rest and self._around.clock() >= self._registers_due:
+                known = await self._read_known(shadow.registers)
+                shadow.compare_registers(known, self._around.clock())
+                self._registers_due = self._around.clock() + REGISTERS_NS
+
+    async def _read_known(self, points: tuple[str, ...]) -> Known:
+        return {one.point: one.value for one in await self._subject.read(*points)}
+
+    # ------------------------------------------------------------------ jogs
+
+    async def begin_jog(self, wanted: command.Jog) -> Held:
+        return await later(self._begin_jog(wanted))
+
+    async def _begin_jog(self, wanted: command.Jog) -> LeasedJog:
+        if self.lost is not None:
+            raise LineFailure(f"jog was not sent: the connection is lost ({self.lost})")
+        jog = self._device.held_jog(wanted)
+        stops = self._stops
+        turn = self._jog_turns.setdefault(wanted.axis, asyncio.Lock())
+        try:
+            async with asyncio.timeout(JOG_WAIT_S):
+                await turn.acquire()
+        except TimeoutError:
+            raise Refusal(f"{self.name} axis {wanted.axis} is jogged already") from None
+        held = LeasedJog(jog, self._around.clock, self._report)
+        try:
+            if self._stops != stops:
+                raise Refusal("jog was not begun: a stop was requested meanwhile")
+            self._jogs[wanted.axis] = held
+            if self._shadow is not None:
+                self._shadow.jogs(wanted.axis, on=True)
+            self._look_away()
+            await held.begin()
+        except BaseException:
+            self._end_jog(wanted.axis)
+            raise
+        held.on_end(lambda: self._end_jog(wanted.axis))
+        return held
+
+    def _end_jog(self, axis: int) -> None:
+        self._jogs.pop(axis, None)
+        if self._shadow is not None:
+            self._shadow.jogs(axis, on=False)
+        self._jog_turns[axis].release()
+        self._wanted.set()
+
+    def _report(self, error: Exception) -> None:
+        """Report an error of a jog for whose end no caller waits."""
+        if isinstance(error, SteptwinError):
+            self._subject.publish(StatusPayload("jog-failed", str(error)))
+        else:
+            self._around.on_internal(error)
+
+    # ------------------------------------------------------------------ the end
+
+    async def close(self) -> None:
+        """Jogs end; then it is asked no more. Its line is left open."""
+        for held in list(self._jogs.values()):
+            held.drop()
+            await held.ended()
+        self._polling.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await self._polling
+
+
+def _is_stop(wanted: Command) -> bool:
+    match wanted:
+        case command.StopAxes():
+            return True
+        case command.ControlProgram(action=action):
+            return action != "start"
+        case _:
+            return False

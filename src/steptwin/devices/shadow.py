@@ -1,0 +1,234 @@
+"""A twin beside a device: fed with the same commands and inputs, and compared with it.
+
+Pure: moments are arguments. The twin goes on in a world of its own, whose time begins with the shadow.
+
+Of commands only beginning and end are known, and a poll takes a while, so positions of a moving axis are compared with a
+tolerance: the distance that it can go meanwhile. Where an axis comes to rest after a stop or a held jog depends on the moment of
+its end, so it is not compared until then, and the twin takes that place over.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import isclose
+from typing import NamedTuple
+
+from steptwin.datasheet import AxisDescription, Datasheet, PinDirection
+from steptwin.errors import SteptwinError
+from steptwin.machine import SECOND, Nanos
+from steptwin.subject import commands as command
+from steptwin.subject.commands import Command, row_of
+from steptwin.subject.devicetwin import DeviceTwin
+from steptwin.subject.world import WorldSubject
+from steptwin.world import script as steps
+from steptwin.world.blueprint import Blueprint
+from steptwin.world.description import read_world
+from steptwin.world.plant import Plant
+
+MOST_SAMPLES = 3000
+MOST_PROBLEMS = 20
+PULSES = 2.0
+"""Tolerance of an axis at rest."""
+LEAST_LAG_NS: Nanos = SECOND // 100
+"""By which a command or a poll is uncertain at least."""
+MIRRORED = (
+    *(command.Enable, command.Move, command.Home, command.StopAxes, command.ControlProgram),
+    *(steps.Write, steps.Request),
+)
+Known = Mapping[str, float | None]
+"""Values of a device by point."""
+
+
+class AxisSample(NamedTuple):
+    """Position of the device and of the twin, and by how much they may differ; None: unknown, or not compared."""
+
+    device: float
+    twin: float
+    tolerance: float | None
+
+
+class Deviation(NamedTuple):
+    """Since when a value is another one. ``what``: an axis or a register."""
+
+    at: Nanos
+    what: str
+    device: float
+    twin: float
+
+    def plain(self) -> dict[str, object]:
+        return {"at_ns": str(self.at), "what": self.what, "device": self.device, "twin": self.twin}
+
+
+@dataclass(slots=True)
+class _ComparedAxis:
+    sheet: AxisDescription
+    lag_ns: Nanos = LEAST_LAG_NS
+    """By how much its last command was uncertain."""
+    is_jogged: bool = False
+    takes_over: bool = False
+    """Whether the twin has to be put where the device has come to rest."""
+    samples: deque[tuple[Nanos, AxisSample]] = field(default_factory=lambda: deque(maxlen=MOST_SAMPLES))
+    first: Deviation | None = None
+
+
+class Shadow:
+    """Of the machine ``name``, from the moment ``now`` on. Raises `SteptwinError` where its twin cannot be made."""
+
+    def __init__(self, name: str, sheet: Datasheet, twin: DeviceTwin, now: Nanos) -> None:
+        self.name = name
+        self.begin = now
+        self._twin = twin
+        self._world = Plant(Blueprint(read_world("twin", twin.text), twin.files), keep_trace=False, keep_inputs=False)
+        self._world.stop_recording()
+        self._subject = WorldSubject(self._world)
+        self._axes = {axis.number: _ComparedAxis(axis) for axis in sheet.axes}
+        self._inputs = tuple(pin.name for pin in sheet.pins if pin.direction is PinDirection.INPUT)
+        self._registers: dict[str, Deviation] = {}
+        self.first: Deviation | None = None
+        """The first difference of all."""
+        self.problems: list[str] = []
+        """Commands that the twin refused."""
+        for register, value in twin.values:
+            self._tell(steps.Write(((name, register, value),)))
+        for number in twin.enabled:
+            self._tell(command.Enable(name, number, on=True))
+
+    @property
+    def points(self) -> tuple[str, ...]:
+        """What is to be read of the device for each sample."""
+        axes = (f"{axis.sheet.name}.{what}" for axis in self._axes.values() for what in ("position", "velocity"))
+        return tuple(f"{self.name}.{path}" for path in (*axes, *self._inputs))
+
+    @property
+    def registers(self) -> tuple[str, ...]:
+        """What is to be read of the device for `compare_registers`."""
+        return tuple(f"{self.name}.{register}" for register in self._twin.compared)
+
+    # ------------------------------------------------------------------ the twin
+
+    def _tell(self, wanted: Command) -> None:
+        try:
+            self._subject.do(wanted)
+        except SteptwinError as error:
+            text = f"{row_of(wanted).name}: {error}"
+            if text not in self.problems and len(self.problems) < MOST_PROBLEMS:
+                self.problems.append(text)
+
+    def _to(self, now: Nanos) -> None:
+        self._world.advance(max(now - self.begin, self._world.now))
+
+    def _read(self, *points: str) -> list[float]:
+        return [0.0 if one.value is None else float(one.value) for one in self._subject.read(*points)]
+
+    # ------------------------------------------------------------------ what happens to the device
+
+    def did(self, wanted: Command, begun: Nanos, ended: Nanos) -> None:
+        """It has been given a command, which took so long."""
+        if type(wanted) not in MIRRORED:
+            return
+        self._to(ended)
+        number = getattr(wanted, "axis", None)
+        for axis in self._axes.values():
+            if number in (None, axis.sheet.number):
+                axis.lag_ns = max(ended - begun, LEAST_LAG_NS)
+                axis.takes_over |= _stops(wanted)
+        self._tell(replace(wanted, line=self._twin.line) if isinstance(wanted, steps.Request) else wanted)
+
+    def jogs(self, number: int, *, on: bool) -> None:
+        """A held jog of an axis begins or has ended. The twin waits where it is."""
+        axis = self._axes[number]
+        axis.is_jogged, axis.takes_over = on, True
+
+    # ------------------------------------------------------------------ comparison
+
+    def compare(self, known: Known, begun: Nanos, ended: Nanos) -> bool:
+        """With values of `points`, read between these moments. Whether all axes of both are at rest."""
+        self._to(ended)
+        for pin in self._inputs:
+            level = known.get(f"{self.name}.{pin}")
+            if level is not None and self._read(f"{self.name}.{pin}") != [level]:
+                self._tell(steps.Set(((self.name, pin, level),)))
+        resting = [self._compare_axis(axis, known, begun, ended) for axis in self._axes.values()]
+        return all(resting)
+
+    def _compare_axis(self, axis: _ComparedAxis, known: Known, begun: Nanos, ended: Nanos) -> bool:
+        """Whether it is at rest."""
+        head = f"{self.name}.{axis.sheet.name}"
+        position, velocity = (known.get(f"{head}.{what}") for what in ("position", "velocity"))
+        if position is None or velocity is None:
+            return False
+        twin, twin_velocity = self._read(f"{head}.position", f"{head}.velocity")
+        is_at_rest = velocity == twin_velocity == 0.0
+        if axis.takes_over and is_at_rest and not axis.is_jogged:
+            twin = self._take_over(axis, position)
+        tolerance: float | None = None
+        if not axis.takes_over:
+            tolerance = self._tolerance(axis, abs(velocity), abs(twin_velocity), ended - begun)
+        sample = AxisSample(position, twin, tolerance)
+        axis.samples.append((ended - self.begin, sample))
+        if tolerance is not None and abs(position - twin) > tolerance and axis.first is None:
+            axis.first = Deviation(ended - self.begin, axis.sheet.name, position, twin)
+            self._note(axis.first)
+        return is_at_rest and not axis.is_jogged
+
+    def _tolerance(self, axis: _ComparedAxis, velocity: float, twin_velocity: float, poll_ns: Nanos) -> float:
+        pulse = 1.0 / (axis.sheet.pulses_per_unit or 1.0)
+        lag_s = (axis.lag_ns + poll_ns) / SECOND
+        if velocity == twin_velocity == 0.0:
+            return PULSES * pulse
+        ramp = max(self._read(*(f"{self.name}.{axis.sheet.name}_{what}" for what in ("ACC", "DEC"))))
+        return PULSES * pulse + (max(velocity, twin_velocity) + ramp * lag_s) * lag_s
+
+    def _take_over(self, axis: _ComparedAxis, position: float) -> float:
+        """The place of the device at rest after a stop or a jog."""
+        axis.takes_over = False
+        self._tell(steps.Write(((self.name, f"{axis.sheet.name}_POS_ACT", position),)))
+        return self._read(f"{self.name}.{axis.sheet.name}.position")[0]
+
+    def compare_registers(self, known: Known, ended: Nanos) -> None:
+        """With values of `registers`, read at rest."""
+        self._to(ended)
+        for point, twin in zip(self.registers, self._read(*self.registers), strict=True):
+            device = known.get(point)
+            name = point.partition(".")[2]
+            if device is None or isclose(device, twin, rel_tol=1e-6, abs_tol=1e-9):
+                self._registers.pop(name, None)
+            else:
+                before = self._registers.get(name)
+                found = Deviation(ended - self.begin if before is None else before.at, name, device, twin)
+                self._registers[name] = found
+                self._note(found)
+
+    def _note(self, found: Deviation) -> None:
+        if self.first is None:
+            self.first = found
+
+    # ------------------------------------------------------------------ as JSON
+
+    def plain(self, after: Nanos) -> dict[str, object]:
+        """With samples later than ``after``, from the beginning of the shadow."""
+        return {
+            "machine": self.name,
+            "axes": [_plain(axis, after) for axis in self._axes.values()],
+            "registers": [found.plain() for found in self._registers.values()],
+            "compared": len(self._twin.compared),
+            "first": None if self.first is None else self.first.plain(),
+            "problems": list(self.problems),
+        }
+
+
+def _stops(wanted: Command) -> bool:
+    return isinstance(wanted, command.StopAxes) or (isinstance(wanted, command.ControlProgram) and wanted.action != "start")
+
+
+def _plain(axis: _ComparedAxis, after: Nanos) -> dict[str, object]:
+    late: Sequence[tuple[Nanos, AxisSample]] = [one for one in axis.samples if one[0] > after]
+    return {
+        "axis": axis.sheet.number,
+        "name": axis.sheet.name,
+        "unit": axis.sheet.unit,
+        "first": None if axis.first is None else axis.first.plain(),
+        "samples": [[at / SECOND, *sample] for at, sample in late],
+    }

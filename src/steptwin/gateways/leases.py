@@ -1,0 +1,91 @@
+"""Jogs by clients of gateways: each lasts for the time given with every call, and ends when its client is lost."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass
+
+from steptwin.errors import Misuse, Refusal, SteptwinError
+from steptwin.gateways.contract import GatewaySubject
+from steptwin.machine import SECOND
+from steptwin.subject.commands import Jog, StopAxes
+from steptwin.subject.jogs import Held
+
+LEASE_S = (0.1, 5.0)
+RENEWALS = 3.0
+"""A jog of the subject is extended so often while it lasts."""
+
+
+@dataclass(slots=True)
+class _Lease:
+    owner: object
+    wanted: Jog
+    held: Held
+    until: float
+    """By the clock of the event loop, s."""
+    task: asyncio.Task[None] | None = None
+
+
+class JogLeases:
+    """The jogs of all sessions, at most one of an axis."""
+
+    def __init__(self, subject: GatewaySubject) -> None:
+        self._subject = subject
+        self._leases: dict[tuple[str, int], _Lease] = {}
+
+    async def jog(self, owner: object, wanted: Jog, lease_s: float) -> None:
+        """Jog for a time from now on; the same jog of the same ``owner`` goes on. Raises `Misuse`, `Refusal`, `LineFailure`."""
+        if not LEASE_S[0] <= lease_s <= LEASE_S[1]:
+            raise Misuse(f"lease = {lease_s:g} s: permitted are {LEASE_S[0]:g} to {LEASE_S[1]:g} s")
+        place = wanted.machine, wanted.axis
+        until = asyncio.get_running_loop().time() + lease_s
+        lease = self._leases.get(place)
+        if lease is not None and lease.held.over is None:
+            if lease.owner is not owner:
+                raise Refusal(f"{wanted.machine} axis {wanted.axis} is jogged by another client")
+            if lease.wanted == wanted:
+                lease.until = until
+                return
+            self._end(lease)
+        held = await self._subject.begin_jog(wanted)
+        lease = self._leases[place] = _Lease(owner, wanted, held, until)
+        lease.task = asyncio.create_task(self._hold(lease))
+
+    async def _hold(self, lease: _Lease) -> None:
+        loop = asyncio.get_running_loop()
+        while lease.held.over is None and (left := lease.until - loop.time()) > 0:
+            await asyncio.sleep(min(left, lease.held.lasts_ns / SECOND / RENEWALS))
+            if lease.held.over is None and loop.time() < lease.until:
+                try:
+                    lease.held.extend()
+                except SteptwinError:  # it has ended
+                    break
+        self._end(lease)
+
+    def _end(self, lease: _Lease) -> None:
+        """Let go of the axis, which brakes."""
+        if lease.held.over is None:
+            lease.held.release()
+        place = lease.wanted.machine, lease.wanted.axis
+        if self._leases.get(place) is lease:
+            del self._leases[place]
+        if lease.task is not None and lease.task is not asyncio.current_task():
+            lease.task.cancel()
+
+    def stopped(self, wanted: StopAxes) -> None:
+        """Axes have been stopped by a command."""
+        for (machine, axis), lease in list(self._leases.items()):
+            if machine == wanted.machine and wanted.axis in (None, axis):
+                lease.held.cut()
+                self._end(lease)
+
+    def drop(self, owner: object) -> None:
+        """A client has gone."""
+        for lease in list(self._leases.values()):
+            if lease.owner is owner:
+                lease.held.drop()
+                self._end(lease)
+
+    def close(self) -> None:
+        for lease in list(self._leases.values()):
+            self._end(lease)

@@ -1,0 +1,120 @@
+"""Topics and payloads of the JSON face; docs/gateways.md lists them.
+
+``BASE/CONTROLLER`` and ``BASE/CONTROLLER/GROUP`` have the values of a controller by name. BASE is the ``topic`` of the gateway's
+table and the name of the subject.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import PurePath
+from typing import Any
+
+from steptwin.errors import Misuse
+from steptwin.gateways.points import CLOCK, CLOCK_POINTS, GatewayPoint, PointValue, points_of
+from steptwin.gateways.sampling import Sample
+from steptwin.subject.contract import Description
+from steptwin.world.gateways import UNNAMED
+
+ONLINE, INSTANCE, DESCRIPTION, EVENTS, DO, ANSWER = "online", "instance", "description", "events", "do", "answer"
+OWN = (ONLINE, INSTANCE, DESCRIPTION, EVENTS, DO, ANSWER, CLOCK)
+"""Topics below BASE that are not controllers."""
+ANSWERS, AT = "answers", "at"
+"""Members beside the values: whether the controller answers, and when the values were so."""
+GROUP_MEANINGS: Mapping[str, str] = {
+    "": "the controller",
+    "program": "its program",
+    "pins": "levels of pins: true and false, volts",
+    "details": "what only this kind of controller has",
+    "registers": "points that the description of the gateway names",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Values that are published together. ``name``: below the controller, empty for itself."""
+
+    topic: str
+    name: str
+    points: tuple[GatewayPoint, ...]
+
+    def values(self, sample: Sample) -> dict[str, PointValue]:
+        """By name; all unknown where the controller does not answer."""
+        found = {point.path[-1]: None if sample.state is None else point.shown(sample.state) for point in self.points}
+        return found if self.name or sample.machine == CLOCK else {ANSWERS: sample.state is not None, **found}
+
+
+class Topics:
+    """Those of a subject. Raises `Misuse` for a controller whose name is a topic already."""
+
+    def __init__(self, beginning: str, file: str, description: Description, registers: Mapping[str, Iterable[str]]) -> None:
+        name = PurePath(file).stem if description.name in UNNAMED and file else description.name
+        self.name = "".join("_" if sign in "+#/" else sign for sign in name)
+        self.base = f"{beginning}/{self.name}"
+        self._description = description
+        self.groups: dict[str, tuple[Group, ...]] = {}
+        for part in description.machines:
+            if part.name in OWN:
+                raise Misuse(f"[gateway.mqtt]: {self.base}/{part.name} is no topic for a controller: call it otherwise")
+            points = points_of(part, description, registers.get(part.name, ()))
+            self.groups[part.name] = tuple(_groups(f"{self.base}/{part.name}", points))
+        if "time" in description.commands:
+            self.groups[CLOCK] = (Group(f"{self.base}/{CLOCK}", "", CLOCK_POINTS),)
+
+    def __call__(self, own: str) -> str:
+        """``BASE/own``."""
+        return f"{self.base}/{own}"
+
+    def describe(self, commands: Iterable[str]) -> dict[str, object]:
+        """What there is: units and meanings, once."""
+        controllers = [
+            {
+                "name": part.name,
+                "kind": part.datasheet.kind,
+                "title": part.datasheet.title,
+                "variant": part.datasheet.variant,
+                "real": part.is_real,
+                "topics": {group.topic: _described(group) for group in self.groups[part.name]},
+            }
+            for part in self._description.machines
+        ]
+        return {
+            "name": self.name,
+            "controllers": controllers,
+            "time": {group.topic: _described(group) for group in self.groups.get(CLOCK, ())},
+            "commands": {"topic": self(DO), "answers": self(ANSWER), "names": list(commands)},
+            "events": self(EVENTS),
+            "online": self(ONLINE),
+        }
+
+
+def _groups(topic: str, points: Iterable[GatewayPoint]) -> Iterable[Group]:
+    found: dict[str, list[GatewayPoint]] = {}
+    for point in points:
+        found.setdefault(point.path[0] if len(point.path) > 1 else "", []).append(point)
+    for name, members in found.items():
+        yield Group(f"{topic}/{name}" if name else topic, name, tuple(members))
+
+
+def _described(group: Group) -> dict[str, object]:
+    values: dict[str, dict[str, object]] = {}
+    for point in group.points:
+        one: dict[str, object] = {"type": point.type.value, "meaning": point.meaning}
+        if point.unit:
+            one["unit"] = point.unit
+        if point.limits is not None:
+            one |= {"low": point.limits.low, "high": point.limits.high}
+        if point.write is not None:
+            one["written"] = True
+        values[point.path[-1]] = one
+    return {"meaning": GROUP_MEANINGS.get(group.name, "an axis"), "values": values}
+
+
+def encode(value: Any) -> bytes:
+    return json.dumps(value, ensure_ascii=False, separators=(",", ":")).encode()
+
+
+def encode_sample(values: Mapping[str, PointValue], sample: Sample) -> bytes:
+    return encode({**values, AT: sample.at.isoformat(timespec="milliseconds").replace("+00:00", "Z")})

@@ -1,0 +1,115 @@
+"""``[history]``: keeps what happens at a subject in its database, in the event loop of the subject."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import time
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+
+from steptwin.errors import LineFailure, SteptwinError
+from steptwin.gateways.contract import GatewaySubject
+from steptwin.gateways.points import registers_by_machine
+from steptwin.history.database import read_url, shown
+from steptwin.history.past import KeptValues
+from steptwin.history.recorder import Recorder
+from steptwin.history.rows import RowBatch, RunHead
+from steptwin.history.spool import Spool
+from steptwin.history.writer import HistoryWriter
+from steptwin.machine import SECOND
+from steptwin.system import reason
+from steptwin.world.historytable import HISTORY, HistorySpec
+
+
+class HistoryKeeper:
+    """Keeps the past of ``subject``, whose description is in ``folder``. A `Gateway`."""
+
+    protocol = "history"
+
+    def __init__(self, spec: HistorySpec, subject: GatewaySubject, folder: Path) -> None:
+        self._spec = spec
+        self._subject = subject
+        self._notice: Callable[[str], object] = lambda _: None
+        self._url = read_url(spec.database, folder)
+        self.past = KeptValues(self._url)
+        """What it has kept."""
+        self._folder = folder / (spec.spool or f"{subject.description.name}.spool")
+        self._recorder: Recorder | None = None
+        self._spool: Spool | None = None
+        self._writer: HistoryWriter | None = None
+        self._task: asyncio.Task[None] | None = None
+        self._has_room = True
+
+    async def open(self, *, listen_any: bool, notice: Callable[[str], None]) -> Mapping[str, object]:
+        """It listens nowhere, whatever is permitted."""
+        self._notice = notice
+        registers = registers_by_machine(f"[{HISTORY}]", self._spec.registers, self._subject.description)
+        self._spool = Spool(self._folder)
+        loop = asyncio.get_running_loop()
+
+        def from_thread(text: str) -> None:
+            loop.call_soon_threadsafe(notice, text)
+
+        self._writer = HistoryWriter(self._url, self._spool, from_thread, keep_days=self._spec.keep_days)
+        self._writer.start()
+        self._recorder = Recorder(self._subject, registers, wall_us=_wall_us, dead_band=self._spec.dead_band)
+        head = await self._recorder.begin()
+        try:
+            self._spool.begin(head)
+        except OSError as error:
+            raise LineFailure(f"{self._folder}: {reason(error)}") from error
+        self._task = asyncio.create_task(self._keep(self._recorder, self._spool))
+        return {"url": shown(self._url)}
+
+    async def _keep(self, recorder: Recorder, spool: Spool) -> None:
+        while True:
+            try:
+                found = await recorder.look()
+            except SteptwinError as error:
+                self._notice(f"history: {error}")
+            else:
+                if lost := self._put(spool, found):
+                    recorder.lost(lost)
+            await asyncio.sleep(self._spec.interval / SECOND)
+
+    def _put(self, spool: Spool, found: Iterable[RunHead | RowBatch]) -> list[RowBatch]:
+        """Into the spool; the batches for which there is no room."""
+        lost: list[RowBatch] = []
+        why = "the database takes nothing, and the spool is full"
+        for one in found:
+            try:
+                if isinstance(one, RunHead):
+                    spool.begin(one)
+                elif not spool.append(one):
+                    lost.append(one)
+                else:
+                    self._has_room = True
+            except OSError as error:
+                why = reason(error)
+                lost += [one] if isinstance(one, RowBatch) else []
+        if lost and self._has_room:
+            self._notice(f"history: nothing is kept: {why} ({self._folder})")
+            self._has_room = False
+        return lost
+
+    async def close(self) -> None:
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.wait((self._task,))
+        if self._recorder is not None and self._spool is not None:
+            if self._task is not None:
+                with contextlib.suppress(SteptwinError):
+                    self._put(self._spool, await self._recorder.look())
+                self._put(self._spool, [self._recorder.end()])
+            self._recorder.close()
+        if self._writer is not None:
+            await asyncio.to_thread(self._writer.close)
+        if self._spool is not None:
+            if self._spool.waiting:
+                self._notice(f"history: {self._spool.waiting} bytes wait for the database in {self._folder}")
+            self._spool.close()
+
+
+def _wall_us() -> int:
+    return time.time_ns() // 1000

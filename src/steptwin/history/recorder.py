@@ -1,0 +1,290 @@
+"""What happens at a subject, as rows: motions of twins as their plans, values when they change, events."""
+
+from __future__ import annotations
+
+import json
+import uuid
+from collections.abc import Callable, Iterable, Mapping
+from typing import NamedTuple
+
+from steptwin.gateways.contract import GatewaySubject
+from steptwin.gateways.points import CLOCK, CLOCK_POINTS, GatewayPoint, PointType, PointValue, points_of
+from steptwin.gateways.sampling import Sample, Sampler
+from steptwin.history.rows import EventRow, KeptValue, PlanRow, PointRow, RowBatch, RunHead, SampleRow
+from steptwin.machine import SECOND, Nanos
+from steptwin.motion.plain import plain_plan
+from steptwin.subject.contract import MachinePart
+from steptwin.subject.events import Event
+from steptwin.subject.following import filter_of
+from steptwin.subject.payloads import SHOWN_KINDS, CoordinatePayload, EdgePayload, PlanPayload, RestoredPayload
+
+MOST_EVENTS = 100_000
+"""Between two looks."""
+TWIN_KINDS = SHOWN_KINDS | {"plan", "coordinate", "edge"}
+REST_NS: Nanos = SECOND
+"""Twins whose events tell most of it are looked at so often without one."""
+ALIVE_US = 60_000_000
+"""A run without changes says so often that it goes on."""
+FROM_PLANS = ("position", "velocity", "moving")
+PASSING = ("program.line", "program.statement", "virtual_time")
+"""Too quick to be looked at now and then."""
+SHARED_CLOCK_POINTS = tuple(point for point in CLOCK_POINTS if point.name not in PASSING)
+
+
+class _Axis(NamedTuple):
+    point: int
+    scale: float
+    round_p: int | None
+
+
+class _Last(NamedTuple):
+    """The value that was kept last, and where it was seen since then with less change than the dead band."""
+
+    value: KeptValue
+    seen: tuple[Nanos, int, KeptValue] | None = None
+
+
+class Recorder:
+    """Rows of ``subject``. ``wall_us``: the wall clock, UTC microseconds."""
+
+    def __init__(
+        self,
+        subject: GatewaySubject,
+        registers: Mapping[str, Iterable[str]],
+        *,
+        wall_us: Callable[[], int],
+        dead_band: float = 0.0,
+    ) -> None:
+        self._subject = subject
+        self._wall_us = wall_us
+        self._dead_band = dead_band
+        self._sampler = Sampler(subject, registers)
+        self._machines = {part.name: part for part in subject.description.machines}
+        self._has_devices = any(part.is_real for part in self._machines.values())
+        kinds = SHOWN_KINDS if self._has_devices else TWIN_KINDS
+        self._following = subject.follow(filter_of(kinds), MOST_EVENTS)
+        self._points: list[PointRow] = []
+        self._sampled: dict[str, list[tuple[int, GatewayPoint]]] = {CLOCK: self._add(CLOCK, SHARED_CLOCK_POINTS)}
+        self._axes: dict[tuple[str, str], _Axis] = {}
+        self._pins: dict[tuple[str, str], int] = {}
+        for part in self._machines.values():
+            self._add_machine(part, registers.get(part.name, ()))
+        self._last: dict[int, _Last] = {}
+        self._plans: dict[tuple[str, str], tuple[str, int]] = {}
+        """Plan and origin of axes."""
+        self._looked: dict[str, Nanos] = {}
+        self._batch = RowBatch(run="", number=0, time=0, at_us=0)
+        self._speed = 1.0
+        self._looked_at: tuple[Nanos, int] = 0, 0
+
+    def _add_machine(self, part: MachinePart, registers: Iterable[str]) -> None:
+        points = [point for point in points_of(part, self._subject.description, registers) if point.name not in PASSING]
+        if part.is_real:
+            self._sampled[part.name] = self._add(part.name, points)
+            return
+        for axis in part.datasheet.axes:
+            (number, _), *_ = self._add(part.name, [point for point in points if point.path == (axis.name, "position")])
+            self._axes[part.name, str(axis.number)] = _Axis(number, axis.pulses_per_unit or 1.0, axis.round_p)
+        pins = [point for point in points if point.path[0] == "pins"]
+        self._pins |= {(part.name, point.path[1]): number for number, point in self._add(part.name, pins)}
+        axes = {axis.name for axis in part.datasheet.axes}
+        rest = [p for p in points if p.path[0] != "pins" and not (p.path[0] in axes and p.path[1] in FROM_PLANS)]
+        self._sampled[part.name] = self._add(part.name, rest)
+
+    def _add(self, machine: str, points: Iterable[GatewayPoint]) -> list[tuple[int, GatewayPoint]]:
+        found: list[tuple[int, GatewayPoint]] = []
+        for point in points:
+            found.append((len(self._points), point))
+            self._points.append(PointRow(f"{machine}.{point.name}", point.unit, point.type.value))
+        return found
+
+    def close(self) -> None:
+        self._sampler.close()
+        self._following.close()
+
+    # ------------------------------------------------------------------ runs
+
+    async def begin(self) -> RunHead:
+        """Begin a run at the present moment, with all values. Raises as commands do."""
+        clock = await self._sampler.take(CLOCK)
+        now, wall = _time(clock), self._wall_us()
+        head = self._begin_run(now, wall)
+        self._following.take()
+        self._take_plans(wall)
+        self._take_sample(clock, now, wall)
+        await self._take_all(now, wall)
+        return head
+
+    def _begin_run(self, time: Nanos, at_us: int) -> RunHead:
+        self._last.clear()
+        self._plans.clear()
+        self._looked.clear()
+        head = RunHead(
+            key=uuid.uuid4().hex,
+            subject=self._subject.description.name,
+            is_virtual=not self._has_devices,
+            began_ns=time,
+            began_us=at_us,
+            points=tuple(self._points),
+        )
+        self._batch = RowBatch(run=head.key, number=1, time=time, at_us=at_us)
+        self._looked_at = time, at_us
+        return head
+
+    def _take_plans(self, wall: int) -> None:
+        for event in self._subject.plans(filter_of(["plan"])):
+            self._take_event(event, event.time, wall)
+
+    async def _take_all(self, now: Nanos, wall: int) -> None:
+        """All values of all machines, also levels, of which events tell."""
+        for name in self._machines:
+            sample = await self._sampler.take(name)
+            self._take_sample(sample, now, wall)
+            if sample.state is not None:
+                for pin, level in sample.state["pins"].items():
+                    if (name, pin) in self._pins:
+                        self._keep(self._pins[name, pin], now, wall, level, is_stepwise=True)
+
+    # ------------------------------------------------------------------ looking
+
+    async def look(self) -> list[RunHead | RowBatch]:
+        """What has happened since the last look: a batch of the present run; the heads of others that have begun, because time
+        has gone back, and their batches."""
+        clock = await self._sampler.take(CLOCK)
+        now, wall = _time(clock), self._wall_us()
+        if clock.state is not None:
+            speed = clock.state["speed"]
+            self._speed = speed if isinstance(speed, int | float) and speed and not clock.state["paused"] else 0.0
+        missed, events = self._following.take()
+        found: list[RunHead | RowBatch] = []
+        while (place := _restored(events)) is not None:
+            for event in events[:place]:
+                self._take_event(event, event.time, wall)
+            at = events[place].time
+            found += [self.end(), self._begin_run(at, self._at(at, now, wall))]
+            events = events[place + 1 :]
+        self._take_events(events, now, wall)
+        if missed:
+            self._note_loss(now, wall, f"{missed} events came too fast and are missing before this moment")
+            self._take_plans(wall)
+        self._take_sample(clock, now, wall)
+        if missed or found:
+            await self._take_all(now, wall)
+        await self._take_changed(events, now, wall)
+        self._looked_at = now, wall
+        return [*found, *self._full(now, wall)]
+
+    async def _take_changed(self, events: Iterable[Event], now: Nanos, wall: int) -> None:
+        if self._has_devices:
+            for sample in await self._sampler.changed(self._machines):
+                self._take_sample(sample, now, wall)
+        for name in self._due(events, now):
+            self._take_sample(await self._sampler.take(name), now, wall)
+
+    def lost(self, batches: Iterable[RowBatch]) -> None:
+        """These could not be kept: say so in the next one."""
+        rows = sum(map(len, batches))
+        self._note_loss(self._batch.time, self._batch.at_us, f"{rows} rows found no room and are missing before this moment")
+
+    def end(self) -> RowBatch:
+        """The last batch of the run, up to the last look."""
+        self._batch.is_last = True
+        self._batch.time, self._batch.at_us = self._looked_at
+        return self._batch
+
+    def _due(self, events: Iterable[Event], now: Nanos) -> list[str]:
+        """Twins to look at: with an event, or not looked at for a while."""
+        if self._has_devices:
+            return []
+        busy = {event.machine for event in events}
+        due = [name for name in self._machines if name in busy or not 0 <= now - self._looked.get(name, -REST_NS) < REST_NS]
+        self._looked |= dict.fromkeys(due, now)
+        return due
+
+    def _full(self, time: Nanos, wall: int) -> list[RowBatch]:
+        full = self._batch
+        if not len(full) and wall - full.at_us < ALIVE_US:
+            return []
+        full.time, full.at_us = time, wall
+        self._batch = RowBatch(run=full.run, number=full.number + 1, time=time, at_us=wall)
+        return [full]
+
+    # ------------------------------------------------------------------ rows
+
+    def _at(self, time: Nanos, now: Nanos, wall: int) -> int:
+        """The wall clock at a moment that was a short while ago."""
+        return wall - int((now - time) / 1000 / self._speed) if self._speed else wall
+
+    def _take_events(self, events: Iterable[Event], now: Nanos, wall: int) -> None:
+        for event in events:
+            self._take_event(event, event.time, self._at(event.time, now, wall))
+
+    def _take_event(self, event: Event, time: Nanos, at_us: int) -> None:
+        match event.payload:
+            case PlanPayload(axis, plan, origin):
+                known = self._plans.get((event.machine, axis), ("", 0))[1]
+                text = json.dumps(plain_plan(plan), separators=(",", ":"))
+                self._keep_plan(event.machine, axis, time, at_us, text, known if origin is None else origin)
+            case CoordinatePayload(axis, origin):
+                plan_text = self._plans.get((event.machine, axis), ("", 0))[0]
+                if plan_text:
+                    self._keep_plan(event.machine, axis, time, at_us, plan_text, origin)
+            case EdgePayload(pin, level):
+                if (event.machine, pin) in self._pins:
+                    self._keep(self._pins[event.machine, pin], time, at_us, level, is_stepwise=True)
+            case payload if event.is_shown:
+                content = json.dumps(payload.plain(), separators=(",", ":"))
+                row = EventRow(time, at_us, event.number, event.machine, event.kind, event.cause, event.text, content)
+                self._batch.events.append(row)
+
+    def _note_loss(self, time: Nanos, wall: int, text: str) -> None:
+        self._batch.events.append(EventRow(time, wall, 0, "", "gap", None, text, "{}"))
+
+    def _keep_plan(self, machine: str, axis: str, time: Nanos, at_us: int, plan: str, origin: int) -> None:
+        if self._plans.get((machine, axis)) == (plan, origin):
+            return
+        self._plans[machine, axis] = plan, origin
+        there = self._axes[machine, axis]
+        self._batch.plans.append(PlanRow(there.point, time, at_us, plan, origin, there.scale, there.round_p))
+
+    def _take_sample(self, sample: Sample, now: Nanos, wall: int) -> None:
+        moving = set()
+        if sample.state is not None and sample.machine in self._machines and not self._machines[sample.machine].is_real:
+            moving = {axis["name"] for axis in sample.state["axes"] if axis["moving"]}
+        for number, point in self._sampled[sample.machine]:
+            if point.path[-1] == "encoder" and point.path[0] in moving:
+                continue  # follows from the motion; it is kept when that is over
+            value = None if sample.state is None else point.read(sample.state)
+            stepwise = point.type is not PointType.NUMBER
+            self._keep(number, now, wall, _kept(value), is_stepwise=stepwise)
+
+    def _keep(self, number: int, time: Nanos, at_us: int, value: KeptValue, *, is_stepwise: bool) -> None:
+        """Keep a value that is another one; of a number that is measured now and then also where it was before, because it
+        changed between these two moments."""
+        last = self._last.get(number)
+        if last is not None:
+            if last.value == value or (not is_stepwise and self._is_near(last.value, value)):
+                self._last[number] = _Last(last.value, (time, at_us, value))
+                return
+            if not is_stepwise and last.seen is not None and (self._has_devices or last.seen[2] != last.value):
+                self._batch.samples.append(SampleRow(number, *last.seen))
+        self._last[number] = _Last(value)
+        self._batch.samples.append(SampleRow(number, time, at_us, value))
+
+    def _is_near(self, last: KeptValue, value: KeptValue) -> bool:
+        if not isinstance(last, float) or not isinstance(value, float):
+            return False
+        return abs(last - value) <= self._dead_band
+
+
+def _restored(events: Iterable[Event]) -> int | None:
+    """The place of the event that time has gone back."""
+    return next((place for place, event in enumerate(events) if isinstance(event.payload, RestoredPayload)), None)
+
+
+def _time(clock: Sample) -> Nanos:
+    return 0 if clock.state is None else int(clock.state["time_ns"])
+
+
+def _kept(value: PointValue) -> KeptValue:
+    return float(value) if isinstance(value, bool | int | float) else value

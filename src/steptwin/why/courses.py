@@ -1,0 +1,108 @@
+"""The courses of what is in no trace, such as registers: found by running parts of the past again, and remembered."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable, Collection, Iterator, Sequence
+from functools import partial
+from typing import NamedTuple, TypeAlias
+
+from steptwin.errors import Misuse
+from steptwin.machine import SECOND, Nanos
+from steptwin.why.log import in_parts
+from steptwin.why.states import Interval
+from steptwin.world import script as do
+from steptwin.world.plant import Plant, RecordedInput
+
+MOST_REMEMBERED = 200_000
+"""Values after which all are forgotten before the next question."""
+
+CourseTurns: TypeAlias = list[tuple[Nanos, float]]
+"""The values from the beginning of an interval on, each with its moment."""
+CourseWatch: TypeAlias = Callable[[Plant, str, CourseTurns], do.Steps]
+"""A script that notes the turns of what has a name."""
+
+
+class _Course(NamedTuple):
+    end: Nanos
+    turns: CourseTurns
+
+
+class Courses:
+    """``make`` gives the world at its beginning, ``inputs`` are what came from outside since, more and more."""
+
+    def __init__(self, make: Callable[[], Plant], inputs: Sequence[RecordedInput]) -> None:
+        self._make = make
+        self._inputs = inputs
+        self._second: Plant | None = None
+        self._known: dict[tuple[str, Nanos], _Course] = {}
+        self._remembered = 0
+
+    def begin(self) -> None:
+        """A question begins."""
+        self._second = None
+        if self._remembered > MOST_REMEMBERED:
+            self._known.clear()
+            self._remembered = 0
+
+    def bring(
+        self, wanted: Collection[str], others: Collection[str], watch: CourseWatch, interval: Interval, at: Nanos
+    ) -> Iterator[None]:
+        """Have the courses in an interval, at least until a moment in it, in parts; those of ``others`` only if
+        it must be run again.
+
+        Raises `Misuse` for what cannot be watched.
+        """
+        (state, end), begin = interval, interval.state.snapshot.now
+        if all((known := self._known.get((name, begin))) is not None and known.end >= min(at, end) for name in wanted):
+            return
+        world = self._second = self._second or self._make()
+        world.restore(state.snapshot)
+        found: dict[str, CourseTurns] = {name: [] for name in (*wanted, *others)}
+        for name, turns in found.items():
+            world.start("why", partial(watch, world, name, turns), is_external=True)
+        for _ in in_parts(world, self._inputs[state.inputs :], end):
+            yield
+        for name, turns in found.items():
+            if not turns:
+                raise Misuse(f"{name}: nothing is known of it at {end / SECOND:g} s")
+            self._known[name, begin] = _Course(end, turns)
+            self._remembered += len(turns)
+
+    def level(self, name: str, interval: Interval, at: Nanos) -> float:
+        """The value at a moment in an interval; at its beginning, if the moment is before."""
+        turns = self._turns(name, interval)
+        return turns[max(0, bisect_right(turns, at, key=_moment) - 1)][1]
+
+    def changes(self, name: str, interval: Interval, until: Nanos) -> Iterator[Nanos]:
+        """The moments of the changes in an interval by a moment, the last one first."""
+        turns = self._turns(name, interval)
+        return (turns[index][0] for index in range(bisect_right(turns, min(until, interval.end), key=_moment) - 1, 0, -1))
+
+    def _turns(self, name: str, interval: Interval) -> CourseTurns:
+        return self._known[name, interval.state.snapshot.now].turns
+
+
+def _moment(turn: tuple[Nanos, float]) -> Nanos:
+    return turn[0]
+
+
+def watch_truth(world: Plant, text: str, turns: CourseTurns) -> do.Steps:
+    """Notes when a condition becomes true and false."""
+    negated = f"not ({text})"
+    is_true = world.holds(world.condition(text))
+    turns.append((world.now, float(is_true)))
+    while True:
+        yield do.Until(negated if is_true else text)
+        is_true = not is_true
+        turns.append((world.now, float(is_true)))
+
+
+def watch_value(world: Plant, name: str, turns: CourseTurns) -> do.Steps:
+    """Notes when a signal takes another value."""
+    value = world.read(name)
+    turns.append((world.now, value))
+    while True:
+        yield do.Until(f"{name} != {value!r}")
+        value = world.read(name)
+        turns.append((world.now, value))

@@ -1,0 +1,73 @@
+"""What all worlds of one description have in common: its values, the contents of its files, and the programs read from them.
+Nothing of it changes, so that any number of worlds may share it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from typing import Any, TypeAlias, TypeVar, cast
+
+from steptwin.diagnostics import Diagnostic, Severity, SourceText, render
+from steptwin.errors import Misuse, SourceErrors
+from steptwin.world.pieces import beside
+from steptwin.world.spec import ControllerSpec, WorldSpec
+from steptwin.world.tomlplaces import Path
+
+T = TypeVar("T")
+
+FileContents: TypeAlias = Mapping[str, bytes]
+"""Contents of the files a description names, and of non-volatile memories (`memory_file`)."""
+
+
+def memory_file(name: str) -> str:
+    """The name, among the files of a world, of the initial non-volatile memory of a controller."""
+    return f"state:{name}"
+
+
+class Blueprint:
+    """A description with its files, from which worlds are built. Errors in files are reported in the text of the description."""
+
+    def __init__(self, spec: WorldSpec, files: FileContents) -> None:
+        self.spec = spec
+        self.files = files
+        self.warnings: list[str] = []
+        """About the files that the description names."""
+        self.makers: dict[str, Callable[[bytes | None], Any]] = {}
+        """Make the machine of each controller whose files have no errors, as `ControllerKind.build`."""
+        self.joined: Sequence[Sequence[str]] | None = None
+        """What shares a kernel, by name (`joined_names`), once a world was built."""
+        self.is_checked = False
+        """Whether a world was built from it without an error: then no other has one, and checks can be left out."""
+        self._known: dict[Path, Any] = {}
+        for controller in spec.controllers:
+            spec.text.unless_wrong(controller.path, partial(self._prepare, controller))
+
+    def once(self, path: Path, make: Callable[[], T]) -> T:
+        """What ``make`` gives, which is called in the first world only. ``path``: a place in the description, or one beyond it.
+
+        The value must follow from the description and its files, and nothing may change it.
+        """
+        found = self._known.get(path)
+        if found is None:
+            found = self._known[path] = make()
+        return cast("T", found)
+
+    def _prepare(self, controller: ControllerSpec) -> None:
+        self.makers[controller.name] = controller.kind.build(controller, self)
+
+    def data(self, name: str) -> bytes:
+        """As `BuildContext.data`."""
+        found = self.files.get(name)
+        if found is None:
+            raise Misuse(f"the content of the file {name!r} is not given with the description")
+        return found
+
+    def accept(self, source: SourceText, findings: Iterable[Diagnostic]) -> None:
+        """As `BuildContext.accept`."""
+        shown = SourceText(beside(self.spec.text.source.name, source.name), source.text)
+        found = tuple(findings)
+        if errors := [one for one in found if one.severity is Severity.ERROR]:
+            raise SourceErrors(render(shown, errors))
+        warnings = [one for one in found if one.severity is Severity.WARNING]
+        if warnings and (text := render(shown, warnings)) not in self.warnings:
+            self.warnings.append(text)

@@ -1,0 +1,40 @@
+import type { Studio } from "../../lib/state/studio.svelte";
+import { draftOf, keepDraft } from "./drafts";
+import { withRow } from "./rows";
+
+export interface Taught {
+  name: string;
+  row: string;
+}
+
+class Waiting {
+  /** Rows by the address of their table, for an editor that is open. */
+  rows = $state.raw<readonly (Taught & { address: string })[]>([]);
+
+  add(address: string, taught: Taught): void {
+    this.rows = [...this.rows, { address, ...taught }];
+  }
+
+  /** Takes out those of a table. */
+  take(address: string): readonly Taught[] {
+    const found = this.rows.filter((one) => one.address === address);
+    if (found.length) this.rows = this.rows.filter((one) => one.address !== address);
+    return found;
+  }
+}
+
+export const waiting = new Waiting();
+
+interface Table {
+  machine: string;
+  place: string;
+  address: string;
+}
+
+/** A row gets into the text of a table that is not in an editor; it stays a draft until it is downloaded. */
+export async function teachDraft(studio: Studio, table: Table, { name, row }: Taught): Promise<void> {
+  const world = studio.model.name;
+  const { text } = await studio.ask("program_text", { machine: table.machine, place: table.place });
+  const [changed] = withRow(draftOf(world, table.address) ?? text, name, row);
+  keepDraft(world, table.address, changed === text ? null : changed);
+}

@@ -1,0 +1,115 @@
+"""A connected device: what becomes of a write that had to wait for the settings to be kept."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any, cast
+
+import pytest
+
+from steptwin.devices.device import ConnectedDevice, DeviceSurroundings
+from steptwin.errors import Refusal
+from steptwin.machine import SECOND
+from steptwin.subject import commands as command
+from steptwin.subject.following import Followers
+from steptwin.world import script as steps
+
+
+class Device:
+    """Its settings are read once `is_read` is set."""
+
+    answers_in_motion = True
+
+    def __init__(self) -> None:
+        self.is_read = asyncio.Event()
+        self.is_asked = asyncio.Event()
+
+    async def settings_text(self) -> str:
+        self.is_asked.set()
+        await self.is_read.wait()
+        return "{}"
+
+
+class Subject:
+    name = "mic488"
+    followers = Followers()
+
+    def __init__(self) -> None:
+        self.done: list[object] = []
+
+    async def do(self, wanted: object) -> str:
+        self.done.append(wanted)
+        return "done"
+
+    async def poll(self) -> None:
+        """Nothing happens."""
+
+    async def read(self, *points: str) -> tuple[object, ...]:
+        return ()
+
+    def publish(self, payload: object) -> None:
+        """Nobody follows."""
+
+    def forget(self) -> None:
+        """Nothing is known."""
+
+
+class Rig:
+    def __init__(self) -> None:
+        self.now = 0
+        self.subject = cast("Any", Subject())
+        self.device = cast("Any", Device())
+        around = DeviceSurroundings(clock=lambda: self.now, keep=lambda name, text: "a file", on_internal=lambda error: None)
+        self.shown = ConnectedDevice(self.subject, self.device, around)
+
+    async def write(self) -> tuple[asyncio.Task[Any], steps.Write]:
+        """A write that may begin a motion, while the settings are being read."""
+        wanted = steps.Write((("mic488", "M1_POS_ABS", 100.0),))
+        task = asyncio.create_task(self.shown._do(wanted))
+        await self.device.is_asked.wait()
+        return task, wanted
+
+
+def test_a_write_goes_after_the_settings_are_kept() -> None:
+    async def story() -> None:
+        rig = Rig()
+        task, wanted = await rig.write()
+        assert rig.subject.done == []
+        rig.device.is_read.set()
+        await task
+        assert rig.subject.done == [wanted]
+        await rig.shown.close()
+
+    asyncio.run(story())
+
+
+def test_a_stop_meanwhile_overtakes_it() -> None:
+    async def story() -> None:
+        rig = Rig()
+        task, wanted = await rig.write()
+        stop = command.StopAxes("mic488", None)
+        await rig.shown._do(stop)
+        rig.device.is_read.set()
+        with pytest.raises(Refusal, match="write was not sent: a stop was requested meanwhile"):
+            await task
+        assert rig.subject.done == [stop]
+        # The settings are kept now: the next one goes at once.
+        await rig.shown._do(wanted)
+        assert rig.subject.done == [stop, wanted]
+        await rig.shown.close()
+
+    asyncio.run(story())
+
+
+def test_settings_that_took_long_do_not_begin_a_motion() -> None:
+    async def story() -> None:
+        rig = Rig()
+        task, _ = await rig.write()
+        rig.now = 6 * SECOND
+        rig.device.is_read.set()
+        with pytest.raises(Refusal, match="it has waited more than 5 s; repeat it"):
+            await task
+        assert rig.subject.done == []
+        await rig.shown.close()
+
+    asyncio.run(story())

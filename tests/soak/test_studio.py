@@ -1,0 +1,122 @@
+"""A studio that is open for eight hours of a busy world stays as large as it is: the service, and the page in a browser."""
+
+from __future__ import annotations
+
+import gc
+import json
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from soak import factor, scaled
+from studio_page import Studio as OpenStudio
+from studio_page import button, show
+from tests.studio.conftest import StudioWorld, browser, start_studio
+from tests.support.studio_rig import Studio, Tab
+
+__all__ = ["browser", "start_studio"]  # fixtures
+
+HOURS = 8
+SPEED = 100.0
+FEW_OBJECTS = 300
+"""Caches fill up a little."""
+MOST_HEAP = 60_000_000
+"""Of the page, after a collection, bytes."""
+BUSY = """
+    [world]
+    name = "hall"
+    [[line]]
+    name = "bus"
+    kind = "modbus"
+    tcp = "127.0.0.1:0"
+    [[mic488]]
+    name = "table"
+    line = "bus"
+    [mic488.M1]
+    unit = "mm"
+    gear = 100.0
+    acc = 400.0
+    dec = 400.0
+    vel = 40.0
+    [[script]]
+    name = "on"
+    steps = [{ write = { "table.M1_EN" = 1 } }]
+    [[script]]
+    name = "go"
+    at = "1 s"
+    repeat = 100000000
+    steps = [
+      { write = { "table.M1_POS_ABS" = 40, "table.OUT1" = 1 } }, { wait = "2 s" },
+      { write = { "table.M1_POS_ABS" = 0, "table.OUT1" = 0 } }, { wait = "2 s" },
+    ]
+"""
+
+
+def objects() -> int:
+    for _ in range(3):
+        gc.collect()
+    return len(gc.get_objects())
+
+
+def look(tab: Tab) -> None:
+    """What a page asks for when it is opened."""
+    tab.ok("follow", kinds=["plan", "edge", "status"], id="events")
+    tab.ok("watch", points=["table.M1.position", "table.M1.status", "time"], rate=10)
+
+
+def busy(studio: Studio, tab: Tab, seconds: int) -> None:
+    """A page that stays; one that comes, does something and goes, ten times."""
+    for part in range(10):
+        visitor = studio.open()
+        look(visitor)
+        for _ in range(max(1, seconds // 10)):
+            studio.run(1000)
+            for one in (tab, visitor):
+                one.read()
+                one.messages.clear()
+        visitor.ok("write", values={"table.USER_REGISTER[1]": part})
+        visitor.close()
+
+
+def test_viewers_of_a_busy_world_leave_nothing_behind() -> None:
+    studio = Studio(BUSY)
+    studio.world.stop_recording()
+    studio.speed = SPEED
+    tab = studio.open()
+    look(tab)
+    length = scaled(round(HOURS * 3600 / SPEED))
+    busy(studio, tab, max(20, length // 10))
+    before = objects()
+    busy(studio, tab, max(20, length))
+    assert objects() - before < FEW_OBJECTS
+    assert studio.errors == []
+
+
+@pytest.fixture
+def studio_world() -> StudioWorld:
+    return StudioWorld(BUSY)
+
+
+def test_a_page_of_a_busy_world_stays_as_large_as_it_is(
+    start_studio: Callable[..., Any], browser: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    process = start_studio("--speed", str(SPEED))
+    studio = OpenStudio(process, browser)
+    page = studio.page(panel="Scope")
+    button(page, "Open beside").click()
+    page.get_by_label("Panel", exact=True).last.select_option(label="Axes")
+    session = page.context.new_cdp_session(page)
+    found = []
+    part_s = HOURS * 3600 / SPEED * factor() / 8
+    for _ in range(8):
+        page.wait_for_timeout(max(500.0, part_s * 1000))
+        session.send("HeapProfiler.collectGarbage")
+        found.append(int(session.send("Runtime.getHeapUsage")["usedSize"]))
+        counted = session.send("Memory.getDOMCounters")
+    show(page, "Overview")
+    with capsys.disabled():
+        print(json.dumps({"heap": found, "dom": counted}))
+    assert max(found) < MOST_HEAP
+    assert counted["nodes"] < 20_000
+    studio.close()
+    assert studio.complaints == []

@@ -1,0 +1,31 @@
+"""Libraries that are missing: the message names those of the extra, and the commands that install them."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+from steptwin.extras import libraries_of, missing
+
+
+def test_the_libraries_of_an_extra_are_those_of_the_package() -> None:
+    project = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())["project"]
+    extras = project["optional-dependencies"]
+    assert {extra: set(libraries_of(extra)) for extra in extras} == {extra: set(names) for extra, names in extras.items()}
+
+
+def test_what_is_missing_is_named_with_the_command_that_installs_it() -> None:
+    assert str(missing("the studio", ["fastapi", "uvicorn"])) == (
+        "the studio needs fastapi and uvicorn, which are not installed: "
+        "in a clone 'make extras' installs them, elsewhere 'pip install fastapi uvicorn'"
+    )
+    assert str(missing("the monitor", ["textual"])).endswith("installs it, elsewhere 'pip install textual'")
+    text = str(missing("it", ["aiomqtt<3", "psycopg[binary]", "numpy"]))
+    assert text.startswith("it needs aiomqtt, psycopg and numpy, which are not installed: ")
+    assert text.endswith("""elsewhere 'pip install "aiomqtt<3" "psycopg[binary]" numpy'""")
+
+
+def test_no_message_and_no_page_installs_by_a_name_that_no_index_has() -> None:
+    root = Path(__file__).parents[1]
+    files = [*(root / "src/steptwin").rglob("*.py"), *root.glob("docs/*.md"), root / "README.md"]
+    assert [file.name for file in files if "install 'steptwin[" in file.read_text() and file.name != "install.md"] == []
