@@ -36,10 +36,11 @@ class Studio:
         self._opened.callback(client.close)
         self.master = Master(client)
 
-    def page(self, language: str = "en-US", panel: str | None = "Axes", **options: Any) -> Page:
+    def page(self, language: str = "en-US", panel: str | None = "Axes", init_script: str = "", **options: Any) -> Page:
         settings: dict[str, Any] = {"viewport": {"width": 1280, "height": 720}, "locale": language, **options}
         context = self._browser.new_context(**settings)
         self._opened.callback(context.close)
+        context.add_init_script(init_script)
         page = context.new_page()
         page.set_default_timeout(WAIT_MS)
         page.on("pageerror", lambda error: self.complaints.append(str(error)))

@@ -122,6 +122,14 @@ export class Documents extends Workspace {
     this.client.didOpen(file);
   }
 
+  /** A server that knows nothing yet gets every text as it is now, without the changes since an earlier server. */
+  opensAnew(): void {
+    for (const file of this.files) {
+      file.doc = file.state.doc;
+      if (file.view !== null) LSPPlugin.get(file.view)?.clear();
+    }
+  }
+
   syncFiles(): readonly Update[] {
     const found: Update[] = [];
     for (const file of this.files) {

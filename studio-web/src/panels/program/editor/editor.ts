@@ -102,7 +102,7 @@ export class ProgramEditor {
     this.documents = this.client.workspace as Documents;
     this.socket = new EditorSocket(url, {
       opened: () => {
-        for (const file of this.documents.files) file.doc = file.state.doc;
+        this.documents.opensAnew();
         this.client.connect(this.socket);
         events.connected(true, "");
       },
