@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import json
 import re
 
@@ -228,6 +229,7 @@ LATE_EDITOR = """
 
 def test_a_text_that_was_changed_before_the_editor_server_answers_has_its_findings(studio: Studio) -> None:
     page = studio.page(panel=None, init_script=LATE_EDITOR)
+    page.clock.install()
     show(page, "Program")
     until(lambda: page.evaluate("Boolean(window.release)"), "the editor server is there")
 
@@ -237,8 +239,10 @@ def test_a_text_that_was_changed_before_the_editor_server_answers_has_its_findin
 
     open_file(PROGRAM + "DELAY 1\nJUMP NOWHERE\n")
     expect(text_of(page)).to_contain_text("NOWHERE")
+    page.clock.pause_at(dt.datetime.now() + dt.timedelta(days=1))  # nothing that waits for a time sends the text before
     page.evaluate("window.release()")
     expect(text_of(page).locator(".cm-lintRange-error")).to_have_text(["NOWHERE"])
+    page.clock.resume()
     open_file("JUMP ELSEWHERE\n")
     expect(text_of(page).locator(".cm-lintRange-error")).to_have_text(["ELSEWHERE"])
     expect(findings(page).get_by_role("listitem")).to_have_count(1)
