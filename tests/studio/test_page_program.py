@@ -239,7 +239,7 @@ def test_a_text_that_was_changed_before_the_editor_server_answers_has_its_findin
 
     open_file(PROGRAM + "DELAY 1\nJUMP NOWHERE\n")
     expect(text_of(page)).to_contain_text("NOWHERE")
-    page.clock.pause_at(dt.datetime.now() + dt.timedelta(days=1))  # nothing that waits for a time sends the text before
+    page.clock.pause_at(dt.datetime.now(dt.UTC) + dt.timedelta(days=1))  # nothing that waits for a time sends the text before
     page.evaluate("window.release()")
     expect(text_of(page).locator(".cm-lintRange-error")).to_have_text(["NOWHERE"])
     page.clock.resume()
