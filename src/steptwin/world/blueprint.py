@@ -4,6 +4,8 @@ Nothing of it changes, so that any number of worlds may share it."""
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from copy import copy
+from dataclasses import replace
 from functools import partial
 from typing import Any, TypeAlias, TypeVar, cast
 
@@ -41,6 +43,12 @@ class Blueprint:
         self._known: dict[Path, Any] = {}
         for controller in spec.controllers:
             spec.text.unless_wrong(controller.path, partial(self._prepare, controller))
+
+    def with_seed(self, seed: int) -> Blueprint:
+        """The same description with another seed; what worlds keep in it does not depend on that."""
+        other = copy(self)
+        other.spec = replace(self.spec, seed=seed)
+        return other
 
     def once(self, path: Path, make: Callable[[], T]) -> T:
         """What ``make`` gives, which is called in the first world only. ``path``: a place in the description, or one beyond it.

@@ -1,0 +1,1 @@
+"""Campaigns: many runs of one world, each a little different, and what must hold in all of them."""

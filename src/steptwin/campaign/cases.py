@@ -1,0 +1,140 @@
+"""The cases of a campaign by number: the same whoever asks for them, in whatever order."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from math import prod
+from typing import NamedTuple
+
+from steptwin.campaign.case import Case, FaultAt, StepAt, VariedValue
+from steptwin.campaign.description import CampaignDescription
+from steptwin.campaign.designs import Design, design_of
+from steptwin.campaign.variation import Choice
+from steptwin.durations import duration
+from steptwin.machine import Nanos
+from steptwin.world.chance import Chance
+
+_NAME = re.compile(r"\{([A-Za-z_][\w-]*)\}")
+
+
+class Dimension(NamedTuple):
+    """Something that is chosen for each case: a value, or whether a fault of less than certain ``chance`` is there.
+
+    ``levels``: so many values, each of which is tried with each of other dimensions; 0: it is drawn.
+    """
+
+    name: str
+    levels: int
+
+
+class Cases:
+    """Of a description. ``count``: how many there are; None: without end."""
+
+    def __init__(self, description: CampaignDescription) -> None:
+        self.description = description
+        is_grid = description.design == "grid"
+        self._doubtful = tuple(n for n, fault in enumerate(description.faults) if fault.chance < 1.0)
+        """The numbers of the faults that may be missing."""
+        self.dimensions = (
+            *(
+                Dimension(one.name, len(one.spread.levels) if is_grid or getattr(one.spread, "is_grid", False) else 0)
+                for one in description.vary
+            ),
+            *(Dimension(f"fault {n + 1}", 2 if is_grid else 0) for n in self._doubtful),
+        )
+        self.grid = prod(one.levels for one in self.dimensions if one.levels)
+        """How many combinations of levels there are; 1 without a grid."""
+
+    @cached_property
+    def count(self) -> int | None:
+        description = self.description
+        if description.runs is not None or description.time_ns is not None or description.until_failure:
+            return description.runs
+        return self.grid
+
+    @cached_property
+    def _design(self) -> Design:
+        drawn = [one.name for one in self.dimensions if not one.levels]
+        return design_of(self.description.design, self.description.seed, drawn, self.count)
+
+    def __getitem__(self, number: int) -> Case:
+        """The case with this number, from 0."""
+        drawn = iter(self._design(number))
+        place = number % self.grid
+        unit: list[float] = []
+        for dimension in reversed(self.dimensions):
+            if dimension.levels:
+                place, level = divmod(place, dimension.levels)
+                unit.append((level + 0.5) / dimension.levels)
+            else:
+                unit.append(-1.0)
+        return self.at(number, [next(drawn) if u < 0.0 else u for u in reversed(unit)])
+
+    def at(self, number: int, unit: Sequence[float]) -> Case:
+        """The case at a point: for each of `dimensions` a number from 0 to below 1."""
+        description = self.description
+        is_grid = description.design == "grid"
+        values: dict[str, VariedValue] = {}
+        for one, dimension, u in zip(description.vary, self.dimensions, unit, strict=False):
+            levels = one.spread.levels if dimension.levels else ()
+            values[one.name] = Choice(levels).value(u) if levels else one.spread.value(u)
+        present = [True] * len(description.faults)
+        for n, u in zip(self._doubtful, unit[len(description.vary) :], strict=True):
+            present[n] = u >= 0.5 if is_grid else u < description.faults[n].chance
+        seed = Chance(description.seed, f"case {number}").draw() >> 1
+        return self.made(number, seed, values, [n for n, one in enumerate(present) if one])
+
+    def made(
+        self,
+        number: int,
+        seed: int,
+        values: Mapping[str, VariedValue],
+        faults: Sequence[int],
+        steps: Sequence[int] | None = None,
+        end_ns: Nanos | None = None,
+    ) -> Case:
+        """The case with these values, and with the faults and steps (None: all) of these tables, from 0."""
+        description = self.description
+        found: list[FaultAt] = []
+        for n in faults:
+            fault = description.faults[n]
+            text = filled(fault.do, values)
+            if description.start_ns is not None and not re.search(r"\bname=", text):
+                # All runs have the seed of their beginning; what a fault draws depends on its name, too.
+                text = f"{text} name={text.split()[0]}-{n + 1}-{seed:x}"
+            found.append(FaultAt(self._moment(fault.at, values), text, n))
+        done = [
+            StepAt(self._moment(step.at, values), filled(step.do, values, is_json=True), n)
+            for n, step in enumerate(description.steps)
+            if steps is None or n in steps
+        ]
+        return Case(number, dict(values), tuple(found), tuple(done), seed, description.end_ns if end_ns is None else end_ns)
+
+    @staticmethod
+    def _moment(at: Nanos | str, values: Mapping[str, VariedValue]) -> Nanos:
+        return duration(values[at]) if isinstance(at, str) else at
+
+
+def filled(text: str, values: Mapping[str, VariedValue], *, is_json: bool = False) -> str:
+    """With values in the place of ``{name}``; in JSON a text that is nothing else becomes the value, of its type."""
+    if is_json:
+        for name in set(re.findall(r'"\{([A-Za-z_][\w-]*)\}"', text)) & set(values):
+            text = text.replace(f'"{{{name}}}"', _json(values[name]))
+    return _NAME.sub(lambda found: _plain(values[found[1]]) if found[1] in values else found[0], text)
+
+
+def names_in(text: str) -> list[str]:
+    """The names to which a text refers."""
+    return _NAME.findall(text)
+
+
+def _plain(value: VariedValue) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _json(value: VariedValue) -> str:
+    import json
+
+    return json.dumps(value, ensure_ascii=False)

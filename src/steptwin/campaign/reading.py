@@ -1,0 +1,350 @@
+"""Reads ``campaign.toml``: its content as values, or all errors in it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from steptwin.campaign.cases import names_in
+from steptwin.campaign.description import (
+    DESIGNS,
+    CampaignDescription,
+    Measure,
+    NamedProperty,
+    VariedFault,
+    VariedStep,
+    step_text,
+)
+from steptwin.campaign.variation import MOST_LEVELS, Between, Choice, Normal, Varied
+from steptwin.durations import duration
+from steptwin.errors import Misuse
+from steptwin.files.textfiles import read_text
+from steptwin.files.world import World, read_beside
+from steptwin.inputfiles import MOST_DESCRIPTION_BYTES
+from steptwin.machine import SECOND, Nanos
+from steptwin.world.expression import parse_condition
+from steptwin.world.pieces import FILE_KEYS
+from steptwin.world.reader import Key, TomlText, optional, read_table
+from steptwin.world.sense import TableRows, check_sense
+from steptwin.world.tables import SEED
+from steptwin.world.tomlplaces import Path as TomlPath
+from steptwin.world.values import flag, name_value, number, positive_time, text_value, whole, word
+
+MOST_RUNS = 1_000_000_000
+CAMPAIGN, VARY, FAULT, STEP, PROPERTY, MEASURE = "campaign", "vary", "fault", "step", "property", "measure"
+
+
+def _condition(value: Any) -> str:
+    parse_condition(text_value(value))
+    return value
+
+
+def _list(value: Any) -> tuple[Any, ...]:
+    if not isinstance(value, list) or not value or any(not isinstance(item, bool | int | float | str) for item in value):
+        raise Misuse(f"{value!r}: expected a list of numbers, texts or truth values")
+    return tuple(value)
+
+
+def _number_or_time(value: Any) -> tuple[float, bool]:
+    """A number, or seconds and whether it is a time."""
+    return (duration(value) / SECOND, True) if isinstance(value, str) else (number()(value), False)
+
+
+def _ends(value: Any) -> tuple[float, float, bool]:
+    if not isinstance(value, list) or len(value) != 2:
+        raise Misuse(f"{value!r}: expected [low, high], such as [0.1, 0.4] or ['0 s', '2 s']")
+    (low, is_time), (high, also) = map(_number_or_time, value)
+    if is_time is not also:
+        raise Misuse(f"{value!r}: expected two numbers or two times")
+    if low >= high:
+        raise Misuse(f"{value!r}: the first must be below the second")
+    return low, high, is_time
+
+
+def _normal(value: Any) -> tuple[float, float, bool]:
+    if not isinstance(value, Mapping) or set(value) != {"mean", "deviation"}:
+        raise Misuse(f"{value!r}: expected {{ mean = NUMBER, deviation = NUMBER }}")
+    (mean, is_time), (deviation, also) = _number_or_time(value["mean"]), _number_or_time(value["deviation"])
+    if is_time is not also:
+        raise Misuse(f"{value!r}: expected two numbers or two times")
+    if deviation <= 0:
+        raise Misuse(f"deviation = {value['deviation']!r}: must be more than 0")
+    return mean, deviation, is_time
+
+
+def _moment(value: Any) -> Nanos | str:
+    """A time, or the name of one that varies."""
+    try:
+        return duration(value)
+    except Misuse:
+        if not isinstance(value, str) or not value[:1].isalpha():
+            raise
+        return name_value(value)
+
+
+def _table(value: Any) -> str:
+    if not isinstance(value, Mapping):
+        raise Misuse(f"{value!r}: expected a step of a script, such as {{ press = 'start' }}")
+    return step_text(value)
+
+
+ROWS: Mapping[str, TableRows] = {
+    CAMPAIGN: TableRows(
+        written=f"[{CAMPAIGN}]",
+        keys=(
+            Key("world", text_value, "the description of the world, beside this file"),
+            Key("end", positive_time, "the virtual time of a run", attribute="end_ns"),
+            optional(text_value, "name", "for people; default that of the file"),
+            optional(whole(1, MOST_RUNS), "runs", "how many; default as many as the grid has"),
+            optional(positive_time, "time", "of the clock on the wall: no run begins later", attribute="time_ns"),
+            optional(flag, "until_failure", "end after the first run that fails", False),
+            optional(SEED, "seed", "where all chance comes from", 0),
+            optional(word(*DESIGNS), "design", "how values are drawn", DESIGNS[0]),
+            optional(_condition, "until", "a condition that ends a run earlier"),
+            optional(positive_time, "start", "the end of the beginning that all runs have in common", attribute="start_ns"),
+            optional(text_value, "database", "of the results: postgresql://HOST/NAME; default a file beside the results"),
+        ),
+    ),
+    VARY: TableRows(
+        written=f"[[{VARY}]]",
+        keys=(
+            optional(text_value, "path", "of a value of the world, as --with has it"),
+            optional(name_value, "name", "a name that other tables refer to as {name}"),
+            optional(_ends, "between", "[low, high], numbers or times"),
+            optional(_normal, "normal", "{ mean = NUMBER, deviation = NUMBER }; between cuts it off"),
+            optional(_list, "choose", "a list of values, one of which is drawn"),
+            optional(_list, "grid", "a list of values, each with each of other grids"),
+            optional(flag, "log", "between: uniform in the logarithm", False),
+            optional(flag, "whole", "between: whole numbers", False),
+            optional(whole(2, MOST_LEVELS), "levels", "between: so many equidistant values, for the design grid", 0),
+        ),
+        need={"log": "between", "whole": "between", "levels": "between"},
+        exclude=(
+            ("path", "name"), ("choose", "grid"), ("between", "choose"), ("between", "grid"), ("normal", "choose"),
+            ("normal", "grid"), ("normal", "log"), ("normal", "whole"), ("normal", "levels"), ("log", "whole"),
+        ),
+    ),
+    FAULT: TableRows(
+        written=f"[[{FAULT}]]",
+        keys=(
+            Key("do", text_value, "KIND NAME=VALUE ..., with {name} for what varies ('steptwin fault --kinds')"),
+            optional(_moment, "at", "a moment, or the name of a time that varies; default where runs begin to vary"),
+            optional(number(0.0, 1.0, above=True), "chance", "of being there", 1.0),
+        ),
+    ),
+    STEP: TableRows(
+        written=f"[[{STEP}]]",
+        keys=(
+            Key("do", _table, "a step of a script, such as { press = 'start' }, with '{name}' for what varies"),
+            optional(_moment, "at", "a moment, or the name of a time that varies; default where runs begin to vary"),
+        ),
+    ),
+    MEASURE: TableRows(
+        written=f"[[{MEASURE}]]",
+        keys=(
+            Key("name", text_value, "for people"),
+            optional(text_value, "value", "a signal, read at the end of a run"),
+            optional(_condition, "when", "a condition: the moment at which it comes true first, s"),
+        ),
+        exclude=(("value", "when"),),
+    ),
+}  # fmt: skip
+"""What the tables may contain, but for properties (`steptwin.campaign.properties`)."""
+
+
+def load_campaign(path: str | Path) -> CampaignDescription:
+    """The campaign that a file describes, with its world. Raises `WorldError` with everything that is wrong with either."""
+    place = Path(path)
+    text = read_text(place, MOST_DESCRIPTION_BYTES).source.text
+    return read_campaign(str(place), text, place.parent)
+
+
+def read_campaign(name: str, text: str, folder: Path) -> CampaignDescription:
+    """As `load_campaign`, of a text whose world lies in a folder."""
+    toml = TomlText(name, text, (), (VARY,))
+    known = [*ROWS, PROPERTY]
+    for key in toml.data:
+        if key not in known:
+            fix = toml.key_replacement((key,) if isinstance(toml.data[key], dict) else (key, 0), key, known)
+            toml.wrong((key,), "D004", f"the file has no [{key}]{toml.near(key, known)}", f"permitted: {', '.join(known)}", fix)
+    head = read_table(toml, (CAMPAIGN,), toml.data.get(CAMPAIGN, {}), ROWS[CAMPAIGN].keys)
+    vary = tuple(found for row in _rows(toml, VARY) if (found := _varied(toml, row)) is not None)
+    start = head.get("start_ns") or 0
+    faults = tuple(VariedFault(row["do"], _at(row, start), row["chance"]) for row in _rows(toml, FAULT))
+    steps = tuple(VariedStep(row["do"], _at(row, start)) for row in _rows(toml, STEP))
+    measures = tuple(_measures(toml))
+    reader = _Checks(toml, head, vary)
+    reader.check_names(faults, steps)
+    reader.check_head()
+    world, files = reader.world(folder)
+    toml.check()
+    if world is None:
+        raise toml.error()
+    named: dict[str, Any] = {**head, "name": head["name"] or Path(name).stem, "world": str(folder / head["world"])}
+    return CampaignDescription(
+        **named,
+        text=world,
+        files=files,
+        vary=vary,
+        faults=faults,
+        steps=steps,
+        properties=tuple[NamedProperty, ...](),
+        measures=measures,
+    )
+
+
+def _rows(toml: TomlText, kind: str) -> Iterable[dict[str, Any]]:
+    """The values of each table that has all it needs."""
+    rows, given = ROWS[kind], toml.data.get(kind, [])
+    if not isinstance(given, list):
+        toml.wrong((kind,), "D002", f"[{kind}] stands once", f"expected [[{kind}]], for there may be several")
+        return
+    for n, table in enumerate(given):
+        values = read_table(toml, (kind, n), table, rows.keys)
+        if all((key.attribute or key.name) in values for key in rows.keys):
+            check_sense(toml, (kind, n), rows, table)
+            yield {**values, "place": (kind, n)}
+
+
+def _at(row: Mapping[str, Any], start: Nanos) -> Nanos | str:
+    return start if row["at"] is None else row["at"]
+
+
+def _varied(toml: TomlText, row: Mapping[str, Any]) -> Varied | None:
+    place: TomlPath = row["place"]
+    spreads = [key for key in ("between", "normal", "choose", "grid") if row[key] is not None]
+    if toml.is_wrong(place):
+        return None
+    if (row["path"] is None) is (row["name"] is None):
+        toml.wrong(place, "D007", "[[vary]] needs one of path and name")
+        return None
+    if not spreads:
+        toml.wrong(place, "D007", "[[vary]] needs one of between, normal, choose and grid")
+        return None
+    try:
+        return Varied(row["path"] or row["name"], row["path"] is not None, _spread(row))
+    except Misuse as error:
+        toml.wrong((*place, spreads[0]), "D003", str(error))
+        return None
+
+
+def _spread(row: Mapping[str, Any]) -> Between | Normal | Choice:
+    between = row["between"]
+    if row["normal"] is not None:
+        mean, deviation, is_time = row["normal"]
+        if between is None:
+            return Normal(mean, deviation, 0.0 if is_time else None, None, is_time=is_time)
+        if between[2] is not is_time:
+            raise Misuse("between and normal: expected numbers in both, or times")
+        return Normal(mean, deviation, between[0], between[1], is_time=is_time)
+    if between is not None:
+        low, high, is_time = between
+        if row["log"] and low <= 0.0:
+            raise Misuse(f"between = {[low, high]}: log needs numbers above 0")
+        if row["whole"] and (is_time or low != int(low) or high != int(high)):
+            raise Misuse(f"between = {[low, high]}: whole needs whole numbers")
+        return Between(low, high, row["log"], row["whole"], is_time, row["levels"])
+    return Choice(row["choose"] or row["grid"], is_grid=row["grid"] is not None)
+
+
+def _measures(toml: TomlText) -> Iterable[Measure]:
+    names: set[str] = set()
+    for row in _rows(toml, MEASURE):
+        if (row["value"] is None) is (row["when"] is None):
+            toml.wrong(row["place"], "D007", "[[measure]] needs one of value and when")
+        if row["name"] in names:
+            toml.wrong((*row["place"], "name"), "D006", f"there is a [[measure]] named {row['name']!r} already")
+        names.add(row["name"])
+        yield Measure(row["name"], row["value"], row["when"])
+
+
+class _Checks:
+    """What tables say about one another."""
+
+    def __init__(self, toml: TomlText, head: Mapping[str, Any], vary: tuple[Varied, ...]) -> None:
+        self._toml = toml
+        self._head = head
+        self._vary = vary
+        self._by_name: dict[str, Between | Normal | Choice] = {one.name: one.spread for one in vary if not one.is_path}
+
+    def check_names(self, faults: tuple[VariedFault, ...], steps: tuple[VariedStep, ...]) -> None:
+        toml = self._toml
+        seen: set[str] = set()
+        for n, one in enumerate(self._vary):
+            if one.name in seen:
+                toml.wrong((VARY, n), "D006", f"{one.name!r} varies already")
+            seen.add(one.name)
+        for kind, found in ((FAULT, faults), (STEP, steps)):
+            for n, one in enumerate(found):
+                for name in names_in(one.do):
+                    if name not in self._by_name:
+                        near = toml.near(name, self._by_name)
+                        toml.wrong((kind, n, "do"), "D009", f"{{{name}}}: no [[vary]] has this name{near}")
+                if isinstance(one.at, str):
+                    self._check_moment((kind, n, "at"), one.at)
+                elif one.at < (self._head.get("start_ns") or 0):
+                    toml.wrong((kind, n, "at"), "D007", "this is before start, up to which all runs have one beginning")
+
+    def _check_moment(self, place: TomlPath, name: str) -> None:
+        spread = self._by_name.get(name)
+        if spread is None:
+            near = self._toml.near(name, self._by_name)
+            self._toml.wrong(place, "D009", f"{name!r} is no time, and no [[vary]] has this name{near}")
+            return
+        start = (self._head.get("start_ns") or 0) / SECOND
+        try:
+            values = spread.values if isinstance(spread, Choice) else (spread.low or 0.0,)
+            earliest = min(duration(value) for value in values) / SECOND
+        except Misuse as error:
+            self._toml.wrong(place, "D007", f"{name!r} varies, but is no time: {error}")
+            return
+        if earliest < start:
+            self._toml.wrong(
+                place, "D007", f"{name!r} may be {earliest:g} s, before start, up to which all runs have one beginning"
+            )
+
+    def check_head(self) -> None:
+        toml, head = self._toml, self._head
+        start, end = head.get("start_ns"), head.get("end_ns")
+        if start is not None and end is not None and start >= end:
+            toml.wrong((CAMPAIGN, "start"), "D007", "start must be before end")
+        for n, one in enumerate(self._vary):
+            if one.is_path and start is not None:
+                toml.wrong(
+                    (VARY, n, "path"),
+                    "D007",
+                    f"{one.name!r} is of the world, which is the same in all runs that have one beginning",
+                    "leave out start, or vary names that faults and steps refer to",
+                )
+            if head.get("design") == "grid" and not one.spread.levels:
+                toml.wrong((VARY, n), "D007", f"{one.name!r} has no few values, as a grid needs", "give choose, grid, or levels")
+        is_grid = head.get("design") == "grid" or any(isinstance(one.spread, Choice) and one.spread.is_grid for one in self._vary)
+        if not (is_grid or head.get("runs") or head.get("time_ns") or head.get("until_failure")):
+            toml.wrong((CAMPAIGN,), "D005", "[campaign]: runs is missing", "how many, or time, until_failure or a grid")
+        if head.get("design") == "latin-hypercube" and not head.get("runs"):
+            toml.wrong((CAMPAIGN, "design"), "D007", "a Latin hypercube needs the number of its points: give runs")
+
+    def world(self, folder: Path) -> tuple[str | None, dict[str, bytes]]:
+        """The text of the world and the files that it names, also those that vary."""
+        if "world" not in self._head:
+            return None, {}
+        try:
+            with World.load(folder / self._head["world"], keep_trace=False, keep_inputs=False) as world:
+                text, files = world.spec.text.source.text, dict(world.files)
+        except Misuse as error:
+            if self._toml.findings:
+                return None, {}
+            raise error
+        base = (folder / self._head["world"]).parent
+        for n, one in enumerate(self._vary):
+            if one.is_path and isinstance(one.spread, Choice) and one.name.split(".")[-1] in FILE_KEYS:
+                self._toml.unless_wrong((VARY, n), partial(_read_all, base, one.spread, files))
+        return text, files
+
+
+def _read_all(base: Path, spread: Choice, files: dict[str, bytes]) -> None:
+    for name in spread.values:
+        if isinstance(name, str) and name not in files:
+            files[name] = read_beside(base, name)
