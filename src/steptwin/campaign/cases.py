@@ -19,7 +19,7 @@ from steptwin.world.chance import Chance
 _NAME = re.compile(r"\{([A-Za-z_][\w-]*)\}")
 
 
-class Dimension(NamedTuple):
+class CaseDimension(NamedTuple):
     """Something that is chosen for each case: a value, or whether a fault of less than certain ``chance`` is there.
 
     ``levels``: so many values, each of which is tried with each of other dimensions; 0: it is drawn.
@@ -39,10 +39,10 @@ class Cases:
         """The numbers of the faults that may be missing."""
         self.dimensions = (
             *(
-                Dimension(one.name, len(one.spread.levels) if is_grid or getattr(one.spread, "is_grid", False) else 0)
+                CaseDimension(one.name, len(one.spread.levels) if is_grid or getattr(one.spread, "is_grid", False) else 0)
                 for one in description.vary
             ),
-            *(Dimension(f"fault {n + 1}", 2 if is_grid else 0) for n in self._doubtful),
+            *(CaseDimension(f"fault {n + 1}", 2 if is_grid else 0) for n in self._doubtful),
         )
         self.grid = prod(one.levels for one in self.dimensions if one.levels)
         """How many combinations of levels there are; 1 without a grid."""
