@@ -28,9 +28,10 @@ from steptwin.commands.auditfile import AuditFile
 from steptwin.commands.demo import demo_world
 from steptwin.commands.keptsettings import keep_settings, state_directory
 from steptwin.commands.recorded import recorded
+from steptwin.commands.studio_branches import BranchStart, WorldBranches
 from steptwin.commands.studio_recordings import WorldRecordings
 from steptwin.commands.studio_work import LineWork
-from steptwin.commands.up_world import Running, UpOptions, up, up_with
+from steptwin.commands.up_world import Running, UpOptions, send_away, up, up_with
 from steptwin.commands.without_world import serve_without_world
 from steptwin.devices.composite import CompositeSubject
 from steptwin.devices.connections import Computer, DeviceConnections
@@ -38,6 +39,7 @@ from steptwin.devices.device import DeviceSurroundings
 from steptwin.devices.worldpart import WorldPart
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
+from steptwin.files.world import World
 from steptwin.httpservice import Tls, listen
 from steptwin.inputfiles import read_bytes
 from steptwin.live.lookback import Lookback
@@ -51,7 +53,10 @@ from steptwin.subject.events import Numbering
 from steptwin.subject.jogs import WorldJogs
 from steptwin.textcodec import decode
 from steptwin.world.addresses import Address, is_loopback, parse_address
+from steptwin.world.blueprint import Blueprint
+from steptwin.world.description import read_world
 from steptwin.world.history import History
+from steptwin.world.pieces import given_files
 from steptwin.world.programtexts import WorldPrograms, configuration_text
 
 DEFAULT = Address("127.0.0.1", 8488)
@@ -108,6 +113,21 @@ def studio(own: StudioOptions, options: UpOptions) -> bool:
             return up_with(world, options, partial(page.open, beside=options))
 
 
+def studio_of_branch(start: BranchStart) -> None:
+    """Show a branch, in which time stands at first. Raises as `studio`."""
+    text, seed, overrides, files = start.snapshot.description
+    spec = read_world(start.source, text, seed, overrides, given_files(files))
+    blueprint = Blueprint(replace(spec, name=start.name), files)
+    entrance = _entrance(start.own)
+    with (
+        listen(entrance.address, is_fixed=True) as listening,
+        World(blueprint, keep_trace=False, keep_inputs=False, at=start.snapshot) as world,
+    ):
+        send_away(world)
+        page = _Page(start.own, entrance, listening, Audit(_now))
+        up_with(world, UpOptions(world=None, ready_file=start.ready_file, speed="0", is_closed=True), partial(page.open))
+
+
 @dataclass(frozen=True, slots=True)
 class _AccessInfo:
     """The address of the studio, and its tokens."""
@@ -159,8 +179,9 @@ class _Page:
         self._listening = listening
         self._audit = audit
 
-    async def open(self, running: Running, *, beside: UpOptions, history: History | None = None) -> None:
-        """Serve it in the event loop of the world of ``beside``, with the past of a world that has one already."""
+    async def open(self, running: Running, *, beside: UpOptions | None = None, history: History | None = None) -> None:
+        """Serve it in the event loop of a world, with the past of one that has one already. ``beside``: of the world whose
+        sessions are saved; a branch has none."""
         live, pace, server = running.live, running.pace, running.server
 
         def moment() -> PresentMoment:
@@ -178,12 +199,36 @@ class _Page:
 
         lookback = Lookback(live, server.cell, pace, history)
         server.join(lookback)
+        recordings = None if beside is None else self._recordings(running, beside)
+        branches = WorldBranches(live, server.cell, lookback, self._branch_options())
+        server.join(branches)
+        await self._serve(
+            server,
+            subject,
+            moment,
+            WorldPrograms(live.world),
+            configuration,
+            lookback=lookback,
+            branches=branches,
+            recordings=recordings,
+            traffic=live.traffic,
+        )
+
+    def _recordings(self, running: Running, beside: UpOptions) -> WorldRecordings:
+        live, server = running.live, running.server
         folder = state_directory() / "recordings" if beside.world is None else beside.world.absolute().parent
         stem = live.world.spec.name if beside.world is None else beside.world.stem
         may_view = is_loopback(self._entrance.address.host)
         recordings = WorldRecordings(live, server.cell, folder, stem, beside.session, may_view=may_view)
         server.join(recordings)
-        await self._serve(server, subject, moment, WorldPrograms(live.world), configuration, lookback, recordings, live.traffic)
+        return recordings
+
+    def _branch_options(self) -> StudioOptions | None:
+        """How the page of a branch is served: as this one, at a free port; None where others can reach this one."""
+        host = self._entrance.address.host
+        if not is_loopback(host):
+            return None
+        return replace(self._own, http=str(Address(host, 0)), audit=None, browser=False, devices=(), view=False)
 
     async def open_without_world(self, server: Server) -> None:
         """Serve it in the event loop of ``server``."""
@@ -202,7 +247,9 @@ class _Page:
         moment: Callable[[], PresentMoment],
         programs: ProgramTexts,
         configuration: Callable[[str], SourceText | None],
+        *,
         lookback: Lookback | None = None,
+        branches: WorldBranches | None = None,
         recordings: WorldRecordings | None = None,
         traffic: Callable[[], Sequence[Mapping[str, object]]] | None = None,
     ) -> None:
@@ -224,6 +271,7 @@ class _Page:
             work=work,
             configuration=configuration,
             lookback=lookback,
+            branches=branches,
             recordings=recordings,
             traffic=traffic,
             on_internal=report,

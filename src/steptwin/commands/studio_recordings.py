@@ -6,18 +6,13 @@ Exports and views are processes of their own, so that the world goes on undistur
 from __future__ import annotations
 
 import asyncio
-import json
 import subprocess
-import sys
-import threading
-import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import TypeAlias
 
-from steptwin.errors import LineFailure, Misuse, Refusal
+from steptwin.commands.studio_processes import ChildProcesses, Process, last_line
+from steptwin.errors import Misuse, Refusal
 from steptwin.eventloop import later
 from steptwin.files import session as sessions
 from steptwin.files.beginning import SESSION_SUFFIX
@@ -28,10 +23,8 @@ from steptwin.live.world import MOST_INPUT_BYTES, MOST_INPUTS, LiveWorld
 from steptwin.world import history
 
 EXPORT_S = 300.0
-"""Longest duration of an export, and of the start of a view."""
+"""Longest duration of an export."""
 MOST_VIEWS = 4
-POLL_S = 0.05
-Process: TypeAlias = subprocess.Popen[bytes]
 
 
 class WorldRecordings:
@@ -130,77 +123,46 @@ class WorldRecordings:
         await asyncio.to_thread(self._processes.close)
 
 
-class _Processes:
+class _Processes(ChildProcesses):
     """Exports and views. All methods block."""
 
     def __init__(self) -> None:
-        self._folder = TemporaryDirectory(prefix="steptwin-")
-        self._turn = threading.Lock()
-        self._running: set[Process] = set()
+        super().__init__()
         self._views: dict[Path, tuple[Process, str]] = {}
-        self._is_closed = False
 
     def export(self, path: Path, form: str) -> Path:
         """One at a time; what has been made is kept. Raises `Refusal`."""
-        target = Path(self._folder.name) / f"{path.stem}.{form}"
-        with self._turn:
+        target = self.folder / f"{path.stem}.{form}"
+        with self.turn:
             if target.exists() and target.stat().st_mtime > path.stat().st_mtime:
                 return target
             target.unlink(missing_ok=True)
-            process = self._start("replay", str(path), "--trace", str(target))
+            process = self.start("steptwin", "replay", str(path), "--trace", str(target))
             try:
                 _, errors = process.communicate(timeout=EXPORT_S)
             except subprocess.TimeoutExpired:
                 raise Refusal(f"{path.name} as {form} takes more than {EXPORT_S:g} s: use steptwin replay and export") from None
             finally:
-                self._end(process)
+                self.end(process)
         if not target.exists():
-            raise Refusal(f"{path.name} as {form}: {_last_line(errors)}")
+            raise Refusal(f"{path.name} as {form}: {last_line(errors)}")
         return target
 
     def view(self, path: Path) -> str:
         """The address of a view, which may be running already; the oldest of too many ends. Raises `LineFailure`."""
-        with self._turn:
+        with self.turn:
             process, url = self._views.get(path, (None, ""))
             if process is not None and process.poll() is None:
                 return url
             while len(self._views) >= MOST_VIEWS:
-                self._end(self._views.pop(next(iter(self._views)))[0])
-            ready = Path(self._folder.name) / f"{path.stem}.ready.json"
+                self.end(self._views.pop(next(iter(self._views)))[0])
+            ready = self.folder / f"{path.stem}.ready.json"
             ready.unlink(missing_ok=True)
             options = ("--view", "--no-browser", "--http", "127.0.0.1:0", "--ready-file", str(ready))
-            process = self._start("studio", str(path), *options)
-            until = time.monotonic() + EXPORT_S
-            while not ready.exists() and process.poll() is None and time.monotonic() < until:
-                time.sleep(POLL_S)
-            if not ready.exists():
-                raise LineFailure(f"the view of {path.name} has not started: {_last_line(self._end(process))}")
-            url = _url_in(ready.read_text("utf-8"))
+            process = self.start("steptwin", "studio", str(path), *options)
+            url = self.url(process, ready, f"the view of {path.name}")
             self._views[path] = process, url
             return url
-
-    def _start(self, *arguments: str) -> Process:
-        if self._is_closed:
-            raise Refusal("the studio ends")
-        none = subprocess.DEVNULL
-        process = subprocess.Popen(
-            [sys.executable, "-m", "steptwin", *arguments], stdin=none, stdout=none, stderr=subprocess.PIPE
-        )
-        self._running.add(process)
-        return process
-
-    def _end(self, process: Process) -> bytes:
-        """What it has written about errors."""
-        self._running.discard(process)
-        process.terminate()
-        return process.communicate()[1]
-
-    def close(self) -> None:
-        self._is_closed = True
-        for process in list(self._running):
-            self._end(process)
-        with self._turn:  # an export notices
-            self._folder.cleanup()
 
 
 def _save(session: sessions.Session, path: Path) -> SavedSession:
@@ -213,13 +175,3 @@ def _save(session: sessions.Session, path: Path) -> SavedSession:
 
 def _plain(saved: SavedSession) -> Mapping[str, object]:
     return {"name": saved.name, "bytes": saved.size, "saved": saved.saved, "until_ns": str(saved.until)}
-
-
-def _last_line(errors: bytes) -> str:
-    lines: Sequence[str] = errors.decode("utf-8", "replace").strip().splitlines()
-    return lines[-1] if lines else "it ended without a word"
-
-
-def _url_in(ready: str) -> str:
-    points = json.loads(ready)["end_points"]
-    return str(next(point["url"] for point in points if point["kind"] == "http"))

@@ -133,7 +133,7 @@ def up_with(world: World, options: UpOptions, addition: Addition | None = None) 
     name = options.name or (world.spec.name if options.world is None else options.world.stem)
     speed = read_speed(options.speed, least=0)
     if not options.is_closed:
-        _send_away(world)
+        send_away(world)
     past = [] if world.now else [record for record in world.trace if is_shown(record)]
     kept = read_kept(options.trace or world.spec.trace or "off")
     if kept is None:
@@ -159,7 +159,7 @@ def up_with(world: World, options: UpOptions, addition: Addition | None = None) 
     return not world.failures and not (options.strict and world.overdue)
 
 
-def _send_away(world: World) -> None:
+def send_away(world: World) -> None:
     """Disconnect the clients of a continued session: they are not connected now."""
     for line in world.lines.values():
         for place in [place for place in line.places if place != SCRIPTS]:

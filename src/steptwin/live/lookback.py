@@ -74,6 +74,13 @@ class Lookback:
         later.then(look.close)
         return later
 
+    def state_at(self, moment: Nanos) -> Later[PlantSnapshot]:
+        """The state of a moment, without inputs before it. Raises as `events`."""
+        look = self.open()
+        later = look.state_at(moment)
+        later.then(look.close)
+        return later
+
     def open(self) -> Look:
         """For another viewer of the past. Raises `Refusal` where there are too many."""
         if self._looks >= MOST_LOOKS:
@@ -116,6 +123,14 @@ class Look:
     ) -> Later[tuple[T, EventBatch]]:
         """To ``end``; see `Lookback.events`."""
         return self._begin(self._follow(begin, end, what, bound, at_begin))
+
+    def state_at(self, moment: Nanos) -> Later[PlantSnapshot]:
+        """See `Lookback.state_at`."""
+        return self._begin(self._state_at(moment))
+
+    def _state_at(self, moment: Nanos) -> Generator[None, None, PlantSnapshot]:
+        yield from self._past.go(moment)
+        return self._past.world.snapshot()
 
     def _follow(
         self, begin: Nanos, end: Nanos, what: Filter, bound: int, at_begin: Callable[[WorldSubject], T]

@@ -20,13 +20,14 @@ from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.later import start
 from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.studio.branchrequests import Branches
 from steptwin.studio.calculations import Calculations
 from steptwin.studio.configurations import Configurations
 from steptwin.studio.looking import KeptPast
 from steptwin.studio.machines import Sheets
 from steptwin.studio.programs import ProgramTexts
 from steptwin.studio.recordingrequests import Recordings
-from steptwin.studio.requests import OF_RECORDINGS, OF_THE_PAST, REQUESTS, permit_of
+from steptwin.studio.requests import OF_BRANCHES, OF_RECORDINGS, OF_THE_PAST, REQUESTS, permit_of
 from steptwin.studio.streams import Streams
 from steptwin.studio.tools import tools
 from steptwin.studio.watches import Watches
@@ -189,6 +190,8 @@ class Surroundings:
     """The past, where one is kept."""
     recordings: Recordings | None = None
     """Of the world, where there is one."""
+    branches: Branches | None = None
+    """Of the world, where there is one."""
     traffic: Callable[[], Sequence[Mapping[str, object]]] | None = None
     """Of the world, where there is one."""
     on_internal: Callable[[Exception], object] = lambda error: None
@@ -245,6 +248,13 @@ class Hub:
             raise Refusal("nothing is recorded here: there is no world")
         return self.around.recordings
 
+    @property
+    def branches(self) -> Branches:
+        """Raises `Refusal` where there is no world."""
+        if self.around.branches is None:
+            raise Refusal("branches are worlds: there is none here")
+        return self.around.branches
+
     def traffic(self) -> dict[str, object]:
         """Raises `Refusal` where there is no world."""
         if self.around.traffic is None:
@@ -280,6 +290,8 @@ class Hub:
             missing |= OF_THE_PAST
         if self.around.recordings is None:
             missing |= OF_RECORDINGS
+        if self.around.branches is None:
+            missing |= OF_BRANCHES
         if self.around.traffic is None:
             missing |= {"traffic"}
         own = [name for name in REQUESTS if name not in missing]

@@ -17,6 +17,7 @@ from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.nearmiss import NearMiss
 from steptwin.plaintypes import shown
+from steptwin.studio.branchrequests import BRANCHES, BranchRequest
 from steptwin.studio.devicerequests import OF_DEVICES, DeviceRequest
 from steptwin.studio.recordingrequests import RECORDINGS, RecordingRequest
 from steptwin.studio.requestrow import NOTHING, RequestRow
@@ -191,6 +192,7 @@ StudioRequest: TypeAlias = (
     | ToolRequest
     | WorkRequest
     | RecordingRequest
+    | BranchRequest
     | DeviceRequest
     | ListPorts
     | Connect
@@ -435,12 +437,14 @@ _ROWS = (
     ),
 )
 
-REQUESTS: Mapping[str, RequestRow] = {row.name: row for row in (*_ROWS, *TOOLS, *WORKS, *RECORDINGS, *OF_DEVICES)}
+REQUESTS: Mapping[str, RequestRow] = {row.name: row for row in (*_ROWS, *TOOLS, *WORKS, *RECORDINGS, *BRANCHES, *OF_DEVICES)}
 ALL: Mapping[str, RequestRow | CommandRow] = {**COMMANDS, **REQUESTS}
 """Every request by name."""
 OF_THE_PAST = frozenset({"look", "go_back", "past_events"})
 """What needs a past that is kept."""
 OF_RECORDINGS = frozenset(row.name for row in RECORDINGS)
+"""What needs a world whose sessions are kept."""
+OF_BRANCHES = frozenset(row.name for row in BRANCHES)
 """What needs a world."""
 IN_THE_PAST = OF_THE_PAST | {"breakpoint", "clear_breakpoint", "stop_on", "step_program", "run", "look_at", "branch"}
 """What changes something and is possible while the past is looked at: a debugger goes forwards from there, too."""

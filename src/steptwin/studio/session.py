@@ -17,6 +17,7 @@ from steptwin.access.roles import LOOK, Permit, Role
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.later import Later, start
 from steptwin.machine import SECOND, Nanos
+from steptwin.studio import branchrequests as branch
 from steptwin.studio import devicerequests as device
 from steptwin.studio import recordingrequests as recording
 from steptwin.studio import requests as ask
@@ -118,6 +119,8 @@ class ViewerSession:
             recording.ReadRecordings: lambda _: hub.recordings.plain(),
             recording.SaveRecording: lambda wanted: hub.recordings.save(wanted.name),
             recording.ViewRecording: self._view_recording,
+            branch.StartBranch: lambda wanted: hub.branches.start(wanted.moment),
+            branch.EndBranch: lambda wanted: hub.branches.end(wanted.branch),
         }
 
     def _own_actions(self) -> Mapping[object, Callable[[Any], object]]:
@@ -135,6 +138,7 @@ class ViewerSession:
             **hub.tools,
             work.Scan: lambda wanted: hub.around.work.scan(wanted.places, wanted.kind, wanted.units, wanted.baud, wanted.timeout),
             work.Verify: lambda wanted: hub.around.work.verify(wanted.address, write=wanted.write),
+            branch.ListBranches: lambda _: hub.branches.plain(),
             work.ReadWork: lambda _: hub.around.work.plain(),
             device.ReadShadow: lambda wanted: hub.around.connections.shadow_of(wanted.machine, wanted.after),
             work.CancelWork: lambda _: hub.around.work.cancel(),

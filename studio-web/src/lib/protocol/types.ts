@@ -1,6 +1,6 @@
 // Made from docs/studio.schema.json by `npm run protocol`; not to be changed by hand.
 
-export type Request = DescribeRequest | ReadRequest | PinsRequest | StateRequest | EncodersRequest | FaultsRequest | FaultKindsRequest | TimeRequest | EndPointsRequest | FollowRequest | UnfollowRequest | SetRequest | PressRequest | ReleaseRequest | WriteRequest | SendRequest | RequestRequest | PowerCycleRequest | TurnRequest | CoupleRequest | FaultRequest | ClearFaultRequest | ExpectRequest | NoteRequest | SeeRequest | EnableRequest | MoveRequest | HomeRequest | JogRequest | StopRequest | ProgramRequest | DownloadRequest | PauseRequest | ResumeRequest | StepRequest | SnapshotRequest | SnapshotsRequest | RestoreRequest | DropSnapshotRequest | SaveRequest | DebugRequest | BreakpointRequest | ClearBreakpointRequest | BreakpointsRequest | StopOnRequest | StepProgramRequest | RunRequest | LookAtRequest | BranchRequest | StackRequest | ValuesRequest | EvaluateRequest | SetValueRequest | ProgramSourceRequest | WhyRequest | HelloRequest | ResyncRequest | WatchRequest | UnwatchRequest | TakeControlRequest | ReleaseControlRequest | RenewRequest | LetGoRequest | StopAllRequest | LookRequest | PastEventsRequest | GoBackRequest | ProgramsRequest | ProgramTextRequest | ProgramMemoryRequest | PortsRequest | ConnectRequest | DisconnectRequest | TrafficRequest | AuditRequest | CalculatorRequest | CalculateRequest | GearRequest | ConfigurationRequest | EditConfigurationRequest | ScanRequest | VerifyRequest | WorkRequest | CancelWorkRequest | RecordingsRequest | SaveRecordingRequest | ViewRecordingRequest | SettingsRequest | ShadowRequest | ShadowStateRequest;
+export type Request = DescribeRequest | ReadRequest | PinsRequest | StateRequest | EncodersRequest | FaultsRequest | FaultKindsRequest | TimeRequest | EndPointsRequest | FollowRequest | UnfollowRequest | SetRequest | PressRequest | ReleaseRequest | WriteRequest | SendRequest | RequestRequest | PowerCycleRequest | TurnRequest | CoupleRequest | FaultRequest | ClearFaultRequest | ExpectRequest | NoteRequest | SeeRequest | EnableRequest | MoveRequest | HomeRequest | JogRequest | StopRequest | ProgramRequest | DownloadRequest | PauseRequest | ResumeRequest | StepRequest | SnapshotRequest | SnapshotsRequest | RestoreRequest | DropSnapshotRequest | SaveRequest | DebugRequest | BreakpointRequest | ClearBreakpointRequest | BreakpointsRequest | StopOnRequest | StepProgramRequest | RunRequest | LookAtRequest | BranchRequest | StackRequest | ValuesRequest | EvaluateRequest | SetValueRequest | ProgramSourceRequest | WhyRequest | HelloRequest | ResyncRequest | WatchRequest | UnwatchRequest | TakeControlRequest | ReleaseControlRequest | RenewRequest | LetGoRequest | StopAllRequest | LookRequest | PastEventsRequest | GoBackRequest | ProgramsRequest | ProgramTextRequest | ProgramMemoryRequest | PortsRequest | ConnectRequest | DisconnectRequest | TrafficRequest | AuditRequest | CalculatorRequest | CalculateRequest | GearRequest | ConfigurationRequest | EditConfigurationRequest | ScanRequest | VerifyRequest | WorkRequest | CancelWorkRequest | RecordingsRequest | SaveRecordingRequest | ViewRecordingRequest | BranchesRequest | StartBranchRequest | EndBranchRequest | SettingsRequest | ShadowRequest | ShadowStateRequest;
 
 /** Every request has exactly one. */
 export type Answer = {
@@ -1518,6 +1518,34 @@ export type ViewRecordingRequest = {
   name: string;
 };
 
+/** The branches of the world that are open. */
+export type BranchesRequest = {
+  do: "branches";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+};
+
+/** Begin another world, without ports, in the state of a moment of the past. It is a studio of its own, in which time stands at first. Nothing changes in the world here. */
+export type StartBranchRequest = {
+  do: "start_branch";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Which moment; the present without. [ns] */
+  at_ns?: string | number | null;
+};
+
+/** End a branch; what is in it is lost. */
+export type EndBranchRequest = {
+  do: "end_branch";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Its number. */
+  branch: number;
+};
+
 /** What can be read and written in a device, as the text that is kept before the first write. */
 export type SettingsRequest = {
   do: "settings";
@@ -1979,6 +2007,24 @@ export type ViewRecordingAnswer = {
   url: string;
 };
 
+export type BranchesAnswer = {
+  branch: number;
+  /** Where it began. Virtual time, as decimal text [ns] */
+  from_ns: string;
+  /** Of its page; the token there is the one of here. */
+  url: string;
+}[];
+
+export type StartBranchAnswer = {
+  branch: number;
+  /** Where it began. Virtual time, as decimal text [ns] */
+  from_ns: string;
+  /** Of its page; the token there is the one of here. */
+  url: string;
+};
+
+export type EndBranchAnswer = null;
+
 export type SettingsAnswer = {
   machine: string;
   text: string;
@@ -2258,6 +2304,9 @@ export interface Requests {
   recordings: { request: RecordingsRequest; answer: RecordingsAnswer };
   save_recording: { request: SaveRecordingRequest; answer: SaveRecordingAnswer };
   view_recording: { request: ViewRecordingRequest; answer: ViewRecordingAnswer };
+  branches: { request: BranchesRequest; answer: BranchesAnswer };
+  start_branch: { request: StartBranchRequest; answer: StartBranchAnswer };
+  end_branch: { request: EndBranchRequest; answer: EndBranchAnswer };
   settings: { request: SettingsRequest; answer: SettingsAnswer };
   shadow: { request: ShadowRequest; answer: ShadowAnswer };
   shadow_state: { request: ShadowStateRequest; answer: ShadowStateAnswer };

@@ -17,6 +17,12 @@ export function giveToken(token: string): void {
   sessionStorage.setItem(TOKEN, token);
 }
 
+/** The address of another studio that takes the same token. */
+export function withToken(url: string): string {
+  const token = sessionStorage.getItem(TOKEN);
+  return token === null ? url : `${url}#token=${encodeURIComponent(token)}`;
+}
+
 /** Of a request over HTTP. */
 export function tokenHeaders(): Record<string, string> {
   const token = sessionStorage.getItem(TOKEN);

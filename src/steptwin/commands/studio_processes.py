@@ -1,0 +1,78 @@
+"""Processes that a studio starts beside itself, so that its world goes on undisturbed. All functions block."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TypeAlias
+
+from steptwin.errors import LineFailure, Refusal
+
+START_S = 300.0
+"""Longest duration of the start of a studio."""
+POLL_S = 0.05
+Process: TypeAlias = subprocess.Popen[bytes]
+
+
+class ChildProcesses:
+    """Processes that end with it, and a folder of their files."""
+
+    def __init__(self) -> None:
+        self._folder = TemporaryDirectory(prefix="steptwin-")
+        self.folder = Path(self._folder.name)
+        self.turn = threading.Lock()
+        """For what is done one at a time."""
+        self._running: set[Process] = set()
+        self._is_closed = False
+
+    def start(self, module: str, *arguments: str, given: bytes | None = None) -> Process:
+        """``given``: what it reads; its input stays open then. Raises `Refusal` when the studio ends."""
+        if self._is_closed:
+            raise Refusal("the studio ends")
+        process = subprocess.Popen(
+            [sys.executable, "-m", module, *arguments],
+            stdin=subprocess.DEVNULL if given is None else subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+        )
+        self._running.add(process)
+        if given is not None and process.stdin is not None:
+            try:
+                process.stdin.write(given)
+                process.stdin.flush()
+            except OSError:  # it has ended already; it says why
+                pass
+        return process
+
+    def url(self, process: Process, ready: Path, what: str) -> str:
+        """The address of the page of a studio, when it is there. Raises `LineFailure` where it does not start."""
+        until = time.monotonic() + START_S
+        while not ready.exists() and process.poll() is None and time.monotonic() < until:
+            time.sleep(POLL_S)
+        if not ready.exists():
+            raise LineFailure(f"{what} has not started: {last_line(self.end(process))}")
+        points = json.loads(ready.read_text("utf-8"))["end_points"]
+        return str(next(point["url"] for point in points if point["kind"] == "http"))
+
+    def end(self, process: Process) -> bytes:
+        """What it has written about errors."""
+        self._running.discard(process)
+        process.terminate()
+        return process.communicate()[1]
+
+    def close(self) -> None:
+        self._is_closed = True
+        for process in list(self._running):
+            self.end(process)
+        with self.turn:  # an export notices
+            self._folder.cleanup()
+
+
+def last_line(errors: bytes) -> str:
+    lines = errors.decode("utf-8", "replace").strip().splitlines()
+    return lines[-1] if lines else "it ended without a word"
