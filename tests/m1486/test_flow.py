@@ -104,6 +104,11 @@ def test_values_are_exact_while_they_are_few() -> None:
     assert {s.variable for s in states[3]} == {1, 11, 21, 31}
 
 
+def test_the_variable_is_calculated_modulo_its_24_bits() -> None:
+    _, states = flow_of(":100\n/7\n-20\n*3\n+20\nF")
+    assert [{s.variable for s in states[index]} for index in range(1, 6)] == [{100}, {14}, {2**24 - 6}, {2**24 - 18}, {2}]
+
+
 def test_the_values_of_five_lines_are_few() -> None:
     _, states = flow_of("?15\n+1")
     assert {s.variable for s in states[1]} == set(range(32))

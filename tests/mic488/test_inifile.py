@@ -79,6 +79,13 @@ def test_setting_a_key_changes_that_value_only(data: bytes, section: str, key: s
         assert any(new[:i] + new[i + extra :] == old for i in range(len(old) + 1))
 
 
+def test_headers_know_their_place() -> None:
+    text = "  [Axis0] ; first\n\n[ M 2 ]\n[open"
+    file = parse(text)
+    assert [text[header.span.start : header.span.end] for header in file.headers] == ["[Axis0]", "[ M 2 ]", "[open"]
+    assert [finding.span for finding in file.findings if finding.code == "C002"] == [file.headers[2].span]
+
+
 def test_setting_a_value_keeps_the_comment_behind_it() -> None:
     changed = IniFile.parse(VENDOR).with_value("axis0", "DEC", "3,5")
     assert changed.to_bytes() == VENDOR.replace(b"Dec = 200   ; ham", b"Dec = 3,5   ; ham")

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import pytest
-from mic488_rig import MM, RUNNING, STOPPED, controller, programmed, started
+from mic488_rig import MM, RUNNING, STOPPED, controller, dint_words, programmed, started
 
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.config import AxisConfig
 from steptwin.mic488.encoder import Coupling
 from steptwin.mic488.program_registers import position_p
 from steptwin.wbc.real import ProgramFault
+from steptwin.world.wires import PinName, Wire
 
 # ---------------------------------------------------------------------- registers
 
@@ -24,6 +25,16 @@ def test_user_registers_are_one_memory_with_the_low_word_first() -> None:
     assert rig.read_words(10, 2) == [70000 & 0xFFFF, 1]
     assert rig.r(30) == -5.0
     assert rig.i(50) == 32767  # WBC-14: the nearest it can hold
+
+
+def test_a_user_register_is_read_in_single_precision_and_one_without_a_number_as_0() -> None:
+    rig = programmed("$R10 = $R20\n$R12 = $D22\n$I14 = $I24\nWAIT IN9 = ON\n")
+    rig.write_words(20, 0x0000, 0x7FC0)  # a NaN
+    rig.write_words(22, *dint_words(2**24 + 1))
+    rig.i(24, -32768)
+    rig.start()
+    rig.wait(0.1)
+    assert (rig.r(10), rig.r(12), rig.i(14)) == (0.0, 2.0**24, -32768)
 
 
 def test_wbc_14_whole_registers_take_the_nearest_number() -> None:
@@ -139,6 +150,57 @@ def test_a_loop_that_changes_a_register_and_changes_it_back_does_not_rest(name: 
     rig.wait(0.1)
     deadline = rig.kernel.deadline()
     assert (rig.state, deadline) == (RUNNING, rig.now + 1_000_000)
+
+
+COUNT_AT_VELOCITY = "MAIN:\nIF StatM1 = 2\n$I0 = $I0 + 1\nENDIF\nJUMP MAIN\n"
+COUNT_WITHOUT_INPUT = "MAIN:\nIF IN1 = 0\n$I0 = $I0 + 1\nENDIF\nJUMP MAIN\n"
+COUNT_TICKS = "MAIN:\n$I1 = $I1 + 1\nJUMP MAIN\nINT_TICK:\n$I0 = $I0 + 1\nRETURN\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "count"),
+    [
+        # 2000 pulses to the limit in velocity mode: 1.5 s and a ramp of 1 s; 4 statements of 1 ms in a round.
+        ("LimRM1 = 9000\nM1 = ON\nVABS M1 1000\nDELAY 1.5\nLimRM1 = 3000\n" + COUNT_AT_VELOCITY, 625),
+        ("LimLM1 = -9000\nM1 = ON\nVABS M1 -1000\nDELAY 1.5\nLimLM1 = -3000\n" + COUNT_AT_VELOCITY, 625),
+        ("LimRM1 = 9000\nM1 = ON\nVABS M1 1000\nDELAY 1.5\nPosM1 = 7000\n" + COUNT_AT_VELOCITY, 625),
+        # The drive's own interrupt, and a wire from OUT1 to IN1, whose filter takes 10 ms.
+        ("CFGINT_M1 = HIGH\nM1 = ON\nMAIN:\n$I1 = $I1 + 1\nJUMP MAIN\nINT_M1:\n$I0 = $I1 + 7\nRETURN\n", 7),
+        ("OUT1 = ON\n" + COUNT_WITHOUT_INPUT, 3),
+        ("OUTPUTS = 1\n" + COUNT_WITHOUT_INPUT, 3),
+        # Each 10 ms from the write on.
+        ("CFGINT_TICK = HIGH\n" + COUNT_TICKS, 599),
+    ],
+)
+def test_what_a_write_leads_to_comes_at_its_moment_although_the_program_could_run_ahead(text: str, count: int) -> None:
+    rig = programmed(text)
+    rig.kernel.connect(Wire(PinName("m", "OUT1"), PinName("m", "IN1")))
+    rig.start()
+    rig.wait(6.0)
+    assert rig.i(0) == pytest.approx(count, abs=1)
+    assert rig.i(1) < 6000 / 2  # no round with fewer than 2 statements
+
+
+def test_registers_of_drives_are_read_in_units_and_inputs_are_the_first_sixteen() -> None:
+    text = (
+        "LimLM1 = -1.5\nLimRM1 = 2.5\nAccM1 = 40\nDecM1 = 30\nVmaxM1 = 20\n"
+        "$R0 = LimLM1\n$R2 = LimRM1\n$R4 = INPUTS\n$R6 = AccM1\n$R8 = DecM1\n$R10 = VmaxM1\nWAIT IN9 = ON\n"
+    )
+    rig = programmed(text, "", controller(MM))
+    for pin in ("IN1", "IN16", "IN17", "IN20"):
+        rig.pin(pin, 1.0)
+    rig.wait(0.1)
+    rig.start()
+    rig.wait(0.1)
+    assert [rig.r(number) for number in range(0, 12, 2)] == [-1.5, 2.5, 0x8001, 40.0, 30.0, 20.0]
+
+
+@pytest.mark.parametrize(("wait", "seconds"), [("VactM1 > 500", 0.5), ("VactM1 = 1000", 1.0), ("PosM1 > 1000", 1.5)])
+def test_a_wait_for_what_a_ramp_changes_ends_during_the_motion(wait: str, seconds: float) -> None:
+    """At 1000 pulses/s²: 1000 pulses/s after 1 s and 500 pulses."""
+    rig = programmed(f"M1 = ON\nVABS M1 1000\nWAIT {wait}\nOUT1 = ON\nWAIT IN9 = ON\n")
+    rig.start()
+    assert rig.pin_until("OUT1", 1.0) == pytest.approx(0.002 + seconds, abs=0.003)
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from chip_rig import ChipWire, Fault, chip_driver, chip_line
 
 from steptwin.drivers import Unconfirmed
 from steptwin.drivers.exchange import Job
-from steptwin.drivers.m1486 import M1486, Busy, Garbled, NoEcho, WrongType
+from steptwin.drivers.m1486 import M1486, AsyncM1486, Busy, Garbled, NoEcho, WrongType
 from steptwin.drivers.m1486.lines import TALK
 from steptwin.drivers.m1486.talk import INVALID_COMMAND, ChipRequest
 from steptwin.errors import LineFailure, Misuse
@@ -275,6 +275,24 @@ def test_a_line_that_belongs_to_the_interface_is_no_output() -> None:
     with pytest.raises(Misuse, match=f"B{min(DUAL_DAC.occupied)} belongs to the Dual DAC interface"):
         chip.set_output(min(DUAL_DAC.occupied), True)
     chip.set_output(1, True)
+
+
+def test_an_output_is_switched_before_anything_is_known_of_the_chip() -> None:
+    wire = ChipWire("B")
+    M1486(chip_line(wire)).set_output(1, False)
+    assert wire.chip.pin("B1") == 0.0
+
+
+def test_a_driver_opens_the_line_at_its_address_as_it_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[tuple[object, ...]] = []
+
+    def line(address: str, *, baud: int, log: object) -> object:
+        opened.append((address, baud, log))
+        return chip_line(ChipWire("B"))
+
+    monkeypatch.setattr("steptwin.drivers.m1486.chip.AsyncM1486Line", line)
+    AsyncM1486("tcp://127.0.0.1:5022", 3, baud=19_200, log=print)
+    assert opened == [("tcp://127.0.0.1:5022", 19_200, print)]
 
 
 def test_who_is_what() -> None:
