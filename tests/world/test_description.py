@@ -49,6 +49,13 @@ def wrong(text: str) -> str:
         (".".join("a" * 20_000) + " = 1\n", "w.toml:1:65: error D001: a key of more than 32 parts"),
         (TABLE + "[mic488.M1]\nin_kl = 'IN21'\n", "in_kl: 'IN21': permitted are IN1 to IN20 or 'none'"),
         (TABLE + "[mic488.M1]\nin_kl = 'IN33'\n", "in_kl: 'IN33': permitted are IN1 to IN20 or 'none'"),
+        (TABLE + "[mic488.M1]\nin_kl = 3.5\n", "in_kl: 3.5 is not a whole number"),
+        (TABLE + "[mic488.M1]\nenc_tolerance = 0.5\n", "enc_tolerance: 0.5 is not a whole number"),
+        (TABLE + "[mic488.M1]\nenc_settle_ms = 0\n", "enc_settle_ms: 0 is not permitted"),
+        (TABLE + "[mic488.M1]\nkp = true\n", "kp: True is not permitted"),
+        (TABLE + "[mic488.M1]\nkp = 'much'\n", "kp: 'much' is not a number"),
+        (TABLE + "[mic488.M1]\nunit = 'mile'\n", "unit: 'mile': permitted are IMP, REV, DEGREE, MM, CM, M"),
+        (TABLE + "[mic488.M1]\nunit = 6\n", "unit: 6: permitted are IMP, REV, DEGREE, MM, CM, M"),
         (TABLE + "[mic488.M1]\nin_kr = 'IN٣'\n", "in_kr: 'IN٣': permitted are IN1 to IN20 or 'none'"),
         (
             TABLE + "[mic488.M1]\nin_kr = 21\n",
@@ -302,6 +309,7 @@ def test_the_configuration_of_a_controller_takes_words_and_numbers() -> None:
     spec = described(
         TABLE + '[mic488.M2]\nunit = "mm"\ngear = 100.0\nin_kl = "IN3"\nlimit_mode = "KL+KR"\n[mic488.IN3]\nlevel = 1\n'
     )
+    assert all(isinstance(value, int) for value in described(TABLE + "[mic488.M1]\nunit = 3.0\nin_kl = 4.0\n").axes[1].values())
     assert spec.axes == {2: {"unit": 3, "gear": 100.0, "in_kl": 2, "limit_mode": 3}}
     assert spec.inputs == {3: {"level": 1}}
 

@@ -195,3 +195,33 @@ def test_what_a_controller_lacks_is_a_refusal() -> None:
     with pytest.raises((Misuse, Refusal), match="m has no place 'program 9' for a program"):
         there.apply_input(Download("m", "program 9", "END\n"))
     assert there.now < MILLISECOND
+
+
+@pytest.mark.parametrize(
+    ("lines", "key", "where", "link"),
+    [
+        ("bus", "pty", "./bus", "pty"),
+        ("bus", "serial", "/dev/ttyS9", "serial"),
+        ("bus", "rtu_tcp", "127.0.0.1:0", "rtu"),
+        ("bus", "rfc2217", "127.0.0.1:0", "rtu"),
+        ("bus", "tcp", "127.0.0.1:0", "tcp"),
+        ("chips", "pty", "./chips", "pty"),
+        ("chips", "serial", "/dev/ttyS9", "serial"),
+        ("chips", "tcp", "127.0.0.1:0", "tcp"),
+        ("chips", "rfc2217", "127.0.0.1:0", "tcp"),
+    ],
+)
+def test_faults_name_the_links_of_a_line_and_know_their_frames(lines: str, key: str, where: str, link: str) -> None:
+    def described(kind: str, link: str) -> World:
+        given = {lines: f'{key} = "{where}"'}
+        text = TEXT.format(bus=given.get("bus", ""), chips=given.get("chips", ""))
+        return World.from_toml(f'{text}[[fault]]\nkind = "{kind}"\nline = "{lines}"\nlink = "{link}"\n')
+
+    assert described("gap", link).spec.faults
+    with pytest.raises(Misuse, match="wrong"):
+        described("gap", "wrong")
+    if link == "tcp" and lines == "bus":
+        with pytest.raises(Misuse, match="Modbus TCP"):
+            described("crc", link)
+    else:
+        described("crc" if lines == "bus" else "flip", link)

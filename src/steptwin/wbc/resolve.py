@@ -257,16 +257,17 @@ class _Resolver:
     def _axis(self, statement: KeywordStatement) -> int | None:
         """The drive a statement names, from 1."""
         name = statement.operands[0]
-        if not isinstance(name, Identifier):
-            return None
+        return self._drive(name, statement.keyword) if isinstance(name, Identifier) else None
+
+    def _drive(self, name: Identifier, keyword: str) -> int | None:
         register = self._scope.register(name)
         if register is not None and register.row.key == "M":
             return register.number
         family = parts(name.key)
         if register is not None or family is None or family[0].key != "M":
-            finding = f.HALT_WITHOUT_DRIVE if statement.keyword in HALTS else f.MOTION_WITHOUT_DRIVE
-            message = f"{statement.keyword} needs a drive; {name.text} is not one"
-            self._report(finding.at(name, message, f"write {STATEMENTS[statement.keyword].usage}, M1…M4"))
+            finding = f.HALT_WITHOUT_DRIVE if keyword in HALTS else f.MOTION_WITHOUT_DRIVE
+            message = f"{keyword} needs a drive; {name.text} is not one"
+            self._report(finding.at(name, message, f"write {STATEMENTS[keyword].usage}, M1…M4"))
         return None
 
     def _pulse(self, number: int, statement: KeywordStatement) -> s.ProgramStep | None:

@@ -119,7 +119,9 @@ def _configured(row: ConfigKey) -> Callable[[Any], Any]:
             number = words[value.upper()]
         if isinstance(number, bool) or not isinstance(number, int | float) or not row.permits(number):
             raise Misuse(f"{value!r}: permitted are {permitted}" if words else f"{value!r} is not permitted")
-        return int(number) if row.whole and number == int(number) else number
+        if row.whole and number != int(number):
+            raise Misuse(f"{value!r} is not a whole number")
+        return int(number) if row.whole else number
 
     return read
 
