@@ -12,6 +12,8 @@ from steptwin.machine import Nanos
 
 VariedValue: TypeAlias = float | int | str | bool
 DIGEST_BYTES = 16
+EXPECTATIONS = "expectations of the scripts"
+"""The name of the verdict on a run whose scripts expected something in vain."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
-from steptwin.campaign.case import Case, CaseResult, Verdict
+from steptwin.campaign.case import EXPECTATIONS, Case, CaseResult, Verdict
 from steptwin.campaign.description import CampaignDescription, Measure
 from steptwin.coverage.counts import Coverage
 from steptwin.coverage.watch import WorldCoverage
@@ -26,8 +26,6 @@ from steptwin.world.reader import TomlText
 from steptwin.world.references import check_step
 from steptwin.world.steptable import STEPS, read_steps
 
-EXPECTATIONS = "expectations of the scripts"
-"""The name of the verdict on a run whose scripts expected something in vain."""
 MOST_BLUEPRINTS = 16
 """So many descriptions that differ are kept, for cases that have the same values."""
 

@@ -1,0 +1,211 @@
+"""Every fault that a world can have: each kind at each of its places, and how often it would have come to it in a run."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+
+from steptwin.errors import Misuse
+from steptwin.world.faults import Fault, parse
+from steptwin.world.faults.kinds import KINDS
+from steptwin.world.faults.table import FaultKind, FaultValue, Layer, Occasion
+from steptwin.world.lines import SCRIPTS
+from steptwin.world.plant import Plant
+from steptwin.world.script import Set, Step
+
+STUCK_OUTPUT = "stuck-output"
+TRIED: dict[str, tuple[dict[str, FaultValue], ...]] = {
+    "stuck": ({"value": 0.0}, {"value": 1.0}),
+    "stuck-output": ({"level": 0}, {"level": 1}),
+    "drift": ({"volts": 0.5}, {"volts": -0.5}),
+    "no-answer": ({"lost": "answer"}, {"lost": "request"}),
+    "bounce": ({},),
+    "wear": ({"writes": 0},),
+}
+"""Parameters with which a kind of fault is tried, where it is not tried with their defaults alone."""
+
+
+class FaultyPart(enum.StrEnum):
+    """What a fault is of."""
+
+    SENSOR = "sensor"
+    ACTUATOR = "actuator"
+    LOGIC = "logic"
+    LINE = "line"
+    POWER = "power"
+    MEMORY = "memory"
+
+
+_OF_KIND = {
+    "stuck": FaultyPart.SENSOR,
+    "bounce": FaultyPart.SENSOR,
+    "slip": FaultyPart.SENSOR,
+    "broken-wire": FaultyPart.SENSOR,
+    "drift": FaultyPart.SENSOR,
+    "master-error": FaultyPart.LINE,
+    "supply-drop": FaultyPart.POWER,
+    "power-cut": FaultyPart.POWER,
+    "brown-out": FaultyPart.POWER,
+    "wear": FaultyPart.MEMORY,
+    "welded-contact": FaultyPart.LOGIC,
+    "open-coil": FaultyPart.LOGIC,
+}
+"""The parts of kinds of faults; those of lines are faults of lines, all others of actuators."""
+_LOGIC = frozenset({"gate", "latch", "timer", "relay", "counter"})
+"""Elements whose outputs are neither sensors nor actuators."""
+
+
+@dataclass(frozen=True, slots=True)
+class PossibleFault:
+    """A fault, without its moment: set, it begins at once. ``place`` names what is faulty, ``mode`` how."""
+
+    part: FaultyPart
+    place: str
+    mode: str
+    fault: Fault
+
+    @property
+    def text(self) -> str:
+        return str(self.fault)
+
+    @property
+    def is_counted(self) -> bool:
+        """Whether it waits for occasions (bytes, requests, edges), so that it may be that of a number (``nth``)."""
+        return self.fault.kind.parameter("nth") is not None
+
+    def once(self, nth: int = 1) -> Fault:
+        """At the occasion of this number alone, counted from the moment at which it is set."""
+        return replace(self.fault, given={**self.fault.given, "nth": nth})
+
+
+def possible_faults(world: Plant) -> list[PossibleFault]:
+    """Every kind of fault at every place of a world, in the order of kinds, then places.
+
+    ``world`` is prepared for faults by this; it is not for other use.
+    """
+    return [found for kind in KINDS.values() for found in _of_kind(world, kind)]
+
+
+def _of_kind(world: Plant, kind: FaultKind) -> Iterator[PossibleFault]:
+    for where, place in _places(world, kind):
+        for more in TRIED.get(kind.name, ({},)):
+            given: dict[str, object] = {**where, **more}
+            try:
+                fault = parse({"kind": kind.name, **given})
+                world.rigging.check(fault)
+            except Misuse:
+                continue  # impossible at this place
+            yield PossibleFault(_part(world, kind, where), place, _mode(kind, more, where), fault)
+
+
+def _mode(kind: FaultKind, more: dict[str, FaultValue], where: dict[str, FaultValue]) -> str:
+    shown = {**({"direction": where["direction"]} if "direction" in where else {}), **more}
+    return " ".join(
+        (kind.name, *(f"{key}={value:g}" if isinstance(value, float) else f"{key}={value}" for key, value in shown.items()))
+    )
+
+
+def _part(world: Plant, kind: FaultKind, where: dict[str, FaultValue]) -> FaultyPart:
+    if kind.layer not in (Layer.PHYSICS, Layer.ELEMENT):
+        return FaultyPart.LINE
+    if kind.name == STUCK_OUTPUT:
+        name = where["element"]
+        of = next((of for of, built in world.parts.elements.items() if name in built), "")
+        return FaultyPart.LOGIC if of in _LOGIC else FaultyPart.SENSOR
+    return _OF_KIND.get(kind.name, FaultyPart.ACTUATOR)
+
+
+def _places(world: Plant, kind: FaultKind) -> Iterator[tuple[dict[str, FaultValue], str]]:
+    """Parameters that choose each place at which a kind of fault may be, and its name."""
+    if kind.layer is Layer.ELEMENT:
+        yield from _elements(world, kind)
+    elif kind.layer is Layer.PHYSICS:
+        yield from _machines(world, kind)
+    else:
+        yield from _lines(world, kind)
+
+
+def _elements(world: Plant, kind: FaultKind) -> Iterator[tuple[dict[str, FaultValue], str]]:
+    used = _sources(world)
+    for name in world.parts.faults.elements:
+        if kind.name != STUCK_OUTPUT:
+            yield {"element": name}, name
+            continue
+        terminals = world.parts.terminals.get(name)
+        for output in () if terminals is None else terminals.outputs:
+            if (name, output) in used:
+                yield {"element": name, "output": output.lower()}, f"{name}.{output.lower()}"
+
+
+def _sources(world: Plant) -> set[tuple[str, str]]:
+    """The outputs that a wire leads away from: what is stuck elsewhere has no effect."""
+    return {tuple(wire.source) for kernel in world.kernels for wire in kernel.wires}
+
+
+def _machines(world: Plant, kind: FaultKind) -> Iterator[tuple[dict[str, FaultValue], str]]:
+    for name, machine in world.machines.items():
+        where: dict[str, FaultValue] = {"machine": name}
+        if kind.parameter("pin") is not None:
+            for pin in _inputs(world, name):
+                yield {**where, "pin": pin}, f"{name}.{pin}"
+        elif kind.parameter("axis") is not None:
+            for number in _axes(world, name, len(machine.axes)):
+                yield {**where, "axis": number}, f"{name}.M{number}"
+        else:
+            yield where, name
+
+
+def _axes(world: Plant, machine: str, count: int) -> list[int]:
+    """The axes that move something; all where the world has no elements."""
+    moving = {axis.mechanism.number for axis in world.axes.values() if axis.spec.drive[0] == machine}
+    return sorted(moving) if any(world.parts.elements.values()) else list(range(1, count + 1))
+
+
+def _inputs(world: Plant, machine: str) -> list[str]:
+    """The inputs that a wire, a switch or a script changes, in the order of the pins."""
+    led = {pin.pin for pin in (*world.parts.driven, *world.parts.circuits) if pin.machine == machine}
+    led |= {pin.upper() for script in world.spec.scripts for name, pin in _set_by(script.steps) if name == machine}
+    return [pin for pin in world.machines[machine].pins() if pin in led]
+
+
+def _set_by(steps: Iterable[Step]) -> Iterator[tuple[str, str]]:
+    for step in steps:
+        if isinstance(step, Set):
+            yield from ((name, pin) for name, pin, _ in step.levels)
+        yield from _set_by(getattr(step, "steps", ()))
+
+
+def _lines(world: Plant, kind: FaultKind) -> Iterator[tuple[dict[str, FaultValue], str]]:
+    directions = ("in", "out") if kind.parameter("direction") is not None else ("",)
+    for spec in world.spec.lines:
+        where: dict[str, FaultValue] = {"line": spec.name}
+        if spec.is_open:
+            where["link"] = SCRIPTS
+        for direction in directions:
+            yield where | ({"direction": direction} if direction else {}), spec.name
+    for name, machine_kind in world.parts.kind_of.items():
+        if machine_kind.registers is not None and name not in world.parts.line_of and kind.layer is not Layer.BYTES:
+            yield {}, name
+            return  # requests to machines without a line do not say to which
+
+
+# ---------------------------------------------------------------------- occasions and moments
+
+
+def occasions(world: Plant, possible: Iterable[PossibleFault], end_ns: int, until: str | None = None) -> dict[str, int]:
+    """How often it comes to each counted fault (by its text) in a run of ``world`` from now to ``end_ns``: every byte, request,
+    edge, save. The run is that without faults."""
+    counted: list[tuple[str, str]] = []
+    for one in possible:
+        if one.is_counted:
+            never = replace(one.fault, given={**one.fault.given, "probability": 0.0})
+            world.put_fault(never)
+            counted.append((one.text, world.parts.faults.active[-1].name))
+    world.run_to(end_ns, until)
+    return {text: world.parts.faults.called(name).seen for text, name in counted}
+
+
+def is_lasting(fault: Fault) -> bool:
+    """Whether it lasts from the moment at which it is set, instead of happening then, or now and then."""
+    return fault.kind.occasion is Occasion.ALWAYS

@@ -1,0 +1,125 @@
+"""Phases of the cycle of a machine: what is on and what moves, from a recorded run."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from operator import itemgetter
+
+from steptwin.datasheet import PinDirection
+from steptwin.machine import SECOND, Nanos
+from steptwin.motion.divisions import StepTrain
+from steptwin.motion.profile import Profile
+from steptwin.world.plant import Plant
+from steptwin.world.trace import TraceRecord
+
+MOST_PHASES = 12
+SHOWN = 3
+"""So many changes are named where a phase begins."""
+
+
+@dataclass(frozen=True, slots=True)
+class CyclePhase:
+    """A state of the outputs and axes of a machine. ``begin`` and ``end`` are of its longest time, ``total`` of all its times."""
+
+    number: int
+    begin: Nanos
+    end: Nanos
+    total: Nanos
+    name: str
+    """What changed at its beginning."""
+
+    @property
+    def middle(self) -> Nanos:
+        return (self.begin + self.end) // 2
+
+    def plain(self) -> dict[str, object]:
+        """As JSON."""
+        return {
+            "number": self.number,
+            "name": self.name,
+            "begin_s": self.begin / SECOND,
+            "end_s": self.end / SECOND,
+            "at_s": self.middle / SECOND,
+            "total_s": self.total / SECOND,
+        }
+
+
+def cycle_phases(world: Plant, begin: Nanos = 0, most: int = MOST_PHASES) -> list[CyclePhase]:
+    """The phases of what a world did from ``begin`` until now, in order; of more than ``most`` those that take longest.
+
+    Two times are of the same phase if the same outputs of controllers, elements and buttons are on and the same axes move. The
+    world has kept its trace.
+    """
+    spans = list(_spans(_changes(world.trace, _acting(world), world.now), begin, world.now))
+    totals: dict[frozenset[str], Nanos] = {}
+    longest: dict[frozenset[str], tuple[Nanos, Nanos, str]] = {}
+    for at, end, state, name in spans:
+        totals[state] = totals.get(state, 0) + end - at
+        if state not in longest or end - at > longest[state][1] - longest[state][0]:
+            longest[state] = at, end, name
+    kept = sorted(totals, key=lambda state: -totals[state])[:most]
+    ordered = sorted(kept, key=lambda state: longest[state][0])
+    return [CyclePhase(n, *longest[state][:2], totals[state], longest[state][2]) for n, state in enumerate(ordered, start=1)]
+
+
+def _acting(world: Plant) -> frozenset[str]:
+    """The outputs that tell phases apart, as records call them; inputs follow from them."""
+    found = {f"{name}.{output.lower()}" for name, one in world.parts.terminals.items() for output in one.outputs}
+    for name, machine in world.machines.items():
+        sheet = world.kind(name).datasheet(machine)
+        found |= {f"{name}.{pin.name}" for pin in sheet.pins if pin.direction is not PinDirection.INPUT}
+    return frozenset(found | set(world.parts.buttons))
+
+
+def _changes(trace: Iterable[TraceRecord], acting: Collection[str], end: Nanos) -> list[tuple[Nanos, str, bool]]:
+    """Moments at which an output or axis is on, or off, from then on."""
+    found: list[tuple[Nanos, str, bool]] = []
+    plans: dict[str, list[tuple[Nanos, Nanos]]] = {}
+    for record in trace:
+        if record.kind == "edge":
+            name = record.subject if record.subject in acting else f"{record.machine}.{record.subject}"
+            if name in acting:
+                found.append((record.time, name, bool(record.value)))
+        elif record.kind == "plan":
+            plan = record.value.profile if isinstance(record.value, StepTrain) else record.value
+            if isinstance(plan, Profile):
+                plans.setdefault(f"{record.machine}.M{record.subject} moving", []).append((record.time, _rests_at(plan, end)))
+    for name, moves in plans.items():
+        for (at, rest), (then, _) in pairwise([*moves, (end + 1, 0)]):
+            found.append((at, name, rest > at))
+            if at < rest < then:
+                found.append((rest, name, False))
+    return sorted(found, key=itemgetter(0))
+
+
+def _rests_at(plan: Profile, end: Nanos) -> Nanos:
+    """When a plan has ended, at most ``end``."""
+    return end if plan.end is None or plan.end > end else plan.end
+
+
+def _spans(
+    changes: Iterable[tuple[Nanos, str, bool]], begin: Nanos, end: Nanos
+) -> Iterator[tuple[Nanos, Nanos, frozenset[str], str]]:
+    """Times without a change, with what is on and what changed before."""
+    on: set[str] = set()
+    since, news = begin, list[str]()
+    for at, name, is_on in changes:
+        if (name in on) is is_on:
+            continue
+        if at > since:
+            if since >= begin:
+                yield since, at, frozenset(on), _named(news)
+            since, news = at, []
+        (on.add if is_on else on.discard)(name)
+        news.append(f"{name}{'' if is_on else ' off'}")
+    if end > since:
+        yield since, end, frozenset(on), _named(news)
+
+
+def _named(news: list[str]) -> str:
+    if not news:
+        return "at the beginning"
+    more = f" and {len(news) - SHOWN} more" if len(news) > SHOWN else ""
+    return ", ".join(news[:SHOWN]) + more

@@ -1,0 +1,103 @@
+"""A case as files with which it can be seen again: a session that ``steptwin replay`` runs, a timeline, and a test for
+pytest that fails until the program is mended."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from pprint import pformat
+from textwrap import fill
+from typing import Any
+
+from steptwin.campaign.case import Case, CaseResult
+from steptwin.campaign.reading import load_campaign
+from steptwin.campaign.runner import CaseRunner
+from steptwin.errors import Misuse, SteptwinError
+from steptwin.files import session as sessions
+from steptwin.files.export import axis_views, write_trace
+from steptwin.files.textfiles import write_bytes
+from steptwin.machine import SECOND
+
+WIDTH = 120
+LONGEST_NAME = 60
+
+
+@dataclass(frozen=True, slots=True)
+class Reproduction:
+    """The files of a case. Without a session the world refused the case; without a test the campaign has no file."""
+
+    session: Path | None
+    timeline: Path | None
+    test: Path | None
+
+    def plain(self, folder: Path) -> dict[str, str]:
+        """Their paths, relative to a folder."""
+        found = {"session": self.session, "timeline": self.timeline, "test": self.test}
+        return {name: os.path.relpath(path, folder) for name, path in found.items() if path is not None}
+
+
+def reproduce(
+    runner: CaseRunner, case: Case, result: CaseResult, folder: Path, name: str, campaign: Path | None = None
+) -> Reproduction:
+    """Write ``NAME.json`` (session), ``NAME.html`` (timeline) and ``test_NAME.py`` into a folder. Raises `Misuse` where that is
+    impossible."""
+    folder.mkdir(parents=True, exist_ok=True)
+    session = timeline = test = None
+    try:
+        world = runner.begin(case, keep=True)
+    except Misuse:
+        world = None
+    if world is not None:
+        try:
+            world.run_to(case.end_ns, runner.description.until)
+        except SteptwinError:
+            pass  # it is the failure: the session ends there
+        else:
+            session, timeline = folder / f"{name}.json", folder / f"{name}.html"
+            sessions.save(sessions.session_of(world), session)
+            write_trace(world.trace, timeline, views=axis_views(world), title=name, ended=world.now)
+    if campaign is not None:
+        test = folder / f"test_{identifier(name)}.py"
+        write_bytes(test, text_of_test(case, result, name, os.path.relpath(campaign, folder)).encode())
+    return Reproduction(session, timeline, test)
+
+
+def identifier(text: str) -> str:
+    """A name for files and functions of Python."""
+    return re.sub(r"\W+", "_", text).strip("_").lower()[:LONGEST_NAME] or "case"
+
+
+def text_of_test(case: Case, result: CaseResult, name: str, campaign: str) -> str:
+    """The text of a test that fails with this case."""
+    title = fill(f"{summary(result)}. At {where(case)}.", WIDTH).replace("\\", "\\\\").replace('"""', "'''")
+    return (
+        f'"""{title}"""\n\nfrom pathlib import Path\n\nfrom steptwin.campaign.reproduce import check_case\n\n'
+        f"CAMPAIGN = Path(__file__).parent / {Path(campaign).as_posix()!r}\n"
+        f"CASE = {pformat(case.plain(), width=WIDTH, sort_dicts=False)}\n\n\n"
+        f"def test_{identifier(name)}() -> None:\n    check_case(CAMPAIGN, CASE)\n"
+    )
+
+
+def summary(result: CaseResult) -> str:
+    """What is wrong, in a line; empty if nothing is."""
+    if result.error is not None:
+        return result.error.strip().partition("\n")[0]
+    return "; ".join(f"{one.name}: {one.why}" if one.why else one.name for one in result.verdicts if not one.holds)
+
+
+def where(case: Case) -> str:
+    """What is particular to a case, in words."""
+    parts = [f"{name} = {value}" for name, value in case.values.items()]
+    parts += [f"{one.at_ns / SECOND:.9g} s: {one.fault}" for one in case.faults]
+    parts += [f"{one.at_ns / SECOND:.9g} s: {one.step}" for one in case.steps]
+    return "; ".join((*parts, f"end {case.end_ns / SECOND:.9g} s"))
+
+
+def check_case(campaign: Path | str, case: Mapping[str, Any]) -> None:
+    """Run a case of a campaign; raises `AssertionError` if a property fails or it does not run to its end."""
+    result = CaseRunner(load_campaign(campaign)).run(Case.of_plain(case))
+    if result.failed:
+        raise AssertionError(summary(result))

@@ -1,0 +1,82 @@
+"""The faults that worlds can have, found from their descriptions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from steptwin.campaign.inventory import FaultyPart, PossibleFault, occasions, possible_faults
+from steptwin.files.world import World
+from steptwin.machine import SECOND
+from steptwin.world.faults import read
+
+EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
+LINE = """
+[[line]]
+name = "bus"
+kind = "modbus"
+
+[[mic488]]
+name = "table"
+line = "bus"
+unit = 3
+
+[[script]]
+name = "go"
+steps = [{ set = { "table.IN4" = 1 } }, { write = { "table.M1_EN" = 1 } }]
+"""
+
+
+def of(file: str) -> list[PossibleFault]:
+    return possible_faults(World.load(EXAMPLES / file))
+
+
+def test_sensors_actuators_logic_and_power_of_the_press() -> None:
+    found = of("press/press.toml")
+    texts = {one.text for one in found}
+    assert {"jam element=ram", "no-air element=ram", "open-coil element=safety", "supply-drop machine=cell"} <= texts
+    assert {"stuck machine=cell pin=IN4 value=0", "stuck machine=cell pin=IN4 value=1"} <= texts
+    assert "stuck-output element=ram output=extended level=1" in texts
+    assert {one.part for one in found if one.place == "ram"} == {FaultyPart.ACTUATOR}
+    assert {one.part for one in found if one.place == "ram.extended"} == {FaultyPart.SENSOR}
+    assert {one.part for one in found if one.place == "valve.out"} == {FaultyPart.LOGIC}
+    assert not [one for one in found if "IN5" in one.text]  # nothing is joined to it
+    assert not [one for one in found if one.fault.kind.name == "stall"]  # no axis
+    assert not [one for one in found if one.place == "danger.hit"]  # leads nowhere
+
+
+def test_only_axes_that_move_something() -> None:
+    assert [one.text for one in of("labeller/labeller.toml") if one.fault.kind.name == "stall"] == ["stall machine=cell axis=1"]
+
+
+@pytest.mark.parametrize(
+    "file", ["press/press.toml", "labeller/labeller.toml", "winder/winder.toml", "pick_and_place/pick_and_place.toml"]
+)
+def test_each_fault_can_be_set_and_is_there_once(file: str) -> None:
+    found = of(file)
+    assert len({one.text for one in found}) == len(found) > 10
+    for one in found:
+        assert str(read(one.text)) == one.text
+        World.load(EXAMPLES / file).fault(one.text)
+
+
+def test_occasions_are_every_byte_and_request_of_a_line() -> None:
+    world = World.from_toml(LINE)
+    found = possible_faults(World.from_toml(LINE))
+    assert "stuck machine=table pin=IN4 value=0" in {one.text for one in found}  # a script sets it
+    counts = occasions(world, found, SECOND)
+    assert counts["flip line=bus direction=in"] == 8  # unit, function, address, value, CRC
+    assert counts["flip line=bus direction=out"] == 8  # the same
+    assert counts["noise line=bus direction=out"] == 1
+    assert counts["crc line=bus"] == counts["busy line=bus"] == 1
+    assert counts["bounce machine=table pin=IN4"] == 1
+
+
+def test_a_fault_at_one_occasion_is_that_alone() -> None:
+    possible = next(one for one in possible_faults(World.from_toml(LINE)) if one.text == "flip line=bus direction=in")
+    for nth in (1, 8, 9):
+        world = World.from_toml(LINE)
+        world.fault(possible.once(nth))
+        world.run(for_=1)
+        assert len(list(world.trace.faults())) == (nth <= 8)
