@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from steptwin.campaign.cases import Cases
-from steptwin.campaign.findings import Finding, find, is_within
+from steptwin.campaign.findings import FoundFailure, find, is_within
 from steptwin.campaign.reading import load_campaign
 from steptwin.campaign.reproduce import check_case, identifier
 from steptwin.campaign.runner import CaseRunner
@@ -80,14 +80,14 @@ def campaign(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def found(campaign: Path) -> list[Finding]:
+def found(campaign: Path) -> list[FoundFailure]:
     description = load_campaign(campaign)
     runner, cases = CaseRunner(description), Cases(description)
     results = [runner.run(cases[number]) for number in range(20)]
     return find(runner, [one for one in results if one.failed], cases.__getitem__, campaign.parent / "out", campaign)
 
 
-def test_each_cause_has_its_simplest_case(found: list[Finding]) -> None:
+def test_each_cause_has_its_simplest_case(found: list[FoundFailure]) -> None:
     assert all(one.shrunk is not None and one.shrunk.is_complete for one in found)
     cases = [one.shrunk.case for one in found if one.shrunk is not None]
     assert {tuple(fault.fault for fault in case.faults) for case in cases} == {
@@ -98,7 +98,7 @@ def test_each_cause_has_its_simplest_case(found: list[Finding]) -> None:
     assert all(case.end_ns < 4_000_000_000 for case in cases)
 
 
-def test_the_session_is_the_run_of_the_case(found: list[Finding], campaign: Path) -> None:
+def test_the_session_is_the_run_of_the_case(found: list[FoundFailure], campaign: Path) -> None:
     for one in found:
         assert one.files is not None
         assert one.files.session is not None
@@ -110,7 +110,7 @@ def test_the_session_is_the_run_of_the_case(found: list[Finding], campaign: Path
         assert one.plain(campaign.parent)["files"]["session"].startswith("out")
 
 
-def test_the_test_fails_until_the_program_is_mended(found: list[Finding], campaign: Path) -> None:
+def test_the_test_fails_until_the_program_is_mended(found: list[FoundFailure], campaign: Path) -> None:
     tests = [str(one.files.test) for one in found if one.files is not None]
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:randomly", *tests]
     failing = subprocess.run(command, cwd=campaign.parent, capture_output=True, text=True, check=False)

@@ -20,7 +20,7 @@ MOST_FINDINGS = 10
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class FoundFailure:
     """``numbers``: of the cases that failed so. ``shrunk``: the simplest one; None where that was not looked for."""
 
     failure: CaseFailure
@@ -91,7 +91,7 @@ def find(
     *,
     runs: int = MOST_RUNS,
     is_over: Callable[[], bool] = lambda: False,
-) -> list[Finding]:
+) -> list[FoundFailure]:
     """The failures among results, each with its simplest case and that as files in ``folder``; those with the most cases first.
 
     Cases with the same failure of which some lack a fault of the simplest case have several causes: each gets its own. ``failed``
@@ -105,14 +105,14 @@ def find(
         if len(groups[failure]) <= MOST_FINDINGS:
             firsts[result.number] = result
     simpler = shrinker(runner.description, runner.run)
-    found: dict[tuple[str, str], Finding] = {}
+    found: dict[tuple[str, str], FoundFailure] = {}
     waiting = sorted(groups.items(), key=lambda group: -len(group[1]))
     while waiting:
         failure, numbers = waiting.pop(0)
         number = numbers[0]
         if len(found) >= MOST_FINDINGS or is_over():
             result = firsts[number] if number in firsts else runner.run(case_of(number))
-            found[failure.property, f"case {number}"] = Finding(failure, tuple(numbers), result, None, None)
+            found[failure.property, f"case {number}"] = FoundFailure(failure, tuple(numbers), result, None, None)
             continue
         shrunk = simpler(case_of(number), failure, runs=runs, is_over=is_over)
         alike, others = _alike(shrunk.case, numbers, case_of)
@@ -123,7 +123,7 @@ def find(
             found[key] = replace(found[key], numbers=(*found[key].numbers, *alike))
             continue
         files = reproduce(runner, shrunk.case, shrunk.result, folder, f"{identifier(failure.property)}-{number}", campaign)
-        found[key] = Finding(shrunk.failure, tuple(alike), shrunk.result, shrunk, files)
+        found[key] = FoundFailure(shrunk.failure, tuple(alike), shrunk.result, shrunk, files)
     return sorted(found.values(), key=lambda one: -len(one.numbers))
 
 
