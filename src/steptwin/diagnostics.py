@@ -9,7 +9,8 @@ import enum
 import re
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 
 LONGEST_SHOWN = 400
 """Characters of a source line in a message; of a longer one the part around the place."""
@@ -67,10 +68,10 @@ class SourceText:
 
     name: str
     text: str
-    _starts: list[int] = field(init=False, repr=False, compare=False)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "_starts", [0, *(end.end() for end in _LINE_END.finditer(self.text))])
+    @cached_property
+    def _starts(self) -> list[int]:
+        return [0, *(end.end() for end in _LINE_END.finditer(self.text))]
 
     def position(self, offset: int) -> tuple[int, int]:
         """Line and column of a character offset, both from 1. The offset after the last character has a place too."""

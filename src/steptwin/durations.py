@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from decimal import Decimal
+from functools import lru_cache
 
 from steptwin.errors import Misuse
 from steptwin.machine import MICROSECOND, MILLISECOND, SECOND, Nanos
@@ -19,14 +20,20 @@ def duration(value: object) -> Nanos:
         text: object = f"{Decimal(str(value)):f}"
     else:
         text = value
-    match = _DURATION.match(text.strip().lower()) if isinstance(text, str) else None
-    unit = UNITS.get(match[2] or "s") if match else None
-    if match is None or unit is None:
+    found = _of_text(text.strip().lower()) if isinstance(text, str) else None
+    if found is None:
         raise Misuse(f"{value!r} is not a time: expected a number with {', '.join(UNITS)}, such as '90 s' or '500 ms'")
-    found = int(Decimal(match[1]) * unit)
     if found > LONGEST_NS:
         raise Misuse(f"{value!r} is too long: permitted are 0 to {LONGEST_NS // UNITS['h']} h")
     return found
+
+
+@lru_cache(maxsize=1024)
+def _of_text(text: str) -> Nanos | None:
+    """Nanoseconds; None for what is no time."""
+    match = _DURATION.match(text)
+    unit = UNITS.get(match[2] or "s") if match else None
+    return None if match is None or unit is None else int(Decimal(match[1]) * unit)
 
 
 def duration_text(time: Nanos) -> str:

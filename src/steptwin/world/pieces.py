@@ -81,7 +81,6 @@ class Pieces:
         self._controllers = controllers
         self._rows = rows
         self._named = named
-        self._referring = referring_keys(rows)
         self._count = 0
         self.files: dict[str, Path] = {}
 
@@ -112,7 +111,7 @@ class Pieces:
         self.files.setdefault(where, (*path, "file"))
         text.use(piece, path)
         parameters = self._parameters(text, path, piece, given)
-        piece.data = _Instance(piece, name, where, parameters, self._referring).data()
+        piece.data = _Instance(piece, name, where, parameters, referring_keys(self._rows)).data()
         self.put_into(piece, (*above, where))
         for kind, tables in piece.data.items():
             self._adopt(text, path, piece, kind, tables)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 from steptwin.diagnostics import Diagnostic, Fix, Severity, SourceText, Span, in_order, render
@@ -70,7 +71,7 @@ class TomlText:
         self._in_files: list[str] = []
         """Errors in files that the description names, rendered."""
         self._near = NearMiss()
-        self._spans: dict[Path, Span] = {}
+        self._spans: Mapping[Path, Span] = {}
         self._wrong: set[Path] = set()
         """Errors in the order of their reports; tables of these are not looked at further."""
         self._left_out: set[str] = set()
@@ -80,8 +81,7 @@ class TomlText:
         self._used: tuple[TomlText, Path] | None = None
         """The text that uses this one, and where."""
         try:
-            self._spans = find_places(text)
-            self.data: dict[str, Any] = tomllib.loads(text)
+            self._spans, data, wrong = _parsed(text)
         except UnsupportedToml as error:
             self.wrong_at(error.span, "D001", str(error))
             raise self.error() from None
@@ -97,18 +97,9 @@ class TomlText:
         except (RecursionError, ValueError):
             self.wrong_at(Span(0, 0), "D001", "this is not TOML of a world: it is nested too deeply, or a number is too long")
             raise self.error() from None
-        self._check_numbers((), self.data)
-
-    def _check_numbers(self, path: Path, value: object) -> None:
-        """TOML's whole numbers have 64 bits; `tomllib` takes any."""
-        if isinstance(value, dict):
-            for name, item in value.items():
-                self._check_numbers((*path, name), item)
-        elif isinstance(value, list):
-            for number, item in enumerate(value):
-                self._check_numbers((*path, number), item)
-        elif isinstance(value, int) and value not in _WHOLE:
-            self.wrong(path, "D001", "a whole number of more than 64 bits")
+        self.data: dict[str, Any] = _copied(data)
+        if wrong is not None:
+            self.wrong(wrong, "D001", "a whole number of more than 64 bits")
             raise self.error()
 
     def wrong_at(self, span: Span, code: str, message: str, hint: str | None = None, fix: Fix | None = None) -> None:
@@ -264,6 +255,33 @@ class TomlText:
         """`WorldError` if anything was wrong."""
         if self.findings:
             raise self.error()
+
+
+@lru_cache(maxsize=8)
+def _parsed(text: str) -> tuple[Mapping[Path, Span], dict[str, Any], Path | None]:
+    """The places and values of a text, and its first number that is too long. They are remembered, for a campaign reads one text
+    for each of its runs; nothing may change them."""
+    places, data = find_places(text), tomllib.loads(text)
+    return places, data, next(_long_numbers((), data), None)
+
+
+def _long_numbers(path: Path, value: object) -> Iterator[Path]:
+    """TOML's whole numbers have 64 bits; `tomllib` takes any."""
+    if isinstance(value, dict):
+        for name, item in value.items():
+            yield from _long_numbers((*path, name), item)
+    elif isinstance(value, list):
+        for number, item in enumerate(value):
+            yield from _long_numbers((*path, number), item)
+    elif isinstance(value, int) and value not in _WHOLE:
+        yield path
+
+
+def _copied(value: Any) -> Any:
+    """A copy of tables and arrays."""
+    if isinstance(value, dict):
+        return {key: _copied(item) if isinstance(item, dict | list) else item for key, item in value.items()}
+    return [_copied(item) if isinstance(item, dict | list) else item for item in value]
 
 
 # ---------------------------------------------------------------------- rows
