@@ -23,6 +23,7 @@ from steptwin.cli import (
     bridge,
     build,
     calc,
+    campaign,
     certificate,
     check,
     commands,
@@ -122,9 +123,10 @@ COMMANDS: Mapping[str, Mapping[str, Callable[..., None]]] = {
         "datasheet": datasheet.datasheet,
     },
 }
-"""By group and name, in the order of ``--help``. ``serve``, a group of commands itself, comes before them."""
+"""By group and name, in the order of ``--help``. ``serve`` and ``campaign`` are groups of commands themselves."""
 GROUPS = {title: tuple(group) for title, group in COMMANDS.items()}
 GROUPS["Twins"] = ("serve", *GROUPS["Twins"])
+GROUPS["Programs and runs"] = (*GROUPS["Programs and runs"], "campaign")
 """Names, as ``--help`` lists them."""
 LONGEST_SUMMARY = 200
 NOT_DONE, MISUSED = 1, 2
@@ -168,6 +170,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.add_typer(serve.app, name="serve", cls=_Commands)
+app.add_typer(campaign.app, name="campaign", cls=_Commands)
 for _group in COMMANDS.values():
     for _name, _command in _group.items():
         app.command(_name, cls=GroupedCommand)(_command)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 from steptwin.coverage.counts import Coverage
@@ -36,6 +37,11 @@ class CoverageReports:
         """Count from now on what a world executes, if that is to be reported. Its description lies in ``folder``."""
         if self._targets:
             self._watches.append(WorldCoverage(world, self.coverage, lambda name: _shown(folder / name, self._here, name)))
+
+    def add(self, coverage: Coverage, folder: Path) -> None:
+        """Report also what was counted elsewhere, of a description that lies in ``folder``."""
+        for text in coverage:
+            self.coverage.add(replace(text, path=_shown(folder / text.path, self._here, text.path)))
 
     def close(self) -> None:
         """End all observation."""

@@ -1,0 +1,217 @@
+"""A campaign from Python.
+
+campaign = Campaign.load("campaign.toml")
+summary = campaign.run("results", jobs=2)
+print(summary.failed, "of", summary.runs, [one.number for one in summary.failures])
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from steptwin.campaign.case import Case, CaseResult
+from steptwin.campaign.cases import Cases
+from steptwin.campaign.description import CampaignDescription
+from steptwin.campaign.execution import Execution
+from steptwin.campaign.reading import load_campaign, read_campaign
+from steptwin.campaign.runner import CaseRunner
+from steptwin.campaign.summary import CampaignSummary
+from steptwin.campaign.workers import workers
+from steptwin.coverage.counts import Coverage
+from steptwin.durations import duration
+from steptwin.errors import Misuse
+from steptwin.extras import libraries_of, missing
+from steptwin.files.textfiles import write_bytes
+from steptwin.files.world import World
+from steptwin.machine import SECOND
+
+if TYPE_CHECKING:
+    from collections.abc import Generator
+
+    from steptwin.campaign.store import CampaignStore
+
+RESULTS, SUMMARY = "results.db", "summary.json"
+"""Files in the folder of the results."""
+
+
+class CampaignProgress(NamedTuple):
+    """``total``: None where nobody knows. ``rate``: runs per second of the wall, since the begin."""
+
+    done: int
+    failed: int
+    total: int | None
+    rate: float
+
+
+def _unwatched(_: CampaignProgress) -> None:
+    """No progress is shown."""
+
+
+class Campaign:
+    """Many runs of one world, and what must hold in all of them. The same cases, results and digest wherever they run."""
+
+    def __init__(self, description: CampaignDescription) -> None:
+        self.description = description
+        self.cases = Cases(description)
+        """By number, from 0."""
+        self.covered = 0
+        """In how many runs what programs execute was counted."""
+        self.coverage = Coverage()
+        """What they executed, after a `run` that counts it."""
+        self._runner: CaseRunner | None = None
+
+    @classmethod
+    def load(cls, path: str | Path) -> Campaign:
+        """The campaign that a file describes. Raises `WorldError` (a `Misuse`) with everything that is wrong with it."""
+        return cls(load_campaign(path))
+
+    @classmethod
+    def from_toml(cls, text: str, folder: str | Path = ".", name: str = "campaign.toml") -> Campaign:
+        """The campaign that a text describes, whose world lies in a folder. Raises `WorldError`."""
+        return cls(read_campaign(name, text, Path(folder)))
+
+    def changed(
+        self,
+        *,
+        runs: int | None = None,
+        seed: int | None = None,
+        time: float | str | None = None,
+        until_failure: bool | None = None,
+    ) -> Campaign:
+        """The same with another seed, or of another extent. Raises `Misuse`."""
+        description = self.description
+        if runs is not None and runs < 1:
+            raise Misuse(f"runs {runs}: must be 1 or more")
+        if seed is not None and not 0 <= seed < 1 << 63:
+            raise Misuse(f"seed {seed}: permitted are whole numbers from 0 to {(1 << 63) - 1}")
+        time_ns = description.time_ns if time is None else duration(time)
+        return Campaign(
+            replace(
+                description,
+                runs=description.runs if runs is None else runs,
+                seed=description.seed if seed is None else seed,
+                time_ns=time_ns,
+                until_failure=description.until_failure if until_failure is None else until_failure,
+            )
+        )
+
+    # ------------------------------------------------------------------ single runs
+
+    @property
+    def runner(self) -> CaseRunner:
+        """Runs single cases in this process."""
+        if self._runner is None:
+            self._runner = CaseRunner(self.description)
+        return self._runner
+
+    def run_case(self, case: Case | int) -> CaseResult:
+        """The result of a case, or of that with a number."""
+        return self.runner.run(case if isinstance(case, Case) else self.cases[case])
+
+    def world(self, case: Case | int) -> World:
+        """The world of a case before it begins to vary, with its trace and session: ``run`` it as long as you like."""
+        return self.runner.begin(case if isinstance(case, Case) else self.cases[case], keep=True)
+
+    # ------------------------------------------------------------------ all of them
+
+    def run(
+        self,
+        out: str | Path | None = None,
+        *,
+        jobs: int | None = 1,
+        dask: str | None = None,
+        coverage: bool = False,
+        progress: Callable[[CampaignProgress], object] = _unwatched,
+    ) -> CampaignSummary:
+        """Run all cases that have no results yet; the results go to the folder ``out``, or are not kept.
+
+        ``jobs``: processes (None: one for each processor); ``dask``: the address of a cluster, or ``"local"``. ``coverage``:
+        count what programs execute. Raises `Misuse`, and `LineFailure` for a database or cluster that fails. Once interrupted,
+        the same call goes on where it was.
+        """
+        with self._store(out) as store, workers(jobs, dask) as there:
+            summary = self._run(store, there, coverage=coverage, progress=progress)
+            if coverage:
+                self.coverage, self.covered = store.coverage()
+        if out is not None:
+            write_bytes(Path(out) / SUMMARY, (json.dumps(summary.plain(), ensure_ascii=False, indent=1) + "\n").encode())
+        return summary
+
+    @contextmanager
+    def _store(self, out: str | Path | None) -> Generator[CampaignStore]:
+        store = self.open_store(out)
+        try:
+            yield store
+        finally:
+            store.close()
+
+    def open_store(self, out: str | Path | None) -> CampaignStore:
+        """The results in a folder, in the database that the description names, or, without either, in memory. To be closed."""
+        try:
+            from sqlalchemy.engine import URL
+
+            from steptwin.campaign.store import CampaignStore
+            from steptwin.history.database import SQLITE, read_url
+        except ImportError:
+            raise missing("a campaign", libraries_of("campaign")) from None
+        folder = None if out is None else Path(out)
+        if folder is not None:
+            _make_folder(folder)
+        if self.description.database is not None:
+            url = read_url(self.description.database, folder or Path())
+        else:
+            url = URL.create(SQLITE, database=None if folder is None else str(folder / RESULTS))
+        description = self.description
+        is_own = self.description.database is None
+        return CampaignStore(url, description.digest, description.name, description.seed, is_own=is_own)
+
+    def _run(
+        self, store: CampaignStore, there: object, *, coverage: bool, progress: Callable[[CampaignProgress], object]
+    ) -> CampaignSummary:
+        from steptwin.campaign.store import StoredCase, gaps
+        from steptwin.campaign.workers import Workers
+
+        assert isinstance(there, Workers)  # noqa: S101
+        description, total = self.description, self.cases.count
+        first = store.first_failure() if description.until_failure else None
+        done = store.numbers()
+        known, failed = len(done), 0
+        began = time.monotonic()
+        counted = store.coverage()[0] if coverage else None
+
+        def is_over() -> bool:
+            late = description.time_ns is not None and (time.monotonic() - began) * SECOND >= description.time_ns
+            return late or (first is not None and description.until_failure)
+
+        def cases() -> Iterator[Case]:
+            limit = total if first is None else first
+            return (self.cases[number] for number in gaps(done, limit))
+
+        finished = 0
+        for batch in Execution(description, there, cases(), is_over, counts=coverage):
+            if counted is not None:
+                for text in Coverage.of_plain(batch.coverage or ()):
+                    counted.add(text)
+            store.add([StoredCase(*both) for both in zip(batch.cases, batch.results, strict=True)], counted)
+            wrong = [one.number for one in batch.results if one.failed]
+            failed += len(wrong)
+            first = min(wrong, default=None) if first is None else min((first, *wrong))
+            finished += len(batch.results)
+            progress(CampaignProgress(known + finished, failed, total, finished / max(time.monotonic() - began, 1e-9)))
+        before = total if first is None or not description.until_failure else first + 1
+        return CampaignSummary.of(description.name, description.digest, description.seed, store.results(before))
+
+
+def _make_folder(folder: Path) -> None:
+    from steptwin.system import reason
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise Misuse(f"--out {folder}: {reason(error)}") from None

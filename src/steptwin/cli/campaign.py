@@ -1,0 +1,74 @@
+"""``steptwin campaign``: many runs of a world, each a little different.
+
+From Python: `steptwin.campaign.campaign.Campaign`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from steptwin.cli.device import Json
+
+app = typer.Typer(no_args_is_help=True, help="Run campaigns: many runs of a world, each a little different.")
+
+File = Annotated[Path, typer.Argument(metavar="FILE", help="The campaign, TOML.")]
+
+
+@app.command("run")
+def run(
+    file: File,
+    runs: Annotated[int | None, typer.Option(help="How many. Default: as the file says.")] = None,
+    jobs: Annotated[int | None, typer.Option(help="Processes. Default: one for each processor.")] = None,
+    dask: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="A cluster of Dask, such as tcp://HOST:8786; 'local' for one here.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Where all chance comes from. Default: as the file says.")] = None,
+    time: Annotated[str | None, typer.Option(metavar="TIME", help="No run begins later, such as '10 min'.")] = None,
+    until_failure: Annotated[bool, typer.Option("--until-failure", help="End with the first run that fails.")] = False,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", metavar="DIR", help="Folder of the results. Default: FILE with .results.")
+    ] = None,
+    coverage: Annotated[
+        list[str] | None,
+        typer.Option(metavar="FILE", help="Coverage of the programs: .info, .html or .json; - for a table."),
+    ] = None,
+    export: Annotated[Path | None, typer.Option(metavar="FILE", help="All runs as a table, .parquet.")] = None,
+    json: Json = False,
+) -> None:
+    """Run a campaign, or what is left of one that was interrupted. The results are the same for any number of processes.
+
+    Exit code 1 when a property failed in a run.
+    """
+    from steptwin.commands.campaign import CampaignOptions
+    from steptwin.commands.campaign import run as run_campaign
+
+    options = CampaignOptions(
+        file=file,
+        out=out,
+        runs=runs,
+        seed=seed,
+        time=time,
+        until_failure=True if until_failure else None,
+        jobs=jobs,
+        dask=dask,
+        coverage=tuple(coverage or ()),
+        export=export,
+        as_json=json,
+    )
+    if not run_campaign(options, typer.echo):
+        raise typer.Exit(1)
+
+
+@app.command("show")
+def show(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of the results.")],
+    json: Json = False,
+) -> None:
+    """Show the summary of a campaign. Exit code 1 when a property failed in a run."""
+    from steptwin.commands.campaign import show as show_summary
+
+    if not show_summary(folder, typer.echo, as_json=json):
+        raise typer.Exit(1)
