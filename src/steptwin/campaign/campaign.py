@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from steptwin.campaign.case import Case, CaseResult
 from steptwin.campaign.cases import Cases
 from steptwin.campaign.description import CampaignDescription
-from steptwin.campaign.execution import Execution
+from steptwin.campaign.execution import CaseExecution
 from steptwin.campaign.reading import load_campaign, read_campaign
 from steptwin.campaign.runner import CaseRunner
 from steptwin.campaign.summary import CampaignSummary
@@ -194,7 +194,7 @@ class Campaign:
             return (self.cases[number] for number in gaps(done, limit))
 
         finished = 0
-        for batch in Execution(description, there, cases(), is_over, counts=coverage):
+        for batch in CaseExecution(description, there, cases(), is_over, counts=coverage):
             if counted is not None:
                 for text in Coverage.of_plain(batch.coverage or ()):
                     counted.add(text)

@@ -40,7 +40,7 @@ class Done:
     coverage: list[Any] | None = None
 
 
-class Execution:
+class CaseExecution:
     """Gives what is done as it is done. ``is_over``: no further case is begun; those that were are awaited."""
 
     def __init__(
