@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from functools import partial
 from pathlib import Path
 from typing import Any
 
-from steptwin.campaign.cases import names_in
+from steptwin.campaign.checks import CAMPAIGN, FAULT, MEASURE, PROPERTY, STEP, VARY, CampaignChecks
 from steptwin.campaign.description import (
     DESIGNS,
     CampaignDescription,
@@ -21,11 +20,10 @@ from steptwin.campaign.variation import MOST_LEVELS, Between, Choice, Normal, Va
 from steptwin.durations import duration
 from steptwin.errors import Misuse
 from steptwin.files.textfiles import read_text
-from steptwin.files.world import World, read_beside
+from steptwin.files.world import World
 from steptwin.inputfiles import MOST_DESCRIPTION_BYTES
 from steptwin.machine import SECOND, Nanos
 from steptwin.world.expression import parse_condition
-from steptwin.world.pieces import FILE_KEYS
 from steptwin.world.reader import Key, TomlText, optional, read_table
 from steptwin.world.sense import TableRows, check_sense
 from steptwin.world.tables import SEED
@@ -33,7 +31,6 @@ from steptwin.world.tomlplaces import Path as TomlPath
 from steptwin.world.values import flag, name_value, number, positive_time, text_value, whole, word
 
 MOST_RUNS = 1_000_000_000
-CAMPAIGN, VARY, FAULT, STEP, PROPERTY, MEASURE = "campaign", "vary", "fault", "step", "property", "measure"
 
 
 def _condition(value: Any) -> str:
@@ -175,17 +172,20 @@ def read_campaign(name: str, text: str, folder: Path) -> CampaignDescription:
     faults = tuple(VariedFault(row["do"], _at(row, start), row["chance"]) for row in _rows(toml, FAULT))
     steps = tuple(VariedStep(row["do"], _at(row, start)) for row in _rows(toml, STEP))
     measures = tuple(_measures(toml))
-    reader = _Checks(toml, head, vary)
-    reader.check_names(faults, steps)
-    reader.check_head()
-    world, files = reader.world(folder)
-    toml.check()
-    if world is None:
+    checks = CampaignChecks(toml, head, vary)
+    checks.check_names(faults, steps)
+    checks.check_head()
+    if "world" not in head or toml.findings:
         raise toml.error()
+    with World.load(folder / head["world"], keep_trace=False, keep_inputs=False) as world:
+        text_of_world, files = world.spec.text.source.text, dict(world.files)
+        checks.read_files((folder / head["world"]).parent, files)
+        checks.check_in(world, files, faults, steps, measures)
+    toml.check()
     named: dict[str, Any] = {**head, "name": head["name"] or Path(name).stem, "world": str(folder / head["world"])}
     return CampaignDescription(
         **named,
-        text=world,
+        text=text_of_world,
         files=files,
         vary=vary,
         faults=faults,
@@ -258,93 +258,3 @@ def _measures(toml: TomlText) -> Iterable[Measure]:
             toml.wrong((*row["place"], "name"), "D006", f"there is a [[measure]] named {row['name']!r} already")
         names.add(row["name"])
         yield Measure(row["name"], row["value"], row["when"])
-
-
-class _Checks:
-    """What tables say about one another."""
-
-    def __init__(self, toml: TomlText, head: Mapping[str, Any], vary: tuple[Varied, ...]) -> None:
-        self._toml = toml
-        self._head = head
-        self._vary = vary
-        self._by_name: dict[str, Between | Normal | Choice] = {one.name: one.spread for one in vary if not one.is_path}
-
-    def check_names(self, faults: tuple[VariedFault, ...], steps: tuple[VariedStep, ...]) -> None:
-        toml = self._toml
-        seen: set[str] = set()
-        for n, one in enumerate(self._vary):
-            if one.name in seen:
-                toml.wrong((VARY, n), "D006", f"{one.name!r} varies already")
-            seen.add(one.name)
-        for kind, found in ((FAULT, faults), (STEP, steps)):
-            for n, one in enumerate(found):
-                for name in names_in(one.do):
-                    if name not in self._by_name:
-                        near = toml.near(name, self._by_name)
-                        toml.wrong((kind, n, "do"), "D009", f"{{{name}}}: no [[vary]] has this name{near}")
-                if isinstance(one.at, str):
-                    self._check_moment((kind, n, "at"), one.at)
-                elif one.at < (self._head.get("start_ns") or 0):
-                    toml.wrong((kind, n, "at"), "D007", "this is before start, up to which all runs have one beginning")
-
-    def _check_moment(self, place: TomlPath, name: str) -> None:
-        spread = self._by_name.get(name)
-        if spread is None:
-            near = self._toml.near(name, self._by_name)
-            self._toml.wrong(place, "D009", f"{name!r} is no time, and no [[vary]] has this name{near}")
-            return
-        start = (self._head.get("start_ns") or 0) / SECOND
-        try:
-            values = spread.values if isinstance(spread, Choice) else (spread.low or 0.0,)
-            earliest = min(duration(value) for value in values) / SECOND
-        except Misuse as error:
-            self._toml.wrong(place, "D007", f"{name!r} varies, but is no time: {error}")
-            return
-        if earliest < start:
-            self._toml.wrong(
-                place, "D007", f"{name!r} may be {earliest:g} s, before start, up to which all runs have one beginning"
-            )
-
-    def check_head(self) -> None:
-        toml, head = self._toml, self._head
-        start, end = head.get("start_ns"), head.get("end_ns")
-        if start is not None and end is not None and start >= end:
-            toml.wrong((CAMPAIGN, "start"), "D007", "start must be before end")
-        for n, one in enumerate(self._vary):
-            if one.is_path and start is not None:
-                toml.wrong(
-                    (VARY, n, "path"),
-                    "D007",
-                    f"{one.name!r} is of the world, which is the same in all runs that have one beginning",
-                    "leave out start, or vary names that faults and steps refer to",
-                )
-            if head.get("design") == "grid" and not one.spread.levels:
-                toml.wrong((VARY, n), "D007", f"{one.name!r} has no few values, as a grid needs", "give choose, grid, or levels")
-        is_grid = head.get("design") == "grid" or any(isinstance(one.spread, Choice) and one.spread.is_grid for one in self._vary)
-        if not (is_grid or head.get("runs") or head.get("time_ns") or head.get("until_failure")):
-            toml.wrong((CAMPAIGN,), "D005", "[campaign]: runs is missing", "how many, or time, until_failure or a grid")
-        if head.get("design") == "latin-hypercube" and not head.get("runs"):
-            toml.wrong((CAMPAIGN, "design"), "D007", "a Latin hypercube needs the number of its points: give runs")
-
-    def world(self, folder: Path) -> tuple[str | None, dict[str, bytes]]:
-        """The text of the world and the files that it names, also those that vary."""
-        if "world" not in self._head:
-            return None, {}
-        try:
-            with World.load(folder / self._head["world"], keep_trace=False, keep_inputs=False) as world:
-                text, files = world.spec.text.source.text, dict(world.files)
-        except Misuse as error:
-            if self._toml.findings:
-                return None, {}
-            raise error
-        base = (folder / self._head["world"]).parent
-        for n, one in enumerate(self._vary):
-            if one.is_path and isinstance(one.spread, Choice) and one.name.split(".")[-1] in FILE_KEYS:
-                self._toml.unless_wrong((VARY, n), partial(_read_all, base, one.spread, files))
-        return text, files
-
-
-def _read_all(base: Path, spread: Choice, files: dict[str, bytes]) -> None:
-    for name in spread.values:
-        if isinstance(name, str) and name not in files:
-            files[name] = read_beside(base, name)
