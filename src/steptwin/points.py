@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -20,6 +20,20 @@ TurningPoints: TypeAlias = Callable[[Nanos], Iterator[Nanos]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class MemoryCells:
+    """Words of a memory of a controller."""
+
+    words: Callable[[], Sequence[int]]
+    """The whole memory, as it is now."""
+    cells: range
+    value: Callable[[Sequence[int]], float]
+    """What these words mean together."""
+
+    def read(self, now: Nanos) -> float:
+        return self.value(self.words()[self.cells.start : self.cells.stop])
+
+
+@dataclass(frozen=True, slots=True)
 class LivePoint:
     """A point of one controller. Between its events the value stays as it is unless there are ``turns``."""
 
@@ -31,6 +45,8 @@ class LivePoint:
     """A value that changes whenever ``turns`` may have changed; None if that is unknown."""
     is_kept: bool = False
     """Whether a write only keeps the value, which is not an event of the controller."""
+    memory: MemoryCells | None = None
+    """Where it is, if it is part of a memory."""
 
 
 def turns_of(profile: Callable[[], Profile]) -> TurningPoints:

@@ -24,7 +24,7 @@ from steptwin.mic488.registers import AXES, CONTROLLER_STATUS_TEXTS
 from steptwin.mic488.status import AXIS_CONDITIONS, CONTROLLER_CONDITIONS
 from steptwin.mic488.values import RegisterItem, UserFormat, named
 from steptwin.motion import Profile
-from steptwin.points import LivePoint, TurningPoints, turns_of, turns_of_round
+from steptwin.points import LivePoint, MemoryCells, TurningPoints, turns_of, turns_of_round
 from steptwin.tables import complete
 
 EFFECTS: Mapping[registermap.WriteEffect, PointEffect] = complete(
@@ -179,7 +179,8 @@ def live_point(device: Mic488Device, text: str) -> LivePoint | None:
     if register.type is Type.MEMORY:
         address = replace(point.addresses[0], place=item.address, words=item.size, type=item.view.name)
         point = replace(point, path=item.name, addresses=(address,))
-        return LivePoint(point=point, read=_user_value(device, item), is_kept=True)
+        memory = _user_words(device, item)
+        return LivePoint(point=point, read=memory.read, is_kept=True, memory=memory)
     behaviour = BEHAVIOUR[register.key]
     if not register.reads:
         return LivePoint(point=point, read=None)
@@ -236,17 +237,22 @@ def _bit(device: Mic488Device, read: Callable[[Mic488Device], bool]) -> Callable
     return lambda now: read(device)
 
 
-def _user_value(device: Mic488Device, item: RegisterItem) -> Callable[[Nanos], float]:
-    cell = item.cell
-    match item.view:
-        case UserFormat.WORD:
-            return lambda now: device.user[cell]
-        case UserFormat.INT:
-            return lambda now: word_to_int(device.user[cell])
-        case UserFormat.DINT:
-            return lambda now: words_to_dint(device.user[cell], device.user[cell + 1])
-        case UserFormat.REAL:
-            return lambda now: words_to_real(device.user[cell], device.user[cell + 1])
+_MEANINGS: Mapping[UserFormat, Callable[[Sequence[int]], float]] = complete(
+    "format of user registers",
+    UserFormat,
+    "meaning of words",
+    {
+        UserFormat.WORD: lambda words: words[0],
+        UserFormat.INT: lambda words: word_to_int(words[0]),
+        UserFormat.DINT: lambda words: words_to_dint(words[0], words[1]),
+        UserFormat.REAL: lambda words: words_to_real(words[0], words[1]),
+    },
+)
+
+
+def _user_words(device: Mic488Device, item: RegisterItem) -> MemoryCells:
+    cells = range(item.cell, item.cell + item.size)
+    return MemoryCells(words=lambda: device.user, cells=cells, value=_MEANINGS[item.view])
 
 
 # ---------------------------------------------------------------------- between events

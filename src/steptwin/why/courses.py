@@ -5,6 +5,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import partial
+from itertools import takewhile
 from typing import NamedTuple, TypeAlias
 
 from steptwin.errors import Misuse
@@ -45,20 +46,19 @@ class Courses:
             self._known.clear()
             self._remembered = 0
 
-    def bring(
-        self, wanted: Collection[str], others: Collection[str], watch: CourseWatch, interval: Interval, at: Nanos
-    ) -> Iterator[None]:
-        """Have the courses in an interval, at least until a moment in it, in parts; those of ``others`` only if
-        it must be run again.
+    def bring(self, wanted: Collection[str], watch: CourseWatch, intervals: Sequence[Interval], at: Nanos) -> Iterator[None]:
+        """Have the courses in the first of ``intervals``, at least until a moment in it, in parts.
 
-        Raises `Misuse` for what cannot be watched.
+        The others are those before it, the last one first; as far as nothing is known of them, they are run again with it, so
+        that one state is restored for all. Raises `Misuse` for what cannot be watched.
         """
-        (state, end), begin = interval, interval.state.snapshot.now
-        if all((known := self._known.get((name, begin))) is not None and known.end >= min(at, end) for name in wanted):
+        if self._has(wanted, intervals[0], at):
             return
+        lacking = [intervals[0], *takewhile(lambda interval: not self._has(wanted, interval, at), intervals[1:])]
+        state, end = lacking[-1].state, lacking[0].end
         world = self._second = self._second or self._make()
         world.restore(state.snapshot)
-        found: dict[str, CourseTurns] = {name: [] for name in (*wanted, *others)}
+        found: dict[str, CourseTurns] = {name: [] for name in wanted}
         for name, turns in found.items():
             world.start("why", partial(watch, world, name, turns), is_external=True)
         for _ in in_parts(world, self._inputs[state.inputs :], end):
@@ -66,8 +66,13 @@ class Courses:
         for name, turns in found.items():
             if not turns:
                 raise Misuse(f"{name}: nothing is known of it at {end / SECOND:g} s")
-            self._known[name, begin] = _Course(end, turns)
-            self._remembered += len(turns)
+            for interval in lacking:
+                self._known[name, interval.state.snapshot.now] = _Course(interval.end, list(_within(turns, interval)))
+            self._remembered += len(turns) + len(lacking)
+
+    def _has(self, wanted: Collection[str], interval: Interval, at: Nanos) -> bool:
+        begin, needed = interval.state.snapshot.now, min(at, interval.end)
+        return all((known := self._known.get((name, begin))) is not None and known.end >= needed for name in wanted)
 
     def level(self, name: str, interval: Interval, at: Nanos) -> float:
         """The value at a moment in an interval; at its beginning, if the moment is before."""
@@ -81,6 +86,14 @@ class Courses:
 
     def _turns(self, name: str, interval: Interval) -> CourseTurns:
         return self._known[name, interval.state.snapshot.now].turns
+
+
+def _within(turns: CourseTurns, interval: Interval) -> Iterator[tuple[Nanos, float]]:
+    """The turns in an interval, the first one at its beginning."""
+    begin = interval.state.snapshot.now
+    first, last = (bisect_right(turns, moment, key=_moment) for moment in (begin, interval.end))
+    yield begin, turns[max(0, first - 1)][1]
+    yield from turns[first:last]
 
 
 def _moment(turn: tuple[Nanos, float]) -> Nanos:

@@ -14,6 +14,7 @@ from typing import NamedTuple
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.statements import StatementHook
+from steptwin.why import points
 from steptwin.world.actions import Download, ExternalInput
 from steptwin.world.elements import ELEMENTS
 from steptwin.world.history import SLICE_NS, replay
@@ -90,6 +91,7 @@ class CauseLog:
             if not self.is_whole:
                 self.executed[name] += [Executed(self.begin, name, frame.place, 0) for frame in programs.stack(self.begin)[:1]]
             programs.hook(self._hook(name, programs))
+        self.points = points.PointTurns(world)
 
     @property
     def is_whole(self) -> bool:
@@ -149,7 +151,7 @@ class CauseLog:
     def is_recorded(self, signal: str) -> bool:
         """Whether every change of a signal is noted."""
         owner, _, pin = signal.partition(".")
-        return pin in self._pins.get(owner, ()) or self.has(signal)
+        return pin in self._pins.get(owner, ()) or self.has(signal) or self.points.turns(signal) is not None
 
     def has(self, signal: str) -> bool:
         """Whether it is the name of something with edges."""
@@ -157,6 +159,9 @@ class CauseLog:
 
     def level(self, signal: str, now: Nanos) -> float:
         """The level of a signal at a moment."""
+        turns = self.points.turns(signal)
+        if turns is not None:
+            return points.level(turns, now)
         last = self.last_change(signal, now)
         return self.first_levels.get(signal, 0.0) if last is None else last.value
 
@@ -168,11 +173,14 @@ class CauseLog:
             index -= 1
         return changes[index - 1] if index else None
 
-    def changes_in(self, signal: str, after: Nanos, until: Nanos) -> Iterator[Change]:
-        """The changes of a signal after a moment until another."""
+    def changes_in(self, signal: str, after: Nanos, until: Nanos) -> Iterator[Nanos]:
+        """The moments at which a signal took another value, after one until another."""
+        turns = self.points.turns(signal)
+        if turns is not None:
+            return points.changes(turns, after, until)
         changes = self.changes.get(signal, [])
         first, last = (bisect_right(changes, moment, key=lambda change: change.time) for moment in (after, until))
-        return (change for change in changes[first:last] if not self.is_first(signal, change))
+        return (change.time for change in changes[first:last] if not self.is_first(signal, change))
 
     def is_first(self, signal: str, change: Change) -> bool:
         """Whether a signal has a level because the world began with it."""
@@ -185,6 +193,9 @@ class CauseLog:
 
     def since(self, signal: str, until: Nanos) -> Nanos | None:
         """Since when a signal has the level of a moment; None: from the beginning."""
+        turns = self.points.turns(signal)
+        if turns is not None:
+            return points.since(turns, until)
         last = self.last_change(signal, until)
         return None if last is None or self.is_first(signal, last) else last.time
 

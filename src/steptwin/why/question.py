@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import TypeAlias
@@ -71,7 +70,6 @@ class Why:
         self._causes = Causes(self.log)
         self._on_the_way = StatesOnTheWay(self.log.world)
         self._courses = Courses(make, self._inputs)
-        self._points: dict[str, list[str]] = {}
 
     def go_on(self, inputs: Iterable[RecordedInput], end: Nanos) -> None:
         """The present is a later one: what came from outside since."""
@@ -174,10 +172,7 @@ class Why:
             (name,) = canonical.values()
             return log.level(name, at), log.since(name, at)
         condition = SignalCondition(text, lambda name: _Level(partial(log.level, canonical[name]), self._unit(name)))
-        changes = [
-            change for name in canonical.values() for change in log.changes.get(name, []) if not log.is_first(name, change)
-        ]
-        times = sorted({change.time for change in changes if change.time <= at})
+        times = sorted({time for name in canonical.values() for time in log.changes_in(name, -1, at)})
         value = condition.holds(at)
         for time in reversed(times):
             if condition.holds(time - 1) is not value:
@@ -197,10 +192,10 @@ class Why:
             watched = {name: full if full.partition(".")[0] in machines else name for name, full in named.items()}
             watch, is_followed = watch_value, is_bare
         value: float | None = None
-        for interval in self._on_the_way.intervals(at, self.end):
-            # What has not changed lately may never have changed: a further question may be about another axis.
-            others = () if value is None or watch is watch_truth else self._others(watched.values())
-            yield from courses.bring(watched.values(), others, watch, interval, at)
+        intervals = list(self._on_the_way.intervals(at, self.end))
+        for number, interval in enumerate(intervals):
+            # As many as have shown no change: what lasts for long is found with few states to restore.
+            yield from courses.bring(watched.values(), watch, intervals[number : number + max(1, number)], at)
 
             def level(moment: Nanos, interval: Interval = interval) -> float:
                 if is_followed:
@@ -211,7 +206,7 @@ class Why:
             value = level(at) if value is None else value
             times = {time for full in watched.values() for time in courses.changes(full, interval, at)}
             for full in recorded.values():
-                times |= {change.time for change in log.changes_in(full, interval.state.snapshot.now, min(at, interval.end))}
+                times.update(log.changes_in(full, interval.state.snapshot.now, min(at, interval.end)))
             for time in sorted(times, reverse=True):
                 if is_followed or level(time - 1) != value:
                     return value, time
@@ -222,17 +217,6 @@ class Why:
         if name in recorded:
             return _Level(partial(self.log.level, recorded[name]), self._unit(name))
         return _Level(partial(self._courses.level, watched[name], interval), self._unit(name))
-
-    def _others(self, watched: Iterable[str]) -> Sequence[str]:
-        """The points with the last parts of these signals, of the same controllers: those of the other axes."""
-        world, found = self.log.world, list[str]()
-        for name in watched:
-            owner, _, path = name.partition(".")
-            if owner in world.machines:
-                if owner not in self._points:
-                    self._points[owner] = list(_points_of(world, owner))
-                found += [f"{owner}.{other}" for other in self._points[owner] if other.split(".")[-1] == path.split(".")[-1]]
-        return found
 
     def _changed(self, signals: Sequence[str], time: Nanos) -> Cause | None:
         """What made one of these signals change at a moment."""
@@ -328,13 +312,3 @@ class Why:
         is_followed = cause is None or cause.link in links
         is_cut = is_followed and not self.log.is_whole and (last is None or last.before is not nothing)
         return Answer(question, at, state, since, tuple(links), is_followed and not is_cut, self.log.begin, is_cut)
-
-
-def _points_of(world: Plant, owner: str) -> Iterator[str]:
-    """The points of a controller that have a value and keep it between events, but for rows of them."""
-    kind, machine = world.kind(owner), world.machine(owner)
-    for point in kind.datasheet(machine).points:
-        with suppress(Misuse):
-            found = kind.point(machine, point.path)
-            if found is not None and found.read is not None and found.turns is None and not found.is_kept:
-                yield point.path

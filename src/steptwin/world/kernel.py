@@ -353,9 +353,15 @@ class Kernel:
         machine, due = self.machines[name], self._due
         self._changed.add(name)
         while due is not None and due <= now:
-            self.now = machine.advance_to_change(now)
+            if self.is_attentive:
+                machine.advance(due)
+                self.now = due
+            else:
+                self.now = machine.advance_to_change(now)
             self._settle_alone(name, plans)
             due = self._due
+            if self.is_attentive and self.on_change is not None:
+                self.on_change(self)
 
     def _settle_alone(self, name: str, plans: RecordedPlans) -> None:
         """As `settle`, for a single machine without parts and wires."""
