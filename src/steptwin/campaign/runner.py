@@ -47,8 +47,11 @@ class CaseRunner:
             world = self._anew({}, description.seed)
             coverage = Coverage()
             watch = WorldCoverage(world, coverage)
-            world.run_to(description.start_ns)
+            ended = world.run_to(description.start_ns)
             watch.close()
+            if ended is not None:
+                start = description.start_ns / SECOND
+                raise Misuse(f"start = {start:g} s: the world ends its run at {world.now / SECOND:g} s: {ended}")
             self._coverage = coverage.plain()
             self._beginning, self._common = world.snapshot(), world.blueprint
 
