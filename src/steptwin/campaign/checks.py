@@ -25,6 +25,7 @@ from steptwin.world.references import check_step
 from steptwin.world.tomlplaces import Path as TomlPath
 
 CAMPAIGN, VARY, FAULT, STEP, PROPERTY, MEASURE = "campaign", "vary", "fault", "step", "property", "measure"
+MATRIX = "matrix"
 """The tables."""
 UNKNOWN_KEY = "D004"
 

@@ -50,6 +50,19 @@ class Measure:
     when: str | None
 
 
+@dataclass(frozen=True, slots=True)
+class MatrixRules:
+    """How effects are told. ``done``: a condition that is true at the end of a run that made its parts; None: the run ends as
+    that without a fault, and no wait of a script has run out of time. ``alarm``: how the machine says that it noticed something.
+    """
+
+    done: str | None = None
+    alarm: str | None = None
+    phases: int | None = None
+    product: tuple[str, ...] = ()
+    """Names of properties whose failure is a wrong part, not a danger."""
+
+
 @dataclass(frozen=True)
 class CampaignDescription:
     """All that runs depend on, the world with its files included: it pickles, and needs no other file where it runs."""
@@ -76,6 +89,8 @@ class CampaignDescription:
     properties: tuple[NamedProperty, ...]
     measures: tuple[Measure, ...]
     database: str | None = None
+    matrix: MatrixRules = MatrixRules()
+    """Of the fault matrix."""
 
     @cached_property
     def digest(self) -> str:
@@ -83,7 +98,7 @@ class CampaignDescription:
         return digest_of(self._decisive())
 
     def _decisive(self) -> Mapping[str, Any]:
-        left = {"runs", "time_ns", "until_failure", "database", "files", "name", "world"}
+        left = {"runs", "time_ns", "until_failure", "database", "files", "name", "matrix", "world"}
         plain: dict[str, Any] = {one.name: repr(getattr(self, one.name)) for one in fields(self) if one.name not in left}
         if self.design == "latin-hypercube":  # its points depend on how many there are
             plain["runs"] = self.runs

@@ -6,10 +6,11 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from steptwin.campaign.checks import CAMPAIGN, FAULT, MEASURE, PROPERTY, STEP, VARY, CampaignChecks
+from steptwin.campaign.checks import CAMPAIGN, FAULT, MATRIX, MEASURE, PROPERTY, STEP, VARY, CampaignChecks
 from steptwin.campaign.description import (
     DESIGNS,
     CampaignDescription,
+    MatrixRules,
     Measure,
     NamedProperty,
     VariedFault,
@@ -31,6 +32,7 @@ from steptwin.world.tomlplaces import Path as TomlPath
 from steptwin.world.values import flag, name_value, number, positive_time, text_value, whole, word
 
 MOST_RUNS = 1_000_000_000
+MOST_PHASES = 1000
 
 
 def _condition(value: Any) -> str:
@@ -147,6 +149,15 @@ ROWS: Mapping[str, TableRows] = {
         ),
         exclude=(("value", "when"),),
     ),
+    MATRIX: TableRows(
+        written=f"[{MATRIX}]",
+        keys=(
+            optional(_condition, "done", "true at the end of a run that made its parts; default: it ends as without a fault"),
+            optional(_condition, "alarm", "how the machine says that it noticed something"),
+            optional(whole(1, MOST_PHASES), "phases", "how many of the cycle are tried at most"),
+            optional(_list, "product", "names of properties whose failure is a wrong part, not a danger", ()),
+        ),
+    ),
 }  # fmt: skip
 """What the tables may contain, but for properties (`steptwin.campaign.properties`)."""
 
@@ -172,6 +183,7 @@ def read_campaign(name: str, text: str, folder: Path) -> CampaignDescription:
     faults = tuple(VariedFault(row["do"], _at(row, start), row["chance"]) for row in _rows(toml, FAULT))
     steps = tuple(VariedStep(row["do"], _at(row, start)) for row in _rows(toml, STEP))
     measures = tuple(_measures(toml))
+    matrix = MatrixRules(**read_table(toml, (MATRIX,), toml.data.get(MATRIX, {}), ROWS[MATRIX].keys))
     checks = CampaignChecks(toml, head, vary)
     checks.check_names(faults, steps)
     checks.check_head()
@@ -192,6 +204,7 @@ def read_campaign(name: str, text: str, folder: Path) -> CampaignDescription:
         steps=steps,
         properties=tuple[NamedProperty, ...](),
         measures=measures,
+        matrix=matrix,
     )
 
 

@@ -115,12 +115,18 @@ class CaseRunner:
         world: World | None = None
         try:
             world = self.begin(case)
-            return self._run(case, world, coverage)
+            return self.finish(case, world, coverage)
         except SteptwinError as error:
-            now, digest = (0, "") if world is None else (world.now, world.trace.digest())
-            return CaseResult(case.number, (), digest, now, {}, str(error))
+            return self.refused(case, world, error)
 
-    def _run(self, case: Case, world: World, coverage: Coverage | None) -> CaseResult:
+    @staticmethod
+    def refused(case: Case, world: World | None, error: SteptwinError) -> CaseResult:
+        """The result of a case that did not begin, or not run to its end."""
+        now, digest = (0, "") if world is None else (world.now, world.trace.digest())
+        return CaseResult(case.number, (), digest, now, {}, str(error))
+
+    def finish(self, case: Case, world: World, coverage: Coverage | None = None) -> CaseResult:
+        """Run the world of a case, as `begin` made it, to its end. Raises `SteptwinError` where it does not get there."""
         watch = None
         if coverage is not None:
             for text in Coverage.of_plain(self._coverage):

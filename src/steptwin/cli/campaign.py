@@ -62,6 +62,29 @@ def run(
         raise typer.Exit(1)
 
 
+@app.command("faults")
+def faults(
+    file: File,
+    jobs: Annotated[int | None, typer.Option(help="Processes. Default: one for each processor.")] = None,
+    phases: Annotated[
+        int | None, typer.Option(help="So many phases of the cycle at most. Default: as the file says, else 12.")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", metavar="DIR", help="Folder of the table and the sessions. Default: FILE with .faults."),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Try every fault of sensors, actuators, logic, lines and power at every phase of the cycle, and tell what the machine did.
+
+    Writes faults.html, faults.csv and a session of each run. Exit code 1 when one was unsafe.
+    """
+    from steptwin.commands.campaign_faults import faults as run_faults
+
+    if not run_faults(file, out, typer.echo, jobs=jobs, phases=phases, as_json=json):
+        raise typer.Exit(1)
+
+
 @app.command("show")
 def show(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of the results.")],

@@ -1,0 +1,118 @@
+"""A fault matrix as one HTML file: faults by phases, then every cell in which something happened."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING
+
+from steptwin.campaign.effects import Effect
+from steptwin.campaign.report.html import link, page, table
+from steptwin.coverage.table import percent_text
+from steptwin.machine import SECOND
+
+if TYPE_CHECKING:
+    from steptwin.campaign.faultmatrix import FaultMatrix, MatrixCell
+
+_STYLE = """
+.matrix td.e { padding: 0; } .matrix td.e a { display: block; padding: .2rem .5rem; text-decoration: none; color: inherit; }
+.unaffected { color: var(--weak); } .safe-stop { background: color-mix(in srgb, var(--good) 22%, transparent); }
+.hangs { background: color-mix(in srgb, var(--note) 22%, transparent); }
+.wrong-part { background: color-mix(in srgb, var(--doubt) 28%, transparent); }
+.unsafe { background: color-mix(in srgb, var(--bad) 35%, transparent); font-weight: 600; }
+span.e { padding: .1rem .5rem; margin-right: .7rem; }
+"""
+_MEANINGS = {
+    Effect.UNAFFECTED: "the same parts were made",
+    Effect.SAFE_STOP: "it stands, and an alarm or a script noticed",
+    Effect.HANGS: "it did not go on, and nothing noticed, or it still moves",
+    Effect.WRONG_PART: "it went on to its end with another result",
+    Effect.UNSAFE: "a property failed",
+}
+
+
+def matrix_page(matrix: FaultMatrix) -> str:
+    title = f"{matrix.name}: faults by phase"
+    counts = matrix.counts
+    legend = table(
+        ("effect", "cells", "meaning"),
+        [(_mark(effect), str(counts[effect]), escape(_MEANINGS[effect])) for effect in Effect],
+        (1,),
+    )
+    ended = f", ended by {matrix.nominal.ended!r}" if matrix.nominal.ended else ""
+    covered = matrix.coverage.summary
+    body = (
+        f"<p>{len(matrix.rows)} faults at {len(matrix.phases)} phases. The run without a fault takes "
+        f"{matrix.nominal.result.end_ns / SECOND:.9g} s{escape(ended)}. {percent_text(covered)} % of the statements and "
+        f"branches of the programs were executed.</p>\n{legend}<h2>Phases</h2>\n{_phases(matrix)}"
+        f"<h2>Matrix</h2>\n<p>Each cell is a session: <code>steptwin replay cells/…</code>, "
+        f"<code>steptwin studio --view cells/…</code>.</p>\n{_matrix(matrix)}"
+        f"<h2>Effects</h2>\n{_effects(matrix)}"
+    )
+    if matrix.left_out:
+        left = ", ".join(f"<code>{escape(one.text)}</code>" for one in matrix.left_out)
+        body += f"<h2>Not tried</h2>\n<p>In the run without a fault it never comes to: {left}</p>\n"
+    return page(title, body, _STYLE)
+
+
+def _mark(effect: Effect) -> str:
+    return f'<span class="e {effect.replace(" ", "-")}">{effect}</span>'
+
+
+def _phases(matrix: FaultMatrix) -> str:
+    rows = [
+        (
+            str(phase.number),
+            escape(phase.name),
+            f"{phase.begin / SECOND:.6g}",
+            f"{phase.end / SECOND:.6g}",
+            f"{phase.middle / SECOND:.6g}",
+        )
+        for phase in matrix.phases
+    ]
+    return table(("phase", "begins with", "from s", "to s", "fault at s"), rows, (2, 3, 4))
+
+
+def _matrix(matrix: FaultMatrix) -> str:
+    head = "".join(f'<th title="{escape(phase.name, quote=True)}">{phase.number}</th>' for phase in matrix.phases)
+    rows = "".join(
+        f"<tr><td>{escape(row.function)}</td><td>{escape(row.possible.part)}</td><td>{escape(row.possible.mode)}</td>"
+        f"{''.join(_cell(cell) for cell in row.cells)}</tr>\n"
+        for row in matrix.rows
+    )
+    return (
+        '<div class="wide"><table class="matrix">\n'
+        f"<tr><th>function</th><th>part</th><th>failure mode</th>{head}</tr>\n{rows}</table></div>\n"
+    )
+
+
+def _cell(cell: MatrixCell) -> str:
+    judged = cell.judgement
+    why = judged.why or ("" if cell.is_struck else "it did not come to it")
+    title = escape(f"{cell.fault}. {why}", quote=True)
+    text = escape(judged.effect if judged.effect is not Effect.UNAFFECTED else "·" if cell.is_struck else "–")
+    inner = f'<a href="{escape(cell.session, quote=True)}">{text}</a>' if cell.session else text
+    return f'<td class="e {judged.effect.replace(" ", "-")}" title="{title}">{inner}</td>'
+
+
+def _effects(matrix: FaultMatrix) -> str:
+    worst = {effect: n for n, effect in enumerate(reversed(Effect))}
+    found = [
+        (worst[cell.judgement.effect], row, cell)
+        for row in matrix.rows
+        for cell in row.cells
+        if cell.judgement.effect is not Effect.UNAFFECTED
+    ]
+    rows = [
+        (
+            _mark(cell.judgement.effect),
+            escape(row.function),
+            escape(row.possible.mode),
+            str(matrix.phases[cell.phase].number),
+            escape(cell.judgement.why),
+            escape(cell.judgement.detection),
+            "" if cell.judgement.after_ns is None else f"{cell.judgement.after_ns / SECOND:.4g}",
+            link(cell.session, "session") if cell.session else "",
+        )
+        for _, row, cell in sorted(found, key=lambda one: one[0])
+    ]
+    return table(("effect", "function", "failure mode", "phase", "why", "detection", "after s", ""), rows, (3, 6))

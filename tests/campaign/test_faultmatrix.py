@@ -1,0 +1,146 @@
+"""Fault matrices of examples, checked by hand, and how effects are told."""
+
+from __future__ import annotations
+
+import csv
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from steptwin.campaign.case import EXPECTATIONS, CaseResult, Verdict
+from steptwin.campaign.effects import Effect, RunFacts, judge
+from steptwin.campaign.faultmatrix import FaultMatrix, fault_matrix
+from steptwin.campaign.reading import load_campaign
+from steptwin.errors import Misuse
+from steptwin.files import session as sessions
+
+EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
+SECOND = 1_000_000_000
+NOMINAL = RunFacts(CaseResult(0, (), "", 10 * SECOND, {"made": 5.0}), "done", None, False, 0, None, False, None, 0, None)
+
+
+def failing(name: str = "guard", at: int | None = 4 * SECOND) -> CaseResult:
+    return CaseResult(0, (Verdict(name, False, -1.0, at, "x > 3"),), "", 10 * SECOND, {"made": 5.0})
+
+
+@pytest.mark.parametrize(
+    ("facts", "effect", "why", "detection", "after"),
+    [
+        (NOMINAL, Effect.UNAFFECTED, "", "", None),
+        (replace(NOMINAL, result=replace(NOMINAL.result, end_ns=12 * SECOND)), Effect.UNAFFECTED, "2 s later", "", None),
+        (replace(NOMINAL, result=failing()), Effect.UNSAFE, "guard: x > 3", "", None),
+        (replace(NOMINAL, result=failing("size")), Effect.WRONG_PART, "size: x > 3", "", None),
+        (replace(NOMINAL, collisions=1), Effect.UNSAFE, "a collision", "", None),
+        (replace(NOMINAL, result=replace(NOMINAL.result, error="too many")), Effect.UNSAFE, "an error: too many", "", None),
+        (replace(NOMINAL, result=failing(EXPECTATIONS)), Effect.WRONG_PART, "expected x > 3", "expectation of a script", 1.0),
+        (
+            replace(NOMINAL, result=replace(NOMINAL.result, measures={"made": 4.0})),
+            Effect.WRONG_PART,
+            "made is 4 instead of 5",
+            "",
+            None,
+        ),
+        (replace(NOMINAL, ended=None), Effect.HANGS, "nothing noticed", "", None),
+        (replace(NOMINAL, ended=None, is_moving=True), Effect.HANGS, "an axis moves", "", None),
+        (replace(NOMINAL, is_done=False), Effect.HANGS, "not done; everything stands", "", None),
+        (replace(NOMINAL, is_done=True, ended=None), Effect.UNAFFECTED, "", "", None),
+        (
+            replace(NOMINAL, overdue=(5 * SECOND, "waited for x"), overdues=1),
+            Effect.SAFE_STOP,
+            "waited for x",
+            "time-out of a script",
+            2.0,
+        ),
+        (replace(NOMINAL, alarm_ns=7 * SECOND, has_alarm=True, ended=None), Effect.SAFE_STOP, "an alarm", "alarm", 4.0),
+        (replace(NOMINAL, alarm_ns=7 * SECOND, has_alarm=True, is_moving=True), Effect.HANGS, "an axis moves", "alarm", 4.0),
+    ],
+)
+def test_effects(facts: RunFacts, effect: Effect, why: str, detection: str, after: float | None) -> None:
+    found = judge(facts, NOMINAL, 3 * SECOND, product=("size",))
+    assert found.effect is effect
+    assert why in found.why
+    assert bool(why) is bool(found.why)
+    assert found.detection == detection
+    assert (None if found.after_ns is None else found.after_ns / SECOND) == after
+
+
+def test_what_fails_without_a_fault_does_not_count() -> None:
+    nominal = replace(NOMINAL, result=failing())
+    assert judge(nominal, nominal, 0).effect is Effect.UNAFFECTED
+
+
+def matrix_of(example: str, folder: Path, text: str, jobs: int = 1) -> FaultMatrix:
+    shutil.copytree(EXAMPLES / example, folder, dirs_exist_ok=True)
+    (folder / "campaign.toml").write_text(f'[campaign]\nworld = "{example}.toml"\nruns = 1\n{text}', encoding="utf-8")
+    return fault_matrix(load_campaign(folder / "campaign.toml"), folder / "out", jobs=jobs)
+
+
+def effects(matrix: FaultMatrix, fault: str) -> list[str]:
+    (row,) = (row for row in matrix.rows if row.possible.text == fault)
+    return [cell.judgement.effect.value for cell in row.cells]
+
+
+@pytest.fixture(scope="module")
+def press(tmp_path_factory: pytest.TempPathFactory) -> tuple[FaultMatrix, Path]:
+    folder = tmp_path_factory.mktemp("press")
+    return matrix_of("press", folder, 'end = "12 s"\n[matrix]\nphases = 7\n'), folder / "out"
+
+
+def test_the_press_by_hand(press: tuple[FaultMatrix, Path]) -> None:
+    matrix, _ = press
+    # A welded contact of the safety relay leaves the valve open when the curtain is interrupted: the ram comes to the hand.
+    assert effects(matrix, "welded-contact element=safety")[:5] == ["unsafe"] * 5
+    # A relay without its coil lets no stroke begin: the operator waits in vain.
+    assert effects(matrix, "open-coil element=safety")[:5] == ["safe stop"] * 5
+    # The window of half a second that never ends accepts the second hand too late, in the first test of the script.
+    assert effects(matrix, "stuck-output element=window output=out level=1")[0] == "wrong part"
+    # The program does not look at the relay.
+    assert set(effects(matrix, "stuck machine=cell pin=IN4 value=0")) == {"unaffected"}
+
+
+def test_each_cell_replays(press: tuple[FaultMatrix, Path]) -> None:
+    matrix, folder = press
+    cells = [cell for row in matrix.rows for cell in row.cells]
+    assert len({cell.session for cell in cells}) == len(cells) == len(matrix.rows) * 7
+    for cell in cells[:: len(cells) // 10]:
+        session = sessions.load(folder / cell.session)
+        assert session.replay().trace.digest() == session.digest
+        assert [str(given.what.fault) for given in session.inputs if hasattr(given.what, "fault")] == [cell.fault]
+
+
+def test_table_page_and_json(press: tuple[FaultMatrix, Path]) -> None:
+    matrix, folder = press
+    page, table, plain = matrix.write(folder)
+    with table.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == sum(matrix.counts.values())
+    assert all((folder / row["session"]).is_file() for row in rows)
+    assert {row["effect"] for row in rows} == {effect.value for effect, count in matrix.counts.items() if count}
+    text = page.read_text(encoding="utf-8")
+    assert all(row["session"] in text for row in rows)
+    assert "http" not in text
+    assert '"left_out"' in plain.read_text(encoding="utf-8")
+    assert matrix.coverage.summary.statements > 0
+
+
+def test_the_labeller_by_hand(tmp_path: Path) -> None:
+    matrix = matrix_of("labeller", tmp_path, 'end = "70 s"\n[matrix]\nalarm = "cell.OUT3"\n', jobs=2)
+    # No mark comes: the alarm after one and a half labels.
+    assert set(effects(matrix, "stuck machine=cell pin=IN2 value=0")) == {"safe stop"}
+    # Products that are not seen get no label.
+    assert set(effects(matrix, "stuck machine=cell pin=IN1 value=0")) == {"wrong part"}
+    # The belt stands: no tenth product within the minute of the script.
+    assert set(effects(matrix, "belt-stop element=belt")) == {"safe stop"}
+    # The web slips a little in one label; the next mark makes it good.
+    assert set(effects(matrix, "lost-steps machine=cell axis=1")) == {"unaffected"}
+    assert {one.fault.kind.name for one in matrix.left_out} >= {"power-cut", "wear", "busy"}
+
+
+def test_a_run_without_a_fault_that_is_refused_is_an_error(tmp_path: Path) -> None:
+    shutil.copytree(EXAMPLES / "press", tmp_path, dirs_exist_ok=True)
+    text = '[campaign]\nworld = "press.toml"\nruns = 1\nend = "1 s"\n[matrix]\nalarm = "cell.OUT77"\n'
+    (tmp_path / "campaign.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(Misuse, match="OUT77"):
+        fault_matrix(load_campaign(tmp_path / "campaign.toml"), tmp_path / "out")
