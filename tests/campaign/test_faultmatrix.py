@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from steptwin.campaign.case import EXPECTATIONS, CaseResult, Verdict
-from steptwin.campaign.effects import Effect, RunFacts, judge
+from steptwin.campaign.effects import FaultEffect, RunFacts, judge
 from steptwin.campaign.faultmatrix import FaultMatrix, fault_matrix
 from steptwin.campaign.reading import load_campaign
 from steptwin.errors import Misuse
@@ -28,36 +28,42 @@ def failing(name: str = "guard", at: int | None = 4 * SECOND) -> CaseResult:
 @pytest.mark.parametrize(
     ("facts", "effect", "why", "detection", "after"),
     [
-        (NOMINAL, Effect.UNAFFECTED, "", "", None),
-        (replace(NOMINAL, result=replace(NOMINAL.result, end_ns=12 * SECOND)), Effect.UNAFFECTED, "2 s later", "", None),
-        (replace(NOMINAL, result=failing()), Effect.UNSAFE, "guard: x > 3", "", None),
-        (replace(NOMINAL, result=failing("size")), Effect.WRONG_PART, "size: x > 3", "", None),
-        (replace(NOMINAL, collisions=1), Effect.UNSAFE, "a collision", "", None),
-        (replace(NOMINAL, result=replace(NOMINAL.result, error="too many")), Effect.UNSAFE, "an error: too many", "", None),
-        (replace(NOMINAL, result=failing(EXPECTATIONS)), Effect.WRONG_PART, "expected x > 3", "expectation of a script", 1.0),
+        (NOMINAL, FaultEffect.UNAFFECTED, "", "", None),
+        (replace(NOMINAL, result=replace(NOMINAL.result, end_ns=12 * SECOND)), FaultEffect.UNAFFECTED, "2 s later", "", None),
+        (replace(NOMINAL, result=failing()), FaultEffect.UNSAFE, "guard: x > 3", "", None),
+        (replace(NOMINAL, result=failing("size")), FaultEffect.WRONG_PART, "size: x > 3", "", None),
+        (replace(NOMINAL, collisions=1), FaultEffect.UNSAFE, "a collision", "", None),
+        (replace(NOMINAL, result=replace(NOMINAL.result, error="too many")), FaultEffect.UNSAFE, "an error: too many", "", None),
+        (
+            replace(NOMINAL, result=failing(EXPECTATIONS)),
+            FaultEffect.WRONG_PART,
+            "expected x > 3",
+            "expectation of a script",
+            1.0,
+        ),
         (
             replace(NOMINAL, result=replace(NOMINAL.result, measures={"made": 4.0})),
-            Effect.WRONG_PART,
+            FaultEffect.WRONG_PART,
             "made is 4 instead of 5",
             "",
             None,
         ),
-        (replace(NOMINAL, ended=None), Effect.HANGS, "nothing noticed", "", None),
-        (replace(NOMINAL, ended=None, is_moving=True), Effect.HANGS, "an axis moves", "", None),
-        (replace(NOMINAL, is_done=False), Effect.HANGS, "not done; everything stands", "", None),
-        (replace(NOMINAL, is_done=True, ended=None), Effect.UNAFFECTED, "", "", None),
+        (replace(NOMINAL, ended=None), FaultEffect.HANGS, "nothing noticed", "", None),
+        (replace(NOMINAL, ended=None, is_moving=True), FaultEffect.HANGS, "an axis moves", "", None),
+        (replace(NOMINAL, is_done=False), FaultEffect.HANGS, "not done; everything stands", "", None),
+        (replace(NOMINAL, is_done=True, ended=None), FaultEffect.UNAFFECTED, "", "", None),
         (
             replace(NOMINAL, overdue=(5 * SECOND, "waited for x"), overdues=1),
-            Effect.SAFE_STOP,
+            FaultEffect.SAFE_STOP,
             "waited for x",
             "time-out of a script",
             2.0,
         ),
-        (replace(NOMINAL, alarm_ns=7 * SECOND, has_alarm=True, ended=None), Effect.SAFE_STOP, "an alarm", "alarm", 4.0),
-        (replace(NOMINAL, alarm_ns=7 * SECOND, has_alarm=True, is_moving=True), Effect.HANGS, "an axis moves", "alarm", 4.0),
+        (replace(NOMINAL, alarm_ns=7 * SECOND, has_alarm=True, ended=None), FaultEffect.SAFE_STOP, "an alarm", "alarm", 4.0),
+        (replace(NOMINAL, alarm_ns=7 * SECOND, has_alarm=True, is_moving=True), FaultEffect.HANGS, "an axis moves", "alarm", 4.0),
     ],
 )
-def test_effects(facts: RunFacts, effect: Effect, why: str, detection: str, after: float | None) -> None:
+def test_effects(facts: RunFacts, effect: FaultEffect, why: str, detection: str, after: float | None) -> None:
     found = judge(facts, NOMINAL, 3 * SECOND, product=("size",))
     assert found.effect is effect
     assert why in found.why
@@ -68,7 +74,7 @@ def test_effects(facts: RunFacts, effect: Effect, why: str, detection: str, afte
 
 def test_what_fails_without_a_fault_does_not_count() -> None:
     nominal = replace(NOMINAL, result=failing())
-    assert judge(nominal, nominal, 0).effect is Effect.UNAFFECTED
+    assert judge(nominal, nominal, 0).effect is FaultEffect.UNAFFECTED
 
 
 def matrix_of(example: str, folder: Path, text: str, jobs: int = 1) -> FaultMatrix:

@@ -19,7 +19,7 @@ LATER = 0.01
 COLLISION = "collision"
 
 
-class Effect(enum.StrEnum):
+class FaultEffect(enum.StrEnum):
     """From the best to the worst. A run has the worst one that fits, but for a safe stop, which explains why nothing was made."""
 
     UNAFFECTED = "unaffected"
@@ -50,7 +50,7 @@ class RunFacts:
 class Judgement:
     """``why``: in words; ``detection``: what noticed the fault; ``after_ns``: how long after it was set."""
 
-    effect: Effect
+    effect: FaultEffect
     why: str
     detection: str
     after_ns: Nanos | None
@@ -105,28 +105,32 @@ def judge(facts: RunFacts, nominal: RunFacts, set_ns: Nanos, product: Collection
     return Judgement(effect, why, detection, after)
 
 
-def _effect(facts: RunFacts, nominal: RunFacts, product: frozenset[str]) -> tuple[Effect, str]:
+def _effect(facts: RunFacts, nominal: RunFacts, product: frozenset[str]) -> tuple[FaultEffect, str]:
     result = facts.result
     if result.error is not None:
-        return Effect.UNSAFE, f"the run ended with an error: {result.error.strip().partition(chr(10))[0]}"
+        return FaultEffect.UNSAFE, f"the run ended with an error: {result.error.strip().partition(chr(10))[0]}"
     wrong = _failed(result)
     for name in _failed(nominal.result):
         wrong.pop(name, None)
     expected = wrong.pop(EXPECTATIONS, None)
     unsafe = [verdict for name, verdict in wrong.items() if name not in product]
     if unsafe:
-        return Effect.UNSAFE, "; ".join(_said(verdict) for verdict in unsafe)
+        return FaultEffect.UNSAFE, "; ".join(_said(verdict) for verdict in unsafe)
     if facts.collisions > nominal.collisions:
-        return Effect.UNSAFE, "a collision"
+        return FaultEffect.UNSAFE, "a collision"
     if facts.has_alarm and not nominal.has_alarm:
-        return (Effect.HANGS, "an alarm, but an axis moves at the end") if facts.is_moving else (Effect.SAFE_STOP, "an alarm")
+        return (
+            (FaultEffect.HANGS, "an alarm, but an axis moves at the end")
+            if facts.is_moving
+            else (FaultEffect.SAFE_STOP, "an alarm")
+        )
     missing = _missing(facts, nominal)
     if missing and facts.is_moving:
-        return Effect.HANGS, f"{missing}; an axis moves at the end"
+        return FaultEffect.HANGS, f"{missing}; an axis moves at the end"
     if missing and facts.overdues > nominal.overdues:
-        return Effect.SAFE_STOP, f"{missing}; everything stands, and a script noticed"
+        return FaultEffect.SAFE_STOP, f"{missing}; everything stands, and a script noticed"
     if missing:
-        return Effect.HANGS, f"{missing}; everything stands, and nothing noticed"
+        return FaultEffect.HANGS, f"{missing}; everything stands, and nothing noticed"
     different = [_said(verdict) for verdict in wrong.values()]
     different += [f"expected {expected.why}"] if expected is not None else []
     different += [
@@ -135,8 +139,8 @@ def _effect(facts: RunFacts, nominal: RunFacts, product: frozenset[str]) -> tupl
         if value != nominal.result.measures.get(name)
     ]
     if different:
-        return Effect.WRONG_PART, "; ".join(different)
-    return Effect.UNAFFECTED, _later(facts, nominal)
+        return FaultEffect.WRONG_PART, "; ".join(different)
+    return FaultEffect.UNAFFECTED, _later(facts, nominal)
 
 
 def _failed(result: CaseResult) -> dict[str, Verdict]:

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from steptwin.campaign.case import Case, FaultAt
 from steptwin.campaign.cases import Cases
 from steptwin.campaign.description import CampaignDescription, MatrixRules
-from steptwin.campaign.effects import Effect, FactsWatch, Judgement, RunFacts, judge
+from steptwin.campaign.effects import FaultEffect, FactsWatch, Judgement, RunFacts, judge
 from steptwin.campaign.inventory import PossibleFault, occasions, possible_faults
 from steptwin.campaign.phases import MOST_PHASES, CyclePhase, cycle_phases
 from steptwin.campaign.report.matrixpage import matrix_page
@@ -68,9 +68,9 @@ class FaultMatrix:
     coverage: Coverage
 
     @property
-    def counts(self) -> dict[Effect, int]:
+    def counts(self) -> dict[FaultEffect, int]:
         found = Counter(cell.judgement.effect for row in self.rows for cell in row.cells)
-        return {effect: found[effect] for effect in Effect}
+        return {effect: found[effect] for effect in FaultEffect}
 
     def plain(self) -> dict[str, Any]:
         """As JSON."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -193,6 +194,9 @@ def read_campaign(name: str, text: str, folder: Path) -> CampaignDescription:
         text_of_world, files = world.spec.text.source.text, dict(world.files)
         checks.read_files((folder / head["world"]).parent, files)
         checks.check_in(world, files, faults, steps, measures)
+        for key in ("done", "alarm"):
+            if (text := getattr(matrix, key)) is not None:
+                toml.unless_wrong((MATRIX, key), partial(world.condition, text))
     toml.check()
     named: dict[str, Any] = {**head, "name": head["name"] or Path(name).stem, "world": str(folder / head["world"])}
     return CampaignDescription(

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from steptwin.campaign.effects import Effect
+from steptwin.campaign.effects import FaultEffect
 from steptwin.campaign.faultmatrix import FaultMatrix, fault_matrix
 from steptwin.campaign.reading import MOST_PHASES, load_campaign
 from steptwin.errors import Misuse
@@ -40,7 +40,7 @@ def faults(file: Path, out: Path | None, write: Print, *, jobs: int | None, phas
     else:
         _print(matrix, write)
         write(f"{time.monotonic() - began:.1f} s; {', '.join(str(path) for path in written)}")
-    return not matrix.counts[Effect.UNSAFE]
+    return not matrix.counts[FaultEffect.UNSAFE]
 
 
 def _progress(done: int, total: int) -> None:
@@ -53,7 +53,7 @@ def _progress(done: int, total: int) -> None:
 def _print(matrix: FaultMatrix, write: Print) -> None:
     counts = ", ".join(f"{effect} {count}" for effect, count in matrix.counts.items())
     write(f"{matrix.name}: {len(matrix.rows)} faults at {len(matrix.phases)} phases: {counts}")
-    unsafe = [(row, cell) for row in matrix.rows for cell in row.cells if cell.judgement.effect is Effect.UNSAFE]
+    unsafe = [(row, cell) for row in matrix.rows for cell in row.cells if cell.judgement.effect is FaultEffect.UNSAFE]
     for row, cell in unsafe[:MOST_LINES]:
         write(f"unsafe: {row.function}, {row.possible.mode}, phase {matrix.phases[cell.phase].number}: {cell.judgement.why}")
     if len(unsafe) > MOST_LINES:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from html import escape
 from typing import TYPE_CHECKING
 
-from steptwin.campaign.effects import Effect
+from steptwin.campaign.effects import FaultEffect
 from steptwin.campaign.report.html import link, page, table
 from steptwin.coverage.table import percent_text
 from steptwin.machine import SECOND
@@ -22,11 +22,11 @@ _STYLE = """
 span.e { padding: .1rem .5rem; margin-right: .7rem; }
 """
 _MEANINGS = {
-    Effect.UNAFFECTED: "the same parts were made",
-    Effect.SAFE_STOP: "it stands, and an alarm or a script noticed",
-    Effect.HANGS: "it did not go on, and nothing noticed, or it still moves",
-    Effect.WRONG_PART: "it went on to its end with another result",
-    Effect.UNSAFE: "a property failed",
+    FaultEffect.UNAFFECTED: "the same parts were made",
+    FaultEffect.SAFE_STOP: "it stands, and an alarm or a script noticed",
+    FaultEffect.HANGS: "it did not go on, and nothing noticed, or it still moves",
+    FaultEffect.WRONG_PART: "it went on to its end with another result",
+    FaultEffect.UNSAFE: "a property failed",
 }
 
 
@@ -35,7 +35,7 @@ def matrix_page(matrix: FaultMatrix) -> str:
     counts = matrix.counts
     legend = table(
         ("effect", "cells", "meaning"),
-        [(_mark(effect), str(counts[effect]), escape(_MEANINGS[effect])) for effect in Effect],
+        [(_mark(effect), str(counts[effect]), escape(_MEANINGS[effect])) for effect in FaultEffect],
         (1,),
     )
     ended = f", ended by {matrix.nominal.ended!r}" if matrix.nominal.ended else ""
@@ -54,7 +54,7 @@ def matrix_page(matrix: FaultMatrix) -> str:
     return page(title, body, _STYLE)
 
 
-def _mark(effect: Effect) -> str:
+def _mark(effect: FaultEffect) -> str:
     return f'<span class="e {effect.replace(" ", "-")}">{effect}</span>'
 
 
@@ -89,18 +89,18 @@ def _cell(cell: MatrixCell) -> str:
     judged = cell.judgement
     why = judged.why or ("" if cell.is_struck else "it did not come to it")
     title = escape(f"{cell.fault}. {why}", quote=True)
-    text = escape(judged.effect if judged.effect is not Effect.UNAFFECTED else "·" if cell.is_struck else "–")
+    text = escape(judged.effect if judged.effect is not FaultEffect.UNAFFECTED else "·" if cell.is_struck else "–")
     inner = f'<a href="{escape(cell.session, quote=True)}">{text}</a>' if cell.session else text
     return f'<td class="e {judged.effect.replace(" ", "-")}" title="{title}">{inner}</td>'
 
 
 def _effects(matrix: FaultMatrix) -> str:
-    worst = {effect: n for n, effect in enumerate(reversed(Effect))}
+    worst = {effect: n for n, effect in enumerate(reversed(FaultEffect))}
     found = [
         (worst[cell.judgement.effect], row, cell)
         for row in matrix.rows
         for cell in row.cells
-        if cell.judgement.effect is not Effect.UNAFFECTED
+        if cell.judgement.effect is not FaultEffect.UNAFFECTED
     ]
     rows = [
         (
