@@ -10,17 +10,21 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from heapq import heapify, heappop, heappush
 from itertools import count
+from typing import Generic, TypeAlias, TypeVar
 
 from steptwin.machine import Nanos
 from steptwin.world.kernel import Kernel, Source
+from steptwin.world.observing import WorldObserver
 from steptwin.world.running import Script
 from steptwin.world.turns import Dues
 
+Waiter: TypeAlias = "Script | WorldObserver"
+W = TypeVar("W", Script, WorldObserver)
 _FEW = 64
 """Number of outdated entries that a queue tolerates before it removes them."""
 
 
-class _Queue:
+class _Queue(Generic[W]):
     """A priority queue of scripts by due moment; scripts due at the same moment keep their order.
 
     Only the last entry of a script is valid. Entries are numbered by ``count``, which several queues share.
@@ -30,10 +34,10 @@ class _Queue:
 
     def __init__(self, count: Iterator[int]) -> None:
         self._count = count
-        self._entries: list[tuple[Nanos, int, int, Script]] = []
+        self._entries: list[tuple[Nanos, int, int, W]] = []
         self._room = _FEW
 
-    def put(self, script: Script, due: Nanos) -> None:
+    def put(self, script: W, due: Nanos) -> None:
         """Make a script due at ``due``, instead of at an earlier entry."""
         script.entry = next(self._count)
         heappush(self._entries, (due, script.number, script.entry, script))
@@ -49,7 +53,7 @@ class _Queue:
             heappop(entries)
         return entries[0][0] if entries else None
 
-    def take(self, now: Nanos) -> Script | None:
+    def take(self, now: Nanos) -> W | None:
         """Remove and return a script that is due by ``now``; None if there is none."""
         first = self.first()
         if first is None or first > now:
@@ -59,27 +63,27 @@ class _Queue:
         return script
 
 
-class Agenda:
+class Agenda(Generic[W]):
     """The waiting scripts: those that wait for a moment, and those that wait for a condition or an answer."""
 
     __slots__ = ("_timed", "_watching")
 
     def __init__(self) -> None:
         numbers = count(1)
-        self._timed = _Queue(numbers)
-        self._watching = _Queue(numbers)
+        self._timed: _Queue[W] = _Queue(numbers)
+        self._watching: _Queue[W] = _Queue(numbers)
 
-    def wait(self, script: Script, until: Nanos) -> None:
+    def wait(self, script: W, until: Nanos) -> None:
         """Let a script wait for a moment."""
         self._timed.put(script, until)
 
-    def watch(self, script: Script, due: Nanos | None) -> None:
+    def watch(self, script: W, due: Nanos | None) -> None:
         """Let a script be evaluated at ``due``; None: only when something has changed on which it depends."""
         script.entry = 0
         if due is not None:
             self._watching.put(script, due)
 
-    def remove(self, script: Script) -> None:
+    def remove(self, script: W) -> None:
         """Remove a script: its entry becomes outdated."""
         script.entry = 0
 
@@ -88,11 +92,11 @@ class Agenda:
         timed, watching = self._timed.first(), self._watching.first()
         return watching if timed is None else timed if watching is None else min(timed, watching)
 
-    def take_timed(self, now: Nanos) -> Script | None:
+    def take_timed(self, now: Nanos) -> W | None:
         """Remove and return a script whose moment has come; None if there is none."""
         return self._timed.take(now)
 
-    def take_watching(self, now: Nanos) -> list[Script]:
+    def take_watching(self, now: Nanos) -> list[W]:
         """Remove and return the scripts that are due for evaluation."""
         taken = []
         while (script := self._watching.take(now)) is not None:
@@ -109,17 +113,17 @@ class Watchers:
     def __init__(self) -> None:
         self._watch: Callable[[Kernel], None] | None = None
         """Called with every changed kernel, including those on which no script depends."""
-        self._scripts: dict[Kernel, dict[str, dict[int, Script]]] = {}
+        self._scripts: dict[Kernel, dict[str, dict[int, Waiter]]] = {}
         """By kernel, name of the source, and number."""
         self._changed: dict[Kernel, None] = {}
-        self._again: dict[int, Script] = {}
+        self._again: dict[int, Waiter] = {}
         self._kernels: list[Kernel] = []
         """All that were watched ever, by number."""
         self._numbers: dict[Kernel, int] = {}
         self._dues = Dues()
         """Of kernels on which a script depends."""
 
-    def set(self, script: Script, sources: tuple[Source, ...]) -> None:
+    def set(self, script: Waiter, sources: tuple[Source, ...]) -> None:
         """Replace what a script depends on."""
         if sources == script.sources:
             return
@@ -131,7 +135,7 @@ class Watchers:
                 self._begin(kernel)
             self._scripts[kernel].setdefault(name, {})[script.number] = script
 
-    def _leave(self, source: Source, script: Script) -> None:
+    def _leave(self, source: Source, script: Waiter) -> None:
         kernel, name = source
         named = self._scripts[kernel]
         scripts = named[name]
@@ -174,11 +178,15 @@ class Watchers:
             if kernel not in self._scripts:
                 kernel.on_change = watch
 
-    def again(self, script: Script) -> None:
+    def again(self, script: Waiter) -> None:
         """Evaluate a script again with the next `take`."""
         self._again[script.number] = script
 
-    def take(self) -> list[Script]:
+    def forget(self, script: Waiter) -> None:
+        """Do not evaluate it again."""
+        self._again.pop(script.number, None)
+
+    def take(self) -> list[Waiter]:
         """The scripts that have to be evaluated, in their order."""
         if not self._changed and not self._again:
             return []

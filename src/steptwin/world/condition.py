@@ -65,14 +65,19 @@ class SignalCondition:
 
     __slots__ = ("_brought", "_comparisons", "_crossings", "_signals", "_test", "text")
 
-    def __init__(self, text: str, signals: Signals) -> None:
-        """Raises `Misuse` for invalid text, for unknown signals, and for a number in a unit that its signals do not have."""
+    def __init__(self, text: str, signals: Signals, node: Truth | None = None) -> None:
+        """``node``: what the text says, if it is known and its numbers are in the units of its signals.
+
+        Raises `Misuse` for invalid text, for unknown signals, and for a number in a unit that its signals do not have.
+        """
         self.text = text
-        node = parse_condition(text)
+        is_new = node is None
+        node = parse_condition(text) if node is None else node
         self._signals = {name: signals(name) for name in node.names()}
         self._brought = tuple(self._signals.values())
         try:
-            node = _in_units(text, tuple((name, signal.unit) for name, signal in self._signals.items()))
+            if is_new:
+                node = _in_units(text, tuple((name, signal.unit) for name, signal in self._signals.items()))
         except Misuse as error:
             raise Misuse(f"condition {text!r}: {error}") from None
         self._test = truth_of(node, {name: signal.value for name, signal in self._signals.items()})

@@ -50,7 +50,7 @@ REMEMBERED = 512
 """Conditions whose parts are remembered by their text, since worlds of one description have the same."""
 """Limit of the characters of an expression."""
 
-_COMPARE: Mapping[str, Callable[[float, float], bool]] = {"==": eq, "!=": ne, "<=": le, ">=": ge, "<": lt, ">": gt}
+COMPARE: Mapping[str, Callable[[float, float], bool]] = {"==": eq, "!=": ne, "<=": le, ">=": ge, "<": lt, ">": gt}
 _OTHER_SIGNS: Mapping[str, str] = {"=": "==", "<>": "!=", "&&": "and", "||": "or"}
 _WORDS = ("and", "or", "not")
 _OPERATIONS = ("+", "-", "*", "/", "%")
@@ -75,11 +75,11 @@ class Comparison:
         yield from self.right.names()
 
     def value(self, values: Callable[[str], float]) -> float:
-        return float(_COMPARE[self.sign](self.left.value(values), self.right.value(values)))
+        return float(COMPARE[self.sign](self.left.value(values), self.right.value(values)))
 
     def range(self, ranges: Callable[[str], Range]) -> Range:
         touched = sides(*Sum(self.left, -1, self.right).range(ranges))
-        truths = {False, True} if NO_NUMBER in touched else {_COMPARE[self.sign](side, 0) for side in touched}
+        truths = {False, True} if NO_NUMBER in touched else {COMPARE[self.sign](side, 0) for side in touched}
         return float(min(truths)), float(max(truths))
 
     def in_unit(self, unit: str, unit_of: UnitOf) -> Comparison:
@@ -135,12 +135,12 @@ Truth: TypeAlias = Comparison | Not | Junction
 @lru_cache(maxsize=REMEMBERED)
 def parse_condition(text: str) -> Truth:
     """Parse what is true or false. Raises `Misuse` with the column, the found and the expected token."""
-    return _Parser(text, "condition").condition()
+    return ConditionParser(text, "condition").condition()
 
 
 def parse_expression(text: str) -> Quantity:
     """Parse what has a value; a number counts as true if it is not 0. Raises `Misuse` as `parse_condition`."""
-    return _Parser(text, "expression").whole()
+    return ConditionParser(text, "expression").whole()
 
 
 def comparisons(node: Truth) -> Iterator[Comparison]:
@@ -160,7 +160,7 @@ def truth_of(node: Truth, reads: Mapping[str, ReadAt], check: Callable[[float], 
     ``reads``: the values of its names. ``check`` is applied to each calculated number before it is compared.
     """
     if isinstance(node, Comparison):
-        compare, left, right = _COMPARE[node.sign], value_of(node.left, reads, check), value_of(node.right, reads, check)
+        compare, left, right = COMPARE[node.sign], value_of(node.left, reads, check), value_of(node.right, reads, check)
         return lambda now: compare(left(now), right(now))
     if isinstance(node, Not):
         inner = truth_of(node.inner, reads, check)
@@ -186,13 +186,13 @@ def value_of(node: Quantity, reads: Mapping[str, ReadAt], check: Callable[[float
     return lambda now: node.value(lambda name: reads[name](now))
 
 
-class _Parser:
-    """``kind``: ``condition``, in which numbers must be compared, or ``expression``."""
+class ConditionParser:
+    """``kind``: ``expression``; or ``condition`` and what is made of conditions, in which numbers must be compared."""
 
     def __init__(self, text: str, kind: str) -> None:
         self._shown = f"{kind} {text!r}"
         self._start = f"{kind} {text[:40]!r}..."
-        self._must_compare = kind == "condition"
+        self._must_compare = kind != "expression"
         self._operand = "a signal or a number" if self._must_compare else "a name or a number"
         if len(text) > LONGEST:
             raise Misuse(f"{self._start} has {len(text)} characters: permitted are {LONGEST}")
@@ -255,7 +255,7 @@ class _Parser:
         if isinstance(node, Comparison | Not | Junction):
             return node
         if self._must_compare and not isinstance(node, SignalName):
-            raise self._wrong(f"one of {' '.join(_COMPARE)}")
+            raise self._wrong(f"one of {' '.join(COMPARE)}")
         return Comparison(node, "!=", NumberLiteral(0.0))
 
     def _or(self) -> Quantity:
@@ -283,7 +283,7 @@ class _Parser:
 
     def _compare(self) -> Quantity:
         left = self._sum()
-        sign = self._accept(*_COMPARE)
+        sign = self._accept(*COMPARE)
         return Comparison(left, sign, self._sum()) if sign else left
 
     def _sum(self) -> Quantity:

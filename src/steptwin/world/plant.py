@@ -30,6 +30,7 @@ from steptwin.world.kernel import Kernel, KernelState
 from steptwin.world.kind import AnyKind, EncoderInputs, NamedRegisters, NewValues, Vision, lacks
 from steptwin.world.lines import Line
 from steptwin.world.names import Unknown
+from steptwin.world.observing import WorldObserver
 from steptwin.world.overrides import Overrides
 from steptwin.world.parts import WorldParts
 from steptwin.world.programs import Programs
@@ -182,10 +183,11 @@ class Plant:
         if found is None:
             if len(self._conditions) >= MOST_REMEMBERED:
                 self._conditions.clear()
-            found = self._conditions[text] = SignalCondition(text, self._watched)
+            found = self._conditions[text] = SignalCondition(text, self.watched)
         return found
 
-    def _watched(self, name: str) -> SignalOf | Idle:
+    def watched(self, name: str) -> SignalOf | Idle:
+        """A signal for a condition. Raises `Misuse` with the existing names, and for one that conditions cannot use."""
         found = self.signal(name)
         found.watch(name)
         return found
@@ -224,6 +226,13 @@ class Plant:
         else:
             steps = (do.At(spec.at or 0), *spec.steps)
             self.start(spec.name, partial(do.run_through, steps, spec.repeat))
+
+    def observe(self, observer: WorldObserver) -> None:
+        """Let it look at the world from now on, until `unobserve`."""
+        self._scripts.observe(observer)
+
+    def unobserve(self, observer: WorldObserver) -> None:
+        self._scripts.unobserve(observer)
 
     def start(self, name: str, make: Callable[[], do.Steps | do.Walk], *, is_external: bool = False) -> Script:
         """Start a script now. ``make`` creates its steps; it is called again when a snapshot is restored."""
@@ -370,7 +379,7 @@ class Plant:
 
     def next(self) -> Nanos | None:
         """The time of the next event of a script; None if there is none."""
-        return _first(*self._scripts.first())
+        return _first(_first(*self._scripts.first()), self._scripts.first_observed(), None)
 
     def advance(self, now: Nanos) -> None:
         """Advance the scripts, and the kernels they depend on, to ``now``, or to the moment at which a script stops the run.
@@ -383,9 +392,14 @@ class Plant:
         while True:
             kernels, own, guests = self._scripts.first()
             due = _first(kernels, own, guests)
+            observed = self._scripts.first_observed()
+            if observed is not None and (due is None or observed < due):
+                due = observed
             if due is None or due > (now if self.stopped is None else self.now):
                 break
-            self.now = max(due, self.now)
+            if due > self.now:
+                self._scripts.leave(due)
+                self.now = due
             rounds, at = (rounds + 1, at) if self.now == at else (0, self.now)
             if rounds > MOST_STEPS_PER_INSTANT:
                 raise Runaway(f"scripts loop without end at {self.now} ns")
@@ -393,11 +407,15 @@ class Plant:
                 self._scripts.advance_kernels()
             elif own is not None and own <= self.now:
                 self._scripts.run_described()
-            else:
+            elif guests is not None and guests <= self.now:
                 self.is_settled = True
                 self._scripts.run_external()
+            else:
+                self._scripts.look()
         self.is_settled = True
         if self.stopped is None:
+            if now > self.now:
+                self._scripts.leave(now)
             self.now = now
 
     def watch_kernels(self, watch: Callable[[Kernel], None]) -> None:

@@ -15,6 +15,7 @@ from steptwin.world.agenda import Agenda, Watchers
 from steptwin.world.kernel import Kernel
 from steptwin.world.master import Master
 from steptwin.world.motions import motion_ends, ordered
+from steptwin.world.observing import WorldObserver
 from steptwin.world.running import PendingRequests, Script, ScriptState, ScriptWait
 
 if TYPE_CHECKING:
@@ -42,7 +43,10 @@ class Scripts:
         self._plant = plant
         self._begun = 0
         self._scripts: dict[int, Script] = {}
-        self._described, self._external = Agenda(), Agenda()
+        self._described: Agenda[Script] = Agenda()
+        self._external: Agenda[Script] = Agenda()
+        self._observed: Agenda[WorldObserver] = Agenda()
+        self._observers: list[WorldObserver] = []
         self._watchers = Watchers()
 
     def watch_kernels(self, kernels: Iterable[Kernel], watch: Callable[[Kernel], None]) -> None:
@@ -74,8 +78,38 @@ class Scripts:
         if self._scripts.get(script.number) is script:  # a step may have restored another state
             del self._scripts[script.number]
 
-    def _agenda_of(self, script: Script) -> Agenda:
+    def _agenda_of(self, script: Script) -> Agenda[Script]:
         return self._external if script.is_external else self._described
+
+    # ------------------------------------------------------------------ observers
+
+    def observe(self, observer: WorldObserver) -> None:
+        """Let it look from now on, after all scripts of each moment."""
+        observer.number = min((one.number for one in self._observers), default=0) - 1
+        self._observers.append(observer)
+        self._watchers.again(observer)
+
+    def unobserve(self, observer: WorldObserver) -> None:
+        self._observers.remove(observer)
+        self._observed.remove(observer)
+        self._watchers.set(observer, ())
+        self._watchers.forget(observer)
+
+    def first_observed(self) -> Nanos | None:
+        """The moment at which an observer looks next, after `first`."""
+        return self._observed.first() if self._observers else None
+
+    def leave(self, moment: Nanos) -> None:
+        """Time goes on to ``moment``, at which nothing has happened yet."""
+        for observer in self._observers:
+            observer.leave(moment)
+
+    def look(self) -> None:
+        """Let observers look that are due now."""
+        for observer in self._observed.take_watching(self._plant.now):
+            sources, due = observer.look(self._plant.now)
+            self._watchers.set(observer, sources)
+            self._observed.watch(observer, due)
 
     # ------------------------------------------------------------------ scheduling
 
@@ -92,7 +126,10 @@ class Scripts:
         """Update the due moments of scripts when something has changed on which they depend."""
         while changed := self._watchers.take():
             for script in changed:
-                self._plan(script)
+                if isinstance(script, Script):
+                    self._plan(script)
+                else:
+                    self._observed.watch(script, self._plant.now)
 
     def _wait(self, script: Script, waiting: ScriptWait) -> None:
         script.waiting = waiting
@@ -134,7 +171,7 @@ class Scripts:
         """Run the external scripts that are due now."""
         self._run(self._external)
 
-    def _run(self, agenda: Agenda) -> None:
+    def _run(self, agenda: Agenda[Script]) -> None:
         """Run scripts whose moment has come, then those with conditions, each once and in order. A script that becomes due after
         its turn runs with the next call."""
         plant = self._plant  # its moment changes if a step restores a snapshot
@@ -291,6 +328,9 @@ class Scripts:
         for script in list(self._scripts.values()):
             self.end(script)
         self._begun = state.begun
+        for observer in self._observers:
+            observer.rewind(self._plant.now)
+            self._watchers.again(observer)
         for one in state.scripts:
             script = self._scripts[one.number] = Script.at(one)
             if one.waiting is not None:

@@ -1,0 +1,207 @@
+"""How far a property is from being violated: quantitative semantics of signal temporal logic.
+
+Values are from -1 to 1, and their sign is the truth: what is true by nothing has `TINY` instead of 0. A window that ends after
+the run is not decided unless it is by then; under `always` it counts as true, under `eventually` as false.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import reduce
+
+from steptwin.campaign.properties.slopes import (
+    TINY,
+    Shape,
+    Slope,
+    constant,
+    from_on,
+    greatest,
+    held_until,
+    least,
+    negative,
+    rises,
+    steps,
+    value_at,
+    within,
+)
+from steptwin.campaign.properties.tree import Atom, Becoming, Combination, CycleTime, Holding, Lasting, PropertyFormula, Tally
+from steptwin.machine import Nanos
+from steptwin.world.expression import COMPARE
+
+
+def forced(value: float, *, holds: bool) -> float:
+    """Within -1 and 1, with the sign of the truth."""
+    return min(max(value, TINY), 1.0) if holds else max(min(value, -TINY), -1.0)
+
+
+class Evaluation:
+    """Of the courses of all comparisons, over one time."""
+
+    def __init__(self, atoms: Mapping[Atom, Shape]) -> None:
+        self._atoms = atoms
+        some = next(iter(atoms.values()))
+        self.begin, self.end = some[0].begin, some[-1].end
+        self._known: dict[tuple[int, bool], Shape] = {}
+
+    def course(self, node: PropertyFormula, *, undecided: bool = True) -> Shape:
+        """``undecided``: what a window counts as that is not decided when the run ends."""
+        key = id(node), undecided
+        found = self._known.get(key)
+        if found is None:
+            found = self._known[key] = self._course(node, undecided)
+        return found
+
+    def _course(self, node: PropertyFormula, undecided: bool) -> Shape:
+        match node:
+            case Atom():
+                return self._atoms[node]
+            case Combination(word, inner):
+                parts = [self.course(one, undecided=undecided) for one in inner]
+                return reduce(least if word == "and" else greatest, parts)
+            case Lasting():
+                return self._lasting(node, undecided)
+            case Holding(first, then, released):
+                a, b = self.course(first, undecided=not released), self.course(then, undecided=released)
+                return negative(held_until(negative(a), negative(b))) if released else held_until(a, b)
+            case Becoming(inner, never):
+                found = self._rise(self.course(inner, undecided=False))
+                return negative(found) if never else found
+            case Tally(inner, sign, number):
+                moments = rises(self.course(inner, undecided=False))
+                return steps(moments, self.begin, self.end, lambda count: _tallied(count, sign, number))
+            case CycleTime():
+                return constant(self.begin, self.end, self._cycles(node))
+        raise AssertionError(node)
+
+    def _lasting(self, node: Lasting, undecided: bool) -> Shape:
+        length, is_once = node.length, node.word == "eventually"
+        if length is None:
+            course = self.course(node.inner, undecided=not is_once)
+            return from_on(course) if is_once else negative(from_on(negative(course)))
+        course = self.course(node.inner, undecided=undecided)
+        if is_once:
+            return self._open(within(course, length), length, undecided)
+        return negative(self._open(within(negative(course), length), length, not undecided))
+
+    def _open(self, course: Shape, length: Nanos, undecided: bool) -> Shape:
+        """Windows that end after the run: as they are where true, otherwise true if that is what undecided counts as."""
+        last = self.end - length
+        if not undecided or last >= self.end:
+            return course
+        found: Shape = []
+        for slope in course:
+            if slope.end <= last or slope.first > 0.0:
+                found.append(slope)
+                continue
+            if slope.begin <= last:
+                found.append(slope.cut(slope.begin, last))
+            found.append(Slope(max(slope.begin, last + 1), slope.end, 1.0, 1.0))
+        return found
+
+    def _rise(self, course: Shape) -> Shape:
+        """1 at its moments; elsewhere as far as it is away, -1 where it has been."""
+        found: Shape = []
+        at = set(rises(course))
+        for slope in course:
+            if slope.first <= 0.0:
+                found.append(slope)
+                continue
+            begin = slope.begin
+            if begin in at:
+                found.append(Slope(begin, begin, 1.0, 1.0))
+                begin += 1
+            if begin <= slope.end:
+                found.append(Slope(begin, slope.end, -1.0, -1.0))
+        return found
+
+    # ------------------------------------------------------------------ cycles
+
+    def cycles(self, node: CycleTime) -> tuple[list[tuple[Nanos, Nanos]], Nanos | None]:
+        """Begin and end of each, and the begin of one that has not ended."""
+        begins = rises(self.course(node.begin, undecided=False))
+        ends = rises(self.course(node.end, undecided=False))
+        found: list[tuple[Nanos, Nanos]] = []
+        n = 0
+        for begin in begins:
+            while n < len(ends) and ends[n] <= begin:
+                n += 1
+            if n == len(ends):
+                return found, begin
+            found.append((begin, ends[n]))
+        return found, None
+
+    def _cycles(self, node: CycleTime) -> float:
+        closed, begun = self.cycles(node)
+        values = [_timed(end - begin, node.sign, node.limit) for begin, end in closed]
+        if begun is not None:
+            so_far = _timed(self.end - begun, node.sign, node.limit)
+            if node.sign in ("<", "<=") and so_far < 0.0:
+                values.append(so_far)
+        return max(values, default=-1.0) if node.some else min(values, default=1.0)
+
+    # ------------------------------------------------------------------ where it is decided
+
+    def decided(self, node: PropertyFormula, moment: Nanos, *, undecided: bool = True) -> tuple[Nanos, PropertyFormula]:
+        """The moment, and the part of a formula, by which its value at ``moment`` is decided."""
+        value = value_at(self.course(node, undecided=undecided), moment)
+        match node:
+            case Combination(_, inner):
+                close = [one for one in inner if abs(value_at(self.course(one, undecided=undecided), moment) - value) < TINY]
+                return self.decided((close or list(inner))[-1], moment, undecided=undecided)
+            case Lasting(word, length, inner):
+                below = undecided if length is not None else word == "always"
+                end = self.end if length is None else min(self.end, moment + length)
+                course = self.course(inner, undecided=below)
+                if word == "eventually":
+                    reached = _first(course, moment, end, lambda one: one > 0.0) if value > 0.0 else None
+                    return (end, node) if reached is None else self.decided(inner, reached, undecided=below)
+                failed = _first(course, moment, end, lambda one: one <= 0.0) if value <= 0.0 else None
+                return self.decided(inner, _lowest(course, moment, end) if failed is None else failed, undecided=below)
+            case Holding(first, _, released) if value <= 0.0 and not released:
+                failed = _first(self.course(first), moment, self.end, lambda one: one <= 0.0)
+                return (self.end, node) if failed is None else self.decided(first, failed)
+            case CycleTime(limit=limit):
+                closed, begun = self.cycles(node)
+                every = [(_timed(end - begin, node.sign, limit), begin, end) for begin, end in closed]
+                if begun is not None and node.sign in ("<", "<="):
+                    every.append((_timed(self.end - begun, node.sign, limit), begun, self.end))
+                worst = min(every, default=(0.0, moment, moment))
+                return min(worst[2], worst[1] + limit) if node.sign in ("<", "<=") and worst[0] < 0 else worst[2], node
+            case Tally(inner, sign, number) if sign in ("<", "<=") and value <= 0.0:
+                moments = [one for one in rises(self.course(inner, undecided=False)) if one >= moment]
+                return moments[min(int(number), len(moments) - 1)], node
+        return moment, node
+
+
+def _first(course: Shape, begin: Nanos, end: Nanos, test: Callable[[float], bool]) -> Nanos | None:
+    for slope in course:
+        if slope.end >= begin and slope.begin <= end and test(slope.first):
+            return max(slope.begin, begin)
+    return None
+
+
+def _lowest(course: Shape, begin: Nanos, end: Nanos) -> Nanos:
+    best: tuple[float, Nanos] | None = None
+    for slope in course:
+        if slope.end >= begin and slope.begin <= end:
+            for at in (max(slope.begin, begin), min(slope.end, end)):
+                if best is None or slope.at(at) < best[0]:
+                    best = slope.at(at), at
+    return begin if best is None else best[1]
+
+
+def _tallied(count: int, sign: str, number: float) -> float:
+    holds = bool(COMPARE[sign](count, number))
+    if sign in ("==", "!="):
+        return (
+            1.0 if holds and sign == "==" else forced(abs(count - number) * (1 if holds else -1) / max(number, 1.0), holds=holds)
+        )
+    away = number + (0.5 if sign == "<=" else -0.5 if sign in ("<", ">=") else 0.5) - count
+    return forced((away if sign in ("<", "<=") else -away) / max(number, 1.0), holds=holds)
+
+
+def _timed(length: Nanos, sign: str, limit: Nanos) -> float:
+    holds = bool(COMPARE[sign](length, limit))
+    if sign in ("==", "!="):
+        return 1.0 if holds else -1.0
+    return forced((limit - length if sign in ("<", "<=") else length - limit) / max(limit, 1), holds=holds)

@@ -1,0 +1,54 @@
+"""A property in words: what decided it, as it would be written."""
+
+from __future__ import annotations
+
+from steptwin.campaign.properties.tree import Atom, Becoming, Combination, CycleTime, Holding, Lasting, PropertyFormula, Tally
+from steptwin.durations import duration_text
+from steptwin.world.expression import Comparison
+from steptwin.world.quantities import Absolute, NumberLiteral, Product, Quantity, Remainder, SignalName, Sum
+
+
+def quantity_text(node: Quantity) -> str:
+    match node:
+        case SignalName(text):
+            return text
+        case NumberLiteral(number, unit):
+            return f"{number:.12g} {unit}".rstrip()
+        case Sum(left, sign, right):
+            return f"({quantity_text(left)} {'+' if sign > 0 else '-'} {quantity_text(right)})"
+        case Product(left, right, divides):
+            return f"({quantity_text(left)} {'/' if divides else '*'} {quantity_text(right)})"
+        case Remainder(left, right):
+            return f"({quantity_text(left)} % {quantity_text(right)})"
+        case Absolute(inner):
+            return f"abs({quantity_text(inner).removeprefix('(').removesuffix(')')})"
+        case Comparison(left, sign, right):
+            return f"{quantity_text(left)} {sign} {quantity_text(right)}"
+    return "(...)"
+
+
+def formula_text(node: PropertyFormula) -> str:
+    match node:
+        case Atom(comparison):
+            return quantity_text(comparison)
+        case Combination(word, inner):
+            return f" {word} ".join(map(_inner_text, inner))
+        case Lasting(word, None, inner):
+            return f"{word} {_inner_text(inner)}"
+        case Lasting("eventually", length, inner):
+            return f"within {duration_text(length or 0)} {_inner_text(inner)}"
+        case Lasting(_, length, inner):
+            return f"{_inner_text(inner)} for {duration_text(length or 0)}"
+        case Holding(first, then, released):
+            return f"{_inner_text(first)} {'unless' if released else 'until'} {_inner_text(then)}"
+        case Becoming(inner, never):
+            return f"{_inner_text(inner)} does {'not ' if never else ''}become true"
+        case Tally(inner, sign, number):
+            return f"count({formula_text(inner)}) {sign} {number:g}"
+        case CycleTime(begin, end, sign, limit):
+            return f"time between {_inner_text(begin)} and {_inner_text(end)} {sign} {duration_text(limit)}"
+    raise AssertionError(node)
+
+
+def _inner_text(node: PropertyFormula) -> str:
+    return formula_text(node) if isinstance(node, Atom | Tally) else f"({formula_text(node)})"

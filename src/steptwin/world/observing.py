@@ -1,0 +1,29 @@
+"""Observers of a running world: they see its signals at every moment at which these change, and change nothing."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from steptwin.machine import Nanos
+from steptwin.world.kernel import Source
+
+
+class WorldObserver(Protocol):
+    number: int
+    """Below 0, given by `steptwin.world.scripts.Scripts.observe`."""
+    entry: int
+    """The number of its valid entry in an agenda."""
+    sources: tuple[Source, ...]
+    """The machines, lines and elements on which what it sees depends."""
+
+    def leave(self, moment: Nanos) -> None:
+        """Before anything happens at ``moment``: what moves is still on the way that it had before."""
+        ...
+
+    def look(self, now: Nanos) -> tuple[tuple[Source, ...], Nanos | None]:
+        """After everything of ``now`` so far. Returns what it depends on, and when it looks next if none of these changes."""
+        ...
+
+    def rewind(self, now: Nanos) -> None:
+        """A snapshot was restored: what was seen from ``now`` on did not happen."""
+        ...
