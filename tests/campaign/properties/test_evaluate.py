@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from fractions import Fraction
 from typing import Any
 
@@ -163,7 +164,7 @@ def line_of(knots: list[tuple[int, Fraction]]) -> tuple[list[Slope], Values]:
     slopes: list[Slope] = []
     values: Values = []
     at = 0
-    for (steps, first), (_, last) in zip(knots, knots[1:], strict=False):
+    for (steps, first), (_, last) in itertools.pairwise(knots):
         here = [first + (last - first) * Fraction(n, steps) for n in range(steps)]
         here = [one or Fraction(1, 10**12) for one in here]
         begin = 0
