@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from steptwin.campaign.case import Case, FaultAt
 from steptwin.campaign.cases import Cases
 from steptwin.campaign.description import CampaignDescription, MatrixRules
-from steptwin.campaign.effects import FaultEffect, FactsWatch, Judgement, RunFacts, judge
+from steptwin.campaign.effects import FactsWatch, FaultEffect, Judgement, RunFacts, judge
 from steptwin.campaign.inventory import PossibleFault, occasions, possible_faults
 from steptwin.campaign.phases import MOST_PHASES, CyclePhase, cycle_phases
 from steptwin.campaign.report.matrixpage import matrix_page

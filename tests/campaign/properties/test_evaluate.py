@@ -52,7 +52,7 @@ def truth(node: PropertyFormula, signals: dict[Any, Values], t: int, *, open_is:
         case Lasting(word, None, inner):
             some = [of(inner, at, word == "always") for at in range(t, end + 1)]
             return all(some) if word == "always" else any(some)
-        case Lasting(word, length, inner):
+        case Lasting(word, int() as length, inner):
             some = [of(inner, at, open_is) for at in range(t, min(end, t + length) + 1)]
             decided = any(some) if word == "eventually" else not all(some)
             if decided:
