@@ -29,6 +29,7 @@ from steptwin.commands.demo import demo_world
 from steptwin.commands.keptsettings import keep_settings, state_directory
 from steptwin.commands.recorded import recorded
 from steptwin.commands.studio_branches import BranchStart, WorldBranches
+from steptwin.commands.studio_drawing import WorldArrangement
 from steptwin.commands.studio_recordings import WorldRecordings
 from steptwin.commands.studio_work import LineWork
 from steptwin.commands.up_world import Running, UpOptions, send_away, up, up_with
@@ -39,6 +40,7 @@ from steptwin.devices.device import DeviceSurroundings
 from steptwin.devices.worldpart import WorldPart
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
+from steptwin.files.beginning import is_session
 from steptwin.files.world import World
 from steptwin.httpservice import Tls, listen
 from steptwin.inputfiles import read_bytes
@@ -46,7 +48,8 @@ from steptwin.live.lookback import Lookback
 from steptwin.live.ports import serial_ports, twin_ports
 from steptwin.live.server import EndPoint, Server
 from steptwin.live.twins import find_device
-from steptwin.studio.hub import Hub, PresentMoment, ProgramTexts, Surroundings
+from steptwin.live.world import LiveWorld
+from steptwin.studio.hub import Hub, PresentMoment, Surroundings
 from steptwin.studio.service import StudioService
 from steptwin.studio.work import DeviceWork
 from steptwin.subject.events import Numbering
@@ -202,17 +205,17 @@ class _Page:
         recordings = None if beside is None else self._recordings(running, beside)
         branches = WorldBranches(live, server.cell, lookback, self._branch_options())
         server.join(branches)
-        await self._serve(
-            server,
-            subject,
-            moment,
-            WorldPrograms(live.world),
-            configuration,
+        around = partial(
+            Surroundings,
+            programs=WorldPrograms(live.world),
+            configuration=configuration,
             lookback=lookback,
             branches=branches,
             recordings=recordings,
+            arrangement=_arrangement(live, None if beside is None else beside.world),
             traffic=live.traffic,
         )
+        await self._serve(server, subject, moment, around)
 
     def _recordings(self, running: Running, beside: UpOptions) -> WorldRecordings:
         live, server = running.live, running.server
@@ -238,20 +241,14 @@ class _Page:
             return PresentMoment(time.monotonic_ns() - begin, running=True, speed=1.0)
 
         subject = CompositeSubject(None, lambda: moment().time, Numbering({}))
-        await self._serve(server, subject, moment, _NoPrograms(), lambda machine: None)
+        await self._serve(server, subject, moment, partial(Surroundings, programs=_NoPrograms()))
 
     async def _serve(
         self,
         server: Server,
         subject: CompositeSubject,
         moment: Callable[[], PresentMoment],
-        programs: ProgramTexts,
-        configuration: Callable[[str], SourceText | None],
-        *,
-        lookback: Lookback | None = None,
-        branches: WorldBranches | None = None,
-        recordings: WorldRecordings | None = None,
-        traffic: Callable[[], Sequence[Mapping[str, object]]] | None = None,
+        surroundings: Callable[..., Surroundings],
     ) -> None:
         loop = asyncio.get_running_loop()
 
@@ -261,19 +258,13 @@ class _Page:
         of_devices = DeviceSurroundings(clock=time.monotonic_ns, keep=keep_settings, on_internal=report)
         connections = DeviceConnections(subject, of_devices, Computer(ports=_ports, find=find_device))
         work = DeviceWork(LineWork(), report)
-        around = Surroundings(
+        around = surroundings(
             moment=moment,
             gate=self._entrance.gate,
             audit=self._audit,
             program=__version__,
-            programs=programs,
             connections=connections,
             work=work,
-            configuration=configuration,
-            lookback=lookback,
-            branches=branches,
-            recordings=recordings,
-            traffic=traffic,
             on_internal=report,
         )
         hub = Hub(subject, subject, around)
@@ -298,6 +289,13 @@ class _Page:
         if self._own.browser and has_desktop():
             token = f"#token={entrance.tokens[0].text}" if entrance.tokens else ""
             threading.Thread(target=webbrowser.open, args=(url + token,), name="browser", daemon=True).start()
+
+
+def _arrangement(live: LiveWorld, path: Path | None) -> WorldArrangement:
+    """Of the description at ``path``, or of a session, whose description is in no file."""
+    shown = live.subject.description
+    names = [part.name for part in (*shown.axes, *shown.elements)]
+    return WorldArrangement(live.world.spec, names, None if path is None or is_session(path) else path)
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,11 +23,12 @@ from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.studio.branchrequests import Branches
 from steptwin.studio.calculations import Calculations
 from steptwin.studio.configurations import Configurations
+from steptwin.studio.drawingrequests import Arrangement
 from steptwin.studio.looking import KeptPast
 from steptwin.studio.machines import Sheets
 from steptwin.studio.programs import ProgramTexts
 from steptwin.studio.recordingrequests import Recordings
-from steptwin.studio.requests import OF_BRANCHES, OF_RECORDINGS, OF_THE_PAST, REQUESTS, permit_of
+from steptwin.studio.requests import OF_BRANCHES, OF_DRAWINGS, OF_RECORDINGS, OF_THE_PAST, REQUESTS, permit_of
 from steptwin.studio.streams import Streams
 from steptwin.studio.tools import tools
 from steptwin.studio.watches import Watches
@@ -192,6 +193,8 @@ class Surroundings:
     """Of the world, where there is one."""
     branches: Branches | None = None
     """Of the world, where there is one."""
+    arrangement: Arrangement | None = None
+    """Of the world, where there is one."""
     traffic: Callable[[], Sequence[Mapping[str, object]]] | None = None
     """Of the world, where there is one."""
     on_internal: Callable[[Exception], object] = lambda error: None
@@ -255,6 +258,13 @@ class Hub:
             raise Refusal("branches are worlds: there is none here")
         return self.around.branches
 
+    @property
+    def arrangement(self) -> Arrangement:
+        """Raises `Refusal` where there is no world."""
+        if self.around.arrangement is None:
+            raise Refusal("what is drawn is a world: there is none here")
+        return self.around.arrangement
+
     def traffic(self) -> dict[str, object]:
         """Raises `Refusal` where there is no world."""
         if self.around.traffic is None:
@@ -292,6 +302,8 @@ class Hub:
             missing |= OF_RECORDINGS
         if self.around.branches is None:
             missing |= OF_BRANCHES
+        if self.around.arrangement is None:
+            missing |= OF_DRAWINGS
         if self.around.traffic is None:
             missing |= {"traffic"}
         own = [name for name in REQUESTS if name not in missing]

@@ -19,6 +19,7 @@ from steptwin.nearmiss import NearMiss
 from steptwin.plaintypes import shown
 from steptwin.studio.branchrequests import BRANCHES, BranchRequest
 from steptwin.studio.devicerequests import OF_DEVICES, DeviceRequest
+from steptwin.studio.drawingrequests import DRAWINGS, DrawingRequest
 from steptwin.studio.recordingrequests import RECORDINGS, RecordingRequest
 from steptwin.studio.requestrow import NOTHING, RequestRow
 from steptwin.studio.shapes import MOMENT
@@ -193,6 +194,7 @@ StudioRequest: TypeAlias = (
     | WorkRequest
     | RecordingRequest
     | BranchRequest
+    | DrawingRequest
     | DeviceRequest
     | ListPorts
     | Connect
@@ -437,7 +439,9 @@ _ROWS = (
     ),
 )
 
-REQUESTS: Mapping[str, RequestRow] = {row.name: row for row in (*_ROWS, *TOOLS, *WORKS, *RECORDINGS, *BRANCHES, *OF_DEVICES)}
+REQUESTS: Mapping[str, RequestRow] = {
+    row.name: row for row in (*_ROWS, *TOOLS, *WORKS, *RECORDINGS, *BRANCHES, *DRAWINGS, *OF_DEVICES)
+}
 ALL: Mapping[str, RequestRow | CommandRow] = {**COMMANDS, **REQUESTS}
 """Every request by name."""
 OF_THE_PAST = frozenset({"look", "go_back", "past_events"})
@@ -448,6 +452,8 @@ OF_BRANCHES = frozenset(row.name for row in BRANCHES)
 """What needs a world."""
 IN_THE_PAST = OF_THE_PAST | {"breakpoint", "clear_breakpoint", "stop_on", "step_program", "run", "look_at", "branch"}
 """What changes something and is possible while the past is looked at: a debugger goes forwards from there, too."""
+OF_DRAWINGS = frozenset(row.name for row in DRAWINGS)
+"""What needs a world."""
 OF_CONNECTION = frozenset({"follow", "unfollow", *(row.name for row in _ROWS if row.is_of_connection)})
 
 

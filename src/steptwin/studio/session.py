@@ -19,6 +19,7 @@ from steptwin.later import Later, start
 from steptwin.machine import SECOND, Nanos
 from steptwin.studio import branchrequests as branch
 from steptwin.studio import devicerequests as device
+from steptwin.studio import drawingrequests as drawing
 from steptwin.studio import recordingrequests as recording
 from steptwin.studio import requests as ask
 from steptwin.studio import workrequests as work
@@ -139,6 +140,8 @@ class ViewerSession:
             work.Scan: lambda wanted: hub.around.work.scan(wanted.places, wanted.kind, wanted.units, wanted.baud, wanted.timeout),
             work.Verify: lambda wanted: hub.around.work.verify(wanted.address, write=wanted.write),
             branch.ListBranches: lambda _: hub.branches.plain(),
+            drawing.ReadDrawing: lambda _: hub.arrangement.plain(),
+            drawing.SaveDrawing: lambda wanted: hub.arrangement.save(wanted.places),
             work.ReadWork: lambda _: hub.around.work.plain(),
             device.ReadShadow: lambda wanted: hub.around.connections.shadow_of(wanted.machine, wanted.after),
             work.CancelWork: lambda _: hub.around.work.cancel(),

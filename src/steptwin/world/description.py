@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from steptwin.errors import Misuse
+from steptwin.world.arrangement import DRAWING, check_places, read_places
 from steptwin.world.element import AnyElement, ElementSpec
 from steptwin.world.elements import ELEMENTS
 from steptwin.world.faults import Fault, FaultMistake, parse
@@ -59,6 +60,7 @@ def describe(
             near = toml.near(key, known)
             fix = toml.key_replacement((key,) if isinstance(data[key], dict) else (key, 0), key, known)
             toml.wrong((key,), "D004", f"the file has no [{key}]{near}", f"permitted: {', '.join(known)}", fix)
+    placed = _rows(toml, DRAWING)
     world = read_table(toml, ("world",), data.get("world", {}), KEYS["world"])
     spec = WorldSpec(
         **world,
@@ -72,12 +74,15 @@ def describe(
         scripts=(*_events(toml), *_scripts(toml)),
         gateways=tuple(read_gateways(toml)),
         history=read_history(toml),
+        drawing=read_places(placed),
         faults=tuple(_faults(toml)),
         text=toml,
         overrides=dict(overrides),
         pieces=pieces.files,
     )
-    check_names(spec, [one for element in ELEMENTS.values() for one in element.named(spec.elements[element.name])])
+    named_elements = [one for element in ELEMENTS.values() for one in element.named(spec.elements[element.name])]
+    check_names(spec, named_elements)
+    check_places(toml, placed, [one.name for one in named_elements])
     return spec if seed is None else replace(spec, seed=_seed(seed))
 
 

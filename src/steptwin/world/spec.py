@@ -13,6 +13,7 @@ from steptwin.world.reader import Path, TomlText
 from steptwin.world.script import Step
 
 if TYPE_CHECKING:
+    from steptwin.world.arrangement import DrawnPlace
     from steptwin.world.element import Element, ElementSpec
     from steptwin.world.gateways import GatewaySpec
     from steptwin.world.historytable import HistorySpec
@@ -79,6 +80,7 @@ class WorldSpec:
     scripts: tuple[ScriptSpec, ...]
     gateways: tuple[GatewaySpec, ...]
     history: HistorySpec | None
+    drawing: tuple[DrawnPlace, ...]
     faults: tuple[Fault | None, ...]
     """None for one with errors, which are in ``text``."""
     text: TomlText

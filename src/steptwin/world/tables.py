@@ -14,6 +14,7 @@ from typing import Any
 from steptwin.durations import duration
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, Nanos
+from steptwin.world.arrangement import DRAWING, DRAWING_TABLE
 from steptwin.world.elements import ELEMENTS
 from steptwin.world.historytable import HISTORY, HISTORY_TABLE
 from steptwin.world.kinds import KINDS, line_kinds
@@ -99,7 +100,7 @@ SCRIPT = TableRows(written="[[script]]", keys=KEYS["script"])
 
 
 def tables() -> Mapping[str, TableRows]:
-    """Every table, in the order of a description: its name and seed, lines, controllers, elements, scripts, history."""
+    """Every table, in the order of a description: its name and seed, lines, controllers, elements, scripts, history, drawing."""
     return _tables_with(tuple(map(id, (*KINDS.values(), *ELEMENTS.values()))))
 
 
@@ -115,7 +116,7 @@ def _tables_with(registered: tuple[int, ...]) -> Mapping[str, TableRows]:
         found[kind.name] = TableRows(written=f"[[{kind.name}]]", keys=kind.keys, exclude=kind.exclusive)
     for element in ELEMENTS.values():
         found |= {element.name: element.rows, **element.inner}
-    return found | {"event": EVENT, "script": SCRIPT, HISTORY: HISTORY_TABLE}
+    return found | {"event": EVENT, "script": SCRIPT, HISTORY: HISTORY_TABLE, DRAWING: DRAWING_TABLE}
 
 
 def _line_keys() -> tuple[Key, ...]:

@@ -24,6 +24,8 @@ export const POLISH: Readonly<Record<string, string>> = {
   DINT: "DINT",
   DIRECT: "DIRECT",
   TRIGGER: "TRIGGER",
+  degree: "°",
+  revolution: "obr.",
   "min. microsteps": "min. mikrokroki",
   "min. microsteps/s": "min. mikrokroki/s",
   "holding register": "rejestr",

@@ -1,6 +1,6 @@
 // Made from docs/studio.schema.json by `npm run protocol`; not to be changed by hand.
 
-export type Request = DescribeRequest | ReadRequest | PinsRequest | StateRequest | EncodersRequest | FaultsRequest | FaultKindsRequest | TimeRequest | EndPointsRequest | FollowRequest | UnfollowRequest | SetRequest | PressRequest | ReleaseRequest | WriteRequest | SendRequest | RequestRequest | PowerCycleRequest | TurnRequest | CoupleRequest | FaultRequest | ClearFaultRequest | ExpectRequest | NoteRequest | SeeRequest | EnableRequest | MoveRequest | HomeRequest | JogRequest | StopRequest | ProgramRequest | DownloadRequest | PauseRequest | ResumeRequest | StepRequest | SnapshotRequest | SnapshotsRequest | RestoreRequest | DropSnapshotRequest | SaveRequest | DebugRequest | BreakpointRequest | ClearBreakpointRequest | BreakpointsRequest | StopOnRequest | StepProgramRequest | RunRequest | LookAtRequest | BranchRequest | StackRequest | ValuesRequest | EvaluateRequest | SetValueRequest | ProgramSourceRequest | WhyRequest | HelloRequest | ResyncRequest | WatchRequest | UnwatchRequest | TakeControlRequest | ReleaseControlRequest | RenewRequest | LetGoRequest | StopAllRequest | LookRequest | PastEventsRequest | GoBackRequest | ProgramsRequest | ProgramTextRequest | ProgramMemoryRequest | PortsRequest | ConnectRequest | DisconnectRequest | TrafficRequest | AuditRequest | CalculatorRequest | CalculateRequest | GearRequest | ConfigurationRequest | EditConfigurationRequest | ScanRequest | VerifyRequest | WorkRequest | CancelWorkRequest | RecordingsRequest | SaveRecordingRequest | ViewRecordingRequest | BranchesRequest | StartBranchRequest | EndBranchRequest | SettingsRequest | ShadowRequest | ShadowStateRequest;
+export type Request = DescribeRequest | ReadRequest | PinsRequest | StateRequest | EncodersRequest | FaultsRequest | FaultKindsRequest | TimeRequest | EndPointsRequest | FollowRequest | UnfollowRequest | SetRequest | PressRequest | ReleaseRequest | WriteRequest | SendRequest | RequestRequest | PowerCycleRequest | TurnRequest | CoupleRequest | FaultRequest | ClearFaultRequest | ExpectRequest | NoteRequest | SeeRequest | EnableRequest | MoveRequest | HomeRequest | JogRequest | StopRequest | ProgramRequest | DownloadRequest | PauseRequest | ResumeRequest | StepRequest | SnapshotRequest | SnapshotsRequest | RestoreRequest | DropSnapshotRequest | SaveRequest | DebugRequest | BreakpointRequest | ClearBreakpointRequest | BreakpointsRequest | StopOnRequest | StepProgramRequest | RunRequest | LookAtRequest | BranchRequest | StackRequest | ValuesRequest | EvaluateRequest | SetValueRequest | ProgramSourceRequest | WhyRequest | HelloRequest | ResyncRequest | WatchRequest | UnwatchRequest | TakeControlRequest | ReleaseControlRequest | RenewRequest | LetGoRequest | StopAllRequest | LookRequest | PastEventsRequest | GoBackRequest | ProgramsRequest | ProgramTextRequest | ProgramMemoryRequest | PortsRequest | ConnectRequest | DisconnectRequest | TrafficRequest | AuditRequest | CalculatorRequest | CalculateRequest | GearRequest | ConfigurationRequest | EditConfigurationRequest | ScanRequest | VerifyRequest | WorkRequest | CancelWorkRequest | RecordingsRequest | SaveRecordingRequest | ViewRecordingRequest | BranchesRequest | StartBranchRequest | EndBranchRequest | DrawingRequest | SaveDrawingRequest | SettingsRequest | ShadowRequest | ShadowStateRequest;
 
 /** Every request has exactly one. */
 export type Answer = {
@@ -1546,6 +1546,24 @@ export type EndBranchRequest = {
   branch: number;
 };
 
+/** Where the page draws axes and elements: x and y of the upper left corner in pixels, by name. Empty: by itself. */
+export type DrawingRequest = {
+  do: "drawing";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+};
+
+/** Write these places into the description of the world, as [[drawing]], in the place of those there. */
+export type SaveDrawingRequest = {
+  do: "save_drawing";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** By the names of axes and elements; 'tool path', 'all buttons'. None: it is drawn by itself. */
+  places: Record<string, number[]>;
+};
+
 /** What can be read and written in a device, as the text that is kept before the first write. */
 export type SettingsRequest = {
   do: "settings";
@@ -2025,6 +2043,21 @@ export type StartBranchAnswer = {
 
 export type EndBranchAnswer = null;
 
+export type DrawingAnswer = {
+  places: Record<string, number[]>;
+  /** Of the description; null: it is in none. */
+  file: string | null;
+};
+
+export type SaveDrawingAnswer = {
+  /** What has been written; null: it cannot be written. */
+  file: string | null;
+  /** For a file. */
+  name: string;
+  /** The description with these places. */
+  text: string;
+};
+
 export type SettingsAnswer = {
   machine: string;
   text: string;
@@ -2307,6 +2340,8 @@ export interface Requests {
   branches: { request: BranchesRequest; answer: BranchesAnswer };
   start_branch: { request: StartBranchRequest; answer: StartBranchAnswer };
   end_branch: { request: EndBranchRequest; answer: EndBranchAnswer };
+  drawing: { request: DrawingRequest; answer: DrawingAnswer };
+  save_drawing: { request: SaveDrawingRequest; answer: SaveDrawingAnswer };
   settings: { request: SettingsRequest; answer: SettingsAnswer };
   shadow: { request: ShadowRequest; answer: ShadowAnswer };
   shadow_state: { request: ShadowStateRequest; answer: ShadowStateAnswer };

@@ -1,0 +1,44 @@
+"""The arrangement of the machine panel of a studio, kept in the description of its world."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from steptwin.errors import Misuse
+from steptwin.files.textfiles import read_text, write_bytes
+from steptwin.world.arrangement import OTHERS, DrawnPlace, arranged
+from steptwin.world.spec import WorldSpec
+
+
+class WorldArrangement:
+    """See `steptwin.studio.drawingrequests.Arrangement`. ``names``: of axes and elements; ``file``: the description, None for a
+    world without such a file."""
+
+    def __init__(self, spec: WorldSpec, names: Sequence[str], file: Path | None) -> None:
+        self._spec = spec
+        self._known = {*names, *OTHERS}
+        self._file = file
+        self._places: Sequence[DrawnPlace] = spec.drawing
+
+    def plain(self) -> Mapping[str, object]:
+        places = {of: [x, y] for of, x, y in self._places}
+        return {"places": places, "file": None if self._file is None else str(self._file)}
+
+    def save(self, places: Sequence[DrawnPlace]) -> Mapping[str, object]:
+        if strange := [place.of for place in places if place.of not in self._known]:
+            raise Misuse(f"places: no axis or element is called {strange[0]!r}; there are {', '.join(sorted(self._known))}")
+        name = f"{self._spec.name if self._file is None else self._file.stem}.toml"
+        if self._file is None:
+            text = arranged(self._spec.text.source.text, places)
+            self._places = places
+            return {"file": None, "name": name, "text": text}
+        now = read_text(self._file)  # it may have been changed since
+        text = arranged(now.source.text, places)
+        try:
+            write_bytes(self._file, now.to_bytes(text))
+        except Misuse:
+            return {"file": None, "name": name, "text": text}
+        finally:
+            self._places = places
+        return {"file": str(self._file), "name": name, "text": text}

@@ -1,0 +1,98 @@
+"""Requests for the arrangement of the machine panel: where axes and elements are drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeAlias
+
+from steptwin.access.roles import LOOK, SERVICE
+from steptwin.studio.requestrow import RequestRow
+from steptwin.subject.fields import LONGEST_TEXT, Field, Schema, ValueType, check_text, whole, wrong
+from steptwin.subject.shapes import members
+from steptwin.world.arrangement import MOST_PLACED, MOST_PX, DrawnPlace
+
+
+@dataclass(frozen=True, slots=True)
+class ReadDrawing:
+    """Where axes and elements are drawn."""
+
+
+@dataclass(frozen=True, slots=True)
+class SaveDrawing:
+    """Writes it into the description."""
+
+    places: tuple[DrawnPlace, ...]
+
+
+DrawingRequest: TypeAlias = ReadDrawing | SaveDrawing
+
+
+class Arrangement(Protocol):
+    """Of one world."""
+
+    def plain(self) -> Mapping[str, object]:
+        """As `_DRAWING`."""
+        ...
+
+    def save(self, places: Sequence[DrawnPlace]) -> Mapping[str, object]:
+        """As `_SAVED`. Raises `Misuse` for what is not there, `Refusal` where the description cannot be changed."""
+        ...
+
+
+_PIXELS: Schema = {"type": "integer", "minimum": 0, "maximum": MOST_PX}
+_CORNER: Schema = {"type": "array", "items": _PIXELS, "minItems": 2, "maxItems": 2}
+
+
+def _places(value: Any) -> tuple[DrawnPlace, ...]:
+    if not isinstance(value, dict) or len(value) > MOST_PLACED:
+        raise wrong(value, PLACES.what)
+    return tuple(DrawnPlace(check_text(name), *_corner(corner)) for name, corner in value.items())
+
+
+def _corner(value: Any) -> tuple[int, int]:
+    pixels = whole(0, MOST_PX)
+    if not isinstance(value, list) or len(value) != 2:
+        raise wrong(value, "[x, y]")
+    return pixels.read(value[0]), pixels.read(value[1])
+
+
+PLACES = ValueType(
+    '{"NAME": [X, Y], ...}',
+    {
+        "type": "object",
+        "maxProperties": MOST_PLACED,
+        "additionalProperties": _CORNER,
+        "propertyNames": {"minLength": 1, "maxLength": LONGEST_TEXT},
+    },
+    _places,
+    lambda places: {of: [x, y] for of, x, y in places},
+)
+
+_FILE: Schema = {"anyOf": [{"type": "string"}, {"type": "null"}], "description": "Of the description; null: it is in none."}
+_DRAWING = members({"places": {"type": "object", "additionalProperties": _CORNER}, "file": _FILE})
+_SAVED = members(
+    {
+        "file": {**_FILE, "description": "What has been written; null: it cannot be written."},
+        "name": {"type": "string", "description": "For a file."},
+        "text": {"type": "string", "description": "The description with these places."},
+    }
+)
+
+DRAWINGS = (
+    RequestRow(
+        "drawing",
+        ReadDrawing,
+        LOOK,
+        "Where the page draws axes and elements: x and y of the upper left corner in pixels, by name. Empty: by itself.",
+        _DRAWING,
+    ),
+    RequestRow(
+        "save_drawing",
+        SaveDrawing,
+        SERVICE._replace(control=False),
+        "Write these places into the description of the world, as [[drawing]], in the place of those there.",
+        _SAVED,
+        (Field("places", PLACES, "By the names of axes and elements; 'tool path', 'all buttons'. None: it is drawn by itself."),),
+    ),
+)
