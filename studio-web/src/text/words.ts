@@ -25,7 +25,7 @@ export const POLISH: Readonly<Record<string, string>> = {
   DIRECT: "DIRECT",
   TRIGGER: "TRIGGER",
   degree: "°",
-  revolution: "obr.",
+  rev: "obr.",
   "min. microsteps": "min. mikrokroki",
   "min. microsteps/s": "min. mikrokroki/s",
   "holding register": "rejestr",
