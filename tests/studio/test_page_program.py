@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import datetime as dt
 import json
 import re
 
 import httpx
 import pytest
 from playwright.sync_api import Locator, Page, expect
-from studio_page import AXE, Studio, button, show
+from studio_page import AXE, Studio, button
 from tests.conftest import until
 from tests.studio.conftest import StudioWorld
 
@@ -209,43 +208,6 @@ def test_a_position_is_taught_in_the_panel_of_the_axes(studio: Studio) -> None:
     expect(table).to_contain_text("PLACE;12.5;x;x;xTHERE;12.5;x;x;x")
     button(page, "Download cell.csv into table").click()
     expect(page.get_by_text("cell.csv is in table now.")).to_be_visible()
-
-
-LATE_EDITOR = """
-    const Socket = window.WebSocket;
-    window.WebSocket = class extends Socket {
-      constructor(url, protocols) {
-        super(url, protocols);
-        if (!String(url).endsWith("/editor")) return;
-        this.addEventListener("open", (opened) => {
-          if (window.released) return;
-          opened.stopImmediatePropagation();
-          window.release = () => { window.released = true; this.onopen(opened); };
-        });
-      }
-    };
-"""
-
-
-def test_a_text_that_was_changed_before_the_editor_server_answers_has_its_findings(studio: Studio) -> None:
-    page = studio.page(panel=None, init_script=LATE_EDITOR)
-    page.clock.install()
-    show(page, "Program")
-    until(lambda: page.evaluate("Boolean(window.release)"), "the editor server is there")
-
-    def open_file(text: str) -> None:
-        file = {"name": "mine.prg", "mimeType": "text/plain", "buffer": text.encode()}
-        page.locator('input[type="file"]').set_input_files(file)
-
-    open_file(PROGRAM + "DELAY 1\nJUMP NOWHERE\n")
-    expect(text_of(page)).to_contain_text("NOWHERE")
-    page.clock.pause_at(dt.datetime.now(dt.UTC) + dt.timedelta(days=1))  # nothing that waits for a time sends the text before
-    page.evaluate("window.release()")
-    expect(text_of(page).locator(".cm-lintRange-error")).to_have_text(["NOWHERE"])
-    page.clock.resume()
-    open_file("JUMP ELSEWHERE\n")
-    expect(text_of(page).locator(".cm-lintRange-error")).to_have_text(["ELSEWHERE"])
-    expect(findings(page).get_by_role("listitem")).to_have_count(1)
 
 
 def test_the_memory_that_a_text_takes_is_shown(studio: Studio) -> None:

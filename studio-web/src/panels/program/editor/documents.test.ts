@@ -1,6 +1,8 @@
-import { EditorState } from "@codemirror/state";
+import type { LSPClient } from "@codemirror/lsp-client";
+import { ChangeSet, EditorState } from "@codemirror/state";
+import type { EditorView } from "@codemirror/view";
 import { expect, test } from "vitest";
-import { OpenText, between, textOf } from "./documents";
+import { Documents, OpenText, between, textOf } from "./documents";
 import { tokensOf } from "./tokens";
 
 const open = (inTwin: string, now: string): OpenText =>
@@ -57,4 +59,49 @@ test("numbers of the protocol become parts of the text", () => {
   ]);
   expect(tokensOf([9, 0, 1, 0, 0], doc)).toEqual([]);
   expect(tokensOf([2, 7, 50, 0, 0], doc)).toEqual([{ from: 16, to: 17, type: 0 }]);
+});
+
+/** As much of a view, and of what the client keeps for it, as texts need: a page is not there. */
+class StandInView {
+  state: EditorState;
+  unsyncedChanges: ChangeSet;
+
+  constructor(text: string) {
+    this.state = EditorState.create({ doc: text });
+    this.unsyncedChanges = ChangeSet.empty(text.length);
+  }
+
+  plugin(): this {
+    return this;
+  }
+
+  clear(): void {
+    this.unsyncedChanges = ChangeSet.empty(this.state.doc.length);
+  }
+
+  type(insert: string): void {
+    const { state, changes } = this.state.update({ changes: { from: this.state.doc.length, insert } });
+    this.state = state;
+    this.unsyncedChanges = this.unsyncedChanges.compose(changes);
+  }
+}
+
+test("a text that was changed before its server answered is opened as it is now, and changes begin there", () => {
+  const documents = new Documents({ didOpen: () => undefined } as unknown as LSPClient, {
+    display: () => Promise.resolve(null),
+    changed: () => undefined,
+  });
+  const file = open("DELAY 1\n", "DELAY 1\n");
+  const view = new StandInView("DELAY 1\n");
+  file.view = view as unknown as EditorView;
+  documents.files.push(file);
+  view.type("JUMP NOWHERE\n");
+  documents.opensAnew();
+  expect(file.doc.toString()).toBe("DELAY 1\nJUMP NOWHERE\n");
+  expect(documents.syncFiles()).toEqual([]);
+  view.type("END\n");
+  const [update] = documents.syncFiles();
+  expect(update?.prevDoc.toString()).toBe("DELAY 1\nJUMP NOWHERE\n");
+  expect(update?.changes.apply(update.prevDoc).toString()).toBe("DELAY 1\nJUMP NOWHERE\nEND\n");
+  expect(file.version).toBe(1);
 });
