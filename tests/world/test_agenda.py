@@ -86,7 +86,7 @@ def test_outdated_entries_are_cleared_away(moments: list[tuple[int, int]]) -> No
     for n, due in moments:
         agenda.wait(scripts[n], due)
         last[n] = due
-        assert len(agenda._timed._entries) <= 2 * 4 + 2 * 64, "outdated entries pile up"
+        assert len(agenda._timed.entries) <= 2 * 4 + 2 * 64, "outdated entries pile up"
     order = sorted(last, key=lambda n: (last[n], n))
     assert [agenda.take_timed(1000).number for _ in order] == order
     assert agenda.take_timed(1000) is None

@@ -7,7 +7,7 @@ from itertools import pairwise
 from math import floor
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from mic488_rig import controller
 from pulse_by_pulse import changes
@@ -58,6 +58,9 @@ def test_the_predicted_edge_is_where_the_state_changes(zone: Zone, steps: list[i
     period=st.fractions(10, 30, max_denominator=9),
     place=st.integers(-3000, 3000),
 )
+@example(low=0, width=0, period=Fraction(95, 9), place=11)  # of 10.56, and not 10
+@example(low=0, width=0, period=Fraction(21, 2), place=11)  # of 10.5
+@example(low=0, width=0, period=Fraction(94, 9), place=10)  # of 10.44
 def test_a_repeated_zone_is_at_every_turn_to_the_nearest_pulse(low: int, width: int, period: Fraction, place: int) -> None:
     """Against every turn that can reach ``place``: nothing adds up over thousands of turns."""
     zone = Zone(low, low + width, 0, period)

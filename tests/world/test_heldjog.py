@@ -21,6 +21,7 @@ from steptwin.subject.payloads import FramePayload, PlanPayload
 from steptwin.subject.world import WorldSubject
 from steptwin.world import script as do
 from steptwin.world.heldjog import STANDS_NS
+from steptwin.world.kinds.m1486.heldjog import M1486HeldJog
 
 MIC = """
     [[line]]
@@ -336,6 +337,31 @@ def test_a_mic488_with_a_position_error_is_not_jogged() -> None:
     rig.world.mic488["a"].device.axes[0].status = AxisStatus.ERROR
     with pytest.raises(Refusal, match="a M1 has a position error: stop it first"):
         rig.begin(Jog("a", 1, 10.0))
+
+
+@pytest.mark.parametrize(
+    ("variant", "velocity", "microsteps"),
+    [
+        # Within 100 ms: what fits with the ramps, but one full step at least; a chip at 24 MHz is twice as fast.
+        ("A", 16.0, 64),
+        ("A2x", 32.0, 3 * 64),
+    ],
+)
+def test_a_slow_jog_of_an_m1486_makes_whole_steps(variant: str, velocity: float, microsteps: int) -> None:
+    rig = chip(variant)
+    held = rig.begin(Jog("drum", 1, 64.0 * velocity))
+    rig.run(50)
+    held.release()
+    rig.run(1000)
+    assert [one for one in rig.sent().split("\r") if one[:1] in ("v", "f")] == ["v16", f"f{microsteps}", "v1000"]
+
+
+def test_a_jog_of_an_m1486_begins_with_its_first_extension() -> None:
+    rig = chip()
+    wanted = Jog("drum", 1, 6400.0)
+    held = M1486HeldJog(rig.world.m1486["drum"].chip, "chips", wanted)
+    assert (held.deadline(), held.advance(rig.world.now)) == (None, ())
+    assert held.extend(rig.world.now) == (do.Send("chips", b"x7\rv100\rf640\rr\r"),)
 
 
 def test_a_jog_that_is_over_asks_for_nothing_more() -> None:

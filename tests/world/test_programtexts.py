@@ -253,6 +253,18 @@ def test_files_of_an_editor_server_are_a_description_of_their_own() -> None:
     ]  # fmt: skip
 
 
+def test_what_a_text_takes_of_the_memory_of_its_place() -> None:
+    description = '[[m1486]]\nname = "c"\nprogram = "p"\n'
+    texts = WorldPrograms(World.from_toml(description, {"p": b"[\nf64\nr\n]\n"}))
+    (place,) = (str(one["place"]) for one in texts.list())
+    (part,) = texts.memory("c", place, "[\nf64\nr\n]\n")
+    assert (part["what"], part["most"], part["unit"]) == ("command memory", 254, "bytes")
+    (longer,) = texts.memory("c", place, "[\nf64\nr\nf64\nr\n]\n")
+    assert [one["used"] for one in (part, longer)] == [5, 10]
+    (wrong,) = texts.memory("c", place, "[\n")
+    assert wrong["used"] == 0
+
+
 def test_positions_have_a_place_even_while_none_are_there() -> None:
     empty = World.from_toml('[[mic488]]\nname = "m"\nfirmware = "1.40"\n')
     (table,) = tomllib.loads(WorldPrograms(empty).files()["steptwin:///world.toml"].decode())["mic488"]

@@ -120,7 +120,7 @@ def setting(world: Plant, machine: str, name: str, value: float) -> ExternalInpu
     if path.upper() in device.pins():
         return Set(((target, kind.input_pin(path, value), value),))
     if kind.registers is not None and kind.point(device, path) is not None:
-        world.requests(target, ((path, value),))  # raises `Misuse`
+        world.requests(target, world.registers(target), ((path, value),))  # raises `Misuse`
         return Write(((target, path, value),))
     known = ", ".join(variables.values()) or "none"
     raise Misuse(f"{name!r} cannot be set: what can be are variables ({known}), inputs and registers that can be written")

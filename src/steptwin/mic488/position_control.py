@@ -89,9 +89,8 @@ class PositionControl(Stateful):
 
     def watch(self, axis: ControlledAxis, now: Nanos) -> None:
         """Watch a motion that may lose steps. An encoder coupled to the drive without loss cannot disagree."""
-        if axis.encoder.agrees:
-            return
-        if (axis.config.pos_ctrl_mode == self.ENCODER or axis.seeks_stop) and axis.profile.moving(now):
+        is_controlled = axis.config.pos_ctrl_mode == self.ENCODER or axis.seeks_stop
+        if is_controlled and not axis.encoder.agrees and axis.profile.moving(now):
             self._expect_progress(axis, now)
             self.tick_ns = _next_tick(now)
 

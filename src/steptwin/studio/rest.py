@@ -127,7 +127,7 @@ class Rest:
             try:
                 fields = await _fields(request)
             except Misuse as error:
-                return _response(failure(error), TOO_LONG if error.args[0] == TOO_LONG_TEXT else MISUSE)
+                return _response(failure(error), TOO_LONG if isinstance(error, BodyTooLong) else MISUSE)
             return await self._answer(request, name, fields)
 
         return do
@@ -189,8 +189,14 @@ class Rest:
         return found
 
 
-TOO_LONG_TEXT = f"a body has at most {LONGEST_REQUEST} bytes"
 OWN = ("do", "id", "version")
+
+
+class BodyTooLong(Misuse):
+    """The body of a request is too long."""
+
+    def __init__(self) -> None:
+        super().__init__(f"a body has at most {LONGEST_REQUEST} bytes")
 
 
 def _bearer(request: Request) -> str | None:
@@ -205,7 +211,7 @@ async def _fields(request: Request) -> dict[str, object]:
     async for piece in request.stream():
         data += piece
         if len(data) > LONGEST_REQUEST:
-            raise Misuse(TOO_LONG_TEXT)
+            raise BodyTooLong
     if not data:
         return {}
     try:

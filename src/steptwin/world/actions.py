@@ -137,16 +137,16 @@ def _move_button(plant: Plant, name: str, *, pressed: bool) -> None:
 def _write(plant: Plant, step: do.Write) -> None:
     parts, now = plant.parts, plant.now
     for name, values in plant.by_machine(step):
-        execute = plant.registers(name).execute
+        registers = plant.registers(name)
         kernel = plant.touch(name)  # as `_now` does: every write of every script comes here
         machine, on = parts.machines[name], parts.line_of.get(name)
-        for pdu in plant.requests(name, values):
+        for pdu in plant.requests(name, registers, values):
             if on is not None:
                 line, unit = on
                 line.master.ask(encode_frame(unit, pdu), ANSWER_NS, now)
             else:
                 _record(plant, name, "request", pdu)
-                execute(machine, pdu, now)
+                registers.execute(machine, pdu, now)
         kernel.mark(name if on is None else on[0].name)
         kernel.settle()
 

@@ -30,25 +30,25 @@ class _Queue(Generic[W]):
     Only the last entry of a script is valid. Entries are numbered by ``count``, which several queues share.
     """
 
-    __slots__ = ("_count", "_entries", "_room")
+    __slots__ = ("_count", "_room", "entries")
 
     def __init__(self, count: Iterator[int]) -> None:
         self._count = count
-        self._entries: list[tuple[Nanos, int, int, W]] = []
+        self.entries: list[tuple[Nanos, int, int, W]] = []
         self._room = _FEW
 
     def put(self, script: W, due: Nanos) -> None:
         """Make a script due at ``due``, instead of at an earlier entry."""
         script.entry = next(self._count)
-        heappush(self._entries, (due, script.number, script.entry, script))
-        if len(self._entries) > self._room:
-            self._entries = [entry for entry in self._entries if entry[3].entry == entry[2]]
-            heapify(self._entries)
-            self._room = 2 * len(self._entries) + _FEW
+        heappush(self.entries, (due, script.number, script.entry, script))
+        if len(self.entries) > self._room:
+            self.entries = [entry for entry in self.entries if entry[3].entry == entry[2]]
+            heapify(self.entries)
+            self._room = 2 * len(self.entries) + _FEW
 
     def first(self) -> Nanos | None:
         """The earliest due moment; None if the queue is empty."""
-        entries = self._entries
+        entries = self.entries
         while entries and entries[0][3].entry != entries[0][2]:
             heappop(entries)
         return entries[0][0] if entries else None
@@ -58,7 +58,7 @@ class _Queue(Generic[W]):
         first = self.first()
         if first is None or first > now:
             return None
-        script = heappop(self._entries)[3]
+        script = heappop(self.entries)[3]
         script.entry = 0
         return script
 
@@ -89,7 +89,8 @@ class Agenda(Generic[W]):
 
     def first(self) -> Nanos | None:
         """The earliest moment at which a script is due."""
-        timed, watching = self._timed.first(), self._watching.first()
+        timed = self._timed.first() if self._timed.entries else None
+        watching = self._watching.first() if self._watching.entries else None
         return watching if timed is None else timed if watching is None else min(timed, watching)
 
     def take_timed(self, now: Nanos) -> W | None:

@@ -26,7 +26,6 @@ def joined_names(spec: WorldSpec, machines: Iterable[str]) -> list[list[str]]:
             name = joined[name]
         return name
 
-    order = {name: i for i, name in enumerate(joined)}
     placed = _placed(spec)
     for reference in _joints(spec):
         one, other = (placed.get(name, name) for name in reference[:2])
@@ -34,8 +33,7 @@ def joined_names(spec: WorldSpec, machines: Iterable[str]) -> list[list[str]]:
         for name in unknown:
             _report(spec, reference.path, name, joined)
         if not unknown:
-            first, second = sorted((root(one), root(other)), key=order.__getitem__)
-            joined[second] = first
+            joined[root(other)] = root(one)
     groups: dict[str, list[str]] = {}
     for name in joined:
         groups.setdefault(root(name), []).append(name)

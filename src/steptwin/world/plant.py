@@ -336,11 +336,11 @@ class Plant:
     def by_machine(step: do.Write) -> Iterator[tuple[str, NewValues]]:
         """The values that a step writes, grouped by machine."""
         for name, group in groupby(step.values, key=itemgetter(0)):
-            yield name, tuple((register, value) for _, register, value in group)
+            yield name, tuple([(register, value) for _, register, value in group])
 
-    def requests(self, name: str, values: NewValues) -> tuple[bytes, ...]:
-        """The PDUs that write ``values`` to a machine. Raises `Misuse` for values that a register does not accept."""
-        registers, machine = self.registers(name), self.parts.machines[name]
+    def requests(self, name: str, registers: NamedRegisters[Any], values: NewValues) -> tuple[bytes, ...]:
+        """The PDUs that write ``values`` to `registers` of a machine. Raises `Misuse` for values that one does not accept."""
+        machine = self.parts.machines[name]
         key = (self.parts.kind_of[name].name, registers.dialect(machine), values)
         found = self._encoded.get(key)
         if found is None:

@@ -131,7 +131,7 @@ def _button(plant: Plant, step: do.Press | do.Release) -> None:
 
 def _write(plant: Plant, step: do.Write) -> None:
     for name, values in plant.by_machine(step):
-        plant.requests(name, values)
+        plant.requests(name, plant.registers(name), values)
 
 
 def _request(plant: Plant, step: do.Request) -> None:

@@ -154,6 +154,6 @@ class Script:
             script._sent = state.place.copy()
             for value in state.place.values():
                 script._next(value)
-        else:
-            script._steps.place = state.place  # type: ignore[union-attr]
+        elif isinstance(script._steps, do.Walk):
+            script._steps.place = state.place
         return script

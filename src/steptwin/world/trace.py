@@ -274,7 +274,7 @@ def _profile(profile: Profile) -> bytes:
     data = b"%d %d " % (profile.start, profile.base) + _FLOAT.pack(b"f", profile.final_p)
     for s in profile.segments:
         data += _arc(s) if isinstance(s, ArcSegment) else _segment(s)
-    return _framed(b"p", data)
+    return _LENGTH.pack(b"p", len(data)) + data
 
 
 def _segment(s: Segment) -> bytes:

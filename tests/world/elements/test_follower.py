@@ -153,6 +153,7 @@ def test_its_faults() -> None:
         (("points =", "point ="), r"\[follower\] has no 'point' \(did you mean 'points'\?\)"),
         (("[200, 0]", "[360, 0]"), "a cam has at least two, from 0 to below 360 degrees"),
         (("[30, 0], [90, 12], [150, 12], [200, 0]", "[30, 1]"), "1 angles: a cam has at least two"),
+        (("[30, 0]", "[-1, 0]"), "4 angles: a cam has at least two, from 0 to below 360 degrees"),
         (("[30, 0]", "[30, -1]"), "lifts are counted from 0"),
         (("[90, 12]", "[20, 12]"), "the first numbers must grow"),
         (("above = 11.0", "abov = 11.0"), r"has no 'abov' \(did you mean 'above'\?\)"),
