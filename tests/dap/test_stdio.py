@@ -108,6 +108,17 @@ def test_conditions_logs_labels_data_and_events(client: DapClient, program: str)
     client.ask("setDataBreakpoints", breakpoints=[{"dataId": found["dataId"]}])
     stopped = go(client, "continue")
     assert (stopped["reason"], stopped["text"]) == ("data breakpoint", "n: 3 → 4")
+    assert found["accessTypes"] == ["write"]
+    (wrong,) = client.ask("setDataBreakpoints", breakpoints=[{"dataId": found["dataId"], "accessType": "readWrite"}])[
+        "breakpoints"
+    ]
+    assert (wrong["verified"], wrong["message"]) == (
+        False,
+        "accessType = 'readWrite': it can stop when a value changes ('write')",
+    )
+    unknown = client.ask("dataBreakpointInfo", name="OTU1", variablesReference=1001)
+    assert unknown["dataId"] is None
+    assert "did you mean" in unknown["description"]
     client.ask("setDataBreakpoints", breakpoints=[])
     (label, wrong) = client.ask("setFunctionBreakpoints", breakpoints=[{"name": "COUNT"}, {"name": "CUONT"}])["breakpoints"]
     assert (label["verified"], wrong["verified"]) == (True, False)

@@ -296,7 +296,9 @@ def test_a_program_error_is_an_event_to_stop_at() -> None:
     ("point", "problem"),
     [
         (at(99), "no statement is in line 99 of m.prg or after it"),
-        (at(1, condition="y.position > 3"), "'y.position' means nothing to m: its variables are n"),
+        (at(1, condition="y.position > 3"), "'y.position' means nothing to m (did you mean 'M1.position'?): its variables are n"),
+        (DataPoint(machine="m", name="OTU1"), "'OTU1' means nothing to m (did you mean 'OUT1'?): its variables are n"),
+        (DataPoint(machine="m", name="n", condition="n > mm"), "'mm' means nothing to m: its variables are n"),
         (at(1, condition="n >"), "expression 'n >' ends too early: expected a name or a number"),
         (at(1, condition="n = = 2"), "expression 'n = = 2', column 5: found '=', expected a name or a number"),
         (at(1, hits="0"), "hit count '0': expected a number from 1 on, after nothing, or one of = < <= > >= %"),
@@ -328,6 +330,29 @@ def test_values_are_read_and_set_with_their_units() -> None:
     assert {"M1.position", "M1.velocity", "M1.status"} <= names
     pins = {value.name: value for value in debugger.scope("m", "Pins").values}
     assert (pins["IN3"].text, pins["IN3"].is_settable, pins["OUT1"].is_settable) == ("1", True, False)
+
+
+@pytest.mark.parametrize("scope", ["Variables", "Axes", "Pins", "Registers", "World"])
+@pytest.mark.parametrize("machine", ["m", "c"])
+def test_what_is_shown_can_be_evaluated(machine: str, scope: str) -> None:
+    debugger = started(world=BOTH)
+    shown = debugger.scope(machine, scope).values
+    lacking = {("c", "Pins"): ["S&D"], ("c", "Axes"): ["M1.status"]}.get((machine, scope), [])
+    assert [value.name for value in shown if not value.expression] == lacking
+    for value in shown:
+        found = debugger.evaluate(machine, value.expression or "0").number
+        assert value.number is None or found == (value.number if value.expression else 0.0)
+    if machine == "c" and scope == "Axes":
+        assert [value.expression for value in shown][:2] == ["position", "velocity"]
+
+
+def test_names_of_registers_in_the_program_can_be_set() -> None:
+    debugger = started()
+    for name, register in (("$R10", "USER_REGISTER[10]:real"), ("$i3", "USER_REGISTER[3]:int"), ("VMAXM1", "M1_VMAX")):
+        assert debugger.set_value("m", name, "33").number == 33.0
+        assert debugger.evaluate("m", name).number == 33.0
+        assert debugger.view.read(f"m.{register}") == 33.0
+    assert debugger.evaluate("m", "time").number == ENTRY / SECOND
 
 
 def test_the_past_cannot_be_changed_unless_it_becomes_a_branch() -> None:

@@ -60,6 +60,15 @@ def test_a_wait_for_ever_shows_what_it_depends_on() -> None:
     ]
 
 
+def test_names_of_registers_in_the_program() -> None:
+    world = World.from_toml('[[mic488]]\nname = "m"\nprogram = "p.prg"\nstart = true\n', {"p.prg": b"DELAY 0.5\n$R10 = 2,5\n"})
+    world.run(1.0)
+    assert shown(world, "$R10 > 1")[0].startswith("m.USER_REGISTER[10]:real > 1 is true, since 0.50")
+    assert shown(world, "m.VmaxM1") == ["m.M1_VMAX is 1000, from the beginning (at 1 s)"]
+    with pytest.raises(Misuse, match="no signal '\\$R11'"):
+        world.why("$R11")
+
+
 def test_the_moment_decides() -> None:
     world = waits()
     assert shown(world, "OUT1 = 0", 0.5) == ["cell.OUT1 = 0 is true, from the beginning (at 0.5 s)"]

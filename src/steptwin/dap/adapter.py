@@ -33,6 +33,8 @@ Arguments: TypeAlias = Mapping[str, Any]
 
 LOOK_S = 0.1
 """Period of the check whether another client lets an attached twin continue."""
+DATA_ACCESS = "write"
+"""Reading a value changes nothing, and is not noticed."""
 FRAMES = 1000
 """Frames of a thread, at most: a frame has the number of its thread times this, and its depth."""
 _STOPS_USUALLY = (Events.PROGRAM_ERROR, Events.WRONG_DATA)
@@ -222,11 +224,23 @@ class Adapter:
             debugger.evaluate(machine, name)
         except Misuse as error:
             return {"dataId": None, "description": str(error)}
-        return {"dataId": f"{machine}/{name}", "description": f"{name} of {machine}", "accessTypes": ["write"]}
+        return {"dataId": f"{machine}/{name}", "description": f"{name} of {machine}", "accessTypes": [DATA_ACCESS]}
 
     def _set_data(self, arguments: Arguments) -> _Body:
-        self._data = [data_point(one) for one in arguments["breakpoints"]]
-        return {"breakpoints": [self._point(one) for one in self._set_all(self._data)]}
+        wanted = [(data_point(one), one.get("accessType") or DATA_ACCESS) for one in arguments["breakpoints"]]
+        self._data = [point for point, access in wanted if access == DATA_ACCESS]
+        found = iter(self._set_all(self._data))
+        return {
+            "breakpoints": [
+                self._point(next(found))
+                if access == DATA_ACCESS
+                else {
+                    "verified": False,
+                    "message": f"accessType = {access!r}: it can stop when a value changes ({DATA_ACCESS!r})",
+                }
+                for _, access in wanted
+            ]
+        }
 
     def _set_all(self, wanted: Sequence[AnyPoint]) -> Sequence[SetPoint]:
         """Set all breakpoints; what became of some of them."""
@@ -490,7 +504,8 @@ def _why(debugger: Target, machine: str, question: str) -> Answer:
 
 def _variable(value: ShownValue) -> _Body:
     hint = {} if value.is_settable else {"presentationHint": {"attributes": ["readOnly"]}}
-    return {"name": value.name, "value": value.text, "variablesReference": 0, "evaluateName": value.name, **hint}
+    evaluated = {"evaluateName": value.expression} if value.expression else {}
+    return {"name": value.name, "value": value.text, "variablesReference": 0, **evaluated, **hint}
 
 
 def _seconds(time: int) -> str:

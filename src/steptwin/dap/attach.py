@@ -272,7 +272,7 @@ class AttachedTwin:
 
 
 def _value(found: Mapping[str, Any]) -> ShownValue:
-    return ShownValue(found["name"], found["value"], found["number"], found["settable"])
+    return ShownValue(found["name"], found["value"], found["number"], found["settable"], found.get("expression", ""))
 
 
 def _wanted(point: AnyPoint) -> command.SetBreakpoint:

@@ -89,7 +89,8 @@ class Breakpoint:
 
 
 class Watch:
-    """A data breakpoint: what it looks at, and whether it is hit. Raises `Misuse` for a condition that is none."""
+    """A data breakpoint: what it looks at, and whether it is hit. Raises `Misuse` for a condition that is none, and for unknown
+    names."""
 
     def __init__(self, number: int, asked: DataPoint, calculate: ResolveExpression) -> None:
         self.number = number
@@ -98,6 +99,7 @@ class Watch:
         text = asked.name if asked.condition is None else with_left_side(asked.name, asked.condition)
         self.has_condition = asked.condition is not None
         self._calculation = calculate(asked.machine, text)
+        self._calculation.check_names()
         self.text = text
 
     def value(self, now: Nanos) -> float | None:

@@ -14,6 +14,7 @@ from sys import float_info
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.nearmiss import NearMiss
 from steptwin.world.expression import ReadAt, parse_expression, value_of
 from steptwin.world.plant import Plant
 from steptwin.world.quantities import unit_of_all
@@ -34,6 +35,8 @@ class ResolvedExpression:
         names = dict.fromkeys(node.names())
         signals = {name: found for name in names if (found := _signal(world, machine, name)) is not None}
         reads = {name: signals[name].value if name in signals else _read_by_program(world, machine, name) for name in names}
+        self._world, self._machine, self._programs = world, machine, world.programs_of(machine)
+        self._by_program = [name for name in names if name not in signals]
         self.is_local = not signals
         """Whether it has names of the program only."""
 
@@ -44,6 +47,12 @@ class ResolvedExpression:
         self._own = world.parts.kernel_of[machine]
         kernels = {source.kernel: None for signal in signals.values() for source in signal.bring(world.now)}
         self._others = [kernel for kernel in kernels if kernel is not self._own]
+
+    def check_names(self) -> None:
+        """Raises `Misuse` for a name that means nothing to the controller, and in none of its programs as they are now."""
+        for name in self._by_program:
+            if not self._programs.has_name(name):
+                _own_signal(self._world, self._machine, name)
 
     @property
     def reads_others(self) -> bool:
@@ -74,7 +83,7 @@ def _signal(world: Plant, machine: str, name: str) -> SignalOf | Idle | None:
     """The signal that a name means; None for a name of the program. Raises `Misuse`."""
     owner, dot, _ = name.partition(".")
     if not dot:
-        return None
+        return world.signal(name) if name == "time" and name not in world.programs_of(machine).variables(world.now) else None
     is_full = owner in world.machines or owner in world.parts.element_names
     found = world.signal(name) if is_full else _own_signal(world, machine, name)
     if not found.is_readable:
@@ -86,8 +95,13 @@ def _own_signal(world: Plant, machine: str, name: str) -> SignalOf | Idle:
     try:
         return world.signal(f"{machine}.{name}")
     except Misuse:
-        known = ", ".join(world.programs_of(machine).variables(world.now)) or "none"
-        raise Misuse(f"{name!r} means nothing to {machine}: its variables are {known}") from None
+        variables = list(world.programs_of(machine).variables(world.now))
+        hint = NearMiss().hint(name, [*variables, *world.machine(machine).pins(), *_paths(world, machine)])
+        raise Misuse(f"{name!r} means nothing to {machine}{hint}: its variables are {', '.join(variables) or 'none'}") from None
+
+
+def _paths(world: Plant, machine: str) -> list[str]:
+    return [point.path for point in world.kind(machine).datasheet(world.machine(machine)).points]
 
 
 def _read_by_program(world: Plant, machine: str, name: str) -> ReadAt:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 
 from steptwin.controllerstate import StateAxis, StateStatus, detail_text
 from steptwin.datasheet import Access
@@ -25,7 +26,18 @@ def scope(world: Plant, machine: str, name: str) -> Scope:
     world.touch(machine)
     if name not in SCOPES:
         raise Misuse(f"no group of values is called {name!r}: there are {', '.join(SCOPES)}")
-    return Scope(name, list(_VALUES[name](world, machine)))
+    return Scope(name, [value._replace(expression=_expression(world, machine, value)) for value in _VALUES[name](world, machine)])
+
+
+def _expression(world: Plant, machine: str, value: ShownValue) -> str:
+    """What evaluates to a value: its name, or what follows the name of the axis where a controller has but one."""
+    _, _, last = value.name.partition(".")
+    for text in (value.name, last):
+        with suppress(Misuse):
+            found = ResolvedExpression(world, machine, text).value(world.now)
+            if value.number is None or found == value.number:
+                return text
+    return ""
 
 
 def _variables(world: Plant, machine: str) -> Iterator[ShownValue]:
@@ -117,9 +129,12 @@ def setting(world: Plant, machine: str, name: str, value: float) -> ExternalInpu
     owner, dot, rest = name.partition(".")
     target, path = (owner, rest) if dot and owner in world.machines else (machine, name)
     kind, device = world.kind(target), world.machine(target)
+    path = world.programs_of(target).point(path) or path if target in world.programs else path
     if path.upper() in device.pins():
         return Set(((target, kind.input_pin(path, value), value),))
-    if kind.registers is not None and kind.point(device, path) is not None:
+    if kind.registers is not None and (point := kind.point(device, path)) is not None:
+        if point.point.access is Access.READ:
+            raise Misuse(f"{name} cannot be set: it can only be read")
         world.requests(target, world.registers(target), ((path, value),))  # raises `Misuse`
         return Write(((target, path, value),))
     known = ", ".join(variables.values()) or "none"

@@ -135,6 +135,8 @@ class ShownValue(NamedTuple):
     text: str
     number: float | None = None
     is_settable: bool = False
+    expression: str = ""
+    """What evaluates to it; empty where nothing does."""
 
 
 class Scope(NamedTuple):

@@ -464,4 +464,10 @@ def _point(wanted: command.SetBreakpoint) -> AnyPoint:
 
 
 def _plain_value(value: ShownValue) -> dict[str, object]:
-    return {"name": value.name, "value": value.text, "number": value.number, "settable": value.is_settable}
+    return {
+        "name": value.name,
+        "value": value.text,
+        "number": value.number,
+        "settable": value.is_settable,
+        "expression": value.expression,
+    }

@@ -174,7 +174,7 @@ DebugCommand: TypeAlias = (
 )
 
 _PLACE = "time_ns, present_ns, begin_ns (the oldest moment that can be gone to), past, going (whether time goes on)"
-_VALUE = "name, value (as text, with its unit), number (null where it is none), settable"
+_VALUE = "name, value (as text, with its unit), number (null where it is none), settable, expression (what evaluates to it)"
 _BREAKPOINT = "number, problem (why it is nowhere; null), lines of the statements, and what was given"
 
 ROWS = (

@@ -130,13 +130,23 @@ class Why:
         for name in dict.fromkeys(parse_condition(text).names()):
             if not self._has(name):
                 having = [machine for machine in world.machines if self._has(f"{machine}.{name}")]
-                if len(having) > 1:
-                    raise Misuse(f"{name} is of {' and '.join(having)}: ask with the controller, such as {having[0]}.{name}")
-                if not having:
+                full = [f"{machine}.{name}" for machine in having] or list(self._registers(name))
+                if len(full) > 1:
+                    owners = [one.partition(".")[0] for one in full]
+                    raise Misuse(f"{name} is of {' and '.join(owners)}: ask with the controller, such as {full[0]}")
+                if not full:
                     world.signal(name)
-                for _ in having:
-                    text = re.sub(rf"(?<![\w.]){re.escape(name)}(?![\w.])", f"{having[0]}.{name}", text)
+                text = re.sub(rf"(?<![\w.$]){re.escape(name)}(?![\w.])", full[0], text)
         return text
+
+    def _registers(self, name: str) -> Iterator[str]:
+        """What a name of a program language means, of each controller with a program: ``table.USER_REGISTER[10]:real`` for
+        ``$R10``, also with the controller before it."""
+        owner, dot, rest = name.rpartition(".")
+        for machine, programs in self.log.world.programs.items():
+            point = programs.point(rest) if not dot or machine == owner else None
+            if point is not None and self._is_signal(f"{machine}.{point}"):
+                yield f"{machine}.{point}"
 
     def _has(self, name: str) -> bool:
         """Whether there is a signal with this name, or a contact."""

@@ -140,6 +140,15 @@ class Programs(Protocol):
         """What a name of the program means to the statement of this moment; None where it means nothing."""
         ...
 
+    def has_name(self, name: str) -> bool:
+        """Whether a name means something in one of the texts, whether or not the program runs."""
+        ...
+
+    def point(self, name: str) -> str | None:
+        """The point of the controller that a name of the language means, such as ``USER_REGISTER[10]:real`` for ``$R10``; None
+        for others."""
+        ...
+
     def set_variable(self, name: str, value: float, now: Nanos) -> None:
         """Raises `Misuse` for a name or value that is not permitted."""
         ...

@@ -1110,7 +1110,7 @@ export type StackRequest = {
   machine: string;
 };
 
-/** A group of values where the debugger stands. Answer: a list of name, value (as text, with its unit), number (null where it is none), settable. */
+/** A group of values where the debugger stands. Answer: a list of name, value (as text, with its unit), number (null where it is none), settable, expression (what evaluates to it). */
 export type ValuesRequest = {
   do: "values";
   /** Comes back with the answer. */
@@ -1122,7 +1122,7 @@ export type ValuesRequest = {
   scope: "Variables" | "Axes" | "Pins" | "Controller" | "Registers" | "World";
 };
 
-/** The value of an expression where the debugger stands. Answer: name, value (as text, with its unit), number (null where it is none), settable. */
+/** The value of an expression where the debugger stands. Answer: name, value (as text, with its unit), number (null where it is none), settable, expression (what evaluates to it). */
 export type EvaluateRequest = {
   do: "evaluate";
   /** Comes back with the answer. */
@@ -1134,7 +1134,7 @@ export type EvaluateRequest = {
   expression: string;
 };
 
-/** A variable, an input or a register takes a value, at the present only. Answer: name, value (as text, with its unit), number (null where it is none), settable. */
+/** A variable, an input or a register takes a value, at the present only. Answer: name, value (as text, with its unit), number (null where it is none), settable, expression (what evaluates to it). */
 export type SetValueRequest = {
   do: "set_value";
   /** Comes back with the answer. */

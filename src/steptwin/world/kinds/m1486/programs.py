@@ -170,6 +170,12 @@ class ChipPrograms:
     def depth(self) -> int:
         return 0 if self._chip.program.back is None else 1
 
+    def has_name(self, name: str) -> bool:
+        return self.read(name, 0) is not None
+
+    def point(self, name: str) -> str | None:
+        return None
+
     def comes_back(self, place: Place) -> bool:
         return True
 

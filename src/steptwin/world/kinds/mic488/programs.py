@@ -15,6 +15,7 @@ from steptwin.mic488.program_registers import ACCESS
 from steptwin.statements import StatementHook
 from steptwin.wbc.dialect import Dialect
 from steptwin.wbc.flow import flow_of
+from steptwin.wbc.registers import parts
 from steptwin.wbc.scope import ProgramScope
 from steptwin.wbc.steps import BLOCK_MARKS, Literal, RegisterOperand, ValueSource, Variable
 from steptwin.wbc.syntax import parse
@@ -117,11 +118,36 @@ class WbcPrograms:
                 return float(ACCESS[row.key].read(number)(control, now))
         return None
 
+    def has_name(self, name: str) -> bool:
+        dialect = self._device.program.dialect
+        return any(self._bank(text).meaning(name, dialect) is not None for text in self.texts)
+
+    def point(self, name: str) -> str | None:
+        found = parts(name.upper())
+        if found is None:
+            return None
+        row, number = found
+        return _POINTS[row.key].format(number) if row.key in _POINTS else None
+
     def set_variable(self, name: str, value: float, now: Nanos) -> None:
         self._device.command(lambda now: self._device.program.set_variable(name, value, now), now)
 
     def execute_all(self, on: bool, now: Nanos) -> None:
         self._device.command(lambda now: self._device.program.rest_in_loops(not on, now), now)
+
+
+_POINTS = {
+    "$I": "USER_REGISTER[{}]:int",
+    "$D": "USER_REGISTER[{}]:dint",
+    "$R": "USER_REGISTER[{}]:real",
+    "ACCM": "M{}_ACC",
+    "DECM": "M{}_DEC",
+    "VMAXM": "M{}_VMAX",
+    "LIMLM": "M{}_POSLIM_L",
+    "LIMRM": "M{}_POSLIM_R",
+    "STATM": "M{}_STATUS",
+}
+"""Registers of the controller, by the registers of the language."""
 
 
 class _Bank:
