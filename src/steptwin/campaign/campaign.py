@@ -17,12 +17,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from steptwin.campaign.case import Case, CaseResult
 from steptwin.campaign.cases import Cases
-from steptwin.campaign.description import CampaignDescription
-from steptwin.campaign.execution import CaseExecution
+from steptwin.campaign.description import SEARCHES, CampaignDescription
+from steptwin.campaign.execution import CaseExecution, Done
 from steptwin.campaign.reading import load_campaign, read_campaign
 from steptwin.campaign.runner import CaseRunner
+from steptwin.campaign.search.exhaustive import ExhaustiveCases
+from steptwin.campaign.search.guided import WAVE, GuidedSearch, distance
 from steptwin.campaign.summary import CampaignSummary
-from steptwin.campaign.workers import workers
+from steptwin.campaign.workers import Workers, workers
 from steptwin.coverage.counts import Coverage
 from steptwin.durations import duration
 from steptwin.errors import Misuse
@@ -58,7 +60,7 @@ class Campaign:
 
     def __init__(self, description: CampaignDescription) -> None:
         self.description = description
-        self.cases = Cases(description)
+        self.cases = ExhaustiveCases(description) if description.search == "exhaustive" else Cases(description)
         """By number, from 0."""
         self.covered = 0
         """In how many runs what programs execute was counted."""
@@ -83,9 +85,12 @@ class Campaign:
         seed: int | None = None,
         time: float | str | None = None,
         until_failure: bool | None = None,
+        search: str | None = None,
     ) -> Campaign:
-        """The same with another seed, or of another extent. Raises `Misuse`."""
+        """The same with another seed or search, or of another extent. Raises `Misuse`."""
         description = self.description
+        if search is not None and search not in SEARCHES:
+            raise Misuse(f"search {search!r}: permitted are {', '.join(SEARCHES)}")
         if runs is not None and runs < 1:
             raise Misuse(f"runs {runs}: must be 1 or more")
         if seed is not None and not 0 <= seed < 1 << 63:
@@ -98,6 +103,7 @@ class Campaign:
                 seed=description.seed if seed is None else seed,
                 time_ns=time_ns,
                 until_failure=description.until_failure if until_failure is None else until_failure,
+                search=description.search if search is None else search,
             )
         )
 
@@ -175,7 +181,6 @@ class Campaign:
         self, store: CampaignStore, there: object, *, coverage: bool, progress: Callable[[CampaignProgress], object]
     ) -> CampaignSummary:
         from steptwin.campaign.store import StoredCase, gaps
-        from steptwin.campaign.workers import Workers
 
         assert isinstance(there, Workers)  # noqa: S101
         description, total = self.description, self.cases.count
@@ -194,7 +199,11 @@ class Campaign:
             return (self.cases[number] for number in gaps(done, limit))
 
         finished = 0
-        for batch in CaseExecution(description, there, cases(), is_over, counts=coverage):
+        if description.search == "guided":
+            batches = self._guided(there, {case.number: distance(result) for case, result in store.results()}, is_over, coverage)
+        else:
+            batches = iter(CaseExecution(description, there, cases(), is_over, counts=coverage))
+        for batch in batches:
             if counted is not None:
                 for text in Coverage.of_plain(batch.coverage or ()):
                     counted.add(text)
@@ -206,6 +215,21 @@ class Campaign:
             progress(CampaignProgress(known + finished, failed, total, finished / max(time.monotonic() - began, 1e-9)))
         before = total if first is None or not description.until_failure else first + 1
         return CampaignSummary.of(description.name, description.digest, description.seed, store.results(before))
+
+    def _guided(self, there: Workers, known: dict[int, float], is_over: Callable[[], bool], counts: bool) -> Iterator[Done]:
+        """Runs waves of cases; ``known`` are the distances of those that ran before, by number."""
+        assert isinstance(self.cases, Cases)  # noqa: S101
+        search, left = GuidedSearch(self.cases), self.cases.count
+        while left is None or left > 0:
+            wave = search.ask(WAVE if left is None else min(WAVE, left))
+            unknown = (case for case in wave if case.number not in known)
+            for batch in CaseExecution(self.description, there, unknown, is_over, counts=counts):
+                known.update((result.number, distance(result)) for result in batch.results)
+                yield batch
+            if any(case.number not in known for case in wave):
+                return
+            search.tell([known[case.number] for case in wave])
+            left = None if left is None else left - len(wave)
 
 
 def _make_folder(folder: Path) -> None:

@@ -13,6 +13,7 @@ from steptwin.campaign.variation import Varied
 from steptwin.machine import Nanos
 from steptwin.world.blueprint import FileContents
 
+SEARCHES = ("random", "exhaustive", "guided")
 DESIGNS = ("random", "grid", "latin-hypercube", "sobol")
 
 
@@ -91,6 +92,7 @@ class CampaignDescription:
     database: str | None = None
     matrix: MatrixRules = MatrixRules()
     """Of the fault matrix."""
+    search: str = SEARCHES[0]
 
     @cached_property
     def digest(self) -> str:

@@ -13,13 +13,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from steptwin.campaign.case import Case, FaultAt
-from steptwin.campaign.cases import Cases
 from steptwin.campaign.description import CampaignDescription, MatrixRules
 from steptwin.campaign.effects import FactsWatch, FaultEffect, Judgement, RunFacts, judge
 from steptwin.campaign.inventory import PossibleFault, occasions, possible_faults
 from steptwin.campaign.phases import MOST_PHASES, CyclePhase, cycle_phases
 from steptwin.campaign.report.matrixpage import matrix_page
 from steptwin.campaign.runner import CaseRunner
+from steptwin.campaign.search.exhaustive import without_faults
 from steptwin.campaign.shrink import ADDED
 from steptwin.campaign.workers import workers
 from steptwin.coverage.counts import Coverage
@@ -171,12 +171,6 @@ def fault_matrix(
         progress(len(rows), len(tried))
     left_out = tuple(one for one in possible if one not in tried)
     return FaultMatrix(description.name, tuple(phases), tuple(rows), left_out, nominal, coverage)
-
-
-def without_faults(description: CampaignDescription) -> Case:
-    """The case with the values of the world's description, and the middle of what has none there; with all steps."""
-    values = {one.name: one.spread.value(0.5) for one in description.vary if not one.is_path}
-    return Cases(description).made(0, description.seed, values, [])
 
 
 def _case(nominal: Case, possible: PossibleFault, phase: CyclePhase) -> Case:

@@ -10,6 +10,7 @@ from typing import Any
 from steptwin.campaign.checks import CAMPAIGN, FAULT, MATRIX, MEASURE, PROPERTY, STEP, VARY, CampaignChecks
 from steptwin.campaign.description import (
     DESIGNS,
+    SEARCHES,
     CampaignDescription,
     MatrixRules,
     Measure,
@@ -102,6 +103,7 @@ ROWS: Mapping[str, TableRows] = {
             optional(flag, "until_failure", "end after the first run that fails", False),
             optional(SEED, "seed", "where all chance comes from", 0),
             optional(word(*DESIGNS), "design", "how values are drawn", DESIGNS[0]),
+            optional(word(*SEARCHES), "search", "how cases are chosen", SEARCHES[0]),
             optional(_condition, "until", "a condition that ends a run earlier"),
             optional(positive_time, "start", "the end of the beginning that all runs have in common", attribute="start_ns"),
             optional(text_value, "database", "of the results: postgresql://HOST/NAME; default a file beside the results"),

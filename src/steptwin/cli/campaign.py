@@ -28,6 +28,10 @@ def run(
     seed: Annotated[int | None, typer.Option(help="Where all chance comes from. Default: as the file says.")] = None,
     time: Annotated[str | None, typer.Option(metavar="TIME", help="No run begins later, such as '10 min'.")] = None,
     until_failure: Annotated[bool, typer.Option("--until-failure", help="End with the first run that fails.")] = False,
+    search: Annotated[
+        str | None,
+        typer.Option(metavar="[random|exhaustive|guided]", help="How cases are chosen. Default: as the file says, else random."),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", metavar="DIR", help="Folder of the results. Default: FILE with .results.")
     ] = None,
@@ -52,6 +56,7 @@ def run(
         seed=seed,
         time=time,
         until_failure=True if until_failure else None,
+        search=search,
         jobs=jobs,
         dask=dask,
         coverage=tuple(coverage or ()),

@@ -35,6 +35,7 @@ class CampaignOptions:
     seed: int | None = None
     time: str | None = None
     until_failure: bool | None = None
+    search: str | None = None
     jobs: int | None = None
     dask: str | None = None
     coverage: Sequence[str] = ()
@@ -48,7 +49,7 @@ def run(options: CampaignOptions, out: Print) -> bool:
     if options.export is not None:
         _check_export(options.export)
     campaign = Campaign.load(options.file).changed(
-        runs=options.runs, seed=options.seed, time=options.time, until_failure=options.until_failure
+        runs=options.runs, seed=options.seed, time=options.time, until_failure=options.until_failure, search=options.search
     )
     folder = options.out or options.file.with_suffix(".results")
     began = time.monotonic()
