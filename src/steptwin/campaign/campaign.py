@@ -60,8 +60,9 @@ class Campaign:
 
     def __init__(self, description: CampaignDescription) -> None:
         self.description = description
-        self.cases = ExhaustiveCases(description) if description.search == "exhaustive" else Cases(description)
-        """By number, from 0."""
+        self.cases = Cases(description)
+        """By number, from 0, but those of other searches than random."""
+        self._chosen = ExhaustiveCases(description) if description.search == "exhaustive" else self.cases
         self.covered = 0
         """In how many runs what programs execute was counted."""
         self.coverage = Coverage()
@@ -118,11 +119,11 @@ class Campaign:
 
     def run_case(self, case: Case | int) -> CaseResult:
         """The result of a case, or of that with a number."""
-        return self.runner.run(case if isinstance(case, Case) else self.cases[case])
+        return self.runner.run(case if isinstance(case, Case) else self._chosen[case])
 
     def world(self, case: Case | int) -> World:
         """The world of a case before it begins to vary, with its trace and session: ``run`` it as long as you like."""
-        return self.runner.begin(case if isinstance(case, Case) else self.cases[case], keep=True)
+        return self.runner.begin(case if isinstance(case, Case) else self._chosen[case], keep=True)
 
     # ------------------------------------------------------------------ all of them
 
@@ -183,7 +184,7 @@ class Campaign:
         from steptwin.campaign.store import StoredCase, gaps
 
         assert isinstance(there, Workers)  # noqa: S101
-        description, total = self.description, self.cases.count
+        description, total = self.description, self._chosen.count
         first = store.first_failure() if description.until_failure else None
         done = store.numbers()
         known, failed = len(done), 0
@@ -196,7 +197,7 @@ class Campaign:
 
         def cases() -> Iterator[Case]:
             limit = total if first is None else first
-            return (self.cases[number] for number in gaps(done, limit))
+            return (self._chosen[number] for number in gaps(done, limit))
 
         finished = 0
         if description.search == "guided":
@@ -218,7 +219,6 @@ class Campaign:
 
     def _guided(self, there: Workers, known: dict[int, float], is_over: Callable[[], bool], counts: bool) -> Iterator[Done]:
         """Runs waves of cases; ``known`` are the distances of those that ran before, by number."""
-        assert isinstance(self.cases, Cases)  # noqa: S101
         search, left = GuidedSearch(self.cases), self.cases.count
         while left is None or left > 0:
             wave = search.ask(WAVE if left is None else min(WAVE, left))
