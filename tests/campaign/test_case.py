@@ -20,7 +20,7 @@ def test_a_case_is_json_and_pickles() -> None:
 
 
 def test_equal_cases_have_equal_digests_whatever_their_number() -> None:
-    values = dict(reversed(CASE.values.items()))
+    values = dict(reversed(list(CASE.values.items())))
     assert replace(CASE, number=4, values=values).digest == CASE.digest
     for other in (replace(CASE, seed=8), replace(CASE, end_ns=98), replace(CASE, faults=()), replace(CASE, values={})):
         assert other.digest != CASE.digest

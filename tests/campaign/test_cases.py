@@ -56,7 +56,7 @@ def test_designs_fill_the_square_evenly(tmp_path: Path, design: str) -> None:
     for name in ("a", "b"):
         strata = sorted(int(float(found[n].values[name]) * 64) for n in range(64))
         assert strata == list(range(64))
-    quarters = [(found[n].values["a"] > 0.5, found[n].values["b"] > 0.5) for n in range(64)]
+    quarters = [(float(found[n].values["a"]) > 0.5, float(found[n].values["b"]) > 0.5) for n in range(64)]
     if design == "sobol":
         assert {quarters.count(one) for one in quarters} == {16}
 

@@ -31,12 +31,13 @@ def test_all_keys_of_a_campaign(tmp_path: Path) -> None:
         tmp_path,
         '[campaign]\nname = "n"\nworld = "world.toml"\nruns = 5\ntime = "10 min"\nuntil_failure = true\nseed = 3\n'
         'design = "sobol"\nend = "2 s"\nuntil = "x.position > 39"\nstart = "100 ms"\ndatabase = "postgresql://h/n"\n'
+        "expectations = false\n"
         '[[fault]]\ndo = "stall machine=table axis=1"\nchance = 0.5\n[[step]]\nat = "1 s"\ndo = { note = "n" }\n'
         '[[measure]]\nname = "m"\nvalue = "x.position"\n',
     )
     assert (found.name, found.runs, found.time_ns, found.until_failure) == ("n", 5, 600 * SECOND, True)
     assert (found.seed, found.design, found.end_ns, found.until) == (3, "sobol", 2 * SECOND, "x.position > 39")
-    assert (found.start_ns, found.database) == (SECOND // 10, "postgresql://h/n")
+    assert (found.start_ns, found.database, found.expectations) == (SECOND // 10, "postgresql://h/n", False)
     assert (found.faults[0].at, found.faults[0].chance) == (SECOND // 10, 0.5)  # where runs begin to vary
     assert (found.steps[0].at, found.steps[0].do) == (SECOND, '{"note": "n"}')
     assert (found.measures[0].value, found.measures[0].when) == ("x.position", None)
@@ -65,6 +66,21 @@ def test_what_varies(tmp_path: Path, keys: str, spread: object) -> None:
 def test_a_path_is_of_the_world(tmp_path: Path) -> None:
     (found,) = load(tmp_path, f'{HEAD}[[vary]]\npath = "x.start"\nbetween = [0, 5]\n').vary
     assert (found.name, found.is_path) == ("x.start", True)
+
+
+@pytest.mark.parametrize(
+    ("keys", "name", "text"),
+    [
+        ('holds = "x.position > 0 for 2 s"', "x.position > 0 for 2 s", "x.position > 0 for 2 s"),
+        ('name = "p"\nalways = "x.position > 0"', "p", "always x.position > 0"),
+        ('never = "x.position < 0"', "never x.position < 0", "never x.position < 0"),
+        ('name = "p"\neventually = "within 1 s x.position > 20"', "p", "eventually within 1 s x.position > 20"),
+        ('name = "p"\nafter = "table.IN1 within 1 s x.position > 20"', "p", "after table.IN1 within 1 s x.position > 20"),
+    ],
+)
+def test_what_must_hold(tmp_path: Path, keys: str, name: str, text: str) -> None:
+    (found,) = load(tmp_path, f"{HEAD}[[property]]\n{keys}\n").properties
+    assert (found.name, found.text) == (name, text)
 
 
 def test_files_that_vary_are_read(tmp_path: Path) -> None:
@@ -108,6 +124,15 @@ def test_files_that_vary_are_read(tmp_path: Path) -> None:
         (HEAD + '[[step]]\ndo = "press start"\n', "expected a step of a script, such as { press = 'start' }"),
         (HEAD + '[[step]]\ndo = { pres = "start" }\n', "has 'pres' (did you mean 'press'?)"),
         (HEAD + '[[step]]\ndo = { press = "start" }\n', "no button is called 'start'"),
+        (HEAD + '[[property]]\nname = "p"\n', "D007: [[property]] needs one of holds, always, never, eventually, after"),
+        (HEAD + '[[property]]\nalways = "x.position >"\n', "6:1: error D009"),
+        (HEAD + '[[property]]\nalways = "x.positoin > 1"\n', "6:1: error D009: property 'always x.positoin > 1'"),
+        (HEAD + '[[property]]\nholds = "no-collison"\n', "(did you mean 'no-collision'?)"),
+        (HEAD + '[[property]]\nalways = "idle"\nnever = "idle"\n', "D007: always and never exclude each other"),
+        (
+            HEAD + '[[property]]\nnever = "idle"\n[[property]]\nnever = "idle"\n',
+            "D006: there is a [[property]] named 'never idle'",
+        ),
         (HEAD + '[[measure]]\nname = "m"\n', "D007: [[measure]] needs one of value and when"),
         (HEAD + '[[measure]]\nname = "m"\nvalue = "y.position"\n', "7:1: error D009"),
         (HEAD + '[[measure]]\nname = "m"\nwhen = "x.position >"\n', "D003: [measure]: when"),
@@ -142,9 +167,12 @@ def test_each_key_refuses_what_it_cannot_be(tmp_path: Path, table: str, key: str
         "fault": HEAD + '[[fault]]\ndo = "stall axis=1"\n',
         "step": HEAD + '[[step]]\ndo = { note = "n" }\n',
         "measure": HEAD + '[[measure]]\nname = "m"\nvalue = "x.position"\n',
+        "matrix": HEAD + "[matrix]\n",
         "property": HEAD + '[[property]]\nalways = "x.position > 0"\n',
     }[table]
     kept = [line for line in lines.splitlines() if not line.startswith(f"{key} =")]
+    if table == "property" and key not in {"name", "always"}:
+        kept.pop()
     text = "\n".join([*kept, f"{key} = [[[]]]", ""])
     found = wrong(tmp_path, text)
     assert f"{text.splitlines().index(f'{key} = [[[]]]') + 1}:1: error D003: [{table}]: {key}:" in found

@@ -88,6 +88,43 @@ def test_runs_from_a_common_beginning_are_those_from_the_beginning(tmp_path: Pat
         assert len(list(world.trace)) == len(world.trace)
 
 
+PROPERTIES = """
+[[property]]
+name = "far"
+eventually = "x.position > 45"
+[[property]]
+name = "shut while it moves"
+never = "table.IN1 and table.M1.moving"
+"""
+
+
+def test_properties_have_verdicts_and_distances(tmp_path: Path) -> None:
+    campaign = Campaign.load(campaign_file(tmp_path, CAMPAIGN + PROPERTIES))
+    early, late = (campaign.run_case(campaign.cases.made(0, 1, {"t": t}, [])) for t in (0.2, 1.4))
+    far, shut, expected = early.verdicts
+    assert (far.name, far.holds, far.robustness > 0) == ("far", True, True)
+    assert (shut.holds, shut.at_ns, shut.robustness < 0) == (False, SECOND // 5, True)
+    assert expected.name == "expectations of the scripts"
+    assert [(one.name, one.holds) for one in late.verdicts] == [("far", True), ("shut while it moves", True)]
+
+
+def test_properties_know_of_the_common_beginning(tmp_path: Path) -> None:
+    """What happens in it counts for each run, as if it had run it itself."""
+    early = '[[property]]\nname = "never below 30"\nnever = "x.position < 30"\n'
+    branched = Campaign.load(campaign_file(tmp_path, COMMON + PROPERTIES + early))
+    anew = Campaign.load(campaign_file(tmp_path, CAMPAIGN + PROPERTIES + early))
+    for n in range(3):
+        case = branched.cases[n]
+        one = branched.run_case(case)
+        assert one == anew.run_case(replace(case, seed=branched.description.seed))
+        assert not one.verdicts[2].holds
+
+
+def test_expectations_of_scripts_need_not_count(tmp_path: Path) -> None:
+    text = CAMPAIGN.replace("seed = 7", "seed = 7\nexpectations = false")
+    assert Campaign.load(campaign_file(tmp_path, text)).run().failed == 0
+
+
 def test_nothing_can_happen_before_the_end_of_a_common_beginning(tmp_path: Path) -> None:
     branched = Campaign.load(campaign_file(tmp_path, COMMON))
     result = branched.run_case(branched.cases.made(0, 1, {"t": 0.3}, []))

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from steptwin.campaign.cases import filled, names_in
-from steptwin.campaign.description import Measure, VariedFault, VariedStep
+from steptwin.campaign.description import Measure, NamedProperty, VariedFault, VariedStep
+from steptwin.campaign.properties import read_property
 from steptwin.campaign.runner import read_step
 from steptwin.campaign.variation import Between, Choice, Normal, Varied, VariedValue
 from steptwin.durations import duration
@@ -129,6 +130,13 @@ class CampaignChecks:
         if self._head["until"] is not None:
             toml.unless_wrong((CAMPAIGN, "until"), partial(world.condition, self._head["until"]))
 
+    def check_properties(self, world: World, properties: tuple[NamedProperty, ...]) -> None:
+        """Whether the world has what they are about."""
+        for n, one in enumerate(properties):
+            table = self._toml.data[PROPERTY][n]
+            word = next(key for key in table if key != "name")
+            self._toml.unless_wrong((PROPERTY, n, word), partial(_watch, world, one))
+
     def _check_fault(self, world: World, text: str) -> None:
         for values in self._samples(text):
             check_step(world, do.SetFault(read_fault(filled(text, values))))
@@ -145,6 +153,10 @@ class CampaignChecks:
         for name in names:
             for value in self._by_name[name].levels if isinstance(self._by_name[name], Choice) else ():
                 yield {**middle, name: value}
+
+
+def _watch(world: World, one: NamedProperty) -> None:
+    read_property(one.text, one.name).watch(world).close()
 
 
 def _read_all(base: Path, spread: Choice, files: dict[str, bytes]) -> None:

@@ -90,6 +90,8 @@ class CampaignDescription:
     properties: tuple[NamedProperty, ...]
     measures: tuple[Measure, ...]
     database: str | None = None
+    expectations: bool = True
+    """Whether a run fails where a script expects something in vain."""
     matrix: MatrixRules = MatrixRules()
     """Of the fault matrix."""
     search: str = SEARCHES[0]

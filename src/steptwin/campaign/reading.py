@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from functools import partial
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from steptwin.campaign.description import (
     VariedStep,
     step_text,
 )
+from steptwin.campaign.properties import read_property
 from steptwin.campaign.variation import MOST_LEVELS, Between, Choice, Normal, Varied
 from steptwin.durations import duration
 from steptwin.errors import Misuse
@@ -91,6 +93,9 @@ def _table(value: Any) -> str:
     return step_text(value)
 
 
+TIMED = ("always", "never", "eventually", "after")
+"""Keys of properties that are their first words."""
+
 ROWS: Mapping[str, TableRows] = {
     CAMPAIGN: TableRows(
         written=f"[{CAMPAIGN}]",
@@ -106,6 +111,7 @@ ROWS: Mapping[str, TableRows] = {
             optional(word(*SEARCHES), "search", "how cases are chosen", SEARCHES[0]),
             optional(_condition, "until", "a condition that ends a run earlier"),
             optional(positive_time, "start", "the end of the beginning that all runs have in common", attribute="start_ns"),
+            optional(flag, "expectations", "whether a run fails where a script expects something in vain", True),
             optional(text_value, "database", "of the results: postgresql://HOST/NAME; default a file beside the results"),
         ),
     ),
@@ -143,6 +149,18 @@ ROWS: Mapping[str, TableRows] = {
             optional(_moment, "at", "a moment, or the name of a time that varies; default where runs begin to vary"),
         ),
     ),
+    PROPERTY: TableRows(
+        written=f"[[{PROPERTY}]]",
+        keys=(
+            optional(text_value, "name", "for people; default the property as it is written"),
+            optional(text_value, "holds", "a property, or a ready one by its name, such as 'no-collision'"),
+            optional(text_value, "always", "what holds at every moment, such as 'x.position < 300'"),
+            optional(text_value, "never", "what holds at no moment"),
+            optional(text_value, "eventually", "what comes true in the run, such as 'within 2 s x.position > 100'"),
+            optional(text_value, "after", "what follows, such as 'stop.pressed within 300 ms not table.M1.moving'"),
+        ),
+        exclude=tuple(combinations(("holds", *TIMED), 2)),
+    ),
     MEASURE: TableRows(
         written=f"[[{MEASURE}]]",
         keys=(
@@ -162,7 +180,7 @@ ROWS: Mapping[str, TableRows] = {
         ),
     ),
 }  # fmt: skip
-"""What the tables may contain, but for properties (`steptwin.campaign.properties`)."""
+"""What the tables may contain."""
 
 
 def load_campaign(path: str | Path) -> CampaignDescription:
@@ -175,7 +193,7 @@ def load_campaign(path: str | Path) -> CampaignDescription:
 def read_campaign(name: str, text: str, folder: Path) -> CampaignDescription:
     """As `load_campaign`, of a text whose world lies in a folder."""
     toml = TomlText(name, text, (), (VARY,))
-    known = [*ROWS, PROPERTY]
+    known = list(ROWS)
     for key in toml.data:
         if key not in known:
             fix = toml.key_replacement((key,) if isinstance(toml.data[key], dict) else (key, 0), key, known)
@@ -186,6 +204,7 @@ def read_campaign(name: str, text: str, folder: Path) -> CampaignDescription:
     faults = tuple(VariedFault(row["do"], _at(row, start), row["chance"]) for row in _rows(toml, FAULT))
     steps = tuple(VariedStep(row["do"], _at(row, start)) for row in _rows(toml, STEP))
     measures = tuple(_measures(toml))
+    properties = tuple(_properties(toml))
     matrix = MatrixRules(**read_table(toml, (MATRIX,), toml.data.get(MATRIX, {}), ROWS[MATRIX].keys))
     checks = CampaignChecks(toml, head, vary)
     checks.check_names(faults, steps)
@@ -196,6 +215,7 @@ def read_campaign(name: str, text: str, folder: Path) -> CampaignDescription:
         text_of_world, files = world.spec.text.source.text, dict(world.files)
         checks.read_files((folder / head["world"]).parent, files)
         checks.check_in(world, files, faults, steps, measures)
+        checks.check_properties(world, properties)
         for key in ("done", "alarm"):
             if (text := getattr(matrix, key)) is not None:
                 toml.unless_wrong((MATRIX, key), partial(world.condition, text))
@@ -208,7 +228,7 @@ def read_campaign(name: str, text: str, folder: Path) -> CampaignDescription:
         vary=vary,
         faults=faults,
         steps=steps,
-        properties=tuple[NamedProperty, ...](),
+        properties=properties,
         measures=measures,
         matrix=matrix,
     )
@@ -266,6 +286,23 @@ def _spread(row: Mapping[str, Any]) -> Between | Normal | Choice:
             raise Misuse(f"between = {[low, high]}: whole needs whole numbers")
         return Between(low, high, row["log"], row["whole"], is_time, row["levels"])
     return Choice(row["choose"] or row["grid"], is_grid=row["grid"] is not None)
+
+
+def _properties(toml: TomlText) -> Iterable[NamedProperty]:
+    names: set[str] = set()
+    for row in _rows(toml, PROPERTY):
+        given = [key for key in ("holds", *TIMED) if row[key] is not None]
+        if not given:
+            toml.wrong(row["place"], "D007", f"[[{PROPERTY}]] needs one of holds, {', '.join(TIMED)}")
+            continue
+        (word,) = given[:1]
+        text = row[word] if word == "holds" else f"{word} {row[word]}"
+        name = row["name"] or text
+        if name in names:
+            toml.wrong((*row["place"], "name"), "D006", f"there is a [[{PROPERTY}]] named {name!r} already")
+        names.add(name)
+        toml.unless_wrong((*row["place"], word), partial(read_property, text, name))
+        yield NamedProperty(name, text)
 
 
 def _measures(toml: TomlText) -> Iterable[Measure]:

@@ -10,6 +10,7 @@ from typing import Any
 
 from steptwin.campaign.case import EXPECTATIONS, Case, CaseResult, Verdict
 from steptwin.campaign.description import CampaignDescription, Measure
+from steptwin.campaign.properties import WatchState, read_property
 from steptwin.coverage.counts import Coverage
 from steptwin.coverage.watch import WorldCoverage
 from steptwin.errors import Misuse, SteptwinError
@@ -41,18 +42,25 @@ class CaseRunner:
         self._paths = frozenset(one.name for one in description.vary if one.is_path)
         self._blueprints: OrderedDict[str, Blueprint] = OrderedDict()
         self._beginning: PlantSnapshot | None = None
+        self._properties = [read_property(one.text, one.name) for one in description.properties]
+        self._seen: list[WatchState | None] = [None] * len(self._properties)
+        """Of the common beginning, by each property."""
         self._coverage: list[Any] = []
         """Of the common beginning, as plain values."""
         if description.start_ns is not None:
             world = self._anew({}, description.seed)
             coverage = Coverage()
             watch = WorldCoverage(world, coverage)
+            watches = [one.watch(world) for one in self._properties]
             ended = world.run_to(description.start_ns)
             watch.close()
             if ended is not None:
                 start = description.start_ns / SECOND
                 raise Misuse(f"start = {start:g} s: the world ends its run at {world.now / SECOND:g} s: {ended}")
             self._coverage = coverage.plain()
+            self._seen = [one.state() for one in watches]
+            for one in watches:
+                one.close()
             self._beginning, self._common = world.snapshot(), world.blueprint
 
     # ------------------------------------------------------------------ worlds
@@ -133,14 +141,18 @@ class CaseRunner:
                 coverage.add(text)
             watch = WorldCoverage(world, coverage)
         measures = _Measures(world, self.description.measures)
+        watches = [one.watch(world, seen) for one, seen in zip(self._properties, self._seen, strict=True)]
         world.run_to(case.end_ns, self.description.until)
         if watch is not None:
             watch.close()
-        verdicts: list[Verdict] = []
-        if len(world.failures):
+        verdicts = [one.verdict() for one in watches]
+        measured = dict(measures.values())
+        for one in watches:
+            measured |= one.measures()
+        if len(world.failures) and self.description.expectations:
             first = world.failures[0]
             verdicts.append(Verdict(EXPECTATIONS, False, -1.0, first.time, str(first.value)))
-        return CaseResult(case.number, tuple(verdicts), world.trace.digest(), world.now, measures.values())
+        return CaseResult(case.number, tuple(verdicts), world.trace.digest(), world.now, measured)
 
 
 class _Measures:
