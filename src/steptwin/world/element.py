@@ -18,7 +18,9 @@ from steptwin.world.tomlplaces import Path
 
 if TYPE_CHECKING:
     from steptwin.world.drawing import Drawing
+    from steptwin.world.elements.axis import BuiltAxis
     from steptwin.world.kind import Terminals
+    from steptwin.world.lanes import MovedLane
     from steptwin.world.signals import SignalOf
     from steptwin.world.site import Site
     from steptwin.world.spec import WorldSpec
@@ -79,7 +81,9 @@ class Element(Generic[S, B]):
     drawing: Callable[[B], Drawing] | None = None
     """How it is drawn, where there is more to see than levels and numbers."""
     lanes: Callable[[S], tuple[str, ...]]
-    """Subjects of the edges that it records in traces."""
+    """Subjects of the edges that it records in traces, besides those of its faults."""
+    moved: Callable[[B], tuple[BuiltAxis, MovedLane]] | None = None
+    """The lane of its motion, which follows from that of an axis."""
     faults: tuple[FaultKind, ...] = ()
     """Its faults (`Layer.ELEMENT`), which act on the built object."""
     is_named: bool = field(init=False)

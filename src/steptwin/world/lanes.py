@@ -6,6 +6,7 @@ A trace has pulses only. The display data are static: they are read from a machi
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import NamedTuple, TypeAlias
 
 from steptwin.machine import MICROSECOND, Nanos
@@ -31,6 +32,44 @@ class PhaseOutputs(NamedTuple):
     characteristic_pin: str = "N"
 
 
+SLIPS, STUCK, LIFT_SHARE, SPRING_SHARE = "slips", "stuck", "lift_share", "frequency_share"
+"""Edges ``ELEMENT.NAME`` that faults record: 1 while a coupling slips or a follower is stuck; the share of the lift of a worn
+cam, of the frequency of a slack belt."""
+
+
+class MovedLane(NamedTuple):
+    """What an axis moves besides its load, as a function of the pulses P of the load (`Mechanics`).
+
+    A shaft is at ``offset`` + ``per_pulse`` · P. A follower is lifted by that angle, as ``points`` say. A carriage swings about
+    it, with ``spring``. A gantry is in the middle between it and the load of ``other``.
+    """
+
+    name: str
+    signal: str
+    """``position`` or ``angle``."""
+    unit: str
+    per_pulse: float
+    offset: float = 0.0
+    coupling: str = ""
+    """The shaft whose coupling may slip."""
+    points: tuple[tuple[float, float], ...] = ()
+    """Angle and lift, by angle."""
+    turn: float = 360.0
+    """Angle after which the points begin anew."""
+    spring: tuple[float, float] | None = None
+    """Frequency (Hz) and damping ratio."""
+    other: tuple[str, str] | None = None
+    """Machine and subject of the other axis of a gantry."""
+
+    @property
+    def steepest(self) -> float:
+        """The most that it moves for a unit of the angle, or 1."""
+        if not self.points:
+            return 1.0
+        around = [*self.points, (self.points[0][0] + self.turn, self.points[0][1])]
+        return max(abs((y1 - y0) / (a1 - a0)) for (a0, y0), (a1, y1) in pairwise(around))
+
+
 class Mechanics(NamedTuple):
     """The mechanics of an axis, which have a name, a unit and a zero of their own.
 
@@ -43,6 +82,8 @@ class Mechanics(NamedTuple):
     zero_p: int = 0
     is_ideal: bool = True
     """Whether the load is at the commanded position, unless a ``load`` of the trace states otherwise."""
+    moved: tuple[MovedLane, ...] = ()
+    """Elements that it moves."""
 
     @property
     def position_name(self) -> str:

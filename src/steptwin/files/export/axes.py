@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from steptwin.machine import MotionController
+from steptwin.world.elements import ELEMENTS
 from steptwin.world.kind import AnyKind
-from steptwin.world.lanes import AxisLane, AxisViews, Mechanics
+from steptwin.world.lanes import AxisLane, AxisViews, Mechanics, MovedLane
 
 if TYPE_CHECKING:
     from steptwin.world.elements.axis import BuiltAxis
@@ -18,9 +19,15 @@ def axis_views(world: Plant) -> AxisViews:
     views: dict[tuple[str, str], AxisLane] = {}
     for name, machine in world.machines.items():
         views |= controller_views(name, world.kind(name), machine)
-    for fitted in world.axes.values():
+    moved: dict[str, list[MovedLane]] = {}
+    for element in ELEMENTS.values():
+        if element.moved is not None:
+            for built in world.parts.built(element).values():
+                axis, lane = element.moved(built)
+                moved.setdefault(axis.spec.name, []).append(lane)
+    for name, fitted in world.axes.items():
         place = fitted.mechanism.machine, str(fitted.mechanism.number)
-        views[place] = views[place]._replace(mechanics=_mechanics(fitted))
+        views[place] = views[place]._replace(mechanics=_mechanics(fitted)._replace(moved=tuple(moved.get(name, ()))))
     return views
 
 

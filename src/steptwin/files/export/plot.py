@@ -19,7 +19,8 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
 
 from steptwin.files.export.polyline import curve
 from steptwin.files.export.progress import TimeProgress
-from steptwin.files.export.recording import AxisTrack, PinTrack, Recording
+from steptwin.files.export.recording import Recording
+from steptwin.files.export.tracks import AxisTrack, PinTrack
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion.divisions import profile_of
 from steptwin.motion.pulses import Reals
@@ -78,9 +79,11 @@ def write_plot(recording: Recording, path: Path, form: str, progress: TimeProgre
     rows = rows[:MOST_ROWS]
     loads = [track.true() for track in axes]
     panels_each = [2 if load is None else 3 for load in loads]
-    heights = [_MOTION_IN] * sum(panels_each) + ([_ROW_IN * len(rows)] if rows else [])
+    moved = [track for track in recording.moved if _moves(track, recording)][:MOST_AXES]
+    heights = [_MOTION_IN] * (sum(panels_each) + len(moved)) + ([_ROW_IN * len(rows)] if rows else [])
     with rc_context(STYLE):
         labels = [_label(track, recording) + " velocity" for track in axes] + [row.label for row in rows]
+        labels += [_label(track, recording) for track in moved]
         labels += [text for load in loads if load is not None for text in (f"{load.view.name} position", _GREY)]
         left = max(_LEFT_IN, _room(labels))
         figure, panels = _figure(recording, heights, left)
@@ -90,6 +93,11 @@ def write_plot(recording: Recording, path: Path, form: str, progress: TimeProgre
             if load is not None:
                 _true(next(rest), track, load, recording)
             progress(begin + (until - begin) * (i + 1) // (len(axes) + 1))
+        for track in moved:
+            panel = next(rest)
+            times, positions, _ = _points(track, recording)
+            panel.plot(*_thinned(times, positions), color=_TRUE, linewidth=1.1)
+            _scale(panel, f"{_label(track, recording)}\n{track.view.unit}", _TRUE)
         if rows:
             _lanes(panels[-1], rows, recording)
         if not panels:

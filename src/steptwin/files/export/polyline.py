@@ -8,7 +8,7 @@ from __future__ import annotations
 from math import ceil, inf, sqrt
 from typing import NamedTuple
 
-from steptwin.files.export.recording import AxisTrack
+from steptwin.files.export.tracks import AxisTrack
 from steptwin.machine import Nanos
 from steptwin.motion import Profile, Segment
 from steptwin.motion.divisions import profile_of

@@ -3,135 +3,18 @@
 from __future__ import annotations
 
 import re
-from bisect import bisect_right
-from collections.abc import Collection, Iterator
-from dataclasses import dataclass, field, replace
-from operator import attrgetter
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 
 from steptwin.errors import Misuse
+from steptwin.files.export.moved import moved_track
+from steptwin.files.export.tracks import AxisTrack, PinTrack
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.motion import Profile, at_rest
-from steptwin.motion.divisions import Plan, StepTrain, profile_of
+from steptwin.motion.divisions import StepTrain, profile_of
 from steptwin.world.course import LoadPiece
-from steptwin.world.lanes import AxisLane, AxisViews, plain_view
+from steptwin.world.lanes import AxisViews, plain_view
 from steptwin.world.trace import Trace, TraceRecord
-
-
-@dataclass(slots=True)
-class AxisTrack:
-    """The plans of an axis: each counts from its moment to that of the next. There is one at the beginning of the window."""
-
-    machine: str
-    view: AxisLane
-    times: list[Nanos] = field(default_factory=list)
-    plans: list[Plan] = field(default_factory=list)
-    loads: list[LoadPiece] = field(default_factory=list)
-    """Positions of the load by moment, if it does not follow the pulses throughout."""
-    free: dict[Nanos, Profile] = field(default_factory=dict)
-    """Motions of the load without current, by the moments of ``loads`` in whose place they are."""
-    origins: list[tuple[Nanos, int]] = field(default_factory=list)
-    """By how many pulses the coordinate is above the count, by moments."""
-
-    @property
-    def name(self) -> str:
-        return f"{self.machine}.{self.view.name}"
-
-    def plan(self, now: Nanos) -> Plan:
-        return self.plans[max(bisect_right(self.times, now) - 1, 0)]
-
-    def stretches(self, after: Nanos, until: Nanos) -> Iterator[tuple[Plan, Nanos, Nanos]]:
-        """(plan, after, until) of every plan in force between; pulses at ``until`` belong to the plan before it."""
-        for i in range(max(bisect_right(self.times, after) - 1, 0), len(self.plans)):
-            end = min(self.times[i + 1], until) if i + 1 < len(self.times) else until
-            if after < end:
-                yield self.plans[i], after, end
-            after = max(after, end)
-            if after >= until:
-                return
-
-    def coordinate(self) -> AxisTrack | None:
-        """The position that registers show, which jumps where it is set; None where it is the count since power-on."""
-        if not self.origins:
-            return None
-        track = AxisTrack(self.machine, self.view)
-        moments = [moment for moment, _ in self.origins]
-        for begin in sorted({*self.times, *(moment for moment in moments if moment >= self.times[0])}):
-            past = bisect_right(moments, begin) - 1
-            track.add(begin, profile_of(self.plan(begin)), self.origins[past][1] if past >= 0 else 0)
-        return track
-
-    def add(self, begin: Nanos, profile: Profile, above_p: int) -> None:
-        """From ``begin`` on it is ``above_p`` pulses above where ``profile`` has it."""
-        self.times.append(begin)
-        self.plans.append(type(profile)(profile.start, profile.base + above_p, profile.segments, profile.final_p))
-
-    def place(self, time: Nanos, loads: list[LoadPiece], free: Profile | None = None) -> None:
-        """From ``time`` on the load is otherwise than was known before: at ``loads``, or it moves freely."""
-        while self.loads and self.loads[-1].begin >= time:
-            self.free.pop(self.loads.pop().begin, None)
-        self.loads += loads
-        if free is not None:
-            self.free[time] = free
-
-    def true(self) -> AxisTrack | None:
-        """The motion of the load, ``zero_p`` included; None where it is not known, or can only be that of the drive."""
-        mechanics = self.view.mechanics
-        if mechanics is None or (mechanics.is_ideal and not self.loads):
-            return None
-        view = AxisLane(f"{mechanics.name} true", mechanics.unit, mechanics.pulses_per_unit)
-        track = AxisTrack(self.machine, view)
-        for begin in sorted({*self.times, *(load.begin for load in self.loads if load.begin >= self.times[0])}):
-            past = bisect_right(self.loads, begin, key=attrgetter("begin")) - 1
-            since, follows, pulses = self.loads[past] if past >= 0 else LoadPiece(begin, True, 0)
-            profile = profile_of(self.plan(begin)) if follows else self.free.get(since) or at_rest(begin, pulses)
-            off = mechanics.zero_p + (pulses if follows else 0)
-            track.add(begin, profile, off)
-        return track
-
-    def most_pulses(self, after: Nanos, until: Nanos) -> int:
-        """How many pulses there are, or more: the whole positions passed."""
-        return sum(_passed(profile_of(plan), begin, end) for plan, begin, end in self.stretches(after, until))
-
-
-def _passed(profile: Profile, after: Nanos, until: Nanos) -> int:
-    count = profile.count(max(after, profile.start))
-    passed = 0
-    for end, reached in zip(profile.ends, profile.counts[1:], strict=False):
-        if after < profile.start + end < until:
-            passed += abs(profile.base + reached - count)
-            count = profile.base + reached
-    return passed + abs(profile.count(max(until, profile.start)) - count)
-
-
-@dataclass(slots=True)
-class PinTrack:
-    """The levels of a pin: each counts from its moment to that of the next."""
-
-    machine: str
-    pin: str
-    times: list[Nanos] = field(default_factory=list)
-    levels: list[float] = field(default_factory=list)
-
-    @property
-    def name(self) -> str:
-        return f"{self.machine}.{self.pin}"
-
-    @property
-    def analog(self) -> bool:
-        return self.pin.startswith("AIN") or any(level not in (0.0, 1.0) for level in self.levels)
-
-    def level(self, now: Nanos) -> float | None:
-        """The level at ``now``. Before its first change a digital pin had the other one; that of an analog pin is unknown."""
-        i = bisect_right(self.times, now)
-        if i:
-            return self.levels[i - 1]
-        return None if self.analog else 1.0 - self.levels[0]
-
-    def changes(self, after: Nanos, until: Nanos) -> Iterator[tuple[Nanos, float]]:
-        """Changes with ``after`` < time <= ``until``; of several at one moment the last."""
-        for i in range(bisect_right(self.times, after), bisect_right(self.times, until)):
-            if i + 1 == len(self.times) or self.times[i + 1] != self.times[i]:
-                yield self.times[i], self.levels[i]
 
 
 @dataclass(slots=True)
@@ -145,6 +28,8 @@ class Recording:
     pins: list[PinTrack]
     marks: list[TraceRecord]
     """Frames, statements, events, inputs and faults, in order."""
+    moved: list[AxisTrack]
+    """Of the elements that axes move, in their units."""
     last: Nanos
     """When something changed last, analog inputs apart: their sources never end; ``until`` where something moves on."""
     title: str = ""
@@ -234,6 +119,8 @@ class _Sorting:
         end = last if until is None else until
         if end < self._begin:
             raise Misuse(f"the window of time ends at {end} ns and begins at {self._begin} ns: it must not end before it begins")
+        moved = self._moved(end)
+        changed = max([changed, *(_last_motion(track, end) for track in moved)])
         order = {name: i for i, name in enumerate(machines)}
         return Recording(
             self._begin,
@@ -242,8 +129,21 @@ class _Sorting:
             sorted(self._axes.values(), key=lambda track: (order[track.machine], _numbers(track.view.name))),
             sorted(self._pins.values(), key=lambda track: (order[track.machine], _numbers(track.pin))),
             self._marks,
+            moved,
             end if None in rests else min(changed if changed > self._begin else last, end),
         )
+
+    def _moved(self, until: Nanos) -> list[AxisTrack]:
+        """What the axes move besides their loads; not a gantry of which one axis is not chosen."""
+        found: list[AxisTrack] = []
+        loads = {place: track.load(its) for place, track in self._axes.items() if (its := track.view.mechanics) is not None}
+        for (machine, subject), track in self._axes.items():
+            pins = {pin: one for (of, pin), one in self._pins.items() if of == machine}
+            for lane in () if track.view.mechanics is None else track.view.mechanics.moved:
+                other = None if lane.other is None else loads.get(lane.other)
+                if until > self._begin and (lane.other is None or other is not None):
+                    found.append(moved_track(lane, loads[machine, subject], other, pins, until))
+        return found
 
     def _rests(self) -> list[Nanos | None]:
         """When each axis, and each load that moves without its drive, comes to rest; None: never."""
@@ -251,6 +151,12 @@ class _Sorting:
         return drives + [
             free.end for track in self._axes.values() for begin, free in track.free.items() if begin == track.loads[-1].begin
         ]
+
+
+def _last_motion(track: AxisTrack, until: Nanos) -> Nanos:
+    """When it is in motion for the last time; 0 if it never is."""
+    ends = [*track.times[1:], until]
+    return max((end for plan, end in zip(track.plans, ends, strict=True) if profile_of(plan).segments), default=0)
 
 
 def _stand_before(track: AxisTrack, begin: Nanos) -> None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Iterator, Mapping
+from itertools import pairwise
 from typing import IO, Any, NamedTuple
 
 from steptwin.durations import LONGEST_NS as LATEST_NS
@@ -21,7 +22,7 @@ from steptwin.motion import Profile
 from steptwin.motion.divisions import StepTrain
 from steptwin.motion.plain import plain_plan, read_plan
 from steptwin.plaintypes import fields_fit, fits, fitting, shown
-from steptwin.world.lanes import AxisLane, AxisViews, Mechanics, PhaseOutputs, StepOutputs
+from steptwin.world.lanes import AxisLane, AxisViews, Mechanics, MovedLane, PhaseOutputs, StepOutputs
 from steptwin.world.trace import KINDS, Trace, TraceRecord
 
 FORMAT = 2
@@ -132,7 +133,9 @@ def _head(data: dict[str, Any]) -> SavedTrace:
         view = _view_from_json(axis)
         if not (fields_fit(view) and fields_fit(view.outputs) and view.pulses_per_unit):
             raise TypeError("axes")
-        if view.mechanics is not None and not (fields_fit(view.mechanics) and view.mechanics.pulses_per_unit):
+        if view.mechanics is not None and not (
+            fields_fit(view.mechanics) and view.mechanics.pulses_per_unit and all(map(_is_moved, view.mechanics.moved))
+        ):
             raise TypeError("mechanics")
         views[fitting("machine", axis["machine"], str), fitting("axis", axis["axis"], str)] = view
     machines = fitting("machines", tuple(data["machines"]), tuple[str, ...])
@@ -198,7 +201,10 @@ def _from_json(value: Any) -> object:
 def _view_to_json(view: AxisLane) -> dict[str, object]:
     data = {**view._asdict(), "outputs": view.outputs._asdict()}
     del data["mechanics"]
-    return data if view.mechanics is None else {**data, "mechanics": view.mechanics._asdict()}
+    if view.mechanics is None:
+        return data
+    mechanics = {**view.mechanics._asdict(), "moved": [lane._asdict() for lane in view.mechanics.moved]}
+    return {**data, "mechanics": mechanics}
 
 
 def _view_from_json(data: dict[str, Any]) -> AxisLane:
@@ -209,5 +215,26 @@ def _view_from_json(data: dict[str, Any]) -> AxisLane:
         made = PhaseOutputs((first, second), **outputs)
     else:
         made = StepOutputs(**outputs)
-    mechanics = Mechanics(**data["mechanics"]) if "mechanics" in data else None
+    mechanics: Mechanics | None = None
+    if "mechanics" in data:
+        its = {**data["mechanics"]}
+        moved = tuple(_moved_from_json(lane) for lane in its.pop("moved", ()))
+        mechanics = Mechanics(**its, moved=moved)
     return AxisLane(data["name"], data["unit"], data["pulses_per_unit"], made, mechanics)
+
+
+def _moved_from_json(data: dict[str, Any]) -> MovedLane:
+    plain = {key: _tuples(value) for key, value in data.items()}
+    return MovedLane(**plain)
+
+
+def _tuples(value: Any) -> Any:
+    return tuple(map(_tuples, value)) if isinstance(value, list) else value
+
+
+def _is_moved(lane: MovedLane) -> bool:
+    """Whether a lane from a file is one that can be computed."""
+    angles = [angle for angle, _ in lane.points] if fields_fit(lane) else []
+    rises = all(a < b for a, b in pairwise(angles)) and (not angles or angles[-1] - angles[0] < lane.turn)
+    swings = lane.spring is None or (lane.spring[0] > 0.0 and 0.0 < lane.spring[1] < 1.0)
+    return fields_fit(lane) and lane.per_pulse != 0.0 and rises and swings

@@ -14,7 +14,8 @@ from typing import IO
 
 from steptwin.files.export.polyline import PolylinePiece, pieces_of
 from steptwin.files.export.progress import TimeProgress
-from steptwin.files.export.recording import AxisTrack, PinTrack, Recording
+from steptwin.files.export.recording import Recording
+from steptwin.files.export.tracks import AxisTrack, PinTrack
 from steptwin.machine import Nanos
 from steptwin.motion.divisions import Plan, StepTrain, profile_of
 from steptwin.motion.plain import plain_plan
@@ -32,6 +33,7 @@ def write_timeline(recording: Recording, file: IO[str], progress: TimeProgress) 
         "span": recording.until - recording.begin,
         "machines": recording.machines,
         "axes": [_axis(track, recording, progress, i) for i, track in enumerate(recording.axes)],
+        "moved": [_moved(track, recording) for track in recording.moved],
         "pins": [_pin(pin, recording) for pin in recording.pins],
         "marks": [_mark(record, recording.begin) for record in recording.marks if record.time <= recording.until],
     }
@@ -81,6 +83,25 @@ def _motion(track: AxisTrack, recording: Recording) -> dict[str, object]:
         "machine": track.machine, "name": view.name, "unit": view.unit, "scale": view.pulses_per_unit,
         "plans": plans, "pieces": pieces,
     }  # fmt: skip
+
+
+def _moved(track: AxisTrack, recording: Recording) -> dict[str, object]:
+    """As `_motion`, without pulses."""
+    plans: list[dict[str, object]] = []
+    pieces: list[int] = []
+    for plan, after, _ in track.stretches(recording.begin, recording.until):
+        pieces += [after - recording.begin, len(plans), 0 if profile_of(plan).segments else -1, 0, 0, 1]
+        plans.append(plain_plan(plan))
+    view = track.view
+    return {
+        "machine": track.machine,
+        "name": view.name,
+        "unit": view.unit,
+        "scale": 1.0,
+        "digits": 3,
+        "plans": plans,
+        "pieces": pieces,
+    }
 
 
 def _divided(plan: Plan, after: Nanos, until: Nanos) -> Iterator[tuple[PolylinePiece, int, int]]:

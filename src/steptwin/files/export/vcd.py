@@ -1,8 +1,8 @@
 """Value change dumps (IEEE 1364): the signals at the terminals, for waveform viewers such as GTKWave.
 
-STEP and DIR, or the two phase currents, of every axis; all pins; position and velocity, and the true position of mechanics that
-can be elsewhere, as real numbers; program lines, frames, events and faults as text. One unit of time is a nanosecond. Whole
-pulse lists become text at once (`vcdtext`), so that a pulse costs less than a tenth of a microsecond.
+STEP and DIR, or the two phase currents, of every axis; all pins; position and velocity, the true position of mechanics that can
+be elsewhere, and the positions of what axes move, as real numbers; program lines, frames, events and faults as text. One unit of
+time is a nanosecond. Whole pulse lists become text at once (`vcdtext`), so that a pulse costs less than a tenth of a microsecond.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ import numpy as np
 from steptwin import __version__
 from steptwin.files.export.polyline import curve
 from steptwin.files.export.progress import TimeProgress
-from steptwin.files.export.recording import AxisTrack, PinTrack, Recording
+from steptwin.files.export.recording import Recording
+from steptwin.files.export.tracks import AxisTrack, PinTrack
 from steptwin.files.export.vcdtext import Times, Tokens, changes_text
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.motion import Profile
@@ -82,6 +83,9 @@ class _Dump:
         for track in recording.axes:
             self._add_outputs(track, pins, recording, quiet)
             self._add_motion(track, recording, quiet)
+        for track in recording.moved:
+            points = curve(track, recording.begin, recording.until)
+            self._add_real(track.machine, track.plain_name, points.times, points.positions, quiet)
         for pin in recording.pins:
             self._add_pin(pin, recording, quiet)
         self._add_texts(recording, quiet)

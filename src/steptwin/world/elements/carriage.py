@@ -22,6 +22,7 @@ from steptwin.world.elements.switch import SWITCH, SwitchSpec, lane_of, put_swit
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.table import ElementEffect
 from steptwin.world.faults.table import number as parameter
+from steptwin.world.lanes import SPRING_SHARE, MovedLane
 from steptwin.world.reader import Key, Row, Table, TomlText, optional
 from steptwin.world.sense import TableRows
 from steptwin.world.signals import SignalOf
@@ -76,7 +77,9 @@ class Carriage(Stateful):
         """Let the belt have a share of its frequency."""
         self._spring = Spring(self.spec.frequency * share, self.spec.damping)
         self._renew(now)
-        self.axis.kernel.mark(self.spec.name)
+        kernel, machine = self.axis.kernel, self.axis.mechanism.machine
+        kernel.report(machine, "edge", f"{self.spec.name}.{SPRING_SHARE}", share)
+        kernel.mark(self.spec.name)
 
     # ------------------------------------------------------------------ part of a kernel
 
@@ -108,6 +111,12 @@ class Carriage(Stateful):
 
     def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
         return self._response.reaches(position - 0.5 * direction, after, direction)
+
+    @property
+    def moved(self) -> tuple[BuiltAxis, MovedLane]:
+        spec, scale = self.spec, self.axis.scale
+        per_pulse = self.axis.mechanism.build.sign / float(scale.pulses_per_unit)
+        return self.axis, MovedLane(spec.name, "position", scale.unit, per_pulse, spring=(spec.frequency, spec.damping))
 
     # ------------------------------------------------------------------ signals
 
@@ -146,11 +155,11 @@ def _drives(course: Course, now: Nanos) -> Iterator[DriveStretch]:
             yield DriveStretch(begin, float(piece.load), 0.0, 0.0, 0.0)
             continue
         offset = piece.load + zero
-        for at, p, v, a, j in _polynomials(profile, begin, end):
+        for at, p, v, a, j in polynomials(profile, begin, end):
             yield DriveStretch(at, offset + sign * p, sign * v, sign * a, sign * j)
 
 
-def _polynomials(profile: Profile, begin: Nanos, end: Nanos | None) -> Iterator[tuple[Nanos, float, float, float, float]]:
+def polynomials(profile: Profile, begin: Nanos, end: Nanos | None) -> Iterator[tuple[Nanos, float, float, float, float]]:
     """Moment, position, velocity, acceleration and jerk at the beginning of each part of a profile between two moments."""
     at = profile.start
     for segment, segment_end in zip(profile.segments, profile.ends, strict=True):
@@ -247,6 +256,7 @@ CARRIAGE: Element[CarriageSpec, Carriage] = Element(
     signals=_signals,
     drawing=lambda carriage: rail(carriage.axis.spec.travel, tuple(one.zone for one in carriage.spec.switches)),
     lanes=lambda spec: tuple(lane_of(spec.name, n) for n in range(1, len(spec.switches) + 1)),
+    moved=lambda carriage: carriage.moved,
     faults=(
         FaultKind(
             "slack-belt",

@@ -15,11 +15,12 @@ from steptwin.state import Stateful
 from steptwin.world.cam import Cam
 from steptwin.world.drawing import ROD, Drawing
 from steptwin.world.element import Element, NamedSpec, Reference
-from steptwin.world.elements.axis import AXIS, turns_of_axis
+from steptwin.world.elements.axis import AXIS, BuiltAxis, turns_of_axis
 from steptwin.world.elements.shaft import SHAFT, TURN, GearedShaft
 from steptwin.world.elements.switch import SWITCH, SwitchSpec, lane_of, put_switch, read_switches, zone_of
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.table import ElementEffect, number
+from steptwin.world.lanes import LIFT_SHARE, STUCK, MovedLane
 from steptwin.world.names import Unknown
 from steptwin.world.reader import Key, Row, Table, TomlText, optional
 from steptwin.world.scale import exact_fraction
@@ -124,11 +125,23 @@ class Follower(Stateful):
 
     def hold(self, holds: bool, now: Nanos) -> None:
         self._held = self.lift(now) if holds else None
+        self._report(STUCK, float(holds))
         self.shaft.axis.kernel.mark(self.spec.name)
 
     def wear(self, share: float) -> None:
         self._share = exact_fraction(share)
+        self._report(LIFT_SHARE, share)
         self.shaft.axis.kernel.mark(self.spec.name)
+
+    def _report(self, what: str, level: float) -> None:
+        axis = self.shaft.axis
+        axis.kernel.report(axis.mechanism.machine, "edge", f"{self.spec.name}.{what}", level)
+
+    @property
+    def moved(self) -> tuple[BuiltAxis, MovedLane]:
+        axis, lane = self.shaft.moved
+        points = tuple(sorted(self.spec.points))
+        return axis, lane._replace(name=self.spec.name, signal="position", unit=self.spec.unit, points=points)
 
     @property
     def drawing(self) -> Drawing:
@@ -234,6 +247,7 @@ FOLLOWER: Element[FollowerSpec, Follower] = Element(
     signals=_signals,
     drawing=lambda follower: follower.drawing,
     lanes=lambda spec: tuple(lane_of(spec.name, n) for n in range(1, len(spec.switches) + 1)),
+    moved=lambda follower: follower.moved,
     faults=(
         FaultKind(
             "stuck-follower",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import ClassVar
 
@@ -18,6 +18,7 @@ from steptwin.world.elements.logic import STUCK_OUTPUT, BoardSpec, Joint, with_t
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.table import ElementEffect, number
 from steptwin.world.kind import Terminals
+from steptwin.world.lanes import MovedLane
 from steptwin.world.reader import Key, TomlText, optional
 from steptwin.world.scale import Loading, burden_of
 from steptwin.world.signals import SignalOf, find_signal
@@ -113,6 +114,13 @@ class Gantry(Touch):
         return rail(self._ends[0].spec.travel)
 
     @property
+    def moved(self) -> tuple[BuiltAxis, MovedLane]:
+        one, other = (end.mechanism for end in self._ends)
+        per_pulse = one.build.sign / float(self._ends[0].scale.pulses_per_unit)
+        place = other.machine, str(other.number)
+        return self._ends[0], MovedLane(self.board.name, "position", self.unit, per_pulse, other=place)
+
+    @property
     def unit(self) -> str:
         return self._ends[0].scale.unit
 
@@ -161,7 +169,7 @@ def _signals(gantry: Gantry) -> Mapping[str, SignalOf]:
     }
 
 
-GANTRY = with_terminals(
+_GANTRY = with_terminals(
     "gantry",
     GantrySpec,
     (
@@ -188,3 +196,4 @@ GANTRY = with_terminals(
         ),
     ),
 )
+GANTRY = replace(_GANTRY, moved=lambda gantry: gantry.moved)

@@ -20,6 +20,7 @@ from steptwin.world.elements.contact import CONTACT_KEYS
 from steptwin.world.elements.switch import lane_of, put_switch
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.table import ElementEffect
+from steptwin.world.lanes import SLIPS, MovedLane
 from steptwin.world.reader import Key, Row, Table, TomlText, optional, read_table
 from steptwin.world.scale import exact_fraction
 from steptwin.world.sense import TableRows, check_sense
@@ -109,12 +110,19 @@ class GearedShaft(Stateful):
 
     def slip(self, slips: bool, now: Nanos) -> None:
         """Let the coupling slip, or grip again where the shaft is then."""
+        kernel, mechanism = self.axis.kernel, self.axis.mechanism
+        kernel.report(mechanism.machine, "edge", f"{self.spec.name}.{SLIPS}", float(slips))
         if slips:
             self._held = self.place(now)
         elif self._held is not None:
-            self._behind = self.axis.mechanism.place(now) - self._held
+            self._behind = mechanism.place(now) - self._held
             self._held = None
-        self.axis.kernel.mark(self.spec.name)
+        kernel.mark(self.spec.name)
+
+    @property
+    def moved(self) -> tuple[BuiltAxis, MovedLane]:
+        sign, name = self.axis.mechanism.build.sign, self.spec.name
+        return self.axis, MovedLane(name, "angle", "degree", float(sign * TURN / self.pulses_per_turn), self.spec.offset, name)
 
     @property
     def behind(self) -> float:
@@ -221,6 +229,7 @@ SHAFT: Element[ShaftSpec, GearedShaft] = Element(
     signals=_signals,
     drawing=lambda shaft: Drawing(DIAL, float(TURN), ("angle",), sensors=tuple(one.zone for one in shaft.spec.cams)),
     lanes=lambda spec: tuple(lane_of(spec.name, n) for n in range(1, len(spec.cams) + 1)),
+    moved=lambda shaft: shaft.moved,
     faults=(
         FaultKind(
             "slipping-coupling",

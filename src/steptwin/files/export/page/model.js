@@ -38,6 +38,7 @@ class Motion {
     this.pieces = axis.pieces;
     this.size = axis.pieces.length / PIECE;
     this.scale = axis.scale;
+    this.digits = axis.digits ?? (axis.scale === 1 ? 1 : 3);
   }
   at(t) { return Math.max(lastAt(this.pieces, PIECE, t), 0); }
   begin(i) { return this.pieces[i * PIECE]; }
@@ -200,6 +201,11 @@ function lanesOf(machine) {
     lanes.push({ ...common, kind: "velocity", name: `${axis.name} velocity`, curves: [{ motion, color: COLORS.velocity }], first: false });
     lanes.push({ ...common, motion: count, kind: "step", name: `${axis.name} pulses`, first: false });
   }
+  for (const moved of DATA.moved.filter((one) => one.machine === machine)) {
+    const motion = new Motion(moved), curves = [{ motion, color: COLORS.true }];
+    if (motion.changes()) lanes.push({ machine, motion, unit: moved.unit, kind: "position", isTrue: true, name: moved.name, curves });
+    else still.push(`${moved.name} ${positionText(motion, 0)} ${moved.unit}`);
+  }
   for (const lane of lanes) if (lane.curves) lane.range = rangeOf(lane.curves, lane.kind === "velocity", 0, SPAN);
   if (still.length) {
     lanes.push({ machine, kind: "still", name: `no motion: ${still.join(", ")}`, first: lanes.length === 0 });
@@ -258,7 +264,7 @@ function number(value, most = 6) {
 }
 
 function positionText(motion, t) {
-  return motion.position(motion.at(t), t).toFixed(motion.scale === 1 ? 1 : 3).replace("-", "−");
+  return motion.position(motion.at(t), t).toFixed(motion.digits).replace("-", "−");
 }
 
 function valueText(lane, t) {

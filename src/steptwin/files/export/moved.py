@@ -1,0 +1,249 @@
+"""Tracks of what axes move besides their loads: shafts, followers, carriages and gantries, from the true positions of the axes.
+
+A trace does not have their motion, because it follows from that of the loads, as `steptwin.world.lanes.MovedLane` says, and from
+the edges that faults record.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
+from itertools import pairwise
+from math import ceil, floor
+from typing import NamedTuple, TypeAlias
+
+from steptwin.files.export.tracks import AxisTrack, PinTrack
+from steptwin.machine import SECOND, Nanos
+from steptwin.motion import Profile, Segment, at_rest
+from steptwin.motion.divisions import profile_of
+from steptwin.motion.elastic import DriveStretch, Response, ResponseStretch, Spring
+from steptwin.world.elements.carriage import polynomials
+from steptwin.world.lanes import LIFT_SHARE, SLIPS, SPRING_SHARE, STUCK, AxisLane, MovedLane
+
+SLACK_P = 0.02
+"""Cubics are at most this far from the motion (pulses of its axis)."""
+_LEAST_NS: Nanos = 10_000
+"""Shorter parts are not divided."""
+_PER_SWING = 8
+
+MotionLook: TypeAlias = Callable[[Nanos], tuple[float, float]]
+"""Position and velocity (per s) at a moment."""
+
+
+class MovedPart(NamedTuple):
+    """A smooth motion from ``begin`` to ``end``. ``longest``: no cubic of it may be longer."""
+
+    begin: Nanos
+    end: Nanos
+    look: MotionLook
+    longest: Nanos | None = None
+
+
+def moved_track(
+    lane: MovedLane, load: AxisTrack, other: AxisTrack | None, pins: Mapping[str, PinTrack], until: Nanos
+) -> AxisTrack:
+    """The motion from the first moment of ``load`` to ``until``, in the unit of the lane. ``load`` and ``other`` are those of
+    `AxisTrack.load`; ``pins`` the edges of its machine, by subject."""
+    if lane.spring is not None:
+        parts = _swinging(lane, load, pins.get(f"{lane.name}.{SPRING_SHARE}"), until)
+    elif other is not None:
+        parts = _halfway(load, other, until)
+    else:
+        coupling = pins.get(f"{lane.coupling}.{SLIPS}")
+        parts = [_scaled(part, lane.per_pulse, lane.offset) for part in _slipping(_parts(load, until), coupling)]
+        if lane.points:
+            parts = _stuck([*_lifted(parts, lane.points, lane.turn)], lane.name, pins)
+    track = AxisTrack(load.machine, AxisLane(f"{lane.name} {lane.signal}", lane.unit))
+    slack = SLACK_P * abs(lane.per_pulse) * lane.steepest
+    for part in parts:
+        for begin, profile in _cubics(part, slack):
+            track.times.append(begin)
+            track.plans.append(profile)
+    return track
+
+
+# ---------------------------------------------------------------------- parts
+
+
+def _parts(load: AxisTrack, until: Nanos) -> Iterator[MovedPart]:
+    """The load, in pulses."""
+    for plan, after, end in load.stretches(load.times[0], until):
+        profile = profile_of(plan)
+        cuts = [profile.start + int(one) for one in profile.ends if after < profile.start + one < end]
+        for begin, last in pairwise([after, *cuts, end]):
+            yield MovedPart(begin, last, partial(_on_profile, profile, begin, last))
+
+
+def _on_profile(profile: Profile, begin: Nanos, end: Nanos, now: Nanos) -> tuple[float, float]:
+    """Position and velocity on the segment between two of its moments, also at its end, where the velocity may jump."""
+    if begin - profile.start < 0 or (profile.end is not None and begin >= profile.end):
+        return profile.base + profile.final_p, 0.0
+    segment = profile.segments[bisect_right(profile.ends, begin - profile.start)]
+    s = (now - profile.start) / SECOND
+    return profile.base + segment.position(s), segment.velocity(s)
+
+
+def _scaled(part: MovedPart, factor: float, offset: float) -> MovedPart:
+    def look(now: Nanos) -> tuple[float, float]:
+        p, v = part.look(now)
+        return offset + factor * p, factor * v
+
+    return part._replace(look=look)
+
+
+def _standing(at: float) -> MotionLook:
+    return lambda now: (at, 0.0)
+
+
+def _cut(parts: Iterable[MovedPart], cuts: Iterable[Nanos]) -> Iterator[MovedPart]:
+    moments = sorted(cuts)
+    for part in parts:
+        ends = [part.begin, *(moment for moment in moments if part.begin < moment < part.end), part.end]
+        yield from (part._replace(begin=begin, end=end) for begin, end in pairwise(ends))
+
+
+def _slipping(parts: Iterable[MovedPart], coupling: PinTrack | None) -> Iterator[MovedPart]:
+    """A shaft stands while its coupling slips, and goes on from there."""
+    held: float | None = None
+    behind = 0.0
+    for part in parts if coupling is None else _cut(parts, coupling.times):
+        here = part.look(part.begin)[0]
+        slips = coupling is not None and part.begin >= coupling.times[0] and bool(coupling.level(part.begin))
+        if slips and held is None:
+            held = here - behind
+        elif not slips and held is not None:
+            behind, held = here - held, None
+        yield _scaled(part, 1.0, -behind) if held is None else part._replace(look=_standing(held))
+
+
+def _lifted(parts: Iterable[MovedPart], points: tuple[tuple[float, float], ...], turn: float) -> Iterator[MovedPart]:
+    """What a cam does with the angles of its shaft: lifts, linear between points, in every revolution."""
+    around = [*points, (points[0][0] + turn, points[0][1])]
+    for part in parts:
+        for begin, end in pairwise([part.begin, *_corners(part, [angle for angle, _ in points], turn), part.end]):
+            angle = part.look((begin + end) // 2)[0]
+            first = floor((angle - points[0][0]) / turn) * turn
+            n = min(max(bisect_right(around, angle - first, key=lambda point: point[0]), 1), len(around) - 1)
+            (a0, y0), (a1, y1) = around[n - 1], around[n]
+            slope = (y1 - y0) / (a1 - a0)
+            yield _scaled(part._replace(begin=begin, end=end), slope, y0 - slope * (a0 + first))
+
+
+def _corners(part: MovedPart, angles: list[float], turn: float) -> list[Nanos]:
+    """When a part, which goes one way, passes any of the angles of a revolution."""
+    low, high = sorted((part.look(part.begin)[0], part.look(part.end)[0]))
+    rises = part.look(part.end)[0] >= part.look(part.begin)[0]
+    found = set[Nanos]()
+    for angle in angles:
+        for n in range(ceil((low - angle) / turn), floor((high - angle) / turn) + 1):
+            level = angle + n * turn
+            before, after = part.begin, part.end
+            while after - before > 1:
+                middle = (before + after) // 2
+                if (part.look(middle)[0] >= level) is rises:
+                    after = middle
+                else:
+                    before = middle
+            if part.begin < after < part.end:
+                found.add(after)
+    return sorted(found)
+
+
+def _stuck(parts: list[MovedPart], name: str, pins: Mapping[str, PinTrack]) -> Iterator[MovedPart]:
+    """A follower that is stuck, or whose cam is worn, by the edges of these faults."""
+    stuck, worn = pins.get(f"{name}.{STUCK}"), pins.get(f"{name}.{LIFT_SHARE}")
+    held: float | None = None
+    for part in _cut(parts, [*(stuck.times if stuck else ()), *(worn.times if worn else ())]):
+        share = 1.0 if worn is None or part.begin < worn.times[0] else worn.level(part.begin)
+        its = _scaled(part, 1.0 if share is None else share, 0.0)
+        if stuck is None or part.begin < stuck.times[0] or not stuck.level(part.begin):
+            held = None
+            yield its
+            continue
+        held = its.look(part.begin)[0] if held is None else held
+        yield part._replace(look=_standing(held))
+
+
+def _halfway(load: AxisTrack, other: AxisTrack, until: Nanos) -> Iterator[MovedPart]:
+    """The middle between two loads, in their unit."""
+    one, two = [*_parts(load, until)], [*_parts(other, until)]
+    rest = at_rest(two[0].begin, 0) if two else at_rest(until, 0)
+    begins = [part.begin for part in two]
+    for part in _cut(one, begins):
+        i = bisect_right(begins, part.begin) - 1
+        beside = two[i].look if i >= 0 else partial(_on_profile, rest, rest.start, until)
+
+        def look(now: Nanos, a: MotionLook = part.look, b: MotionLook = beside) -> tuple[float, float]:
+            (p, v), (q, w) = a(now), b(now)
+            return (
+                (p / load.view.pulses_per_unit + q / other.view.pulses_per_unit) / 2.0,
+                (v / load.view.pulses_per_unit + w / other.view.pulses_per_unit) / 2.0,
+            )
+
+        yield part._replace(look=look)
+
+
+def _swinging(lane: MovedLane, load: AxisTrack, share: PinTrack | None, until: Nanos) -> Iterator[MovedPart]:
+    """A carriage behind its axis, from rest; where the belt changes, it goes on as it moves there."""
+    if lane.spring is None:
+        return
+    changes = [] if share is None else [(time, lane.spring[0] * level) for time, level in share.changes(load.times[0] - 1, until)]
+    drives = [*_drives(load, until)]
+    x, v = drives[0].p, 0.0
+    ends = [load.times[0], *(time for time, _ in changes), until]
+    for (begin, end), frequency in zip(pairwise(ends), [lane.spring[0], *(one for _, one in changes)], strict=True):
+        spring = Spring(frequency, lane.spring[1])
+        first = max(bisect_right(drives, begin, key=lambda drive: drive.begin) - 1, 0)
+        now = drives[first]
+        s = (begin - now.begin) / SECOND
+        here = DriveStretch(begin, *now.at(begin), now.a + now.j * s, now.j)
+        response = Response(spring, [here, *drives[first + 1 :]], x, v)
+        begins = [stretch.drive.begin for stretch in response.stretches]
+        for stretch, last in zip(response.stretches, [*begins[1:], until], strict=True):
+            if stretch.drive.begin < end:
+                yield _scaled(_swing(stretch, min(last, end)), lane.per_pulse, 0.0)
+        x, v = response.at(end)
+
+
+def _swing(stretch: ResponseStretch, end: Nanos) -> MovedPart:
+    swings = stretch.cosine_p or stretch.sine_p
+    longest = floor(SECOND / stretch.spring.frequency / _PER_SWING) if swings else None
+    return MovedPart(stretch.drive.begin, end, stretch.at, longest)
+
+
+def _drives(load: AxisTrack, until: Nanos) -> Iterator[DriveStretch]:
+    for plan, after, end in load.stretches(load.times[0], until):
+        for at, p, v, a, j in polynomials(profile_of(plan), after, end):
+            yield DriveStretch(at, p, v, a, j)
+
+
+# ---------------------------------------------------------------------- cubics
+
+
+def _cubics(part: MovedPart, slack: float) -> Iterator[tuple[Nanos, Profile]]:
+    """Profiles of one cubic each that are no farther than ``slack`` from a part."""
+    count = 1 if part.longest is None else max(ceil((part.end - part.begin) / part.longest), 1)
+    ends = [part.begin + (part.end - part.begin) * n // count for n in range(count + 1)]
+    open_parts = [*pairwise(ends)][::-1]
+    while open_parts:
+        begin, end = open_parts.pop()
+        if end <= begin:
+            continue
+        profile = _cubic(begin, end, *part.look(begin), *part.look(end))
+        quarters = [begin + (end - begin) * n // 4 for n in (1, 2, 3)]
+        if end - begin > _LEAST_NS and any(abs(profile.position(now) - part.look(now)[0]) > slack for now in quarters):
+            middle = (begin + end) // 2
+            open_parts += [(middle, end), (begin, middle)]
+        else:
+            yield begin, profile
+
+
+def _cubic(begin: Nanos, end: Nanos, p0: float, v0: float, p1: float, v1: float) -> Profile:
+    """Hermite: both positions and velocities."""
+    if p0 == p1 and not v0 and not v1:
+        return at_rest(begin, 0, p0)
+    s = (end - begin) / SECOND
+    slope = (p1 - p0) / s
+    c2, c3 = (3.0 * slope - 2.0 * v0 - v1) / s, (v0 + v1 - 2.0 * slope) / (s * s)
+    return Profile(begin, 0, (Segment(s, 0.0, p0, v0, c2, c3, 1 if p1 >= p0 else -1),), p1)
