@@ -41,6 +41,14 @@ Questions = Annotated[
     list[str] | None,
     typer.Option(metavar="QUESTION", help="Ask why something is as it is at the end, as 'steptwin why' does; repeatable."),
 ]
+Properties = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--property",
+        metavar="PROPERTY",
+        help="What must hold in the run, such as 'never guard.open and table.M1.moving'; exit code 1 if not; repeatable. Worlds.",
+    ),
+]
 Trace = Annotated[Path | None, typer.Option(help="Write a trace to a file (.jsonl, .html, .vcd, .csv, ...) or into a directory.")]
 
 
@@ -98,6 +106,7 @@ class _RunOptions:
     trace: Path | None
     coverage: tuple[str, ...]
     questions: tuple[str, ...]
+    properties: tuple[str, ...]
     as_json: bool
     program: ProgramOptions
     wbc: WbcOptions
@@ -121,6 +130,7 @@ def run(
     trace: Trace = None,
     coverage: Coverage = None,
     why: Questions = None,
+    properties: Properties = None,
     json: Json = False,
     *,
     program: ProgramOptions,
@@ -151,6 +161,7 @@ def run(
         trace=trace,
         coverage=tuple(coverage or ()),
         questions=tuple(why or ()),
+        properties=tuple(properties or ()),
         as_json=json,
         program=program,
         wbc=wbc,
@@ -158,6 +169,8 @@ def run(
         world=world,
         shown=shown,
     )
+    if wanted.properties and runner is not _run_world:
+        raise Misuse(f"--property is for worlds: {file} is a program")
     if not runner(file, wanted):
         raise typer.Exit(1)
 
@@ -245,6 +258,7 @@ def _run_world(file: Path, given: _RunOptions) -> bool:
         trace=given.trace,
         coverage=given.coverage,
         questions=given.questions,
+        properties=given.properties,
         session=given.world.session,
         allow_outside=given.world.allow_outside,
         strict=given.world.strict,

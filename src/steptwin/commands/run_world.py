@@ -11,6 +11,7 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from steptwin.campaign.properties import Verdict, read_property
 from steptwin.commands.program_run import report_causes
 from steptwin.controllerstate import ControllerState
 from steptwin.datasheet import plain
@@ -66,6 +67,8 @@ class WorldRun:
     """Files for coverage of programs; ``-`` for a table."""
     questions: Sequence[str] = ()
     """What is asked at the end (`steptwin.why`)."""
+    properties: Sequence[str] = ()
+    """What must hold in the run (`steptwin.campaign.properties`)."""
     session: Path | None = None
     allow_outside: bool = False
     """Files of the description may lie anywhere."""
@@ -104,6 +107,7 @@ def _run_and_report(world: World, options: WorldRun, reports: CoverageReports, o
     before = filter(is_shown, world.trace) if began else ()  # what happens at power-on is part of the run
     known = Counter(record.machine for record in before)
     _arrange(world, options)
+    properties = [read_property(text).watch(world) for text in options.properties]
     selection = read_selection(options.names, options.kinds, named_in(world.parts))
     usual = USUAL_LIMIT_NS if options.until is None else LONGEST_RUN_NS
     limit = options.limit if options.limit is not None else usual
@@ -112,6 +116,8 @@ def _run_and_report(world: World, options: WorldRun, reports: CoverageReports, o
     with bar(f"running {world.spec.name}", began, began + limit) as progress:
         reason = _run(world, options.until, limit, progress)
     wall_s = time.perf_counter() - wall
+    verdicts = [one.verdict() for one in properties]
+    measures = {name: value for one in properties for name, value in one.measures().items()}
     written = _write(world, options)
     session = sessions.session_of(world)
     if options.session is not None:
@@ -120,7 +126,7 @@ def _run_and_report(world: World, options: WorldRun, reports: CoverageReports, o
     tables: list[str] = []
     written += reports.write(tables.append)
     in_vain = options.until if reason is None else None
-    outcome = WorldRunResult(began, known, reason, in_vain, wall_s, session.digest, written)
+    outcome = WorldRunResult(began, known, reason, in_vain, wall_s, session.digest, written, verdicts, measures)
     if options.as_json:
         _json(world, outcome, out)
     else:
@@ -132,7 +138,8 @@ def _run_and_report(world: World, options: WorldRun, reports: CoverageReports, o
     if reason is INTERRUPTED:
         raise KeyboardInterrupt
     in_time = not world.overdue and in_vain is None
-    return not world.failures and (in_time or not options.strict)
+    holds = all(one.holds for one in verdicts)
+    return not world.failures and holds and (in_time or not options.strict)
 
 
 def _watched(world: World) -> dict[str, ProgramReport]:
@@ -176,6 +183,9 @@ class WorldRunResult(NamedTuple):
     wall_s: float
     digest: str
     written: list[Path]
+    verdicts: list[Verdict]
+    measures: dict[str, float]
+    """Of cycle times in properties."""
 
 
 def _arrange(world: World, options: WorldRun) -> None:
@@ -253,6 +263,10 @@ def _print_end(world: World, outcome: WorldRunResult, selection: Selection, out:
     ended = "" if outcome.reason is None else f", ended by: {outcome.reason}"
     begun = f", from {outcome.began / SECOND:g} s on" if outcome.began else ""
     out(f"{world.time:g} s of {world.spec.name}{begun} in {outcome.wall_s:.2f} s{ended}")
+    for verdict in outcome.verdicts:
+        out(_verdict_text(verdict))
+    for name, value in outcome.measures.items():
+        out(f"{name}: {value:g}{'' if name.endswith(' cycles') else ' s'}")
     for failure in world.failures:
         out(f"expectation failed at {failure.time / SECOND:g} s: {failure.value}")
     if world.failures.more:
@@ -268,6 +282,13 @@ def _print_end(world: World, outcome: WorldRunResult, selection: Selection, out:
     for path in outcome.written:
         out(f"wrote {path}")
     out(f"digest {outcome.digest}")
+
+
+def _verdict_text(verdict: Verdict) -> str:
+    if verdict.holds:
+        return f"property holds, robustness {verdict.robustness:.4g}: {verdict.name}"
+    at = "" if verdict.at_ns is None else f" at {verdict.at_ns / SECOND:.9g} s"
+    return f"property violated{at}, robustness {verdict.robustness:.4g}: {verdict.name}: {verdict.why}"
 
 
 def _print_unfinished(world: World, began: Nanos, selection: Selection, out: Print) -> None:
@@ -298,6 +319,17 @@ def _json(world: World, outcome: WorldRunResult, out: Print) -> None:
         "ended_by": outcome.reason,
         "in_vain": outcome.in_vain,
         "failures": [{"time_s": f.time / SECOND, "condition": f.value} for f in world.failures],
+        "properties": [
+            {
+                "property": one.name,
+                "holds": one.holds,
+                "robustness": one.robustness,
+                "time_s": None if one.at_ns is None else one.at_ns / SECOND,
+                "why": one.why,
+            }
+            for one in outcome.verdicts
+        ],
+        "measures": outcome.measures,
         "waiting": [one._asdict() for one in waiting(world)],
         "overdue": [{"time_s": late.time / SECOND, "what": late.value} for late in world.overdue],
         "axes": {
