@@ -52,10 +52,8 @@ class ComparisonRecord:
         holds = bool(self._compare(left, right))
         away = (left - right) / self.scale
         match self.node.sign:
-            case "==" | "!=" if (self.node.sign == "==") is holds and (holds or not self._moving):
-                value = 1.0
             case "==":
-                value = -abs(away)
+                value = 1.0 if holds else -abs(away)
             case "!=":
                 value = abs(away) if holds else -1.0
             case "<" | "<=":
