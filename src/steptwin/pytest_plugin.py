@@ -16,6 +16,7 @@ import pytest
 from steptwin.errors import Misuse, SteptwinError
 
 if TYPE_CHECKING:
+    from steptwin.campaign.summary import CampaignSummary
     from steptwin.files.coverage import CoverageReports
     from steptwin.testing.m1486 import M1486Rig
     from steptwin.testing.mic488 import Mic488Rig
@@ -30,6 +31,8 @@ FIXTURES = {
     "baud, twin_only): the MIC488 that the fixture mic488 is (steptwin)",
     "m1486": "m1486(*, variant, address, interface, program, time, speed, link, faults, seed, line_timing, baud, twin_only): the "
     "M1486 that the fixture m1486 is (steptwin)",
+    "steptwin_campaign": "steptwin_campaign(file, *, runs, seed, search, jobs, out): the campaign that the fixture "
+    "steptwin_campaign has run (steptwin)",
     "steptwin_world": "steptwin_world(file, *, time, speed): the world that the fixture steptwin_world is (steptwin)",
 }
 """Fixtures and markers, which have the same names."""
@@ -260,6 +263,27 @@ def steptwin_world(request: pytest.FixtureRequest) -> Iterator[WorldRig]:
         return WorldRig(options, request.config.stash[_devices], request.path.parent, partial(_observe, request))
 
     yield from _rig(request, "steptwin_world", make)
+
+
+@pytest.fixture
+def steptwin_campaign(request: pytest.FixtureRequest, tmp_path: Path) -> CampaignSummary:
+    """The summary of a campaign that was run (`steptwin.campaign.summary.CampaignSummary`). The test fails if a run did.
+
+    ``@pytest.mark.steptwin_campaign("campaign.toml", runs=100)`` names its file, beside the test.
+    """
+    from steptwin.testing.campaign import CampaignMarker, run_campaign
+    from steptwin.testing.rig import options_of
+
+    def run() -> tuple[CampaignSummary, str]:
+        arguments, given = _options(request, "steptwin_campaign")
+        given.pop("time", None)
+        options = options_of("steptwin_campaign", CampaignMarker, arguments, given)
+        return run_campaign(options, request.path.parent, tmp_path / "campaign")
+
+    summary, text = _without_traceback("steptwin_campaign", run)
+    if text:
+        pytest.fail(text, pytrace=False)
+    return summary
 
 
 @pytest.fixture

@@ -90,6 +90,19 @@ def faults(
         raise typer.Exit(1)
 
 
+@app.command("compare")
+def compare(
+    before: Annotated[Path, typer.Argument(metavar="DIR1", help="Folder of the results before.")],
+    after: Annotated[Path, typer.Argument(metavar="DIR2", help="Folder of the results after.")],
+    json: Json = False,
+) -> None:
+    """Compare two campaigns, such as before and after a change of the program. Exit code 1 when it became worse."""
+    from steptwin.commands.campaign import compare as compare_folders
+
+    if not compare_folders(before, after, typer.echo, as_json=json):
+        raise typer.Exit(1)
+
+
 @app.command("show")
 def show(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of the results.")],

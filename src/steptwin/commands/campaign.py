@@ -12,6 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from steptwin.campaign.campaign import RESULTS, SUMMARY, Campaign, CampaignProgress
+from steptwin.campaign.report import comparison
+from steptwin.campaign.report.campaignpage import told
+from steptwin.campaign.report.write import write_report
 from steptwin.errors import Misuse
 from steptwin.extras import libraries_of, missing
 from steptwin.files.coverage import CoverageReports
@@ -55,11 +58,14 @@ def run(options: CampaignOptions, out: Print) -> bool:
     began = time.monotonic()
     with _progress(campaign) as progress:
         summary = campaign.run(folder, jobs=options.jobs, dask=options.dask, coverage=bool(options.coverage), progress=progress)
+    report = write_report(campaign, summary, folder, options.file)
     if options.as_json:
         out(_json(summary.plain()))
     else:
         _print(summary.plain(), out)
-        out(f"{time.monotonic() - began:.1f} s; results in {folder}")
+        for cause in report.found:
+            out(f"cause, {len(cause.numbers)} runs: {told(cause)}")
+        out(f"{time.monotonic() - began:.1f} s; results in {folder}, report.html shows them")
     reports.add(campaign.coverage, options.file.parent)
     tables: list[str] = []
     reports.write(tables.append)
@@ -90,6 +96,14 @@ def show(folder: Path, out: Print, *, as_json: bool) -> bool:
     for line in [text] if as_json else lines:
         out(line)
     return not plain["failed"]
+
+
+def compare(before: Path, after: Path, out: Print, *, as_json: bool) -> bool:
+    """Print what differs between two folders of results. Returns whether it did not become worse. Raises `Misuse`."""
+    found = comparison.compare(before, after)
+    for line in [_json(found)] if as_json else comparison.lines(found):
+        out(line)
+    return found["verdict"] != "worse"
 
 
 def _json(plain: Any) -> str:

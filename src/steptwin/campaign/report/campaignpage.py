@@ -1,0 +1,131 @@
+"""The report of a campaign as one HTML file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET
+
+from steptwin.campaign.findings import FoundFailure
+from steptwin.campaign.report.html import link, page, table
+from steptwin.campaign.report.statistics import Histogram, Influence
+from steptwin.campaign.reproduce import summary, where
+from steptwin.campaign.summary import CampaignSummary
+
+WIDTH, HEIGHT = 340, 130
+_STYLE = "rect { fill: var(--note); } .bad { color: var(--bad); } .good { color: var(--good); }"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CampaignReport:
+    summary: CampaignSummary
+    found: Sequence[FoundFailure]
+    influences: Sequence[Influence]
+    histograms: Sequence[Histogram]
+    search: str
+
+    def plain(self, folder: Path) -> dict[str, Any]:
+        """As JSON; paths are relative to ``folder``."""
+        return {
+            **self.summary.plain(),
+            "search": self.search,
+            "causes": [one.plain(folder) for one in self.found],
+            "influences": [one._asdict() for one in self.influences],
+            "measures": [one._asdict() for one in self.histograms],
+        }
+
+    def junit(self) -> bytes:
+        """A test case for each property, with the causes of its failures."""
+        by_property: dict[str, list[FoundFailure]] = {name: [] for name in self.summary.properties}
+        for one in self.found:
+            by_property.setdefault(one.failure.property, []).append(one)
+        if not by_property:
+            by_property["runs"] = []
+        failed = sum(1 for found in by_property.values() if found)
+        suite = ET.Element("testsuite", name=self.summary.name, tests=str(len(by_property)), failures=str(failed), errors="0")
+        for name, found in by_property.items():
+            case = ET.SubElement(suite, "testcase", classname=self.summary.name, name=name)
+            if found:
+                texts = [f"{len(one.numbers)} of {self.summary.runs} runs: {told(one)}" for one in found]
+                ET.SubElement(case, "failure", message=texts[0]).text = "\n".join(texts)
+        return ET.tostring(suite, encoding="utf-8", xml_declaration=True)
+
+    def html(self, folder: Path) -> str:
+        one = self.summary
+        low, high = one.interval
+        rate = "no runs" if one.pass_rate is None else f"{one.pass_rate:.2%} pass"
+        chosen = "" if self.search == "random" else f"; no probability: cases were chosen by a search, {self.search}"
+        body = (
+            f'<p class="big {"bad" if one.failed else "good"}">{rate}</p>\n'
+            f"<p>{one.runs} runs, {one.failed} failed. The share that passes is between {low:.2%} and {high:.2%} "
+            f"(Wilson, 95 %{chosen}). Seed {one.seed}, digest <code>{one.digest}</code>.</p>\n"
+            f"<h2>Properties</h2>\n{self._properties()}"
+        )
+        if self.found:
+            body += f"<h2>Failures by cause</h2>\n{self._causes(folder)}"
+        if self.influences:
+            body += f"<h2>What matters most</h2>\n{self._influences()}"
+        if self.histograms:
+            body += f"<h2>Measures</h2>\n{''.join(_figure(one) for one in self.histograms)}\n"
+        return page(f"Campaign {one.name}", body, _STYLE)
+
+    def _properties(self) -> str:
+        rows = [
+            (
+                escape(name),
+                str(one.failed),
+                "" if abs(one.robustness) == float("inf") else f"{one.robustness:.4g}",
+                "" if one.case is None else str(one.case),
+            )
+            for name, one in self.summary.properties.items()
+        ]
+        return (
+            table(("property", "failed", "least robustness", "in case"), rows, (1, 2, 3)) if rows else "<p>There are none.</p>\n"
+        )
+
+    def _causes(self, folder: Path) -> str:
+        rows: list[tuple[str, ...]] = []
+        for one in self.found:
+            files = {} if one.files is None else one.files.plain(folder)
+            links = ", ".join(link(Path(path).as_posix(), name) for name, path in files.items())
+            what = escape(summary(one.result))
+            rows.append((escape(one.failure.property), str(len(one.numbers)), what, escape(_simplest(one)), links))
+        return table(("property", "runs", "what", "simplest case", ""), rows, (1,))
+
+    def _influences(self) -> str:
+        rows = [(escape(one.name), f"{one.correlation:+.3f}", f"{one.p_value:.2g}") for one in self.influences]
+        of = "the least robustness" if self.influences[0].of == "robustness" else "whether a run passes"
+        return f"<p>Spearman's rank correlation with {of}.</p>\n" + table(("value", "correlation", "p"), rows, (1, 2))
+
+
+def told(one: FoundFailure) -> str:
+    """A cause in a line."""
+    return f"{summary(one.result)}. {_simplest(one)}"
+
+
+def _simplest(one: FoundFailure) -> str:
+    if one.shrunk is None:
+        return f"case {one.numbers[0]}"
+    if not one.shrunk.repeats:
+        return f"case {one.numbers[0]} did not fail again"
+    return where(one.shrunk.case) + ("" if one.shrunk.is_complete else " (the budget ended before it was the simplest)")
+
+
+def _figure(one: Histogram) -> str:
+    most, span = max(one.counts), (one.edges[-1] - one.edges[0]) or 1.0
+    bars = ""
+    for count, left, right in zip(one.counts, one.edges, one.edges[1:], strict=False):
+        x, width = (left - one.edges[0]) / span * WIDTH, max((right - left) / span * WIDTH - 1, 1)
+        height = count / most * (HEIGHT - 24)
+        y = HEIGHT - 18 - height
+        bars += f'<rect x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="{height:.1f}"><title>{count}</title></rect>'
+    caption = f"{escape(one.name)}: {one.count} runs, {one.least:.6g} to {one.most:.6g}, mean {one.mean:.6g}"
+    return (
+        f'<figure><svg width="{WIDTH}" height="{HEIGHT}" role="img" aria-label="{escape(one.name, quote=True)}">{bars}'
+        f'<text x="0" y="{HEIGHT - 4}">{one.edges[0]:.6g}</text>'
+        f'<text x="{WIDTH}" y="{HEIGHT - 4}" text-anchor="end">{one.edges[-1]:.6g}</text></svg>'
+        f"<figcaption>{caption}</figcaption></figure>"
+    )

@@ -1,0 +1,60 @@
+"""Writes the report of a campaign whose results are in a folder: ``report.html``, ``report.json``, ``junit.xml``, and the files
+of each cause in ``failures``."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator
+from itertools import islice
+from pathlib import Path
+
+from steptwin.campaign.campaign import Campaign
+from steptwin.campaign.case import Case, CaseResult
+from steptwin.campaign.findings import find
+from steptwin.campaign.report.campaignpage import CampaignReport
+from steptwin.campaign.report.statistics import RunColumns, histogram, influences
+from steptwin.campaign.summary import CampaignSummary
+from steptwin.files.textfiles import write_bytes
+
+SHRINKING_S = 60.0
+"""The wall time for making failures simpler."""
+MOST_FAILED = 2000
+"""Failed runs whose causes are told apart."""
+FAILURES = "failures"
+
+
+def write_report(campaign: Campaign, summary: CampaignSummary, folder: Path, file: Path | None) -> CampaignReport:
+    """``file``: the description, for the tests of what failed. Raises `Misuse`."""
+    store = campaign.open_store(folder)
+    cases: dict[int, Case] = {}
+
+    def failed() -> Iterator[CaseResult]:
+        for case, result in islice(store.results(failed=True), MOST_FAILED):
+            cases[case.number] = case
+            yield result
+
+    try:
+        columns = RunColumns.of(store.results())
+        end = time.monotonic() + SHRINKING_S
+        found = find(
+            campaign.runner, failed(), cases.__getitem__, folder / FAILURES, file, is_over=lambda: time.monotonic() > end
+        )
+    finally:
+        store.close()
+    shown = (histogram(name, numbers) for name, numbers in columns.measures.items())
+    report = CampaignReport(
+        summary=summary,
+        found=found,
+        influences=influences(columns),
+        histograms=[one for one in shown if one is not None],
+        search=campaign.description.search,
+    )
+    text = json.dumps(report.plain(folder), ensure_ascii=False, indent=1) + "\n"
+    for name, content in {
+        "report.html": report.html(folder).encode(),
+        "report.json": text.encode(),
+        "junit.xml": report.junit(),
+    }.items():
+        write_bytes(folder / name, content)
+    return report
