@@ -59,6 +59,9 @@ class HistoryWriter:
             self.prepare()
         except LineFailure as error:
             self._away(error)
+        except Misuse:
+            self._engine.dispose()
+            raise
         self._thread.start()
 
     def close(self) -> None:
