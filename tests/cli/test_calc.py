@@ -38,6 +38,7 @@ def test_what_a_time_determines() -> None:
 def test_gear_of_mechanics() -> None:
     assert json.loads(printed("mic488", *SCREW, "--json"))["pulses_per_unit"]["mm"] == 640
     assert "mm                      640" in printed("mic488", *SCREW)
+    assert printed("mic488", "--lead", "0.5cm", "--microsteps", "16") == printed("mic488", *SCREW)
 
 
 @pytest.mark.parametrize(("suffix", "head"), [("svg", b"<?xml"), ("png", b"\x89PNG")])
@@ -59,6 +60,7 @@ def test_a_picture(tmp_path: Path, suffix: str, head: bytes) -> None:
         (("mic488", "--gear", "640", *SCREW), "--gear and the mechanics exclude each other"),
         (("mic488", "--unit", "step", *SCREW), "unit step: a MIC488 has imp, rev"),
         (("mic488", "--variant", "B"), "--variant is not for the MIC488"),
+        (("mic488", "--lead", "5deg", "--microsteps", "16"), "--lead: '5deg' is no length: units are mm, cm, m"),
         (("m1486", "--gear", "3"), "--gear is not for the M1486"),
         (("m1486", "--deceleration", "3"), "--deceleration is not for the M1486A"),
         (("m1486", "--variant", "Z"), "no M1486 variant is called 'Z'"),

@@ -129,6 +129,10 @@ def test_a_missing_file_is_the_same_everywhere(
     ("arguments", "message"),
     [
         (["info", "--nothing"], "No such option: --nothing; usage: steptwin info -h"),
+        (
+            ["calc", "mic488", "--gear", "5mm"],
+            "Invalid value for '--gear': '5mm': expected a number, without a unit; usage: steptwin calc -h",
+        ),
         (["nothing"], "No such command 'nothing'; usage: steptwin -h"),
         (["fmt", "--check"], "Missing argument 'FILES'; usage: steptwin fmt -h"),
     ],

@@ -352,6 +352,34 @@ def test_fixes_of_what_was_said() -> None:
     assert [action.title for action in found] == ["Replace GOTO by JUMP (W137)", "Replace == by = (W116)"]
 
 
+@pytest.mark.parametrize(
+    ("uri", "text", "fixed"),
+    [
+        (CFG, "[Axis0\nGear=2\n", "[Axis0]\nGear=2\n"),
+        (CSV, "a;1;2\nb;1;2;3;4\n", "a;1;2;x;x\nb;1;2;3;4\n"),
+        (CSV, "a;1;2;3;4;;;\n", "a;1;2;3;4\n"),
+        (CSV, "a;1;2;3;4;5\n", None),
+    ],
+)
+def test_fixes_of_files_beside_a_program(uri: str, text: str, fixed: str | None) -> None:
+    made = session()
+    made.open(uri, {CFG: "mic488-config", CSV: "mic488-positions"}[uri], 1, text)
+    found = navigation.fixes(made, uri, Span(0, 5))
+    edits = [edit for action in found for edit in action.edits[uri]]
+    assert [text[: edit.span.start] + edit.text + text[edit.span.end :] for edit in edits] == ([] if fixed is None else [fixed])
+
+
+def test_hover_of_a_section_of_the_configuration() -> None:
+    made = session()
+    made.open(CFG, "", 1, "[Axis1]\nGear=2\n[nothing]\n")
+    analysis = made.analysis(CFG)
+    assert analysis is not None
+    found = analysis.hover(2)
+    assert found is not None
+    assert found.text.startswith("`[Axis1]` is axis M2.\n\n* `Unit`: permitted: 0 = imp, 1 = rev")
+    assert analysis.hover(17) is None
+
+
 def test_hints_show_values_memory_and_times() -> None:
     made = session(machine_csv=TABLE, machine_cfg=CONFIG)
     analysis = made.analysis(PRG)

@@ -84,6 +84,16 @@ def test_examples_are_right(name: str) -> None:
     assert len(of(made).outline()) > 5
 
 
+def test_signals_that_do_not_exist_have_a_fix() -> None:
+    steps = (
+        '[[script]]\nname = "s"\nat = 0\nsteps = [{ until = "m.M1.psition > 4" }, { expect = "tabel.OUT1" }, { press = "gp" }]\n'
+    )
+    text = '[[mic488]]\nname = "m"\n[[mic488]]\nname = "table"\n[[button]]\nname = "goon"\nto = "m.IN1"\n' + steps
+    made = session(text)
+    titles = [action.title for action in navigation.fixes(made, URI, Span(0, len(text)))]
+    assert titles == ["Replace m.M1.psition by m.M1.position (D009)", "Replace tabel by table (D009)"]
+
+
 def test_what_is_wrong_has_its_place_and_a_fix() -> None:
     text = WORLD.replace("pitch =", "pich =").replace('to = "table.IN5"', 'to = "table.IN5"\ncontact = "N0"')
     made = session(text)

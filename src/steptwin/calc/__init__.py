@@ -14,7 +14,7 @@ from steptwin.calc.calculator import TIMES, Calculator, range_text
 from steptwin.calc.contract import Calculation, CurvePoint, Formula, Model, MovePart, MoveQuantity, RequiredSetting, curve, plain
 from steptwin.calc.m1486 import M1486Model
 from steptwin.calc.mic488 import Mic488Model
-from steptwin.calc.units import Dimension, DriveMechanics, UnitScale, read_quantity, unit_of
+from steptwin.calc.units import Dimension, DriveMechanics, UnitScale, read_lead, read_quantity, unit_of
 from steptwin.datasheet import AxisDescription, Datasheet
 from steptwin.m1486.variants import variant
 
@@ -37,6 +37,7 @@ __all__ = [
     "curve",
     "plain",
     "range_text",
+    "read_lead",
     "read_quantity",
     "unit_of",
 ]

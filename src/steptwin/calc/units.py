@@ -102,6 +102,14 @@ def unit_of(text: str) -> str:
     return name
 
 
+def read_lead(text: str) -> float:
+    """The travel in one revolution, mm; a number without a unit is in mm. Raises `Misuse`."""
+    value, unit = read_quantity(text, Dimension.DISTANCE)
+    if unit is not None and unit not in _IN_MM:
+        raise Misuse(f"{text!r} is no length: units are {', '.join(_IN_MM)}")
+    return value if unit is None else value * _IN_MM[unit]
+
+
 def read_quantity(text: str, dimension: Dimension) -> tuple[float, str | None]:
     """A number with its unit of distance (None: none was given), such as ``150 mm``, ``2.5rev/s``, ``600 rpm``; of time in
     seconds. Raises `Misuse` for what is none of this dimension."""

@@ -207,10 +207,21 @@ def main() -> None:
     sys.exit(code if isinstance(code, int) else 0)
 
 
+_NO_NUMBER = {
+    "Input should be a valid number, unable to parse string as a number": "a number, without a unit",
+    "Input should be a valid integer, unable to parse string as an integer": "a whole number",
+}
+"""What the library that reads options says of a value, and what it means."""
+
+
 def _usage(error: TyperException) -> str:
     """The message for wrong usage, with the command that shows help."""
     # typer checks choices with a validator whose name it puts into the message.
     message = error.format_message().replace("Value error, ", "").rstrip(".")
+    for words, needed in _NO_NUMBER.items():
+        if words in message:
+            given = next((one["input"] for one in getattr(error.__context__, "errors", list)()), None)
+            message = message.replace(words, f"{given!r}: expected {needed}" if given is not None else f"expected {needed}")
     context = getattr(error, "ctx", None)
     if context is None or message.startswith("Usage: "):  # a group without a command is shown its help
         return message

@@ -59,8 +59,21 @@ class MechanicsOptions(OptionGroup):
         None
     )
     lead: Annotated[
-        float | None, typer.Option(help="Travel in one revolution: lead of a screw, teeth × pitch of a pulley [mm].")
+        str | None,
+        _value("Travel in one revolution: lead of a screw, teeth × pitch of a pulley, such as 5mm [mm]."),
     ] = None
+
+    def values(self) -> dict[str, float]:
+        """What is given; the lead in mm. Raises `Misuse`."""
+        from steptwin.calc import read_lead
+
+        found = self.given()
+        if self.lead is not None:
+            try:
+                found["lead"] = read_lead(self.lead)
+            except Misuse as error:
+                raise Misuse(f"--lead: {error}") from None
+        return found
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,7 +120,7 @@ def calc(
     Values have units: of distance imp, step, rev, degree, mm, cm, m, with /s or /s2 behind them, of time s, ms, min; a number
     without a unit is in the controller's own unit. Exit code 2 if a value is outside its range or a time is not possible.
     """
-    known_mechanics = mechanics.given()
+    known_mechanics = mechanics.values()
     if kind is CalculatedKind.MIC488:
         chip.refuse("the MIC488")
         calculator, scale = _mic488(known_mechanics, controller)

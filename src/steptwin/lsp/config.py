@@ -41,7 +41,7 @@ class ConfigAnalysis(Analysis):
     def hover(self, place: int) -> Hover | None:
         entry = self._entry_at(place)
         if entry is None:
-            return None
+            return self._hover_section(place)
         key = self._key(entry)
         if key is None:
             return None
@@ -49,6 +49,14 @@ class ConfigAnalysis(Analysis):
         meaning = _meaning(key, entry.value)
         value = f"\n\n{entry.value} is {meaning}." if meaning else ""
         return Hover(span, f"`[{entry.section}] {key.name}`\n\n{key.hint[0].upper()}{key.hint[1:]}.{value}")
+
+    def _hover_section(self, place: int) -> Hover | None:
+        header = next((header for header in self._file.headers if header.span.start <= place <= header.span.end), None)
+        keys = {} if header is None else self._keys.get(header.section.lower(), {})
+        if header is None or not keys:
+            return None
+        rows = [f"* `{key.name}`: {key.hint}" for key in keys.values()]
+        return Hover(header.span, "\n".join((f"`[{header.section}]` {_section_meaning(header.section)}\n", *rows)))
 
     def items(self, place: int) -> Completions:
         number = self.lines.line_of(place)
@@ -132,6 +140,16 @@ class ConfigAnalysis(Analysis):
             if meaning:
                 found.append(Hint(entry.value_span.end, meaning, "the meaning of the number"))
         return found
+
+
+def _section_meaning(section: str) -> str:
+    """What a section of the configuration is about."""
+    kind, number = section.rstrip("0123456789").lower(), section.lstrip("AINXSainxs")
+    if kind == "axis":
+        return f"is axis M{int(number) + 1}."
+    if kind in ("in", "ain"):
+        return f"is {'input IN' if kind == 'in' else 'analog input AIN'}{int(number) + 1}."
+    return {"wbc_program": "is for programs.", "trigger": "is for the trigger mode."}.get(section.lower(), "")
 
 
 def _meaning(key: ConfigKey, value: str) -> str:

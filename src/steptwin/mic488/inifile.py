@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
-from steptwin.diagnostics import Diagnostic, Severity, SourceText, Span, in_order
+from steptwin.diagnostics import Diagnostic, Fix, Severity, SourceText, Span, in_order
 from steptwin.errors import Misuse
 
 _LINE = re.compile(r"([^\r\n]*)(\r\n|\r|\n|\Z)")
@@ -152,8 +152,8 @@ def _read(source: SourceText, encoding: str) -> IniFile:
     entries: list[IniEntry] = []
     findings: list[Diagnostic] = []
 
-    def find(code: str, severity: Severity, span: Span, message: str, hint: str | None = None) -> None:
-        findings.append(Diagnostic(code, severity, span, message, hint))
+    def find(code: str, severity: Severity, span: Span, message: str, hint: str | None = None, fix: Fix | None = None) -> None:
+        findings.append(Diagnostic(code, severity, span, message, hint, fix))
 
     binary = source.text.find("\0")
     if binary >= 0:
@@ -167,7 +167,9 @@ def _read(source: SourceText, encoding: str) -> IniFile:
             name, bracket, _ = stripped[1:].partition("]")
             span = Span(span.start, span.start + 1 + len(name) + len(bracket))
             if not bracket:
-                find("C002", Severity.ERROR, span, f"the section header {stripped} is not closed", "permitted: [name]")
+                begun = stripped.split(";", 1)[0].rstrip()
+                fix = Fix(Span(span.start, span.start + len(begun)), f"{begun}]")
+                find("C002", Severity.ERROR, span, f"the section header {stripped} is not closed", "permitted: [name]", fix)
             headers.append(Header(name.strip(), span))
         elif (entry := _entry(line, start, headers[-1].section if headers else None)) is not None:
             entries.append(entry)

@@ -139,7 +139,11 @@ def _row(content: str, span: Span, diagnostics: list[Diagnostic]) -> PositionRow
         cells.pop()
     if len(cells) != PARAMETERS + 1:
         message = f"{len(cells)} columns instead of {PARAMETERS + 1}"
-        diagnostics.append(f.TABLE_COLUMNS.at(span, message, "a row is name;p1;p2;p3;p4"))
+        kept, more = cells[: PARAMETERS + 1], cells[PARAMETERS + 1 :]
+        # A value that is missing is none, which is written x; one that is too many is removed if it is empty.
+        whole = ";".join([*kept, *["x"] * (PARAMETERS + 1 - len(kept))])
+        fix = None if any(cell.strip() for cell in more) else whole
+        diagnostics.append(f.TABLE_COLUMNS.at(span, message, "a row is name;p1;p2;p3;p4", fix=fix))
     name = cells[0].strip()
     if name and not is_name(name):
         hint = "names have letters without accents, digits and _, and do not begin with a digit"

@@ -15,8 +15,19 @@ if TYPE_CHECKING:
 class Unknown(Misuse):
     """Nothing is called ``name``."""
 
-    def __init__(self, name: str, text: str) -> None:
+    def __init__(self, name: str, text: str, meant: str | None = None) -> None:
+        """``meant``: what was probably meant."""
         self.name = name
+        self.meant = meant
+        super().__init__(text)
+
+
+class UnknownSignal(Misuse):
+    """What is there has no signal ``name``; ``meant``: the one that was probably meant."""
+
+    def __init__(self, name: str, text: str, meant: str | None) -> None:
+        self.name = name
+        self.meant = meant
         super().__init__(text)
 
 

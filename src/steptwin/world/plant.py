@@ -174,8 +174,9 @@ class Plant:
 
     @staticmethod
     def unknown(what: str, name: str, known: Iterable[str]) -> Unknown:
-        hint = NearMiss().hint(name, known)
-        return Unknown(name, f"no {what} is called {name!r}{hint}; there are {', '.join(known) or 'none'}")
+        near = NearMiss()
+        text = f"no {what} is called {name!r}{near.hint(name, known)}; there are {', '.join(known) or 'none'}"
+        return Unknown(name, text, near.of(name, known))
 
     def condition(self, text: str) -> SignalCondition:
         """The condition with this text. Raises `Misuse` for invalid text and for unknown signals."""

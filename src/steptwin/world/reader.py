@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, TypeAlias, TypeVar
 from steptwin.diagnostics import Diagnostic, Fix, Severity, SourceText, Span, in_order, render
 from steptwin.errors import Misuse, SourceErrors
 from steptwin.nearmiss import NearMiss
-from steptwin.world.names import Unknown
+from steptwin.world.names import Unknown, UnknownSignal
 from steptwin.world.tomlplaces import Path, UnsupportedToml, find_places
 from steptwin.world.values import Word
 
@@ -180,7 +180,8 @@ class TomlText:
         """What is at ``path`` does not fit the rest. Not reported where it only follows from something else that
         is wrong; then what the table would have been is not there either."""
         if not (isinstance(error, Unknown) and self.may_be_broken(error.name)):
-            self.wrong(path, "D009", f"{place}{error}")
+            fix = self.replacement(path, error.name, error.meant) if isinstance(error, Unknown | UnknownSignal) else None
+            self.wrong(path, "D009", f"{place}{error}", fix=fix)
         elif len(path) > 1 and (name := self._name_of(path[0], path[1])) is not None:
             self.leave_out(name)
 

@@ -12,7 +12,7 @@ from steptwin.errors import Misuse
 from steptwin.machine import SECOND, MotionController, Nanos
 from steptwin.nearmiss import NearMiss
 from steptwin.world.kernel import Source
-from steptwin.world.names import Unknown
+from steptwin.world.names import Unknown, UnknownSignal
 
 if TYPE_CHECKING:
     from steptwin.world.kind import AnyKind
@@ -137,8 +137,9 @@ def find_signal(plan: WorldParts, name: str) -> SignalOf | Idle:
     machine = plan.machines.get(owner)
     if machine is None:
         known = [*plan.machines, *plan.element_names, "time", "idle"]
-        hint = NearMiss().hint(owner, known)
-        raise Unknown(owner, f"no signal {name!r}: nothing is called {owner!r}{hint}; there are {', '.join(known)}")
+        near = NearMiss()
+        text = f"no signal {name!r}: nothing is called {owner!r}{near.hint(owner, known)}; there are {', '.join(known)}"
+        raise Unknown(owner, text, near.of(owner, known))
     return _of_machine(plan.kind_of[owner], machine, plan.kernel_of[owner].source(owner), rest, name)
 
 
@@ -177,6 +178,10 @@ def _unknown(known: Sequence[str], rest: str, name: str, others: str = "") -> Mi
     of_axis = [path for path in known if dot and path.upper().startswith(f"{axis.upper()}.")]
     shown = of_axis or known[:MOST_NAMED]
     more = "" if of_axis or len(shown) == len(known) else f" and more, {len(known)} in all"
-    return Misuse(
-        f"no signal {name!r}{NearMiss().hint(rest, known)}; there are {', '.join(shown)}{more}{'' if of_axis else others}"
+    near = NearMiss()
+    meant = near.of(rest, known)
+    return UnknownSignal(
+        name,
+        f"no signal {name!r}{near.hint(rest, known)}; there are {', '.join(shown)}{more}{'' if of_axis else others}",
+        None if meant is None else f"{name.removesuffix(rest)}{meant}",
     )
