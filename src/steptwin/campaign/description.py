@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
 
+from steptwin import __version__
 from steptwin.campaign.case import digest_of
 from steptwin.campaign.variation import Varied
 from steptwin.machine import Nanos
@@ -103,7 +104,9 @@ class CampaignDescription:
 
     def _decisive(self) -> Mapping[str, Any]:
         left = {"runs", "time_ns", "until_failure", "database", "files", "name", "matrix", "world"}
-        plain: dict[str, Any] = {one.name: repr(getattr(self, one.name)) for one in fields(self) if one.name not in left}
+        plain: dict[str, Any] = {"version": __version__} | {
+            one.name: repr(getattr(self, one.name)) for one in fields(self) if one.name not in left
+        }
         if self.design == "latin-hypercube":  # its points depend on how many there are
             plain["runs"] = self.runs
         return plain | {"files": {name: content.hex() for name, content in self.files.items()}}
