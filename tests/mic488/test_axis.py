@@ -320,6 +320,32 @@ def test_mic_42_what_is_read_in_dint_mode_can_be_written_back(rig: Rig, key: str
 
 
 @pytest.mark.parametrize("side", [-1, 1])
+@pytest.mark.parametrize(("missing", "overruns"), [(0, 0), (1, 1)])
+def test_an_axis_that_cannot_brake_by_a_pulse_overruns(rig: Rig, side: int, missing: int, overruns: int) -> None:
+    """1000 pulses/s after 1 s and 500 pulses; after 2 s it needs as many again behind 1500."""
+    rig.set("VEL_ABS", side * 1000.0)
+    rig.wait(2.0)
+    rig.set("POSLIM_R" if side > 0 else "POSLIM_L", side * (2000.0 - missing))
+    rig.until(1, 10 if side > 0 else 9)
+    assert (rig.position(), len(rig.events("overrun"))) == (side * 2000.0, overruns)
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_soft_limit_holds_where_the_counter_has_wrapped(rig: Rig, side: int) -> None:
+    """30 pulses over the border are 20 behind it; the limit is 5 behind it."""
+    rig.use_dint()
+    end, other_end = (2**31 - 1, -(2**31)) if side > 0 else (-(2**31), 2**31 - 1)
+    rig.set("POS_ACT", end - side * 9)
+    rig.set("POS_REL", side * 30)
+    rig.until(1, 4)
+    assert rig.position() == other_end + side * 20
+    rig.set("POSLIM_L" if side > 0 else "POSLIM_R", other_end + side * 5)
+    rig.set("VEL_ABS", -side * 10)
+    rig.until(1, 9 if side > 0 else 10)
+    assert rig.position() == other_end + side * 5
+
+
+@pytest.mark.parametrize("side", [-1, 1])
 def test_no_overrun_from_standstill(rig: Rig, side: int) -> None:
     """An axis at rest beyond a limit has nothing to brake."""
     rig.set("POS_ACT", side * 1000.0)

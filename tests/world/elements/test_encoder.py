@@ -43,3 +43,15 @@ def test_counts_of_two_revolutions(encoder: str, counts: int) -> None:
     axis.move_to(10.0)
     world.run(until="idle")
     assert (axis.position, axis.encoder) == (10.0, counts)
+
+
+@pytest.mark.parametrize(("mount", "counts"), [("", 400), ('mount = "motor"', 400), ('mount = "load"', 440)])
+def test_an_encoder_on_the_load_is_behind_the_play(mount: str, counts: int) -> None:
+    """80 counts per mm; after a reversal the load is 0.5 mm behind the motor."""
+    world = World.from_toml(TEXT.replace("[axis.encoder]", "backlash = 0.5\n[axis.encoder]") + mount + "\n")
+    axis = world.mic488["m"].axis[1]
+    axis.enable()
+    for position in (10.0, 5.0):
+        axis.move_to(position)
+        world.run(until="idle")
+    assert (axis.position, axis.encoder) == (5.0, counts)

@@ -145,6 +145,13 @@ def test_its_faults() -> None:
     assert [level for _, level in edges(worn, "knife.switch2")][:3] == [0.0, 1.0, 0.0]
 
 
+def test_a_turn_has_twice_as_many_pulses_as_its_cam_has_points() -> None:
+    """4 points. 160 pulses per unit, and a turn in 1 / ratio units: 10 pulses, and 7."""
+    assert World.from_toml(TEXT.replace("ratio = 0.03", "ratio = 16"))
+    with pytest.raises(WorldError, match="too few for so many"):
+        World.from_toml(TEXT.replace("ratio = 0.03", "ratio = 22"))
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
