@@ -411,7 +411,7 @@ def test_elements_are_described_with_terminals_and_signals() -> None:
     )
     description = describe(world)
     assert description.elements == (
-        ElementPart("both", "gate", ("in1", "in2"), ("out",), ()),
+        ElementPart("both", "gate", ("in1", "in2"), ("out",), (), function="and"),
         ElementPart(
             "clamp", "cylinder", ("extend",), ("extended", "retracted"), (SignalPart("position", "mm", 0.0, 40.0),),
             DrawingPart("rod", 40.0, ("position",), 0.0, (SwitchPart("a.IN3", 19.0, 21.0),)),

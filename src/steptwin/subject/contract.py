@@ -133,6 +133,8 @@ class ElementPart:
     signals: tuple[SignalPart, ...]
     """Those that are no terminals."""
     drawing: DrawingPart | None = None
+    function: str | None = None
+    """What it does among those of its kind: ``and`` of a gate, ``on-delay`` of a timer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -239,6 +241,7 @@ def read_description(data: Mapping[str, Any]) -> Description:
             tuple(one["outputs"]),
             tuple(SignalPart(**signal) for signal in one["signals"]),
             None if one["drawing"] is None else _read_drawing(one["drawing"]),
+            one.get("function"),
         )
         for one in data["elements"]
     )

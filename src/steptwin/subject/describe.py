@@ -73,7 +73,9 @@ def _element(world: Plant, kind: str, name: str) -> ElementPart:
     signals = world.parts.element_signals(name) or {}
     others = {signal: of for signal, of in signals.items() if signal not in (*inputs, *outputs)}
     parts = tuple(SignalPart(signal, of.unit, *(of.bounds or (None, None))) for signal, of in others.items())
-    return ElementPart(name, kind, inputs, outputs, parts, drawing)
+    function_of = ELEMENTS[kind].function
+    function = None if function_of is None else function_of(world.parts.elements[kind][name])
+    return ElementPart(name, kind, inputs, outputs, parts, drawing, function)
 
 
 def _connections(world: Plant) -> Iterator[ConnectionPart]:

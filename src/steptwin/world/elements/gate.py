@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 from steptwin.machine import Nanos
@@ -63,11 +63,12 @@ class GateSpec(BoardSpec):
 class Gate(BoardPart):
     """Gives its output the level that follows from its inputs, without delay."""
 
-    __slots__ = ("_function", "_inputs")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_function", "_inputs"}) | BoardPart.FIXED
+    __slots__ = ("_function", "_inputs", "kind")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_function", "_inputs", "kind"}) | BoardPart.FIXED
 
     def __init__(self, board: Board, kind: str, inputs: Iterable[str]) -> None:
         super().__init__(board)
+        self.kind = kind
         self._function = FUNCTIONS[kind]
         self._inputs = tuple(inputs)
 
@@ -75,7 +76,7 @@ class Gate(BoardPart):
         self.board.put(OUT, float(self._function([self.board.is_on(name) for name in self._inputs])))
 
 
-GATE = with_terminals(
+_GATE = with_terminals(
     "gate",
     GateSpec,
     (
@@ -89,3 +90,4 @@ GATE = with_terminals(
     faults=(STUCK_OUTPUT,),
     make=lambda spec, site: Gate(site.board(spec.name), spec.kind, spec.names),
 )
+GATE = replace(_GATE, function=lambda gate: gate.kind)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from steptwin.machine import Nanos
@@ -38,12 +38,12 @@ class Timer(BoardPart):
     """On-delay (TON): on once the input has been on for ``time``. Off-delay (TOF): off once it has been off for ``time``.
     Pulse (TP): on for ``time`` from an edge of the input from 0 to 1; edges meanwhile do nothing."""
 
-    __slots__ = ("_due", "_kind", "_time", "_was_on")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_kind", "_time"}) | BoardPart.FIXED
+    __slots__ = ("_due", "_time", "_was_on", "kind")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"kind", "_time"}) | BoardPart.FIXED
 
     def __init__(self, board: Board, kind: str, time: Nanos) -> None:
         super().__init__(board)
-        self._kind = kind
+        self.kind = kind
         self._time = time
         self._was_on = False
         self._due: Nanos | None = None
@@ -61,19 +61,19 @@ class Timer(BoardPart):
             self._was_on = is_on
             self._turn(is_on, now)
         runs = self._due is not None
-        if self._kind == ON_DELAY:
+        if self.kind == ON_DELAY:
             level = is_on and not runs
-        elif self._kind == OFF_DELAY:
+        elif self.kind == OFF_DELAY:
             level = is_on or runs
         else:
             level = runs
         self.board.put(OUT, float(level))
 
     def _turn(self, is_on: bool, now: Nanos) -> None:
-        if self._kind == PULSE:
+        if self.kind == PULSE:
             if is_on and self._due is None:
                 self._due = now + self._time
-        elif is_on is (self._kind == ON_DELAY):
+        elif is_on is (self.kind == ON_DELAY):
             self._due = now + self._time
         else:
             self._due = None
@@ -82,7 +82,7 @@ class Timer(BoardPart):
         return self._due
 
 
-TIMER = with_terminals(
+_TIMER = with_terminals(
     "timer",
     TimerSpec,
     (
@@ -93,3 +93,4 @@ TIMER = with_terminals(
     faults=(STUCK_OUTPUT,),
     make=lambda spec, site: Timer(site.board(spec.name), spec.kind, spec.time),
 )
+TIMER = replace(_TIMER, function=lambda timer: timer.kind)

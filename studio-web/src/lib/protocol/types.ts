@@ -370,6 +370,7 @@ export type Description = {
       })[];
       low: number;
     } | null;
+    function: string | null;
   })[];
   connections: ({
     source: string;
