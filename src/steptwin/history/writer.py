@@ -10,7 +10,7 @@ from sqlalchemy import Engine
 from sqlalchemy.engine import URL
 from sqlalchemy.exc import DBAPIError, IntegrityError, InterfaceError, OperationalError
 
-from steptwin.errors import LineFailure, SteptwinError
+from steptwin.errors import LineFailure, Misuse, SteptwinError
 from steptwin.history.chores import DAY_US, begin_anew, remove_old, summarise
 from steptwin.history.database import engine_of, failure, shown, upgrade
 from steptwin.history.spool import Spool, Taken
