@@ -62,9 +62,7 @@ def run(options: CampaignOptions, out: Print) -> bool:
     if options.as_json:
         out(_json(summary.plain()))
     else:
-        _print(summary.plain(), out)
-        for cause in report.found:
-            out(f"cause, {len(cause.numbers)} runs: {told(cause)}")
+        _print(summary.plain(), out, [f"cause, {len(one.numbers)} runs: {told(one)}" for one in report.found])
         out(f"{time.monotonic() - began:.1f} s; results in {folder}, report.html shows them")
     reports.add(campaign.coverage, options.file.parent)
     tables: list[str] = []
@@ -110,7 +108,7 @@ def _json(plain: Any) -> str:
     return json.dumps(plain, ensure_ascii=False, indent=2)
 
 
-def _print(plain: Any, out: Print) -> None:
+def _print(plain: Any, out: Print, causes: Sequence[str] = ()) -> None:
     runs, failed = plain["runs"], plain["failed"]
     low, high = plain["interval"]
     if not runs:
@@ -125,6 +123,8 @@ def _print(plain: Any, out: Print) -> None:
         out(f"case {one['number']}: {_given(one['case'])}: {one['why']}")
     if failed > MOST_LINES:
         out(f"... and {failed - MOST_LINES} more: {SUMMARY} has the first 1000, the database all")
+    for cause in causes:
+        out(cause)
     out(f"seed {plain['seed']}, digest {plain['digest']}")
 
 
