@@ -6,10 +6,12 @@ import json
 import os
 import random
 import signal
+import sqlite3
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -195,23 +197,24 @@ def test_a_campaign_that_was_killed_goes_on(tmp_path: Path) -> None:
     running = subprocess.Popen(command, stdout=subprocess.DEVNULL)
     campaign = Campaign.load(path)
     try:
-        until(lambda: (out / RESULTS).exists() and _stored(campaign, out) > 5, "some results")
+        until(lambda: _stored(out) > 5, "some results", 100.0)
     finally:
         running.kill()
         running.wait()
-    known = _stored(campaign, out)
+    known = _stored(out)
     assert known < 3000
     few = campaign.changed(runs=known + 20)
     summary = few.run(out)
     assert summary.plain() == few.run().plain()
 
 
-def _stored(campaign: Campaign, out: Path) -> int:
-    store = campaign.open_store(out)
+def _stored(out: Path) -> int:
+    """How many cases have results; it only looks, so that it is in nobody's way."""
     try:
-        return len(store.numbers())
-    finally:
-        store.close()
+        with closing(sqlite3.connect(f"file:{out / RESULTS}?mode=ro", uri=True)) as connection:
+            return int(connection.execute("SELECT count(*) FROM campaign_case").fetchone()[0])
+    except sqlite3.OperationalError:  # there is no file or table yet
+        return 0
 
 
 def test_a_changed_campaign_needs_another_folder(doors: Campaign, tmp_path: Path) -> None:
