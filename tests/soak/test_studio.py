@@ -11,7 +11,7 @@ import pytest
 from soak import factor, scaled
 from studio_page import Studio as OpenStudio
 from studio_page import button, show
-from tests.studio.conftest import StudioWorld, browser, start_studio
+from tests.studio.conftest import TABLE, StudioWorld, browser, start_studio
 from tests.support.studio_rig import Studio, Tab
 
 __all__ = ["browser", "start_studio"]  # fixtures
@@ -22,22 +22,9 @@ FEW_OBJECTS = 300
 """Caches fill up a little."""
 MOST_HEAP = 60_000_000
 """Of the page, after a collection, bytes."""
-BUSY = """
-    [world]
-    name = "hall"
-    [[line]]
-    name = "bus"
-    kind = "modbus"
-    tcp = "127.0.0.1:0"
-    [[mic488]]
-    name = "table"
-    line = "bus"
-    [mic488.M1]
-    unit = "mm"
-    gear = 100.0
-    acc = 400.0
-    dec = 400.0
-    vel = 40.0
+BUSY = (
+    TABLE
+    + """
     [[script]]
     name = "on"
     steps = [{ write = { "table.M1_EN" = 1 } }]
@@ -50,6 +37,7 @@ BUSY = """
       { write = { "table.M1_POS_ABS" = 0, "table.OUT1" = 0 } }, { wait = "2 s" },
     ]
 """
+)
 
 
 def objects() -> int:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser
     from studio_page import Studio
 
-WORLD = """
+TABLE = """
     [world]
     name = "hall"
     [[line]]
@@ -41,6 +41,10 @@ WORLD = """
     acc = 400.0
     dec = 400.0
     vel = 40.0
+"""
+WORLD = (
+    TABLE
+    + """
     [[line]]
     name = "chips"
     kind = "m1486"
@@ -50,6 +54,7 @@ WORLD = """
     line = "chips"
     address = 7
 """
+)
 
 ROOT = Path(__file__).parent.parent.parent
 

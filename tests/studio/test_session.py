@@ -281,6 +281,18 @@ def test_the_clock_comes_once_a_second_and_when_time_goes_otherwise() -> None:
     assert int(clocks[0]["time_ns"]) > 2900 * MILLISECOND
 
 
+def test_the_clock_comes_also_where_time_stands() -> None:
+    """A page that hears nothing takes the studio for lost."""
+    studio = Studio()
+    studio.speed = 0.0
+    tab = studio.open()
+    studio.run(1100)
+    tab.read()
+    for _ in range(3):
+        studio.run(1100)
+        assert [one["clock"]["time_ns"] for one in tab.read() if "clock" in one] == [str(studio.world.now)]
+
+
 # ---------------------------------------------------------------------- whatever comes
 
 

@@ -16,7 +16,7 @@ from steptwin.eventloop import later
 from steptwin.live.cell import Cell
 from steptwin.live.lookback import Lookback
 from steptwin.live.world import LiveWorld
-from steptwin.machine import SECOND, Nanos
+from steptwin.machine import MILLISECOND, Nanos
 from steptwin.world.plant import PlantSnapshot
 from steptwin.world.trace import Mark
 
@@ -88,7 +88,7 @@ class WorldBranches:
     def _begin(self, own: StudioOptions, number: int, snapshot: PlantSnapshot) -> _OpenBranch:
         """Blocks until its page is there. Its trace and its inputs begin anew: nothing of the past is recorded there."""
         spec, ready = self._live.world.spec, self._processes.folder / f"{number}.ready.json"
-        name = f"{spec.name}, branch {number} from {snapshot.now / SECOND:.3f} s"
+        name = f"{spec.name}, branch {number} from {snapshot.now // MILLISECOND / 1000:.3f} s"
         begun = BranchStart(own, ready, name, spec.text.source.name, replace(snapshot, inputs=(), trace=Mark(())))
         process = self._processes.start(MODULE, given=pickle.dumps(begun))
         return _OpenBranch(process, snapshot.now, self._processes.url(process, ready, f"branch {number}"))

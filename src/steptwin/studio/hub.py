@@ -167,10 +167,13 @@ class Shared:
         self.text = json.dumps(value)
 
     def put(self, value: object) -> None:
-        text = json.dumps(value)
-        if text != self.text:
-            self.text = text
-            self.version += 1
+        if json.dumps(value) != self.text:
+            self.repeat(value)
+
+    def repeat(self, value: object) -> None:
+        """Send it, also if it has not changed."""
+        self.text = json.dumps(value)
+        self.version += 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -470,4 +473,4 @@ class Hub:
         goes = moment.running, moment.speed
         if goes != self._running or now >= self._clock_due:
             self._running, self._clock_due = goes, now + CLOCK_NS
-            self.shared["clock"].put(moment.plain())
+            self.shared["clock"].repeat(moment.plain())  # where time stands, too: pages see that the studio is there
