@@ -80,6 +80,12 @@ class AxisDescription:
     """By which it can be moved at once."""
     velocities: Limits | None = None
     """That it can be commanded to make, with their sign."""
+    velocity_point: str | None = None
+    """Path of the point with the velocity of moves to positions; None where there is none, or that is not known."""
+    ramp_points: tuple[str, ...] = ()
+    """Paths of the points with the acceleration and deceleration of these moves."""
+    limit_codes: tuple[int, int] | None = None
+    """Numbers of its status where it stands at the limit in the negative and in the positive direction."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -247,6 +253,8 @@ def read_datasheet(data: Mapping[str, Any]) -> Datasheet:
 
 def _read_axis(data: Mapping[str, Any]) -> AxisDescription:
     read: dict[str, Any] = {name: _read_limits(data[name]) for name in ("positions", "distances", "velocities")}
+    read["ramp_points"] = tuple(data["ramp_points"])
+    read["limit_codes"] = None if data["limit_codes"] is None else tuple(data["limit_codes"])
     return AxisDescription(**{**data, **read})
 
 

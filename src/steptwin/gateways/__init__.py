@@ -30,6 +30,7 @@ KINDS: Mapping[str, _GatewayModule] = complete(
     {
         "prometheus": _GatewayModule("steptwin.gateways.prometheus", "metrics"),
         "opcua": _GatewayModule("steptwin.gateways.opcua.gateway", "opcua"),
+        "epics": _GatewayModule("steptwin.gateways.epics.gateway", "epics"),
         "mqtt": _GatewayModule("steptwin.gateways.mqtt.gateway", "mqtt"),
     },
 )

@@ -31,6 +31,9 @@ class GatewayClient:
     def check(self, wanted: Command) -> None:
         """Raises `NotPermitted`."""
         name = row_of(wanted).name
-        needed = PERMITS[name].role
+        self.check_role(name, PERMITS[name].role)
+
+    def check_role(self, name: str, needed: Role) -> None:
+        """Raises `NotPermitted` for what ``name`` stands for."""
         if self.role < needed:
             raise NotPermitted(f"{name} is for the role {needed.title}; {self.name} has the role {self.role.title}")

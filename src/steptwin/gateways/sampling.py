@@ -68,12 +68,16 @@ class Sampler:
 
     async def changed(self, machines: Iterable[str]) -> list[Sample]:
         """Samples of those ``machines`` that may have changed since their last one."""
+        return await asyncio.gather(*map(self.take, self.due(machines)))
+
+    def due(self, machines: Iterable[str]) -> list[str]:
+        """Those ``machines`` that may have changed since their last sample."""
         missed, events = self._following.take()
         if missed:
             self._resting.clear()
         for event in events:
             self._resting.pop(event.machine, None)
-        return await asyncio.gather(*(self.take(name) for name in machines if self._is_due(name)))
+        return [name for name in machines if self._is_due(name)]
 
     def _is_due(self, machine: str) -> bool:
         left_out = self._resting.get(machine)

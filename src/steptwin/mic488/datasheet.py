@@ -15,6 +15,7 @@ from steptwin.mic488.events import EVENTS
 from steptwin.mic488.points import EFFECTS, limits, points, unit_of
 from steptwin.mic488.registermap import RegisterMap
 from steptwin.mic488.registers import AXES, register_map
+from steptwin.mic488.status import LIMIT
 
 COORDINATES = 2**31
 MOST_KEPT = 64
@@ -47,7 +48,17 @@ def datasheet_of(firmware: str, scales: tuple[tuple[str, float | None], ...] = D
 
 def _axis(number: int, unit: str, gear: float | None) -> AxisDescription:
     """Coordinates are whole numbers of 32 bits with a sign, in pulses (MIC-7); a distance may wrap (MIC-42)."""
-    axis = AxisDescription(number=number, name=f"M{number}", unit=unit, pulses_per_unit=gear, round_p=2 * COORDINATES)
+    name = f"M{number}"
+    axis = AxisDescription(
+        number=number,
+        name=name,
+        unit=unit,
+        pulses_per_unit=gear,
+        round_p=2 * COORDINATES,
+        velocity_point=f"{name}_VMAX",
+        ramp_points=(f"{name}_ACC", f"{name}_DEC"),
+        limit_codes=(int(LIMIT[-1]), int(LIMIT[1])),
+    )
     if gear is None:
         return axis
     coordinates = Limits(-COORDINATES / gear, (COORDINATES - 1) / gear)

@@ -5,6 +5,7 @@ The tables are here; what serves them is in `steptwin.gateways`.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -103,6 +104,21 @@ class MqttSpec(GatewaySpec):
     sparkplug: SparkplugSpec | None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EpicsSpec(ListeningSpec):
+    prefix: str
+    """With what names of records begin."""
+    beacons: str
+    """HOST:PORT to which the server announces itself."""
+    interval: Nanos
+    """How often values are looked at that clients have asked for, ns."""
+    registers: tuple[str, ...]
+    """Further points to show: ``MACHINE.POINT``."""
+    role: str | None
+    """Of clients, of which Channel Access knows no more than names; None: engineer where only this computer is served,
+    otherwise viewer."""
+
+
 class _GatewayReader(NamedTuple):
     rows: TableRows
     make: Callable[..., GatewaySpec]
@@ -119,6 +135,12 @@ def _broker(value: Any) -> str:
     return value
 
 
+def _beacons(value: Any) -> str:
+    if address_value(value).endswith(":0"):
+        raise Misuse(f"{value!r}: the port for beacons is 1 to 65535, usually 5065")
+    return value
+
+
 def _topic(value: Any) -> str:
     if any(sign in text_value(value) for sign in "+#\0") or value.startswith(("/", "$")) or value.endswith("/"):
         raise Misuse(f"{value!r}: a topic has no + and #, and begins and ends without /")
@@ -128,6 +150,15 @@ def _topic(value: Any) -> str:
 def _id(value: Any) -> str:
     if any(sign in text_value(value) for sign in "+/#\0"):
         raise Misuse(f"{value!r}: an id of Sparkplug has no +, / and #")
+    return value
+
+
+_RECORD_NAME = re.compile(r"[A-Za-z0-9_:;<>\[\]-]*\Z")
+
+
+def _prefix(value: Any) -> str:
+    if not isinstance(value, str) or not _RECORD_NAME.match(value):
+        raise Misuse(f"{value!r}: names of records have letters from A to Z, digits and _-:;<>[]")
     return value
 
 
@@ -163,6 +194,18 @@ _KINDS: Mapping[str, _GatewayReader] = {
             need={"certificate": "key", "key": "certificate", "trusted": "certificate"},
         ),
         OpcUaSpec,
+    ),
+    "epics": _GatewayReader(
+        _rows(
+            "epics",
+            "127.0.0.1:5064",
+            optional(_prefix, "prefix", "with what names of records begin; those of controllers follow", ""),
+            optional(_beacons, "beacons", "HOST:PORT to which the server announces itself", "127.0.0.1:5065"),
+            optional(positive_time, "interval", "how often values are looked at that clients have asked for", 100 * MILLISECOND),
+            optional(texts, "registers", "further points to show: MACHINE.POINT, such as table.USER_REGISTER[5]", ()),
+            optional(word(*ROLES), "role", "role of all clients"),
+        ),
+        EpicsSpec,
     ),
     "mqtt": _GatewayReader(
         TableRows(

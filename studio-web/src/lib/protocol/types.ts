@@ -440,6 +440,9 @@ export type Description = {
         high: number | null;
         is_low_excluded: boolean;
       } | null;
+      velocity_point: string | null;
+      ramp_points: string[];
+      limit_codes: number[] | null;
     })[];
     pins: ({
       name: string;

@@ -1,0 +1,122 @@
+"""The gateway: records from the description, and the server that is kept up to date until it is closed."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+
+from steptwin.access.roles import ROLES, Role
+from steptwin.errors import Misuse
+from steptwin.gateways.contract import GatewaySubject
+from steptwin.gateways.epics.channels import PvDatabase, RecordBase
+from steptwin.gateways.epics.controller import EpicsController
+from steptwin.gateways.epics.motorrecord import MotorRecord
+from steptwin.gateways.epics.pointrecord import CommandRecord, PointRecord
+from steptwin.gateways.epics.server import ChannelAccessServer
+from steptwin.gateways.leases import JogLeases
+from steptwin.gateways.methods import CONTROLLER_METHODS, PROGRAM_METHODS, methods_of
+from steptwin.gateways.points import CLOCK, CLOCK_POINTS, GatewayPoint, points_of, registers_by_machine
+from steptwin.gateways.sampling import Sampler
+from steptwin.machine import SECOND
+from steptwin.subject.contract import MachinePart
+from steptwin.world.addresses import is_loopback, parse_address
+from steptwin.world.gateways import EpicsSpec
+
+LONGEST_NAME = 60
+"""Characters of the name of a record."""
+
+
+class EpicsGateway:
+    """Serves ``subject`` at the address of ``spec``. A `Gateway`."""
+
+    protocol = "EPICS Channel Access"
+
+    def __init__(self, spec: EpicsSpec, subject: GatewaySubject, folder: Path) -> None:
+        self._spec = spec
+        self._subject = subject
+        self._controllers: dict[str, EpicsController] = {}
+        self._sampler: Sampler | None = None
+        self._leases = JogLeases(subject)
+        self._server: ChannelAccessServer | None = None
+        self._task: asyncio.Task[None] | None = None
+        self._leaving: set[asyncio.Task[None]] = set()
+
+    async def open(self, *, listen_any: bool, notice: Callable[[str], None]) -> Mapping[str, object]:
+        spec = self._spec
+        address = parse_address(spec.listen, listen_any=listen_any)
+        beacons = parse_address(spec.beacons, listen_any=listen_any)
+        open_to = Role.ENGINEER if is_loopback(address.host) else Role.VIEWER
+        role = open_to if spec.role is None else ROLES[spec.role]
+        registers = registers_by_machine("[gateway.epics]", spec.registers, self._subject.description)
+        self._sampler = Sampler(self._subject, registers)
+        records: dict[str, RecordBase] = {}
+        for name in (*(part.name for part in self._subject.description.machines), CLOCK):
+            self._controllers[name] = EpicsController(name, self._subject, self._sampler, self._leases, role)
+        for part in self._subject.description.machines:
+            records |= self._records(part, registers[part.name])
+        records |= dict(self._points(CLOCK, CLOCK_POINTS))
+        for name in records:
+            if len(name) > LONGEST_NAME:
+                raise Misuse(
+                    f"[gateway.epics]: {name} has {len(name)} characters: permitted for the name of a record are {LONGEST_NAME}"
+                )
+        server = ChannelAccessServer(PvDatabase(records), address, beacons, self._leave)
+        port = await server.open()
+        self._server = server
+        self._task = asyncio.create_task(self._publish(server, self._sampler))
+        return {"host": address.host, "port": port, "prefix": spec.prefix}
+
+    def _records(self, part: MachinePart, registers: list[str]) -> dict[str, RecordBase]:
+        found: dict[str, RecordBase] = {}
+        controller = self._controllers[part.name]
+        for axis in part.datasheet.axes:
+            name = self._name(part.name, axis.name)
+            motor = MotorRecord(name, part, axis, controller)
+            controller.records.append(motor)
+            found[name] = motor
+        found |= dict(self._points(part.name, points_of(part, self._subject.description, registers)))
+        for path, rows in (((), CONTROLLER_METHODS), (("program",), PROGRAM_METHODS)):
+            for row in methods_of(part, rows, None):
+                name = self._name(part.name, *path, row.name)
+                found[name] = CommandRecord(name, row, controller)
+        return found
+
+    def _points(self, machine: str, points: tuple[GatewayPoint, ...]) -> Iterator[tuple[str, PointRecord]]:
+        controller = self._controllers[machine]
+        for point in points:
+            name = self._name(machine, *point.path)
+            record = PointRecord(name, point, controller)
+            controller.records.append(record)
+            yield name, record
+
+    def _name(self, *path: str) -> str:
+        return f"{self._spec.prefix}{':'.join(path)}"
+
+    def _leave(self, circuit: object) -> None:
+        for controller in self._controllers.values():
+            if controller.is_busy:
+                task = asyncio.create_task(controller.leave(circuit))
+                self._leaving.add(task)
+                task.add_done_callback(self._leaving.discard)
+
+    async def _publish(self, server: ChannelAccessServer, sampler: Sampler) -> None:
+        while True:
+            await asyncio.sleep(self._spec.interval / SECOND)
+            busy = [name for name, controller in self._controllers.items() if controller.is_busy]
+            wanted = [name for name, one in self._controllers.items() if one.is_wanted] if server.has_clients else []
+            due = dict.fromkeys((*busy, *sampler.due(wanted)))
+            await asyncio.gather(*(self._controllers[name].refresh() for name in due))
+
+    async def close(self) -> None:
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.wait((self._task, *self._leaving))
+        self._leases.close()
+        if self._server is not None:
+            await self._server.close()
+        if self._sampler is not None:
+            self._sampler.close()
+
+
+make = EpicsGateway

@@ -1,0 +1,130 @@
+"""What a put to each field of a motor record does."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Awaitable, Callable
+from typing import Protocol
+
+from steptwin.errors import Refusal
+from steptwin.gateways.epics.channels import FieldValue, Putter
+from steptwin.gateways.epics.motorfields import SET
+
+
+class PutTarget(Protocol):
+    """A motor record (`steptwin.gateways.epics.motorrecord`). Positions are those of the user; all may raise `SteptwinError`."""
+
+    values: dict[str, FieldValue]
+
+    def user(self, dial: float) -> float:
+        """The position of the user at one of the dial."""
+        ...
+
+    def check_setting(self, who: Putter) -> None: ...
+
+    def set_position(self, user: float) -> None: ...
+
+    def shift(self, offset: float) -> None: ...
+
+    def limit(self, name: str, value: float) -> None: ...
+
+    async def move(self, who: Putter, user: float) -> None: ...
+
+    async def home(self, who: Putter, button: str) -> None: ...
+
+    async def jog(self, who: Putter, button: str) -> None: ...
+
+    async def end_jog(self) -> None: ...
+
+    async def stop(self, who: Putter) -> None: ...
+
+    async def pause(self, who: Putter, state: int) -> None: ...
+
+    async def enable(self, who: Putter, *, on: bool) -> None: ...
+
+    async def write_ramp(self, who: Putter, velocity: float, seconds: float) -> None: ...
+
+
+async def put_setting(record: PutTarget, who: Putter, name: str, value: FieldValue) -> None:
+    record.check_setting(who)
+    record.values[name] = value
+
+
+async def _put_position(record: PutTarget, who: Putter, name: str, value: FieldValue) -> None:
+    number = float(value)
+    if name == "RVAL":
+        number *= float(record.values["MRES"])
+        if math.isnan(number):
+            raise Refusal("the step is not known")
+    user = number if name == "VAL" else record.user(number)
+    if name == "RLV":
+        user = float(record.values["VAL"]) + number
+    if record.values["SET"] == SET:
+        record.check_setting(who)
+        record.set_position(user)
+    else:
+        await record.move(who, user)
+
+
+async def _put_tweak(record: PutTarget, who: Putter, name: str, value: FieldValue) -> None:
+    if value:
+        distance = float(record.values["TWV"]) * (1 if name == "TWF" else -1)
+        await record.move(who, float(record.values["VAL"]) + distance)
+
+
+async def _put_button(record: PutTarget, who: Putter, name: str, value: FieldValue) -> None:
+    if name in ("HOMF", "HOMR"):
+        if value:
+            await record.home(who, name)
+    elif value:
+        await record.jog(who, name)
+    elif record.values[name]:
+        await record.end_jog()
+
+
+async def _put_stop(record: PutTarget, who: Putter, name: str, value: FieldValue) -> None:
+    if value:
+        await record.stop(who)
+
+
+async def _put_spmg(record: PutTarget, who: Putter, name: str, value: FieldValue) -> None:
+    await record.pause(who, int(value))
+
+
+async def _put_ramp(record: PutTarget, who: Putter, name: str, value: FieldValue) -> None:
+    velocity, seconds = float(record.values["VELO"]), float(record.values["ACCL"])
+    await record.write_ramp(who, *((float(value), seconds) if name == "VELO" else (velocity, float(value))))
+
+
+async def _put_limit(record: PutTarget, who: Putter, name: str, value: FieldValue) -> None:
+    record.check_setting(who)
+    record.limit(name, float(value))
+
+
+async def _put_offset(record: PutTarget, who: Putter, name: str, value: FieldValue) -> None:
+    record.check_setting(who)
+    record.shift(float(value))
+
+
+async def _put_direction(record: PutTarget, who: Putter, name: str, value: FieldValue) -> None:
+    record.check_setting(who)
+    record.values[name] = value
+    record.shift(float(record.values["OFF"]))
+
+
+async def _put_enable(record: PutTarget, who: Putter, name: str, value: FieldValue) -> None:
+    await record.enable(who, on=bool(value))
+
+
+PUTS: dict[str, Callable[[PutTarget, Putter, str, FieldValue], Awaitable[None]]] = {
+    **dict.fromkeys(("VAL", "DVAL", "RVAL", "RLV"), _put_position),
+    **dict.fromkeys(("TWF", "TWR"), _put_tweak),
+    **dict.fromkeys(("JOGF", "JOGR", "HOMF", "HOMR"), _put_button),
+    "STOP": _put_stop,
+    "SPMG": _put_spmg,
+    **dict.fromkeys(("VELO", "ACCL"), _put_ramp),
+    **dict.fromkeys(("HLM", "LLM", "DHLM", "DLLM"), _put_limit),
+    "OFF": _put_offset,
+    "DIR": _put_direction,
+    "CNEN": _put_enable,
+}
