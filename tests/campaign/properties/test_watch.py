@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from steptwin.campaign.properties import read_property
+from steptwin.campaign.properties import Verdict, read_property
 from steptwin.errors import Misuse
 from steptwin.files.world import World
 
@@ -45,7 +45,7 @@ def world() -> World:
     return World.from_toml(WORLD)
 
 
-def said(text: str, seconds: float = 4.0):
+def said(text: str, seconds: float = 4.0) -> Verdict:
     run = world()
     watch = read_property(text).watch(run)
     run.run(until=seconds)

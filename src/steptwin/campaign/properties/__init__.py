@@ -1,4 +1,4 @@
-"""Temporal conditions over the signals of a world: exact, with the distance from being violated (ADR 27)."""
+"""Temporal conditions over the signals of a world: exact, with the distance from being violated (ADR 28)."""
 
 from steptwin.campaign.case import Verdict
 from steptwin.campaign.properties.watch import Property, PropertyWatch, WatchState, read_property

@@ -11,7 +11,7 @@ from steptwin.campaign.properties.ready import check_ready, formula_of
 from steptwin.campaign.properties.recording import ComparisonRecord
 from steptwin.campaign.properties.slopes import TINY, Shape, Slope, shortest, value_at
 from steptwin.campaign.properties.text import parse_property
-from steptwin.campaign.properties.tree import Atom, Becoming, Holding, Lasting, PropertyFormula, measured, nodes
+from steptwin.campaign.properties.tree import Atom, Becoming, CycleTime, Holding, Lasting, PropertyFormula, Tally, measured, nodes
 from steptwin.campaign.properties.words import formula_text
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
@@ -61,7 +61,7 @@ class PropertyWatch:
         fine = _shaped(self._formula)
         atoms = dict.fromkeys(node for node in nodes(self._formula) if isinstance(node, Atom))
         try:
-            self._recordings = {atom: ComparisonRecord(world, atom, is_fine=fine) for atom in atoms}
+            self._recordings = {atom: ComparisonRecord(world, atom, is_fine=atom in fine) for atom in atoms}
         except Misuse as error:
             raise Misuse(f"property {which.text!r}: {error}") from None
         if earlier is not None:
@@ -151,7 +151,10 @@ class PropertyWatch:
         return found
 
 
-def _shaped(formula: PropertyFormula) -> bool:
-    """Whether the value between turns matters: several comparisons meet, or a window ends there."""
-    atoms = {node for node in nodes(formula) if isinstance(node, Atom)}
-    return len(atoms) > 1 or any(isinstance(node, Lasting) and node.length is not None for node in nodes(formula))
+def _shaped(formula: PropertyFormula) -> frozenset[Atom]:
+    """The comparisons whose value between turns matters, because they meet others or a window. Counts and cycle times need only
+    the moments at which they change."""
+    counted = {one for node in nodes(formula) if isinstance(node, CycleTime | Tally) for one in nodes(node)}
+    atoms = {node for node in nodes(formula) if isinstance(node, Atom)} - counted
+    windows = any(isinstance(node, Lasting) and node.length is not None for node in nodes(formula))
+    return frozenset(atoms) if windows or len(atoms) > 1 else frozenset()
