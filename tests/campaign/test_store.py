@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import multiprocessing
 from array import array
 from collections.abc import Callable, Iterator
+from multiprocessing.queues import Queue
+from multiprocessing.synchronize import Barrier
 from pathlib import Path
 
 import pytest
@@ -12,7 +15,7 @@ from sqlalchemy import update
 
 from steptwin.campaign.case import Case, CaseResult, Verdict
 from steptwin.campaign.parquet import write_cases
-from steptwin.campaign.store import CAMPAIGN, CampaignStore, StoredCase, gaps
+from steptwin.campaign.store import CAMPAIGN, METADATA, CampaignStore, StoredCase, gaps
 from steptwin.coverage.counts import Coverage
 from steptwin.errors import LineFailure, Misuse
 from steptwin.history.database import engine_of, read_url
@@ -75,6 +78,32 @@ def test_coverage_is_kept_with_the_cases_that_it_counts(url: str) -> None:
     coverage, count = store.coverage()
     assert (coverage.plain(), count) == ([], 2)
     store.close()
+
+
+def _open_at_once(url: str, others: Barrier, found: Queue[int | str]) -> None:
+    others.wait()
+    try:
+        store = opened(url, "at once")
+        store.add([stored(0)])
+        found.put(len(store.numbers()))
+        store.close()
+    except Exception as error:  # noqa: BLE001 - the other process tells it
+        found.put(repr(error))
+
+
+def test_processes_that_create_it_at_the_same_moment(url: str) -> None:
+    if url.startswith("postgresql"):  # the other tests have created the tables
+        engine = engine_of(read_url(url, Path()))
+        METADATA.drop_all(engine)
+        engine.dispose()
+    context = multiprocessing.get_context("spawn")
+    others, found = context.Barrier(3), context.Queue()
+    processes = [context.Process(target=_open_at_once, args=(url, others, found)) for _ in range(3)]
+    for one in processes:
+        one.start()
+    assert [found.get() for _ in processes] == [1] * 3
+    for one in processes:
+        one.join()
 
 
 def test_other_files_and_versions_are_refused(tmp_path: Path) -> None:

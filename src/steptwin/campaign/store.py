@@ -20,6 +20,7 @@ from sqlalchemy import (
     String,
     Table,
     Text,
+    func,
     insert,
     select,
     update,
@@ -35,6 +36,8 @@ from steptwin.history.database import POSTGRESQL, engine_of, failure, shown
 
 FORMAT = 1
 """Of the tables; another one is refused."""
+_CREATION = 0x73746570
+"""The advisory lock of PostgreSQL for the creation of the tables."""
 _STREAMED = 1000
 """Rows that are fetched at a time."""
 
@@ -79,6 +82,7 @@ class CampaignStore:
         self._insert: Any = postgresql.insert if url.get_backend_name() == POSTGRESQL else sqlite.insert
         try:
             with self._begin() as connection:
+                _lock(connection)
                 METADATA.create_all(connection)
                 self._id = self._find(connection, digest, name, seed, is_own=is_own)
         except BaseException:
@@ -164,6 +168,14 @@ class CampaignStore:
         with self._begin() as connection:
             row = connection.execute(select(CAMPAIGN.c.coverage, CAMPAIGN.c.covered).where(CAMPAIGN.c.id == self._id)).one()
             return Coverage.of_plain(json.loads(row.coverage or "[]")), int(row.covered)
+
+
+def _lock(connection: Connection) -> None:
+    """Until the end of the transaction no other process creates the tables, or enters the campaign."""
+    if connection.dialect.name == POSTGRESQL:
+        connection.execute(select(func.pg_advisory_xact_lock(_CREATION)))
+    else:
+        connection.exec_driver_sql("BEGIN IMMEDIATE")
 
 
 def _json(plain: Any) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sqlite3
+import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -22,6 +24,7 @@ SQLITE, POSTGRESQL = "sqlite", "postgresql"
 BUSY_S = 10
 """For another process that writes to the same file."""
 CONNECT_S = 5
+RETRY_S = 0.01
 
 
 def read_url(text: str, folder: Path) -> URL:
@@ -59,11 +62,26 @@ def engine_of(url: URL) -> Engine:
 
 def _set_up(connection: Any, _: object) -> None:
     try:
-        for pragma in ("journal_mode=WAL", "synchronous=NORMAL", "foreign_keys=ON"):
+        _write_ahead(connection)
+        for pragma in ("synchronous=NORMAL", "foreign_keys=ON"):
             connection.execute(f"PRAGMA {pragma}")
     except BaseException:  # of a file that is no database; nobody else closes it then
         connection.close()
         raise
+
+
+def _write_ahead(connection: Any) -> None:
+    """The first connection of a file changes its journal. SQLite does not wait for others that do so at the same moment."""
+    end = time.monotonic() + BUSY_S
+    while True:
+        try:
+            connection.execute("PRAGMA journal_mode=WAL")
+        except sqlite3.OperationalError as error:
+            if error.sqlite_errorcode != sqlite3.SQLITE_BUSY or time.monotonic() >= end:
+                raise
+            time.sleep(RETRY_S)
+        else:
+            return
 
 
 def failure(url: URL, error: DBAPIError) -> LineFailure:
