@@ -290,3 +290,15 @@ def test_a_batch_is_repeatable_and_pickles(doors: Campaign) -> None:
 
     description, cases = pickle.loads(pickle.dumps((doors.description, [doors.cases[n] for n in range(3)])))
     assert run_batch(description, cases, counts=False).results == tuple(doors.run_case(n) for n in range(3))
+
+
+def test_what_the_file_leaves_open_is_given_with_the_call(tmp_path: Path) -> None:
+    text = CAMPAIGN.replace("runs = 40\n", "")
+    campaign = Campaign.load(campaign_file(tmp_path, text))
+    with pytest.raises(Misuse, match="campaign 'doors' has no end: give runs, time, until_failure or a grid"):
+        campaign.run(tmp_path / "results")
+    assert not (tmp_path / "results").exists()
+    assert campaign.changed(runs=3).run().runs == 3
+    assert campaign.changed(until_failure=True).run().failed == 1
+    hypercube = Campaign.load(campaign_file(tmp_path, text.replace("seed = 7", 'design = "latin-hypercube"')))
+    assert hypercube.changed(runs=4).run().runs == 4

@@ -71,7 +71,7 @@ def test_a_sobol_sequence_goes_on_across_its_blocks(tmp_path: Path) -> None:
 
 def test_a_latin_hypercube_needs_a_number_of_runs(tmp_path: Path) -> None:
     with pytest.raises(Misuse, match="a Latin hypercube needs the number of its points: give runs"):
-        cases(tmp_path, 'time = "1 s"\ndesign = "latin-hypercube"\n' + TWO)
+        cases(tmp_path, 'time = "1 s"\ndesign = "latin-hypercube"\n' + TWO)[0]
 
 
 def test_a_fault_is_there_as_often_as_its_chance_says(tmp_path: Path) -> None:

@@ -142,8 +142,9 @@ class Campaign:
         count what programs execute. Raises `Misuse`, and `LineFailure` for a database or cluster that fails. Once interrupted,
         the same call goes on where it was.
         """
+        total = self._chosen.count
         with self._store(out) as store, workers(jobs, dask) as there:
-            summary = self._run(store, there, coverage=coverage, progress=progress)
+            summary = self._run(store, there, total, coverage=coverage, progress=progress)
             if coverage:
                 self.coverage, self.covered = store.coverage()
         if out is not None:
@@ -179,12 +180,17 @@ class Campaign:
         return CampaignStore(url, description.digest, description.name, description.seed, is_own=is_own)
 
     def _run(
-        self, store: CampaignStore, there: object, *, coverage: bool, progress: Callable[[CampaignProgress], object]
+        self,
+        store: CampaignStore,
+        there: Workers,
+        total: int | None,
+        *,
+        coverage: bool,
+        progress: Callable[[CampaignProgress], object],
     ) -> CampaignSummary:
         from steptwin.campaign.store import StoredCase, gaps
 
-        assert isinstance(there, Workers)  # noqa: S101
-        description, total = self.description, self._chosen.count
+        description = self.description
         first = store.first_failure() if description.until_failure else None
         done = store.numbers()
         known, failed = len(done), 0

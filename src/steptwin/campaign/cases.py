@@ -13,6 +13,7 @@ from steptwin.campaign.description import CampaignDescription
 from steptwin.campaign.designs import Design, design_of
 from steptwin.campaign.variation import Choice
 from steptwin.durations import duration
+from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.world.chance import Chance
 
@@ -30,7 +31,7 @@ class CaseDimension(NamedTuple):
 
 
 class Cases:
-    """Of a description. ``count``: how many there are; None: without end."""
+    """Of a description."""
 
     def __init__(self, description: CampaignDescription) -> None:
         self.description = description
@@ -49,9 +50,12 @@ class Cases:
 
     @cached_property
     def count(self) -> int | None:
+        """How many there are; None: without end. Raises `Misuse` where nothing says when to end."""
         description = self.description
         if description.runs is not None or description.time_ns is not None or description.until_failure:
             return description.runs
+        if description.design != "grid" and not any(one.levels for one in self.dimensions):
+            raise Misuse(f"campaign {description.name!r} has no end: give runs, time, until_failure or a grid")
         return self.grid
 
     @cached_property

@@ -91,11 +91,6 @@ class CampaignChecks:
                 )
             if head.get("design") == "grid" and not one.spread.levels:
                 toml.wrong((VARY, n), "D007", f"{one.name!r} has no few values, as a grid needs", "give choose, grid, or levels")
-        is_grid = head.get("design") == "grid" or any(isinstance(one.spread, Choice) and one.spread.is_grid for one in self._vary)
-        if not (is_grid or head.get("runs") or head.get("time_ns") or head.get("until_failure")):
-            toml.wrong((CAMPAIGN,), "D005", "[campaign]: runs is missing", "how many, or time, until_failure or a grid")
-        if head.get("design") == "latin-hypercube" and not head.get("runs"):
-            toml.wrong((CAMPAIGN, "design"), "D007", "a Latin hypercube needs the number of its points: give runs")
 
     # ------------------------------------------------------------------ in the world
 

@@ -153,10 +153,10 @@ def _progress(campaign: Campaign) -> Generator[Callable[[CampaignProgress], obje
         TimeRemainingColumn(),
     )
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(campaign.description.name, total=campaign.cases.count, more="")
+        task = bar.add_task(campaign.description.name, total=None, more="")
 
         def show_progress(progress: CampaignProgress) -> None:
-            bar.update(task, completed=progress.done, more=f"{progress.failed} failed, {progress.rate:.0f}/s")
+            bar.update(task, completed=progress.done, total=progress.total, more=f"{progress.failed} failed, {progress.rate:.0f}/s")
 
         yield show_progress
 
