@@ -156,7 +156,8 @@ def _progress(campaign: Campaign) -> Generator[Callable[[CampaignProgress], obje
         task = bar.add_task(campaign.description.name, total=None, more="")
 
         def show_progress(progress: CampaignProgress) -> None:
-            bar.update(task, completed=progress.done, total=progress.total, more=f"{progress.failed} failed, {progress.rate:.0f}/s")
+            more = f"{progress.failed} failed, {progress.rate:.0f}/s"
+            bar.update(task, completed=progress.done, total=progress.total, more=more)
 
         yield show_progress
 
