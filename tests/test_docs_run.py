@@ -17,6 +17,11 @@ NOT_RUN = {
         "runs this test",
     ],
     "docs/architecture.md": ["an excerpt"],
+    "docs/campaign-results.md": [
+        "names of files are those of failures; tests/campaign/test_findings.py does it",
+        "takes minutes; tests/campaign/test_faultmatrix.py does it",
+        "needs two campaigns; tests/campaign/report/test_report.py does it",
+    ],
     "docs/control.md": ["needs a running twin that listens on TCP"],
     "docs/devices.md": ["seeks a line that nothing switches", "needs a device, and goes on until Ctrl-C", "needs a device"],
     "docs/drivers.md": ["needs a device"],
