@@ -11,6 +11,7 @@ from typing import Any, cast
 from steptwin.errors import LineFailure
 from steptwin.gateways.contract import GatewaySubject
 from steptwin.gateways.points import CLOCK, State
+from steptwin.machine import Nanos
 from steptwin.subject import commands as command
 from steptwin.subject.following import USUAL, Filter
 
@@ -28,6 +29,8 @@ class Sample:
     machine: str
     state: State | None
     at: datetime
+    time: Nanos = 0
+    """The same moment by the clock of the subject, which may stand; 0 without an answer."""
 
 
 class Sampler:
@@ -48,7 +51,8 @@ class Sampler:
         if machine == CLOCK:
             return Sample(CLOCK, cast("State", (await self._subject.do(command.Time())).value), datetime.now(UTC))
         try:
-            state = cast("Mapping[str, Any]", (await self._subject.do(command.ReadState(machine))).value)
+            answer = await self._subject.do(command.ReadState(machine))
+            state = cast("Mapping[str, Any]", answer.value)
             registers = await self._read(machine)
         except LineFailure:
             return Sample(machine, None, datetime.now(UTC))
@@ -56,7 +60,7 @@ class Sampler:
             self._resting[machine] = 0
         else:
             self._resting.pop(machine, None)
-        return Sample(machine, {**state, "registers": registers}, datetime.now(UTC))
+        return Sample(machine, {**state, "registers": registers}, datetime.now(UTC), answer.time)
 
     async def _read(self, machine: str) -> Mapping[str, float | None]:
         names = self._registers.get(machine, ())

@@ -37,7 +37,7 @@ put("M1.TWV", 3)
 put("M1.TWR", 1)
 found["tweaked"] = [get("M1.RBV"), get("M1.TWR")]
 put("M1.DIR", "Neg")
-found["turned"] = [get("M1.RBV"), get("M1.DRBV")]
+found["turned"] = [get("M1.RBV"), get("M1.DRBV"), get("M1.OFF")]
 put("M1.DIR", "Pos")
 
 epics.caput(f"{PREFIX}M1.JOGF", 1)

@@ -72,7 +72,7 @@ def test_records_for_pyepics(tmp_path: Path) -> None:
         assert client("pyepics_records.py", points["epics"]["port"], "ST:table:") == {
             "moved": [20.0, 1, 0],
             "tweaked": [17.0, 0],
-            "turned": [-17.0, 17.0],
+            "turned": [17.0, 17.0, 34.0],
             "jogs": [1, True],
             "jogged": [0, True, True],
             "values": [1, 42.0, "ok", "imp", "ST:table:M1"],

@@ -122,6 +122,10 @@ class EpicsController:
         self._commands += 1
         self._leases.drop(owner)
 
+    def replace_jog(self, axis: int) -> None:
+        """Another command has taken the axis."""
+        self._leases.stopped(StopAxes(self.name, axis))
+
     async def _guarded(self, act: Callable[[], Awaitable[None]]) -> None:
         self._commands += 1
         self._on_their_way += 1

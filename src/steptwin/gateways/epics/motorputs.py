@@ -6,9 +6,11 @@ import math
 from collections.abc import Awaitable, Callable
 from typing import Protocol
 
-from steptwin.errors import Refusal
+from steptwin.errors import Misuse, Refusal
 from steptwin.gateways.epics.channels import FieldValue, Putter
 from steptwin.gateways.epics.motorfields import SET
+
+FIXED = "no command changes the position of the controller"
 
 
 class PutTarget(Protocol):
@@ -25,6 +27,8 @@ class PutTarget(Protocol):
     def set_position(self, user: float) -> None: ...
 
     def shift(self, offset: float) -> None: ...
+
+    def turn(self, direction: int) -> None: ...
 
     def limit(self, name: str, value: float) -> None: ...
 
@@ -56,9 +60,18 @@ async def _put_position(record: PutTarget, who: Putter, name: str, value: FieldV
         number *= float(record.values["MRES"])
         if math.isnan(number):
             raise Refusal("the step is not known")
-    user = number if name == "VAL" else record.user(number)
     if name == "RLV":
-        user = float(record.values["VAL"]) + number
+        await _take_position(record, who, float(record.values["VAL"]) + number)
+    elif name == "VAL":
+        await _take_position(record, who, number)
+    elif record.values["SET"] == SET:
+        raise Refusal(f"{name} with SET: {FIXED}")
+    else:
+        await record.move(who, record.user(number))
+
+
+async def _take_position(record: PutTarget, who: Putter, user: float) -> None:
+    """A field in the coordinates of the user is put: move, or with SET change OFF."""
     if record.values["SET"] == SET:
         record.check_setting(who)
         record.set_position(user)
@@ -69,13 +82,14 @@ async def _put_position(record: PutTarget, who: Putter, name: str, value: FieldV
 async def _put_tweak(record: PutTarget, who: Putter, name: str, value: FieldValue) -> None:
     if value:
         distance = float(record.values["TWV"]) * (1 if name == "TWF" else -1)
-        await record.move(who, float(record.values["VAL"]) + distance)
+        await _take_position(record, who, float(record.values["VAL"]) + distance)
 
 
 async def _put_button(record: PutTarget, who: Putter, name: str, value: FieldValue) -> None:
     if name in ("HOMF", "HOMR"):
-        if value:
-            await record.home(who, name)
+        if not value:
+            raise Misuse(f"{name}: 0: permitted is 1; STOP ends it")
+        await record.home(who, name)
     elif value:
         await record.jog(who, name)
     elif record.values[name]:
@@ -108,8 +122,7 @@ async def _put_offset(record: PutTarget, who: Putter, name: str, value: FieldVal
 
 async def _put_direction(record: PutTarget, who: Putter, name: str, value: FieldValue) -> None:
     record.check_setting(who)
-    record.values[name] = value
-    record.shift(float(record.values["OFF"]))
+    record.turn(int(value))
 
 
 async def _put_enable(record: PutTarget, who: Putter, name: str, value: FieldValue) -> None:

@@ -20,12 +20,17 @@ from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.gateways.epics.channels import LOST, NO_ALARM, NOT_KNOWN, FieldRow, FieldValue, Putter, RecordAlarm, RecordBase
 from steptwin.gateways.epics.controller import EpicsController
 from steptwin.gateways.epics.motorfields import FROZEN, GO, MOTOR_FIELDS, MOVE, PAUSE, STOP, StatusBit, first_values
-from steptwin.gateways.epics.motorputs import PUTS, put_setting
+from steptwin.gateways.epics.motorputs import FIXED, PUTS, put_setting
 from steptwin.gateways.sampling import Sample
+from steptwin.machine import SECOND, Nanos
 from steptwin.subject.commands import Enable, Home, Jog, Move, StopAxes
 from steptwin.subject.contract import MachinePart
 from steptwin.world.script import Write
 
+ON_ITS_WAY = SECOND // 2
+"""A motion that has not begun so long after its command does not begin any more."""
+BETWEEN = SECOND // 10
+"""The jog of a controller that only knows moves rests for less between two of them."""
 RELATIVE = 1e-6
 """Registers have numbers of 32 bits."""
 _ALARMS = {
@@ -46,6 +51,9 @@ class _Motion:
     is_paused: bool = False
     is_foreign: bool = False
     """It was begun by somebody else."""
+    has_begun: bool = False
+    """Whether it has been seen; a command can be on its way to the controller for a while."""
+    rests_since: Nanos | None = None
     waiting: list[asyncio.Future[None]] = field(default_factory=list)
 
     def end(self, error: SteptwinError | None = None) -> None:
@@ -176,13 +184,13 @@ class MotorRecord(RecordBase):
             self.alarm = LOST
             self.values["MSTA"] = int(self.values["MSTA"]) | StatusBit.COMM_ERROR
         else:
-            self._take(sample.state["axes"][self._index], is_sure=is_sure)
+            self._take(sample.state["axes"][self._index], sample.time, is_sure=is_sure)
         self._show_alarm()
         if self._motion is not None and self._jog is not None:
             await self._look_after_jog()
         await self.show()
 
-    def _take(self, state: Any, *, is_sure: bool) -> None:
+    def _take(self, state: Any, time: Nanos, *, is_sure: bool) -> None:
         code, level = state["status"]["code"], state["status"]["level"]
         dial = state["position"]
         self.alarm = _ALARMS[level] if dial is not None else NOT_KNOWN
@@ -212,15 +220,28 @@ class MotorRecord(RecordBase):
             return
         if self._motion is None:
             if moves:
-                self._motion = _Motion(is_foreign=True)
+                self._motion = _Motion(is_foreign=True, has_begun=True)
                 self.values |= {"DMOV": 0, "ATHM": 0}
             elif dial is not None and not self.values["DMOV"]:
                 self.values["DMOV"] = 1
             elif dial is not None and self._has_not_aimed:
                 self._has_not_aimed = False
                 self._aim(dial)
-        elif not moves:
+        elif moves:
+            self._motion.has_begun, self._motion.rests_since = True, None
+        elif self._is_over(self._motion, time, has_moved=dial is not None and dial != before):
             self._end(self._motion, state)
+
+    def _is_over(self, motion: _Motion, time: Nanos, *, has_moved: bool) -> bool:
+        """Of an axis that rests."""
+        if motion.rests_since is None:
+            motion.rests_since = time
+        if time >= motion.rests_since + (ON_ITS_WAY if self._jog is not None or not motion.has_begun else BETWEEN):
+            return True
+        if motion.button in ("JOGF", "JOGR"):
+            return False
+        is_there = motion.target is not None and abs(self._number("DRBV") - motion.target) <= self._number("RDBD")
+        return motion.has_begun or has_moved or is_there
 
     def _moves(self, state: Any) -> bool:
         """Whether the axis moves; of a device whose status has no text for it: unless it says that it rests."""
@@ -261,7 +282,7 @@ class MotorRecord(RecordBase):
         if self._jog is not None:
             self._jog = None
             self._controller.end_jog(self)
-        if motion.target is not None and self.values["SPMG"] == MOVE:
+        if not motion.is_foreign and self.values["SPMG"] == MOVE:
             self.values["SPMG"] = PAUSE
         self.values["DMOV"] = 1
         self._ramp = ()  # it may have been changed by others
@@ -285,7 +306,7 @@ class MotorRecord(RecordBase):
     async def _begin(self, motion: _Motion, act: Callable[[], Awaitable[None]]) -> asyncio.Future[None]:
         """Begin a motion; the result is there at its end. A motion that is being made becomes it: who waits for that waits for
         this."""
-        before, is_done = self._motion, self.values["DMOV"]
+        before, shown = self._motion, {name: self.values[name] for name in ("DMOV", "ATHM")}
         if motion.button is not None:
             self.values[motion.button] = 1
         self.values |= {"DMOV": 0, "ATHM": 0}
@@ -293,7 +314,7 @@ class MotorRecord(RecordBase):
         try:
             await act()
         except SteptwinError:
-            self.values["DMOV"] = is_done
+            self.values |= shown
             if motion.button is not None:
                 self.values[motion.button] = 0
             raise
@@ -301,8 +322,9 @@ class MotorRecord(RecordBase):
             motion.waiting = before.waiting
             if before.button is not None:
                 self.values[before.button] = 0
-        if motion.button not in ("JOGF", "JOGR"):
+        if self._jog is not None and motion.button not in ("JOGF", "JOGR"):
             self._jog = None
+            self._controller.replace_jog(self._axis.number)
         self._motion = motion
         over: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         motion.waiting.append(over)
@@ -344,8 +366,11 @@ class MotorRecord(RecordBase):
         await over
 
     async def home(self, who: Putter, button: str) -> None:
+        """In the direction of the button, in dial coordinates."""
         self._check_goes()
-        velocity = abs(self._number("HVEL")) * self._sign * (1 if button == "HOMF" else -1)
+        if self._motion is not None and self._motion.button in ("HOMF", "HOMR"):
+            raise Refusal(f"{self._place}: it is homing")
+        velocity = abs(self._number("HVEL")) * (1 if button == "HOMF" else -1)
         if not velocity:
             raise Misuse(f"{self._place}: HVEL is 0")
         wanted = Home(self._controller.name, self._axis.number, velocity)
@@ -369,7 +394,7 @@ class MotorRecord(RecordBase):
         await (await self._begin(_Motion(button=button), begin))
 
     def _check_goes(self) -> None:
-        if self.values["SPMG"] != GO:
+        if self.values["SPMG"] in (STOP, PAUSE):
             raise Refusal(f"{self._place}: SPMG is {MOTOR_FIELDS['SPMG'].states[int(self.values['SPMG'])]}")
 
     def _runs_out(self, velocity: float) -> bool:
@@ -423,6 +448,8 @@ class MotorRecord(RecordBase):
         motion, before = self._motion, self.values["SPMG"]
         self.values["SPMG"] = state
         if motion is None:
+            if state == STOP:
+                self._aim(self._number("DRBV"))
             return
         if state == PAUSE and motion.target is not None:
             if motion.is_paused:
@@ -464,7 +491,7 @@ class MotorRecord(RecordBase):
         if self._motion is not None:
             raise Refusal(f"{self._place}: it moves")
         if self.values["FOFF"] == FROZEN:
-            raise Refusal(f"{self._place}: OFF is frozen (FOFF), and no command changes the position of the controller")
+            raise Refusal(f"{self._place}: OFF is frozen (FOFF), and {FIXED}")
         self.shift(user - self._number("DRBV") * self._sign)
 
     def shift(self, offset: float) -> None:
@@ -474,6 +501,12 @@ class MotorRecord(RecordBase):
         self.values["RBV"] = self.user(dial)
         self._aim(self._number("DVAL") if self._motion is not None else dial)
         self._show_limits()
+
+    def turn(self, direction: int) -> None:
+        """DIR is put: VAL stays, by OFF, unless that is frozen."""
+        val = self._number("VAL")
+        self.values["DIR"] = direction
+        self.shift(self._number("OFF") if self.values["FOFF"] == FROZEN else val - self._number("DVAL") * self._sign)
 
     def limit(self, name: str, value: float) -> None:
         """One of HLM, LLM, DHLM, DLLM is put."""
