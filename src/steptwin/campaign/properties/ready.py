@@ -15,7 +15,7 @@ from steptwin.world.plant import Plant
 
 _NAMED = re.compile(r"\s*([A-Za-z]+(?:-[A-Za-z]+)+)\s*(?:=\s*)?(.*)\Z", re.DOTALL)
 _TIME = re.compile(r"(?:within\s+)?(\d+(?:\.\d+)?\s*(?:ns|us|ms|s|min|h))\b\s*(.*)\Z", re.DOTALL)
-_LATER = re.compile(r"(.*?)\s+within\s+(\d+(?:\.\d+)?\s*(?:ns|us|ms|s|min|h))\s*\Z", re.DOTALL)
+_LATER = re.compile(r"(?:(.*?)\s+)?within\s+(\d+(?:\.\d+)?\s*(?:ns|us|ms|s|min|h))\s*\Z", re.DOTALL)
 USUAL_TIME = "1 s"
 
 
@@ -42,7 +42,7 @@ def _no_collision(rest: str, world: Plant | None) -> str:
 
 def _no_lost_step(rest: str, world: Plant | None) -> str:
     later = _LATER.match(rest)
-    noticed, time = (later[1], later[2]) if later else (rest, USUAL_TIME)
+    noticed, time = (later[1] or "", later[2]) if later else (rest, USUAL_TIME)
     if world is None:
         return f"after any.lost != 0 within {time} ({noticed or 'any.noticed'})"
     if not world.axes:
@@ -73,7 +73,9 @@ def _stops(rest: str, world: Plant | None) -> str:
 
 def _returns(rest: str, world: Plant | None) -> str:
     later = _LATER.match(rest)
-    condition = _given("returns-to-safe", later[1] if later else rest, "the condition that is safe, such as table.OUT1 == 0")
+    condition = _given(
+        "returns-to-safe", later[1] or "" if later else rest, "the condition that is safe, such as table.OUT1 == 0"
+    )
     return f"eventually {f'within {later[2]} ' if later else ''}(always ({condition}))"
 
 
