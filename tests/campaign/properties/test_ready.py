@@ -1,4 +1,4 @@
-"""Ready properties on moving machines: each holds in a run, and a real mistake violates it at the moment that its physics gives."""
+"""Ready properties on moving machines: each holds in a run, and a real mistake violates it."""
 
 from __future__ import annotations
 
