@@ -12,6 +12,7 @@ from steptwin.campaign.campaign import Campaign
 from steptwin.campaign.case import Case, CaseResult, Verdict
 from steptwin.campaign.search.exhaustive import ExhaustiveCases
 from steptwin.campaign.search.guided import FARTHEST, GuidedSearch, distance
+from steptwin.campaign.variation import Choice, Varied
 from steptwin.errors import Misuse
 
 WORLD = """
@@ -97,7 +98,11 @@ def test_a_guided_search_needs_fewer_cases_than_chance(campaign: Campaign) -> No
     assert median(asked_until_found(campaign, seed) for seed in range(5)) < 0.69 / area / 2  # half of the median of chance
 
 
-def test_the_same_cases_for_the_same_results(campaign: Campaign) -> None:
+@pytest.mark.parametrize("values", [1, 2])  # that are continuous: estimators, evolution
+def test_the_same_cases_for_the_same_results(campaign: Campaign, values: int) -> None:
+    if values == 1:
+        fixed = Varied("b", False, Choice((0.27, 0.5)))
+        campaign = Campaign(replace(campaign.description, vary=(campaign.description.vary[0], fixed)))
     one, other = (GuidedSearch(campaign.cases) for _ in range(2))
     for _ in range(4):
         cases = one.ask()
