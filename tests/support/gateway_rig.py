@@ -15,7 +15,7 @@ from tests.conftest import STEPTWIN, until
 
 from steptwin import World
 from steptwin.errors import LineFailure
-from steptwin.gateways.contract import PastValues
+from steptwin.gateways.contract import CommandLog, PastValues
 from steptwin.subject import commands as command
 from steptwin.subject.contract import Description, Reading, Result
 from steptwin.subject.events import Event
@@ -32,6 +32,7 @@ class GatewayWorld:
         self.inner = WorldSubject(self.world)
         self.jogs = WorldJogs(self.inner)
         self.past: PastValues | None = None
+        self.audit: CommandLog | None = None
         self.silent: set[str] = set()
         self.done: list[command.Command] = []
 

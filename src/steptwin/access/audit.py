@@ -5,14 +5,22 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Protocol
 
-from steptwin.access.control import Viewer
+from steptwin.access.roles import Role
 from steptwin.machine import Nanos
 
 MOST_ENTRIES = 10_000
 LONGEST_FIELDS = 1000
 """Characters of the fields of an entry; of more the long values are left out."""
 LONGEST_VALUE = 200
+
+
+class Acting(Protocol):
+    """Who gives commands: a viewer of the studio, or a client of a gateway. As text: the name, and where it is."""
+
+    @property
+    def role(self) -> Role: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +54,7 @@ class Audit:
         self._clock = clock
         self._sink = sink
 
-    def add(self, viewer: Viewer, time: Nanos, do: str, fields: Mapping[str, object], outcome: str) -> None:
+    def add(self, viewer: Acting, time: Nanos, do: str, fields: Mapping[str, object], outcome: str) -> None:
         kept = fields if len(str(fields)) <= LONGEST_FIELDS else {name: _short(value) for name, value in fields.items()}
         entry = Entry(self._clock(), time, str(viewer), viewer.role.title, do, kept, outcome)
         self._entries.append(entry)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from steptwin.cli.worldoptions import ListenAny, ReadyFile
+from steptwin.cli.worldoptions import AuditInto, ListenAny, ReadyFile
 
 
 def bridge(
@@ -15,10 +15,11 @@ def bridge(
     *,
     listen_any: ListenAny = False,
     ready_file: ReadyFile = None,
+    audit: AuditInto = None,
 ) -> None:
     """Serve real devices to programs of a plant, by the gateways of a file, until Ctrl-C.
 
     It owns the lines of the devices: commands are sent in order, stops first, and nothing is repeated."""
     from steptwin.commands.bridge import bridge as serve_devices
 
-    serve_devices(file, listen_any=listen_any, ready_file=ready_file)
+    serve_devices(file, listen_any=listen_any, ready_file=ready_file, audit=audit)

@@ -13,7 +13,7 @@ import typer
 
 from steptwin.cli.optiongroups import grouped
 from steptwin.cli.pages import PageFormat, PageSection, show
-from steptwin.cli.worldoptions import Coverage, LiveOptions, ReadyFile, ShownOptions, WorldRunOptions, up_options
+from steptwin.cli.worldoptions import AuditInto, Coverage, LiveOptions, ReadyFile, ShownOptions, WorldRunOptions, up_options
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND
 
@@ -31,6 +31,7 @@ def up(
     past: Annotated[bool, typer.Option("--past", help="Keep the past, as far as memory permits, for 'steptwin why'.")] = False,
     coverage: Coverage = None,
     ready_file: ReadyFile = None,
+    audit: AuditInto = None,
     keys: Annotated[bool, typer.Option("--keys", help="Show all keys of a description.")] = False,
     form: Annotated[PageFormat, typer.Option("--format", help="How to print the keys.")] = PageFormat.TEXT,
     live: LiveOptions,
@@ -46,11 +47,14 @@ def up(
         return
     if world is None:
         raise Misuse("a world is missing: give its description (.toml) or a session (.json)")
+    from steptwin.commands.auditfile import audit_into
     from steptwin.commands.up_world import up as run_up
 
     wanted = replace(up_options(world, ready_file, live, options), past=past, coverage=tuple(coverage or ()))
     wanted = replace(wanted, names=tuple(shown.of or ()), kinds=tuple(shown.show or ()))
-    if not run_up(wanted):
+    with audit_into(audit) as log:
+        has_held = run_up(replace(wanted, audit=log))
+    if not has_held:
         raise typer.Exit(1)
 
 

@@ -21,6 +21,10 @@ Faults = Annotated[
 ]
 ReadyFile = Annotated[Path | None, typer.Option(help="JSON file with the end points, written when all of them are open.")]
 ListenAny = Annotated[bool, typer.Option("--listen-any", help="Permit addresses that other computers can reach.")]
+AuditInto = Annotated[
+    Path | None,
+    typer.Option("--audit", metavar="FILE", help="Append who gave which command by a gateway to a file of JSON lines."),
+]
 Coverage = Annotated[
     list[str] | None,
     typer.Option(

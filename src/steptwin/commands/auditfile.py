@@ -1,18 +1,35 @@
-"""The audit log of the studio in a file: lines of JSON. A file that is full is kept until the next one is."""
+"""The audit log in a file: lines of JSON. A file that is full is kept until the next one is."""
 
 from __future__ import annotations
 
 import json
 import os
+from collections.abc import Generator
+from contextlib import contextmanager
+from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
 from typing import Self, TextIO
 
-from steptwin.access.audit import Entry
+from steptwin.access.audit import Audit, Entry
 from steptwin.errors import Misuse
 from steptwin.system import reason
 
 MOST_BYTES = 8 << 20
+
+
+def wall_clock() -> str:
+    return datetime.now(UTC).isoformat(timespec="milliseconds")
+
+
+@contextmanager
+def audit_into(path: Path | None) -> Generator[Audit | None]:
+    """An audit log that is kept in a file; None without one. Raises `Misuse` where it cannot be written."""
+    if path is None:
+        yield None
+        return
+    with AuditFile(path) as file:
+        yield Audit(wall_clock, file.add)
 
 
 class AuditFile:

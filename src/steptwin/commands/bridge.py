@@ -8,14 +8,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from steptwin.commands.gateways import open_gateways
+from steptwin.access.audit import Audit
+from steptwin.commands.auditfile import audit_into
+from steptwin.commands.gateways import open_gateways, recording
 from steptwin.commands.keptsettings import keep_settings
 from steptwin.commands.without_world import serve_without_world
 from steptwin.devices.composite import CompositeSubject
 from steptwin.devices.connections import Computer, DeviceConnections
 from steptwin.devices.device import DeviceSurroundings
 from steptwin.eventloop import result_of
-from steptwin.gateways.contract import PastValues
+from steptwin.gateways.contract import CommandLog, PastValues
 from steptwin.gateways.devicefile import DeviceFile, read_device_file
 from steptwin.inputfiles import read_bytes
 from steptwin.later import start
@@ -31,18 +33,20 @@ from steptwin.textcodec import decode
 from steptwin.world.addresses import check_addresses
 
 
-def bridge(file: Path, *, listen_any: bool, ready_file: Path | None) -> None:
+def bridge(file: Path, *, listen_any: bool, ready_file: Path | None, audit: Path | None = None) -> None:
     """Serve the devices of ``file`` until SIGINT, SIGTERM or SIGHUP. Raises `SteptwinError` with a text for the user."""
     wanted = read_device_file(str(file), decode(read_bytes(file), str(file)).text)
     check_addresses([gateway.listen for gateway in wanted.gateways], listen_any=listen_any)
 
-    async def open_all(server: Server) -> None:
-        await _open(server, wanted, file, listen_any=listen_any)
+    with audit_into(audit) as log:
 
-    asyncio.run(serve_without_world(ready_file, open_all))
+        async def open_all(server: Server) -> None:
+            await _open(server, wanted, file, log, listen_any=listen_any)
+
+        asyncio.run(serve_without_world(ready_file, open_all))
 
 
-async def _open(server: Server, wanted: DeviceFile, file: Path, *, listen_any: bool) -> None:
+async def _open(server: Server, wanted: DeviceFile, file: Path, audit: Audit | None, *, listen_any: bool) -> None:
     begin = time.monotonic_ns()
 
     def now() -> Nanos:
@@ -59,6 +63,7 @@ async def _open(server: Server, wanted: DeviceFile, file: Path, *, listen_any: b
     for device in wanted.devices:
         await connections.open(device.address, device.name)
     devices = _Devices(wanted.name, subject)
+    devices.audit = recording(audit, now)
     await open_gateways(server, wanted.gateways, wanted.history, file.parent, devices, listen_any=listen_any)
 
 
@@ -71,6 +76,7 @@ class _Devices:
 
     def __init__(self, name: str, subject: CompositeSubject) -> None:
         self.past: PastValues | None = None
+        self.audit: CommandLog | None = None
         self._name = name
         self._subject = subject
 

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
+from steptwin.access.audit import Audit
 from steptwin.extras import libraries_of, missing
 from steptwin.gateways import make_gateway
-from steptwin.gateways.contract import GatewaySubject, PastValues
+from steptwin.gateways.contract import CommandLog, GatewaySubject, PastValues
 from steptwin.live.server import EndPoint, Server
 from steptwin.live.world import LiveWorld
 from steptwin.live.world_control import WorldControl
+from steptwin.machine import Nanos
 from steptwin.subject.commands import Command, Jog
 from steptwin.subject.contract import Description, Reading, Result
 from steptwin.subject.events import Event
@@ -28,6 +30,7 @@ class KeptSubject(GatewaySubject, Protocol):
     """A subject that gets its history."""
 
     past: PastValues | None
+    audit: CommandLog | None
 
 
 async def open_gateways(
@@ -60,11 +63,19 @@ def _make_keeper(spec: HistorySpec, subject: GatewaySubject, folder: Path) -> Hi
     return HistoryKeeper(spec, subject, folder)
 
 
+def recording(audit: Audit | None, now: Callable[[], Nanos]) -> CommandLog | None:
+    """What enters commands of gateways into ``audit``, at the moment that ``now`` gives."""
+    if audit is None:
+        return None
+    return lambda who, do, fields, outcome: audit.add(who, now(), do, fields, outcome)
+
+
 class LiveWorldSubject:
     """A live world for gateways: it answers at once."""
 
     def __init__(self, control: WorldControl, live: LiveWorld) -> None:
         self.past: PastValues | None = None
+        self.audit: CommandLog | None = None
         self._control = control
         self._live = live
 

@@ -14,7 +14,6 @@ import webbrowser
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from functools import partial
 from math import inf
 from pathlib import Path
@@ -24,7 +23,7 @@ from steptwin.access.audit import Audit
 from steptwin.access.origin import Origins
 from steptwin.access.roles import Role
 from steptwin.access.tokens import AccessGate, Token, read_tokens
-from steptwin.commands.auditfile import AuditFile
+from steptwin.commands.auditfile import AuditFile, wall_clock
 from steptwin.commands.demo import demo_world
 from steptwin.commands.keptsettings import keep_settings, state_directory
 from steptwin.commands.recorded import recorded
@@ -96,7 +95,7 @@ def studio(own: StudioOptions, options: UpOptions) -> bool:
     """
     entrance = _entrance(own)
     with ExitStack() as stack:
-        audit = Audit(_now) if own.audit is None else Audit(_now, stack.enter_context(AuditFile(own.audit)).add)
+        audit = Audit(wall_clock) if own.audit is None else Audit(wall_clock, stack.enter_context(AuditFile(own.audit)).add)
         listening = stack.enter_context(listen(entrance.address, is_fixed=own.http is not None))
         page = _Page(own, entrance, listening, audit)
         if own.view:
@@ -107,7 +106,7 @@ def studio(own: StudioOptions, options: UpOptions) -> bool:
             opening = partial(page.open, beside=options, history=history)
             return up_with(world, replace(options, speed="0", is_closed=True), opening)
         if options.world is not None:
-            return up(replace(options, keeps_inputs=True), partial(page.open, beside=options))
+            return up(replace(options, keeps_inputs=True, audit=audit), partial(page.open, beside=options))
         if own.devices:
             asyncio.run(serve_without_world(options.ready_file, page.open_without_world))
             return True
@@ -127,7 +126,7 @@ def studio_of_branch(start: BranchStart) -> None:
         World(blueprint, keep_trace=False, keep_inputs=False, at=start.snapshot) as world,
     ):
         send_away(world)
-        page = _Page(start.own, entrance, listening, Audit(_now))
+        page = _Page(start.own, entrance, listening, Audit(wall_clock))
         up_with(world, UpOptions(world=None, ready_file=start.ready_file, speed="0", is_closed=True), partial(page.open))
 
 
@@ -167,10 +166,6 @@ def _entrance(own: StudioOptions) -> _AccessInfo:
         roles = [] if is_local else [role for role in reversed(Role) if role <= own.highest]
         tokens = tuple(Token(role, role.title, secrets.token_urlsafe(24)) for role in roles)
     return _AccessInfo(address, tls, tokens, own.highest)
-
-
-def _now() -> str:
-    return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
 class _Page:

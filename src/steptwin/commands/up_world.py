@@ -13,7 +13,8 @@ from math import inf
 from pathlib import Path
 from typing import TypeAlias
 
-from steptwin.commands.gateways import LiveWorldSubject, open_gateways
+from steptwin.access.audit import Audit
+from steptwin.commands.gateways import LiveWorldSubject, open_gateways, recording
 from steptwin.errors import Misuse
 from steptwin.files import session as sessions
 from steptwin.files.beginning import begin_world, check_session_target, is_session, set_faults
@@ -81,6 +82,8 @@ class UpOptions:
     names: Sequence[str] = ()
     """What is shown: of these controllers, elements and lines only (`steptwin.world.records.Selection`)."""
     kinds: Sequence[str] = ()
+    audit: Audit | None = None
+    """Where commands of gateways are recorded."""
     allow_outside: bool = False
     """Files of the description may lie anywhere."""
     is_closed: bool = False
@@ -284,6 +287,7 @@ async def _open(server: Server, live: LiveWorld, pace: Pace, options: UpOptions,
     if not options.is_closed:
         folder = Path() if options.world is None else options.world.parent
         spec, subject = live.world.spec, LiveWorldSubject(control, live)
+        subject.audit = recording(options.audit, lambda: live.world.now)
         await open_gateways(server, spec.gateways, spec.history, folder, subject, listen_any=options.listen_any)
     if options.ready_file is not None:
         server.write_ready_file(options.ready_file)

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 from steptwin.access.commands import PERMITS
-from steptwin.access.roles import Role
-from steptwin.errors import Refusal
+from steptwin.access.roles import LOOK, Role
+from steptwin.errors import Refusal, SteptwinError
 from steptwin.gateways.contract import GatewaySubject
-from steptwin.subject.commands import Command, row_of
+from steptwin.subject.commands import Command, StopAxes, plain_command, row_of
 from steptwin.subject.contract import Result
+from steptwin.subject.dispatch import code_of
+
+
+def address_text(address: object) -> str:
+    """Of a socket: ``HOST:PORT``."""
+    return ":".join(map(str, address[:2])) if isinstance(address, tuple | list) else str(address)
 
 
 class NotPermitted(Refusal):
@@ -22,11 +30,32 @@ class GatewayClient:
 
     name: str
     role: Role
+    place: str = ""
+    """The protocol, and where it is as far as that is known."""
+
+    def __str__(self) -> str:
+        return f"{self.name} ({self.place})"
 
     async def do(self, subject: GatewaySubject, wanted: Command) -> Result:
         """Raises `NotPermitted`, `Misuse`, `Refusal` and `LineFailure`."""
-        self.check(wanted)
-        return await subject.do(wanted)
+        with self.noted(subject, wanted):
+            self.check(wanted)
+            return await subject.do(wanted)
+
+    @contextmanager
+    def noted(self, subject: GatewaySubject, wanted: Command) -> Generator[None]:
+        """Record a command in the audit log of ``subject``, with what becomes of it within. Who looks is not recorded."""
+        outcome = "internal"
+        try:
+            yield
+            outcome = "done"
+        except SteptwinError as error:
+            outcome = code_of(error)
+            raise
+        finally:
+            if subject.audit is not None and (isinstance(wanted, StopAxes) or PERMITS[row_of(wanted).name] != LOOK):
+                fields = plain_command(wanted)
+                subject.audit(self, str(fields.pop("do")), fields, outcome)
 
     def check(self, wanted: Command) -> None:
         """Raises `NotPermitted`."""

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from datetime import datetime
 from typing import NamedTuple, Protocol
 
+from steptwin.access.audit import Acting
 from steptwin.subject.commands import Command, Jog
 from steptwin.subject.contract import Description, Reading, Result
 from steptwin.subject.events import Event
@@ -18,6 +19,12 @@ class PastValue(NamedTuple):
 
     at: datetime
     value: float | str | None
+
+
+class CommandLog(Protocol):
+    """The audit log (`steptwin.access.audit`) at the present moment of a subject."""
+
+    def __call__(self, who: Acting, do: str, fields: Mapping[str, object], outcome: str, /) -> None: ...
 
 
 class PastValues(Protocol):
@@ -37,6 +44,11 @@ class GatewaySubject(Protocol):
     @property
     def past(self) -> PastValues | None:
         """None where no history is kept."""
+        ...
+
+    @property
+    def audit(self) -> CommandLog | None:
+        """None where commands are not recorded."""
         ...
 
     @property

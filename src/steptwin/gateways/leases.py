@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+from contextlib import nullcontext
 from dataclasses import dataclass
 
 from steptwin.errors import Misuse, Refusal, SteptwinError
+from steptwin.gateways.clients import GatewayClient
 from steptwin.gateways.contract import GatewaySubject
 from steptwin.machine import SECOND
 from steptwin.subject.commands import Jog, StopAxes
@@ -33,8 +35,18 @@ class JogLeases:
         self._subject = subject
         self._leases: dict[tuple[str, int], _Lease] = {}
 
-    async def jog(self, owner: object, wanted: Jog, lease_s: float) -> None:
-        """Jog for a time from now on; the same jog of the same ``owner`` goes on. Raises `Misuse`, `Refusal`, `LineFailure`."""
+    async def jog(self, owner: object, client: GatewayClient, wanted: Jog, lease_s: float) -> None:
+        """Jog for a time from now on; the same jog of the same ``owner`` goes on, and is in the audit log once.
+
+        Raises `Misuse`, `Refusal`, `LineFailure`.
+        """
+        lease = self._leases.get((wanted.machine, wanted.axis))
+        is_new = lease is None or lease.held.over is not None or lease.owner is not owner or lease.wanted != wanted
+        with client.noted(self._subject, wanted) if is_new else nullcontext():
+            client.check(wanted)
+            await self._jog(owner, wanted, lease_s)
+
+    async def _jog(self, owner: object, wanted: Jog, lease_s: float) -> None:
         if not LEASE_S[0] <= lease_s <= LEASE_S[1]:
             raise Misuse(f"lease = {lease_s:g} s: permitted are {LEASE_S[0]:g} to {LEASE_S[1]:g} s")
         place = wanted.machine, wanted.axis

@@ -33,7 +33,7 @@ from steptwin.studio.watches import Watched
 from steptwin.subject import commands as command
 from steptwin.subject.commands import Command, read_command
 from steptwin.subject.contract import Result
-from steptwin.subject.dispatch import LONGEST_REQUEST, Message, answer, failure, fields_of, id_of, read_message
+from steptwin.subject.dispatch import LONGEST_REQUEST, Message, answer, code_of, failure, fields_of, id_of, read_message
 from steptwin.subject.following import Filter, filter_of
 from steptwin.tables import complete
 
@@ -221,7 +221,7 @@ class ViewerSession:
         try:
             result = await self._permitted(wanted, permit, identity)
         except Exception as error:
-            self._audit(wanted, permit, _outcome(error))
+            self._audit(wanted, permit, code_of(error))
             raise
         self._audit(wanted, permit, "done")
         return result
@@ -463,8 +463,3 @@ class ViewerSession:
         }
         text = json.dumps(whole, separators=(",", ":"))
         return f'{{"seq":0,"hello":{text[:-1]},"description":{hub.description}}}}}'
-
-
-def _outcome(error: Exception) -> str:
-    code = failure(error)["error"]
-    return str(code["code"]) if isinstance(code, dict) else "internal"

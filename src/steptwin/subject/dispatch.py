@@ -92,12 +92,15 @@ def answer(result: Result) -> Message:
 
 def failure(error: Exception) -> Message:
     """An error as a value. ``code``: misuse, refusal, failure (the line or the peer), internal."""
+    code = code_of(error)
     if isinstance(error, SteptwinError):
-        return {"error": {"code": _code(error), "message": str(error)}}
-    return {"error": {"code": "internal", "message": f"internal error, please report it: {type(error).__name__}: {error}"}}
+        return {"error": {"code": code, "message": str(error)}}
+    return {"error": {"code": code, "message": f"internal error, please report it: {type(error).__name__}: {error}"}}
 
 
-def _code(error: SteptwinError) -> str:
+def code_of(error: Exception) -> str:
+    if not isinstance(error, SteptwinError):
+        return "internal"
     return "misuse" if isinstance(error, Misuse) else "refusal" if isinstance(error, Refusal) else "failure"
 
 

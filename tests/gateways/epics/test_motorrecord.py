@@ -585,3 +585,19 @@ def test_an_axis_of_an_m1486() -> None:
         assert val == rbv
 
     check(act, CHIP)
+
+
+def test_commands_are_in_the_audit_log() -> None:
+    async def act(rig: Rig) -> None:
+        found: list[tuple[object, ...]] = []
+        rig.world.audit = lambda who, do, fields, outcome: found.append((str(who), do, outcome))
+        await rig.put("VAL", 5.0)
+        await rig.refused("VAL", 1e9, Misuse, "permitted")
+        jog = await rig.begin("JOGF", 1, OTHER)
+        await rig.until(lambda: float(rig.get("RBV")[0]) > 60.0)
+        await rig.put("JOGF", 0, OTHER)
+        await rig.over(jog)
+        me, other = "me@here (EPICS, 127.0.0.1:1)", "other@there (EPICS, 127.0.0.1:2)"
+        assert found == [(me, "move", "done"), (me, "move", "misuse"), (other, "jog", "done")]
+
+    check(act)

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from gateway_rig import GatewayWorld
 
+from steptwin.access.audit import Audit
 from steptwin.errors import Misuse
 from steptwin.gateways.mqtt.jsoncommands import REPEATED_S, Doorkeeper, JsonCommands, JsonRequest
 from steptwin.world.description import read_world
@@ -39,6 +40,35 @@ class Rig:
 
 
 ENABLE = {"do": "enable", "machine": "table", "axis": 1}
+
+
+def test_commands_are_in_the_audit_log(tmp_path: Path) -> None:
+    """Each that was given, with its outcome; a jog once; who looks not."""
+    rig = Rig(tmp_path, 'tokens = "tokens"')
+    audit = Audit(lambda: "2026-01-01T00:00:00.000+00:00")
+    rig.world.audit = lambda who, do, fields, outcome: audit.add(who, 5, do, fields, outcome)
+    rig.ask({**ENABLE, "token": OPERATOR})
+    rig.ask(ENABLE)
+    rig.ask({"do": "state", "machine": "table"})
+    rig.ask({"do": "move", "machine": "table", "axis": 9, "to": 1, "token": OPERATOR})
+    rig.ask({"do": "stop", "machine": "table"})
+
+    async def jog() -> None:
+        request = {"do": "jog", "machine": "table", "axis": 1, "velocity": 5.0, "lease_s": 1.0, "token": OPERATOR}
+        for _ in range(3):
+            await rig.commands.answer(JsonRequest(json.dumps(request).encode(), is_retained=False, sender=("me",)))
+        rig.commands.lost()
+
+    asyncio.run(jog())
+    found = [(one.viewer, one.role, one.do, one.outcome) for one in audit.last(100)]
+    assert found == [
+        ("press (MQTT)", "operator", "enable", "done"),
+        ("a client without token (MQTT)", "viewer", "enable", "refusal"),
+        ("press (MQTT)", "operator", "move", "misuse"),
+        ("a client without token (MQTT)", "viewer", "stop", "done"),
+        ("press (MQTT)", "operator", "jog", "done"),
+    ]
+    assert audit.last(100)[0].fields == {"machine": "table", "axis": 1}
 
 
 def enabled(rig: Rig) -> list[object]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import socket
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -43,7 +44,7 @@ def test_a_device_is_driven_lost_and_found(require_peer: Callable[[str], str], t
             return client("call", object=AXIS, method=f"ns=2;s=types.Axis.{method}", given=[value])
 
         with running(tmp_path, *device):
-            points = stack.enter_context(running(tmp_path, "bridge", "cell.toml"))
+            points = stack.enter_context(running(tmp_path, "bridge", "cell.toml", "--audit", "audit"))
             client("connect", url=points["opcua"]["url"], folder=str(tmp_path / "client"))
             assert call("Enable", {"type": "boolean", "value": True}) == "Good"
             assert call("MoveTo", {"type": "double", "value": 40}) == "Good"
@@ -58,3 +59,11 @@ def test_a_device_is_driven_lost_and_found(require_peer: Callable[[str], str], t
             assert (read("position"), read("velocity"), read("enabled")) == ((0.0, "Good"), (0.0, "Good"), (False, "Good"))
             assert call("MoveTo", {"type": "double", "value": 5}) == "BadInvalidState", "its drive is off now"
             client("close")
+    entries = [json.loads(line) for line in (tmp_path / "audit").read_text().splitlines()]
+    assert all(entry["viewer"].startswith("anonymous (OPC UA, 127.0.0.1:") for entry in entries)
+    assert [(entry["do"], entry["fields"].get("to"), entry["outcome"]) for entry in entries] == [
+        ("enable", None, "done"),
+        ("move", 40.0, "done"),
+        ("move", 80.0, "failure"),
+        ("move", 5.0, "refusal"),
+    ]

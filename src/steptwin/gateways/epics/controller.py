@@ -8,7 +8,7 @@ from typing import Protocol
 
 from steptwin.access.commands import PERMITS
 from steptwin.access.roles import Role
-from steptwin.gateways.clients import GatewayClient
+from steptwin.gateways.clients import GatewayClient, address_text
 from steptwin.gateways.contract import GatewaySubject
 from steptwin.gateways.epics.channels import Putter
 from steptwin.gateways.leases import LEASE_S, JogLeases
@@ -95,7 +95,7 @@ class EpicsController:
     # ------------------------------------------------------------------ commands
 
     def client(self, who: Putter) -> GatewayClient:
-        return GatewayClient(f"{who.user}@{who.host}", self._role)
+        return GatewayClient(f"{who.user}@{who.host}", self._role, f"EPICS, {address_text(who.circuit)}")
 
     def check_may_change(self, who: Putter) -> None:
         """Settings of records are for those who move. Raises `NotPermitted`."""
@@ -115,8 +115,7 @@ class EpicsController:
     async def jog(self, owner: object, who: Putter, wanted: Jog) -> None:
         """Begin it, or let it go on. Raises `SteptwinError`."""
         client = self.client(who)
-        client.check(wanted)
-        await self._guarded(lambda: self._leases.jog(owner, wanted, JOG_LEASE_S))
+        await self._guarded(lambda: self._leases.jog(owner, client, wanted, JOG_LEASE_S))
 
     def end_jog(self, owner: object) -> None:
         self._commands += 1

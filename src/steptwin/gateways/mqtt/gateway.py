@@ -6,6 +6,7 @@ import asyncio
 import os
 import ssl
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from steptwin.errors import Misuse
@@ -68,7 +69,7 @@ class MqttGateway:
             rows_of(self._subject.description, registers),
             self._subject,
             self._sampler,
-            door.anybody,
+            replace(door.anybody, place="MQTT, Sparkplug B"),
             interval=self._spec.interval,
             store=self._spec.store,
         )

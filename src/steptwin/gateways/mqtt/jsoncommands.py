@@ -28,6 +28,8 @@ COMMANDS = (
     "clear_fault",
 )
 """Those of the control endpoint that are taken here: no files, no debugger."""
+PROTOCOL = "MQTT"
+"""The broker does not tell where its clients are."""
 TOKEN, LEASE = "token", "lease_s"
 """Members of a request besides those of the command; a jog needs a lease."""
 REPEATED_S = 60.0
@@ -45,7 +47,7 @@ class Doorkeeper:
             text = decode(read_bytes(folder / spec.tokens), spec.tokens).text
             self._gate = AccessGate(read_tokens(text, spec.tokens))
         open_to = Role.ENGINEER if is_local and spec.tokens is None else Role.VIEWER
-        self.anybody = GatewayClient("a client without token", open_to if spec.role is None else ROLES[spec.role])
+        self.anybody = GatewayClient("a client without token", open_to if spec.role is None else ROLES[spec.role], PROTOCOL)
 
     def admit(self, token: object) -> GatewayClient:
         """Raises `Refusal` for a token that is wrong."""
@@ -54,7 +56,7 @@ class Doorkeeper:
         if self._gate is None or not isinstance(token, str):
             raise Refusal("wrong token")
         role, name = self._gate.enter(token or " ")
-        return GatewayClient(name or "", role)
+        return GatewayClient(name or "", role, PROTOCOL)
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,8 +113,7 @@ class JsonCommands:
         if isinstance(wanted, Jog):
             if isinstance(lease, bool) or not isinstance(lease, int | float):
                 raise Misuse(f"a jog needs {LEASE}: how long it goes on unless it is repeated, in s")
-            client.check(wanted)
-            await self._leases.jog(client.name, wanted, float(lease))
+            await self._leases.jog(client.name, client, wanted, float(lease))
             return Result(None, 0, 0)
         if lease is not None:
             raise Misuse(f"{LEASE} is for a jog only")

@@ -120,8 +120,7 @@ class NodeService:
         own = [value for value, argument in zip(values, row.arguments, strict=True) if argument.of]
         wanted = row.make(bound.part.name, bound.axis, *own)
         if isinstance(wanted, Jog):
-            client.check(wanted)
-            await self._leases.jog(session, wanted, values[-1])
+            await self._leases.jog(session, client, wanted, values[-1])
             return
         await client.do(self._subject, wanted)
         if isinstance(wanted, StopAxes):

@@ -13,7 +13,7 @@ from asyncua.server.internal_session import InternalSession
 
 from steptwin.access.roles import Role
 from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
-from steptwin.gateways.clients import GatewayClient, NotPermitted
+from steptwin.gateways.clients import GatewayClient, NotPermitted, address_text
 from steptwin.gateways.opcua.nodetypes import status
 
 CODES: tuple[tuple[type[SteptwinError], int], ...] = (
@@ -92,7 +92,8 @@ class GatewaySession(InternalSession):
 
     @property
     def _client(self) -> GatewayClient:
-        return self.user.client if isinstance(self.user, GatewayUser) else NOBODY
+        client = self.user.client if isinstance(self.user, GatewayUser) else NOBODY
+        return replace(client, place=f"OPC UA, {address_text(self.name)}")
 
     async def read(self, params: ua.ReadParameters) -> list[ua.DataValue]:
         await self._service.refresh(one.NodeId for one in params.NodesToRead if one.AttributeId == ua.AttributeIds.Value)
