@@ -125,6 +125,25 @@ def test_expectations_of_scripts_need_not_count(tmp_path: Path) -> None:
     assert Campaign.load(campaign_file(tmp_path, text)).run().failed == 0
 
 
+@pytest.mark.parametrize("counts", [True, False])
+def test_a_request_that_is_lost_on_the_line_fails_the_run(tmp_path: Path, counts: bool) -> None:
+    world = WORLD.replace('name = "table"', 'name = "table"\nline = "bus"', 1) + '[[line]]\nname = "bus"\nkind = "modbus"\n'
+    world = world.replace('name = "go"', 'name = "go"\nat = "10 ms"')  # after the fault
+    text = f"""
+[campaign]
+world = "world.toml"
+runs = 1
+end = "20 s"
+expectations = {str(counts).lower()}
+[[fault]]
+do = "no-answer line=bus"
+"""
+    result = Campaign.load(campaign_file(tmp_path, text, world)).run_case(0)
+    assert result.failed is counts
+    why = [one.why for one in result.verdicts if one.name == "waits of the scripts"]
+    assert why == (["go waited in vain for an answer on bus"] if counts else [])
+
+
 def test_nothing_can_happen_before_the_end_of_a_common_beginning(tmp_path: Path) -> None:
     branched = Campaign.load(campaign_file(tmp_path, COMMON))
     result = branched.run_case(branched.cases.made(0, 1, {"t": 0.3}, []))

@@ -14,6 +14,8 @@ VariedValue: TypeAlias = float | int | str | bool
 DIGEST_BYTES = 16
 EXPECTATIONS = "expectations of the scripts"
 """The name of the verdict on a run whose scripts expected something in vain."""
+WAITS = "waits of the scripts"
+"""The name of the verdict on a run whose scripts waited for a condition or an answer in vain."""
 
 
 @dataclass(frozen=True, slots=True)

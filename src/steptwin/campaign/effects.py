@@ -6,7 +6,7 @@ import enum
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from steptwin.campaign.case import EXPECTATIONS, CaseResult, Verdict
+from steptwin.campaign.case import EXPECTATIONS, WAITS, CaseResult, Verdict
 from steptwin.campaign.description import MatrixRules
 from steptwin.files.world import World
 from steptwin.machine import SECOND, Nanos
@@ -113,6 +113,7 @@ def _effect(facts: RunFacts, nominal: RunFacts, product: frozenset[str]) -> tupl
     for name in _failed(nominal.result):
         wrong.pop(name, None)
     expected = wrong.pop(EXPECTATIONS, None)
+    wrong.pop(WAITS, None)  # that something was missing is judged by what became of it, below
     unsafe = [verdict for name, verdict in wrong.items() if name not in product]
     if unsafe:
         return FaultEffect.UNSAFE, "; ".join(_said(verdict) for verdict in unsafe)

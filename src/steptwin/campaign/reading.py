@@ -111,7 +111,7 @@ ROWS: Mapping[str, TableRows] = {
             optional(word(*SEARCHES), "search", "how cases are chosen", SEARCHES[0]),
             optional(_condition, "until", "a condition that ends a run earlier"),
             optional(positive_time, "start", "the end of the beginning that all runs have in common", attribute="start_ns"),
-            optional(flag, "expectations", "whether a run fails where a script expects something in vain", True),
+            optional(flag, "expectations", "whether a run fails where a script expects or waits for something in vain", True),
             optional(text_value, "database", "of the results: postgresql://HOST/NAME; default a file beside the results"),
         ),
     ),

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
-from steptwin.campaign.case import EXPECTATIONS, Case, CaseResult, Verdict
+from steptwin.campaign.case import EXPECTATIONS, WAITS, Case, CaseResult, Verdict
 from steptwin.campaign.description import CampaignDescription, Measure
 from steptwin.campaign.properties import WatchState, read_property
 from steptwin.coverage.counts import Coverage
@@ -152,6 +152,9 @@ class CaseRunner:
         if len(world.failures) and self.description.expectations:
             first = world.failures[0]
             verdicts.append(Verdict(EXPECTATIONS, False, -1.0, first.time, str(first.value)))
+        if len(world.overdue) and self.description.expectations:
+            late = world.overdue[0]
+            verdicts.append(Verdict(WAITS, False, -1.0, late.time, str(late.value)))
         return CaseResult(case.number, tuple(verdicts), world.trace.digest(), world.now, measured)
 
 

@@ -13,7 +13,7 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
 from functools import partial
 from typing import NamedTuple, TypeAlias, TypeVar
 
-from steptwin.campaign.case import EXPECTATIONS, Case, CaseResult, FaultAt, VariedValue
+from steptwin.campaign.case import EXPECTATIONS, WAITS, Case, CaseResult, FaultAt, VariedValue
 
 T = TypeVar("T")
 
@@ -130,7 +130,7 @@ class _Shrinker:
 
     def _is_same(self, result: CaseResult) -> bool:
         found = failures_of(result)
-        if self.failure.property in {ERROR, EXPECTATIONS}:
+        if self.failure.property in {ERROR, EXPECTATIONS, WAITS}:
             return self.failure in found
         return self.failure.property in [one.property for one in found]
 
