@@ -159,6 +159,16 @@ def _controllers(items: list[pytest.Item]) -> set[str]:
 
 
 @pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
+    """A test that passes fails where a property of its twins is violated at its end."""
+    result = yield
+    violated = [line for rig in item.stash.get(_rigs, {}).values() for line in rig.violated()]
+    if violated:
+        pytest.fail("\n".join(violated), pytrace=False)
+    return result
+
+
+@pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:

@@ -33,6 +33,8 @@ from steptwin.world.trace import TraceRecord
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
+    from steptwin.campaign.case import Verdict
+
 T = TypeVar("T")
 D = TypeVar("D", bound="DataclassInstance")
 
@@ -79,6 +81,7 @@ class Rig:
         self._device = device
         self._directory = directory
         self._shown: deque[object] = deque(maxlen=MOST_SHOWN)
+        self._verdicts: list[Callable[[], Verdict]] = []
 
     @property
     def time(self) -> float:
@@ -105,6 +108,30 @@ class Rig:
         if isinstance(self._time, WallTime):
             self.twin_only("later()")
         self._time.later(seconds, act)
+
+    def must_hold(self, text: str, name: str = "") -> Callable[[], Verdict]:
+        """Watch a property (`steptwin.campaign.properties`) from now on; the test fails if it is violated at its end.
+
+        What is returned gives the verdict so far, with its robustness. Raises `Misuse`. The twin's.
+        """
+        __tracebackhide__ = True
+        from steptwin.campaign.properties import read_property
+
+        watch = self._in_world(lambda world: read_property(text, name).watch(world))
+
+        def verdict() -> Verdict:
+            return self._in_world(lambda _: watch.verdict())
+
+        self._verdicts.append(verdict)
+        return verdict
+
+    def violated(self) -> list[str]:
+        """Which of `must_hold` are violated, and why; each is a line."""
+        said = [verdict() for verdict in self._verdicts]
+        return [f"property violated: {one.name}: {one.why}" for one in said if not one.holds]
+
+    def _in_world(self, act: Callable[[World], T]) -> T:
+        raise NotImplementedError
 
     def log(self) -> str:
         """The last frames and events, one in a line."""
@@ -192,6 +219,10 @@ class LineRig(Rig):
                 live.stale = True
 
         return self._at_present(at)
+
+    def _in_world(self, act: Callable[[World], T]) -> T:
+        __tracebackhide__ = True
+        return self._on("must_hold()", act)
 
     def _place(self, link: str, kind: str) -> Port:
         """A place on its line for one more program."""

@@ -198,6 +198,10 @@ class WorldRig(Rig):
 
         return self._at_present(at)
 
+    def _in_world(self, act: Callable[[World], T]) -> T:
+        __tracebackhide__ = True
+        return self.call(act)
+
     def axis(self, name: str) -> WorldAxis:
         """Where the load of an axis really is. The twin's."""
         __tracebackhide__ = True
