@@ -64,7 +64,7 @@ class Rig:
             rows,
             self.world,
             Sampler(self.world, {}),
-            GatewayClient("anybody", Role.ENGINEER),
+            GatewayClient("anybody", Role.ENGINEER, "MQTT, Sparkplug B"),
             interval=round(INTERVAL_S * 1000) * MILLISECOND,
             store=store,
         )
@@ -298,6 +298,8 @@ def test_a_command_by_name_or_alias_and_none_that_is_retained() -> None:
         rig = Rig()
         await rig.tick()
         await rig.connect()
+        noted: list[tuple[str, ...]] = []
+        rig.world.audit = lambda who, do, fields, outcome: noted.append((str(who), do, outcome))
         enable = SparkplugMetric(name="M1/Commands/Enable", type=SparkplugType.BOOLEAN, value=True)
         by_alias = SparkplugMetric(alias=rig.aliases["M2/Commands/Enable"], type=None, value=None)
         rig.message("spBv1.0/plant/DCMD/hall/table", encode_payload(SparkplugPayload(metrics=(enable,))), retained=True)
@@ -308,6 +310,7 @@ def test_a_command_by_name_or_alias_and_none_that_is_retained() -> None:
         rig.message("spBv1.0/plant/DCMD/hall/table", encode_payload(SparkplugPayload(metrics=(enable, by_alias))))
         await rig.tick()
         assert [one for one in rig.world.done if isinstance(one, command.Enable)] == [command.Enable("table", 1)]
+        assert noted == [("anybody (MQTT, Sparkplug B)", "enable", "done")]
         assert "None: expected true or false" in str(rig.metrics("Commands/Result")[-1].value)
         return rig
 
