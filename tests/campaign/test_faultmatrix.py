@@ -131,6 +131,20 @@ def test_table_page_and_json(press: tuple[FaultMatrix, Path]) -> None:
     assert matrix.coverage.summary.statements > 0
 
 
+def test_a_property_in_time_tells_what_is_unsafe(tmp_path: Path) -> None:
+    """The hand breaks the curtain in the stroke; a welded contact keeps the valve open for longer than the relay needs."""
+    guarded = '[[property]]\nname = "guarded"\nnever = "(curtain.pressed and valve.out) for 20 ms"\n'
+    matrix = matrix_of("press", tmp_path, f'end = "12 s"\n[matrix]\nphases = 2\n{guarded}')
+    cells = [(row.possible.text, cell.judgement) for row in matrix.rows for cell in row.cells]
+    found = [(fault, judged.effect) for fault, judged in cells if "guarded" in judged.why]
+    assert {fault for fault, _ in found} == {
+        "welded-contact element=safety",
+        "stuck-output element=safety output=no level=1",
+        "stuck-output element=valve output=out level=1",
+    }
+    assert {effect for _, effect in found} == {FaultEffect.UNSAFE}
+
+
 def test_the_labeller_by_hand(tmp_path: Path) -> None:
     matrix = matrix_of("labeller", tmp_path, 'end = "70 s"\n[matrix]\nalarm = "cell.OUT3"\n', jobs=2)
     # No mark comes: the alarm after one and a half labels.
