@@ -192,6 +192,11 @@ element = "clamp"
 from_s = 0.35
 until_s = 0.9
 [[fault]]
+kind = "empty-feeder"
+element = "belt"
+from_s = 0.2
+until_s = 0.5
+[[fault]]
 kind = "burnt-out"
 element = "busy"
 from_s = 0.4

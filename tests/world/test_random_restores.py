@@ -92,7 +92,10 @@ PARTS = (
         "[[supply]]\nname = 'p'\nfeeds = 'c'\nrise = '20 ms'\n"
         "[[fault]]\nkind = 'brown-out'\nelement = 'p'\nfrom_s = 0.9\nuntil_s = 1.0\n"
     ),
-    "[[conveyor]]\nname = 'w'\nlength = 200\naxis = 'y'\nfeed_every = '300 ms'\n[[conveyor.sensor]]\nat = 60\nto = 'c.IN4'\n",
+    (
+        "[[conveyor]]\nname = 'w'\nlength = 200\naxis = 'y'\nfeed_every = '300 ms'\n[[conveyor.sensor]]\nat = 60\nto = 'c.IN4'\n"
+        "[[fault]]\nkind = 'empty-feeder'\nelement = 'w'\nfrom_s = 0.5\nuntil_s = 1.3\n"
+    ),
     "[[cylinder]]\nname = 'z'\nextend = 'c.OUT1'\n[[cylinder.switch]]\nabove = 40\nto = 'c.IN5'\n",
     (
         "[[timer]]\nname = 'd'\ninput = 'c.OUT1'\nkind = 'on-delay'\ntime = '70 ms'\n"

@@ -42,6 +42,8 @@ export const MEANINGS: Readonly<Record<string, string>> = {
   "A cylinder stands where it is.": "Siłownik stoi tam, gdzie jest.",
   "A conveyor with a speed stands, although it is switched on.":
     "Przenośnik o podanej prędkości stoi, choć jest włączony.",
+  "The feeder of a conveyor is empty or blocked: no workpieces come onto it.":
+    "Podajnik przenośnika jest pusty lub zablokowany: nie przychodzą na niego detale.",
   "A suction cup does not hold a vacuum.": "Przyssawka nie trzyma podciśnienia.",
   "A brake has only a share of its torque.": "Hamulec ma tylko część momentu.",
   "A brake does not let go.": "Hamulec nie zwalnia.",

@@ -215,6 +215,54 @@ def test_a_belt_whose_drive_fails_stands() -> None:
         World.from_toml(ON_AN_AXIS).fault("belt-stop element=belt")
 
 
+def test_an_empty_feeder_puts_nothing_on_and_goes_on_with_the_next() -> None:
+    world = World.from_toml(TEXT.replace("workpiece", 'feed_every = "400 ms"\nworkpiece'))
+    world.mic488["a"].write("OUT1", 1)
+    world.fault("empty-feeder element=belt from_s=0.5 until_s=1.5")
+    world.run(until="belt.missed == 1", for_=10)
+    assert world.now == 800 * MILLISECOND
+    world.press("feeder", "10 ms")
+    world.run(until=2.1)
+    # Due at 800 and 1200 ms, and the button: the belt is free, so that each is missed only through the fault.
+    assert [time for time, _ in happened(world)] == [400, 1600, 2000]
+    assert [world.read(f"belt.{name}") for name in ("fed", "missed")] == [3, 3]
+    assert edges(world, "belt.feeder_stands") == [(500, 1), (1500, 0)]
+
+
+def test_a_workpiece_before_a_button_is_missed_where_another_one_lies() -> None:
+    world = World.from_toml(TEXT)
+    for _ in range(3):
+        world.press("feeder", "10 ms")
+        world.run(for_=0.1)
+    assert [world.read(f"belt.{name}") for name in ("fed", "missed")] == [1, 2]
+
+
+def test_an_empty_feeder_takes_nothing_from_the_conveyor_before() -> None:
+    second = '[[conveyor]]\nname = "second"\nlength = 50.0\nspeed = 100.0\nworkpiece = 40.0\n'
+    world = World.from_toml(TEXT.replace("workpiece = 40.0", 'workpiece = 40.0\nnext = "second"') + second)
+    world.mic488["a"].write("OUT1", 1)
+    world.press("feeder", "10 ms")
+    world.fault("empty-feeder element=second")
+    world.run(until=4.0)
+    assert [world.read(f"second.{name}") for name in ("count", "fed", "missed")] == [1, 0, 0]
+
+
+@pytest.mark.parametrize("moment_s", [0.6, 0.8, 1.3, 1.5])
+def test_snapshots_have_an_empty_feeder(moment_s: float) -> None:
+    text = TEXT.replace("workpiece", 'feed_every = "400 ms"\nworkpiece')
+    text += '[[fault]]\nkind = "empty-feeder"\nelement = "belt"\nfrom_s = 0.5\nuntil_s = 1.5\n'
+    world = World.from_toml(text)
+    world.mic488["a"].write("OUT1", 1)
+    world.run(until=moment_s)
+    snapshot = world.snapshot()
+    world.run(until=5.0)
+    other = World.from_toml(text)
+    other.restore(snapshot)
+    other.run(until=5.0)
+    assert other.trace.digest() == world.trace.digest()
+    assert other.read("belt.missed") == world.read("belt.missed") == 2
+
+
 @pytest.mark.parametrize("moment_s", [0.0, 0.3, 1.0, 2.41, 2.9])
 def test_snapshots_have_it(moment_s: float) -> None:
     text = TEXT.replace("workpiece", 'feed_every = "700 ms"\nworkpiece')

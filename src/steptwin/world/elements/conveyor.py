@@ -38,6 +38,8 @@ from steptwin.world.tomlplaces import Path
 from steptwin.world.values import INPUT_PIN, OUTPUT_PIN, NameOf, number, positive_time
 
 RUN, FEED = "RUN", "FEED"
+FEEDER_STANDS = "feeder_stands"
+"""Edges ``CONVEYOR.feeder_stands`` that a fault records."""
 MOST_PLACES = 24
 """Limit of the workpieces of a conveyor whose places are signals."""
 PICOMETRES = 10**9
@@ -132,9 +134,11 @@ class Conveyor(BoardPart):
         "delivered",
         "drive",
         "fed",
+        "feeder_stands",
         "following",
         "is_stopped",
         "load",
+        "missed",
         "per_mm",
         "spec",
     )
@@ -165,8 +169,12 @@ class Conveyor(BoardPart):
         """How many workpieces it was fed with."""
         self.delivered = 0
         """How many have left at its end."""
+        self.missed = 0
+        """How many did not come when they should: the beginning was occupied, or the feeder stood."""
         self.is_stopped = False
         """Fault: its own drive does not move it."""
+        self.feeder_stands = False
+        """Fault: no workpieces come onto it, but those of a conveyor before it."""
         self._is_fed = False
         self._next_feed = spec.feed_every
         self._due: Nanos | None = None
@@ -208,7 +216,9 @@ class Conveyor(BoardPart):
 
     def _feed(self, now: Nanos) -> None:
         """Put a workpiece at the beginning, where there is room for it."""
-        if self.load.covering(0, self.drive.place(now)) is not None:
+        if self.feeder_stands or self.load.covering(0, self.drive.place(now)) is not None:
+            self.missed += 1
+            self.board.kernel.mark(self.board.name)
             return
         self.fed += 1
         self.put(f"{self.spec.name}.{self.fed}", 0.0, self.places(self.spec.workpiece), now)
@@ -314,6 +324,14 @@ def _stop(active: ActiveFault, conveyor: Conveyor, begins: bool, now: Nanos) -> 
     return f"the drive of {conveyor.spec.name} {'fails' if begins else 'is repaired'}"
 
 
+def _stop_feeder(active: ActiveFault, conveyor: Conveyor, begins: bool, now: Nanos) -> str:
+    conveyor.feeder_stands = begins
+    kernel, name = conveyor.board.kernel, conveyor.spec.name
+    kernel.report(kernel.owner(name), "edge", f"{name}.{FEEDER_STANDS}", float(begins))
+    kernel.mark(name)
+    return f"the feeder of {name} {'stands' if begins else 'works again'}"
+
+
 def _make(spec: ConveyorSpec, site: Site) -> Conveyor:
     board = site.board(spec.name)
     if spec.axis is None:
@@ -401,6 +419,7 @@ def _signals(conveyor: Conveyor) -> Mapping[str, SignalOf]:
         "count": SignalOf(source, lambda now: float(len(conveyor.load.pieces))),
         "fed": SignalOf(source, lambda now: float(conveyor.fed)),
         "delivered": SignalOf(source, lambda now: float(conveyor.delivered)),
+        "missed": SignalOf(source, lambda now: float(conveyor.missed)),
     }
 
 
@@ -430,6 +449,13 @@ CONVEYOR = with_terminals(
             "A conveyor with a speed stands, although it is switched on.",
             effect=ElementEffect(_stop),
             check=_check_stop,
+        ),
+        FaultKind(
+            "empty-feeder",
+            Layer.ELEMENT,
+            Occasion.ALWAYS,
+            "The feeder of a conveyor is empty or blocked: no workpieces come onto it.",
+            effect=ElementEffect(_stop_feeder),
         ),
     ),
     inner=Inner(
