@@ -141,6 +141,9 @@ def test_every_kind_of_fault_says_what_it_takes() -> None:
             "required": False,
         },
     ]
+    assert found["slipping-coupling"]["elements"] == ["shaft"]
+    assert {"gate", "relay", "supply"} <= set(found["stuck-output"]["elements"])
+    assert stuck["elements"] == []
     (nth,) = (one for one in found["crc"]["parameters"] if one["name"] == "nth")
     assert nth["default"] == "each time"
     assert next(one for one in found["flip"]["parameters"] if one["name"] == "direction")["words"] == ["in", "out"]

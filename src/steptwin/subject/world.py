@@ -23,6 +23,7 @@ from steptwin.wire.frameline import FrameLine
 from steptwin.world import script as steps
 from steptwin.world.actions import Download, ExternalInput, See
 from steptwin.world.control import ControllerCommand, Jog
+from steptwin.world.elements import failing
 from steptwin.world.faults.kinds import rows
 from steptwin.world.heldjog import HeldJog
 from steptwin.world.kinds import line_kinds
@@ -72,7 +73,7 @@ class WorldSubject:
             command.ReadState: self._state,
             command.Encoders: self._encoders,
             command.ListFaults: lambda _: self._faults(),
-            command.ListFaultKinds: lambda _: [kind.plain() for kind in rows()],
+            command.ListFaultKinds: lambda _: [{**kind.plain(), "elements": list(failing(kind))} for kind in rows()],
             command.Time: lambda _: self.time(),
             command.TakeSnapshot: lambda wanted: self.snapshots.add(wanted, self.world.snapshot()),
             command.ListSnapshots: lambda _: self.snapshots.plain(),
