@@ -17,9 +17,10 @@ from caproto import AlarmSeverity, AlarmStatus
 from steptwin.controllerstate import StatusLevel
 from steptwin.datasheet import AxisDescription, Condition, Limits
 from steptwin.errors import Misuse, Refusal, SteptwinError
-from steptwin.gateways.epics.channels import LOST, NO_ALARM, NOT_KNOWN, FieldRow, FieldValue, Putter, RecordAlarm, RecordBase
+from steptwin.gateways.epics.channels import LOST, NO_ALARM, NOT_KNOWN, FieldRow, FieldValue, Putter, RecordAlarm
 from steptwin.gateways.epics.controller import EpicsController
-from steptwin.gateways.epics.motorfields import FROZEN, GO, MOTOR_FIELDS, MOVE, PAUSE, STOP, StatusBit, first_values
+from steptwin.gateways.epics.motorcoordinates import MotorCoordinates
+from steptwin.gateways.epics.motorfields import FROZEN, GO, MOTOR_FIELDS, MOVE, PAUSE, STOP, StatusBit
 from steptwin.gateways.epics.motorputs import FIXED, PUTS, put_setting
 from steptwin.gateways.sampling import Sample
 from steptwin.machine import SECOND, Nanos
@@ -65,7 +66,7 @@ class _Motion:
                     one.set_exception(error)
 
 
-class MotorRecord(RecordBase):
+class MotorRecord(MotorCoordinates):
     """The record ``name`` of an axis of ``part``. Satisfies `Record` and `SampledRecord`."""
 
     def __init__(self, name: str, part: MachinePart, axis: AxisDescription, controller: EpicsController) -> None:
@@ -85,7 +86,6 @@ class MotorRecord(RecordBase):
         self._has_not_aimed = True
         """Before the first sample VAL is not known."""
         self._ramp: tuple[float, ...] = ()
-        self.values = first_values()
         step = math.nan if axis.pulses_per_unit is None else 1.0 / axis.pulses_per_unit
         texts = {"NAME": name[:39], "DESC": self._place[:39], "OUT": self._place[:39], "EGU": axis.unit[:15]}
         self.values |= {"MRES": step, "ERES": step, "UREV": 200 * step, **texts}
@@ -118,9 +118,6 @@ class MotorRecord(RecordBase):
     def value(self, name: str) -> FieldValue:
         return self.values[name]
 
-    def _number(self, name: str) -> float:
-        return float(self.values[name])
-
     async def refresh(self) -> None:
         await self._controller.refresh()
         if not self._ramp:
@@ -142,35 +139,6 @@ class MotorRecord(RecordBase):
         for name in ("JVEL", "HVEL"):
             self.values[name] = min(self._number(name) or velocity, velocity)
         await self.show()
-
-    # ------------------------------------------------------------------ coordinates
-
-    @property
-    def _sign(self) -> int:
-        return -1 if self.values["DIR"] else 1
-
-    def user(self, dial: float) -> float:
-        return dial * self._sign + self._number("OFF")
-
-    def _dial(self, user: float) -> float:
-        return (user - self._number("OFF")) * self._sign
-
-    def _steps(self, dial: float) -> int:
-        """0 where the step is not known."""
-        step = self._number("MRES")
-        return 0 if math.isnan(step) else max(-(2**31), min(2**31 - 1, round(dial / step)))
-
-    def _aim(self, dial: float) -> None:
-        self.values |= {"DVAL": dial, "VAL": self.user(dial), "RVAL": self._steps(dial), "DIFF": dial - self._number("DRBV")}
-
-    def _show_limits(self) -> None:
-        """HLM and LLM from those of the dial."""
-        ends = sorted((self.user(self._number("DLLM")), self.user(self._number("DHLM"))))
-        self.values |= {"LLM": ends[0], "HLM": ends[1]}
-
-    def _is_outside(self, dial: float) -> bool:
-        low, high = self._number("DLLM"), self._number("DHLM")
-        return not (low == high == 0.0) and not low <= dial <= high
 
     # ------------------------------------------------------------------ samples
 
@@ -493,29 +461,6 @@ class MotorRecord(RecordBase):
         if self.values["FOFF"] == FROZEN:
             raise Refusal(f"{self._place}: OFF is frozen (FOFF), and {FIXED}")
         self.shift(user - self._number("DRBV") * self._sign)
-
-    def shift(self, offset: float) -> None:
-        """OFF is put."""
-        self.values["OFF"] = offset
-        dial = self._number("DRBV")
-        self.values["RBV"] = self.user(dial)
-        self._aim(self._number("DVAL") if self._motion is not None else dial)
-        self._show_limits()
-
-    def turn(self, direction: int) -> None:
-        """DIR is put: VAL stays, by OFF, unless that is frozen."""
-        val = self._number("VAL")
-        self.values["DIR"] = direction
-        self.shift(self._number("OFF") if self.values["FOFF"] == FROZEN else val - self._number("DVAL") * self._sign)
-
-    def limit(self, name: str, value: float) -> None:
-        """One of HLM, LLM, DHLM, DLLM is put."""
-        if name in ("HLM", "LLM"):
-            is_high = (name == "HLM") is (self._sign > 0)
-            name, value = ("DHLM" if is_high else "DLLM"), self._dial(value)
-        self.values[name] = value
-        self._show_limits()
-        self.values["LVIO"] = int(self._is_outside(self._number("DVAL")))
 
     async def enable(self, who: Putter, *, on: bool) -> None:
         if "enable" not in self._taken:
