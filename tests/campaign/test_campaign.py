@@ -208,6 +208,30 @@ def test_a_campaign_that_was_killed_goes_on(tmp_path: Path) -> None:
     assert summary.plain() == few.run().plain()
 
 
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="processes are found in /proc")
+def test_an_interrupt_is_for_the_first_process_alone_also_while_the_others_begin(tmp_path: Path) -> None:
+    """Ctrl-C on a terminal goes to all of them."""
+    path = campaign_file(tmp_path, CAMPAIGN.replace("runs = 40", "runs = 3000"))
+    out = tmp_path / "out"
+    command = [sys.executable, "-m", "steptwin", "campaign", "run", str(path), "--jobs", "2", "--out", str(out)]
+    running = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    children = Path(f"/proc/{running.pid}/task/{running.pid}/children")
+
+    def has_results() -> bool:
+        for child in children.read_text().split():
+            os.kill(int(child), signal.SIGINT)
+        return _stored(out) > 5
+
+    try:
+        until(has_results, "some results", 100.0)
+        running.send_signal(signal.SIGINT)
+        _, errors = running.communicate(timeout=100)
+    finally:
+        running.kill()
+        running.wait()
+    assert (running.returncode, errors) == (130, "")
+
+
 def _stored(out: Path) -> int:
     """How many cases have results; it only looks, so that it is in nobody's way."""
     try:

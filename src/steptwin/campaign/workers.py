@@ -85,10 +85,25 @@ def _end_with(parent: Any) -> None:
     os._exit(1)
 
 
+@contextmanager
+def _without_interrupts() -> Generator[None]:
+    """Processes that begin meanwhile never see Ctrl-C, also before `_begin`. Only the main thread can change that."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
 def _pool(jobs: int) -> Executor:
     pool = ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), initializer=_begin)
     try:
-        pool.submit(os.getpid).result()
+        with _without_interrupts():
+            begun = [pool.submit(os.getpid) for _ in range(jobs)]
+        begun[0].result()
     except BrokenExecutor:
         raise Misuse(
             "the processes of the campaign end as they begin: a script that runs one with jobs needs "
