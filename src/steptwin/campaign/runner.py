@@ -22,7 +22,7 @@ from steptwin.world.description import read_world
 from steptwin.world.faults import read as read_fault
 from steptwin.world.overrides import Overrides
 from steptwin.world.pieces import given_files
-from steptwin.world.plant import PlantSnapshot
+from steptwin.world.plantsnapshot import PlantSnapshot
 from steptwin.world.reader import TomlText
 from steptwin.world.references import check_step
 from steptwin.world.steptable import STEPS, read_steps

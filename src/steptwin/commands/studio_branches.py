@@ -17,7 +17,7 @@ from steptwin.live.cell import Cell
 from steptwin.live.lookback import Lookback
 from steptwin.live.world import LiveWorld
 from steptwin.machine import MILLISECOND, Nanos
-from steptwin.world.plant import PlantSnapshot
+from steptwin.world.plantsnapshot import PlantSnapshot
 from steptwin.world.trace import Mark
 
 if TYPE_CHECKING:

@@ -13,6 +13,7 @@ from typing import Any, TypeAlias
 
 from steptwin.dap.arguments import data_point, label_point, line_points
 from steptwin.dap.attach import AttachedTwin
+from steptwin.dap.capabilities import CAPABILITIES
 from steptwin.dap.launch import Launch, open_world, read_launch
 from steptwin.dap.sources import Sources, texts_of
 from steptwin.dap.target import Target
@@ -37,26 +38,6 @@ DATA_ACCESS = "write"
 """Reading a value changes nothing, and is not noticed."""
 FRAMES = 1000
 """Frames of a thread, at most: a frame has the number of its thread times this, and its depth."""
-_STOPS_USUALLY = (Events.PROGRAM_ERROR, Events.WRONG_DATA)
-CAPABILITIES: _Body = {
-    "supportsConfigurationDoneRequest": True,
-    "supportsFunctionBreakpoints": True,
-    "supportsConditionalBreakpoints": True,
-    "supportsHitConditionalBreakpoints": True,
-    "supportsLogPoints": True,
-    "supportsDataBreakpoints": True,
-    "supportsEvaluateForHovers": True,
-    "supportsStepBack": True,
-    "supportsSetVariable": True,
-    "supportsSetExpression": True,
-    "supportsRestartRequest": True,
-    "supportsTerminateRequest": True,
-    "supportsLoadedSourcesRequest": True,
-    "supportsBreakpointLocationsRequest": True,
-    "exceptionBreakpointFilters": [
-        {"filter": event.code, "label": event.title, "default": event in _STOPS_USUALLY} for event in Events
-    ],
-}
 _REASONS: Mapping[StopReason, str] = {
     StopReason.ENTRY: "entry",
     StopReason.STEP: "step",

@@ -25,7 +25,8 @@ from steptwin.why.answer import Answer
 from steptwin.why.kept import PastQuestions
 from steptwin.world.actions import ExternalInput
 from steptwin.world.history import History, outside_past
-from steptwin.world.plant import Plant, PlantSnapshot
+from steptwin.world.plant import Plant
+from steptwin.world.plantsnapshot import PlantSnapshot
 from steptwin.world.programs import Place, Programs
 
 T = TypeVar("T")

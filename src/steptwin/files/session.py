@@ -28,7 +28,7 @@ from steptwin.world.faults import Fault, parse
 from steptwin.world.history import replay
 from steptwin.world.overrides import Overrides
 from steptwin.world.pieces import given_files
-from steptwin.world.plant import RecordedInput
+from steptwin.world.plantsnapshot import RecordedInput
 
 FORMAT = 1
 LONGEST_NUMBER = 100

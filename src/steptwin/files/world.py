@@ -34,7 +34,8 @@ from steptwin.world.kinds.m1486.view import M1486View
 from steptwin.world.kinds.mic488.view import Mic488View
 from steptwin.world.overrides import NO_OVERRIDES, Overrides
 from steptwin.world.pieces import given_files
-from steptwin.world.plant import Plant, PlantSnapshot
+from steptwin.world.plant import Plant
+from steptwin.world.plantsnapshot import PlantSnapshot
 from steptwin.world.running import Script
 from steptwin.world.spec import WorldSpec
 from steptwin.world.views import LineView, MechanicsView, Views

@@ -29,7 +29,8 @@ from steptwin.subject.dispatch import Action
 from steptwin.subject.payloads import BreakpointsPayload, LogPayload, StoppedPayload
 from steptwin.tables import complete
 from steptwin.world.actions import Download
-from steptwin.world.plant import WORLD, PlantSnapshot, RecordedInput
+from steptwin.world.plant import WORLD
+from steptwin.world.plantsnapshot import PlantSnapshot, RecordedInput
 
 _EVENTS = complete("event", command.EVENTS, "codes", {event.code: event for event in Events})
 

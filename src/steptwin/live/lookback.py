@@ -18,7 +18,7 @@ from steptwin.machine import Nanos
 from steptwin.subject.following import EventBatch, Filter
 from steptwin.subject.world import WorldSubject
 from steptwin.world.history import History, Past
-from steptwin.world.plant import PlantSnapshot
+from steptwin.world.plantsnapshot import PlantSnapshot
 from steptwin.world.programtexts import WorldPrograms
 
 STATE_S = 1.0

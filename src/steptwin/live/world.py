@@ -20,7 +20,7 @@ from steptwin.world.history import History
 from steptwin.world.kernel import Kernel
 from steptwin.world.kinds import line_kinds
 from steptwin.world.lines import LineEndPoint
-from steptwin.world.plant import PlantSnapshot
+from steptwin.world.plantsnapshot import PlantSnapshot
 from steptwin.world.turns import Dues
 
 MOST_INPUTS = 200_000

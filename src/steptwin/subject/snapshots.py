@@ -7,7 +7,7 @@ from itertools import count
 from steptwin.errors import Misuse
 from steptwin.nearmiss import NearMiss
 from steptwin.subject.commands import DropSnapshot, RestoreSnapshot, TakeSnapshot
-from steptwin.world.plant import PlantSnapshot
+from steptwin.world.plantsnapshot import PlantSnapshot
 
 MOST_SNAPSHOTS = 32
 

@@ -29,7 +29,8 @@ from steptwin.world.heldjog import HeldJog
 from steptwin.world.kinds import line_kinds
 from steptwin.world.lines import LineWords
 from steptwin.world.motions import ordered
-from steptwin.world.plant import WORLD, Plant, PlantSnapshot
+from steptwin.world.plant import WORLD, Plant
+from steptwin.world.plantsnapshot import PlantSnapshot
 from steptwin.world.programs import StatementFollower
 from steptwin.world.trace import TraceRecord
 

@@ -13,7 +13,8 @@ from steptwin.machine import SECOND, Nanos
 from steptwin.why.log import in_parts
 from steptwin.why.states import Interval
 from steptwin.world import script as do
-from steptwin.world.plant import Plant, RecordedInput
+from steptwin.world.plant import Plant
+from steptwin.world.plantsnapshot import RecordedInput
 
 MOST_REMEMBERED = 200_000
 """Values after which all are forgotten before the next question."""

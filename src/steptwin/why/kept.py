@@ -12,7 +12,8 @@ from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.why.question import Asking, Why
 from steptwin.world.history import History, outside_past
-from steptwin.world.plant import Plant, PlantSnapshot
+from steptwin.world.plant import Plant
+from steptwin.world.plantsnapshot import PlantSnapshot
 
 FIRST_SPAN_NS: Nanos = 5 * SECOND
 """So much of the past is looked at first, and `FURTHER` times as much where the causes are older."""

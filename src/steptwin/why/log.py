@@ -18,7 +18,8 @@ from steptwin.why import points
 from steptwin.world.actions import Download, ExternalInput
 from steptwin.world.elements import ELEMENTS
 from steptwin.world.history import SLICE_NS, replay
-from steptwin.world.plant import Plant, RecordedInput
+from steptwin.world.plant import Plant
+from steptwin.world.plantsnapshot import RecordedInput
 from steptwin.world.programs import Place, Programs
 from steptwin.world.trace import TraceRecord
 

@@ -19,7 +19,8 @@ from steptwin.why.states import Interval, StatesOnTheWay
 from steptwin.world.condition import Signal, SignalCondition
 from steptwin.world.expression import parse_condition
 from steptwin.world.history import outside_past
-from steptwin.world.plant import Plant, RecordedInput
+from steptwin.world.plant import Plant
+from steptwin.world.plantsnapshot import RecordedInput
 from steptwin.world.programs import Resource, ResourceKind
 
 MOST_STATES = 5

@@ -17,7 +17,8 @@ from steptwin.durations import duration_text
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.world.actions import size_of
-from steptwin.world.plant import Plant, PlantSnapshot, RecordedInput
+from steptwin.world.plant import Plant
+from steptwin.world.plantsnapshot import PlantSnapshot, RecordedInput
 
 MOST_STATES = 256
 MOST_CONTROLLER_STATES = 4096

@@ -8,11 +8,10 @@ kernels are advanced.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import groupby
 from operator import itemgetter
-from typing import Any, NamedTuple
+from typing import Any
 
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse, Runaway, TimeReversal
@@ -26,60 +25,30 @@ from steptwin.world.condition import SignalCondition
 from steptwin.world.contacts import Button
 from steptwin.world.elements.axis import BuiltAxis
 from steptwin.world.faults import Fault
-from steptwin.world.kernel import Kernel, KernelState
+from steptwin.world.kernel import Kernel
 from steptwin.world.kind import AnyKind, EncoderInputs, NamedRegisters, NewValues, Vision, lacks
 from steptwin.world.lines import Line
 from steptwin.world.names import Unknown
 from steptwin.world.observing import WorldObserver
 from steptwin.world.overrides import Overrides
 from steptwin.world.parts import WorldParts
+from steptwin.world.plantsnapshot import PlantSnapshot, RecordedInput
 from steptwin.world.programs import Programs
 from steptwin.world.programtexts import GivenFiles
 from steptwin.world.references import check_faults, check_scripts, check_step
-from steptwin.world.reports import Reports, ReportsState
+from steptwin.world.reports import Reports
 from steptwin.world.rigging import Rigging
 from steptwin.world.running import Script
-from steptwin.world.scripts import MOST_STEPS_PER_INSTANT, Scripts, ScriptsState
+from steptwin.world.scripts import MOST_STEPS_PER_INSTANT, Scripts
 from steptwin.world.signals import Idle, SignalOf, find_signal
 from steptwin.world.spec import ScriptSpec
-from steptwin.world.trace import Mark, Trace, TraceRecord
+from steptwin.world.trace import Trace, TraceRecord
 
 WORLD = "world"
 """The machine name in records that belong to no machine."""
 
 MOST_REMEMBERED = 10_000
 """Size limit of each cache of requests, signals and conditions, which scripts use repeatedly."""
-
-
-class RecordedInput(NamedTuple):
-    """An external input and its moment. ``settled``: the scripts of the description had already run at that moment."""
-
-    time: Nanos
-    what: ExternalInput
-    settled: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class PlantSnapshot:
-    """The complete state of a world at a moment."""
-
-    description: tuple[str, int, Overrides, FileContents]
-    now: Nanos
-    kernels: tuple[KernelState, ...]
-    faults: tuple[tuple[Fault, str, Nanos], ...]
-    """The faults that were set, with their names and moments."""
-    rigged: tuple[str, ...]
-    """The machines that were prepared for faults."""
-    faults_state: Any
-    scripts: ScriptsState
-    inputs: tuple[RecordedInput, ...]
-    is_settled: bool
-    failures: ReportsState
-    overdue: ReportsState
-    trace: Mark
-    scheduled: frozenset[str]
-    """Names of the scheduled steps that can still be cancelled."""
-    downloaded: tuple[tuple[tuple[str, str], SourceText], ...]
 
 
 class Plant:
