@@ -2,122 +2,21 @@
 
 from __future__ import annotations
 
-import asyncio
-from collections.abc import Callable, Coroutine, Mapping
+from collections.abc import Mapping
 
 import pytest
-from gateway_rig import GatewayWorld
-from virtual_loop import run_virtually
+from motorrecord_rig import CHIP, ME, OTHER, TABLE, MotorRig, check
 
 from steptwin.access.roles import Role
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.gateways.clients import NotPermitted
-from steptwin.gateways.epics.channels import LOST, NO_ALARM, FieldValue, Putter
-from steptwin.gateways.epics.controller import EpicsController
+from steptwin.gateways.epics.channels import LOST, NO_ALARM, FieldValue
 from steptwin.gateways.epics.motorfields import StatusBit
-from steptwin.gateways.epics.motorrecord import MotorRecord
-from steptwin.gateways.leases import JogLeases
-from steptwin.gateways.sampling import Sampler
-from steptwin.machine import MILLISECOND
-from steptwin.subject.commands import Advance, Enable, Move, StopAxes
-
-ME = Putter("me", "here", ("127.0.0.1", 1))
-OTHER = Putter("other", "there", ("127.0.0.1", 2))
-TABLE = """
-[[mic488]]
-name = "table"
-[mic488.M1]
-unit = "mm"
-gear = 100.0
-vel = 50.0
-acc = 100.0
-dec = 100.0
-in_kl = "IN1"
-in_kr = "IN2"
-home_mode = "HOME1"
-limit_mode = "KL+KR"
-[[axis]]
-name = "x"
-drive = "table.M1"
-pitch = 32.0
-travel = [-60.0, 60.0]
-start = 20.0
-[[axis.switch]]
-below = 0.0
-to = "table.IN1"
-[[axis.switch]]
-above = 55.0
-to = "table.IN2"
-"""
-"""x stands 20 mm above the switch KL; its position begins with 0."""
-PLAIN = '[[mic488]]\nname = "table"\n[mic488.M1]\nunit = "mm"\ngear = 100.0\nvel = 50.0\nacc = 100.0\ndec = 100.0\n'
-CHIP = '[[m1486]]\nname = "feed"\nline = "bus"\n[[line]]\nname = "bus"\nkind = "m1486"\n'
-STEP_NS = 20 * MILLISECOND
-LONGEST_S = 60.0
-
-
-class Rig:
-    """The record of the first axis; its world goes on while somebody waits."""
-
-    def __init__(self, text: str, role: Role) -> None:
-        self.world = GatewayWorld(text)
-        part = self.world.description.machines[0]
-        self.leases = JogLeases(self.world)
-        self.controller = EpicsController(part.name, self.world, Sampler(self.world, {}), self.leases, role)
-        self.record = MotorRecord("ST:x", part, part.datasheet.axes[0], self.controller)
-        self.controller.records.append(self.record)
-
-    def get(self, *names: str) -> list[FieldValue]:
-        return [self.record.value(name) for name in names]
-
-    async def tick(self) -> None:
-        await asyncio.sleep(STEP_NS / 1e9)
-        self.world.inner.do(Advance(duration=STEP_NS))
-        self.world.jogs.advance(self.world.world.now)
-        await self.controller.refresh()
-
-    async def until(self, is_there: Callable[[], bool]) -> None:
-        for _ in range(round(LONGEST_S * 1e9 / STEP_NS)):
-            if is_there():
-                return
-            await self.tick()
-        raise AssertionError(self.record.values)
-
-    async def begin(self, name: str, value: FieldValue, who: Putter = ME) -> asyncio.Task[None]:
-        """A put that is waited for elsewhere."""
-        put = asyncio.create_task(self.record.put(who, name, value))
-        await self.tick()
-        return put
-
-    async def over(self, put: asyncio.Task[None]) -> None:
-        await self.until(put.done)
-        await put
-
-    async def put(self, name: str, value: FieldValue, who: Putter = ME) -> None:
-        await self.over(await self.begin(name, value, who))
-
-    async def refused(self, name: str, value: FieldValue, kind: type[SteptwinError], text: str, who: Putter = ME) -> None:
-        with pytest.raises(kind, match=text):
-            await self.put(name, value, who)
-
-    async def stands(self) -> None:
-        await self.until(lambda: self.get("DMOV", "MOVN") == [1, 0])
-
-
-def check(act: Callable[[Rig], Coroutine[None, None, None]], text: str = PLAIN, role: Role = Role.ENGINEER) -> None:
-    async def run() -> None:
-        rig = Rig(text, role)
-        await rig.record.refresh()
-        if role is Role.ENGINEER and "mic488" in text:
-            await rig.put("CNEN", 1)
-        await act(rig)
-        rig.leases.close()
-
-    run_virtually(run())
+from steptwin.subject.commands import Enable, Move, StopAxes
 
 
 def test_a_put_is_over_with_the_motion() -> None:
-    async def act(rig: Rig) -> None:
+    async def act(rig: MotorRig) -> None:
         put = await rig.begin("VAL", 30.0)
         assert rig.get("VAL", "DMOV", "MOVN") == [30.0, 0, 1]
         assert not put.done()
@@ -128,7 +27,7 @@ def test_a_put_is_over_with_the_motion() -> None:
 
 
 def test_dmov_is_0_even_for_a_move_to_where_it_stands() -> None:
-    async def act(rig: Rig) -> None:
+    async def act(rig: MotorRig) -> None:
         shown: list[FieldValue] = []
         show = rig.record.show
 
@@ -149,7 +48,7 @@ def test_dmov_is_0_even_for_a_move_to_where_it_stands() -> None:
     [("DVAL", 12.0, 12.0), ("RVAL", 1500, 15.0), ("RLV", -4.0, 6.0), ("TWF", 1, 13.0), ("TWR", 1, 7.0)],
 )
 def test_other_fields_that_move(name: str, value: FieldValue, there: float) -> None:
-    async def act(rig: Rig) -> None:
+    async def act(rig: MotorRig) -> None:
         await rig.put("VAL", 10.0)
         await rig.put("TWV", 3.0)
         await rig.put(name, value)
@@ -159,7 +58,7 @@ def test_other_fields_that_move(name: str, value: FieldValue, there: float) -> N
 
 
 def test_a_new_target_during_a_move() -> None:
-    async def act(rig: Rig) -> None:
+    async def act(rig: MotorRig) -> None:
         first = await rig.begin("VAL", 100.0)
         second = await rig.begin("VAL", 40.0, OTHER)
         assert not first.done()
@@ -171,7 +70,7 @@ def test_a_new_target_during_a_move() -> None:
 
 
 def test_stop_ends_the_put_and_val_follows() -> None:
-    async def act(rig: Rig) -> None:
+    async def act(rig: MotorRig) -> None:
         put = await rig.begin("VAL", 1000.0)
         await rig.put("STOP", 1)
         await rig.over(put)
@@ -187,7 +86,7 @@ def test_stop_ends_the_put_and_val_follows() -> None:
 
 
 def test_without_limits() -> None:
-    async def act(rig: Rig) -> None:
+    async def act(rig: MotorRig) -> None:
         await rig.put("HLM", 10.0)
         assert rig.get("DHLM", "DLLM", "LVIO") == [10.0, 0.0, 0]
         await rig.refused("VAL", 20.0, Misuse, r"20 mm: permitted are 0 to 10 mm \(LLM, HLM\)")
@@ -200,7 +99,7 @@ def test_without_limits() -> None:
 
 
 def test_limits_that_val_does_not_keep_any_more() -> None:
-    async def act(rig: Rig) -> None:
+    async def act(rig: MotorRig) -> None:
         await rig.put("VAL", 20.0)
         await rig.put("HLM", 10.0)
         assert rig.get("LVIO") == [1]
@@ -209,7 +108,7 @@ def test_limits_that_val_does_not_keep_any_more() -> None:
 
 
 def test_limits_of_user_and_dial() -> None:
-    async def act(rig: Rig) -> None:
+    async def act(rig: MotorRig) -> None:
         await rig.put("DHLM", 30.0)
         await rig.put("DLLM", -10.0)
         await rig.put("DIR", 1)
@@ -224,7 +123,7 @@ def test_limits_of_user_and_dial() -> None:
 def test_limit_switches() -> None:
     """HLS and LLS in user coordinates, RHLS and RLLS in those of the controller."""
 
-    async def act(rig: Rig) -> None:
+    async def act(rig: MotorRig) -> None:
         await rig.refused("VAL", -50.0, Refusal, "the motion ended at")
         assert rig.get("RLLS", "RHLS", "LLS", "HLS", "MISS") == [1, 0, 1, 0, 1]
         val, rbv = rig.get("VAL", "RBV")
@@ -248,7 +147,7 @@ def test_limit_switches() -> None:
 def test_home(direction: int) -> None:
     """HOMF and HOMR are in dial coordinates, whatever DIR is."""
 
-    async def act(rig: Rig) -> None:
+    async def act(rig: MotorRig) -> None:
         await rig.put("DIR", direction)
         await rig.put("HVEL", 10.0)
         put = await rig.begin("HOMR", 1)
@@ -267,7 +166,7 @@ def test_home(direction: int) -> None:
 
 
 def test_home_stopped_and_refused() -> None:
-    async def act(rig: Rig) -> None:
+    async def act(rig: MotorRig) -> None:
         await rig.refused("HOMF", 0, Misuse, "HOMF: 0: permitted is 1")
         put = await rig.begin("HOMF", 1)
         await rig.put("STOP", 1)
@@ -278,7 +177,7 @@ def test_home_stopped_and_refused() -> None:
 
 
 def test_a_refused_move_leaves_everything() -> None:
-    async def act(rig: Rig) -> None:
+    async def act(rig: MotorRig) -> None:
         await rig.put("HVEL", 10.0)
         await rig.put("HOMR", 1)
         there = rig.get("VAL", "RBV")
@@ -291,7 +190,7 @@ def test_a_refused_move_leaves_everything() -> None:
 
 @pytest.mark.parametrize(("button", "sign"), [("JOGF", 1), ("JOGR", -1)])
 def test_a_jog_ends_with_its_button(button: str, sign: int) -> None:
-    async def act(rig: Rig) -> None:
+    async def act(rig: MotorRig) -> None:
         put = await rig.begin(button, 1)
         await rig.until(lambda: sign * float(rig.get("RBV")[0]) > 60.0)
         assert rig.get(button, "DMOV") == [1, 0]
@@ -305,7 +204,7 @@ def test_a_jog_ends_with_its_button(button: str, sign: int) -> None:
 
 
 def test_a_jog_goes_as_the_user_sees_it() -> None:
-    async def act(rig: Rig) -> None:
+    async def act(rig: MotorRig) -> None:
         await rig.put("DIR", 1)
         await rig.begin("JOGF", 1)
         await rig.until(lambda: float(rig.get("RBV")[0]) > 5.0)
@@ -317,7 +216,7 @@ def test_a_jog_goes_as_the_user_sees_it() -> None:
 
 
 def test_a_jog_ends_within_the_limits() -> None:
-    async def act(rig: Rig) -> None:
+    async def act(rig: MotorRig) -> None:
         await rig.put("HLM", 100.0)
         await rig.put("JOGF", 1)
         rbv, limit, pressed = rig.get("RBV", "LVIO", "JOGF")
@@ -330,7 +229,7 @@ def test_a_jog_ends_within_the_limits() -> None:
 
 
 def test_a_jog_ends_with_the_connection_of_its_client() -> None:
-    async def act(rig: Rig) -> None:
+    async def act(rig: MotorRig) -> None:
         put = await rig.begin("JOGF", 1)
         await rig.until(lambda: float(rig.get("RBV")[0]) > 5.0)
         await rig.controller.leave(OTHER.circuit)
@@ -345,7 +244,7 @@ def test_a_jog_ends_with_the_connection_of_its_client() -> None:
 
 
 def test_a_move_instead_of_a_jog() -> None:
-    async def act(rig: Rig) -> None:
+    async def act(rig: MotorRig) -> None:
         jog = await rig.begin("JOGF", 1)
         await rig.until(lambda: float(rig.get("RBV")[0]) > 5.0)
         await rig.put("VAL", 200.0)
@@ -359,7 +258,7 @@ def test_a_move_instead_of_a_jog() -> None:
 
 
 def test_stop_of_spmg() -> None:
-    async def act(rig: Rig) -> None:
+    async def act(rig: MotorRig) -> None:
         put = await rig.begin("VAL", 1000.0)
         await rig.put("SPMG", 0)
         await rig.over(put)
@@ -378,7 +277,7 @@ def test_stop_of_spmg() -> None:
 
 
 def test_pause_and_go() -> None:
-    async def act(rig: Rig) -> None:
+    async def act(rig: MotorRig) -> None:
         put = await rig.begin("VAL", 100.0)
         await rig.put("SPMG", 1)
         await rig.until(lambda: rig.get("MOVN") == [0])
@@ -394,7 +293,7 @@ def test_pause_and_go() -> None:
 
 
 def test_a_target_that_is_given_in_a_pause() -> None:
-    async def act(rig: Rig) -> None:
+    async def act(rig: MotorRig) -> None:
         await rig.put("SPMG", 1)
         put = await rig.begin("VAL", 10.0)
         later = await rig.begin("VAL", 12.0)
@@ -412,7 +311,7 @@ def test_a_target_that_is_given_in_a_pause() -> None:
 
 
 def test_with_move_each_motion_ends_with_a_pause() -> None:
-    async def act(rig: Rig) -> None:
+    async def act(rig: MotorRig) -> None:
         await rig.put("SPMG", 2)
         jog = await rig.begin("JOGF", 1)
         await rig.until(lambda: float(rig.get("RBV")[0]) > 5.0)
@@ -430,7 +329,7 @@ def test_with_move_each_motion_ends_with_a_pause() -> None:
 def test_set_changes_the_offset(name: str, value: FieldValue, there: float) -> None:
     """Of a record at 10 mm; nothing moves, and the limits of the user go with it."""
 
-    async def act(rig: Rig) -> None:
+    async def act(rig: MotorRig) -> None:
         await rig.put("VAL", 10.0)
         await rig.put("DHLM", 50.0)
         await rig.put("SET", 1)
@@ -442,7 +341,7 @@ def test_set_changes_the_offset(name: str, value: FieldValue, there: float) -> N
 
 
 def test_set_of_what_only_a_controller_could_do() -> None:
-    async def act(rig: Rig) -> None:
+    async def act(rig: MotorRig) -> None:
         await rig.put("SET", 1)
         for name in ("DVAL", "RVAL"):
             await rig.refused(name, 5, Refusal, "no command changes the position of the controller")
@@ -454,7 +353,7 @@ def test_set_of_what_only_a_controller_could_do() -> None:
 
 
 def test_the_direction_keeps_val_unless_the_offset_is_frozen() -> None:
-    async def act(rig: Rig) -> None:
+    async def act(rig: MotorRig) -> None:
         await rig.put("VAL", 10.0)
         await rig.put("DIR", 1)
         assert rig.get("VAL", "RBV", "OFF", "DVAL") == [10.0, 10.0, 20.0, 10.0]
@@ -469,7 +368,7 @@ def test_the_direction_keeps_val_unless_the_offset_is_frozen() -> None:
 
 
 def test_a_viewer_stops_and_no_more() -> None:
-    async def act(rig: Rig) -> None:
+    async def act(rig: MotorRig) -> None:
         rig.world.inner.do(Enable("table", 1))
         rig.world.inner.do(Move("table", 1, to=1000.0))
         await rig.tick()
@@ -501,7 +400,7 @@ def test_a_viewer_stops_and_no_more() -> None:
 
 
 def test_motions_of_others() -> None:
-    async def act(rig: Rig) -> None:
+    async def act(rig: MotorRig) -> None:
         rig.world.inner.do(Move("table", 1, to=30.0))
         await rig.tick()
         assert rig.get("DMOV", "MOVN", "VAL") == [0, 1, 0.0]
@@ -512,7 +411,7 @@ def test_motions_of_others() -> None:
 
 
 def test_a_move_that_others_stop_fails() -> None:
-    async def act(rig: Rig) -> None:
+    async def act(rig: MotorRig) -> None:
         put = await rig.begin("VAL", 1000.0)
         rig.world.inner.do(StopAxes("table", 1))
         with pytest.raises(Refusal, match=r"the motion ended at .* mm, not at 1000 mm"):
@@ -526,7 +425,7 @@ def test_a_move_that_others_stop_fails() -> None:
 
 
 def test_a_device_that_is_lost_during_a_move() -> None:
-    async def act(rig: Rig) -> None:
+    async def act(rig: MotorRig) -> None:
         put = await rig.begin("VAL", 1000.0)
         rig.world.silent.add("table")
         for _ in range(50):
@@ -547,7 +446,7 @@ def test_a_device_that_is_lost_during_a_move() -> None:
 
 
 def test_velocity_and_acceleration_of_the_registers() -> None:
-    async def act(rig: Rig) -> None:
+    async def act(rig: MotorRig) -> None:
         assert rig.get("VELO", "ACCL", "JVEL", "HVEL") == [50.0, 0.5, 50.0, 50.0]
         await rig.put("VELO", 20.0)
         assert rig.get("VELO", "ACCL", "JVEL", "HVEL") == [20.0, 0.5, 20.0, 20.0]
@@ -562,7 +461,7 @@ def test_velocity_and_acceleration_of_the_registers() -> None:
 def test_an_axis_of_an_m1486() -> None:
     """It tells no velocity, switches no drive and does not home."""
 
-    async def act(rig: Rig) -> None:
+    async def act(rig: MotorRig) -> None:
         assert rig.get("VELO", "ACCL", "JVEL", "HVEL", "MRES", "EGU") == [0.0, 0.0, 0.0, 0.0, 1.0, "min. microsteps"]
         assert not int(rig.get("MSTA")[0]) & StatusBit.GAIN_SUPPORT
         await rig.refused("VELO", 5.0, Refusal, "no register has its velocity")
@@ -588,7 +487,7 @@ def test_an_axis_of_an_m1486() -> None:
 
 
 def test_commands_are_in_the_audit_log() -> None:
-    async def act(rig: Rig) -> None:
+    async def act(rig: MotorRig) -> None:
         found: list[tuple[object, ...]] = []
         rig.world.audit = lambda who, do, fields, outcome: found.append((str(who), do, outcome))
         await rig.put("VAL", 5.0)
