@@ -77,10 +77,13 @@ def test_the_fault_matters_most(report: tuple[CampaignReport, Path]) -> None:
 def test_junit_has_a_failure_for_each_property_that_failed(report: tuple[CampaignReport, Path]) -> None:
     found, folder = report
     suite = ET.parse(folder / "junit.xml").getroot()
-    assert suite.attrib["tests"] == suite.attrib["failures"] == "1"
+    assert [case.attrib["name"] for case in suite] == ["expectations of the scripts", "waits of the scripts"]
+    assert suite.attrib["tests"] == suite.attrib["failures"] == "2"
     failure = suite.find("testcase/failure")
     assert failure is not None
-    assert f"{found.summary.failed} of 20 runs" in failure.attrib["message"]
+    counts = {one.failure.property: len(one.numbers) for one in found.found}
+    assert sum(counts.values()) == found.summary.failed  # each run is of one cause
+    assert failure.attrib["message"].startswith(f"{counts['expectations of the scripts']} of 20 runs")
     assert "jam element=ram" in failure.attrib["message"]
 
 
@@ -98,7 +101,7 @@ def test_two_campaigns_beside_each_other(report: tuple[CampaignReport, Path], tm
     found = compare(before, after)
     assert found["verdict"] == "better"
     assert found["p_value"] < 0.05
-    assert [name for name, _ in found["gone"]] == ["expectations of the scripts"]
+    assert [name for name, _ in found["gone"]] == ["expectations of the scripts", "waits of the scripts"]
     assert compare(after, before)["verdict"] == "worse"
     assert any("gone" in line for line in lines(found))
     with pytest.raises(Misuse, match=r"no report\.json"):
@@ -122,6 +125,18 @@ def test_a_fault_that_is_missing_counts_as_none() -> None:
     (found,) = influences(RunColumns.of(results))
     assert found.name == "fault jam element=ram"
     assert found.correlation == pytest.approx(-1.0)
+
+
+def test_a_fault_with_what_varies_is_one() -> None:
+    results = [
+        (
+            Case(n, {}, (FaultAt(1, f"stall machine=m axis=1 for_s={n / 10}"),) * (n % 2), (), 1, 1),
+            CaseResult(n, (Verdict("p", n % 2 == 0, 1.0 - n % 2, None, ""),), "", 1, {}),
+        )
+        for n in range(8)
+    ]
+    words = "stall machine=m axis=1 for_s={length}"
+    assert [one.name for one in influences(RunColumns.of(results, [words]))] == [f"fault {words}"]
 
 
 def test_without_numbers_there_is_no_histogram() -> None:

@@ -117,7 +117,9 @@ READY: Mapping[str, ReadyProperty] = {
             _no_lost_step,
         ),
         ReadyProperty("never-moves-while", "CONDITION", "no axis of a controller moves while CONDITION is true", _never_moves),
-        ReadyProperty("stops-within", "TIME after CONDITION", "all axes stand TIME after CONDITION came true", _stops),
+        ReadyProperty(
+            "stops-within", "TIME after CONDITION", "all axes stand at some moment within TIME after CONDITION came true", _stops
+        ),
         ReadyProperty("returns-to-safe", "CONDITION [within TIME]", "in the end CONDITION is true and stays so", _returns),
     )
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
 from typing import Any, NamedTuple
@@ -44,10 +44,11 @@ class RunColumns:
     passed: array[float] = field(default_factory=lambda: array("d"))
 
     @classmethod
-    def of(cls, results: Iterable[tuple[Case, CaseResult]]) -> RunColumns:
+    def of(cls, results: Iterable[tuple[Case, CaseResult]], faults: Sequence[str] = ()) -> RunColumns:
+        """``faults``: the words of each ``[[fault]]``, in which what varies has a name."""
         found = cls()
         for case, result in results:
-            for name, value in _numbers(case).items():
+            for name, value in _numbers(case, faults).items():
                 found.values.setdefault(name, array("d", [float("nan")] * len(found.passed))).append(value)
             for name, measure in result.measures.items():
                 found.measures.setdefault(name, array("d")).append(measure)
@@ -59,12 +60,12 @@ class RunColumns:
         return found
 
 
-def _numbers(case: Case) -> Mapping[str, float]:
-    """What varies as numbers: values, and how often each fault is there."""
+def _numbers(case: Case, faults: Sequence[str]) -> Mapping[str, float]:
+    """What varies as numbers: values, and 1 for each fault that is there."""
     found = {name: float(value) for name, value in case.values.items() if not isinstance(value, str)}
     for fault in case.faults:
-        kind = f"fault {fault.fault.partition(' name=')[0]}"
-        found[kind] = 1.0
+        words = faults[fault.table] if 0 <= fault.table < len(faults) else fault.fault.partition(" name=")[0]
+        found[f"fault {words}"] = 1.0
     return found
 
 

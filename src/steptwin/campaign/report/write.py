@@ -35,7 +35,7 @@ def write_report(campaign: Campaign, summary: CampaignSummary, folder: Path, fil
             yield result
 
     try:
-        columns = RunColumns.of(store.results())
+        columns = RunColumns.of(store.results(), [one.do for one in campaign.description.faults])
         end = time.monotonic() + SHRINKING_S
         found = find(
             campaign.runner, failed(), cases.__getitem__, folder / FAILURES, file, is_over=lambda: time.monotonic() > end
