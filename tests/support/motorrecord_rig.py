@@ -11,9 +11,9 @@ from virtual_loop import run_virtually
 
 from steptwin.access.roles import Role
 from steptwin.errors import SteptwinError
-from steptwin.gateways.epics.channels import FieldValue, Putter
 from steptwin.gateways.epics.controller import EpicsController
 from steptwin.gateways.epics.motorrecord import MotorRecord
+from steptwin.gateways.epics.records import FieldValue, Putter
 from steptwin.gateways.leases import JogLeases
 from steptwin.gateways.sampling import Sampler
 from steptwin.machine import MILLISECOND

@@ -110,12 +110,16 @@ class EpicsSpec(ListeningSpec):
     """With what names of records begin."""
     beacons: str
     """HOST:PORT to which the server announces itself."""
+    pva: str | None
+    """HOST:PORT where the same records are served over PV Access, None: not at all."""
+    pva_beacons: str
+    """HOST:PORT to which that server announces itself."""
     interval: Nanos
     """How often values are looked at that clients have asked for, ns."""
     registers: tuple[str, ...]
     """Further points to show: ``MACHINE.POINT``."""
     role: str | None
-    """Of clients, of which Channel Access knows no more than names; None: engineer where only this computer is served,
+    """Of clients, of which the protocols know no more than names; None: engineer where only this computer is served,
     otherwise viewer."""
 
 
@@ -137,7 +141,13 @@ def _broker(value: Any) -> str:
 
 def _beacons(value: Any) -> str:
     if address_value(value).endswith(":0"):
-        raise Misuse(f"{value!r}: the port for beacons is 1 to 65535, usually 5065")
+        raise Misuse(f"{value!r}: the port for beacons is 1 to 65535, usually 5065, of PV Access 5076")
+    return value
+
+
+def _pv_access(value: Any) -> str:
+    if address_value(value).endswith(":65535"):
+        raise Misuse(f"{value!r}: the port is at most 65534, because the next one is for searches")
     return value
 
 
@@ -201,9 +211,12 @@ _KINDS: Mapping[str, _GatewayReader] = {
             "127.0.0.1:5064",
             optional(_prefix, "prefix", "with what names of records begin; those of controllers follow", ""),
             optional(_beacons, "beacons", "HOST:PORT to which the server announces itself", "127.0.0.1:5065"),
+            optional(_pv_access, "pva", "HOST:PORT for PV Access besides, usually 127.0.0.1:5075; searches at the next port"),
+            optional(_beacons, "pva_beacons", "HOST:PORT to which the server of PV Access announces itself", "127.0.0.1:5076"),
             optional(positive_time, "interval", "how often values are looked at that clients have asked for", 100 * MILLISECOND),
             optional(texts, "registers", "further points to show: MACHINE.POINT, such as table.USER_REGISTER[5]", ()),
             optional(word(*ROLES), "role", "role of all clients"),
+            need={"pva_beacons": "pva"},
         ),
         EpicsSpec,
     ),

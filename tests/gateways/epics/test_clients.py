@@ -1,4 +1,4 @@
-"""Motor records and others for independent clients: ophyd-async's Motor, pyepics; each in a process of its own."""
+"""Motor records and others for independent clients: ophyd-async's Motor, pyepics, pvaPy; each in a process of its own."""
 
 from __future__ import annotations
 
@@ -27,7 +27,11 @@ TABLE = """
 
 
 def client(program: str, port: int, name: str) -> dict[str, Any]:
-    environment = {**os.environ, "EPICS_CA_ADDR_LIST": f"127.0.0.1:{port}", "EPICS_CA_AUTO_ADDR_LIST": "NO"}
+    return run_client(program, name, EPICS_CA_ADDR_LIST=f"127.0.0.1:{port}", EPICS_CA_AUTO_ADDR_LIST="NO")
+
+
+def run_client(program: str, name: str, **variables: str) -> dict[str, Any]:
+    environment = {**os.environ, **variables}
     done = subprocess.run(
         [sys.executable, str(CLIENTS / program), name], env=environment, capture_output=True, text=True, check=False, timeout=100
     )
@@ -84,9 +88,48 @@ def test_records_for_pyepics(tmp_path: Path) -> None:
         }
 
 
+PV_EXPECTED = {
+    "types": [f"epics:nt/{name}:1.0" for name in ("NTScalar", "NTScalar", "NTEnum", "NTScalar", "NTEnum")],
+    "while it is off": "channel ST:table:M1 PvaClientPut::put table M1: the motion ended at 0 imp, not at 10 imp: off",
+    "moved": [30.0, 30.0, 1],
+    "seen": [1, 0, 1, 0, 1],
+    "by": 20.0,
+    "display": ["imp", 0, -(2.0**31), 2.0**31 - 1, "Position."],
+    "time": True,
+    "alarm": {"severity": 0, "status": 0, "message": ""},
+    "velocity": ["imp/s", "s"],
+    "limits": [-5.0, 40.0, -5.0, 40.0],
+    "beyond": [
+        "channel ST:table:M1 PvaClientPut::put table M1: 50 imp: permitted are -5 to 40 imp (LLM, HLM)",
+        1,
+        20.0,
+    ],
+    "states": {"index": 3, "choices": ["Stop", "Pause", "Move", "Go"]},
+    "no state": "index '9' out of bounds",
+    "read only": "channel ST:table:M1.RBV PvaClientPut::put RBV cannot be put",
+    "on its way": 0,
+    "stopped": [True, True],
+    "a jog ends with its channel": 0,
+    "values": [1, 42.0, "ok", "ST:table:M1"],
+    "unknown": {"severity": 3, "status": 6, "message": "not known"},
+    "stopped by the controller": True,
+}
+
+
+def test_records_for_pvapy(tmp_path: Path) -> None:
+    """Over PV Access, found by a search."""
+    with served(f'{TABLE}pva = "127.0.0.1:0"\nregisters = ["table.USER_REGISTER[5]"]\n', tmp_path) as points:
+        pva = points["epics"]["pva"]
+        search = {"EPICS_PVA_ADDR_LIST": pva["host"], "EPICS_PVA_BROADCAST_PORT": str(pva["search_port"])}
+        found = run_client("pvapy_records.py", "ST:table:", **search, EPICS_PVA_AUTO_ADDR_LIST="NO")
+    assert found == PV_EXPECTED
+
+
 @pytest.mark.parametrize(
     ("keys", "message"),
     [
+        ('pva = "127.0.0.1:65535"', "the port is at most 65534, because the next one is for searches"),
+        ('pva_beacons = "127.0.0.1:5076"', "pva_beacons means nothing without pva"),
         ('prefix = "A.B"', "names of records have letters"),
         ('beacons = "127.0.0.1:0"', "the port for beacons is 1 to 65535"),
         ('role = "boss"', "permitted are viewer, operator, engineer"),

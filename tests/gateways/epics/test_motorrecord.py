@@ -10,8 +10,8 @@ from motorrecord_rig import CHIP, ME, OTHER, TABLE, MotorRig, check
 from steptwin.access.roles import Role
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.gateways.clients import NotPermitted
-from steptwin.gateways.epics.channels import LOST, NO_ALARM, FieldValue
 from steptwin.gateways.epics.motorfields import StatusBit
+from steptwin.gateways.epics.records import LOST, NO_ALARM, FieldValue
 from steptwin.subject.commands import Enable, Move, StopAxes
 
 

@@ -10,7 +10,7 @@ from steptwin.access.commands import PERMITS
 from steptwin.access.roles import Role
 from steptwin.gateways.clients import GatewayClient, address_text
 from steptwin.gateways.contract import GatewaySubject
-from steptwin.gateways.epics.channels import Putter
+from steptwin.gateways.epics.records import Putter
 from steptwin.gateways.leases import LEASE_S, JogLeases
 from steptwin.gateways.sampling import Sample, Sampler
 from steptwin.subject.commands import Command, Jog, ReadPoints, StopAxes

@@ -5,14 +5,17 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from steptwin.access.roles import ROLES, Role
 from steptwin.errors import Misuse
+from steptwin.extras import libraries_of, missing
 from steptwin.gateways.contract import GatewaySubject
-from steptwin.gateways.epics.channels import PvDatabase, RecordBase
+from steptwin.gateways.epics.channels import PvDatabase
 from steptwin.gateways.epics.controller import EpicsController
 from steptwin.gateways.epics.motorrecord import MotorRecord
 from steptwin.gateways.epics.pointrecord import CommandRecord, PointRecord
+from steptwin.gateways.epics.records import Record
 from steptwin.gateways.epics.server import ChannelAccessServer
 from steptwin.gateways.leases import JogLeases
 from steptwin.gateways.methods import CONTROLLER_METHODS, PROGRAM_METHODS, methods_of
@@ -20,17 +23,18 @@ from steptwin.gateways.points import CLOCK, CLOCK_POINTS, GatewayPoint, points_o
 from steptwin.gateways.sampling import Sampler
 from steptwin.machine import SECOND
 from steptwin.subject.contract import MachinePart
-from steptwin.world.addresses import is_loopback, parse_address
+from steptwin.world.addresses import Address, is_loopback, parse_address
 from steptwin.world.gateways import EpicsSpec
+
+if TYPE_CHECKING:
+    from steptwin.gateways.epics.pvserver import PvAccessServer
 
 LONGEST_NAME = 60
 """Characters of the name of a record."""
 
 
 class EpicsGateway:
-    """Serves ``subject`` at the address of ``spec``. A `Gateway`."""
-
-    protocol = "EPICS Channel Access"
+    """Serves ``subject`` at the addresses of ``spec``. A `Gateway`."""
 
     def __init__(self, spec: EpicsSpec, subject: GatewaySubject, folder: Path) -> None:
         self._spec = spec
@@ -39,18 +43,27 @@ class EpicsGateway:
         self._sampler: Sampler | None = None
         self._leases = JogLeases(subject)
         self._server: ChannelAccessServer | None = None
+        self._pv_server: PvAccessServer | None = None
+        self._pv_place = ""
         self._task: asyncio.Task[None] | None = None
         self._leaving: set[asyncio.Task[None]] = set()
+
+    @property
+    def protocol(self) -> str:
+        return f"EPICS Channel Access{self._pv_place}"
 
     async def open(self, *, listen_any: bool, notice: Callable[[str], None]) -> Mapping[str, object]:
         spec = self._spec
         address = parse_address(spec.listen, listen_any=listen_any)
         beacons = parse_address(spec.beacons, listen_any=listen_any)
-        open_to = Role.ENGINEER if is_loopback(address.host) else Role.VIEWER
+        pva = None if spec.pva is None else parse_address(spec.pva, listen_any=listen_any)
+        pva_beacons = parse_address(spec.pva_beacons, listen_any=listen_any)
+        hosts = [one.host for one in (address, pva) if one is not None]
+        open_to = Role.ENGINEER if all(map(is_loopback, hosts)) else Role.VIEWER
         role = open_to if spec.role is None else ROLES[spec.role]
         registers = registers_by_machine("[gateway.epics]", spec.registers, self._subject.description)
         self._sampler = Sampler(self._subject, registers)
-        records: dict[str, RecordBase] = {}
+        records: dict[str, Record] = {}
         for name in (*(part.name for part in self._subject.description.machines), CLOCK):
             self._controllers[name] = EpicsController(name, self._subject, self._sampler, self._leases, role)
         for part in self._subject.description.machines:
@@ -64,11 +77,28 @@ class EpicsGateway:
         server = ChannelAccessServer(PvDatabase(records), address, beacons, self._leave)
         port = await server.open()
         self._server = server
+        found: dict[str, object] = {"host": address.host, "port": port, "prefix": spec.prefix}
+        if pva is not None:
+            try:
+                found["pva"] = await self._open_pv_access(records, pva, pva_beacons)
+            except BaseException:
+                await self.close()
+                raise
         self._task = asyncio.create_task(self._publish(server, self._sampler))
-        return {"host": address.host, "port": port, "prefix": spec.prefix}
+        return found
 
-    def _records(self, part: MachinePart, registers: list[str]) -> dict[str, RecordBase]:
-        found: dict[str, RecordBase] = {}
+    async def _open_pv_access(self, records: Mapping[str, Record], address: Address, beacons: Address) -> Mapping[str, object]:
+        try:
+            from steptwin.gateways.epics.pvserver import PvAccessServer
+        except ImportError:
+            raise missing("[gateway.epics] pva", libraries_of("epics")) from None
+        self._pv_server = PvAccessServer(records, address, beacons, self._leave)
+        ports = await self._pv_server.open()
+        self._pv_place = f", PV Access at {Address(address.host, ports['port'])}"
+        return {"host": address.host, **ports}
+
+    def _records(self, part: MachinePart, registers: list[str]) -> dict[str, Record]:
+        found: dict[str, Record] = {}
         controller = self._controllers[part.name]
         for axis in part.datasheet.axes:
             name = self._name(part.name, axis.name)
@@ -104,7 +134,8 @@ class EpicsGateway:
         while True:
             await asyncio.sleep(self._spec.interval / SECOND)
             busy = [name for name, controller in self._controllers.items() if controller.is_busy]
-            wanted = [name for name, one in self._controllers.items() if one.is_wanted] if server.has_clients else []
+            has_clients = server.has_clients or (self._pv_server is not None and self._pv_server.has_clients)
+            wanted = [name for name, one in self._controllers.items() if one.is_wanted] if has_clients else []
             due = dict.fromkeys((*busy, *sampler.due(wanted)))
             await asyncio.gather(*(self._controllers[name].refresh() for name in due))
 
@@ -113,6 +144,8 @@ class EpicsGateway:
             self._task.cancel()
             await asyncio.wait((self._task, *self._leaving))
         self._leases.close()
+        if self._pv_server is not None:
+            await self._pv_server.close()
         if self._server is not None:
             await self._server.close()
         if self._sampler is not None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 
-from steptwin.gateways.epics.channels import RecordBase
 from steptwin.gateways.epics.motorfields import FROZEN, first_values
+from steptwin.gateways.epics.records import RecordBase
 
 
 class MotorCoordinates(RecordBase, ABC):
@@ -47,9 +47,17 @@ class MotorCoordinates(RecordBase, ABC):
         ends = sorted((self.user(self._number("DLLM")), self.user(self._number("DHLM"))))
         self.values |= {"LLM": ends[0], "HLM": ends[1]}
 
+    @property
+    def _has_limits(self) -> bool:
+        return not self._number("DLLM") == self._number("DHLM") == 0.0
+
+    @property
+    def _has_no_offset(self) -> bool:
+        """Whether positions of the user are those of the dial."""
+        return not self.values["OFF"] and self._sign > 0
+
     def _is_outside(self, dial: float) -> bool:
-        low, high = self._number("DLLM"), self._number("DHLM")
-        return not (low == high == 0.0) and not low <= dial <= high
+        return self._has_limits and not self._number("DLLM") <= dial <= self._number("DHLM")
 
     def shift(self, offset: float) -> None:
         """OFF is put."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from steptwin.gateways.epics.channels import FieldRow, FieldType, FieldValue
+from steptwin.gateways.epics.records import AlarmSeverity, FieldQuantity, FieldRow, FieldType, FieldValue
 
 STOP, PAUSE, MOVE, GO = range(4)
 """States of SPMG."""
@@ -12,8 +12,8 @@ USE, SET = range(2)
 VARIABLE, FROZEN = range(2)
 
 
-def _double(name: str, meaning: str, *, put: bool = False, unit: bool = True) -> FieldRow:
-    return FieldRow(name=name, meaning=meaning, type=FieldType.DOUBLE, is_writable=put, has_unit=unit)
+def _double(name: str, meaning: str, quantity: FieldQuantity, *, put: bool = False) -> FieldRow:
+    return FieldRow(name=name, meaning=meaning, type=FieldType.DOUBLE, is_writable=put, quantity=quantity)
 
 
 def _short(name: str, meaning: str, *, put: bool = False) -> FieldRow:
@@ -32,23 +32,20 @@ def _states(name: str, meaning: str, *states: str, put: bool = False) -> FieldRo
     return FieldRow(name=name, meaning=meaning, type=FieldType.STATES, is_writable=put, states=states)
 
 
-_SEVERITIES = ("NO_ALARM", "MINOR", "MAJOR", "INVALID")
-
-
 def _rows() -> Iterator[FieldRow]:
-    yield _double("VAL", "Wanted position; a put moves.", put=True)
-    yield _double("DVAL", "The same in dial coordinates, which are those of the controller.", put=True)
+    yield _double("VAL", "Wanted position; a put moves.", FieldQuantity.USER, put=True)
+    yield _double("DVAL", "The same in dial coordinates, which are those of the controller.", FieldQuantity.DIAL, put=True)
     yield _long("RVAL", "The same in steps.", put=True)
-    yield _double("RLV", "Wanted distance; a put moves.", put=True)
-    yield _double("RBV", "Position.")
-    yield _double("DRBV", "Position, dial.")
+    yield _double("RLV", "Wanted distance; a put moves.", FieldQuantity.LENGTH, put=True)
+    yield _double("RBV", "Position.", FieldQuantity.USER)
+    yield _double("DRBV", "Position, dial.", FieldQuantity.DIAL)
     yield _long("RRBV", "Position in steps.")
-    yield _double("DIFF", "DVAL - DRBV.")
+    yield _double("DIFF", "DVAL - DRBV.", FieldQuantity.LENGTH)
     yield _short("DMOV", "1 when the whole motion is over.")
     yield _short("MOVN", "1 while the motor moves.")
     yield _short("STOP", "1 stops; it is 0 again then.", put=True)
     yield _states("SPMG", "Whether motions may be made.", "Stop", "Pause", "Move", "Go", put=True)
-    yield _double("TWV", "Distance of a tweak.", put=True)
+    yield _double("TWV", "Distance of a tweak.", FieldQuantity.LENGTH, put=True)
     yield _short("TWF", "1 moves by TWV.", put=True)
     yield _short("TWR", "1 moves by -TWV.", put=True)
     yield _short("JOGF", "1 jogs in the positive direction until 0.", put=True)
@@ -56,33 +53,33 @@ def _rows() -> Iterator[FieldRow]:
     yield _short("HOMF", "1 homes in the positive direction.", put=True)
     yield _short("HOMR", "1 homes in the negative direction.", put=True)
     yield _short("ATHM", "1 where it was homed, until it moves.")
-    yield _double("HLM", "Highest position.", put=True)
-    yield _double("LLM", "Lowest position.", put=True)
-    yield _double("DHLM", "Highest position, dial; with DLLM 0 there are no limits.", put=True)
-    yield _double("DLLM", "Lowest position, dial.", put=True)
+    yield _double("HLM", "Highest position.", FieldQuantity.USER, put=True)
+    yield _double("LLM", "Lowest position.", FieldQuantity.USER, put=True)
+    yield _double("DHLM", "Highest position, dial; with DLLM 0 there are no limits.", FieldQuantity.DIAL, put=True)
+    yield _double("DLLM", "Lowest position, dial.", FieldQuantity.DIAL, put=True)
     yield _short("LVIO", "1 after a motion was refused because of limits.")
     yield _short("HLS", "1 at the limit switch of the positive direction.")
     yield _short("LLS", "1 at that of the negative direction.")
     yield _short("RHLS", "The same of the controller.")
     yield _short("RLLS", "The same of the controller.")
-    yield _double("VELO", "Velocity of moves; 0 where the controller does not tell.", put=True)
-    yield _double("VMAX", "Highest velocity; 0 where it is not known.")
-    yield _double("VBAS", "Base velocity.")
-    yield _double("ACCL", "Time until VELO is reached, s.", put=True, unit=False)
-    yield _double("JVEL", "Velocity of jogs.", put=True)
-    yield _double("HVEL", "Velocity of homing.", put=True)
-    yield _double("OFF", "RBV - DRBV in the direction of DIR.", put=True)
+    yield _double("VELO", "Velocity of moves; 0 where the controller does not tell.", FieldQuantity.VELOCITY, put=True)
+    yield _double("VMAX", "Highest velocity; 0 where it is not known.", FieldQuantity.VELOCITY)
+    yield _double("VBAS", "Base velocity.", FieldQuantity.VELOCITY)
+    yield _double("ACCL", "Time until VELO is reached, s.", FieldQuantity.TIME, put=True)
+    yield _double("JVEL", "Velocity of jogs.", FieldQuantity.VELOCITY, put=True)
+    yield _double("HVEL", "Velocity of homing.", FieldQuantity.VELOCITY, put=True)
+    yield _double("OFF", "RBV - DRBV in the direction of DIR.", FieldQuantity.LENGTH, put=True)
     yield _states("DIR", "Whether positions go as those of the controller.", "Pos", "Neg", put=True)
     yield _states("SET", "Whether puts to VAL change OFF instead of moving.", "Use", "Set", put=True)
     yield _states("FOFF", "Whether they may: Frozen refuses them.", "Variable", "Frozen", put=True)
     yield _long("MSTA", "Status bits.")
     yield _short("MISS", "1 after a move that did not arrive.")
     yield _states("CNEN", "Whether the drive is on.", "Disable", "Enable", put=True)
-    yield _double("MRES", "A step.")
-    yield _double("ERES", "As MRES.")
-    yield _double("UREV", "A revolution of 200 steps; no controller tells another one.")
+    yield _double("MRES", "A step.", FieldQuantity.LENGTH)
+    yield _double("ERES", "As MRES.", FieldQuantity.LENGTH)
+    yield _double("UREV", "A revolution of 200 steps; no controller tells another one.", FieldQuantity.LENGTH)
     yield _long("SREV", "Steps of this revolution.")
-    yield _double("RDBD", "How far from VAL a move may end.", put=True)
+    yield _double("RDBD", "How far from VAL a move may end.", FieldQuantity.LENGTH, put=True)
     yield _short("PREC", "Decimals that are shown.", put=True)
     yield _text("EGU", "Unit.")
     yield _text("DESC", "Controller and axis.")
@@ -91,7 +88,7 @@ def _rows() -> Iterator[FieldRow]:
     yield _text("DTYP", "steptwin")
     yield _text("OUT", "Controller and axis.")
     yield _states("STAT", "Kind of alarm.", "NO_ALARM", "STATE", "COMM", "UDF", "HIGH", "LOW")
-    yield _states("SEVR", "Severity of the alarm.", *_SEVERITIES)
+    yield _states("SEVR", "AlarmSeverity of the alarm.", *(one.name for one in AlarmSeverity))
 
 
 MOTOR_FIELDS: Mapping[str, FieldRow] = {row.name: row for row in _rows()}

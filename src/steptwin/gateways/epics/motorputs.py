@@ -7,8 +7,8 @@ from collections.abc import Awaitable, Callable
 from typing import Protocol
 
 from steptwin.errors import Misuse, Refusal
-from steptwin.gateways.epics.channels import FieldValue, Putter
 from steptwin.gateways.epics.motorfields import SET
+from steptwin.gateways.epics.records import FieldValue, Putter
 
 FIXED = "no command changes the position of the controller"
 

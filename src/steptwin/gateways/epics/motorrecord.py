@@ -12,16 +12,25 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from caproto import AlarmSeverity, AlarmStatus
-
 from steptwin.controllerstate import StatusLevel
 from steptwin.datasheet import AxisDescription, Condition, Limits
 from steptwin.errors import Misuse, Refusal, SteptwinError
-from steptwin.gateways.epics.channels import LOST, NO_ALARM, NOT_KNOWN, FieldRow, FieldValue, Putter, RecordAlarm
 from steptwin.gateways.epics.controller import EpicsController
 from steptwin.gateways.epics.motorcoordinates import MotorCoordinates
 from steptwin.gateways.epics.motorfields import FROZEN, GO, MOTOR_FIELDS, MOVE, PAUSE, STOP, StatusBit
 from steptwin.gateways.epics.motorputs import FIXED, PUTS, put_setting
+from steptwin.gateways.epics.records import (
+    LOST,
+    NO_ALARM,
+    NOT_KNOWN,
+    AlarmKind,
+    AlarmSeverity,
+    FieldQuantity,
+    FieldRow,
+    FieldValue,
+    Putter,
+    RecordAlarm,
+)
 from steptwin.gateways.sampling import Sample
 from steptwin.machine import SECOND, Nanos
 from steptwin.subject.commands import Enable, Home, Jog, Move, StopAxes
@@ -36,10 +45,10 @@ RELATIVE = 1e-6
 """Registers have numbers of 32 bits."""
 _ALARMS = {
     StatusLevel.OK.value: NO_ALARM,
-    StatusLevel.WARNING.value: RecordAlarm(AlarmStatus.STATE, AlarmSeverity.MINOR_ALARM),
-    StatusLevel.ERROR.value: RecordAlarm(AlarmStatus.STATE, AlarmSeverity.MAJOR_ALARM),
+    StatusLevel.WARNING.value: RecordAlarm(AlarmKind.STATE, AlarmSeverity.MINOR),
+    StatusLevel.ERROR.value: RecordAlarm(AlarmKind.STATE, AlarmSeverity.MAJOR),
 }
-_STATES_OF_STAT = {AlarmStatus.NO_ALARM: 0, AlarmStatus.STATE: 1, AlarmStatus.COMM: 2, AlarmStatus.UDF: 3}
+_STAT = MOTOR_FIELDS["STAT"].states
 
 
 @dataclass(slots=True)
@@ -87,7 +96,7 @@ class MotorRecord(MotorCoordinates):
         """Before the first sample VAL is not known."""
         self._ramp: tuple[float, ...] = ()
         step = math.nan if axis.pulses_per_unit is None else 1.0 / axis.pulses_per_unit
-        texts = {"NAME": name[:39], "DESC": self._place[:39], "OUT": self._place[:39], "EGU": axis.unit[:15]}
+        texts = {"NAME": name, "DESC": self._place, "OUT": self._place, "EGU": axis.unit}
         self.values |= {"MRES": step, "ERES": step, "UREV": 200 * step, **texts}
         self.values["PREC"] = self.precision
         if axis.pulses_per_unit is not None:
@@ -108,9 +117,20 @@ class MotorRecord(MotorCoordinates):
             return 3
         return max(0, min(9, math.ceil(math.log10(self._axis.pulses_per_unit))))
 
-    @property
-    def limits(self) -> Limits | None:
-        return self._axis.positions
+    def unit_of(self, row: FieldRow) -> str:
+        per = {FieldQuantity.PURE: "", FieldQuantity.VELOCITY: f"{self.unit}/s", FieldQuantity.TIME: "s"}
+        return per.get(row.quantity, self.unit)
+
+    def limits_of(self, row: FieldRow) -> Limits | None:
+        """Of positions those of the record; where it has none, those of the axis."""
+        if row.quantity is FieldQuantity.VELOCITY:
+            return Limits(0.0, self._number("VMAX")) if self.values["VMAX"] else None
+        if row.quantity not in (FieldQuantity.USER, FieldQuantity.DIAL):
+            return None
+        if not self._has_limits:
+            return self._axis.positions if row.quantity is FieldQuantity.DIAL or self._has_no_offset else None
+        low, high = ("LLM", "HLM") if row.quantity is FieldQuantity.USER else ("DLLM", "DHLM")
+        return Limits(self._number(low), self._number(high))
 
     def field(self, name: str) -> FieldRow | None:
         return MOTOR_FIELDS.get(name)
@@ -219,7 +239,7 @@ class MotorRecord(MotorCoordinates):
         return condition is None or condition is Condition.MOVING
 
     def _show_alarm(self) -> None:
-        self.values |= {"STAT": _STATES_OF_STAT[self.alarm.status], "SEVR": int(self.alarm.severity)}
+        self.values |= {"STAT": _STAT.index(self.alarm.kind.name), "SEVR": self.alarm.severity.value}
 
     def _end(self, motion: _Motion, state: Any) -> None:
         """It stands."""
@@ -368,9 +388,8 @@ class MotorRecord(MotorCoordinates):
     def _runs_out(self, velocity: float) -> bool:
         """Whether a jog has to be stopped now so that it ends within the limits."""
         margin = velocity * (self._number("ACCL") / 2.0 + _LOOK_AHEAD_S)
-        low, high = self._number("DLLM"), self._number("DHLM")
         there = self._number("DRBV") + margin
-        return not (low == high == 0.0) and (there > high if velocity > 0.0 else there < low)
+        return self._has_limits and (there > self._number("DHLM") if velocity > 0.0 else there < self._number("DLLM"))
 
     async def _look_after_jog(self) -> None:
         if self._jog is None:

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from caproto import AlarmSeverity, AlarmStatus
+import math
+import time
 
 from steptwin.datasheet import Limits
 from steptwin.errors import Misuse
-from steptwin.gateways.epics.channels import (
+from steptwin.gateways.epics.controller import EpicsController
+from steptwin.gateways.epics.records import (
     DEFAULT_FIELD,
     LOST,
     NO_ALARM,
     NOT_KNOWN,
+    TOO_LARGE,
+    FieldQuantity,
     FieldRow,
     FieldType,
     FieldValue,
     Putter,
-    RecordAlarm,
     RecordBase,
 )
-from steptwin.gateways.epics.controller import EpicsController
 from steptwin.gateways.methods import MethodRow
 from steptwin.gateways.points import GatewayPoint, PointType
 from steptwin.gateways.sampling import Sample
@@ -38,7 +40,6 @@ _RECORD_TYPES = {
     PointType.TEXT: ("stringin", "stringout"),
 }
 """Read only, and writable."""
-TOO_LARGE = RecordAlarm(AlarmStatus.HIGH, AlarmSeverity.INVALID_ALARM)
 OFF_ON = ("0", "1")
 
 
@@ -64,7 +65,7 @@ class PointRecord(RecordBase):
             type=_TYPES[point.type],
             is_writable=point.write is not None,
             states=OFF_ON,
-            has_unit=True,
+            quantity=FieldQuantity.VALUE,
         )
         texts = {
             "NAME": name,
@@ -73,16 +74,14 @@ class PointRecord(RecordBase):
             "RTYP": _RECORD_TYPES[point.type][point.write is not None],
         }
         self._fields = {DEFAULT_FIELD: row} | {text: _text(text, "") for text in texts}
-        self._values: dict[str, FieldValue] = {text: value[:39] for text, value in texts.items()}
+        self._values: dict[str, FieldValue] = dict(texts)
         self._values[DEFAULT_FIELD] = "" if point.type is PointType.TEXT else 0
 
-    @property
-    def unit(self) -> str:
-        return self._point.unit
+    def unit_of(self, row: FieldRow) -> str:
+        return self._point.unit if row.quantity is FieldQuantity.VALUE else ""
 
-    @property
-    def limits(self) -> Limits | None:
-        return self._point.limits
+    def limits_of(self, row: FieldRow) -> Limits | None:
+        return self._point.limits if row.quantity is FieldQuantity.VALUE else None
 
     def field(self, name: str) -> FieldRow | None:
         return self._fields.get(name)
@@ -110,11 +109,13 @@ class PointRecord(RecordBase):
     async def put(self, who: Putter, name: str, value: FieldValue) -> None:
         if self._point.write is None or isinstance(value, str):
             raise Misuse(f"{self._values['NAME']} cannot be written")
+        if not math.isfinite(value):
+            raise Misuse(f"{self._values['NAME']}: {value}: expected a number")
         limits = self._point.limits
         if limits is not None:
             is_low = limits.low is not None and (value <= limits.low if limits.is_low_excluded else value < limits.low)
-            if is_low or value != value or (limits.high is not None and value > limits.high):  # noqa: PLR0124  NaN
-                raise Misuse(f"{self._values['NAME']}: {value:g} {self.unit}: permitted are {limits.low} to {limits.high}")
+            if is_low or (limits.high is not None and value > limits.high):
+                raise Misuse(f"{self._values['NAME']}: {value:g} {self._point.unit}: permitted are {_range(limits)}")
         await self._controller.do(who, self._point.write(float(value)))
         await self._controller.refresh()
 
@@ -125,23 +126,36 @@ class PointRecord(RecordBase):
         pass
 
 
+def _range(limits: Limits) -> str:
+    if limits.low is None:
+        return f"numbers up to {limits.high:g}"
+    above = "above " * limits.is_low_excluded
+    if limits.high is None:
+        return f"numbers {above or 'from '}{limits.low:g}"
+    return f"{above}{limits.low:g} to {limits.high:g}"
+
+
 class CommandRecord(RecordBase):
     """The record ``name`` of a command of ``controller``: a put of 1 does it, and it is 0 again then. Satisfies `Record`."""
 
     precision = 0
-    unit = ""
-    limits = None
     alarm = NO_ALARM
-    at_s = 0.0
 
     def __init__(self, name: str, row: MethodRow, controller: EpicsController) -> None:
         super().__init__()
+        self.at_s = time.time()
         self._row = row
         self._controller = controller
         self._field = FieldRow(
             name=DEFAULT_FIELD, meaning=row.meaning, type=FieldType.STATES, is_writable=True, states=("Done", "Do")
         )
-        self._texts = {"NAME": name[:39], "DESC": row.meaning[:39], "RTYP": "bo"}
+        self._texts = {"NAME": name, "DESC": row.meaning, "RTYP": "bo"}
+
+    def unit_of(self, row: FieldRow) -> str:
+        return ""
+
+    def limits_of(self, row: FieldRow) -> Limits | None:
+        return None
 
     def field(self, name: str) -> FieldRow | None:
         return self._field if name == DEFAULT_FIELD else _text(name, "") if name in self._texts else None
@@ -151,6 +165,7 @@ class CommandRecord(RecordBase):
 
     async def put(self, who: Putter, name: str, value: FieldValue) -> None:
         if value:
+            self.at_s = time.time()
             await self._controller.do(who, self._row.make(self._controller.name, None))
             await self._controller.refresh()
 

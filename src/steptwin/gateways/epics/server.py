@@ -7,18 +7,64 @@ import functools
 import logging
 import socket
 from collections.abc import Callable, Coroutine
-from typing import Any
+from typing import Any, NoReturn
 
-from caproto.asyncio.server import Context
+from caproto import ErrorResponse, WriteNotifyResponse
+from caproto.asyncio.server import Context, VirtualCircuit
 from caproto.asyncio.utils import _DatagramProtocol, _TransportWrapper, _UdpTransportWrapper
+from caproto.server.common import DisconnectedCircuit
 
 from steptwin.errors import LineFailure
 from steptwin.gateways.epics.channels import PvDatabase
 from steptwin.system import reason
 from steptwin.world.addresses import Address
 
+MONITORS_S = 1.0
+"""How long an answer waits for monitors, which a client that does not read can hold up."""
 ATTEMPTS = 20
 """For a free port that TCP and UDP have alike."""
+
+
+class _Circuit(VirtualCircuit):
+    """A connection. The answer to a put is behind the monitors of its end: who learns that it is over has seen them.
+
+    The library collects monitors for 10 ms, and answers at once.
+    """
+
+    async def subscription_queue_loop(self) -> None:
+        """Send what has been published together, without waiting for more."""
+        self.events_on.set()
+        queue = self.subscription_queue
+        try:
+            while True:
+                found = [await queue.get()]
+                while not queue.empty():
+                    found.append(queue.get_nowait())
+                wanted = {sub.subscriptionid for subs in self.subscriptions.values() for sub in subs}
+                # What a slow client has not taken in time is None: newer values follow.
+                commands = [command for command in (one() for one in found) if command is not None]
+                await super().send(*(command for command in commands if command.subscriptionid in wanted))
+                for _ in found:
+                    queue.task_done()
+        except DisconnectedCircuit:
+            await self._on_disconnect()
+            self.circuit.disconnect()
+            await self.context.circuit_disconnected(self)
+
+    async def send(self, *commands: Any) -> None:
+        if any(isinstance(command, WriteNotifyResponse | ErrorResponse) for command in commands):
+            published = asyncio.ensure_future(self._published())
+            either = [published] if self._sub_task is None else [published, self._sub_task]
+            try:
+                await asyncio.wait(either, timeout=MONITORS_S, return_when=asyncio.FIRST_COMPLETED)
+            finally:
+                published.cancel()
+        await super().send(*commands)
+
+    async def _published(self) -> None:
+        """All that has been published is sent."""
+        await self.context.subscription_queue.join()
+        await self.subscription_queue.join()
 
 
 class ChannelAccessServer(Context):
@@ -26,6 +72,8 @@ class ChannelAccessServer(Context):
 
     ``on_leave`` is called with the address of a client whose connection has ended.
     """
+
+    CircuitClass = _Circuit
 
     def __init__(self, database: PvDatabase, address: Address, beacons: Address, on_leave: Callable[[object], None]) -> None:
         logger = logging.getLogger("caproto")
@@ -83,6 +131,11 @@ class ChannelAccessServer(Context):
     async def circuit_disconnected(self, circuit: Any) -> None:
         await super().circuit_disconnected(circuit)
         self._on_leave(circuit.circuit.address)
+
+    async def subscription_queue_loop(self) -> NoReturn:
+        while True:
+            await self._subscription_queue_iteration(*await self.subscription_queue.get())
+            self.subscription_queue.task_done()
 
     @property
     def has_clients(self) -> bool:
