@@ -138,6 +138,9 @@ class _Builder:
                         self.spec.text.unless_wrong(spec.path, partial(element.connect, spec, part, self.site))
         if not self.spec.text.findings:
             self.site.close_circuits()
+            for number, kernel in enumerate(self.parts.kernels):
+                if order := self.blueprint.once(("order", number), kernel.order):
+                    kernel.arrange(order)
 
     def _element(self, element: AnyElement, spec: ElementSpec) -> Any:
         """The built element; None if it has errors."""

@@ -6,7 +6,7 @@ advanced only when an event concerns it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple, Protocol
 
@@ -14,6 +14,7 @@ from steptwin.errors import Misuse, Runaway, TimeReversal
 from steptwin.machine import Drive, Fact, MotionController, Nanos, PinEdge
 from steptwin.state import Plain
 from steptwin.world.board import Board
+from steptwin.world.order import successors, update_order
 from steptwin.world.recordedplans import RecordedPlans
 from steptwin.world.trace import RecordSink, TraceRecord
 from steptwin.world.turns import Dues, Turns
@@ -109,6 +110,8 @@ class Kernel:
         """The machines, and the lines and elements with a part that computes their signals."""
         self._part_names: list[str | None] = []
         """The line or element whose signals each part computes."""
+        self._drives: dict[int, str] = {}
+        """The machine or element whose input a part drives."""
         self._watching_all: list[int] = []
         self._machine_turns, self._part_turns = Turns(), Turns()
         """What has to be looked at when the signals settle."""
@@ -157,15 +160,20 @@ class Kernel:
         """Add the terminals of an element, whose part has their state."""
         self.boards[board.name] = board
 
-    def add_part(self, part: KernelPart, watches: Iterable[str] | None = None, name: str | None = None) -> None:
+    def add_part(
+        self, part: KernelPart, watches: Iterable[str] | None = None, name: str | None = None, drives: str | None = None
+    ) -> None:
         """Add a part; it is first updated when the signals settle next, then whenever it is due or something that it watches has
         changed.
 
         ``watches``: names of machines, lines and elements; None: every change. ``name``: the line or element whose signals it
-        computes; they may change with each of its updates, and only then.
+        computes; they may change with each of its updates, and only then. ``drives``: the machine or element whose input
+        it drives.
         """
         self._join()
         number = len(self.parts)
+        if drives is not None:
+            self._drives[number] = drives
         self.parts.append(part)
         self._part_names.append(name)
         if name is not None:
@@ -180,6 +188,19 @@ class Kernel:
         self.stale = True
         if self.on_change is not None:
             self.on_change(self)
+
+    def order(self) -> Sequence[int]:
+        """The numbers of its parts in the order in which they should be updated (`arrange`); empty if they are in that order."""
+        found = update_order(successors(self._part_names, self._watching, self._drives, self.wires), self._watching_all)
+        return () if found == sorted(found) else found
+
+    def arrange(self, order: Sequence[int]) -> None:
+        """Update its parts in another order from now on, before the first moment. ``order``: their present numbers."""
+        new = {old: number for number, old in enumerate(order)}
+        self.parts = [self.parts[old] for old in order]
+        self._part_names = [self._part_names[old] for old in order]
+        self._watching = {name: [new[old] for old in those] for name, those in self._watching.items()}
+        self._watching_all = [new[old] for old in self._watching_all]
 
     def source(self, name: str) -> Source:
         """The machine, line or element ``name`` as what a value depends on."""

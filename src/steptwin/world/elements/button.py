@@ -47,7 +47,7 @@ def _build(spec: ButtonSpec, site: Site) -> tuple[Button, Kernel]:
         lane=spec.name,
     )
     button.rest_at(spec.contact == "NC")
-    kernel.add_part(button, (circuit.target.machine,), spec.name)
+    kernel.add_part(button, (circuit.target.machine,), spec.name, circuit.target.machine)
     return button, kernel
 
 

@@ -390,7 +390,8 @@ def _put_sensors(spec: ConveyorSpec, conveyor: Conveyor, site: Site) -> None:
 def _put_sensor(conveyor: Conveyor, spec: SensorSpec, lane: str, site: Site) -> None:
     kernel = conveyor.board.kernel
     circuit = site.circuit(kernel, spec.target, (*spec.path, "to"), spec.join)
-    kernel.add_part(Sensor(circuit, conveyor, spec, site.bounce_of(circuit), lane), (conveyor.board.name,))
+    sensor = Sensor(circuit, conveyor, spec, site.bounce_of(circuit), lane)
+    kernel.add_part(sensor, (conveyor.board.name,), drives=circuit.target.machine)
 
 
 def _place_names(spec: ConveyorSpec) -> tuple[str, ...]:

@@ -117,7 +117,7 @@ def put_switch(
         chance=site.bounce_of(circuit),
         lane=lane,
     )
-    kernel.add_part(part, (moved_by,) if isinstance(moved_by, str) else moved_by)
+    kernel.add_part(part, (moved_by,) if isinstance(moved_by, str) else moved_by, drives=circuit.target.machine)
 
 
 def zone_of(spec: SwitchSpec, places: Callable[[float], int], period: Fraction | int | None = None) -> Zone:
