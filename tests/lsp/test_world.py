@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -14,6 +16,7 @@ from steptwin.errors import Misuse
 from steptwin.lsp import navigation
 from steptwin.lsp.analysis import Analysis
 from steptwin.lsp.session import EditorSession
+from steptwin.world.tables import all_keys
 
 URI = "file:///m/cell.toml"
 PROGRAM_URI = "file:///m/a.prg"
@@ -178,12 +181,51 @@ def test_signals_are_completed_where_conditions_and_steps_name_them() -> None:
     assert "within" not in items(script + 'until = "x.position > 1", ')  # a key follows, no signal
 
 
+CYLINDER = '\n[[cylinder]]\nname = "ram"\nstroke = 50.0\nextend_time = "1 s"\nextend = "table.OUT1"\n'
+
+
+def test_signals_of_elements_are_completed_while_other_tables_are_wrong() -> None:
+    wrong = WORLD + CYLINDER + "\n[[script]]\nname = 5\nsteps = [\n{ until = '"
+    made = session(wrong)
+    assert {"ram", "start"} <= set(items(wrong, made))
+    for typed, signals in {"ram.": ["extend", "extended", "retracted", "position"], "start.": ["pressed"]}.items():
+        made.open(URI, "", 2, wrong + typed)
+        assert items(wrong + typed, made) == [f"{typed}{signal}" for signal in signals]
+    load = WORLD + CYLINDER + "\n[[load]]\nname = 'part'\naxis = 'x'\nwhen = 'ram.posi"
+    assert "ram.position" in items(load)
+    broken = wrong.replace("stroke = 50.0", "stroke = ") + "ram."
+    made.open(URI, "", 3, broken)
+    assert "ram.position" in items(broken, made)
+
+
+def test_signals_of_elements_in_used_files_are_completed() -> None:
+    text = '[[mic488]]\nname = "table"\n[[use]]\nfile = "part.toml"\nname = "left"\n[[event]]\nwhen = "'
+    part = '[parameters]\n[[button]]\nname = "go"\nto = "table.IN1"\n'
+    assert "left_go" in items(text, session(text, part_toml=part))
+    assert items(text + "left_go.", session(text + "left_go.", part_toml=part)) == ["left_go.pressed"]
+
+
+_STOP = re.compile(r"""\$\{\d+\|(\w+)[^}]*\}|\$\{\d+:(\w+)\}|(?<=")\$\d(?=")|\$[1-9]""")
+"""Of a snippet, with the first word or the default of it."""
+
+
+def test_every_snippet_of_a_table_has_the_keys_that_it_needs() -> None:
+    found = [item for item in of(session(WORLD + "\n[")).items(len(WORLD) + 2).items if item.is_snippet]
+    assert len(found) > 40
+    for item in found:
+        text = _STOP.sub(lambda stop: stop[1] or stop[2] or "1", item.insert).removesuffix("$0")
+        assert tomllib.loads(text), item
+        keys = {line.partition(" = ")[0] for line in text.splitlines()[1:]}
+        name = item.label.strip("[]").rpartition(".")[2]
+        assert {key.name for key in all_keys().get(name, ()) if key.is_required} <= keys, item.label
+
+
 def test_hovers_of_signals() -> None:
     analysis = of(session())
     for mark, text in {
         "M1_EN": "`table.M1_EN`: ",
         "M1.status ==": "5 = position error",
-        "position > 10": None,
+        "position > 10": "`x.position`: position of the axis x. Unit: mm.",
     }.items():
         found = analysis.hover(WORLD.index(mark))
         assert (found is None) if text is None else (found is not None and text in found.text), (mark, found)

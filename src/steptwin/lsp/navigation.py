@@ -116,7 +116,7 @@ def fixes(session: EditorSession, uri: str, span: Span) -> list[CodeAction]:
 def _title(diagnostic: Diagnostic, old: str, new: str) -> str:
     shown = new.strip()
     if not shown:
-        title = "Start a new line" if "\n" in new else f"Remove {old.strip()}" if not new else "Write a blank"
+        title = "Start a new line" if "\n" in new else f"Remove {old.strip() or 'the empty line'}" if not new else "Write a blank"
     else:
         title = f"Write {shown}" if not old.strip() else f"Replace {old.strip()} by {shown}"
     return f"{title.splitlines()[0][:100]} ({diagnostic.code})"

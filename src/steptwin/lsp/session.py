@@ -23,6 +23,7 @@ from steptwin.lsp.toolong import TooLong
 from steptwin.lsp.wbc.analysis import WbcAnalysis
 from steptwin.lsp.wbc.surroundings import ProgramContext
 from steptwin.lsp.world.analysis import WorldAnalysis
+from steptwin.lsp.world.built import ElementSignals
 from steptwin.m1486.lines import STEP_DIRECTION
 from steptwin.m1486.variants import DEFAULT as DEFAULT_VARIANT
 from steptwin.mic488.config import ControllerConfig, examine_config
@@ -62,6 +63,7 @@ class EditorSession:
         self._analysed: dict[str, _Analysed] = {}
         self._outside: dict[str, tuple[object, LineIndex | None]] = {}
         self._kept: dict[str, _Kept] = {}
+        self._elements: dict[str, ElementSignals] = {}
         self._worlds: list[str] | None = None
         self._beside: dict[tuple[str, str], str | None] = {}
 
@@ -79,7 +81,7 @@ class EditorSession:
         self._documents[normal(uri)] = document.changed(version, changes, self.encoding)
 
     def close(self, uri: str) -> None:
-        for kept in (self._documents, self._edited, self._analysed):
+        for kept in (self._documents, self._edited, self._analysed, self._elements):
             kept.pop(normal(uri), None)
         self.refresh()
 
@@ -172,7 +174,7 @@ class EditorSession:
             case Language.POSITIONS:
                 return TableAnalysis(uri, lines, self._used_rows(uri))
             case Language.WORLD:
-                return WorldAnalysis(uri, lines, _Around(self))
+                return WorldAnalysis(uri, lines, _Around(self), self._elements.setdefault(uri, ElementSignals()))
 
     # -- the files of a machine
 

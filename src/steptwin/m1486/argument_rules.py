@@ -84,7 +84,17 @@ def _out_of_range(command: ChipCommand, number: int, variant: Variant) -> Diagno
         hint = f"{_lines_reached(number)}; {hint}"
     elif number == 0 and key in _INSTEAD_OF_ZERO:
         fix = Fix(command.span, _INSTEAD_OF_ZERO[key])
+    elif kind is ArgType.NUMBER:
+        fix = _nearest(command, number, variant)
     return findings.OUT_OF_RANGE(command.argument_span, f"{subject} is out of range", hint, fix)
+
+
+def _nearest(command: ChipCommand, number: int, variant: Variant) -> Fix | None:
+    """The end of the range that a number is beyond."""
+    permitted = rows(command.key)[0].permitted(variant)
+    if len(rows(command.key)) > 1 or not isinstance(permitted, range):
+        return None
+    return Fix(command.argument_span, str(permitted[0] if number < permitted[0] else permitted[-1]))
 
 
 def _lines_reached(number: int) -> str:

@@ -246,7 +246,8 @@ def _labels(stream: CommandStream, flow: FlowAnalysis) -> Iterator[Diagnostic]:
         for _, group in groupby(places, lambda at: (stream.in_file[at], stream.resets[at])):
             first, *others = group
             if used.isdisjoint((first, *others)):
-                yield findings.LABEL_UNUSED(stream.commands[first].span, f"nothing jumps to label {label}")
+                span = stream.commands[first].span
+                yield findings.LABEL_UNUSED(span, f"nothing jumps to label {label}", None, Fix(span, ""))
                 continue
             for later in others:
                 message = f"label {label} is given a second time"
@@ -283,5 +284,7 @@ def _shared_registers(stream: CommandStream, flow: FlowAnalysis, variant: Varian
         if moves or operates:
             message = f"on {variant.title} the registers lie in the last {variant.shared_bits} bits of the command memory"
             hint = f"safe with \\ as the first command and at most {limit} bits; these are {stream.bits} bits"
-            yield findings.REGISTERS_SHARED(command.span, message, hint)
+            first = stream.commands[0].span.start
+            fix = Fix(Span(first, first), "\\\n") if stream.bits <= limit else None
+            yield findings.REGISTERS_SHARED(command.span, message, hint, fix)
             return

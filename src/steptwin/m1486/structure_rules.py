@@ -64,9 +64,11 @@ def _overwritten(stream: CommandStream, index: int, target: int, variant: Varian
 
 def _brackets(stream: CommandStream) -> Iterator[Diagnostic]:
     for index in stream.nested_opens:
-        yield findings.FILE_IN_FILE(stream.commands[index].span, "[ inside [ ]", "close the first file with ]")
+        span = stream.commands[index].span
+        yield findings.FILE_IN_FILE(span, "[ inside [ ]", "close the first file with ]", Fix(span, ""))
     for index in stream.lone_closes:
-        yield findings.FILE_NOT_OPEN(stream.commands[index].span, "] without [", "[ begins what ] runs")
+        span = stream.commands[index].span
+        yield findings.FILE_NOT_OPEN(span, "] without [", "[ begins what ] runs", Fix(span, ""))
     for file in stream.files:
         if file.closes is None:
             end = stream.commands[-1].span.end
@@ -107,7 +109,8 @@ def _loops(stream: CommandStream, variant: Variant) -> Iterator[Diagnostic]:
     for index in stream.open_loops:
         yield findings.LOOP_OPEN(stream.commands[index].span, "L without E", "E ends what L repeats")
     for index in stream.lone_ends:
-        yield findings.LOOP_END_ALONE(stream.commands[index].span, "E without L", "L begins what E ends")
+        span = stream.commands[index].span
+        yield findings.LOOP_END_ALONE(span, "E without L", "L begins what E ends", Fix(span, ""))
     for index, depth in stream.depth.items():
         if depth > LOOP_LEVELS:
             hint = f"at most {LOOP_LEVELS} levels"

@@ -280,10 +280,19 @@ def _no_other_notation(reader: _LineReader, key: str, start: int) -> None:
         return
     if not has_digits and rest[0] in "+-":
         hint = "F moves in positive, B in negative direction" if key in "FB" else "numbers have no sign"
-        reader.give_up(findings.BAD_ARGUMENT, span, f"{rest} has a sign", hint)
+        reader.give_up(findings.BAD_ARGUMENT, span, f"{rest} has a sign", hint, _without_sign(reader, key, start))
     if has_digits and rest[0] in ".,":
         number = reader.chars[start:]
         reader.give_up(findings.BAD_ARGUMENT, reader.span(start, len(reader.chars)), f"{number} is not a whole number")
+
+
+def _without_sign(reader: _LineReader, key: str, start: int) -> Fix | None:
+    """F-640 is B640. A negative number of another command has no such form, and neither has what is more than a number."""
+    sign, digits = reader.chars[start], reader.chars[start + 1 :]
+    if not digits.isdecimal() or (sign == "-" and key not in "FB"):
+        return None
+    other = {"F": "B", "B": "F"}[key] if sign == "-" else key
+    return Fix(reader.span(start - len(key), len(reader.chars)), f"{other}{digits}")
 
 
 def _condition(reader: _LineReader) -> tuple[JumpCondition, int]:

@@ -168,6 +168,16 @@ class ConfigKey:
     def permits(self, value: float) -> bool:
         return value in self.permitted and (not self.choices or value in self.choices)
 
+    def nearest(self, value: float) -> str | None:
+        """The permitted number nearest to one; None where numbers have meanings, or no number is the nearest."""
+        if any(self.choices.values()):
+            return None
+        if self.choices:
+            return f"{min(self.choices, key=lambda choice: abs(choice - value))}"
+        low, high = self.permitted.low, self.permitted.high
+        found = value if self.permits(value) else low if low is not None and value <= low else high
+        return None if found is None or not self.permits(found) else f"{found:.10g}"
+
     @property
     def hint(self) -> str:
         if self.note:
@@ -313,17 +323,22 @@ class _ConfigReader:
 
     def _value(self, entry: IniEntry, key: ConfigKey) -> float | None:
         if not _NUMBER.match(entry.value):
-            return self._refuse("C006", entry, key, "is not a number" if entry.value else "has no value")
+            joined = "".join(entry.value.split())
+            is_number = _NUMBER.match(joined) is not None and key.permits(float(joined.replace(",", ".")))
+            why = "is not a number" if entry.value else "has no value"
+            return self._refuse("C006", entry, key, why, joined if is_number else None)
         value = float(entry.value.replace(",", "."))
         if key.whole and not value.is_integer():
-            return self._refuse("C007", entry, key, "is not a whole number")
+            return self._refuse("C007", entry, key, "is not a whole number", key.nearest(round(value)))
         if not key.permits(value):
-            return self._refuse("C008", entry, key, "is not permitted")
+            return self._refuse("C008", entry, key, "is not permitted", key.nearest(value))
         return int(value) if key.whole else value
 
-    def _refuse(self, code: str, entry: IniEntry, key: ConfigKey, why: str) -> None:
+    def _refuse(self, code: str, entry: IniEntry, key: ConfigKey, why: str, meant: str | None) -> None:
+        """``meant``: the value that takes its place."""
         message = f"[{entry.section}] {entry.key} = {entry.value} {why}"
-        self.findings.append(Diagnostic(code, Severity.ERROR, entry.value_span, message, key.hint))
+        fix = None if meant is None else Fix(entry.value_span, meant)
+        self.findings.append(Diagnostic(code, Severity.ERROR, entry.value_span, message, key.hint, fix))
 
     def has_known_section(self) -> bool:
         known = {section.lower() for section in self._known}

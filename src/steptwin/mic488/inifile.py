@@ -174,7 +174,8 @@ def _read(source: SourceText, encoding: str) -> IniFile:
         elif (entry := _entry(line, start, headers[-1].section if headers else None)) is not None:
             entries.append(entry)
         elif headers or "=" not in line:
-            find("C001", Severity.WARNING, span, f"{stripped!r} has no effect", "permitted: [section], key=value, ; comment")
+            hint, fix = "permitted: [section], key=value, ; comment", Fix(Span(span.start, span.start), "; ")
+            find("C001", Severity.WARNING, span, f"{stripped!r} has no effect", hint, fix)
         else:
             find("C001", Severity.WARNING, span, f"{stripped!r} is before the first [section] and has no effect")
     findings += _repeated(headers, entries)
@@ -205,5 +206,6 @@ def _repeated(headers: list[Header], entries: list[IniEntry]) -> Iterator[Diagno
         name = (entry.section.lower(), entry.key.lower())
         if name in keys:
             message = f"[{entry.section}] {entry.key} is repeated; the first one counts"
-            yield Diagnostic("C003", Severity.WARNING, entry.key_span, message)
+            fix = Fix(Span(entry.key_span.start, entry.key_span.start), "; ")
+            yield Diagnostic("C003", Severity.WARNING, entry.key_span, message, fix=fix)
         keys.add(name)

@@ -66,7 +66,7 @@ class BlockMatcher:
     def _continue(self, keyword: str, step: int, place: Spanned) -> None:
         finding, opening = _NOT_OPENED[keyword]
         if not self._open[opening]:
-            self._diagnostics.append(finding.at(place, f"{keyword} without {opening}", f"no {opening} is open here"))
+            self._diagnostics.append(finding.at(place, f"{keyword} without {opening}", f"no {opening} is open here", ""))
             return
         while self._stack[-1][0] != opening:
             self._abandon()

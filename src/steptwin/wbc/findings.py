@@ -31,10 +31,20 @@ class ProgramFinding:
     def severity(self) -> Severity:
         return Severity.ERROR if self.code.startswith("W1") else Severity.WARNING
 
-    def at(self, place: Spanned, message: str, hint: str | None = None, fix: str | None = None) -> Diagnostic:
-        """The message for one place; ``fix`` is the text that replaces it."""
+    def at(self, place: Spanned, message: str, hint: str | None = None, fix: str | Fix | None = None) -> Diagnostic:
+        """The message for one place; ``fix`` is the text that replaces it, or a replacement elsewhere."""
         span = Span(place.start, place.end)
-        return Diagnostic(self.code, self.severity, span, message, hint, None if fix is None else Fix(span, fix))
+        return Diagnostic(self.code, self.severity, span, message, hint, Fix(span, fix) if isinstance(fix, str) else fix)
+
+
+def before(place: Spanned, text: str) -> Fix:
+    """Insert ``text`` before a place."""
+    return Fix(Span(place.start, place.start), text)
+
+
+def after(place: Spanned, text: str) -> Fix:
+    """Insert ``text`` after a place."""
+    return Fix(Span(place.end, place.end), text)
 
 
 FINDINGS: dict[str, ProgramFinding] = {}

@@ -75,7 +75,9 @@ def interrupt_ends(flow: ControlFlow, executable: s.Executable) -> list[Diagnost
         falls = any(step is None or isinstance(step, s.InterruptStep) for step in ends)
         if falls or not any(isinstance(step, s.JumpStep | s.EndStep | s.ProgResetStep) for step in ends):
             message = f"the interrupt label of {event.name} has no RETURN"
-            found.append(f.NO_RETURN.at(place, message, "end it with RETURN, or leave it by JUMP"))
+            beyond = [number for number in numbers if number == len(steps) or isinstance(steps[number], s.InterruptStep)]
+            fix = f.after(steps[min(beyond) - 1], "\nRETURN") if beyond else None
+            found.append(f.NO_RETURN.at(place, message, "end it with RETURN, or leave it by JUMP", fix))
         else:
             message = f"every path from the interrupt label of {event.name} leaves without RETURN"
             found.append(f.LEFT_BY_JUMP.at(place, message, "the interrupted line is not continued"))

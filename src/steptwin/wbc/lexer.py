@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from typing import NamedTuple
 
 NUMBER = 1
@@ -18,6 +19,9 @@ STRANGE = 7
 
 BLANKS = " \t\v\f"
 """Characters that separate words. Other white space, such as a no-break space, is a strange character."""
+
+
+_LETTERS_WITH_STROKES = str.maketrans("łŁøØđĐ", "lLoOdD")
 
 
 class Lexeme(NamedTuple):
@@ -50,6 +54,14 @@ def tokens(text: str, offset: int) -> list[Lexeme]:
         Lexeme(match.lastindex or STRANGE, match[0], match.start() + offset, match.end() + offset)
         for match in _TOKEN.finditer(text)
     ]
+
+
+def plain_name(text: str) -> str | None:
+    """A name as WBC writes it: without accents and ``$``, with ``_`` for other signs. None if a letter has no such form."""
+    plain = unicodedata.normalize("NFKD", text.removeprefix("$").translate(_LETTERS_WITH_STROKES))
+    letters = "".join(char for char in plain if not unicodedata.combining(char))
+    found = "".join(char if char.isalnum() else "_" for char in letters)
+    return found if is_name(found) and found.strip("_") else None
 
 
 def is_name(text: str) -> bool:

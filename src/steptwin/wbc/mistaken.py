@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping
 
-from steptwin.diagnostics import Diagnostic
+from steptwin.diagnostics import Diagnostic, Fix, Span
 from steptwin.wbc import findings as f
 from steptwin.wbc import steps as s
 from steptwin.wbc.dialect import Dialect
@@ -59,11 +59,22 @@ def unused_variables(executable: s.Executable, scope: ProgramScope, dialect: Dia
         if index not in read:
             meant = register_meant(name.key, dialect) or scope.nearest_register(name.text)
             hint = f"remove it, or did you mean {meant or 'a register'}?"
-            found.append(f.NEVER_USED.at(name, f"{name.text} is set but never used", hint, fix=meant))
+            fix = meant or _removed(executable, index)
+            found.append(f.NEVER_USED.at(name, f"{name.text} is set but never used", hint, fix))
         elif (meant := register_meant(name.key, dialect, _CERTAIN)) is not None:
             message = f"{name.text} is a variable: it has nothing to do with {meant}"
             found.append(f.LIKE_A_REGISTER.at(name, message, f"did you mean {meant}?", fix=meant))
     return found
+
+
+def _removed(executable: s.Executable, index: int) -> Fix | None:
+    """The removal of the statement that sets a variable, if it is the only one."""
+    sets = [step for step in executable.steps if isinstance(step, s.SetStep) and _is_variable(step.target, index)]
+    return Fix(Span(sets[0].start, sets[0].end), "") if len(sets) == 1 else None
+
+
+def _is_variable(target: object, index: int) -> bool:
+    return isinstance(target, s.Variable) and target.index == index
 
 
 def waits_for_variables(executable: s.Executable, dialect: Dialect) -> list[Diagnostic]:

@@ -80,7 +80,9 @@ class _Outliner:
                 assigned.setdefault(statement.target.key, statement.target)
         result.writes_row_0 = any(self._scope.family(name) in ROW_0 for name in assigned.values())
         if last is not None:
-            self._report(f.LABEL_AT_END.at(last.name, f"nothing follows the label {last.name.text}", "put an END after it"))
+            end = "RETURN" if last.name.key in BY_LABEL else "END"
+            message = f"nothing follows the label {last.name.text}"
+            self._report(f.LABEL_AT_END.at(last.name, message, f"put {end} after it", f.after(last, f"\n{end}")))
         self._check_length()
         result.blocks = self._matcher.finish()
         return result

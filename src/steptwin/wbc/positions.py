@@ -11,11 +11,11 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from steptwin.diagnostics import Diagnostic, Span, split_lines
+from steptwin.diagnostics import Diagnostic, Fix, Span, split_lines
 from steptwin.errors import Misuse
 from steptwin.wbc import findings as f
 from steptwin.wbc.dialect import MAX_POSITIONS
-from steptwin.wbc.lexer import is_name
+from steptwin.wbc.lexer import is_name, plain_name
 from steptwin.wbc.registers import REAL_MAX
 
 PARAMETERS = 4
@@ -110,10 +110,10 @@ def parse_positions(text: str) -> tuple[PositionTable, list[Diagnostic]]:
         span = Span(start, start + len(content))
         start += len(line) + len(end)
         if not content:
-            blanks.append(span)
+            blanks.append(Span(span.start, start))
             continue
         hint = "remove it: rows are counted by lines"
-        diagnostics += [f.TABLE_BLANK.at(blank, "an empty line", hint) for blank in blanks]
+        diagnostics += [f.TABLE_BLANK.at(blank, "an empty line", hint, Fix(blank, "")) for blank in blanks]
         blanks.clear()
         row = _row(content, span, diagnostics)
         key = row.name.upper()
@@ -147,7 +147,8 @@ def _row(content: str, span: Span, diagnostics: list[Diagnostic]) -> PositionRow
     name = cells[0].strip()
     if name and not is_name(name):
         hint = "names have letters without accents, digits and _, and do not begin with a digit"
-        diagnostics.append(f.TABLE_NAME.at(_cell(span.start, content), f"{name!r} cannot be written after @", hint))
+        place = _cell(span.start, content)
+        diagnostics.append(f.TABLE_NAME.at(place, f"{name!r} cannot be written after @", hint, plain_name(name)))
     values: list[float | None] = []
     at = span.start + len(cells[0]) + 1
     for number, cell in enumerate(cells[1 : PARAMETERS + 1], 1):
@@ -164,7 +165,9 @@ def _value(cell: str, number: int, span: Span, diagnostics: list[Diagnostic]) ->
     hint = "write a number like 20, -70, 20.5 or 20,5, or x to leave the axis alone"
     if not _NUMBER.match(text):
         found = repr(text) if text else "nothing"
-        diagnostics.append(f.TABLE_NUMBER.at(span, f"p{number} is {found}, neither a number nor x", hint))
+        joined = "".join(text.split())
+        fix = joined if _NUMBER.match(joined) else None if text else _LEFT_ALONE
+        diagnostics.append(f.TABLE_NUMBER.at(span, f"p{number} is {found}, neither a number nor x", hint, fix))
         return None
     value = float(text.replace(",", "."))
     if abs(value) > REAL_MAX:

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import re
 
-from steptwin.diagnostics import Diagnostic
+from steptwin.diagnostics import Diagnostic, Fix, Span
 from steptwin.nearmiss import NearMiss
 from steptwin.wbc import findings as f
 from steptwin.wbc.findings import ProgramFinding
 from steptwin.wbc.foreign_words import DECLARATIONS, ELSE_IF, INSTEAD
-from steptwin.wbc.lexer import COMPARISON, NUMBER, OPERATOR, STRANGE, WORD, WRONG_NUMBER, Lexeme, is_name
+from steptwin.wbc.lexer import COMPARISON, NUMBER, OPERATOR, STRANGE, WORD, WRONG_NUMBER, Lexeme, is_name, plain_name
 from steptwin.wbc.registers import parts
 from steptwin.wbc.statements import (
     COMPARISONS,
@@ -149,10 +149,10 @@ class StatementReader:
         if equals is None or equals.kind != COMPARISON:
             compound = equals is not None and self._at < self._last and self._tokens[self._at].text == "="
             if compound and equals is not None:
-                hint = f"write {target.text} = {target.text} {equals.text} …"
-                raise Rejected(f.WRONG_OPERATOR.at(equals, f"there is no {equals.text}=", hint))
+                raise Rejected(_compound(target.text, equals, self._tokens[self._at]))
             place = equals or self._end()
-            raise Rejected(f.MISSING_EQUALS.at(place, f"= is missing after {target.text}", f"write {SET_USAGE}"))
+            fix = f.before(place, "= ") if equals is not None and equals.kind in (WORD, NUMBER) else None
+            raise Rejected(f.MISSING_EQUALS.at(place, f"= is missing after {target.text}", f"write {SET_USAGE}", fix))
         if equals.text != "=":
             fix = "=" if equals.text in _EQUALS_ELSEWHERE else None
             raise Rejected(f.WRONG_OPERATOR.at(equals, f"an assignment is written with =, not {equals.text}", fix=fix))
@@ -204,8 +204,9 @@ class StatementReader:
             raise self._bad_label(first)
         if self._last > 2:
             self._at = 2
+            rest = self._place_of_rest()
             raise Rejected(
-                f.TRAILING.at(self._place_of_rest(), "a label must be on a line of its own", "put this on the next line")
+                f.TRAILING.at(rest, "a label must be on a line of its own", "put this on the next line", f.before(rest, "\n"))
             )
         return Label(first.start, self._tokens[-1].end, Identifier(first.start, first.end, first.text, key))
 
@@ -214,8 +215,8 @@ class StatementReader:
         if first.text == ":":
             return Rejected(f.BAD_LABEL.at(first, "the name of the label is missing before ':'", hint))
         if first.kind == NUMBER:
-            return Rejected(f.NUMERIC_LABEL.at(first, f"{first.text} is a number, not a label", hint))
-        return Rejected(f.BAD_LABEL.at(first, f"{first.text!r} cannot be a label", hint))
+            return Rejected(f.NUMERIC_LABEL.at(first, f"{first.text} is a number, not a label", hint, _label_of(first)))
+        return Rejected(f.BAD_LABEL.at(first, f"{first.text!r} cannot be a label", hint, plain_name(first.text)))
 
     def _unknown(self, first: Lexeme, second: Lexeme | None) -> Rejected:
         """A first word that is neither a statement nor followed by =."""
@@ -227,13 +228,14 @@ class StatementReader:
             fix = "=" if second.text in _EQUALS_ELSEWHERE else None
             return Rejected(f.WRONG_OPERATOR.at(second, f"an assignment is written with =, not {second.text}", fix=fix))
         if self._tokens[-1].text == ":":
-            return Rejected(f.BAD_LABEL.at(self._place_of_all(), "a label is one word", "write it like MY_LABEL:"))
+            joined = "_".join(token.text for token in self._tokens[:-1])
+            fix = f"{joined}:" if is_name(joined) else None
+            return Rejected(f.BAD_LABEL.at(self._place_of_all(), "a label is one word", "write it like MY_LABEL:", fix))
         if parts(key) is not None and second is not None:
             hint = f"write {first.text} = {second.text}"
             return Rejected(f.MISSING_EQUALS.at(first, f"= is missing after {first.text}", hint, fix=f"{first.text} ="))
         if self._last > 2 and second is not None and second.kind == OPERATOR and self._tokens[2].text == "=":
-            hint = f"write {first.text} = {first.text} {second.text} …"
-            return Rejected(f.WRONG_OPERATOR.at(second, f"there is no {second.text}=", hint))
+            return Rejected(_compound(first.text, second, self._tokens[2]))
         meant = _STATEMENTS_ELSEWHERE.get(key)
         if meant is None and key not in INSTEAD and key not in ELSE_IF:
             meant = self._near.of(first.text, (SET, *STATEMENTS))
@@ -283,11 +285,11 @@ class StatementReader:
         if token is None:
             raise Rejected(f.MISSING_LABEL.at(self._end(), "JUMP lacks the label", "write JUMP LABEL"))
         if token.kind == NUMBER:
-            raise Rejected(
-                f.NUMERIC_LABEL.at(token, f"{token.text} is a number, not a label", "JUMP goes to a label, not to a line")
-            )
+            hint = "JUMP goes to a label, not to a line"
+            raise Rejected(f.NUMERIC_LABEL.at(token, f"{token.text} is a number, not a label", hint, _label_of(token)))
         if token.kind != WORD or not is_name(token.text):
-            raise Rejected(f.BAD_LABEL.at(token, f"{token.text!r} cannot be a label", "write JUMP LABEL"))
+            fix = plain_name(token.text)
+            raise Rejected(f.BAD_LABEL.at(token, f"{token.text!r} cannot be a label", "write JUMP LABEL", fix))
         return Identifier(token.start, token.end, token.text, token.text.upper())
 
     def _row(self, row: StatementRow) -> OperandNode:
@@ -372,7 +374,8 @@ class StatementReader:
         left, right = only.text.split(",")
         middle = only.end - len(right)
         hint = f"write {left}, {right} with a blank, or a decimal point in numbers"
-        self._diagnostics.append(f.AMBIGUOUS_COMMA.at(only, f"read as the two numbers {left} and {right}", hint))
+        message = f"read as the two numbers {left} and {right}"
+        self._diagnostics.append(f.AMBIGUOUS_COMMA.at(only, message, hint, f"{left}, {right}"))
         return [
             DecimalNumber(only.start, middle - 1, left, float(left)),
             DecimalNumber(middle, only.end, right, float(right)),
@@ -416,7 +419,8 @@ class StatementReader:
         if not is_name(text) and not _USER_REGISTER.match(text):
             strange = next((c for c in text if not (c.isascii() and (c.isalnum() or c == "_"))), text[0])
             hint = "names have letters without accents, digits and _, and do not begin with a digit"
-            raise Rejected(f.ILLEGAL_CHARACTER.at(token, f"illegal character {strange!r} in the name {text}", hint))
+            message = f"illegal character {strange!r} in the name {text}"
+            raise Rejected(f.ILLEGAL_CHARACTER.at(token, message, hint, plain_name(text)))
         return Identifier(token.start, token.end, text, text.upper())
 
     # -- tokens
@@ -432,7 +436,8 @@ class StatementReader:
         if token is not None and token.text == mark:
             return
         if token is None:
-            raise Rejected(f.TOO_FEW.at(self._end(), f"{mark} is missing", usage))
+            end = self._end()
+            raise Rejected(f.TOO_FEW.at(end, f"{mark} is missing", usage, f.after(end, ")") if mark == ")" else None))
         if token.text == ")":
             raise Rejected(f.TOO_FEW.at(token, f"{mark} is missing", usage))
         raise Rejected(f.WRONG_ARGUMENT.at(token, f"{mark} is expected before {token.text}", usage))
@@ -455,6 +460,18 @@ class _Place:
     def __init__(self, start: int, end: int) -> None:
         self.start = start
         self.end = end
+
+
+def _compound(name: str, operator: Lexeme, equals: Lexeme) -> Diagnostic:
+    """``n += 1``."""
+    text = f"{name} = {name} {operator.text}"
+    fix = Fix(Span(operator.start, equals.end), text.removeprefix(f"{name} "))
+    return f.WRONG_OPERATOR.at(operator, f"there is no {operator.text}=", f"write {text} …", fix)
+
+
+def _label_of(number: Lexeme) -> str | None:
+    """The label that is written instead of a number; the same wherever the number stands."""
+    return f"L{number.text}" if number.text.isdecimal() else None
 
 
 def _reserved_target(token: Lexeme) -> Diagnostic:

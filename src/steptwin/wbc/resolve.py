@@ -16,7 +16,7 @@ from steptwin.wbc.foreign import IF_UNKNOWN
 from steptwin.wbc.memory import StepMemory
 from steptwin.wbc.outline import outline
 from steptwin.wbc.paths import names_no_axis, row_problem
-from steptwin.wbc.positions import PositionTable, rows_text
+from steptwin.wbc.positions import PositionTable, number_text, rows_text
 from steptwin.wbc.registers import parts
 from steptwin.wbc.scope import ProgramScope
 from steptwin.wbc.statements import HALTS, MOTIONS, ROW_MOTIONS, SET, STATEMENTS
@@ -134,11 +134,13 @@ class _Resolver:
         if domain is None or domain.has(value):
             return
         place = statement.value
+        nearest = domain.low if value <= domain.low else domain.high
+        fix = number_text(nearest) if isinstance(place, DecimalNumber) and domain.has(nearest) else None
+        hint = f"permitted: {domain}"
         if target.row.saturates:
-            kept = domain.low if value < domain.low else domain.high
-            self._report(f.SATURATES.at(place, f"{target.name} becomes {kept:.10g}, not {value:.10g}", f"permitted: {domain}"))
+            self._report(f.SATURATES.at(place, f"{target.name} becomes {nearest:.10g}, not {value:.10g}", hint, fix))
         else:
-            self._report(f.OUT_OF_RANGE.at(place, f"{value:.10g} is out of range for {target.name}", f"permitted: {domain}"))
+            self._report(f.OUT_OF_RANGE.at(place, f"{value:.10g} is out of range for {target.name}", hint, fix))
 
     def _expression(self, node: Binary | FunctionCall) -> s.Operation | s.FunctionOperation | None:
         value = self._scope.value
@@ -211,7 +213,8 @@ class _Resolver:
         seconds = self._value(statement.operands[0])
         if isinstance(seconds, s.Literal) and seconds.value < s.SHORTEST_DELAY_S:
             message = f"DELAY {seconds.value:g} waits {s.SHORTEST_DELAY_S:g} s"
-            self._report(f.SHORT_DELAY.at(statement.operands[0], message, f"the shortest delay is {s.SHORTEST_DELAY_S:g} s"))
+            fix = f"{s.SHORTEST_DELAY_S:g}" if isinstance(statement.operands[0], DecimalNumber) else None
+            self._report(f.SHORT_DELAY.at(statement.operands[0], message, f"the shortest delay is {s.SHORTEST_DELAY_S:g} s", fix))
         self._check_time("DELAY", statement.operands[0], seconds)
         return None if seconds is None else s.DelayStep(statement.start, statement.end, seconds)
 

@@ -98,7 +98,8 @@ def axes_never_enabled(executable: s.Executable, positions: PositionTable | None
             if axis not in enabled and axis not in reported:
                 reported.add(axis)
                 message = f"M{axis} is moved, but the program never enables it"
-                found.append(f.NEVER_ENABLED.at(step, message, f"write M{axis} = ON, unless a master enables the drive"))
+                fix = f.before(executable.steps[0], f"M{axis} = ON\n")
+                found.append(f.NEVER_ENABLED.at(step, message, f"write M{axis} = ON, unless a master enables the drive", fix))
     return found
 
 
@@ -201,7 +202,8 @@ def interrupts(executable: s.Executable, setup: Setup | None) -> list[Diagnostic
         if event not in executable.entries and event not in reported:
             reported.add(event)
             message = f"the interrupt of {event.name} is enabled, but there is no label INT_{event.name}"
-            found.append(f.NO_HANDLER.at(step, message, f"write INT_{event.name}: and its lines up to RETURN"))
+            fix = f.after(executable.steps[-1], f"{_end_of(executable)}\nINT_{event.name}:\nRETURN")
+            found.append(f.NO_HANDLER.at(step, message, f"write INT_{event.name}: and its lines up to RETURN", fix))
     for event, entry in executable.entries.items():
         if event not in switched_on and _stays_off(event, setup):
             if event.input > INPUTS:
@@ -213,6 +215,12 @@ def interrupts(executable: s.Executable, setup: Setup | None) -> list[Diagnostic
             message = f"the interrupt of {event.name} is never enabled"
             found.append(f.INTERRUPT_OFF.at(executable.steps[entry], message, hint))
     return found
+
+
+def _end_of(executable: s.Executable) -> str:
+    """What ends the lines above a label that is appended."""
+    ends = isinstance(executable.steps[-1], s.EndStep | s.JumpStep | s.ReturnStep | s.ProgResetStep)
+    return "" if ends else "\nEND"
 
 
 def _stays_off(event: InterruptEvent, setup: Setup | None) -> bool:

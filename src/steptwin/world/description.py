@@ -99,7 +99,7 @@ def _tables(toml: TomlText, kind: str, also: tuple[str, ...] = ()) -> list[tuple
     rows = tables()[kind]
     given = toml.data.get(kind, [])
     if not isinstance(given, list):
-        toml.wrong((kind,), "D002", f"[{kind}] stands once", f"expected [[{kind}]], for there may be several")
+        toml.stands_once(kind)
         given = []
     names: set[str] = set()
     for number_, table in enumerate(given):
@@ -154,7 +154,7 @@ def _faults(toml: TomlText) -> list[Fault | None]:
     found: list[Fault | None] = []
     tables = toml.data.get("fault", [])
     if not isinstance(tables, list):
-        toml.wrong(("fault",), "D002", "[fault] stands once", "expected [[fault]], for there may be several")
+        toml.stands_once("fault")
         tables = []
     for n, table in enumerate(tables):
         if not isinstance(table, Mapping):

@@ -88,7 +88,7 @@ class Pieces:
         """Replace the uses in ``text`` by the tables of their files. ``above``: the files in which it is used."""
         uses = text.data.pop(USE, [])
         if not isinstance(uses, list):
-            text.wrong((USE,), "D002", f"[{USE}] stands once", f"expected [[{USE}]], for there may be several")
+            text.stands_once(USE)
             return
         for number, use in enumerate(uses):
             path: Path = (USE, number)
@@ -157,7 +157,7 @@ class Pieces:
         elif kind == "world":
             piece.wrong((kind,), "D004", "[world] is for the description, not for a file that it uses")
         elif not isinstance(tables, list):
-            piece.wrong((kind,), "D002", f"[{kind}] stands once", f"expected [[{kind}]], for there may be several")
+            piece.stands_once(kind)
         else:
             there = text.data.setdefault(kind, [])
             if isinstance(there, list):

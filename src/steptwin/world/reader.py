@@ -249,6 +249,29 @@ class TomlText:
         place = -1 if span is None else self.source.text.rfind(old, span.start, span.end)
         return None if place < 0 or new is None else Fix(Span(place, place + len(old)), new)
 
+    def doubled(self, name: str) -> Fix | None:
+        """The fix that writes ``[[name]]`` for ``[name]``."""
+        found = re.search(rf"^[ \t]*(\[[ \t]*{re.escape(name)}[ \t]*\])(?!\])", self.source.text, re.MULTILINE)
+        return None if found is None else Fix(Span(*found.span(1)), f"[{found[1]}]")
+
+    def removal(self, path: Path) -> Fix | None:
+        """The fix that removes a key with its value, if it has a line of its own."""
+        span, text = self._spans.get(path), self.source.text
+        if span is None:
+            return None
+        start, end = text.rfind("\n", 0, span.start) + 1, text.find("\n", span.end)
+        before, after = text[start : span.start], text[span.end : end if end >= 0 else None]
+        is_alone = not before.strip() and not after.strip()
+        return Fix(Span(start, end + 1 if end >= 0 else len(text)), "") if is_alone else None
+
+    def means_nothing(self, path: Path, message: str, hint: str | None = None) -> None:
+        """The key at ``path`` has no effect beside the others."""
+        self.wrong(path, "D007", message, hint, self.removal(path))
+
+    def stands_once(self, name: str) -> None:
+        """There may be several tables ``name``."""
+        self.wrong((name,), "D002", f"[{name}] stands once", f"expected [[{name}]], for there may be several", self.doubled(name))
+
     def error(self) -> WorldError:
         return WorldError(self.source, self.findings, self._in_files)
 

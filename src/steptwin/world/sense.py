@@ -50,7 +50,7 @@ def check_sense(text: TomlText, path: Path, rows: TableRows, table: object, kind
         return  # reported already
     for key, other in rows.need.items():
         if key in table and other not in table:
-            text.wrong((*path, key), "D007", f"{key} means nothing without {other}")
+            text.means_nothing((*path, key), f"{key} means nothing without {other}")
     for one, other in rows.exclude:
         if one in table and other in table:
             text.wrong((*path, other), "D007", f"{one} and {other} exclude each other")
@@ -60,7 +60,7 @@ def check_sense(text: TomlText, path: Path, rows: TableRows, table: object, kind
         return
     for key, kinds in rows.only.items():
         if key in table and kind not in kinds:
-            text.wrong((*path, key), "D007", f"{key} means nothing for kind = {kind!r}", f"it is for {' and '.join(kinds)}")
+            text.means_nothing((*path, key), f"{key} means nothing for kind = {kind!r}", f"it is for {' and '.join(kinds)}")
 
 
 def of_lines() -> Mapping[str, tuple[str, ...]]:

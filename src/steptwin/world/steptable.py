@@ -227,9 +227,13 @@ def _step(text: TomlText, path: Path, n: int, table: object) -> Step | None:
         return Repeat(values.get("repeat", 1), read_steps(text, (*path, STEPS.name), table.get(STEPS.name, [])))
     kinds = [key for key in table if key in ACTIONS]
     if len(kinds) != 1:
-        near = "".join(text.near(key, ACTIONS) for key in table if key not in ACTIONS)
+        unknown = [key for key in table if key not in ACTIONS]
+        near = "".join(text.near(key, ACTIONS) for key in unknown)
+        fixes = [fix for key in unknown if not kinds and (fix := text.key_replacement((*path, key), key, ACTIONS)) is not None]
         found = f"has {' and '.join(kinds)}" if kinds else f"has {', '.join(map(repr, table)) or 'nothing'}"
-        text.wrong(path, "D008", f"step {n} {found}{near}", f"expected one of {', '.join(ACTIONS)}, repeat")
+        text.wrong(
+            path, "D008", f"step {n} {found}{near}", f"expected one of {', '.join(ACTIONS)}, repeat", next(iter(fixes), None)
+        )
         return None
     action = ACTIONS[kinds[0]]
     before = len(text.findings)

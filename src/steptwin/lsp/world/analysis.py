@@ -14,6 +14,7 @@ from steptwin.lsp.analysis import Analysis
 from steptwin.lsp.answers import Completions, DocumentLink, Fold, Hover, OutlineItem, SemanticToken, TokenKind
 from steptwin.lsp.files import name_of, relative
 from steptwin.lsp.positions import LineIndex
+from steptwin.lsp.world.built import ElementSignals, UnitsOfSignals
 from steptwin.lsp.world.items import ItemBuilder, keys_of
 from steptwin.lsp.world.outline import TableOutline, WorldOutline
 from steptwin.lsp.world.signals import WorldSignals
@@ -55,10 +56,20 @@ class Around(Protocol):
 class WorldAnalysis(Analysis):
     """The other files are read when an answer depends on them."""
 
-    def __init__(self, uri: str, lines: LineIndex, around: Around) -> None:
+    def __init__(self, uri: str, lines: LineIndex, around: Around, elements: ElementSignals) -> None:
+        """``elements`` belongs to all states of the text."""
         super().__init__(uri, lines)
         self._around = around
+        self._elements = elements
         self._outline = WorldOutline(lines)
+
+    @cached_property
+    def _signals(self) -> WorldSignals:
+        return WorldSignals(self._outline, self._controllers, self._signals_of_elements)
+
+    def _signals_of_elements(self, edited: TableOutline | None) -> UnitsOfSignals:
+        """``edited``: the table that is being typed in."""
+        return self._elements.known(self.lines, self._outline.tables, edited, name_of(self.uri), self._read)
 
     @cached_property
     def _found(self) -> Sequence[Diagnostic]:
@@ -93,9 +104,7 @@ class WorldAnalysis(Analysis):
         found = _KEY.match(self.text, self.lines.starts[line], self.lines.ends[line])
         key = None if found is None else next((key for key in keys_of(table) if key.name == found[1]), None)
         if found is None or key is None or key.name == "when":
-            of_signal = WorldSignals(self._outline, self._controllers).hover(
-                self.lines.line(line), self.lines.starts[line], place
-            )
+            of_signal = self._signals.hover(self.lines.line(line), self.lines.starts[line], place)
             if of_signal is not None or found is None or key is None:
                 return of_signal
         span = Span(found.start(1), max(self.lines.ends[line], found.end(1)))
@@ -108,7 +117,7 @@ class WorldAnalysis(Analysis):
         table = self._outline.table_at(place)
         present = () if table is None else self._present(table, number)
         files = [name_of(uri) for uri in self._around.beside(self.uri)]
-        return ItemBuilder(self._outline, self._controllers, files).items(before, place, present)
+        return ItemBuilder(self._outline, self._signals, files).items(before, place, present)
 
     def _present(self, table: TableOutline, without: int) -> Iterator[str]:
         """The keys of a table, except those of one line."""

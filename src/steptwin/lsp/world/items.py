@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from steptwin.diagnostics import Span
 from steptwin.lsp.answers import Completion, CompletionKind, Completions
 from steptwin.lsp.world.outline import TableOutline, WorldOutline
 from steptwin.lsp.world.signals import WorldSignals
+from steptwin.lsp.world.snippets import table_snippet, value_snippet
 from steptwin.symbols import SymbolKind
 from steptwin.world.elements import ELEMENTS
 from steptwin.world.gateways import GATEWAY, GATEWAYS
-from steptwin.world.kind import AnyKind
 from steptwin.world.kinds import KINDS
 from steptwin.world.reader import Key
 from steptwin.world.steptable import ACTIONS
@@ -52,9 +52,10 @@ def keys_of(table: TableOutline) -> Sequence[Key]:
 class ItemBuilder:
     """For one text. ``files`` gives the names of files beside it by ending."""
 
-    def __init__(self, outline: WorldOutline, controllers: Mapping[str, AnyKind], files: Iterable[str]) -> None:
+    def __init__(self, outline: WorldOutline, signals: WorldSignals, files: Iterable[str]) -> None:
         self._outline = outline
-        self._controllers = controllers
+        self._signals = signals
+        self._controllers = signals.controllers
         self._files = tuple(files)
 
     def items(self, before: str, place: int, present: Iterable[str]) -> Completions:
@@ -64,7 +65,7 @@ class ItemBuilder:
         table = self._outline.table_at(place)
         if table is None:
             return Completions(())
-        signals = WorldSignals(self._outline, self._controllers).items(before, place)
+        signals = self._signals.items(before, place, table)
         if signals is not None:
             return Completions(tuple(signals))
         if table.kind in ("event", "script") and (steps := self._step(before, place)) is not None:
@@ -134,30 +135,35 @@ def _text(text: str, span: Span, mark: str, detail: str) -> Completion:
 
 
 def _tables(span: Span) -> Iterator[Completion]:
-    for text in dict.fromkeys((*map(written, (*all_keys(), "fault")), *_inner_tables())):
-        yield Completion(text, CompletionKind.KEY, span, "table")
-    for kind in KINDS.values():
-        yield from (Completion(f"[{kind.name}.{inner}]", CompletionKind.KEY, span, "table") for inner in kind.inner_tables)
+    found: dict[str, Sequence[Key]] = {written(name): keys for name, keys in all_keys().items()}
+    for text, keys in ({written("fault"): ()} | found | dict(_inner_tables())).items():
+        insert = table_snippet(text, keys)
+        yield Completion(text, CompletionKind.KEY, span, "table", "", insert, is_snippet=True)
 
 
-def _inner_tables() -> Iterator[str]:
-    """Tables in those of elements, which may have them from another one, and of gateways."""
+def _inner_tables() -> Iterator[tuple[str, Sequence[Key]]]:
+    """Tables in those of elements, which may have them from another one, of gateways and controllers, with their keys."""
     for element in ELEMENTS.values():
         for key, rows in element.inner.items():
             name = f"[{element.name}.{key}]"
-            yield f"[{name}]" if rows.written.startswith("[[") else name
-    yield from (rows.written for rows in GATEWAYS.values())
+            yield f"[{name}]" if rows.written.startswith("[[") else name, rows.keys
+    yield from ((rows.written, rows.keys) for rows in GATEWAYS.values())
+    for kind in KINDS.values():
+        yield from ((f"[{kind.name}.{inner}]", ()) for inner in kind.inner_tables)
 
 
 def _keys(table: TableOutline, span: Span, present: frozenset[str]) -> Iterator[Completion]:
     for key in keys_of(table):
         if key.name not in present:
             detail = f"{key.meaning} (needed)" if key.is_required else key.meaning
-            yield Completion(
-                key.name, CompletionKind.KEY, span, detail, insert=f"{key.name} = ", rank=0 if key.is_required else 5
-            )
+            yield _key(key, span, detail, rank=0 if key.is_required else 5)
 
 
 def _actions(span: Span) -> Iterator[Completion]:
-    for name, action in ACTIONS.items():
-        yield Completion(name, CompletionKind.KEY, span, action.main.meaning, insert=f"{name} = ")
+    for action in ACTIONS.values():
+        yield _key(action.main, span, action.main.meaning)
+
+
+def _key(key: Key, span: Span, detail: str, rank: int = 5) -> Completion:
+    insert = f"{key.name} = {value_snippet(key, 1)}"
+    return Completion(key.name, CompletionKind.KEY, span, detail, "", insert, is_snippet=True, rank=rank)

@@ -72,7 +72,7 @@ class LoadSpec(BoardSpec):
             text.wrong(self.path, "D007", f"{self.name!r} weighs nothing: give it a mass, a force, a friction or an inertia")
         if (self.of is None) is not (self.points is None):
             key, other = ("of", "points") if self.points is None else ("points", "of")
-            text.wrong((*self.path, key), "D007", f"{key} means nothing without {other}")
+            text.means_nothing((*self.path, key), f"{key} means nothing without {other}")
         shares = [share for _, share in self.points or ()]
         if not all(0.0 <= share <= MOST_SHARE for share in shares):
             there = f"{min(shares):g} to {max(shares):g}"
