@@ -272,6 +272,25 @@ def test_mic_19_at_status_5_the_coordinate_becomes_the_encoders(command: tuple[s
     assert (rig.position(), rig.get("ENC_XPOS"), motor(rig) - before) == (880.0, 880.0, 80)
 
 
+@pytest.mark.parametrize("command", [("POS_ABS", 2000.0), ("POS_ABS", 820.0), ("VEL_ABS", 500.0)])
+def test_mic_19_a_difference_at_enabling_stays(command: tuple[str, float]) -> None:
+    """EN off keeps the position (MIC-9): what a hand turns meanwhile is no error of the drive, also not at status 5."""
+    rig = encoder_rig(enc_tolerance=2)
+    rig.set("POS_ABS", 800.0)
+    rig.until(1, REACHED)
+    rig.coil(EN, False)
+    turn(rig, 50)
+    rig.coil(EN, True)
+    assert (rig.position(), rig.get("ENC_XPOS")) == (800.0, 1200.0)
+    rig.set("POS_ABS", 880.0)
+    rig.until(1, REACHED, CORRECTION)
+    assert (rig.status(), rig.position(), rig.get("ENC_XPOS")) == (REACHED, 880.0, 1280.0)
+    couple(rig, Coupling.BLOCKED)
+    rig.set(*command)
+    rig.until(1, ERROR)
+    assert (rig.position(), rig.get("ENC_XPOS")) == (880.0, 1280.0)
+
+
 def test_mic_19_tolerance_settling_and_giving_up_are_configured() -> None:
     rig = encoder_rig(enc_tolerance=0, enc_settle_ms=700, err_time_ms=300)
     rig.set("POS_ABS", 800.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from steptwin.diagnostics import Span
 from steptwin.files.world import World
 from steptwin.world.description import read_world
 from steptwin.world.kinds.mic488.table import Mic488Spec
@@ -218,6 +219,23 @@ def wrong(text: str) -> str:
 )
 def test_what_is_wrong_is_told_with_its_place(text: str, message: str) -> None:
     assert message in wrong(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "start", "end"),
+    [
+        ("[world]\nname = = 2\n", 15, 16),
+        ("[world", 6, 6),
+        ("[world]\nseed = " + "9" * 5000 + "\n", 0, 0),
+        (f"[world]\nseed = {1 << 63}\n", 15, 34),
+        ("x = " + "[" * 33 + "]" * 33, 37, 37),
+    ],
+)
+def test_what_is_no_toml_has_one_finding_with_its_characters(text: str, start: int, end: int) -> None:
+    with pytest.raises(WorldError) as raised:
+        read_world("w", text)
+    (found,) = raised.value.findings
+    assert (found.code, found.span) == ("D001", Span(start, end))
 
 
 def places(text: str) -> list[str]:

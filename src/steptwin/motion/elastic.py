@@ -135,10 +135,7 @@ class Response:
                 x, v = last.at(drive.begin)
                 v += 2.0 * spring.rate * (drive.p - before.at(drive.begin)[0])
             before = drive
-            found = ResponseStretch.of(spring, drive, x, v)
-            if self.stretches and drive.begin <= self.stretches[-1].drive.begin:
-                self.stretches.pop()
-            self.stretches.append(found)
+            self.stretches.append(ResponseStretch.of(spring, drive, x, v))
         self._let_settle()
 
     def _let_settle(self) -> None:

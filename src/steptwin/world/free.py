@@ -159,7 +159,7 @@ def slow_from(profile: Profile, now: Nanos, speed: float) -> Nanos | None:
             return None
         until = profile.start + int(end)
         if until > now:
-            # At the end of each segment it stands.
-            is_slowing = s.c2 * s.direction < 0.0 and abs(s.velocity(s.end_s)) < speed
-            return max(now, profile.start + ceil(s.when_speed(speed) * SECOND)) if is_slowing else until
+            # At the end of each segment it stands. It is faster than ``speed`` now, so what ends slower brakes.
+            brakes = abs(s.velocity(s.end_s)) < speed
+            return max(now, profile.start + ceil(s.when_speed(speed) * SECOND)) if brakes else until
     return now

@@ -239,3 +239,18 @@ def test_the_moments_at_which_it_may_settle_are_after_the_present_one() -> None:
     found.advance(moments[-1])
     settled.bring(found.now)
     assert settled.value(found.now) == 1.0
+
+
+def test_a_stiff_belt_is_settled_while_its_axis_stands() -> None:
+    """At 10 kHz it lags by less than what counts as swinging, in ramps and between them."""
+    found = world(**{"carriage.tool.frequency": 10_000.0})
+    settled = found.signal("tool.settled")
+    start(found)
+
+    def at(t: float) -> float:
+        found.run(until=t)
+        settled.bring(found.now)
+        return settled.value(found.now)
+
+    assert [at(t) for t in (0.0, 0.04, 0.08, 0.1, 0.25, 0.3, 0.34)] == [0.0] * 6 + [1.0]
+    assert found.read("tool.position") == 20.0
