@@ -48,6 +48,26 @@ def test_a_relay_follows_its_coil_after_its_time() -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    ("element", "output", "text"),
+    [
+        ("[[relay]]\ncoil = 'c.OUT1'\npull_in = '20 ms'\ndrop_out = '30 ms'", "no", "0, e follows after 30 ms"),
+        ("[[timer]]\nkind = 'on-delay'\ntime = '40 ms'\ninput = 'c.OUT1'", "out", "0"),
+        ("[[timer]]\nkind = 'off-delay'\ntime = '40 ms'\ninput = 'c.OUT1'", "out", "0, e follows after 40 ms"),
+        ("[[timer]]\nkind = 'pulse'\ntime = '1100 ms'\ninput = 'c.OUT1'", "out", "1, e follows after 1100 ms"),
+    ],
+)
+def test_what_an_element_delays(element: str, output: str, text: str) -> None:
+    """OUT1 is on from 1 s to 2 s."""
+    kind, _, keys = element.partition("\n")
+    world = World.from_toml(f"[[mic488]]\nname = 'c'\n{kind}\nname = 'e'\n{keys}\n")
+    for level in (1, 0):
+        world.run(for_=1.0)
+        world.mic488["c"].write("OUT1", level)
+    world.run(for_=1.0)
+    assert shown(world, f"e.{output}")[2].split(" s ")[1] == f"c c.OUT1 became {text}"
+
+
 def test_a_wait_for_ever_shows_what_it_depends_on() -> None:
     assert shown(waits(), "cell")[:7] == [
         "cell waits at line 5 `WAIT IN2 = ON`, since 1.012000 s (at 5 s)",

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from steptwin.files.world import World
-from steptwin.world.elements import ELEMENTS
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
 ENDS = {
@@ -23,21 +22,6 @@ ENDS = {
 
 def example(name: str) -> World:
     return World.load(EXAMPLES / name / f"{name}.toml")
-
-
-WORLDS = [file for file in sorted(EXAMPLES.rglob("*.toml")) if "[parameters]" not in file.read_text()]
-"""The others are pieces of worlds."""
-
-
-@pytest.mark.parametrize("file", WORLDS, ids=lambda file: file.stem)
-def test_every_lane_of_an_element_is_recorded(file: Path) -> None:
-    """From its first level on."""
-    with World.load(file) as world:
-        world.run(for_=0.001)
-        recorded = {record.subject for record in world.trace.edges()}
-        for element in ELEMENTS.values():
-            lanes = {lane for spec in world.spec.elements[element.name] for lane in element.lanes(spec)}
-            assert lanes <= recorded
 
 
 @pytest.mark.parametrize("name", ENDS)

@@ -82,8 +82,6 @@ class Element(Generic[S, B]):
     """How it is drawn, where there is more to see than levels and numbers."""
     function: Callable[[B], str] | None = None
     """The word that says what it does among those of its kind, such as ``and``."""
-    lanes: Callable[[S], tuple[str, ...]]
-    """Subjects of the edges that it records in traces, besides those of its faults."""
     moved: Callable[[B], tuple[BuiltAxis, MovedLane]] | None = None
     """The lane of its motion, which follows from that of an axis."""
     faults: tuple[FaultKind, ...] = ()

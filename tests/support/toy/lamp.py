@@ -108,7 +108,6 @@ LAMP: Element[LampSpec, Lamp] = Element(
     refers=_refers,
     build=_build,
     signals=_signals,
-    lanes=lambda spec: (spec.name,),
     faults=(FaultKind("burnt-out", Layer.ELEMENT, Occasion.ALWAYS, "A lamp stays dark.", effect=ElementEffect(_burn)),),
 )
 

@@ -199,5 +199,4 @@ AXIS: Element[AxisSpec, BuiltAxis] = Element(
     build=_build,
     connect=_connect,
     signals=_signals,
-    lanes=lambda spec: tuple(lane_of(spec.name, n) for n in range(1, len(spec.switches) + 1)),
 )

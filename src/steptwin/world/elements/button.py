@@ -72,5 +72,4 @@ BUTTON: Element[ButtonSpec, tuple[Button, Kernel]] = Element(
     refers=_refers,
     build=_build,
     signals=_signals,
-    lanes=lambda spec: (spec.name,),
 )

@@ -255,7 +255,6 @@ CARRIAGE: Element[CarriageSpec, Carriage] = Element(
     build=_build,
     signals=_signals,
     drawing=lambda carriage: rail(carriage.axis.spec.travel, tuple(one.zone for one in carriage.spec.switches)),
-    lanes=lambda spec: tuple(lane_of(spec.name, n) for n in range(1, len(spec.switches) + 1)),
     moved=lambda carriage: carriage.moved,
     faults=(
         FaultKind(

@@ -466,6 +466,5 @@ CONVEYOR = with_terminals(
         read=_read_sensors,
         refers=_refers_of_sensors,
         build=_put_sensors,
-        lanes=lambda spec: tuple(_lane(spec, n) for n in range(1, len(spec.sensors) + 1)),
     ),
 )

@@ -213,6 +213,5 @@ CYLINDER = with_terminals(
         read=lambda text, path, table: tuple(read_switches(text, path, table)),
         refers=_refers_of_switches,
         build=_put_switches,
-        lanes=lambda spec: tuple(lane_of(spec.name, n) for n in range(1, len(spec.switches) + 1)),
     ),
 )

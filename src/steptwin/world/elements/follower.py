@@ -246,7 +246,6 @@ FOLLOWER: Element[FollowerSpec, Follower] = Element(
     build=_build,
     signals=_signals,
     drawing=lambda follower: follower.drawing,
-    lanes=lambda spec: tuple(lane_of(spec.name, n) for n in range(1, len(spec.switches) + 1)),
     moved=lambda follower: follower.moved,
     faults=(
         FaultKind(

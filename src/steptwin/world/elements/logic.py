@@ -1,4 +1,4 @@
-"""What elements with terminals have in common: a board, keys that join outputs of others to it, its levels as signals and lanes,
+"""What elements with terminals have in common: a board, keys that join outputs of others to it, its levels as signals,
 and the fault of an output that is stuck."""
 
 from __future__ import annotations
@@ -101,7 +101,6 @@ class Inner(Generic[S, P]):
     read: Callable[[TomlText, Path, Table], tuple[Any, ...]]
     refers: Callable[[S], Iterable[Reference]]
     build: Callable[[S, P, Site], None]
-    lanes: Callable[[S], tuple[str, ...]]
 
 
 def _wires(spec: BoardSpec) -> Iterator[tuple[Wire, Path]]:
@@ -204,10 +203,6 @@ def with_terminals(
         terminals=lambda found: found.terminals,
         signals=all_signals,
         drawing=drawing,
-        lanes=lambda found: (
-            *(f"{found.name}.{output.lower()}" for output in found.terminals.outputs),
-            *(() if inner is None else inner.lanes(found)),
-        ),
         faults=tuple(faults),
     )
 

@@ -228,7 +228,6 @@ SHAFT: Element[ShaftSpec, GearedShaft] = Element(
     build=_build,
     signals=_signals,
     drawing=lambda shaft: Drawing(DIAL, float(TURN), ("angle",), sensors=tuple(one.zone for one in shaft.spec.cams)),
-    lanes=lambda spec: tuple(lane_of(spec.name, n) for n in range(1, len(spec.cams) + 1)),
     moved=lambda shaft: shaft.moved,
     faults=(
         FaultKind(

@@ -108,5 +108,4 @@ SOURCE: Element[SourceSpec, AnalogSource] = Element(
     read=_read,
     refers=_refers,
     build=_build,
-    lanes=lambda spec: (),
 )

@@ -125,7 +125,6 @@ TRANSDUCER: Element[TransducerSpec, Transducer] = Element(
     refers=_refers,
     build=_build,
     signals=lambda built: {"volts": SignalOf((built.source,), built.volts, unit="V", bounds=(LOWEST_V, HIGHEST_V))},
-    lanes=lambda spec: (),
     faults=(
         FaultKind(
             "broken-wire",

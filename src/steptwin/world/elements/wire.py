@@ -52,5 +52,4 @@ WIRE: Element[WireSpec, Wire] = Element(
     read=_read,
     refers=_refers,
     build=_build,
-    lanes=lambda spec: (),
 )
