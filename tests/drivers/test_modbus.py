@@ -404,3 +404,16 @@ def test_rtu_noise_keeps_the_line_for_a_fifth_of_a_second_at_most() -> None:
     for now in range(0, SECOND, 5 * MILLISECOND):
         master.stray(b"x", now)
     assert master.free_ns == SECOND // 5
+
+
+@pytest.mark.parametrize("over", ["rtu", "tcp"])
+def test_after_a_reset_nothing_is_awaited(over: str) -> None:
+    """An answer that comes after the connection was opened anew is that of nobody."""
+    answer = encode_response(RegistersResponse((0, 0x4148)))
+    frame = rtu.encode_frame(1, answer) if over == "rtu" else mbap.encode_frame(1, 1, answer)
+    for is_reset in (False, True):
+        master: RtuMaster | TcpMaster = RtuMaster() if over == "rtu" else TcpMaster()
+        master.start(ModbusQuery(1, POSITION), 0, urgent=False)
+        if is_reset:
+            master.reset()
+        assert master.receive(frame, MILLISECOND) == (None if is_reset else answer)

@@ -45,3 +45,9 @@ def test_between_corners_it_goes_one_way(cam: Cam, place: int, way: int) -> None
         assert (corner - before) * way > 0
         before = corner
     assert abs(before - place) > cam.turn / 2
+
+
+@given(cam=cams(), place=st.integers(-300, 300), way=st.sampled_from([1, -1]))
+def test_corners_go_through_all_revolutions_that_differ(cam: Cam, place: int, way: int) -> None:
+    *_, last = cam.corners(place, way)
+    assert (last - place) * way >= cam.turn * cam.turn.denominator

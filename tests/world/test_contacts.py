@@ -18,6 +18,7 @@ from steptwin.machine import MILLISECOND, SECOND, PinEdge
 from steptwin.mic488.config import AxisConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.motion import MotionState, Profile, plan_position
+from steptwin.motion.profile import cruise
 from steptwin.world.chance import Chance
 from steptwin.world.contacts import Button, Circuit, CountedPosition, Switch, Zone
 from steptwin.world.kernel import Kernel
@@ -245,3 +246,13 @@ def test_a_counted_position_is_reached_where_its_pulses_lead(
             break
         count = new
     assert CountedPosition(axis).reaches(position, after, direction) == expected
+
+
+def test_a_place_where_a_way_begins_is_reached_when_it_is_come_to_again() -> None:
+    """From 0 up to 10, down to -10 and up to 10: 0 is come to upwards once, at 4 s."""
+    axis = ToyAxis()
+    ways = ((0.0, 1.0, 0.0, 1), (1.0, 3.0, 10.0, -1), (3.0, 5.0, -10.0, 1))
+    axis.follow(Profile(0, 0, tuple(cruise(begin, end, p, 10.0 * way) for begin, end, p, way in ways), 10.0))
+    assert CountedPosition(axis).reaches(0, 0, 1) == pytest.approx(4 * SECOND, abs=2)
+    assert CountedPosition(axis).reaches(0, 0, -1) == pytest.approx(2 * SECOND, abs=2)
+    assert CountedPosition(axis).reaches(10, SECOND, 1) == pytest.approx(5 * SECOND, abs=2)

@@ -226,9 +226,10 @@ def test_what_is_wrong_is_told_with_its_place(text: str, message: str) -> None:
     [
         ("[world]\nname = = 2\n", 15, 16),
         ("[world", 6, 6),
-        ("[world]\nseed = " + "9" * 5000 + "\n", 0, 0),
-        (f"[world]\nseed = {1 << 63}\n", 15, 34),
-        ("x = " + "[" * 33 + "]" * 33, 37, 37),
+        ("[world]\nseed = " + "9" * 5000 + "\n", 15, 79),
+        (f"[world]\nseed = {1 << 63}\n", 8, 34),
+        ("x = " + "[" * 40, 37, 38),
+        (".".join("a" * 3000) + " = 1\n", 64, 65),
     ],
 )
 def test_what_is_no_toml_has_one_finding_with_its_characters(text: str, start: int, end: int) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+from itertools import pairwise
 from math import inf, pi
 
 import pytest
@@ -338,3 +340,35 @@ def test_what_is_not_below_0_only_at_the_end_is_not_found_before_it() -> None:
     assert _first_not_below_0([line, (5.0, 0.0, 0.0)], 0.0, 1.0, 1e-12) is None
     assert _first_not_below_0([line], 0.0, 1.1, 1e-12) == 1.0
     assert _first_not_below_0([line], 1.0, 2.0, 1e-12) == 1.0
+
+
+@given(
+    curve=CURVES,
+    share=st.floats(0.01, 0.99),
+    direction=st.sampled_from([1, -1]),
+    above=st.sampled_from([0.0, 1e-6]),
+)
+def test_what_is_needed_may_be_all_of_the_torque(curve: tuple, share: float, direction: int, above: float) -> None:
+    """In a motion without end, whose torque is that of the line through two points, exactly calculated."""
+    speed = share * curve[-1][0]
+    (s0, t0), (s1, t1) = next((a, b) for a, b in pairwise(curve) if speed <= b[0])
+    torque = Fraction(t0) + (Fraction(t1) - Fraction(t0)) * (Fraction(speed) - s0) / (Fraction(s1) - Fraction(s0))
+    drive = motor(curve, friction=float(torque) * (1.0 + above))
+    lost = drive.loses(Segment(inf, 2.0, 0.0, direction * speed, 0.0, 0.0, direction), 2.0, inf, 1)
+    assert lost == (2.0 if above and torque else None)
+
+
+def test_what_uses_all_of_the_torque_at_its_end_loses_nothing() -> None:
+    """From 0 to 500 pulses/s in 0.5 s: the torque is 1 - v/2000, and 0.75 is needed."""
+    drive = motor(((0.0, 1.0), (1000.0, 0.5)), inertia=0.75 / 1000.0)
+    for end_s, lost in ((0.5, None), (0.5 + 1e-6, 0.5)):
+        assert drive.loses(Segment(end_s, 0.0, 0.0, 0.0, 500.0, 0.0, 1), 0.0, end_s, 1) == lost
+
+
+def test_what_is_within_rounding_of_0_is_no_loss_and_what_leads_below_it_is() -> None:
+    slack = 1e-12
+    assert _first_below_0((-slack, 0.0, 0.0), 0.0, 1.0, slack) is None
+    assert _first_below_0((-1.1 * slack, 0.0, 0.0), 0.0, 1.0, slack) == 0.0
+    # (u - 1)² - 1e-6 begins at 0, and is above it again 2e-3 later.
+    assert _first_not_below_0([(1.0 - 1e-6, -2.0, 1.0)], 1.0 - 1e-3, 2.0, slack) == pytest.approx(1.0 + 1e-3)
+    assert _first_not_below_0([(1.0, -2.0, 1.0)], 1.0, 2.0, slack) == 1.0

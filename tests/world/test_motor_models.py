@@ -260,6 +260,17 @@ def test_the_share_that_holds_it_is_that_of_the_torques(hold: float, falls: bool
     assert bool(events(found, "fall")) is falls
 
 
+def test_detent_is_not_added_to_the_current_that_is_left() -> None:
+    """Without current it would hold what is left of the load, 0.4 N·m."""
+    places = []
+    for detent in ("", "\ndetent = 0.45"):
+        found = world(LIFT.format(hold=0.3) + detent)
+        start(found, 3200)
+        found.run(for_=1.0)
+        places.append(found.read("x.position"))
+    assert places[0] == places[1] < 3000
+
+
 def test_the_next_motion_takes_what_stands_and_loses_what_falls() -> None:
     found = world(LIFT.format(hold=0.41))
     for target in (3200, 0, 6400):

@@ -7,8 +7,11 @@ from typing import Any
 
 import pytest
 
+from steptwin.diagnostics import Fix, Span
 from steptwin.errors import Misuse
-from steptwin.world.values import flag, number, pair, pin_name, points, positive_time, text_value, whole, word
+from steptwin.machine import SECOND
+from steptwin.world.reader import TomlText
+from steptwin.world.values import flag, number, pair, pin_name, points, positive_time, text_value, whole, whole_seconds, word
 
 
 @pytest.mark.parametrize(
@@ -43,6 +46,12 @@ from steptwin.world.values import flag, number, pair, pin_name, points, positive
         (word("sine", "ramp"), 3, "3: permitted are sine, ramp$"),
         (positive_time, "1 us", 1000),
         (positive_time, "0 s", "'0 s': must be more than 0"),
+        (whole_seconds, "1 s", SECOND),
+        (whole_seconds, "1 h", 3600 * SECOND),
+        (whole_seconds, "2 s", 2 * SECOND),
+        (whole_seconds, "0 s", "'0 s': permitted are whole seconds from 1s to 3600s"),
+        (whole_seconds, "3601 s", "'3601 s': permitted are whole seconds from 1s to 3600s"),
+        (whole_seconds, "1500 ms", "'1500 ms': permitted are whole seconds from 1s to 3600s"),
         (pair, [1, 2.5], (1.0, 2.5)),
         (pair, [2, 2], r"\[2, 2\]: the first must be below the second"),
         (pair, [1, 2, 3], r"\[1, 2, 3\]: expected \[low, high\]"),
@@ -68,3 +77,9 @@ def test_values_at_their_limits(read: Callable[[Any], Any], value: object, expec
         return
     found = read(value)
     assert (found, type(found)) == (expected, type(expected))
+
+
+@pytest.mark.parametrize(("text", "path", "start"), [("nmae = 1", ("nmae",), 0), ("[a]\n nmae = 1", ("a", "nmae"), 5)])
+def test_the_fix_of_a_misspelt_key_replaces_it_alone(text: str, path: tuple[str, ...], start: int) -> None:
+    fix = TomlText("w", text).key_replacement(path, "nmae", ("name", "other"))
+    assert fix == Fix(Span(start, start + 4), "name")

@@ -45,8 +45,8 @@ B = TypeVar("B")
 
 
 class Reference(NamedTuple):
-    """Two machines, lines or elements with terminals that an element connects, so that they share a kernel; both are the same if
-    it concerns only one. ``path``: the key that names them."""
+    """Two machines, lines or elements with terminals that an element connects, so that they share a kernel. ``path``: the key
+    that names ``other``; what names ``one`` is its own table, or another reference, in which both are the same."""
 
     one: str
     other: str

@@ -29,10 +29,9 @@ def joined_names(spec: WorldSpec, machines: Iterable[str]) -> list[list[str]]:
     placed = _placed(spec)
     for reference in _joints(spec):
         one, other = (placed.get(name, name) for name in reference[:2])
-        unknown = [name for name in dict.fromkeys((one, other)) if name not in joined]
-        for name in unknown:
-            _report(spec, reference.path, name, joined)
-        if not unknown:
+        if other not in joined:
+            _report(spec, reference.path, other, joined)
+        elif one in joined:
             joined[root(other)] = root(one)
     groups: dict[str, list[str]] = {}
     for name in joined:

@@ -28,6 +28,7 @@ def _read(text: TomlText, row: Row, table: Table) -> WireSpec:
 
 
 def _refers(spec: WireSpec, world: WorldSpec) -> Iterator[Reference]:
+    yield Reference(spec.source[0], spec.source[0], spec.path)
     yield Reference(spec.source[0], spec.target[0], spec.path)
 
 
