@@ -25,7 +25,11 @@ NOT_RUN = {
     "docs/control.md": ["needs a running twin that listens on TCP"],
     "docs/devices.md": ["seeks a line that nothing switches", "needs a device, and goes on until Ctrl-C", "needs a device"],
     "docs/drivers.md": ["needs a device"],
-    "docs/gateways.md": ["needs a broker; tests/gateways/mqtt does it", "needs a client of EPICS; tests/gateways/epics does it"],
+    "docs/gateways.md": [
+        "needs a running twin; tests/live/test_tls.py does it",
+        "needs a broker; tests/gateways/mqtt does it",
+        "needs a client of EPICS; tests/gateways/epics does it",
+    ],
     "docs/getting-started.md": ["needs mbpoll; tests/peers/test_readme.py does it"],
     "docs/install.md": ["a clone is what these pages are run in", "needs a package index", "needs a package index"],
     "docs/monitor.md": ["needs a device and a terminal"],

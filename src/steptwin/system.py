@@ -26,6 +26,9 @@ def reason(error: Exception) -> str:
     """The reason of an error as text; of a system error without the additions of libraries, such as the address."""
     if not isinstance(error, OSError):
         return str(error) or type(error).__name__
+    if "ssl" in sys.modules and isinstance(error, sys.modules["ssl"].SSLError):  # its number is none of the system
+        said = getattr(error, "verify_message", None) or (error.reason or str(error)).replace("_", " ")
+        return said.lower()
     number = error.errno if error.errno in errno.errorcode else None
     return (error.strerror or str(error) if number is None else os.strerror(number)).lower() or type(error).__name__
 

@@ -9,6 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from steptwin.cli import app
+from steptwin.errors import Misuse
 
 ANYWHERE = "127.0.0.1:0"
 
@@ -36,6 +37,14 @@ def test_links_are_those_of_the_options_or_the_usual_ones(
     assert CliRunner().invoke(app, ["serve", device, *option]).exit_code == 0
     links = served[0].links.items()
     assert {key: Path(value).name if key == "pty" else value for key, value in links if value is not None} == expected
+
+
+def test_files_of_an_encrypted_line_are_given_together() -> None:
+    words = ["serve", "mic488", "--tls-tcp", ANYWHERE, "--certificate", "a.pem", "--key", "a.key"]
+    assert isinstance(CliRunner().invoke(app, words).exception, Misuse)
+    printed = CliRunner().invoke(app, [*words, "--trusted", "clients", "--print-world"]).stdout
+    assert f'tls_tcp = "{ANYWHERE}"' in printed
+    assert f'trusted = "{Path("clients").absolute()}"' in printed
 
 
 @pytest.mark.parametrize("device", ["mic488", "m1486"])

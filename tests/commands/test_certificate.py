@@ -36,6 +36,15 @@ def test_days_have_a_range(days: int, tmp_path: Path) -> None:
         make_certificate(tmp_path, [], days)
 
 
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [({"role": "cook"}, "--role cook: roles are viewer, operator, engineer"), ({"name": "x" * 65}, "--name has 65 characters")],
+)
+def test_roles_and_names_that_are_not_permitted(options: dict[str, str], message: str, tmp_path: Path) -> None:
+    with pytest.raises(Misuse, match=message):
+        make_certificate(tmp_path, [], 30, **options)
+
+
 def test_a_folder_that_cannot_be_made(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(Misuse, match="not a directory"):

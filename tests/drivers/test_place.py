@@ -30,7 +30,13 @@ def test_addresses() -> None:
     assert str(parse_line_address("COM3", 9600).endpoint) == "COM3"
 
 
-@pytest.mark.parametrize("text", ["", "127.0.0.1:5020", "http://x:1", "rtu-tcp://host", "tcp://", "tcp://h:99999", "tcp://h:1/x"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("", "127.0.0.1:5020", "http://x:1", "rtu-tcp://host", "tcp://", "tcp://h:99999", "tcp://h:1/x"),
+        *("tcp://h:1?key=k", "tls://h:1", "tls://h:1?certificate=c&key=k"),
+    ],
+)
 def test_what_is_no_address(text: str) -> None:
     with pytest.raises(Misuse, match=r"address|names no port"):
         parse_line_address(text, 38400)

@@ -26,6 +26,8 @@ Make = Callable[[], tuple[Cell, Mic488Device]]
 
 INPUTS = bytes.fromhex("010213880008FD62")
 INPUTS_ANSWER = bytes.fromhex("01020100A188")
+PLAIN = [key for key, transport in TRANSPORTS.items() if transport.is_address and key != "tls_tcp"]
+"""Those that listen; the encrypted one has tests of its own (`test_tls`)."""
 SET_BAUD = bytes((255, 251, 44, 255, 250, 44, 1, 0, 0, 0x25, 0x80, 255, 240))  # RFC 2217: WILL COM-PORT-OPTION, 9600 bit/s
 
 
@@ -60,7 +62,7 @@ def test_there_is_one_for_every_key_and_lines_name_no_others() -> None:
     assert len({transport.kind for transport in TRANSPORTS.values()}) == len(TRANSPORTS)
 
 
-@pytest.mark.parametrize("key", [key for key, transport in TRANSPORTS.items() if transport.is_address])
+@pytest.mark.parametrize("key", PLAIN)
 def test_those_that_listen_say_where_and_answer_there(run: Run, make_cell: Make, key: str) -> None:
     async def play(found: OpenLink) -> tuple[str, dict[str, Any], bytes]:
         return found.place, dict(found.details), await asked(found, INPUTS, len(INPUTS_ANSWER))
@@ -70,7 +72,7 @@ def test_those_that_listen_say_where_and_answer_there(run: Run, make_cell: Make,
     assert answer == INPUTS_ANSWER
 
 
-@pytest.mark.parametrize("key", [key for key, transport in TRANSPORTS.items() if transport.is_address])
+@pytest.mark.parametrize("key", PLAIN)
 def test_those_that_listen_need_permission_for_other_networks(run: Run, make_cell: Make, key: str) -> None:
     async def play(found: OpenLink) -> str:
         return found.place

@@ -26,7 +26,8 @@ Device = Annotated[
         envvar="STEPTWIN_DEVICE",
         metavar="DEVICE",
         help="A running twin: mic488, machine.table (a controller of it) or its file machine.toml. A device: /dev/ttyUSB0, COM3, "
-        "HOST:PORT, rtu-tcp://HOST:PORT, rfc2217://HOST:PORT. Behind it ,unit=N ,baud=N ,config=FILE ,firmware=V ,timeout=S; for "
+        "HOST:PORT, rtu-tcp://HOST:PORT, rfc2217://HOST:PORT, tls://HOST:PORT?…. "
+        "Behind it ,unit=N ,baud=N ,config=FILE ,firmware=V ,timeout=S; for "
         "an M1486 ,kind=m1486 or ,chip=7 ,variant=B. Default: the only running twin.",
         autocompletion=completion.devices,
     ),

@@ -12,6 +12,7 @@ import typer
 from steptwin.cli import completion
 from steptwin.cli.optiongroups import GroupedCommand, OptionGroup, grouped
 from steptwin.cli.worldoptions import Control, Faults, LogTraffic, ReadyFile, Speed
+from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
     from steptwin.commands.serve import ServeOptions
@@ -46,11 +47,24 @@ class LineOptions(OptionGroup):
             "rfc2217": self.rfc2217,
         }
 
+    @property
+    def tls(self) -> dict[str, str | None]:
+        """Files of encrypted links, by keys of ``[[line]]``. Raises `Misuse`."""
+        return {}
+
 
 @dataclass(frozen=True, kw_only=True)
 class ModbusOptions(LineOptions):
     tcp: Annotated[str | None, typer.Option(metavar="HOST:PORT", help="Modbus TCP; port 0 takes a free one.")] = None
     rtu_tcp: Annotated[str | None, typer.Option(metavar="HOST:PORT", help="RTU frames over TCP.")] = None
+    tls_tcp: Annotated[
+        str | None, typer.Option(metavar="HOST:PORT", help="Modbus TCP Security, such as 127.0.0.1:8802; with the next three.")
+    ] = None
+    certificate: Annotated[Path | None, typer.Option(help="Certificate of the twin (PEM).")] = None
+    key: Annotated[Path | None, typer.Option(help="Its key (PEM).")] = None
+    trusted: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Certificates of clients, or of those who sign them (.pem).")
+    ] = None
     baud: Annotated[int | None, typer.Option(help="Baud rate. Default: that of the configuration, or 38400.")] = None
     line_timing: Annotated[
         str,
@@ -69,7 +83,14 @@ class ModbusOptions(LineOptions):
 
     @property
     def links(self) -> dict[str, str | None]:
-        return {**super().links, "rtu_tcp": self.rtu_tcp}
+        return {**super().links, "rtu_tcp": self.rtu_tcp, "tls_tcp": self.tls_tcp}
+
+    @property
+    def tls(self) -> dict[str, str | None]:
+        files = {"certificate": self.certificate, "key": self.key, "trusted": self.trusted}
+        if len({self.tls_tcp is None, *(file is None for file in files.values())}) > 1:
+            raise Misuse("--tls-tcp, --certificate, --key and --trusted are given together")
+        return {name: None if file is None else str(file.absolute()) for name, file in files.items()}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,6 +147,7 @@ class TwinOptions(OptionGroup):
         return ServeOptions(
             name=name,
             links=line.links if any(line.links.values()) else {"pty": _default_pty(name), **self._listening(ports)},
+            tls=line.tls,
             baud=line.baud,
             speed=self.speed,
             control=self.control,
@@ -184,7 +206,7 @@ def mic488(
 ) -> None:
     """Serve virtual MIC488 controllers.
 
-    Without any of --pty, --serial, --tcp, --rtu-tcp and --rfc2217 it listens on a pty (where the
+    Without any of --pty, --serial, --tcp, --rtu-tcp, --rfc2217 and --tls-tcp it listens on a pty (where the
     system has them), on 127.0.0.1:5020 (Modbus TCP) and on
     127.0.0.1:5021 (RTU over TCP).
     """

@@ -1,4 +1,4 @@
-"""``steptwin certificate``: a certificate of this computer for servers, signed by itself, with its key."""
+"""``steptwin certificate``: signed by itself, with its key: of this computer for servers, or of a client with a role."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from datetime import UTC, datetime, timedelta
 from ipaddress import ip_address
 from pathlib import Path
 
+from steptwin.access.modbusroles import ROLE_OID, role_value
+from steptwin.access.roles import ROLES
 from steptwin.errors import Misuse
 from steptwin.extras import missing
 from steptwin.system import reason
@@ -19,18 +21,30 @@ ALWAYS = ("localhost", "127.0.0.1", "::1")
 DAYS = (1, 7300)
 
 
-def make_certificate(folder: Path, hosts: Sequence[str], days: int) -> tuple[Path, Path]:
+LONGEST_NAME = 64
+"""Characters of a common name (X.520)."""
+
+
+def make_certificate(
+    folder: Path, hosts: Sequence[str], days: int, *, role: str | None = None, name: str = "steptwin"
+) -> tuple[Path, Path]:
     """Write certificate and key into ``folder``, for this computer and the names and addresses in ``hosts``.
+
+    ``role``: that of a client of Modbus/TCP Security. It cannot sign others: no owner raises his role.
 
     Raises `Misuse` for files that are there already or cannot be written, and where the package cryptography is missing.
     """
     if not DAYS[0] <= days <= DAYS[1]:
         raise Misuse(f"--days {days}: permitted are {DAYS[0]} to {DAYS[1]}")
+    if role is not None and role not in ROLES:
+        raise Misuse(f"--role {role}: roles are {', '.join(ROLES)}")
+    if not 1 <= len(name) <= LONGEST_NAME:
+        raise Misuse(f"--name has {len(name)} characters: permitted are 1 to {LONGEST_NAME}")
     files = folder / CERTIFICATE, folder / KEY
     for file in files:
         if file.exists():
             raise Misuse(f"{file} is there already; remove it, or name another folder")
-    certificate, key = _make(dict.fromkeys([*ALWAYS, socket.gethostname(), *hosts]), days)
+    certificate, key = _make(dict.fromkeys([*ALWAYS, socket.gethostname(), *hosts]), days, name, role)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         files[0].write_bytes(certificate)
@@ -41,7 +55,7 @@ def make_certificate(folder: Path, hosts: Sequence[str], days: int) -> tuple[Pat
     return files
 
 
-def _make(hosts: Iterable[str], days: int) -> tuple[bytes, bytes]:
+def _make(hosts: Iterable[str], days: int, common_name: str, role: str | None) -> tuple[bytes, bytes]:
     """Both as PEM."""
     try:
         from cryptography import x509
@@ -61,20 +75,20 @@ def _make(hosts: Iterable[str], days: int) -> tuple[bytes, bytes]:
                 yield x509.DNSName(host)
 
     key = rsa.generate_private_key(public_exponent=65537, key_size=2048)
-    name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "steptwin")])
+    name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, common_name)])
     usage = x509.KeyUsage(
         digital_signature=True,
         content_commitment=True,
         key_encipherment=True,
         data_encipherment=True,
-        key_cert_sign=True,
+        key_cert_sign=role is None,
         key_agreement=False,
         crl_sign=False,
         encipher_only=False,
         decipher_only=False,
     )
     now = datetime.now(UTC)
-    certificate = (
+    builder = (
         x509.CertificateBuilder()
         .subject_name(name)
         .issuer_name(name)
@@ -82,12 +96,15 @@ def _make(hosts: Iterable[str], days: int) -> tuple[bytes, bytes]:
         .serial_number(x509.random_serial_number())
         .not_valid_before(now - timedelta(minutes=5))
         .not_valid_after(now + timedelta(days=days))
-        .add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
+        .add_extension(x509.BasicConstraints(ca=role is None, path_length=0 if role is None else None), critical=True)
         .add_extension(x509.SubjectKeyIdentifier.from_public_key(key.public_key()), critical=False)
         .add_extension(usage, critical=True)
         .add_extension(x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH]), critical=False)
         .add_extension(x509.SubjectAlternativeName(list(names())), critical=False)
-        .sign(key, hashes.SHA256())
     )
+    if role is not None:
+        extension = x509.UnrecognizedExtension(x509.ObjectIdentifier(ROLE_OID), role_value(role))
+        builder = builder.add_extension(extension, critical=False)
+    certificate = builder.sign(key, hashes.SHA256())
     private = key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
     return certificate.public_bytes(Encoding.PEM), private

@@ -25,6 +25,8 @@ class ServeOptions:
     name: str
     links: Mapping[str, str | None] = field(default_factory=dict)
     """Its links, by keys of ``[[line]]``."""
+    tls: Mapping[str, str | None] = field(default_factory=dict)
+    """Files of encrypted ones, by keys of ``[[line]]``."""
     baud: int | None = None
     speed: str = "1"
     control: str | None = None
@@ -43,7 +45,7 @@ class ServeOptions:
         timing = None if self.line_timing == "off" else self.line_timing
         return Whole(
             name=self.name,
-            line={**self.links, "baud": self.baud, **line, "timing": timing},
+            line={**self.links, **self.tls, "baud": self.baud, **line, "timing": timing},
             seed=self.seed,
             state=None if self.state is None else str(self.state),
             trace=self.trace,

@@ -312,8 +312,9 @@ async def _open_line(server: Server, live: LiveWorld, line: LineSpec, options: U
 
     on = "" if len(live.world.spec.lines) == 1 else f", {line.name}"
     links = line_kinds()[line.kind].links
+    how = {"listen_any": options.listen_any, "tls": line.tls, "folder": Path() if options.world is None else options.world.parent}
     for key, where in line.links.items():
         link, transport = links[key], TRANSPORTS[key]
         make_port = maker(link, several=transport.has_several)
         protocol = f"{link.protocol}{on}"
-        await server.open(transport, where, protocol, make_port, line=line.name, wire=wire, listen_any=options.listen_any)
+        await server.open(transport, where, protocol, make_port, line=line.name, wire=wire, **how)

@@ -1,4 +1,5 @@
-"""Addresses of lines: ``/dev/ttyUSB0``, ``COM3``, ``tcp://host:5020``, ``rtu-tcp://host:5021``, ``rfc2217://host:port``."""
+"""Addresses of lines: ``/dev/ttyUSB0``, ``COM3``, ``tcp://host:5020``, ``rtu-tcp://host:5021``, ``rfc2217://host:port``,
+``tls://host:8802?certificate=FILE&key=FILE&trusted=FILE``."""
 
 from __future__ import annotations
 
@@ -10,7 +11,7 @@ import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol, cast
-from urllib.parse import urlsplit
+from urllib.parse import parse_qsl, urlsplit
 
 from steptwin.drivers.exchange import LineLost
 from steptwin.errors import Misuse
@@ -21,10 +22,14 @@ if TYPE_CHECKING:
     from serialx import BaseSerial, BaseSerialTransport
 
 CONNECT_S = 3.0
-MODBUS_PORT = 502
+MODBUS_PORT, SECURE_PORT = 502, 802
 READ_BYTES = 4096
 BAUDS = (300, 1_000_000)
-FORMS = "expected a serial port such as /dev/ttyUSB0 or COM3, tcp://HOST:PORT, rtu-tcp://HOST:PORT or rfc2217://HOST:PORT"
+FORMS = (
+    "expected a serial port such as /dev/ttyUSB0 or COM3, tcp://HOST:PORT, rtu-tcp://HOST:PORT, rfc2217://HOST:PORT or "
+    "tls://HOST:PORT?certificate=FILE&key=FILE&trusted=FILE"
+)
+TLS_FILES = ("certificate", "key", "trusted")
 
 
 class Channel(Protocol):
@@ -72,20 +77,25 @@ def parse_line_address(text: str, baud: int) -> LineAddress:
         return LineAddress(SerialEndpoint(text, baud), serial=SerialLine(baud))
     if scheme == "rfc2217":
         return LineAddress(SerialEndpoint(text, baud), serial=SerialLine(baud))
-    if scheme not in ("tcp", "rtu-tcp"):
+    if scheme not in ("tcp", "rtu-tcp", "tls"):
         raise Misuse(f"{text!r} is not an address: {FORMS}")
     try:
         parts = urlsplit(text)
         host, port = parts.hostname, parts.port
-        rest = parts.path.strip("/") + parts.query + parts.fragment
+        files = parse_qsl(parts.query, keep_blank_values=True, strict_parsing=True) if parts.query else []
+        rest = parts.path.strip("/") + parts.fragment
     except ValueError:
-        host, port, rest = None, None, ""
-    if not host or rest:
+        host, port, files, rest = None, None, [], ""
+    if not host or rest or sorted(name for name, value in files if value) != sorted(TLS_FILES if scheme == "tls" else ()):
         raise Misuse(f"{text!r} is not an address: {FORMS}")
     if port is None:
-        if scheme != "tcp":
+        if scheme == "rtu-tcp":
             raise Misuse(f"{text!r} names no port: {FORMS}")
-        port = MODBUS_PORT
+        port = MODBUS_PORT if scheme == "tcp" else SECURE_PORT
+    if scheme == "tls":
+        from steptwin.drivers.tls import TlsEndpoint
+
+        return LineAddress(TlsEndpoint(scheme, host, port, **dict(files)), framed=True)
     return LineAddress(TcpEndpoint(scheme, host, port), framed=scheme == "tcp")
 
 

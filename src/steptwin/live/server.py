@@ -26,6 +26,7 @@ from steptwin.live.transports import LinkArguments, Transport
 from steptwin.machine import SECOND, Nanos, Port
 from steptwin.system import process_exists, reason
 from steptwin.world.addresses import Address
+from steptwin.world.links import TlsFiles
 
 OTHER_FILES = 32
 """Open files other than clients."""
@@ -43,8 +44,9 @@ MIC488, ``chip`` (a hexadecimal digit) of an M1486."""
 
 @dataclass(frozen=True, slots=True)
 class EndPoint:
-    """An address on which a twin listens. ``kind``: pty, serial, tcp, rtu-tcp, rfc2217, vision, control, http. ``line``: the name
-    of the one reached there."""
+    """An address on which a twin listens. ``kind``: pty, serial, tcp, tls, rtu-tcp, rfc2217, vision, control, http.
+
+    ``line``: the name of the one reached there."""
 
     kind: str
     place: str
@@ -99,6 +101,8 @@ class Server:
         line: str | None = None,
         wire: TwinLine = UNTIMED,
         listen_any: bool = False,
+        tls: TlsFiles | None = None,
+        folder: Path = Path(),
     ) -> None:
         """Open a link to the ports that ``make_port`` makes; ``where`` is the value for the transport.
 
@@ -107,7 +111,14 @@ class Server:
         wire = replace(wire, notice=self.notice)
         opened = await transport.open(
             LinkArguments(
-                where=where, make_port=make_port, line=wire, cell=self.cell, clients=self._clients, listen_any=listen_any
+                where=where,
+                make_port=make_port,
+                line=wire,
+                cell=self.cell,
+                clients=self._clients,
+                listen_any=listen_any,
+                tls=tls,
+                folder=folder,
             )
         )
         self._links.append(opened.link)

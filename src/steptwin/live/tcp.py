@@ -32,6 +32,17 @@ class Listener(Protocol):
 LISTENER: type[Listener] = EpollListener if HAS_EPOLL else AsyncioListener
 
 
+def listening_at(address: Address) -> socket.socket:
+    """A listening socket. Raises `LineFailure` naming the address."""
+    try:
+        return listening(address)
+    except OSError as error:
+        hint = "; port 0 takes a free one" if error.errno == errno.EADDRINUSE else ""
+        raise LineFailure(f"cannot listen on {address}: {reason(error)}{hint}") from error
+    except UnicodeError as error:
+        raise LineFailure(f"cannot listen on {address}: no name of a host") from error
+
+
 class TcpLink:
     """A listening address; every client gets a port of its own from ``make_port``."""
 
@@ -52,13 +63,7 @@ class TcpLink:
 
     async def open(self) -> Address:
         """Listen; returns the address with the port in use. Raises `LineFailure` naming the address."""
-        try:
-            listener = listening(self._asked)
-        except OSError as error:
-            hint = "; port 0 takes a free one" if error.errno == errno.EADDRINUSE else ""
-            raise LineFailure(f"cannot listen on {self._asked}: {reason(error)}{hint}") from error
-        except UnicodeError as error:
-            raise LineFailure(f"cannot listen on {self._asked}: no name of a host") from error
+        listener = listening_at(self._asked)
         address = Address(self._asked.host, listener.getsockname()[1])
         self._listener = self._kind(listener, address, self._cell, self._make_port, self._clients)
         await self._listener.start()

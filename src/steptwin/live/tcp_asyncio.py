@@ -35,7 +35,7 @@ class AsyncioListener:
 
     def _welcome(self) -> asyncio.Protocol:
         if not self._clients.have_room():
-            return _TurnedAway()
+            return TurnedAway()
         connection = AsyncioConnection(self._cell, self._make_port(), self._clients)
         self._connections.add(connection)
         return connection
@@ -48,7 +48,7 @@ class AsyncioListener:
             connection.close()
 
 
-class _TurnedAway(asyncio.Protocol):
+class TurnedAway(asyncio.Protocol):
     """A refused client."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -76,13 +76,13 @@ class AsyncioConnection(asyncio.Protocol):
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = cast(asyncio.Transport, transport)
-        self._transport.set_write_buffer_limits(high=0)  # report pending data at once
+        self._feed = Feed(self._cell, self.port, self)
+        self._transport.set_write_buffer_limits(high=1)  # report pending data at once; with 0, TLS reports none, too
         with contextlib.suppress(OSError):  # the client is gone already; the loop will notice
             set_up(transport.get_extra_info("socket"))
         host, port, *_ = transport.get_extra_info("peername") or ("unknown", 0)
         self._peer = Address(host, port)
         self._is_open = True
-        self._feed = Feed(self._cell, self.port, self)
 
     def data_received(self, data: bytes) -> None:
         if self._received:

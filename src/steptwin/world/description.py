@@ -14,7 +14,7 @@ from steptwin.world.faults import Fault, FaultMistake, parse
 from steptwin.world.gateways import GATEWAY, read_gateways
 from steptwin.world.historytable import read_history
 from steptwin.world.kinds import KINDS
-from steptwin.world.links import LINK_KEYS
+from steptwin.world.links import LINK_KEYS, TLS_KEYS, TlsFiles
 from steptwin.world.names import check_names
 from steptwin.world.overrides import NO_OVERRIDES, Overrides, override
 from steptwin.world.pieces import PARAMETERS, USE, Pieces, ReadFile, is_piece, no_files
@@ -126,7 +126,9 @@ def _elements(toml: TomlText, element: AnyElement) -> Iterator[ElementSpec]:
 
 def _line(row: dict[str, Any]) -> LineSpec:
     found = {key.name: row.pop(key.name) for key in LINK_KEYS}
-    return LineSpec(**row, links={name: value for name, value in found.items() if value is not None})
+    files = [row.pop(key.name) for key in TLS_KEYS]
+    tls = None if None in files else TlsFiles(*files)
+    return LineSpec(**row, links={name: value for name, value in found.items() if value is not None}, tls=tls)
 
 
 def _events(toml: TomlText) -> list[ScriptSpec]:

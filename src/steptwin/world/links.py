@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from steptwin.world.reader import optional
 from steptwin.world.values import address_value, text_value
 
@@ -11,5 +13,22 @@ LINK_KEYS = (
     optional(address_value, "tcp", "HOST:PORT for live clients (Modbus TCP, or raw characters)"),
     optional(address_value, "rtu_tcp", "HOST:PORT for live clients of RTU over TCP"),
     optional(address_value, "rfc2217", "HOST:PORT of a network serial port (RFC 2217) for live clients"),
+    optional(address_value, "tls_tcp", "HOST:PORT for live clients of Modbus TCP Security, such as 127.0.0.1:8802"),
 )
 """In the order in which they are opened."""
+
+TLS_KEYS = (
+    optional(text_value, "certificate", "tls_tcp: file with the certificate of this line, PEM"),
+    optional(text_value, "key", "tls_tcp: file with its key, PEM"),
+    optional(text_value, "trusted", "tls_tcp: folder with the certificates of clients, or of those who sign them (.pem)"),
+)
+TLS_NEED = {"tls_tcp": "trusted", "trusted": "certificate", "certificate": "key", "key": "tls_tcp"}
+"""In a circle: each needs all."""
+
+
+class TlsFiles(NamedTuple):
+    """What encrypted connections need: PEM files, and a folder of them."""
+
+    certificate: str
+    key: str
+    trusted: str

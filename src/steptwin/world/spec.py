@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from steptwin.machine import Nanos
 from steptwin.world.faults import Fault
+from steptwin.world.links import TlsFiles
 from steptwin.world.overrides import Overrides
 from steptwin.world.reader import Path, TomlText
 from steptwin.world.script import Step
@@ -31,6 +32,8 @@ class LineSpec:
     gap: Nanos | None
     links: Mapping[str, str]
     """Addresses of its external links, by key."""
+    tls: TlsFiles | None = None
+    """Of encrypted ones, relative to the description."""
     path: Path = ()
 
     @property

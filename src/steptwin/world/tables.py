@@ -18,7 +18,7 @@ from steptwin.world.arrangement import DRAWING, DRAWING_TABLE
 from steptwin.world.elements import ELEMENTS
 from steptwin.world.historytable import HISTORY, HISTORY_TABLE
 from steptwin.world.kinds import KINDS, line_kinds
-from steptwin.world.links import LINK_KEYS
+from steptwin.world.links import LINK_KEYS, TLS_KEYS, TLS_NEED
 from steptwin.world.pieces import USE, USES
 from steptwin.world.reader import Key, optional
 from steptwin.world.sense import TableRows, of_lines
@@ -78,6 +78,7 @@ KEYS: Mapping[str, tuple[Key, ...]] = {
             "silence in ms after which bytes of no frame are given up; default 0.75 on a serial port, else 20",
         ),
         *LINK_KEYS,
+        *TLS_KEYS,
     ),
     "event": (
         optional(name_value, "name", "for the trace"),
@@ -110,7 +111,7 @@ def _tables_with(registered: tuple[int, ...]) -> Mapping[str, TableRows]:
     found = {
         "world": TableRows(written="[world]", keys=KEYS["world"]),
         USE: USES,
-        "line": TableRows(written="[[line]]", keys=_line_keys(), only=of_lines()),
+        "line": TableRows(written="[[line]]", keys=_line_keys(), need=TLS_NEED, only=of_lines()),
     }
     for kind in KINDS.values():
         found[kind.name] = TableRows(written=f"[[{kind.name}]]", keys=kind.keys, exclude=kind.exclusive)

@@ -7,6 +7,7 @@ from steptwin.live.transports.pty import PTY
 from steptwin.live.transports.rfc2217 import RFC2217
 from steptwin.live.transports.serial import SERIAL
 from steptwin.live.transports.tcp import RTU_TCP, TCP, VISION
+from steptwin.live.transports.tls import TLS_TCP
 from steptwin.tables import complete
 from steptwin.world.links import LINK_KEYS
 
@@ -14,7 +15,7 @@ TRANSPORTS = complete(
     "key of [[line]]",
     [key.name for key in LINK_KEYS],
     "transport",
-    {"tcp": TCP, "rtu_tcp": RTU_TCP, "rfc2217": RFC2217, "pty": PTY, "serial": SERIAL},
+    {"tcp": TCP, "rtu_tcp": RTU_TCP, "rfc2217": RFC2217, "pty": PTY, "serial": SERIAL, "tls_tcp": TLS_TCP},
 )
 """By the key of ``[[line]]`` that opens it."""
 

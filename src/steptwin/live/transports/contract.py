@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 from steptwin.live.cell import Cell
 from steptwin.live.clients import Clients
 from steptwin.live.links import Link
 from steptwin.live.rfc2217 import TwinLine
 from steptwin.machine import Port
+from steptwin.world.links import TlsFiles
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,6 +30,9 @@ class LinkArguments:
     """All clients over TCP, of which there is a limit."""
     listen_any: bool = False
     """Whether addresses that other computers can reach are permitted."""
+    tls: TlsFiles | None = None
+    """Certificates, for those that encrypt; relative to ``folder``."""
+    folder: Path = Path()
 
 
 @dataclass(frozen=True, slots=True)

@@ -57,6 +57,7 @@ MODBUS = LineKind(
         "rtu_tcp": LinkKind("rtu", "rtu", "RTU over TCP"),
         "tcp": LinkKind("tcp", "tcp", "Modbus TCP"),
         "rfc2217": LinkKind("rtu", "rtu", "network port"),
+        "tls_tcp": LinkKind("tcp", "tcp", "Modbus TCP Security"),
     },
     keys=frozenset({"gap"}),
     make=line.make,
