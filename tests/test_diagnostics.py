@@ -140,7 +140,8 @@ def test_to_json_is_plain_data_with_places_from_one() -> None:
 def test_a_suggestion_that_the_text_makes_already_is_shown_once() -> None:
     span = Span(0, 1)
     for message, hint in (("unknown; did you mean speed?", None), ("unknown", "did you mean speed?")):
-        shown = render(SourceText("p", "x"), [Diagnostic("W104", Severity.ERROR, span, message, hint, Fix(span, "speed"))])
+        fix = Fix(span, "speed", is_named=True)
+        shown = render(SourceText("p", "x"), [Diagnostic("W104", Severity.ERROR, span, message, hint, fix)])
         assert shown.count("speed") == 1, shown
 
 

@@ -40,10 +40,11 @@ class Severity(enum.Enum):
 
 @dataclass(frozen=True, slots=True)
 class Fix:
-    """Replace ``span`` by ``text``."""
+    """Replace ``span`` by ``text``. ``is_named``: the message or the hint has the text already."""
 
     span: Span
     text: str
+    is_named: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +124,7 @@ def render(source: SourceText, diagnostics: Sequence[Diagnostic]) -> str:
         parts.append(f"  {pad} | {' ' * before}{'^' * width}")
         if d.hint:
             parts.append(visible(f"  {pad} = {_cut(d.hint)}"))
-        if d.fix and f"did you mean {d.fix.text}?" not in f"{d.message} {d.hint}":
+        if d.fix and not d.fix.is_named:
             parts.append(visible(f"  {pad} = suggestion: {_cut(d.fix.text.strip()) or _blank_fix(d.fix.text)}"))
     if len(diagnostics) > MOST_SHOWN:
         parts.append(visible(f"{source.name}: {len(diagnostics) - MOST_SHOWN} more are not shown"))

@@ -6,7 +6,7 @@ A machine never reads a clock, a file or a socket. Time is an argument, the next
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias, TypeGuard
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 if TYPE_CHECKING:
     from steptwin.motion.divisions import Plan
@@ -166,6 +166,7 @@ class Port(Protocol):
         ...
 
 
+@runtime_checkable
 class SendingPort(Port, Protocol):
     """A port that also sends without a request: it calls ``on_output`` when there are bytes for `to_send`."""
 
@@ -173,8 +174,3 @@ class SendingPort(Port, Protocol):
     def on_output(self) -> Callable[[], None] | None: ...
     @on_output.setter
     def on_output(self, call: Callable[[], None] | None) -> None: ...
-
-
-def is_sending(port: Port) -> TypeGuard[SendingPort]:
-    """Whether a port is a `SendingPort`."""
-    return hasattr(port, "on_output")

@@ -55,6 +55,11 @@ def sync_directory(directory: Path) -> None:
         os.close(handle)
 
 
+def processors() -> int:
+    """The processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 def process_exists(number: int) -> bool:
     """Whether a process of this number is running."""
     if sys.platform == "win32":  # on Windows os.kill ends the process, whatever the signal

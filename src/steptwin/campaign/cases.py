@@ -40,7 +40,7 @@ class Cases:
         """The numbers of the faults that may be missing."""
         self.dimensions = (
             *(
-                CaseDimension(one.name, len(one.spread.levels) if is_grid or getattr(one.spread, "is_grid", False) else 0)
+                CaseDimension(one.name, len(one.spread.levels) if is_grid or one.spread.is_grid else 0)
                 for one in description.vary
             ),
             *(CaseDimension(f"fault {n + 1}", 2 if is_grid else 0) for n in self._doubtful),

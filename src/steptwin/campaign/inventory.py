@@ -12,7 +12,7 @@ from steptwin.world.faults.kinds import KINDS
 from steptwin.world.faults.table import FaultKind, FaultValue, Layer, Occasion
 from steptwin.world.lines import SCRIPTS
 from steptwin.world.plant import Plant
-from steptwin.world.script import Set, Step
+from steptwin.world.script import Repeat, Set, Step
 
 STUCK_OUTPUT = "stuck-output"
 TRIED: dict[str, tuple[dict[str, FaultValue], ...]] = {
@@ -173,7 +173,8 @@ def _set_by(steps: Iterable[Step]) -> Iterator[tuple[str, str]]:
     for step in steps:
         if isinstance(step, Set):
             yield from ((name, pin) for name, pin, _ in step.levels)
-        yield from _set_by(getattr(step, "steps", ()))
+        elif isinstance(step, Repeat):
+            yield from _set_by(step.steps)
 
 
 def _lines(world: Plant, kind: FaultKind) -> Iterator[tuple[dict[str, FaultValue], str]]:

@@ -216,9 +216,9 @@ def read_campaign(name: str, text: str, folder: Path) -> CampaignDescription:
         checks.read_files((folder / head["world"]).parent, files)
         checks.check_in(world, files, faults, steps, measures)
         checks.check_properties(world, properties)
-        for key in ("done", "alarm"):
-            if (text := getattr(matrix, key)) is not None:
-                toml.unless_wrong((MATRIX, key), partial(world.condition, text))
+        for key, condition in (("done", matrix.done), ("alarm", matrix.alarm)):
+            if condition is not None:
+                toml.unless_wrong((MATRIX, key), partial(world.condition, condition))
     toml.check()
     named: dict[str, Any] = {**head, "name": head["name"] or Path(name).stem, "world": str(folder / head["world"])}
     return CampaignDescription(

@@ -17,6 +17,7 @@ from steptwin.errors import Misuse, SteptwinError
 from steptwin.files.world import World
 from steptwin.machine import SECOND, Nanos
 from steptwin.world import script as do
+from steptwin.world import steptable
 from steptwin.world.blueprint import Blueprint
 from steptwin.world.description import read_world
 from steptwin.world.faults import read as read_fault
@@ -25,7 +26,6 @@ from steptwin.world.pieces import given_files
 from steptwin.world.plantsnapshot import PlantSnapshot
 from steptwin.world.reader import TomlText
 from steptwin.world.references import check_step
-from steptwin.world.steptable import STEPS, read_steps
 
 MOST_BLUEPRINTS = 16
 """So many descriptions that differ are kept, for cases that have the same values."""
@@ -187,8 +187,8 @@ def read_step(text: str) -> do.Step:
     """The step in a table that is JSON. Raises `Misuse`."""
     table: Any = json.loads(text)
     toml = TomlText("step", "")
-    steps = read_steps(toml, (STEPS.name,), [table])
-    if toml.findings:
+    step = steptable.read_step(toml, (), table)
+    if step is None:
         found = toml.findings[0]
-        raise Misuse(f"step {text}: {found.message.removeprefix('step 1 ')}{f': {found.hint}' if found.hint else ''}")
-    return steps[0]
+        raise Misuse(f"step {text}: {found.message}{f': {found.hint}' if found.hint else ''}")
+    return step

@@ -28,6 +28,11 @@ class Spread(Protocol):
         """All its values, where they are few; else empty."""
         ...
 
+    @property
+    def is_grid(self) -> bool:
+        """Whether each value is tried with each value of other grids, in every design."""
+        ...
+
 
 @dataclass(frozen=True, slots=True)
 class Between:
@@ -55,6 +60,10 @@ class Between:
             return (self.value(0.5),) if self.steps else ()
         return tuple(dict.fromkeys(self.value(n / (self.steps - 1)) for n in range(self.steps)))
 
+    @property
+    def is_grid(self) -> bool:
+        return False
+
 
 @dataclass(frozen=True, slots=True)
 class Normal:
@@ -81,6 +90,10 @@ class Normal:
     @property
     def levels(self) -> tuple[VariedValue, ...]:
         return ()
+
+    @property
+    def is_grid(self) -> bool:
+        return False
 
 
 @dataclass(frozen=True, slots=True)

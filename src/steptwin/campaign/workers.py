@@ -19,6 +19,7 @@ from steptwin.campaign.runner import CaseRunner
 from steptwin.coverage.counts import Coverage
 from steptwin.errors import LineFailure, Misuse
 from steptwin.extras import libraries_of, missing
+from steptwin.system import processors
 
 LOCAL = "local"
 """The address that stands for a cluster of Dask on this computer."""
@@ -35,13 +36,18 @@ class BatchResult(NamedTuple):
     """As plain values."""
 
 
-_KEPT = threading.local()
-"""The runner of each thread: workers of Dask have several."""
+class _KeptRunner(threading.local):
+    """The digest of the last description and its runner, of each thread: workers of Dask have several."""
+
+    runner: tuple[str, CaseRunner] | None = None
+
+
+_KEPT = _KeptRunner()
 
 
 def run_batch(description: CampaignDescription, cases: Sequence[Case], *, counts: bool) -> BatchResult:
     """Run cases in whichever process this is. The blueprint and the beginning are made by the first batch."""
-    known: tuple[str, CaseRunner] | None = getattr(_KEPT, "runner", None)
+    known = _KEPT.runner
     if known is None or known[0] != description.digest:
         known = _KEPT.runner = description.digest, CaseRunner(description)
     began = time.perf_counter()
@@ -114,7 +120,7 @@ def _pool(jobs: int) -> Executor:
 
 def usual_jobs() -> int:
     """As many as there are processors for this process."""
-    return min(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1, MOST_JOBS)
+    return min(processors(), MOST_JOBS)
 
 
 @contextmanager

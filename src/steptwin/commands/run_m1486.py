@@ -112,7 +112,7 @@ def run(options: M1486Run, out: Print, warn: Print) -> bool:
         reports.observe(world, Path())
         if options.trace is not None:
             StatementFollower(world, world.trace.add)
-        chips = Chips(world, len(typed))
+        chips = Chips(world, len(typed), changes)
         limit = options.longest
         begin = time.perf_counter()
         why = run_on(world, limit, lambda: chips.due(limit), chips.are_idle, until_idle=options.until_idle)
@@ -141,8 +141,9 @@ def describe_chips(chain: Chain, name: str, program: Path | None, typed: Sequenc
 class Chips:
     """Observes the chips of a world in which a host sends lines."""
 
-    def __init__(self, world: World, lines: int) -> None:
+    def __init__(self, world: World, lines: int, changes: Sequence[InputChange]) -> None:
         self.world = world
+        self._changes: dict[object, InputChange] = {change.note: change for change in changes}
         self.chips = {name: view.chip for name, view in world.m1486.items()}
         self.happened: list[ChipEvent] = []
         self.sent = bytearray()
@@ -158,9 +159,9 @@ class Chips:
     def _recorded(self, record: TraceRecord) -> None:
         if record.kind == "event" and record.machine in self.chips:
             self._happens(record.machine, M1486Event(record.time, record.subject, str(record.value)))
-        elif record.kind == "event" and record.subject == NOTE:
-            chip, _, text = str(record.value).partition(".")
-            self._happens(chip, M1486Event(record.time, "input", f"input {text}"))
+        elif record.kind == "event" and record.subject == NOTE and (change := self._changes.get(record.value)) is not None:
+            chip, _, pin = change.pin.partition(".")
+            self._happens(chip, M1486Event(record.time, "input", f"input {pin} {'high' if change.level else 'low'}"))
         elif record.kind == "frame" and record.subject == FROM_HOST:
             self.unsent -= 1
         elif record.kind == "frame" and isinstance(record.value, bytes):

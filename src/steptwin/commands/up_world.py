@@ -311,7 +311,7 @@ async def _open_line(server: Server, live: LiveWorld, line: LineSpec, options: U
         return lambda: PlacePort(live, line.name, f"{link.place}-{next(number)}" if several else link.place, link.place_kind)
 
     on = "" if len(live.world.spec.lines) == 1 else f", {line.name}"
-    links = line_kinds()[line.kind].links
+    links = line_kinds()[line.kind].opened_by
     how = {"listen_any": options.listen_any, "tls": line.tls, "folder": Path() if options.world is None else options.world.parent}
     for key, where in line.links.items():
         link, transport = links[key], TRANSPORTS[key]

@@ -37,6 +37,7 @@ MIRRORED = (
     *(command.Enable, command.Move, command.Home, command.StopAxes, command.ControlProgram),
     *(steps.Write, steps.Request),
 )
+OF_AXES = (command.Enable, command.Move, command.Home, command.StopAxes)
 Known = Mapping[str, float | None]
 """Values of a device by point."""
 
@@ -129,7 +130,7 @@ class Shadow:
         if type(wanted) not in MIRRORED:
             return
         self._to(ended)
-        number = getattr(wanted, "axis", None)
+        number = wanted.axis if isinstance(wanted, OF_AXES) else None
         for axis in self._axes.values():
             if number in (None, axis.sheet.number):
                 axis.lag_ns = max(ended - begun, LEAST_LAG_NS)

@@ -37,14 +37,13 @@ def read_stretch(past: HistoryDatabase, run: int | None, begin: str | None, end:
     Times without a run are of the last one. Raises `Misuse`.
     """
     moments = _moment(begin), _moment(end)
-    is_of_run = any(isinstance(moment, float) for moment in moments)
-    found = past.run(-1 if run is None else run) if is_of_run or run is not None else None
-    try:
-        is_empty = None not in moments and moments[1] < moments[0]  # type: ignore[operator]
-    except TypeError:
-        raise Misuse(f"{begin!r} and {end!r}: give two dates, or two times since the begin of a run") from None
-    if is_empty:
+    dates = [moment for moment in moments if isinstance(moment, datetime)]
+    times = [moment for moment in moments if isinstance(moment, float)]
+    if dates and times:
+        raise Misuse(f"{begin!r} and {end!r}: give two dates, or two times since the begin of a run")
+    if dates != sorted(dates) or times != sorted(times):
         raise Misuse(f"--to {end}: this is before --from {begin}")
+    found = past.run(-1 if run is None else run) if times or run is not None else None
     return Stretch(*moments, found)
 
 

@@ -165,7 +165,7 @@ class LiveWorld:
         if self.ring is not None:
             self.ring.clear()
         for line in world.spec.lines:
-            links = {link.place for link in line_kinds()[line.kind].links.values()}
+            links = {link.place for link in line_kinds()[line.kind].opened_by.values()}
             for place in [place for place in world.lines[line.name].places if place.partition("-")[0] in links]:
                 self.apply_input(Leave(line.name, place))
         for port in list(self.ports):

@@ -382,7 +382,8 @@ def _near(name: str, there: list[str]) -> str | None:
 def _unknown(span: Span, what: str, near: str | None) -> Diagnostic:
     if near is None:
         return Diagnostic("C005", Severity.WARNING, span, f"{what} is not known and has no effect")
-    return Diagnostic("C005", Severity.WARNING, span, f"{what} is not known; did you mean {near}?", fix=Fix(span, near))
+    fix = Fix(span, near, is_named=True)
+    return Diagnostic("C005", Severity.WARNING, span, f"{what} is not known; did you mean {near}?", fix=fix)
 
 
 def input_name(number: int) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import fields
@@ -72,7 +73,7 @@ class TwinEvent(NamedTuple):
         return f"{self.time_s:12.6f} s  {self.text}"
 
 
-class Rig:
+class Rig(ABC):
     """Base of the rigs. What is marked as *the twin's* skips the test where a device replaces it (``--device``)."""
 
     def __init__(self, name: str, time: RigTime, device: str | None, directory: Path) -> None:
@@ -130,8 +131,9 @@ class Rig:
         said = [verdict() for verdict in self._verdicts]
         return [f"property violated: {one.name}: {one.why}" for one in said if not one.holds]
 
+    @abstractmethod
     def _in_world(self, act: Callable[[World], T]) -> T:
-        raise NotImplementedError
+        """The result of ``act``, which gets the world while no other thread changes it."""
 
     def log(self) -> str:
         """The last frames and events, one in a line."""
@@ -142,6 +144,7 @@ class Rig:
         __tracebackhide__ = True
         pytest.skip(f"{what} exists on a twin only, and --device names {self._device}")
 
+    @abstractmethod
     def begin(self) -> None:
         """Skip the test before it begins if the device does not fit its marker."""
 

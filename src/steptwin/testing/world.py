@@ -142,7 +142,7 @@ class WorldRig(Rig):
         found = next((spec for spec in self._spec.lines if spec.name == line), None)
         if found is None:
             raise World.unknown("line", line, [spec.name for spec in self._spec.lines])
-        return line_kinds()[found.kind].links["tcp"].place_kind
+        return line_kinds()[found.kind].opened_by["tcp"].place_kind
 
     def _port(self, line: str, kind: str) -> PlacePort:
         return PlacePort(self._live, line, f"test-{next(self._places)}", kind)

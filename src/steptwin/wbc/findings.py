@@ -31,9 +31,15 @@ class ProgramFinding:
     def severity(self) -> Severity:
         return Severity.ERROR if self.code.startswith("W1") else Severity.WARNING
 
-    def at(self, place: Spanned, message: str, hint: str | None = None, fix: str | Fix | None = None) -> Diagnostic:
-        """The message for one place; ``fix`` is the text that replaces it, or a replacement elsewhere."""
+    def at(
+        self, place: Spanned, message: str, hint: str | None = None, fix: str | Fix | None = None, meant: str | None = None
+    ) -> Diagnostic:
+        """The message for one place. ``fix`` is the text that replaces it, or a replacement elsewhere. ``meant`` is the name that
+        was probably meant: the fix, and the hint asks for it.
+        """
         span = Span(place.start, place.end)
+        if meant is not None:
+            return Diagnostic(self.code, self.severity, span, message, f"did you mean {meant}?", Fix(span, meant, is_named=True))
         return Diagnostic(self.code, self.severity, span, message, hint, Fix(span, fix) if isinstance(fix, str) else fix)
 
 

@@ -13,7 +13,7 @@ from dataclasses import replace
 from itertools import accumulate
 from operator import add
 
-from steptwin.diagnostics import Diagnostic, Fix, Span, in_order
+from steptwin.diagnostics import Diagnostic, Span, in_order
 from steptwin.wbc.check import CheckedProgram, check_program
 from steptwin.wbc.dialect import DEFAULT, Dialect
 from steptwin.wbc.memory import StepMemory
@@ -119,7 +119,7 @@ class Edited:
 
     def placed(self, diagnostic: Diagnostic) -> Diagnostic:
         fix = diagnostic.fix
-        moved = None if fix is None else Fix(self.span(fix.span), fix.text)
+        moved = None if fix is None else replace(fix, span=self.span(fix.span))
         return replace(diagnostic, span=self.span(diagnostic.span), fix=moved)
 
 

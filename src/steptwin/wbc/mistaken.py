@@ -59,11 +59,12 @@ def unused_variables(executable: s.Executable, scope: ProgramScope, dialect: Dia
         if index not in read:
             meant = register_meant(name.key, dialect) or scope.nearest_register(name.text)
             hint = f"remove it, or did you mean {meant or 'a register'}?"
-            fix = meant or _removed(executable, index)
+            named = None if meant is None else Fix(Span(name.start, name.end), meant, is_named=True)
+            fix = named or _removed(executable, index)
             found.append(f.NEVER_USED.at(name, f"{name.text} is set but never used", hint, fix))
         elif (meant := register_meant(name.key, dialect, _CERTAIN)) is not None:
             message = f"{name.text} is a variable: it has nothing to do with {meant}"
-            found.append(f.LIKE_A_REGISTER.at(name, message, f"did you mean {meant}?", fix=meant))
+            found.append(f.LIKE_A_REGISTER.at(name, message, meant=meant))
     return found
 
 

@@ -241,7 +241,7 @@ class StatementReader:
             meant = self._near.of(first.text, (SET, *STATEMENTS))
         if meant is not None:
             self.keyword = meant
-            return Rejected(f.UNKNOWN_STATEMENT.at(first, f"unknown statement {first.text}", f"did you mean {meant}?", fix=meant))
+            return Rejected(f.UNKNOWN_STATEMENT.at(first, f"unknown statement {first.text}", meant=meant))
         if key in INSTEAD or key in DECLARATIONS:
             return Rejected(f.UNKNOWN_STATEMENT.at(first, f"WBC has no {key}", INSTEAD.get(key)))
         if self._last == 2 and second is not None and second.kind == NUMBER:
@@ -347,8 +347,8 @@ class StatementReader:
         if row is None:
             known = [r.name for r in FUNCTIONS.values()]
             meant = _FUNCTIONS_ELSEWHERE.get(token.text.upper()) or self._near.of(token.text, known)
-            hint = f"did you mean {meant}?" if meant else f"known are {', '.join(known)}"
-            raise Rejected(f.UNKNOWN_FUNCTION.at(token, f"unknown function {token.text}", hint, fix=meant))
+            hint = f"known are {', '.join(known)}"
+            raise Rejected(f.UNKNOWN_FUNCTION.at(token, f"unknown function {token.text}", hint, meant=meant))
         usage = f"write {row.name}({', '.join('XY'[: row.arguments])})"
         self._at += 2
         arguments = [self._value(f.TOO_FEW, f.WRONG_ARGUMENT, row.name, usage)]

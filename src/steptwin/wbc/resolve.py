@@ -238,8 +238,8 @@ class _Resolver:
             return s.JumpStep(statement.start, statement.end, target)
         if not self._outline.has_broken_labels:
             meant = self._near.of(name.text, self._outline.labels)
-            hint = f"did you mean {meant}?" if meant else f"define the label as {name.text}: on a line of its own"
-            self._report(f.UNKNOWN_LABEL.at(name, f"there is no label {name.text}", hint, fix=meant))
+            hint = f"define the label as {name.text}: on a line of its own"
+            self._report(f.UNKNOWN_LABEL.at(name, f"there is no label {name.text}", hint, meant=meant))
         return None
 
     def _motion(self, number: int, statement: KeywordStatement) -> s.ProgramStep | None:
@@ -316,8 +316,8 @@ class _Resolver:
         if index is not None:
             return s.Literal(float(index))
         meant = self._near.of(name.text, self._positions.names())
-        hint = f"did you mean @{meant}?" if meant else f"the table has {rows_text(len(self._positions.rows))}"
-        self._report(f.UNKNOWN_POSITION.at(position, f"there is no position {name.text}", hint, fix=meant and f"@{meant}"))
+        hint = f"the table has {rows_text(len(self._positions.rows))}"
+        self._report(f.UNKNOWN_POSITION.at(position, f"there is no position {name.text}", hint, meant=meant and f"@{meant}"))
         return None
 
     def _report_unchecked(self, place: OperandNode) -> None:

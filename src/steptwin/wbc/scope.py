@@ -223,9 +223,8 @@ class ProgramScope:
             self._report(f.RESERVED.at(name, f"{name.text} is {reason}, not a value"))
             return
         meant = VALUES.get(key) or self.nearest(name.text)
-        hint = f"did you mean {meant}?" if meant else self._names_for(other)
-        hint = hint or "a variable comes into being when it is first set"
-        self._report(f.UNKNOWN_VARIABLE.at(name, f"unknown variable {name.text}", hint, fix=meant))
+        hint = self._names_for(other) or "a variable comes into being when it is first set"
+        self._report(f.UNKNOWN_VARIABLE.at(name, f"unknown variable {name.text}", hint, meant=meant))
 
     def _names_for(self, other: ValueNode | None) -> str:
         """The predefined names that make sense with a register; nothing where there are none."""

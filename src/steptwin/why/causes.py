@@ -307,7 +307,7 @@ class Causes:
         if plan is None:
             return None
         record = self._log.record(plan)
-        profile = profile_of(record.value)  # type: ignore[arg-type]
+        profile = profile_of(record.plan())
         name = f"{machine}.M{record.subject}"
         shown = f"{mechanics} ({name})" if mechanics else name
         is_before = not self._log.is_whole and plan.time == self._log.begin
@@ -325,7 +325,7 @@ class Causes:
 
     def _end(self, plan: Change) -> tuple[float, Nanos]:
         """When the motion of a plan ends, which may be never; of several at once, the one planned last."""
-        profile = profile_of(self._log.record(plan).value)  # type: ignore[arg-type]
+        profile = profile_of(self._log.record(plan).plan())
         if not profile.segments:
             return plan.time, plan.time
         return math.inf if profile.end is None else profile.end, plan.time

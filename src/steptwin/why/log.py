@@ -117,7 +117,7 @@ class CauseLog:
         records = self.records[group]
         match record.kind:
             case "edge":
-                change = Change(record.time, float(record.value), group, len(records))  # type: ignore[arg-type]
+                change = Change(record.time, record.level(), group, len(records))
                 self.changes[self.signal_of(record)].append(change)
             case "plan":
                 self.plans[record.machine, record.subject].append(Change(record.time, 0.0, group, len(records)))

@@ -60,16 +60,12 @@ class Frames:
         """A request in words."""
         place, _, _ = record.subject.rpartition("/")
         self._told.clear()
-        self.words[record.machine].frame(record.time, place, FrameDirection.IN, _bytes(record))
+        self.words[record.machine].frame(record.time, place, FrameDirection.IN, record.data())
         if self._told:
             return self._told[-1].meaning
-        return _bytes(record).decode("ascii", "backslashreplace")
+        return record.data().decode("ascii", "backslashreplace")
 
     def reaches(self, record: TraceRecord, unit: int) -> bool:
         """Whether a record is a request that may change the controller with an address."""
         place, _, direction = record.subject.rpartition("/")
-        return direction == FrameDirection.IN.value and unit in self.words[record.machine].changes(place, _bytes(record))
-
-
-def _bytes(record: TraceRecord) -> bytes:
-    return bytes(record.value)  # type: ignore[call-overload]
+        return direction == FrameDirection.IN.value and unit in self.words[record.machine].changes(place, record.data())

@@ -125,7 +125,7 @@ def _elements(toml: TomlText, element: AnyElement) -> Iterator[ElementSpec]:
 
 
 def _line(row: dict[str, Any]) -> LineSpec:
-    found = {key.name: row.pop(key.name) for key in LINK_KEYS}
+    found = {name: row.pop(name) for name in LINK_KEYS}
     files = [row.pop(key.name) for key in TLS_KEYS]
     tls = None if None in files else TlsFiles(*files)
     return LineSpec(**row, links={name: value for name, value in found.items() if value is not None}, tls=tls)

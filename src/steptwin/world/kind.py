@@ -12,6 +12,7 @@ from steptwin.errors import Misuse
 from steptwin.machine import MachineEvent, MotionController, Nanos
 from steptwin.textcodec import decode
 from steptwin.world.kernel import Kernel
+from steptwin.world.links import LINK_KEYS
 from steptwin.world.mechanics import EncoderReader
 from steptwin.world.reader import Key, Row, Table, TomlText
 from steptwin.world.scale import DriveScale
@@ -279,13 +280,23 @@ class LineKind:
     meaning: str
     """For people: ``modbus (MIC488)``."""
     links: Mapping[str, LinkKind]
-    """Keys of ``[[line]]`` that open it for programs outside, and what they open."""
+    """Keys of ``[[line]]`` that open it for programs outside, and what they open. `opened_by` has all."""
     keys: frozenset[str] = frozenset()
     """Other keys of ``[[line]]`` that not all kinds have."""
     make: Callable[[LineSpec, Sequence[Member], Kernel, RecordSink, Faults], Line]
     """The line with its members, at least one. Raises `Misuse` if they do not fit together."""
     words: Callable[[Any, str, Callable[[FrameLine], None]], LineWords]
     """What goes over a line that was made, in words for a function; the text is put before the name of a place."""
+
+    @property
+    def opened_by(self) -> Mapping[str, LinkKind]:
+        """What each key of ``[[line]]`` opens that can open it."""
+        alike = {
+            key.name: LinkKind(self.links[key.like].place_kind, key.name, f"{self.links[key.like].protocol}, {key.name}")
+            for key in LINK_KEYS.values()
+            if key.name not in self.links and key.like in self.links
+        }
+        return {**self.links, **alike}
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,20 +2,39 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
-from steptwin.world.reader import optional
+from steptwin.world.reader import Key, optional
 from steptwin.world.values import address_value, text_value
 
-LINK_KEYS = (
-    optional(text_value, "pty", "path of a pseudo terminal for a live client"),
-    optional(text_value, "serial", "a real serial port"),
-    optional(address_value, "tcp", "HOST:PORT for live clients (Modbus TCP, or raw characters)"),
-    optional(address_value, "rtu_tcp", "HOST:PORT for live clients of RTU over TCP"),
-    optional(address_value, "rfc2217", "HOST:PORT of a network serial port (RFC 2217) for live clients"),
-    optional(address_value, "tls_tcp", "HOST:PORT for live clients of Modbus TCP Security, such as 127.0.0.1:8802"),
-)
-"""In the order in which they are opened."""
+
+@dataclass(frozen=True, slots=True)
+class LinkKey:
+    """A key of ``[[line]]`` that opens it."""
+
+    key: Key
+    like: str | None = None
+    """Another one. A kind of line that has no row for this one in its `steptwin.world.kind.LineKind.links` carries the same bytes
+    over both. None: such a line cannot be opened so."""
+
+    @property
+    def name(self) -> str:
+        return self.key.name
+
+
+LINK_KEYS: dict[str, LinkKey] = {
+    key.name: LinkKey(key)
+    for key in (
+        optional(text_value, "pty", "path of a pseudo terminal for a live client"),
+        optional(text_value, "serial", "a real serial port"),
+        optional(address_value, "tcp", "HOST:PORT for live clients (Modbus TCP, or raw characters)"),
+        optional(address_value, "rtu_tcp", "HOST:PORT for live clients of RTU over TCP"),
+        optional(address_value, "rfc2217", "HOST:PORT of a network serial port (RFC 2217) for live clients"),
+        optional(address_value, "tls_tcp", "HOST:PORT for live clients of Modbus TCP Security, such as 127.0.0.1:8802"),
+    )
+}
+"""By name, in the order in which they are opened. `steptwin.live.transports.register` adds to it."""
 
 TLS_KEYS = (
     optional(text_value, "certificate", "tls_tcp: file with the certificate of this line, PEM"),

@@ -68,7 +68,8 @@ def _wires(plan: WorldParts) -> Iterator[RequestRoute]:
         if line is None:
             continue  # something is wrong with it
         kind, name = line_kinds()[spec.kind], f"line {spec.name!r} carries"
-        links = {kind.links[key].place: kind.links[key].place_kind for key in spec.links}
+        opened = kind.opened_by
+        links = {opened[key].place: opened[key].place_kind for key in spec.links}
         outside = [
             RequestRoute(name, line.fault_kinds[place_kind], link, line.units, on=spec.name) for link, place_kind in links.items()
         ]

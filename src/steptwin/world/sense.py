@@ -65,7 +65,7 @@ def check_sense(text: TomlText, path: Path, rows: TableRows, table: object, kind
 
 def of_lines() -> Mapping[str, tuple[str, ...]]:
     """Keys of a line that not all kinds of lines have, and the kinds that do."""
-    lines = line_kinds().values()
-    keys = {key: None for kind in lines for key in (*kind.links, *kind.keys)}
-    having = {key: tuple(kind.name for kind in lines if key in kind.links or key in kind.keys) for key in keys}
+    lines = {kind.name: (*kind.opened_by, *kind.keys) for kind in line_kinds().values()}
+    keys = dict.fromkeys(key for keys in lines.values() for key in keys)
+    having = {key: tuple(name for name, keys in lines.items() if key in keys) for key in keys}
     return {key: kinds for key, kinds in having.items() if len(kinds) < len(lines)}

@@ -206,6 +206,11 @@ _UNREAD = Note("")
 """Placeholder for a step with an error, so that later steps keep their numbers; such a script never runs."""
 
 
+def read_step(text: TomlText, path: Path, table: object) -> Step | None:
+    """The step of one table; None if it has errors, which are added to ``text``."""
+    return _step(text, path, "the step", table)
+
+
 def read_steps(text: TomlText, path: Path, value: object) -> tuple[Step, ...]:
     """Steps from a list of tables; errors are added to ``text``."""
     if not isinstance(value, list):
@@ -213,14 +218,14 @@ def read_steps(text: TomlText, path: Path, value: object) -> tuple[Step, ...]:
         return ()
     steps: list[Step] = []
     for n, table in enumerate(value):
-        step = _step(text, (*path, n), n + 1, table)
+        step = _step(text, (*path, n), f"step {n + 1}", table)
         steps.append(_UNREAD if step is None else step)
     return tuple(steps)
 
 
-def _step(text: TomlText, path: Path, n: int, table: object) -> Step | None:
+def _step(text: TomlText, path: Path, called: str, table: object) -> Step | None:
     if not isinstance(table, Mapping):
-        text.wrong(path, "D002", f"step {n} is {table!r}", "expected a table, such as { wait = '1 s' }")
+        text.wrong(path, "D002", f"{called} is {table!r}", "expected a table, such as { wait = '1 s' }")
         return None
     if "repeat" in table:
         values = read_table(text, path, table, (REPEAT,), (STEPS.name,))
@@ -232,7 +237,7 @@ def _step(text: TomlText, path: Path, n: int, table: object) -> Step | None:
         fixes = [fix for key in unknown if not kinds and (fix := text.key_replacement((*path, key), key, ACTIONS)) is not None]
         found = f"has {' and '.join(kinds)}" if kinds else f"has {', '.join(map(repr, table)) or 'nothing'}"
         text.wrong(
-            path, "D008", f"step {n} {found}{near}", f"expected one of {', '.join(ACTIONS)}, repeat", next(iter(fixes), None)
+            path, "D008", f"{called} {found}{near}", f"expected one of {', '.join(ACTIONS)}, repeat", next(iter(fixes), None)
         )
         return None
     action = ACTIONS[kinds[0]]
@@ -243,5 +248,5 @@ def _step(text: TomlText, path: Path, n: int, table: object) -> Step | None:
     try:
         return action.make(*(values[key.attribute or key.name] for key in (action.main, *action.others)))
     except Misuse as error:
-        text.wrong(path, "D007", f"step {n}: {error}")
+        text.wrong(path, "D007", f"{called}: {error}")
         return None

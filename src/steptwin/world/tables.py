@@ -77,8 +77,6 @@ KEYS: Mapping[str, tuple[Key, ...]] = {
             "gap",
             "silence in ms after which bytes of no frame are given up; default 0.75 on a serial port, else 20",
         ),
-        *LINK_KEYS,
-        *TLS_KEYS,
     ),
     "event": (
         optional(name_value, "name", "for the trace"),
@@ -102,7 +100,7 @@ SCRIPT = TableRows(written="[[script]]", keys=KEYS["script"])
 
 def tables() -> Mapping[str, TableRows]:
     """Every table, in the order of a description: its name and seed, lines, controllers, elements, scripts, history, drawing."""
-    return _tables_with(tuple(map(id, (*KINDS.values(), *ELEMENTS.values()))))
+    return _tables_with(tuple(map(id, (*KINDS.values(), *ELEMENTS.values(), *LINK_KEYS.values()))))
 
 
 @lru_cache(maxsize=4)
@@ -121,9 +119,10 @@ def _tables_with(registered: tuple[int, ...]) -> Mapping[str, TableRows]:
 
 
 def _line_keys() -> tuple[Key, ...]:
-    """What kinds of lines there are is known when all are registered."""
+    """What kinds of lines and links there are is known when all are registered."""
     meaning = " or ".join(kind.meaning for kind in line_kinds().values())
-    return tuple(replace(key, meaning=meaning) if key.name == "kind" else key for key in KEYS["line"])
+    own = (replace(key, meaning=meaning) if key.name == "kind" else key for key in KEYS["line"])
+    return (*own, *(link.key for link in LINK_KEYS.values()), *TLS_KEYS)
 
 
 def all_keys() -> dict[str, tuple[Key, ...]]:

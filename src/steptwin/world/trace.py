@@ -26,7 +26,7 @@ from typing import Any, NamedTuple, TypeAlias
 from steptwin.errors import Misuse
 from steptwin.machine import Fact, Nanos
 from steptwin.motion import Profile, Segment
-from steptwin.motion.divisions import StepTrain
+from steptwin.motion.divisions import Plan, StepTrain
 from steptwin.motion.paths import ArcSegment
 
 KINDS = ("plan", "load", "free", "coordinate", "edge", "frame", "statement", "event", "input", "fault")
@@ -43,6 +43,27 @@ class TraceRecord(NamedTuple):
     value: object
     facts: tuple[Fact, ...] = ()
     """The content of the event's text as fields, for programs. It is not part of the digest, which has the text."""
+
+    def plan(self) -> Plan:
+        """The value of a ``plan``."""
+        if not isinstance(self.value, Profile | StepTrain):
+            raise self._other("plan")
+        return self.value
+
+    def level(self) -> float:
+        """The value of an ``edge``."""
+        if not isinstance(self.value, float):
+            raise self._other("edge")
+        return self.value
+
+    def data(self) -> bytes:
+        """The value of a ``frame``."""
+        if not isinstance(self.value, bytes):
+            raise self._other("frame")
+        return self.value
+
+    def _other(self, kind: str) -> TypeError:
+        return TypeError(f"a record of kind {self.kind} with the value {self.value!r}: expected a {kind}")
 
 
 RecordSink: TypeAlias = Callable[[TraceRecord], None]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 from steptwin.campaign.properties.text import parse_property
@@ -102,8 +102,8 @@ def _nothing(name: str, rest: str) -> None:
         raise Misuse(f"property {name!r}: found {rest!r}, expected nothing after it")
 
 
-def _all(texts: object) -> str:
-    return " and ".join(f"({text})" for text in texts)  # type: ignore[attr-defined]
+def _all(texts: Iterable[str]) -> str:
+    return " and ".join(f"({text})" for text in texts)
 
 
 READY: Mapping[str, ReadyProperty] = {

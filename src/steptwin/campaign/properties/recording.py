@@ -15,6 +15,7 @@ from steptwin.world.expression import COMPARE, value_of
 from steptwin.world.kernel import Source
 from steptwin.world.plant import Plant
 from steptwin.world.quantities import Absolute, NumberLiteral, Product, Quantity, Remainder, Sum
+from steptwin.world.signals import SignalOf
 
 FINEST_NS: Nanos = 1000
 """Stretches are not divided further."""
@@ -171,7 +172,8 @@ def _span(world: Plant, name: str) -> float | None:
     axis = world.axes.get(owner)
     if axis is not None and rest == "position" and axis.spec.travel is not None:
         return axis.spec.travel[1] - axis.spec.travel[0]
-    bounds = getattr(world.signal(name), "bounds", None)
+    signal = world.signal(name)
+    bounds = signal.bounds if isinstance(signal, SignalOf) else None
     return bounds[1] - bounds[0] if bounds is not None and bounds[1] > bounds[0] else None
 
 

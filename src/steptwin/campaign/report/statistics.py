@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import isfinite
 from typing import Any, NamedTuple
 
 from steptwin.campaign.case import Case, CaseResult
 from steptwin.campaign.search.guided import distance
+from steptwin.world.faults import read as read_fault
 
 BINS = 24
 MOST_MATTERING = 20
@@ -64,7 +65,7 @@ def _numbers(case: Case, faults: Sequence[str]) -> Mapping[str, float]:
     """What varies as numbers: values, and 1 for each fault that is there."""
     found = {name: float(value) for name, value in case.values.items() if not isinstance(value, str)}
     for fault in case.faults:
-        words = faults[fault.table] if 0 <= fault.table < len(faults) else fault.fault.partition(" name=")[0]
+        words = faults[fault.table] if 0 <= fault.table < len(faults) else str(replace(read_fault(fault.fault), name=""))
         found[f"fault {words}"] = 1.0
     return found
 

@@ -18,7 +18,15 @@ _WHY = {
 }
 
 
-class ModbusRefusal(Refusal):
+class Mic488Refusal(Refusal):
+    """A refusal by the controller at ``place``; ``what`` is the message without it."""
+
+    def __init__(self, place: str, what: str) -> None:
+        self.what = what
+        super().__init__(f"{place}: {what}")
+
+
+class ModbusRefusal(Mic488Refusal):
     """The controller answered with a Modbus exception; ``code`` is its number."""
 
     def __init__(self, place: str, request: object, exception: ModbusException) -> None:
@@ -26,10 +34,10 @@ class ModbusRefusal(Refusal):
         name = EXCEPTION_NAMES.get(exception.code, "unknown")
         why = _WHY.get(exception.code)
         reason = f"exception {exception.code:02X}, {name}"
-        super().__init__(f"{place}: '{request}' was refused: {f'{why} ({reason})' if why else reason}")
+        super().__init__(place, f"'{request}' was refused: {f'{why} ({reason})' if why else reason}")
 
 
-class NotReady(Refusal):
+class NotReady(Mic488Refusal):
     """The state of the controller does not permit the request; nothing was sent."""
 
 

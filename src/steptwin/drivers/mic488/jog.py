@@ -87,8 +87,9 @@ class AsyncMic488Jog:
             if speed > vmax * (1.0 + SINGLE):
                 name = unit.unit_name(axis)
                 raise NotReady(
-                    f"{unit.place}: a jog of M{axis} at {speed:g} {name}/s is faster than its VMAX, {vmax:g} {name}/s (which a "
-                    "program that was killed while it jogged leaves at the velocity of its jog): set VMAX first"
+                    unit.place,
+                    f"a jog of M{axis} at {speed:g} {name}/s is faster than its VMAX, {vmax:g} {name}/s (which a program that "
+                    "was killed while it jogged leaves at the velocity of its jog): set VMAX first",
                 )
             self._reach_u = speed * self._hold_s + speed * speed / (2.0 * dec)
             if vmax != speed:
@@ -143,7 +144,7 @@ class AsyncMic488Jog:
         control = await self._unit.control(timeout_ns=self._exchange_ns())
         if control.triggered:
             raise NotReady(
-                f"{self._unit.place}: AXIS_CTR_MODE was set to TRIGGER by another program: M{self._axis} is no longer jogged"
+                self._unit.place, f"AXIS_CTR_MODE was set to TRIGGER by another program: M{self._axis} is no longer jogged"
             )
         return control
 

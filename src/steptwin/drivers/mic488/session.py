@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from steptwin.drivers import Mic488
+from steptwin.drivers.mic488.failures import Mic488Refusal
 from steptwin.errors import Misuse, Refusal
 from steptwin.mic488.registermap import DataType, RegisterMap
 from steptwin.mic488.registers import register_map
@@ -76,10 +77,10 @@ def carry_out_one(mic: Mic488, line: str) -> dict[str, Any]:
 def _result(mic: Mic488, action: Action) -> dict[str, Any]:
     try:
         return action(mic)
-    except Misuse:
-        raise
+    except Mic488Refusal as refusal:
+        return {"refused": refusal.what}
     except Refusal as refusal:
-        return {"refused": str(refusal).removeprefix(f"{mic.place}: ")}
+        return {"refused": str(refusal)}
 
 
 def action_of(line: str, registers: RegisterMap) -> Action:

@@ -130,7 +130,7 @@ async def put_back(unit: Unit, snapshot: Mic488Snapshot, *, counters: bool, outp
     control = await unit.control()
     moving = [f"M{axis} ({status_text(code)})" for axis, code in enumerate(control.axes, start=1) if code in MOVING]
     if moving:
-        raise NotReady(f"{unit.place}: nothing is restored while axes move: {', '.join(moving)}")
+        raise NotReady(unit.place, f"nothing is restored while axes move: {', '.join(moving)}")
     wanted = await changes(unit, snapshot, counters=counters, outputs=outputs)
     for change in wanted:
         if change.item.register.type is not Type.MEMORY:
@@ -139,7 +139,7 @@ async def put_back(unit: Unit, snapshot: Mic488Snapshot, *, counters: bool, outp
         await unit.write_user(first, UserFormat.WORD, values)
     left = await changes(unit, snapshot, counters=counters, outputs=outputs)
     if left:
-        raise NotReady(f"{unit.place}: not kept by the controller: {'; '.join(map(str, left))}")
+        raise NotReady(unit.place, f"not kept by the controller: {'; '.join(map(str, left))}")
     return wanted
 
 

@@ -68,7 +68,7 @@ class Mic488Part:
         before = self._mic.firmware
         await self._mic.find_firmware()
         if self._mic.firmware != before:
-            raise NotReady(f"{self.line.place}: another controller is there: firmware {self._mic.firmware} instead of {before}")
+            raise NotReady(self.line.place, f"another controller is there: firmware {self._mic.firmware} instead of {before}")
 
     # ------------------------------------------------------------------ points
 

@@ -248,8 +248,9 @@ class Unit:
         gear = self.gear(axis)
         if gear is None:
             raise NotReady(
-                f"{self.place}: DATA_TYPE is DINT, so {item.name} takes pulses, and GEAR is not known: "
-                "give the configuration, or set DATA_TYPE to REAL"
+                self.place,
+                f"DATA_TYPE is DINT, so {item.name} takes pulses, and GEAR is not known: "
+                "give the configuration, or set DATA_TYPE to REAL",
             )
         return round(value_u * gear)
 
@@ -280,7 +281,7 @@ class Unit:
         values = self._control_block.values(words(answer), DataType.REAL)
         found = [int(values[item]) for item in self._control_items]
         if found[0] not in (DataType.REAL, DataType.DINT):
-            raise NotReady(f"{self.place}: unit {self.number} reads DATA_TYPE = {found[0]}, which is not a value of a MIC488")
+            raise NotReady(self.place, f"unit {self.number} reads DATA_TYPE = {found[0]}, which is not a value of a MIC488")
         status = found[3] if self._has_status else None
         control = ControlRegisters(at, DataType(found[0]), found[1], found[2] == 1, status, tuple(found[-AXES:]))
         self.wording.data_type = control.data_type
@@ -292,12 +293,13 @@ class Unit:
         control = await self.control()
         if control.triggered:
             raise NotReady(
-                f"{self.place}: unit {self.number} is in TRIGGER mode (AXIS_CTR_MODE = 1), in which a motion waits for its "
-                "trigger: set AXIS_CTR_MODE to 0"
+                self.place,
+                f"unit {self.number} is in TRIGGER mode (AXIS_CTR_MODE = 1), in which a motion waits for its trigger: set "
+                "AXIS_CTR_MODE to 0",
             )
         for axis in axes:
             if control.axes[axis - 1] == AxisStatus.OFF:  # MIC-8
-                raise NotReady(f"{self.place}: M{axis} of unit {self.number} is switched off: enable it first (M{axis}_EN = 1)")
+                raise NotReady(self.place, f"M{axis} of unit {self.number} is switched off: enable it first (M{axis}_EN = 1)")
         return control
 
     def lock(self) -> AbstractAsyncContextManager[object]:

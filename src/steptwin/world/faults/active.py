@@ -121,9 +121,10 @@ class ActiveFault(Stateful):
         return touched is not None and touched.start <= span[1] and span[0] < touched.stop
 
     def is_on(self, link: str, line: str) -> bool:
-        """Whether it is meant for ``link`` (empty: not known) of ``line`` (empty: not one of a world)."""
+        """Whether it is meant for ``link`` (empty: not known; ``tcp``: each of it) of ``line`` (empty: none of a world)."""
         get = self.fault.get
-        return (not link or get("link") in (None, link)) and get("line") in (None, line)
+        wanted = get("link")
+        return (not link or wanted in (None, link, link.rpartition("-")[0])) and get("line") in (None, line)
 
 
 def addresses(pdu: bytes) -> range | None:

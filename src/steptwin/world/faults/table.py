@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias, TypedDict, Unpack
 
 from steptwin.errors import Misuse
 from steptwin.tables import IncompleteTable
@@ -244,12 +244,20 @@ class FaultKind:
         return next((parameter for parameter in self.parameters if parameter.name == name), None)
 
 
-def whole(name: str, meaning: str, least: int, most: int | None, **others: object) -> Parameter:
-    return Parameter(name, ParameterForm.WHOLE, meaning, least, most, **others)  # type: ignore[arg-type]
+class ParameterOptions(TypedDict, total=False):
+    """What a parameter that is a number may have besides its range; see `Parameter`."""
+
+    default: FaultValue | None
+    otherwise: str
+    is_required: bool
 
 
-def number(name: str, meaning: str, least: float, most: float | None, **others: object) -> Parameter:
-    return Parameter(name, ParameterForm.NUMBER, meaning, least, most, **others)  # type: ignore[arg-type]
+def whole(name: str, meaning: str, least: int, most: int | None, **options: Unpack[ParameterOptions]) -> Parameter:
+    return Parameter(name, ParameterForm.WHOLE, meaning, least, most, **options)
+
+
+def number(name: str, meaning: str, least: float, most: float | None, **options: Unpack[ParameterOptions]) -> Parameter:
+    return Parameter(name, ParameterForm.NUMBER, meaning, least, most, **options)
 
 
 LARGEST_WHOLE = 1 << 63
@@ -277,7 +285,7 @@ _MOMENTS = (
     _COUNT,
     _WINDOW[1],
 )
-_LINK = Parameter("link", ParameterForm.TEXT, "On this link alone, such as tcp-1, rtu-1, pty, serial.", otherwise="all")
+_LINK = Parameter("link", ParameterForm.TEXT, "On this link alone, such as tcp-1, pty, serial; tcp: each tcp-N.", otherwise="all")
 _LINE = Parameter("line", ParameterForm.TEXT, "On this line of a world alone.", otherwise="all")
 _MACHINE = Parameter("machine", ParameterForm.TEXT, "Which machine; for a served twin its unit.", otherwise="the only one")
 AXIS = whole("axis", "Which axis.", 1, 16, default=1)
@@ -360,14 +368,13 @@ def check(parameter: Parameter, value: object, where: str) -> FaultValue:
         return _span(parameter, value, where)
     if form is ParameterForm.NUMBER and isinstance(value, int) and not isinstance(value, bool):
         value = float(value)
-    right: bool
     if form is ParameterForm.WHOLE or form is ParameterForm.NUMBER:
-        right = type(value) is (int if form is ParameterForm.WHOLE else float) and _is_within(parameter, value)  # type: ignore[arg-type]
-    else:
-        right = isinstance(value, str) and value != "" and (not parameter.words or value in parameter.words)
-    if not right:
-        raise Misuse(f"{where} = {value!r}: permitted are {parameter.permitted}")
-    return value  # type: ignore[return-value]
+        wanted = int if form is ParameterForm.WHOLE else float
+        if isinstance(value, wanted) and not isinstance(value, bool) and _is_within(parameter, value):
+            return value
+    elif isinstance(value, str) and value != "" and (not parameter.words or value in parameter.words):
+        return value
+    raise Misuse(f"{where} = {value!r}: permitted are {parameter.permitted}")
 
 
 def _is_within(parameter: Parameter, value: float) -> bool:

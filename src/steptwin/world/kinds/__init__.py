@@ -19,7 +19,7 @@ def register(kind: AnyKind) -> None:
         raise Misuse(f"there is a kind of controllers called {kind.name!r} already")
     if line_kinds().get(kind.line.name, kind.line) is not kind.line:
         raise Misuse(f"there is a kind of lines called {kind.line.name!r} already")
-    unknown = kind.line.links.keys() - {key.name for key in LINK_KEYS}
+    unknown = kind.line.links.keys() - LINK_KEYS.keys()
     if unknown:
         raise Misuse(f"lines of kind {kind.line.name!r} have links that are no keys of [[line]]: {', '.join(sorted(unknown))}")
     KINDS[kind.name] = kind
