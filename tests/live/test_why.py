@@ -82,7 +82,7 @@ def test_the_answer_is_that_of_the_session(run: Run) -> None:
 
 def test_a_chain_is_followed_to_older_states(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[int] = []
-    monkeypatch.setattr(kept, "_Known", lambda history, at, real=kept._Known: made.append(at) or real(history, at))
+    monkeypatch.setattr(kept, "_Known", lambda history, at, most, real=kept._Known: made.append(at) or real(history, at, most))
 
     async def scene() -> None:
         rig = Asked()

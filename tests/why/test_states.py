@@ -20,12 +20,17 @@ WORLD = '[[mic488]]\nname = "m"\nprogram = "m.prg"\nstart = true\n'
 QUESTIONS = ("m.USER_REGISTER[4] > 3", "m.USER_REGISTER[4]", "m.USER_REGISTER[5] == 1", "m.USER_REGISTER[5]", "time > 1.5")
 
 
+def whole_past(world: World) -> Why:
+    """What is noted of the whole past at once."""
+    return Why(lambda: World(world.blueprint), world.inputs, world.now)
+
+
 def counting() -> Why:
     world = World.from_toml(WORLD, {"m.prg": COUNTS.encode()})
     world.run(1.7)
     world.apply_input(do.Write((("m", "USER_REGISTER[4]", 90.0),)))
     world.run(for_=6.0)
-    return world.past
+    return whole_past(world)
 
 
 @pytest.mark.parametrize("question", QUESTIONS)
@@ -110,10 +115,10 @@ def test_what_is_noted_of_points_is_what_a_run_shows(program: str, wired: str, m
     world.apply_input(do.Write((("m", "USER_REGISTER[4]", 90.0), ("m", "M2_ACC", 500.0))))
     world.run(for_=3.0)
     moments = [number * 310 * MILLISECOND for number in range(1, 16)]
-    past = world.past
+    past = whole_past(world)
     noted = [past.ask(question, at) for question in SEEN for at in moments]
     monkeypatch.setattr(points, "MOST_TURNS", 0)
-    past = world.past
+    past = whole_past(world)
     assert noted == [past.ask(question, at) for question in SEEN for at in moments]
     assert past.log.points.turns("m.M2_ACC") is None
     assert len({answer.since for answer in noted}) > 5
@@ -126,7 +131,7 @@ def test_a_condition_of_a_pin_and_a_register() -> None:
     world.run(1.0)
     world.apply_input(do.Press("go"))
     world.run(for_=2.0)
-    past = world.past
+    past = whole_past(world)
     assert past.ask("m.USER_REGISTER[4] == 5 and m.IN1", 1_200 * MILLISECOND).since == SECOND
     assert past.ask("m.USER_REGISTER[4] == 5 and go", 1_200 * MILLISECOND).since == SECOND
     last = past.ask("m.USER_REGISTER[4] == 5 and m.IN1").since

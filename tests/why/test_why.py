@@ -279,8 +279,11 @@ def test_a_program_that_was_replaced() -> None:
     world.mic488["cell"].write("PROGRAM_CTRL", 0)
     world.apply_input(Download("cell", "program 0", "OUT4 = ON\n"))
     world.run(6.0)
-    assert world.why("OUT1", 2.0).links[0].text == "cell.OUT1 became 1"
-    assert shown(world, "cell", 2.0)[0].startswith("cell does not wait: a statement of a program that was replaced since")
+    past = world.past
+    assert past.ask("cell", 2_000_000_000).state.startswith("cell waits at line 5")
+    past.ask("OUT4")  # it is known up to the end now
+    assert past.ask("OUT1", 2_000_000_000).links[0].text == "cell.OUT1 became 1"
+    assert past.ask("cell", 2_000_000_000).state.startswith("cell does not wait: a statement of a program that was replaced")
 
 
 def test_contacts_are_signals_too() -> None:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from steptwin.files.session import Session
-from steptwin.why.question import Why
+from steptwin.why.repeated import RepeatedPast
 
 
-def why_of_session(session: Session) -> Why:
+def why_of_session(session: Session) -> RepeatedPast:
     """Raises `Misuse` when its world cannot be made again."""
-    return Why(session.world, session.inputs, session.until)
+    return RepeatedPast(session.world, session.inputs, session.until)

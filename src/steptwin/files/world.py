@@ -22,7 +22,7 @@ from steptwin.files.textfiles import read_text
 from steptwin.inputfiles import MOST_DESCRIPTION_BYTES, read_bytes, shown
 from steptwin.machine import SECOND, Nanos
 from steptwin.why.answer import Answer
-from steptwin.why.question import Why
+from steptwin.why.repeated import RepeatedPast
 from steptwin.world import script as do
 from steptwin.world.blueprint import Blueprint, memory_file
 from steptwin.world.description import describe, read_world
@@ -310,13 +310,13 @@ class World(Plant):
     # ------------------------------------------------------------------ causes
 
     @property
-    def past(self) -> Why:
-        """The past until now, for questions (`Why.ask`). Raises `Misuse` for a world that does not keep its inputs."""
+    def past(self) -> RepeatedPast:
+        """The past until now, for questions (`RepeatedPast.ask`). Raises `Misuse` for a world that does not keep its inputs."""
         if not self.keeps_inputs:
             raise Misuse("this world does not keep its inputs, so its past is not known: make it with keep_inputs=True")
         self.advance(self.now)
         self.settle_all()
-        return Why(lambda: type(self)(self.blueprint, failing=self.failed_saves), self.inputs, self.now)
+        return RepeatedPast(lambda: type(self)(self.blueprint, failing=self.failed_saves), self.inputs, self.now)
 
     def why(self, question: str, at: Duration | None = None) -> Answer:
         """Why a signal has its value, a condition its truth, or a controller's program waits; now or at a moment.

@@ -71,6 +71,10 @@ class Courses:
                 self._known[name, interval.state.snapshot.now] = _Course(interval.end, list(_within(turns, interval)))
             self._remembered += len(turns) + len(lacking)
 
+    def remember(self, name: str, interval: Interval, value: float) -> None:
+        """What has a name has one value in a whole interval."""
+        self._known.setdefault((name, interval.state.snapshot.now), _Course(interval.end, [(interval.state.snapshot.now, value)]))
+
     def _has(self, wanted: Collection[str], interval: Interval, at: Nanos) -> bool:
         begin, needed = interval.state.snapshot.now, min(at, interval.end)
         return all((known := self._known.get((name, begin))) is not None and known.end >= needed for name in wanted)

@@ -6,27 +6,46 @@ older ones where the causes are older. It stays for further questions, which onl
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
+from typing import Protocol
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.why.question import Asking, Why
-from steptwin.world.history import History, outside_past
+from steptwin.world.history import PastState, outside_past
 from steptwin.world.plant import Plant
-from steptwin.world.plantsnapshot import PlantSnapshot
+from steptwin.world.plantsnapshot import PlantSnapshot, RecordedInput
 
 FIRST_SPAN_NS: Nanos = 5 * SECOND
 """So much of the past is looked at first, and `FURTHER` times as much where the causes are older."""
+FIRST_STATEMENTS = 5000
+"""Of a program, at most as many at first."""
 FURTHER = 8
 MOST_NOTED = 500_000
 """Limit of the records and statements that are noted: some 100 MB."""
 
 
-class PastQuestions:
-    """Answers questions about the past in ``history``."""
+class StatesAndInputs(Protocol):
+    """What `steptwin.world.history.History` has of the past of a world."""
 
-    def __init__(self, history: History) -> None:
+    @property
+    def world(self) -> Plant: ...
+    @property
+    def begin(self) -> Nanos: ...
+    @property
+    def branch(self) -> int: ...
+    def state_at(self, moment: Nanos) -> PastState: ...
+    def keeps_inputs_from(self, number: int) -> bool: ...
+    def inputs_from(self, number: int) -> Sequence[RecordedInput]: ...
+
+
+class PastQuestions:
+    """Answers questions about the past in ``history``. ``most``: limit of what is noted."""
+
+    def __init__(self, history: StatesAndInputs, most: int = MOST_NOTED) -> None:
         self._history = history
+        self._most = most
         self._known: _Known | None = None
 
     def asking(self, question: str, at: Nanos | None = None) -> Asking:
@@ -36,35 +55,41 @@ class PastQuestions:
         at = now if at is None else at
         if not history.begin <= at <= now:
             raise Misuse(outside_past(at, history.begin, now))
-        known, span = self._known, FIRST_SPAN_NS
+        known, span = self._known, self._first_span()
         if known is None or not known.fits(at, now - span):
-            known = self._known = _Known(history, max(history.begin, at - span))
+            known = self._known = _Known(history, max(history.begin, at - span), self._most)
         answer = yield from known.asking(question, at)
         while answer.is_cut and (older := known.older(at)) is not None:
             yield
             try:
-                known = _Known(history, older)
+                known = _Known(history, older, self._most)
                 answer = yield from known.asking(question, at)
             except Misuse:
                 break
             self._known = known
         return answer
 
+    def _first_span(self) -> Nanos:
+        """Shorter where statements take less time."""
+        times = [programs.statement_time for programs in self._history.world.programs.values() if programs.statement_time]
+        return min([FIRST_SPAN_NS, *(FIRST_STATEMENTS * time for time in times)])
+
 
 class _Known:
     """What is known of the past from a state of it on. ``moment``: from the newest state at or before it."""
 
-    def __init__(self, history: History, moment: Nanos) -> None:
+    def __init__(self, history: StatesAndInputs, moment: Nanos, most: int) -> None:
         snapshot, self._taken = history.state_at(moment)
         self._history = history
         self._branch = history.branch
-        self._why = Why(partial(_second_world, history.world, snapshot), (), snapshot.now, MOST_NOTED)
+        self._most = most
+        self._why = Why(partial(_second_world, history.world, snapshot), (), snapshot.now, most)
 
     def fits(self, at: Nanos, not_before: Nanos) -> bool:
         """Whether a question about a moment can be answered from it. ``not_before``: up to when it must have come."""
         history, log = self._history, self._why.log
         is_same = history.branch == self._branch and history.keeps_inputs_from(self._taken)
-        return is_same and log.begin <= at and not_before <= self._why.end and log.noted < MOST_NOTED // 2
+        return is_same and log.begin <= at and not_before <= self._why.end and log.noted < self._most // 2
 
     def asking(self, question: str, at: Nanos) -> Asking:
         inputs = self._history.inputs_from(self._taken)
@@ -75,9 +100,9 @@ class _Known:
     def older(self, at: Nanos) -> Nanos | None:
         """From where to look at the past instead; None if nothing older is kept, or too much has happened since."""
         history, log, end = self._history, self._why.log, self._why.end
-        span = FURTHER * max(at - log.begin, FIRST_SPAN_NS)
+        span = FURTHER * max(at - log.begin, 1)
         if log.noted:
-            span = min(span, MOST_NOTED * (end - log.begin) // (2 * log.noted) - (end - at))
+            span = min(span, self._most * (end - log.begin) // (2 * log.noted) - (end - at))
         moment = max(history.begin, at - span)
         return moment if moment < log.begin and history.state_at(moment)[0].now < log.begin else None
 

@@ -33,6 +33,15 @@ Asking: TypeAlias = Generator[None, None, Answer]
 FoundValue: TypeAlias = Generator[None, None, tuple[float, Nanos | None]]
 
 
+def finish(asking: Asking) -> Answer:
+    """The answer, after all parts."""
+    while True:
+        try:
+            next(asking)
+        except StopIteration as end:
+            return end.value
+
+
 @dataclass(frozen=True, slots=True)
 class _Level:
     """A signal whose course is known. As `steptwin.world.condition.Signal`."""
@@ -79,12 +88,7 @@ class Why:
 
     def ask(self, question: str, at: Nanos | None = None) -> Answer:
         """The answer for a moment (ns), the end by default. Raises `Misuse` for what is no question here."""
-        asking = self.asking(question, at)
-        while True:
-            try:
-                next(asking)
-            except StopIteration as end:
-                return end.value
+        return finish(self.asking(question, at))
 
     def asking(self, question: str, at: Nanos | None = None) -> Asking:
         """As `ask`, in parts."""
@@ -204,6 +208,8 @@ class Why:
             watch, is_followed = watch_value, is_bare
         value: float | None = None
         intervals = list(self._on_the_way.intervals(at, self.end))
+        if watch is watch_truth:
+            self._remember_rests(text, canonical, intervals)
         for number, interval in enumerate(intervals):
             # As many as have shown no change: what lasts for long is found with few states to restore.
             yield from courses.bring(watched.values(), watch, intervals[number : number + max(1, number)], at)
@@ -222,6 +228,25 @@ class Why:
                 if is_followed or level(time - 1) != value:
                     return value, time
         return value or 0.0, None
+
+    def _remember_rests(self, text: str, canonical: Mapping[str, str], intervals: Iterable[Interval]) -> None:
+        """The truth of a condition in the intervals in which nothing changes that it depends on."""
+        log = self.log
+        for interval in intervals:
+            begin, levels = interval.state.snapshot.now, dict[str, float]()
+            for name, full in canonical.items():
+                if not log.is_recorded(full):
+                    rest = self._on_the_way.rest(full, interval)
+                    if rest is None:
+                        break
+                    levels[name] = rest
+                elif any(log.changes_in(full, begin - 1, interval.end)):
+                    break
+                else:
+                    levels[name] = log.level(full, begin)
+            else:
+                at_rest = SignalCondition(text, lambda name, levels=levels: _Level(lambda now: levels[name], self._unit(name)))
+                self._courses.remember(text, interval, float(at_rest.holds(begin)))
 
     def _level_in(self, interval: Interval, recorded: Mapping[str, str], watched: Mapping[str, str], name: str) -> Signal:
         """A signal of a condition in an interval."""

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from typing import NamedTuple
 
+from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
+from steptwin.points import FARTHEST_NS
 from steptwin.world.history import PastState
 from steptwin.world.plant import Plant
+from steptwin.world.signals import SignalOf
 
 MOST_KEPT = 64
 FIRST_DISTANCE_NS: Nanos = SECOND // 2
@@ -21,13 +25,23 @@ class Interval(NamedTuple):
     end: Nanos
 
 
+class Rest(NamedTuple):
+    """A moving quantity that stands. ``version``: it stands as long as this stays the same."""
+
+    value: float
+    version: object
+
+
 class StatesOnTheWay:
     """Of ``world``, the first one where it is now."""
 
     def __init__(self, world: Plant) -> None:
         self._world = world
+        self._moving = dict(_moving(world))
         self._distance: Nanos = FIRST_DISTANCE_NS
         self._states: list[PastState] = []
+        self._rests: dict[Nanos, Mapping[str, Rest]] = {}
+        """What stands at the moments of the states."""
         self.pass_by(0)
 
     def pass_by(self, inputs: int) -> None:
@@ -35,9 +49,16 @@ class StatesOnTheWay:
         if self._states and self._world.now < self._states[-1].snapshot.now + self._distance:
             return
         self._states.append(PastState(self._world.snapshot(with_inputs=False), inputs))
+        now = self._world.now
+        self._rests[now] = {name: rest for name, signal in self._moving.items() if (rest := _rest(signal, now)) is not None}
         if len(self._states) > MOST_KEPT:
             del self._states[1::2]
             self._distance *= 2
+
+    def rest(self, name: str, interval: Interval) -> float | None:
+        """The value of a moving quantity that stands during an interval; None where it does not, or that is not known."""
+        begin = self._rests[interval.state.snapshot.now].get(name)
+        return begin.value if begin is not None and begin == self._rests.get(interval.end, {}).get(name) else None
 
     def until(self, moment: Nanos) -> Iterator[PastState]:
         """The states by a moment, the last one first."""
@@ -49,3 +70,23 @@ class StatesOnTheWay:
         for state in self.until(moment):
             yield Interval(state, end)
             end = state.snapshot.now
+
+
+def _moving(world: Plant) -> Iterator[tuple[str, SignalOf]]:
+    """The quantities that move, and can tell when their course is another one."""
+    elements = (name for built in world.parts.elements.values() for name in built)
+    names = [f"{name}.{signal}" for name in elements for signal in world.parts.element_signals(name) or ()]
+    for owner, machine in world.machines.items():
+        names += [f"{owner}.{point.path}" for point in world.kind(owner).datasheet(machine).points]
+    for name in names:
+        with suppress(Misuse):  # of a row of registers one must be chosen
+            found = world.signal(name)
+            if isinstance(found, SignalOf) and found.continuous and found.read is not None and found.version() is not None:
+                yield name, found
+
+
+def _rest(signal: SignalOf, now: Nanos) -> Rest | None:
+    if next(signal.turns(now), None) is not None:
+        return None
+    value = signal.value(now)
+    return Rest(value, signal.version()) if signal.value(now + FARTHEST_NS) == value else None

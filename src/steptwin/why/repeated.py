@@ -1,0 +1,82 @@
+"""Questions about the past of a world that keeps its inputs but no states: it is run again once, at full speed, to have these."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable, Iterator, Sequence
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.why.answer import Answer
+from steptwin.why.kept import FIRST_SPAN_NS, PastQuestions
+from steptwin.why.log import MOST_NOTED, in_parts
+from steptwin.why.question import Asking, finish
+from steptwin.world.history import PastState, outside_past
+from steptwin.world.plant import Plant
+from steptwin.world.plantsnapshot import RecordedInput
+
+STATES = 64
+"""Number of states at equal distances; further ones are near the end, about which most questions are."""
+
+
+class RepeatedPast:
+    """Answers questions about the past until ``end``. ``make`` gives the world at its beginning, ``inputs`` are what came from
+    outside since."""
+
+    def __init__(self, make: Callable[[], Plant], inputs: Sequence[RecordedInput], end: Nanos) -> None:
+        self._make = make
+        self._inputs = list(inputs)
+        self._end = end
+        self._questions: PastQuestions | None = None
+
+    def ask(self, question: str, at: Nanos | None = None) -> Answer:
+        """The answer for a moment (ns), the end by default. Raises `Misuse` for what is no question here."""
+        return finish(self.asking(question, at))
+
+    def asking(self, question: str, at: Nanos | None = None) -> Asking:
+        """As `ask`, in parts."""
+        if self._questions is None:
+            states = StatesOfRun(self._make(), self._inputs, self._end)
+            yield from states.run()
+            self._questions = PastQuestions(states, MOST_NOTED)
+        return (yield from self._questions.asking(question, at))
+
+
+class StatesOfRun:
+    """States of a world that is run to ``end``. As `steptwin.world.history.History`, with all inputs."""
+
+    branch = 0
+
+    def __init__(self, world: Plant, inputs: Sequence[RecordedInput], end: Nanos) -> None:
+        self.world = world
+        self.begin = world.now
+        self._inputs = inputs
+        self._end = end
+        self._states = [PastState(world.snapshot(with_inputs=False), 0)]
+
+    def run(self) -> Iterator[None]:
+        """Run the world, in parts."""
+        self.world.stop_recording()
+        span = self._end - self.begin
+        moments = {self.begin + span * number // STATES for number in range(1, STATES + 1)}
+        while span > FIRST_SPAN_NS:
+            span //= 2
+            moments.add(self._end - span)
+        done = 0
+        for moment in sorted(moments):
+            for is_input in in_parts(self.world, self._inputs[done:], moment):
+                done += is_input
+                yield
+            self._states.append(PastState(self.world.snapshot(with_inputs=False), done))
+
+    def state_at(self, moment: Nanos) -> PastState:
+        index = bisect_right(self._states, moment, key=lambda state: state.snapshot.now)
+        if not index:
+            raise Misuse(outside_past(moment, self.begin, self._end))
+        return self._states[index - 1]
+
+    def keeps_inputs_from(self, number: int) -> bool:
+        return True
+
+    def inputs_from(self, number: int) -> Sequence[RecordedInput]:
+        return self._inputs[number:]
