@@ -43,9 +43,9 @@ class StatesAndInputs(Protocol):
 class PastQuestions:
     """Answers questions about the past in ``history``. ``most``: limit of what is noted."""
 
-    def __init__(self, history: StatesAndInputs, most: int = MOST_NOTED) -> None:
+    def __init__(self, history: StatesAndInputs, most: int | None = None) -> None:
         self._history = history
-        self._most = most
+        self._most = MOST_NOTED if most is None else most
         self._known: _Known | None = None
 
     def asking(self, question: str, at: Nanos | None = None) -> Asking:

@@ -25,7 +25,7 @@ class Interval(NamedTuple):
     end: Nanos
 
 
-class Rest(NamedTuple):
+class Standing(NamedTuple):
     """A moving quantity that stands. ``version``: it stands as long as this stays the same."""
 
     value: float
@@ -40,7 +40,7 @@ class StatesOnTheWay:
         self._moving = dict(_moving(world))
         self._distance: Nanos = FIRST_DISTANCE_NS
         self._states: list[PastState] = []
-        self._rests: dict[Nanos, Mapping[str, Rest]] = {}
+        self._rests: dict[Nanos, Mapping[str, Standing]] = {}
         """What stands at the moments of the states."""
         self.pass_by(0)
 
@@ -85,8 +85,8 @@ def _moving(world: Plant) -> Iterator[tuple[str, SignalOf]]:
                 yield name, found
 
 
-def _rest(signal: SignalOf, now: Nanos) -> Rest | None:
+def _rest(signal: SignalOf, now: Nanos) -> Standing | None:
     if next(signal.turns(now), None) is not None:
         return None
     value = signal.value(now)
-    return Rest(value, signal.version()) if signal.value(now + FARTHEST_NS) == value else None
+    return Standing(value, signal.version()) if signal.value(now + FARTHEST_NS) == value else None
