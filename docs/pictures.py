@@ -240,6 +240,34 @@ speed = 400.0
 run = "table.OUT1"
 workpiece = 60.0
 """
+STOP = """
+[[conveyor]]
+name = "line"
+length = 600.0
+speed = 200.0
+run = "table.OUT1"
+feed_every = "500 ms"
+workpiece = 60.0
+[[conveyor.stop]]
+at = 400.0
+hold = "table.OUT2"
+"""
+CUP = """
+[[button]]
+name = "part"
+to = "cup.pick"
+[[vacuum]]
+name = "cup"
+ejector = "table.OUT1"
+"""
+GRIPPER = """
+[[button]]
+name = "part"
+to = "jaws.pick"
+[[gripper]]
+name = "jaws"
+close = "table.OUT1"
+"""
 GAP = """
 [[transducer]]
 name = "gap"
@@ -271,6 +299,13 @@ def main() -> None:
     feeds = ((0.1, "OUT1=1"), (0.2, "OUT2=1"), (0.9, "OUT2=0"), (1.0, "OUT2=1"), (1.6, "OUT1=0"), (2.2, "OUT1=1"))
     fronts = "infeed.place1", "outfeed.place1"
     draw("conveyor", CONVEYOR, feeds, 3.4, fronts, ("table.OUT1", "table.OUT2", "table.IN5"))
+    held = ((0.0, "OUT1=1"), (1.0, "OUT2=1"), (4.6, "OUT2=0"))
+    draw("stop", STOP, held, 5.5, ("line.place1", "line.place2", "line.place3"), ("table.OUT2",))
+    tries = ((0.1, "OUT1=1"), (0.5, "OUT1=0"), (0.6, "part+"), (0.8, "OUT1=1"), (1.3, "OUT1=0"))
+    draw("vacuum", CUP, tries, 1.6, ("cup.pressure",), ("table.OUT1", "cup.pick", "cup.held"))
+    draw(
+        "gripper", GRIPPER, tries, 1.6, ("jaws.position",), ("table.OUT1", "jaws.pick", "jaws.opened", "jaws.closed", "jaws.held")
+    )
 
 
 if __name__ == "__main__":

@@ -176,6 +176,9 @@ feed_every = "150 ms"
 at = 100.0
 to = "table.IN11"
 bounce = "2 ms"
+[[conveyor.stop]]
+at = 200.0
+hold = "table.OUT1"
 [[vacuum]]
 name = "cup"
 ejector = "clamp.extended"
@@ -186,6 +189,13 @@ build_up = "40 ms"
 [[wire]]
 from = "cup.held"
 to = "table.IN12"
+[[gripper]]
+name = "jaws"
+close = "clamp.extended"
+pick = "clamp.extended"
+from = "belt"
+pick_at = 120.0
+close_time = "30 ms"
 [[fault]]
 kind = "jam"
 element = "clamp"

@@ -117,6 +117,13 @@ PARTS = (
         "[[fault]]\nkind = 'leak'\nelement = 'u'\nfrom_s = 0.7\nuntil_s = 0.9\n"
     ),
     (
+        "[[conveyor]]\nname = 'o'\nlength = 150\nspeed = 200\nfeed_every = '300 ms'\nmarks = [9]\nmass = 0.3\nnext = 'j'\n"
+        "[[conveyor.sensor]]\nat = 50\nsees = 'mark'\nto = 'c.IN14'\n[[conveyor.stop]]\nat = 90\nhold = 'c.OUT1'\n"
+        "[[conveyor]]\nname = 'j'\nlength = 150\nspeed = 80\n"
+        "[[gripper]]\nname = 'ja'\nclose = 'c.OUT1'\npick = 'c.OUT1'\nfrom = 'o'\npick_at = 90\nclose_time = '300 ms'\n"
+        "[[fault]]\nkind = 'worn-jaws'\nelement = 'ja'\nfrom_s = 1.2\nuntil_s = 1.3\n"
+    ),
+    (
         "[[load]]\nname = 'm'\naxis = 'x'\nmass = 2\nforce = 12\nwhen = 'c.OUT1'\n"
         "[[load]]\nname = 'i'\naxis = 'x'\nfriction_force = 60\nof = 'x.position'\npoints = [[10, 0.2], [60, 1]]\n"
         "[[fault]]\nkind = 'other-load'\nelement = 'm'\nfactor = 4\nfrom_s = 1.1\n"

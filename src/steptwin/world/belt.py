@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from math import ceil
 from typing import ClassVar, NamedTuple, Protocol
 
 from steptwin.machine import Nanos
@@ -21,12 +22,14 @@ class ConstantDrive(Stateful):
     """A drive with a constant forward speed while it is switched on, without ramps. A place is 1 pm, so that 1 mm/s is one place
     per nanosecond."""
 
-    __slots__ = ("_base", "_begin", "_changes", "_divisor", "_speed", "runs")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_divisor", "_speed"})
+    __slots__ = ("_base", "_begin", "_changes", "_divisor", "_speed", "runs", "stride")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_divisor", "_speed", "stride"})
 
     def __init__(self, speed: Fraction, now: Nanos) -> None:
         """``speed`` in mm/s."""
         self._speed, self._divisor = speed.as_integer_ratio()
+        self.stride = ceil(speed)
+        """The most that it moves within a nanosecond."""
         self._base = 0
         self._begin = now
         self._changes = 0
@@ -58,6 +61,20 @@ class Workpiece(NamedTuple):
     """Name of the conveyor that was fed with it, and its number there, from 1."""
     origin: int
     length: int
+    mass: float = 0.0
+    """kg."""
+    marks: tuple[tuple[int, int], ...] = ()
+    """Begin and end of each mark, from the front."""
+    held: int | None = None
+    """Where its front stands, while the belt does not move it."""
+
+    def front(self, belt: int) -> int:
+        """The place of its front while the belt is at ``belt``."""
+        return belt - self.origin if self.held is None else self.held
+
+    def zones(self, *, of_marks: bool) -> tuple[tuple[int, int], ...]:
+        """Begin and end, from the front, of what a sensor sees: of it, or of its marks."""
+        return self.marks if of_marks else ((0, self.length),)
 
 
 class Load(Stateful):
@@ -81,21 +98,41 @@ class Load(Stateful):
         self.pieces = tuple(one for one in self.pieces if one != piece)
         self._changes += 1
 
-    def covering(self, position: int, belt: int) -> Workpiece | None:
-        """The workpiece over ``position`` while the belt is at ``belt``; the one put there first if there are several."""
-        return next((one for one in self.pieces if 0 <= belt - one.origin - position <= one.length), None)
+    def hold(self, piece: Workpiece, front: int) -> None:
+        """Let a workpiece stand with its front at ``front``, whatever the belt does."""
+        self._replace(piece, piece._replace(held=front))
 
-    def edges(self, position: int, belt: int) -> tuple[int | None, int | None]:
-        """The next positions of the belt below and above ``belt`` at which the workpiece over ``position`` may change."""
+    def release(self, piece: Workpiece, belt: int) -> None:
+        """Let a workpiece that stood go on with the belt, which is at ``belt``."""
+        self._replace(piece, piece._replace(origin=belt - piece.front(belt), held=None))
+
+    def _replace(self, piece: Workpiece, other: Workpiece) -> None:
+        self.pieces = tuple(other if one == piece else one for one in self.pieces)
+        self._changes += 1
+
+    def covering(self, position: int, belt: int, *, of_marks: bool = False) -> Workpiece | None:
+        """The workpiece over ``position``, or with a mark there, while the belt is at ``belt``; of several the one put there
+        first."""
+        for one in self.pieces:
+            behind = one.front(belt) - position
+            if any(begin <= behind <= end for begin, end in one.zones(of_marks=of_marks)):
+                return one
+        return None
+
+    def edges(self, position: int, belt: int, *, of_marks: bool = False) -> tuple[int | None, int | None]:
+        """The next positions of the belt below and above ``belt`` at which `covering` may change."""
         below: int | None = None
         above: int | None = None
         for one in self.pieces:
-            begin = one.origin + position
-            for place in (begin - 1, begin, begin + one.length, begin + one.length + 1):
-                if place < belt and (below is None or place > below):
-                    below = place
-                elif place > belt and (above is None or place < above):
-                    above = place
+            if one.held is not None:
+                continue
+            front = one.origin + position
+            for begin, end in one.zones(of_marks=of_marks):
+                for place in (front + begin - 1, front + begin, front + end, front + end + 1):
+                    if place < belt and (below is None or place > below):
+                        below = place
+                    elif place > belt and (above is None or place < above):
+                        above = place
         return below, above
 
 

@@ -45,6 +45,7 @@ export const MEANINGS: Readonly<Record<string, string>> = {
   "The feeder of a conveyor is empty or blocked: no workpieces come onto it.":
     "Podajnik przenośnika jest pusty lub zablokowany: nie przychodzą na niego detale.",
   "A suction cup does not hold a vacuum.": "Przyssawka nie trzyma podciśnienia.",
+  "The jaws of a gripper let workpieces slip.": "Szczęki chwytaka nie utrzymują detali.",
   "A brake has only a share of its torque.": "Hamulec ma tylko część momentu.",
   "A brake does not let go.": "Hamulec nie zwalnia.",
   "A shaft stands while its axis turns; afterwards it goes on from where it stands.":

@@ -139,5 +139,5 @@ def test_rails() -> None:
 def test_elements_that_have_a_fault() -> None:
     assert failing(fault_kinds()["leak"]) == ("vacuum",)
     assert set(failing(fault_kinds()["stuck-output"])) == {
-        "gate", "latch", "timer", "counter", "relay", "cylinder", "vacuum", "brake", "collision", "gantry", "supply",
+        "gate", "latch", "timer", "counter", "relay", "cylinder", "vacuum", "gripper", "brake", "collision", "gantry", "supply",
     }  # fmt: skip

@@ -54,8 +54,8 @@ def test_shared_parameters_say_which_kinds_have_them() -> None:
     ]
     assert {parameter.name: of for parameter, of in found}["from_s"] == (
         "each byte, each delivery, each answer, each request, each change, each save, stuck, master-error, "
-        "stuck-output, welded-contact, open-coil, no-air, jam, belt-stop, empty-feeder, leak, worn-brake, stuck-brake, "
-        "slipping-coupling, stuck-follower, worn-cam, slack-belt, broken-wire, drift, stiff-guides, brown-out, other-load"
+        "stuck-output, welded-contact, open-coil, no-air, jam, belt-stop, empty-feeder, leak, worn-jaws, worn-brake, "
+        "stuck-brake, slipping-coupling, stuck-follower, worn-cam, slack-belt, broken-wire, drift, stiff-guides, brown-out, other-load"
     )
     assert len({parameter for parameter, _ in found}) == len(found)
     for parameter, of in found:
@@ -120,6 +120,7 @@ def test_which_faults_elements_have() -> None:
         "cylinder": {"stuck-output", "no-air", "jam"},
         "conveyor": {"belt-stop", "empty-feeder"},
         "vacuum": {"stuck-output", "leak"},
+        "gripper": {"stuck-output", "worn-jaws"},
         "brake": {"stuck-output", "worn-brake", "stuck-brake"},
         "carriage": {"slack-belt"},
         "transducer": {"broken-wire", "drift"},

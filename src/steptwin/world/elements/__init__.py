@@ -18,6 +18,7 @@ from steptwin.world.elements.cylinder import CYLINDER
 from steptwin.world.elements.follower import FOLLOWER
 from steptwin.world.elements.gantry import GANTRY
 from steptwin.world.elements.gate import GATE
+from steptwin.world.elements.gripper import GRIPPER
 from steptwin.world.elements.latch import LATCH
 from steptwin.world.elements.load import LOAD
 from steptwin.world.elements.relay import RELAY
@@ -74,6 +75,7 @@ for _one in (
     CYLINDER,
     CONVEYOR,
     VACUUM,
+    GRIPPER,
     BRAKE,
     SHAFT,
     FOLLOWER,

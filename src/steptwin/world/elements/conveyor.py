@@ -1,13 +1,12 @@
 """``[[conveyor]]``: a belt that carries workpieces, with sensors that see them.
 
 A workpiece enters with its front at 0, when FEED is switched on or at a fixed period, unless another one is there; it leaves when
-its front comes to the end of the belt.
+its front comes to the end of the belt. Stops hold workpieces back on a belt with its own drive.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from functools import partial
 from math import ceil, floor, nan
@@ -17,27 +16,21 @@ from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.world.belt import BeltDrive, ConstantDrive, Load, Workpiece, next_change
 from steptwin.world.board import Board
-from steptwin.world.chance import Chance
-from steptwin.world.contacts import Circuit, Contact
 from steptwin.world.drawing import BELT, Drawing, SensorZone
 from steptwin.world.element import Reference
 from steptwin.world.elements.axis import find_axis
-from steptwin.world.elements.contact import CONTACT_KEYS
-from steptwin.world.elements.logic import BoardPart, BoardSpec, Inner, Joint, with_terminals
+from steptwin.world.elements.beltsensor import SENSOR, Sensor, SensorSpec, read_inner
+from steptwin.world.elements.conveyortable import FEED, RUN, STOP, ConveyorSpec, StopSpec, mark_places, stop_terminal
+from steptwin.world.elements.logic import BoardPart, Inner, with_terminals
 from steptwin.world.faults import ActiveFault, Fault, FaultKind, Layer, Occasion
 from steptwin.world.faults.table import ElementEffect
-from steptwin.world.kind import Terminals
 from steptwin.world.names import Unknown
-from steptwin.world.reader import Key, Table, TomlText, optional, read_table
+from steptwin.world.reader import Key, optional
 from steptwin.world.scale import exact_fraction
-from steptwin.world.sense import TableRows, check_sense
 from steptwin.world.signals import SignalOf
-from steptwin.world.site import Site, Terminal
-from steptwin.world.spec import WorldSpec
-from steptwin.world.tomlplaces import Path
-from steptwin.world.values import INPUT_PIN, OUTPUT_PIN, NameOf, number, positive_time
+from steptwin.world.site import Site
+from steptwin.world.values import OUTPUT_PIN, NameOf, number, positive_time
 
-RUN, FEED = "RUN", "FEED"
 FEEDER_STANDS = "feeder_stands"
 """Edges ``CONVEYOR.feeder_stands`` that a fault records."""
 MOST_PLACES = 24
@@ -46,81 +39,15 @@ PICOMETRES = 10**9
 """In a millimetre: places of a belt that no axis moves."""
 
 
-# ---------------------------------------------------------------------- tables
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SensorSpec:
-    """A light barrier or proximity switch over the belt."""
-
-    at: float
-    target: Terminal
-    contact: str
-    join: str | None
-    bounce: Nanos
-    bounces: int
-    path: Path = ()
-
-
-SENSOR = TableRows(
-    written="[[conveyor.sensor]]",
-    keys=(
-        Key("at", number(0.0), "mm from the beginning of the belt"),
-        Key("to", INPUT_PIN, "the input, on while a workpiece covers it: MACHINE.PIN", attribute="target"),
-        *CONTACT_KEYS,
-    ),
-    need={"bounces": "bounce"},
-)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ConveyorSpec(BoardSpec):
-    length: float
-    speed: float | None
-    run: Terminal | None
-    axis: str | None
-    mm_per_unit: float
-    feed: Terminal | None
-    feed_every: Nanos | None
-    workpiece: float
-    next: str | None
-    sensors: tuple[SensorSpec, ...]
-
-    @property
-    def terminals(self) -> Terminals:
-        return Terminals(digital_inputs=(FEED,) if self.speed is None else (RUN, FEED))
-
-    @property
-    def joints(self) -> Iterable[Joint]:
-        if self.run is not None and self.speed is not None:
-            yield Joint("run", RUN, self.run)
-        if self.feed is not None:
-            yield Joint("feed", FEED, self.feed)
-
-    def others(self, world: WorldSpec) -> Iterable[tuple[str, str]]:
-        if self.axis is not None:
-            yield "axis", self.axis
-        if self.next is not None:
-            yield "next", self.next
-
-    def check(self, text: TomlText) -> None:
-        if (self.speed is None) is (self.axis is None):
-            text.wrong(self.path, "D007", "a conveyor needs one of speed and axis")
-        if self.next == self.name:
-            text.wrong((*self.path, "next"), "D007", f"{self.name} is followed by itself")
-        for sensor in self.sensors:
-            if sensor.at > self.length:
-                text.wrong((*sensor.path, "at"), "D007", f"at = {sensor.at:g} is beyond length = {self.length:g}")
-
-
 # ---------------------------------------------------------------------- what is built
 
 
 class Conveyor(BoardPart):
     """A belt with its workpieces. ``drive`` moves it, in places of which ``per_mm`` are a millimetre.
 
-    What leaves it is put at the beginning of the following one, or is gone. A belt that an axis moves backwards loses workpieces
-    at its beginning.
+    What leaves it is put at the beginning of the following one, or is gone. On a belt with its own drive workpieces stand before
+    a stop that is on, behind one that stands, and at the end while the beginning of the following conveyor is occupied. A belt
+    that an axis moves backwards loses workpieces at its beginning.
     """
 
     __slots__ = (
@@ -130,7 +57,8 @@ class Conveyor(BoardPart):
         "_moved_by",
         "_next_feed",
         "_own",
-        "_version",
+        "_seen",
+        "_stops",
         "delivered",
         "drive",
         "fed",
@@ -143,7 +71,7 @@ class Conveyor(BoardPart):
         "spec",
     )
     FIXED: ClassVar[frozenset[str]] = (
-        frozenset({"_length", "_moved_by", "_version", "drive", "following", "per_mm", "spec"}) | BoardPart.FIXED
+        frozenset({"_length", "_moved_by", "_seen", "_stops", "drive", "following", "per_mm", "spec"}) | BoardPart.FIXED
     )
 
     def __init__(
@@ -161,6 +89,7 @@ class Conveyor(BoardPart):
         self.drive = drive
         self.per_mm = per_mm
         self._length = self.places(spec.length)
+        self._stops = tuple((stop_terminal(n), self.places(stop.at)) for n, stop in enumerate(spec.stops, start=1))
         self._own = own
         self._moved_by = moved_by
         self.following: Conveyor | None = None
@@ -179,7 +108,7 @@ class Conveyor(BoardPart):
         self._next_feed = spec.feed_every
         self._due: Nanos | None = None
         """When a workpiece comes to an end of the belt."""
-        self._version: object = None
+        self._seen: object = None
 
     @property
     def has_own_drive(self) -> bool:
@@ -195,7 +124,15 @@ class Conveyor(BoardPart):
 
     @property
     def watches(self) -> tuple[str, ...]:
-        return (self.board.name, *self._moved_by)
+        return (self.board.name, *self._moved_by, *(() if self.spec.next is None else (self.spec.next,)))
+
+    def _state(self) -> object:
+        """Another value whenever workpieces may move or stand otherwise."""
+        return self.version(), self._raised(), None if self.following is None else self.following.version()
+
+    def _raised(self) -> tuple[int, ...]:
+        """The places of the stops that are on."""
+        return tuple(place for terminal, place in self._stops if self.board.is_on(terminal))
 
     def update(self, now: Nanos) -> None:
         if self._own is not None:
@@ -207,12 +144,12 @@ class Conveyor(BoardPart):
         if self._next_feed is not None and self._next_feed <= now:
             self._feed(now)
             self._next_feed += self.spec.feed_every or 0
-        version = self.version()
-        if version != self._version or (self._due is not None and self._due <= now):
+        if self._state() != self._seen or (self._due is not None and self._due <= now):
+            self._hold(now)
             self._deliver(now)
-            self._version = self.version()
+            self._seen = self._state()
             self.board.kernel.mark(self.board.name)
-            self._due = next_change(self.drive, *self._ends(now), now)
+            self._due = self._next(now)
 
     def _feed(self, now: Nanos) -> None:
         """Put a workpiece at the beginning, where there is room for it."""
@@ -221,13 +158,25 @@ class Conveyor(BoardPart):
             self.board.kernel.mark(self.board.name)
             return
         self.fed += 1
-        self.put(f"{self.spec.name}.{self.fed}", 0.0, self.places(self.spec.workpiece), now)
+        spec = self.spec
+        marks = tuple((self.places(mark), self.places(mark + spec.mark_width)) for mark in spec.marks)
+        self.put(Workpiece(f"{spec.name}.{self.fed}", 0, self.places(spec.workpiece), spec.mass, marks), 0.0, now)
 
-    def put(self, name: str, front: float, length: int, now: Nanos) -> None:
-        """Put a workpiece with its front ``front`` mm from the beginning. ``length`` in places of this belt."""
-        self.load.put(Workpiece(name, self.drive.place(now) - self.places(front), length))
-        self.report(f"{name} is on {self.spec.name}", name, "on")
+    def put(self, piece: Workpiece, front: float, now: Nanos) -> None:
+        """Put a workpiece, whose lengths are places of this belt, with its front ``front`` mm from the beginning."""
+        self.load.put(piece._replace(origin=self.drive.place(now) - self.places(front), held=None))
+        self.report(f"{piece.name} is on {self.spec.name}", piece.name, "on")
         self.board.kernel.mark(self.board.name)
+
+    def take_over(self, piece: Workpiece, other: Conveyor, front: float, now: Nanos) -> None:
+        """Put a workpiece that was on another belt on this one."""
+        ratio = self.per_mm / other.per_mm
+
+        def places(length: int) -> int:
+            return floor(length * ratio + Fraction(1, 2))
+
+        marks = tuple((places(begin), places(end)) for begin, end in piece.marks)
+        self.put(piece._replace(length=places(piece.length), marks=marks), front, now)
 
     def take(self, piece: Workpiece) -> None:
         """Take a workpiece off the belt."""
@@ -238,7 +187,11 @@ class Conveyor(BoardPart):
         """How far the front of a workpiece is from the beginning, mm. 0 is the workpiece that was put there first; NaN if
         there are fewer."""
         pieces = self.load.pieces
-        return float((self.drive.place(now) - pieces[number].origin) / self.per_mm) if number < len(pieces) else nan
+        return float(pieces[number].front(self.drive.place(now)) / self.per_mm) if number < len(pieces) else nan
+
+    def mass(self, now: Nanos) -> float:
+        """kg of the workpieces on it."""
+        return sum(piece.mass for piece in self.load.pieces)
 
     def report(self, text: str, name: str, what: str) -> None:
         """Something has happened to a workpiece."""
@@ -246,68 +199,84 @@ class Conveyor(BoardPart):
         facts = ("workpiece", name), ("conveyor", self.spec.name), ("what", what)
         kernel.report(kernel.owner(self.board.name), "event", "workpiece", text, *facts)
 
+    def _hold(self, now: Nanos) -> None:
+        """Let workpieces stand where they cannot go on, and let those go on that can."""
+        if self._own is None:
+            return
+        belt, stride = self.drive.place(now), self._own.stride
+        ahead: int | None = None
+        for piece in sorted(self.load.pieces, key=lambda one: one.front(belt), reverse=True):
+            front = piece.front(belt)
+            limit = self._limit(front, stride, ahead, now)
+            if limit is not None and front >= limit:
+                at = limit if front - limit <= stride else front
+                if piece.held != at:
+                    self.load.hold(piece, at)
+                    self.report(
+                        f"{piece.name} stands at {float(at / self.per_mm):g} mm of {self.spec.name}", piece.name, "stands"
+                    )
+                ahead = at - piece.length - 1
+                continue
+            ahead = None
+            if piece.held is not None:
+                self.load.release(piece, belt)
+                self.report(f"{piece.name} goes on on {self.spec.name}", piece.name, "goes on")
+
+    def _limit(self, front: int, stride: int, ahead: int | None, now: Nanos) -> int | None:
+        """The place up to which a workpiece can go, with its front at ``front``. ``ahead``: behind one that stands before it."""
+        limits = [place for place in self._raised() if place >= front - stride]
+        if ahead is not None:
+            limits.append(ahead)
+        if self._is_blocked(now):
+            limits.append(self._length)
+        return min(limits, default=None)
+
+    def _is_blocked(self, now: Nanos) -> bool:
+        """Whether there is no room for a workpiece at the beginning of the following conveyor."""
+        following = self.following
+        return following is not None and self._own is not None and following.covers_beginning(now)
+
+    def covers_beginning(self, now: Nanos) -> bool:
+        return self.load.covering(0, self.drive.place(now)) is not None
+
     def _deliver(self, now: Nanos) -> None:
         """Let go what has come to an end of the belt."""
         belt, length = self.drive.place(now), self._length
         for piece in self.load.pieces:
-            front = belt - piece.origin
-            if front >= length:
+            front = piece.front(belt)
+            if front >= length and piece.held is None:
                 self.delivered += 1
                 self.take(piece)
                 self.report(f"{piece.name} leaves {self.spec.name}", piece.name, "leaves")
                 if self.following is not None:
-                    self.following.put(piece.name, 0.0, self.following.places_of(self, piece.length), now)
+                    self.following.take_over(piece, self, 0.0, now)
             elif front < 0:
                 self.take(piece)
                 self.report(f"{piece.name} falls off the beginning of {self.spec.name}", piece.name, "falls")
 
-    def places_of(self, other: Conveyor, places: int) -> int:
-        """A length on another belt in places of this one."""
-        return floor(places * self.per_mm / other.per_mm + Fraction(1, 2))
+    def _next(self, now: Nanos) -> Nanos | None:
+        """When the next workpiece is lost at the beginning, is delivered or cannot go on; or can again, at the end."""
+        belt = self.drive.place(now)
+        moving = [piece for piece in self.load.pieces if piece.held is None]
+        below = max((piece.origin for piece in moving), default=None)
+        above = min((piece.origin + self._way(piece, belt, now) for piece in moving), default=None)
+        due = next_change(self.drive, None if below is None else below - 1, above, now)
+        following = self.following
+        if following is None or not self.load.pieces or not self._is_blocked(now):
+            return due
+        free = next_change(following.drive, *following.load.edges(0, following.drive.place(now)), now)
+        return free if due is None else due if free is None else min(due, free)
 
-    def _ends(self, now: Nanos) -> tuple[int | None, int | None]:
-        """Places of the belt at which the next workpiece is lost at its beginning, and delivered at its end."""
-        origins = [piece.origin for piece in self.load.pieces]
-        return (max(origins) - 1, min(origins) + self._length) if origins else (None, None)
+    def _way(self, piece: Workpiece, belt: int, now: Nanos) -> int:
+        """Up to where a moving workpiece can go."""
+        front = piece.front(belt)
+        before = [one for one in self.load.pieces if one.held is not None and one.held > front]
+        ahead = min((one.front(belt) - one.length - 1 for one in before), default=None)
+        found = self._limit(front, 0, ahead, now) if self._own is not None else None
+        return self._length if found is None else min(found, self._length)
 
     def deadline(self) -> Nanos | None:
         moments = (moment for moment in (self._due, self._next_feed) if moment is not None)
-        return min(moments, default=None)
-
-
-class Sensor(Contact):
-    """On while a workpiece covers its place."""
-
-    __slots__ = ("_at", "_conveyor", "_seen")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_at", "_conveyor", "_seen"}) | Contact.FIXED
-
-    def __init__(self, circuit: Circuit, conveyor: Conveyor, spec: SensorSpec, chance: Chance, lane: str) -> None:
-        super().__init__(
-            circuit,
-            normally_closed=spec.contact == "NC",
-            bounce_ns=spec.bounce,
-            bounces=spec.bounces,
-            chance=chance,
-            lane=lane,
-        )
-        self._conveyor = conveyor
-        self._at = conveyor.places(spec.at)
-        self._seen: object = None
-        self.rest_at(self.normally_closed)
-
-    def update(self, now: Nanos) -> None:
-        self.bounce(now)
-        version = self._conveyor.version()
-        if version == self._seen and (self._due is None or self._due > now):
-            return
-        self._seen = version
-        drive, load = self._conveyor.drive, self._conveyor.load
-        belt = drive.place(now)
-        self.change((load.covering(self._at, belt) is not None) is not self.normally_closed, now)
-        self._due = next_change(drive, *load.edges(self._at, belt), now)
-
-    def deadline(self) -> Nanos | None:
-        moments = (moment for moment in (self.bounce_due(), self._due) if moment is not None)
         return min(moments, default=None)
 
 
@@ -361,18 +330,6 @@ def find_conveyor(name: str, site: Site) -> Conveyor:
     return found
 
 
-def _read_sensors(text: TomlText, path: Path, table: Table) -> tuple[SensorSpec, ...]:
-    given = table.get("sensor", [])
-    found: list[SensorSpec] = []
-    for n, sensor in enumerate(given if isinstance(given, list) else [given]):
-        of_sensor = (*path, "sensor", n)
-        values = read_table(text, of_sensor, sensor, SENSOR.keys)
-        if "target" in values and "at" in values:
-            check_sense(text, of_sensor, SENSOR, sensor)
-            found.append(SensorSpec(**values, path=of_sensor))
-    return tuple(found)
-
-
 def _refers_of_sensors(spec: ConveyorSpec) -> Iterator[Reference]:
     for sensor in spec.sensors:
         yield Reference(spec.name, sensor.target[0], (*sensor.path, "to"))
@@ -402,7 +359,8 @@ def _place_names(spec: ConveyorSpec) -> tuple[str, ...]:
 def _drawing(conveyor: Conveyor) -> Drawing:
     spec = conveyor.spec
     sensors = tuple(SensorZone(sensor.target, sensor.at, sensor.at) for sensor in spec.sensors)
-    return Drawing(BELT, spec.length, _place_names(spec), spec.workpiece, sensors)
+    stops = tuple(SensorZone((spec.name, stop_terminal(n)), stop.at, stop.at) for n, stop in enumerate(spec.stops, start=1))
+    return Drawing(BELT, spec.length, _place_names(spec), spec.workpiece, sensors + stops)
 
 
 def _refuse_place() -> None:
@@ -421,6 +379,7 @@ def _signals(conveyor: Conveyor) -> Mapping[str, SignalOf]:
         "fed": SignalOf(source, lambda now: float(conveyor.fed)),
         "delivered": SignalOf(source, lambda now: float(conveyor.delivered)),
         "missed": SignalOf(source, lambda now: float(conveyor.missed)),
+        "mass": SignalOf(source, conveyor.mass, unit="kg"),
     }
 
 
@@ -436,6 +395,9 @@ CONVEYOR = with_terminals(
         optional(OUTPUT_PIN, "feed", "output joined to FEED, which puts a workpiece on when it is switched on"),
         optional(positive_time, "feed_every", "a workpiece comes after each such time"),
         optional(number(0.0, above=True), "workpiece", "length of a workpiece, mm", 50.0),
+        optional(number(0.0), "mass", "kg of a workpiece", 0.0),
+        optional(mark_places, "marks", "mm from the front of a workpiece to each of its marks, such as [10, 35]", ()),
+        optional(number(0.0, above=True), "mark_width", "length of a mark, mm", 2.0),
         optional(NameOf("conveyor"), "next", "the conveyor on which workpieces go on"),
     ),
     make=_make,
@@ -459,12 +421,22 @@ CONVEYOR = with_terminals(
             effect=ElementEffect(_stop_feeder),
         ),
     ),
-    inner=Inner(
-        key="sensor",
-        attribute="sensors",
-        rows=SENSOR,
-        read=_read_sensors,
-        refers=_refers_of_sensors,
-        build=_put_sensors,
+    inner=(
+        Inner(
+            key="sensor",
+            attribute="sensors",
+            rows=SENSOR,
+            read=partial(read_inner, key="sensor", rows=SENSOR, make=SensorSpec, needed=("at", "target")),
+            refers=_refers_of_sensors,
+            build=_put_sensors,
+        ),
+        Inner(
+            key="stop",
+            attribute="stops",
+            rows=STOP,
+            read=partial(read_inner, key="stop", rows=STOP, make=StopSpec, needed=("at",)),
+            refers=lambda spec: (),
+            build=lambda spec, conveyor, site: None,
+        ),
     ),
 )

@@ -206,12 +206,14 @@ CYLINDER = with_terminals(
         ),
         FaultKind("jam", Layer.ELEMENT, Occasion.ALWAYS, "A cylinder stands where it is.", effect=ElementEffect(_jam)),
     ),
-    inner=Inner(
-        key="switch",
-        attribute="switches",
-        rows=SWITCH,
-        read=lambda text, path, table: tuple(read_switches(text, path, table)),
-        refers=_refers_of_switches,
-        build=_put_switches,
+    inner=(
+        Inner(
+            key="switch",
+            attribute="switches",
+            rows=SWITCH,
+            read=lambda text, path, table: tuple(read_switches(text, path, table)),
+            refers=_refers_of_switches,
+            build=_put_switches,
+        ),
     ),
 )

@@ -151,7 +151,7 @@ def with_terminals(
     make: Callable[[S, Site], P],
     signals: Callable[[P], Mapping[str, SignalOf]] = lambda part: {},
     faults: Sequence[FaultKind] = (),
-    inner: Inner[S, P] | None = None,
+    inner: Sequence[Inner[S, P]] = (),
     connect: Callable[[S, P, Site], None] | None = None,
     drawing: Callable[[P], Drawing] | None = None,
 ) -> Element[S, P]:
@@ -161,7 +161,7 @@ def with_terminals(
     """
 
     def read(text: TomlText, row: Row, table: Table) -> S:
-        more: dict[str, Any] = {} if inner is None else {inner.attribute: inner.read(text, row["path"], table)}
+        more: dict[str, Any] = {one.attribute: one.read(text, row["path"], table) for one in inner}
         found = spec(**row, **more)
         found.check(text)
         return found
@@ -172,16 +172,16 @@ def with_terminals(
             yield Reference(found.name, joint.source[0], (*found.path, joint.key))
         for key, other in found.others(world):
             yield Reference(found.name, other, (*found.path, key))
-        if inner is not None:
-            yield from inner.refers(found)
+        for one in inner:
+            yield from one.refers(found)
 
     def build(found: S, site: Site) -> P:
         part = make(found, site)
         part.board.kernel.add_part(part, part.watches, found.name)
         for wire, path in site.blueprint.once((*found.path, "wires"), lambda: tuple(_wires(found))):
             site.join(wire, path)
-        if inner is not None:
-            inner.build(found, part, site)
+        for one in inner:
+            one.build(found, part, site)
         return part
 
     def all_signals(part: P) -> Mapping[str, SignalOf]:
@@ -194,8 +194,8 @@ def with_terminals(
         name=name,
         spec=spec,
         rows=TableRows(written=f"[[{name}]]", keys=(Key("name", name_value, "how others name it"), *keys)),
-        inner={} if inner is None else {inner.key: inner.rows},
-        inner_attributes={} if inner is None else {inner.key: inner.attribute},
+        inner={one.key: one.rows for one in inner},
+        inner_attributes={one.key: one.attribute for one in inner},
         read=read,
         refers=refers,
         build=build,

@@ -2,38 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import ceil
 from typing import ClassVar
 
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.motion.exponential import decay, logarithm
-from steptwin.world.belt import Workpiece, next_change
 from steptwin.world.board import Board
-from steptwin.world.elements.conveyor import Conveyor, find_conveyor
-from steptwin.world.elements.logic import STUCK_OUTPUT, BoardPart, BoardSpec, Joint, with_terminals
+from steptwin.world.elements.carrier import CARRIER_KEYS, HELD, PICK, PLACE, Carrier, CarrierSpec, carrier_signals
+from steptwin.world.elements.logic import STUCK_OUTPUT, Joint, with_terminals
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.table import ElementEffect
 from steptwin.world.kind import Terminals
 from steptwin.world.reader import TomlText, optional
 from steptwin.world.signals import SignalOf
 from steptwin.world.site import Site, Terminal
-from steptwin.world.spec import WorldSpec
-from steptwin.world.values import OUTPUT_PIN, NameOf, number, positive_time
+from steptwin.world.values import OUTPUT_PIN, number, positive_time
 
-EJECTOR, PICK, PLACE, HELD = "EJECTOR", "PICK", "PLACE", "HELD"
+EJECTOR = "EJECTOR"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class VacuumSpec(BoardSpec):
+class VacuumSpec(CarrierSpec):
     ejector: Terminal | None
-    pick: Terminal | None
-    place: Terminal | None
-    source: str | None
-    pick_at: float
-    onto: str | None
-    place_at: float
     vacuum: float
     threshold: float
     build_up: Nanos
@@ -44,20 +36,8 @@ class VacuumSpec(BoardSpec):
         return Terminals(digital_inputs=(EJECTOR, PICK, PLACE), outputs=(HELD,))
 
     @property
-    def joints(self) -> Iterable[Joint]:
-        for key, terminal, source in (
-            ("ejector", EJECTOR, self.ejector),
-            ("pick", PICK, self.pick),
-            ("place", PLACE, self.place),
-        ):
-            if source is not None:
-                yield Joint(key, terminal, source)
-
-    def others(self, world: WorldSpec) -> Iterable[tuple[str, str]]:
-        if self.source is not None:
-            yield "from", self.source
-        if self.onto is not None:
-            yield "onto", self.onto
+    def own_joint(self) -> Joint | None:
+        return None if self.ejector is None else Joint("ejector", EJECTOR, self.ejector)
 
     def check(self, text: TomlText) -> None:
         if self.threshold >= self.vacuum:
@@ -68,40 +48,18 @@ class VacuumSpec(BoardSpec):
             )
 
 
-class Vacuum(BoardPart):
+class Vacuum(Carrier):
     """The pressure in the cup, below that of the air, goes exponentially to ``vacuum`` while the ejector is on and a workpiece
     closes the cup, else to 0. From 0 it takes ``build_up`` to the threshold, from ``vacuum`` it takes ``release``. HELD is on
     from the threshold on.
-
-    A workpiece is in the cup while it is held. Then it lies on the belt below, or has fallen.
     """
 
-    __slots__ = (
-        "_begin",
-        "_due",
-        "_first",
-        "_goal",
-        "_is_held",
-        "_pick_at",
-        "carried",
-        "dropped",
-        "leaks",
-        "onto",
-        "source",
-        "spec",
-    )
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_pick_at", "onto", "source", "spec"}) | BoardPart.FIXED
+    __slots__ = ("_begin", "_due", "_first", "_goal", "_is_held", "leaks", "spec")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"spec"}) | Carrier.FIXED
 
-    def __init__(self, board: Board, spec: VacuumSpec, source: Conveyor | None, onto: Conveyor | None) -> None:
-        super().__init__(board)
+    def __init__(self, board: Board, spec: VacuumSpec, site: Site) -> None:
+        super().__init__(board, spec, site)
         self.spec = spec
-        self.source = source
-        self._pick_at = 0 if source is None else source.places(spec.pick_at)
-        self.onto = onto
-        self.carried: Workpiece | None = None
-        """The workpiece in the cup, as it was on the belt it was taken from."""
-        self.dropped = 0
-        """How many have fallen."""
         self.leaks = False
         self._is_held = False
         self._begin: Nanos = board.kernel.now
@@ -141,68 +99,23 @@ class Vacuum(BoardPart):
 
     # ------------------------------------------------------------------ time
 
-    @property
-    def watches(self) -> tuple[str, ...]:
-        return (self.board.name, *(() if self.source is None else (self.source.board.name,)))
-
     def update(self, now: Nanos) -> None:
-        goal = self.spec.vacuum if self.board.is_on(EJECTOR) and self._is_closed(now) and not self.leaks else 0.0
+        goal = self.spec.vacuum if self.board.is_on(EJECTOR) and self.is_occupied(now) and not self.leaks else 0.0
         if goal != self._goal:
             self._go(goal, now)
         if self._due is not None and self._due <= now:
             self._due = None
             self._is_held = not self._is_held
             if self._is_held:
-                self._pick(now)
+                self.take(now)
             else:
-                self._let_go(now)
+                self.let_go(now)
         self.board.put(HELD, float(self._is_held))
 
-    def _is_closed(self, now: Nanos) -> bool:
-        """Whether a workpiece closes the cup."""
-        return self.carried is not None or self._below(now) is not None
-
-    def _below(self, now: Nanos) -> Workpiece | None:
-        """The workpiece under the cup. Without a conveyor there is one wherever PICK is on."""
-        if not self.board.is_on(PICK):
-            return None
-        source = self.source
-        if source is None:
-            return Workpiece("workpiece", 0, 0)
-        return source.load.covering(self._pick_at, source.drive.place(now))
-
-    def _pick(self, now: Nanos) -> None:
-        piece = self._below(now)
-        if self.carried is None and piece is not None:
-            self.carried = piece
-            if self.source is not None:
-                self.source.take(piece)
-                self.source.report(f"{self.board.name} holds {piece.name}", piece.name, "held")
-
-    def _let_go(self, now: Nanos) -> None:
-        piece, self.carried = self.carried, None
-        source, onto = self.source, self.onto
-        if piece is None or source is None:
-            return
-        if onto is not None and self.board.is_on(PLACE):
-            onto.put(piece.name, self.spec.place_at, onto.places_of(source, piece.length), now)
-        elif self.board.is_on(PICK):
-            source.put(piece.name, self.spec.pick_at, piece.length, now)
-        else:
-            self.dropped += 1
-            source.report(f"{piece.name} falls from {self.board.name}", piece.name, "falls")
-
     def deadline(self) -> Nanos | None:
-        moments = (moment for moment in (self._due, self._passing()) if moment is not None)
+        passing = self.passing(self.board.kernel.now) if self.board.is_on(EJECTOR) else None
+        moments = (moment for moment in (self._due, passing) if moment is not None)
         return min(moments, default=None)
-
-    def _passing(self) -> Nanos | None:
-        """When a belt that moves brings a workpiece under the cup, or takes it away."""
-        source, now = self.source, self.board.kernel.now
-        if source is None or self.carried is not None or not (self.board.is_on(EJECTOR) and self.board.is_on(PICK)):
-            return None
-        edges = source.load.edges(self._pick_at, source.drive.place(now))
-        return next_change(source.drive, *edges, now)
 
 
 # ---------------------------------------------------------------------- the element
@@ -211,11 +124,6 @@ class Vacuum(BoardPart):
 def _leak(active: ActiveFault, vacuum: Vacuum, begins: bool, now: Nanos) -> str:
     vacuum.leaks = begins
     return f"{vacuum.board.name} {'leaks' if begins else 'is tight again'}"
-
-
-def _make(spec: VacuumSpec, site: Site) -> Vacuum:
-    source, onto = (None if name is None else find_conveyor(name, site) for name in (spec.source, spec.onto))
-    return Vacuum(site.board(spec.name), spec, source, onto)
 
 
 def _signals(vacuum: Vacuum) -> Mapping[str, SignalOf]:
@@ -227,7 +135,7 @@ def _signals(vacuum: Vacuum) -> Mapping[str, SignalOf]:
     bounds = (0.0, vacuum.spec.vacuum)
     return {
         "pressure": SignalOf(source, vacuum.pressure, turning, lambda: vacuum.version, unit="kPa", bounds=bounds),
-        "dropped": SignalOf(source, lambda now: float(vacuum.dropped)),
+        **carrier_signals(vacuum),
     }
 
 
@@ -236,24 +144,13 @@ VACUUM = with_terminals(
     VacuumSpec,
     (
         optional(OUTPUT_PIN, "ejector", "output joined to EJECTOR; without it a wire may be"),
-        optional(OUTPUT_PIN, "pick", "output joined to PICK: the cup is where it picks up"),
-        optional(OUTPUT_PIN, "place", "output joined to PLACE: the cup is where it puts down"),
-        optional(
-            NameOf("conveyor"),
-            "from",
-            "conveyor that it picks from; without one a workpiece is there whenever PICK is on",
-            None,
-            "source",
-        ),
-        optional(number(0.0), "pick_at", "with from: mm from the beginning of the belt", 0.0),
-        optional(NameOf("conveyor"), "onto", "conveyor that it puts on"),
-        optional(number(0.0), "place_at", "with onto: mm from the beginning of the belt, of the front of the workpiece", 0.0),
+        *CARRIER_KEYS,
         optional(number(0.0, 101.0, above=True), "vacuum", "kPa below the pressure of the air, with a closed cup", 70.0),
         optional(number(0.0, 101.0, above=True), "threshold", "kPa, from which HELD is on", 50.0),
         optional(positive_time, "build_up", "from 0 to the threshold", 100 * MILLISECOND),
         optional(positive_time, "release", "from vacuum to the threshold", 40 * MILLISECOND),
     ),
-    make=_make,
+    make=lambda spec, site: Vacuum(site.board(spec.name), spec, site),
     signals=_signals,
     faults=(
         STUCK_OUTPUT,
