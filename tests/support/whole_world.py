@@ -169,6 +169,7 @@ extend = "power.no"
 extend_time = "90 ms"
 [[conveyor]]
 name = "belt"
+mass = 0.5
 length = 300.0
 speed = 500.0
 feed_every = "150 ms"
@@ -178,7 +179,7 @@ to = "table.IN11"
 bounce = "2 ms"
 [[conveyor.stop]]
 at = 200.0
-hold = "table.OUT1"
+hold = "power.nc"
 [[vacuum]]
 name = "cup"
 ejector = "clamp.extended"

@@ -156,7 +156,8 @@ def test_run_and_up_have_it(tmp_path: Path, capfd: pytest.CaptureFixture[str], m
 
 EDGES = """
 beam.skewed belt.sensor1 both.out box.acts bump.hit clamp.extended clamp.retracted cup.held cycles.out
-hold.released jaws.closed jaws.held jaws.opened knife.switch1 power.nc power.no rail.good seen.out slide.switch1 start start-time.out
+hold.released jaws.closed jaws.held jaws.opened knife.switch1
+power.nc power.no rail.good seen.out slide.switch1 start start-time.out
 turret.switch1
 """
 

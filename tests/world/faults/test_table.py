@@ -55,7 +55,8 @@ def test_shared_parameters_say_which_kinds_have_them() -> None:
     assert {parameter.name: of for parameter, of in found}["from_s"] == (
         "each byte, each delivery, each answer, each request, each change, each save, stuck, master-error, "
         "stuck-output, welded-contact, open-coil, no-air, jam, belt-stop, empty-feeder, leak, worn-jaws, worn-brake, "
-        "stuck-brake, slipping-coupling, stuck-follower, worn-cam, slack-belt, broken-wire, drift, stiff-guides, brown-out, other-load"
+        "stuck-brake, slipping-coupling, stuck-follower, worn-cam, slack-belt, broken-wire, drift, "
+        "stiff-guides, brown-out, other-load"
     )
     assert len({parameter for parameter, _ in found}) == len(found)
     for parameter, of in found:
