@@ -30,6 +30,7 @@ from steptwin.cli import (
     dap,
     datasheet,
     decompile,
+    displays,
     explain,
     export,
     fault,
@@ -77,6 +78,7 @@ COMMANDS: Mapping[str, Mapping[str, Callable[..., None]]] = {
         "resume": pace.resume,
         "save": pace.save,
         "certificate": certificate.certificate,
+        "displays": displays.displays,
     },
     "Programs and runs": {
         "check": check.check,

@@ -3,34 +3,27 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from steptwin.access.roles import ROLES, Role
-from steptwin.errors import Misuse
 from steptwin.extras import libraries_of, missing
 from steptwin.gateways.contract import GatewaySubject
 from steptwin.gateways.epics.channels import PvDatabase
 from steptwin.gateways.epics.controller import EpicsController
-from steptwin.gateways.epics.motorrecord import MotorRecord
-from steptwin.gateways.epics.pointrecord import CommandRecord, PointRecord
 from steptwin.gateways.epics.records import Record
+from steptwin.gateways.epics.recordset import make_records
 from steptwin.gateways.epics.server import ChannelAccessServer
 from steptwin.gateways.leases import JogLeases
-from steptwin.gateways.methods import CONTROLLER_METHODS, PROGRAM_METHODS, methods_of
-from steptwin.gateways.points import CLOCK, CLOCK_POINTS, GatewayPoint, points_of, registers_by_machine
+from steptwin.gateways.points import CLOCK, registers_by_machine
 from steptwin.gateways.sampling import Sampler
 from steptwin.machine import SECOND
-from steptwin.subject.contract import MachinePart
 from steptwin.world.addresses import Address, is_loopback, parse_address
 from steptwin.world.gateways import EpicsSpec
 
 if TYPE_CHECKING:
     from steptwin.gateways.epics.pvserver import PvAccessServer
-
-LONGEST_NAME = 60
-"""Characters of the name of a record."""
 
 
 class EpicsGateway:
@@ -63,17 +56,9 @@ class EpicsGateway:
         role = open_to if spec.role is None else ROLES[spec.role]
         registers = registers_by_machine("[gateway.epics]", spec.registers, self._subject.description)
         self._sampler = Sampler(self._subject, registers)
-        records: dict[str, Record] = {}
         for name in (*(part.name for part in self._subject.description.machines), CLOCK):
             self._controllers[name] = EpicsController(name, self._subject, self._sampler, self._leases, role)
-        for part in self._subject.description.machines:
-            records |= self._records(part, registers[part.name])
-        records |= dict(self._points(CLOCK, CLOCK_POINTS))
-        for name in records:
-            if len(name) > LONGEST_NAME:
-                raise Misuse(
-                    f"[gateway.epics]: {name} has {len(name)} characters: permitted for the name of a record are {LONGEST_NAME}"
-                )
+        records = make_records(spec.prefix, self._subject, self._controllers, registers)
         server = ChannelAccessServer(PvDatabase(records), address, beacons, self._leave)
         port = await server.open()
         self._server = server
@@ -96,32 +81,6 @@ class EpicsGateway:
         ports = await self._pv_server.open()
         self._pv_place = f", PV Access at {Address(address.host, ports['port'])}"
         return {"host": address.host, **ports}
-
-    def _records(self, part: MachinePart, registers: list[str]) -> dict[str, Record]:
-        found: dict[str, Record] = {}
-        controller = self._controllers[part.name]
-        for axis in part.datasheet.axes:
-            name = self._name(part.name, axis.name)
-            motor = MotorRecord(name, part, axis, controller)
-            controller.records.append(motor)
-            found[name] = motor
-        found |= dict(self._points(part.name, points_of(part, self._subject.description, registers)))
-        for path, rows in (((), CONTROLLER_METHODS), (("program",), PROGRAM_METHODS)):
-            for row in methods_of(part, rows, None):
-                name = self._name(part.name, *path, row.name)
-                found[name] = CommandRecord(name, row, controller)
-        return found
-
-    def _points(self, machine: str, points: tuple[GatewayPoint, ...]) -> Iterator[tuple[str, PointRecord]]:
-        controller = self._controllers[machine]
-        for point in points:
-            name = self._name(machine, *point.path)
-            record = PointRecord(name, point, controller)
-            controller.records.append(record)
-            yield name, record
-
-    def _name(self, *path: str) -> str:
-        return f"{self._spec.prefix}{':'.join(path)}"
 
     def _leave(self, circuit: object) -> None:
         for controller in self._controllers.values():

@@ -1,0 +1,171 @@
+"""Displays: widgets and properties that Phoebus has, at places beside each other, with records that the gateway serves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cache
+from itertools import combinations
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from gateway_rig import GatewayWorld
+
+from steptwin.access.roles import Role
+from steptwin.commands.displays import write_displays
+from steptwin.errors import Misuse
+from steptwin.gateways.epics.controller import EpicsController
+from steptwin.gateways.epics.displays import displays_of
+from steptwin.gateways.epics.records import Record, found_field
+from steptwin.gateways.epics.recordset import make_records
+from steptwin.gateways.leases import JogLeases
+from steptwin.gateways.points import CLOCK
+from steptwin.gateways.sampling import Sampler
+
+HALL = """
+    [[mic488]]
+    name = "table"
+    [[m1486]]
+    name = "feed"
+    line = "bus"
+    [[line]]
+    name = "bus"
+    kind = "m1486"
+"""
+REGISTERS = {"table": ["USER_REGISTER[5]", "M1_VMAX"], "feed": []}
+_ALL = "name x y width height visible tooltip actions rules scripts class "
+_PV = f"{_ALL} pv_name border_alarm_sensitive "
+_TEXT = "font foreground_color background_color "
+_ASKING = "enabled confirm_dialog confirm_message password "
+_LABELS = "bit off_label off_color on_label on_color labels_from_pv "
+_SHOWING = "format precision show_units wrap_words vertical_alignment horizontal_alignment "
+_LISTS = {
+    "action_button": f"{_PV} {_TEXT} {_ASKING} text transparent rotation_step",
+    "bool_button": f"{_PV} {_TEXT} {_ASKING} {_LABELS} off_image on_image show_led mode",
+    "combo": f"{_PV} {_TEXT} {_ASKING} items_from_pv items editable",
+    "group": f"{_ALL} {_TEXT} macros style transparent line_color",
+    "label": f"{_ALL} {_TEXT} text transparent horizontal_alignment vertical_alignment auto_size wrap_words",
+    "led": f"{_PV} {_LABELS} font foreground_color line_color square",
+    "textentry": f"{_PV} {_TEXT} {_SHOWING} multi_line enabled",
+    "textupdate": f"{_PV} {_TEXT} {_SHOWING} transparent rotation_step interactive",
+}
+PROPERTIES = {kind: set(listed.split()) for kind, listed in _LISTS.items()}
+"""By the type of a widget: those that `defineProperties` of its class has in ControlSystemStudio/phoebus,
+app/display/model/src/main/java/org/csstudio/display/builder/model/widgets."""
+VERSIONS = dict.fromkeys(PROPERTIES, "2.0.0") | {"action_button": "3.0.0", "group": "3.0.0"}
+ACTIONS = {"write_pv": {"description", "pv_name", "value"}, "open_display": {"description", "file", "target"}}
+MOST = {"mode": 2, "vertical_alignment": 2, "style": 3}
+"""The last of the values that a property has, which are numbers in a file."""
+WRITING = ("textentry", "combo", "bool_button")
+
+
+COMMON = "RBV MOVN STOP VAL SPMG TWR TWV TWF JOGR JOGF JVEL LLM LLS HLM HLS LVIO"
+MORE = "HOMR HOMF HVEL ATHM VELO ACCL CNEN"
+
+
+@cache
+def shown() -> dict[str, ElementTree.Element]:
+    world = GatewayWorld(HALL)
+    texts = displays_of(world.description, "ST:", REGISTERS)
+    return {name: ElementTree.fromstring(text) for name, text in texts.items()}
+
+
+def widgets(node: ElementTree.Element) -> Iterator[ElementTree.Element]:
+    return node.iter("widget")
+
+
+def place(node: ElementTree.Element) -> list[int]:
+    return [int(node.findtext(key, "")) for key in ("x", "y", "width", "height")]
+
+
+def test_there_is_one_for_each_controller_and_an_overview_that_opens_them() -> None:
+    displays = shown()
+    assert list(displays) == ["overview.bob", "controller-table.bob", "controller-feed.bob"]
+    assert all((node.tag, node.get("version")) == ("display", "2.0.0") for node in displays.values())
+    opened = {name: sorted(node.text or "" for node in display.iter("file")) for name, display in displays.items()}
+    assert opened == {
+        "overview.bob": ["controller-feed.bob", "controller-table.bob"],
+        "controller-table.bob": ["overview.bob"],
+        "controller-feed.bob": ["overview.bob"],
+    }
+
+
+def test_widgets_and_properties_are_those_of_phoebus() -> None:
+    for display in shown().values():
+        assert {child.tag for child in display} == {"name", "width", "height", "widget"}
+        for widget in widgets(display):
+            kind = widget.get("type", "")
+            assert widget.get("version") == VERSIONS[kind]
+            assert {child.tag for child in widget} - {"widget"} <= PROPERTIES[kind]
+            assert kind == "group" or widget.find("widget") is None
+            assert {child.tag: int(child.text or "") for child in widget if child.tag in MOST}.items() <= {
+                (tag, number) for tag, most in MOST.items() for number in range(most + 1)
+            }
+            for action in widget.iter("action"):
+                assert {child.tag for child in action} == ACTIONS[action.get("type", "")]
+
+
+def test_widgets_are_beside_each_other_and_within_their_display() -> None:
+    def look(inside: ElementTree.Element) -> None:
+        parts = inside.findall("widget")
+        wide, high = int(inside.findtext("width", "")), int(inside.findtext("height", ""))
+        for x, y, width, height in map(place, parts):
+            assert x >= 0 <= y
+            assert x + width <= wide, inside.findtext("name")
+            assert y + height <= high, inside.findtext("name")
+        for (x, y, width, height), (u, v, breadth, length) in combinations(map(place, parts), 2):
+            assert x + width <= u or u + breadth <= x or y + height <= v or v + length <= y
+        for group in parts:
+            if group.get("type") == "group":
+                look(group)
+
+    for display in shown().values():
+        look(display)
+
+
+@pytest.fixture
+def records() -> dict[str, Record]:
+    world = GatewayWorld(HALL)
+    leases, sampler = JogLeases(world), Sampler(world, REGISTERS)
+    names = [*(part.name for part in world.description.machines), CLOCK]
+    controllers = {name: EpicsController(name, world, sampler, leases, Role.ENGINEER) for name in names}
+    return make_records("ST:", world, controllers, REGISTERS)
+
+
+def test_every_name_is_one_that_the_gateway_serves(records: dict[str, Record]) -> None:
+    """And what is put can be put."""
+    names = {node.text or "" for display in shown().values() for node in display.iter("pv_name")}
+    assert len(names) > 100
+    assert {name for name in records if name.startswith("ST:table:M") and name.count(":") == 2} == {
+        f"ST:table:M{number}" for number in range(1, 5)
+    }
+    for name in names:
+        assert found_field(records, name)[1] is not None
+    puts = [node for display in shown().values() for node in display.iter("action") if node.get("type") == "write_pv"]
+    puts += [node for display in shown().values() for node in widgets(display) if node.get("type") in WRITING]
+    assert [name for node in puts if not found_field(records, name := node.findtext("pv_name", ""))[1].is_writable] == []
+
+
+def test_a_panel_has_what_its_axis_does() -> None:
+    """An M1486 does not home, has no drive that is switched, and tells no velocity."""
+    fields = {
+        name: {(node.text or "").partition(".")[2] for node in display.iter("pv_name")} - {""}
+        for name, display in shown().items()
+    }
+    assert fields["controller-feed.bob"] == set(COMMON.split())
+    assert fields["controller-table.bob"] == set(f"{COMMON} {MORE}".split())
+
+
+def test_the_command_writes_them(tmp_path: Path) -> None:
+    from steptwin.cli.displays import displays
+
+    file = tmp_path / "hall.toml"
+    file.write_text(f'{HALL}\n[gateway.epics]\nprefix = "ST:"\nregisters = ["table.USER_REGISTER[5]", "table.M1_VMAX"]\n')
+    displays(file, tmp_path / "bob")
+    written = {path.name: ElementTree.parse(path).getroot() for path in (tmp_path / "bob").iterdir()}
+    assert sorted(written) == sorted(shown())
+    for name in ("controller-table.bob", "controller-feed.bob"):
+        assert ElementTree.tostring(written[name]) == ElementTree.tostring(shown()[name])
+    file.write_text(HALL)
+    with pytest.raises(Misuse, match=r"hall\.toml has no \[gateway\.epics\]"):
+        write_displays(file, tmp_path / "bob")
