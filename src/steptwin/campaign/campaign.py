@@ -39,6 +39,8 @@ if TYPE_CHECKING:
     from steptwin.campaign.store import CampaignStore
 
 RESULTS, SUMMARY = "results.db", "summary.json"
+SUFFIX = ".results"
+"""Of the folder of results beside the file of a campaign."""
 """Files in the folder of the results."""
 
 

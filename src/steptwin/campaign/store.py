@@ -6,6 +6,7 @@ import json
 from array import array
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from sqlalchemy import (
@@ -32,7 +33,7 @@ from sqlalchemy.exc import DBAPIError
 from steptwin.campaign.case import Case, CaseResult
 from steptwin.coverage.counts import Coverage
 from steptwin.errors import Misuse
-from steptwin.history.database import POSTGRESQL, engine_of, failure, shown
+from steptwin.history.database import POSTGRESQL, SQLITE, engine_of, failure, shown
 
 FORMAT = 1
 """Of the tables; another one is refused."""
@@ -168,6 +169,23 @@ class CampaignStore:
         with self._begin() as connection:
             row = connection.execute(select(CAMPAIGN.c.coverage, CAMPAIGN.c.covered).where(CAMPAIGN.c.id == self._id)).one()
             return Coverage.of_plain(json.loads(row.coverage or "[]")), int(row.covered)
+
+
+def counted(path: Path) -> tuple[int, int]:
+    """How many results a database beside a campaign has, and how many of them failed; it may be written meanwhile.
+
+    Raises `LineFailure`.
+    """
+    url = URL.create(SQLITE, database=str(path))
+    engine = engine_of(url)
+    try:
+        with engine.connect() as connection:
+            failed = func.count().filter(CASE.c.failed)
+            return tuple(connection.execute(select(func.count(), failed).select_from(CASE)).one())
+    except DBAPIError as error:
+        raise failure(url, error) from None
+    finally:
+        engine.dispose()
 
 
 def _lock(connection: Connection) -> None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from steptwin.campaign.campaign import RESULTS, SUMMARY, Campaign, CampaignProgress
+from steptwin.campaign.campaign import RESULTS, SUFFIX, SUMMARY, Campaign, CampaignProgress
 from steptwin.campaign.report import comparison
 from steptwin.campaign.report.campaignpage import told
 from steptwin.campaign.report.write import write_report
@@ -54,7 +54,7 @@ def run(options: CampaignOptions, out: Print) -> bool:
     campaign = Campaign.load(options.file).changed(
         runs=options.runs, seed=options.seed, time=options.time, until_failure=options.until_failure, search=options.search
     )
-    folder = options.out or options.file.with_suffix(".results")
+    folder = options.out or options.file.with_suffix(SUFFIX)
     began = time.monotonic()
     with _progress(campaign) as progress:
         summary = campaign.run(folder, jobs=options.jobs, dask=options.dask, coverage=bool(options.coverage), progress=progress)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 from steptwin.access.audit import Audit
 from steptwin.extras import libraries_of, missing
 from steptwin.gateways import make_gateway
-from steptwin.gateways.contract import CommandLog, GatewaySubject, PastValues
+from steptwin.gateways.contract import CommandLog, GatewaySubject, OpenGateway, PastValues
 from steptwin.live.server import EndPoint, Server
 from steptwin.live.world import LiveWorld
 from steptwin.live.world_control import WorldControl
@@ -41,18 +41,22 @@ async def open_gateways(
     subject: KeptSubject,
     *,
     listen_any: bool,
-) -> None:
+) -> list[OpenGateway]:
     """Open those of a file in ``folder``. Raises `Misuse` or `LineFailure` for one that cannot be opened."""
+    opened: list[OpenGateway] = []
     if history is not None:
         keeper = _make_keeper(history, subject, folder)
         details = await keeper.open(listen_any=listen_any, notice=server.notice)
         server.join(keeper, EndPoint(HISTORY, str(details["url"]), keeper.protocol, details))
+        opened.append(OpenGateway(HISTORY, str(details["url"]), keeper))
         subject.past = keeper.past
     for spec in specs:
         gateway = make_gateway(spec, subject, folder)
         details = await gateway.open(listen_any=listen_any, notice=server.notice)
         place = str(details.get("url") or f"{details['host']}:{details['port']}")
         server.join(gateway, EndPoint(spec.kind, place, gateway.protocol, details))
+        opened.append(OpenGateway(spec.kind, place, gateway))
+    return opened
 
 
 def _make_keeper(spec: HistorySpec, subject: GatewaySubject, folder: Path) -> HistoryKeeper:

@@ -28,7 +28,9 @@ from steptwin.commands.demo import demo_world
 from steptwin.commands.keptsettings import keep_settings, state_directory
 from steptwin.commands.recorded import recorded
 from steptwin.commands.studio_branches import BranchStart, WorldBranches
+from steptwin.commands.studio_campaigns import FolderCampaigns
 from steptwin.commands.studio_drawing import WorldArrangement
+from steptwin.commands.studio_plant import WorldPlant
 from steptwin.commands.studio_recordings import WorldRecordings
 from steptwin.commands.studio_work import LineWork
 from steptwin.commands.up_world import Running, UpOptions, send_away, up, up_with
@@ -200,6 +202,9 @@ class _Page:
         recordings = None if beside is None else self._recordings(running, beside)
         branches = WorldBranches(live, server.cell, lookback, self._branch_options())
         server.join(branches)
+        campaigns = _campaigns(None if beside is None else beside.world)
+        if campaigns is not None:
+            server.join(campaigns)
         around = partial(
             Surroundings,
             programs=WorldPrograms(live.world),
@@ -207,6 +212,8 @@ class _Page:
             lookback=lookback,
             branches=branches,
             recordings=recordings,
+            plant=None if beside is None else WorldPlant(running.gateways),
+            campaigns=campaigns,
             arrangement=_arrangement(live, None if beside is None else beside.world),
             traffic=live.traffic,
         )
@@ -291,6 +298,11 @@ def _arrangement(live: LiveWorld, path: Path | None) -> WorldArrangement:
     shown = live.subject.description
     names = [part.name for part in (*shown.axes, *shown.elements)]
     return WorldArrangement(live.world.spec, names, None if path is None or is_session(path) else path)
+
+
+def _campaigns(path: Path | None) -> FolderCampaigns | None:
+    """Those in the folder of a description, or below it."""
+    return None if path is None or is_session(path) else FolderCampaigns(path)
 
 
 @dataclass(frozen=True, slots=True)

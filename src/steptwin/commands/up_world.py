@@ -22,6 +22,7 @@ from steptwin.files.coverage import CoverageReports
 from steptwin.files.export import axis_views, check_target, growing_file, read_trace, write_trace
 from steptwin.files.export.tracefile import Kept, Ring, TraceFile, read_kept
 from steptwin.files.world import World
+from steptwin.gateways.contract import OpenGateway
 from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
 from steptwin.live.display import Display, Lines, Notices, banner, remarks_on
@@ -102,6 +103,8 @@ class Running:
     live: LiveWorld
     pace: Pace
     control: WorldControl
+    gateways: list[OpenGateway] = field(default_factory=list)
+    """Those that are open, the history among them; empty until the world runs."""
 
 
 Addition: TypeAlias = Callable[[Running], Awaitable[None]]
@@ -282,13 +285,15 @@ async def _open(server: Server, live: LiveWorld, pace: Pace, options: UpOptions,
         await _open_for_others(server, live, control, options)
     if options.past:
         server.join(Lookback(live, server.cell, pace))
+    running = Running(server, live, pace, control)
     if addition is not None:
-        await addition(Running(server, live, pace, control))
+        await addition(running)
     if not options.is_closed:
         folder = Path() if options.world is None else options.world.parent
         spec, subject = live.world.spec, LiveWorldSubject(control, live)
         subject.audit = recording(options.audit, lambda: live.world.now)
-        await open_gateways(server, spec.gateways, spec.history, folder, subject, listen_any=options.listen_any)
+        opened = await open_gateways(server, spec.gateways, spec.history, folder, subject, listen_any=options.listen_any)
+        running.gateways.extend(opened)
     if options.ready_file is not None:
         server.write_ready_file(options.ready_file)
 

@@ -21,6 +21,16 @@ class PastValue(NamedTuple):
     value: float | str | None
 
 
+class OpenGateway(NamedTuple):
+    """A gateway that has been opened."""
+
+    kind: str
+    """The name of its table: ``opcua``, ``history``."""
+    place: str
+    """Its address for people."""
+    gateway: Gateway
+
+
 class CommandLog(Protocol):
     """The audit log (`steptwin.access.audit`) at the present moment of a subject."""
 
@@ -73,6 +83,29 @@ class GatewaySubject(Protocol):
         ...
 
 
+class ClientState(NamedTuple):
+    """A program that uses a gateway."""
+
+    name: str
+    place: str
+    """Where it is, as far as that is known."""
+    role: str
+    """Its title; empty where the protocol has no clients with roles."""
+    follows: tuple[str, ...] = ()
+    """The values that it is sent when they change, by the names of the protocol."""
+
+
+class GatewayState(NamedTuple):
+    """The present state of a gateway."""
+
+    is_up: bool
+    text: str
+    """In words, such as why it is not up."""
+    shown: int | None = None
+    """How many values it shows; None where that is no fixed number."""
+    clients: tuple[ClientState, ...] = ()
+
+
 class Gateway(Protocol):
     """A gateway in the event loop of its subject."""
 
@@ -89,5 +122,7 @@ class Gateway(Protocol):
         Raises `Misuse` for an address that is not permitted, `LineFailure` for one that cannot be used.
         """
         ...
+
+    def state(self) -> GatewayState: ...
 
     async def close(self) -> None: ...

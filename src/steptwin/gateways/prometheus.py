@@ -14,7 +14,8 @@ from prometheus_client import CollectorRegistry
 from prometheus_client.core import Metric
 from prometheus_client.exposition import choose_encoder
 
-from steptwin.gateways.contract import GatewaySubject
+from steptwin.access.roles import Role
+from steptwin.gateways.contract import ClientState, GatewayState, GatewaySubject
 from steptwin.gateways.metrics import PREFIX, Metrics
 from steptwin.httpservice import HttpService, listen
 from steptwin.world.addresses import Address, parse_address
@@ -22,6 +23,9 @@ from steptwin.world.gateways import ListeningSpec
 
 _Send: TypeAlias = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 TEXT = "text/plain; charset=utf-8"
+LONGEST_PROGRAM = 80
+MOST_READERS = 16
+"""Readers that are remembered: the last ones."""
 
 
 class PrometheusGateway:
@@ -34,14 +38,21 @@ class PrometheusGateway:
         self._subject = subject
         self._metrics: Metrics | None = None
         self._service: HttpService | None = None
+        self._pages: Pages | None = None
 
     async def open(self, *, listen_any: bool, notice: Callable[[str], None]) -> Mapping[str, object]:
         listening = listen(parse_address(self._spec.listen, listen_any=listen_any), is_fixed=True)
         self._metrics = Metrics(self._subject)
-        self._service = HttpService(Pages(self._metrics), listening)
+        self._pages = Pages(self._metrics)
+        self._service = HttpService(self._pages, listening)
         self._service.start()
         host, port = listening.getsockname()[:2]
         return {"host": host, "port": port, "url": f"http://{Address(host, port)}/metrics"}
+
+    def state(self) -> GatewayState:
+        readers = {} if self._pages is None else self._pages.readers
+        clients = [ClientState(program, place, Role.VIEWER.title) for place, program in readers.items()]
+        return GatewayState(is_up=True, text="listens", clients=tuple(clients))
 
     async def close(self) -> None:
         if self._service is not None:
@@ -58,6 +69,8 @@ class Pages:
 
     def __init__(self, metrics: Metrics) -> None:
         self._metrics = metrics
+        self.readers: dict[str, str] = {}
+        """Programs that have read metrics, by the host that they are on; the last one is the newest."""
 
     async def __call__(self, scope: Mapping[str, Any], receive: object, send: _Send) -> None:
         if scope["type"] != "http":
@@ -68,7 +81,9 @@ class Pages:
         path = scope["path"]
         if path == "/metrics":
             found = await self._metrics.read()
-            accepted = dict(scope["headers"]).get(b"accept", b"").decode("latin-1")
+            headers = dict(scope["headers"])
+            accepted = headers.get(b"accept", b"").decode("latin-1")
+            self._note((scope.get("client") or ("", 0))[0], headers.get(b"user-agent", b"").decode("latin-1"))
             encode, kind = choose_encoder(accepted)
             await _answer(send, scope, 200, kind, encode(_registry(found)))
         elif path == "/health":
@@ -79,6 +94,12 @@ class Pages:
             await _answer(send, scope, 503 if silent else 200, TEXT, text.encode())
         else:
             await _answer(send, scope, 404, TEXT, b"served are /metrics, /health and /ready\n")
+
+    def _note(self, host: str, program: str) -> None:
+        self.readers.pop(host, None)
+        self.readers[host] = program[:LONGEST_PROGRAM]
+        if len(self.readers) > MOST_READERS:
+            del self.readers[next(iter(self.readers))]
 
 
 def controllers_up(metrics: Iterable[Metric]) -> dict[str, bool]:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from steptwin.errors import LineFailure, SteptwinError
-from steptwin.gateways.contract import GatewaySubject
+from steptwin.gateways.contract import GatewayState, GatewaySubject
 from steptwin.gateways.points import registers_by_machine
 from steptwin.history.database import read_url, shown
 from steptwin.history.past import KeptValues
@@ -92,6 +92,17 @@ class HistoryKeeper:
             self._notice(f"history: nothing is kept: {why} ({self._folder})")
             self._has_room = False
         return lost
+
+    @property
+    def url(self) -> str:
+        """Of its database, with its password."""
+        return self._url.render_as_string(hide_password=False)
+
+    def state(self) -> GatewayState:
+        waiting = 0 if self._spool is None else self._spool.waiting
+        lost = None if self._writer is None else self._writer.lost
+        text = "writes" if lost is None else lost
+        return GatewayState(is_up=lost is None, text=f"{text}; {waiting} bytes wait" if waiting else text)
 
     async def close(self) -> None:
         if self._task is not None:

@@ -87,6 +87,8 @@ class PointSeries:
     seconds: NDArray[np.float64]
     runs: NDArray[np.int64]
     values: NDArray[Any]
+    is_motion: bool = False
+    """Whether values between these moments are between these values; otherwise each holds until the next one."""
 
     def __len__(self) -> int:
         return len(self.at)
@@ -233,7 +235,8 @@ class HistoryDatabase:
         else:
             kept = self._samples(ids, kind, bounds, runs, most)
             rows = kept if every_s is None else _of_samples(point, kept, runs, bounds, every_s)
-        return _arrays(point, unit, rows[:most], is_text=kind == TEXTS)
+        is_motion = bool(motions) or is_velocity
+        return _arrays(point, unit, rows[:most], is_text=kind == TEXTS, is_motion=is_motion)
 
     def _bounds(self, begin: Moment, end: Moment, run: int | None) -> _Bounds:
         if not isinstance(begin, int | float) and not isinstance(end, int | float):
@@ -403,7 +406,7 @@ def _check_size(point: str, found: int, length_s: float, every_s: float | None) 
         raise Misuse(f"{point} has more than {MOST_VALUES} values here: take a shorter stretch, or one value in a longer time")
 
 
-def _arrays(point: str, unit: str, rows: list[_Row], *, is_text: bool) -> PointSeries:
+def _arrays(point: str, unit: str, rows: list[_Row], *, is_text: bool, is_motion: bool) -> PointSeries:
     return PointSeries(
         point,
         unit,
@@ -411,6 +414,7 @@ def _arrays(point: str, unit: str, rows: list[_Row], *, is_text: bool) -> PointS
         np.array([row.time / SECOND for row in rows], dtype=np.float64),
         np.array([row.run for row in rows], dtype=np.int64),
         np.array([row.value for row in rows], dtype=object if is_text else np.float64),
+        is_motion,
     )
 
 

@@ -37,7 +37,8 @@ class HistoryWriter:
         self._keep_days = keep_days
         self._engine: Engine = engine_of(url)
         self._is_ready = False
-        self._is_away = False
+        self.lost: str | None = None
+        """Why the database takes nothing; None while it does."""
         self._writer = TableWriter()
         self._ending = threading.Event()
         self._removal: Iterator[None] | None = None
@@ -81,7 +82,7 @@ class HistoryWriter:
                 self._ending.wait(pause)
             if self._ending.is_set():
                 deadline = deadline or time.monotonic() + END_S
-                if time.monotonic() > deadline or (pause and self._is_away):
+                if time.monotonic() > deadline or (pause and self.lost is not None):
                     return
             try:
                 if not self._write_next():
@@ -92,21 +93,22 @@ class HistoryWriter:
             except LineFailure as error:
                 self._away(error)
             except SteptwinError as error:
-                self._notice(f"the history ends: {error}")
+                self.lost = f"the history ends: {error}"
+                self._notice(self.lost)
                 return
             except OSError as error:
                 self._away(LineFailure(f"the spool of the history: {reason(error)}"))
             else:
-                if self._is_away and self._is_ready:
-                    self._is_away = False
+                if self.lost is not None and self._is_ready:
+                    self.lost = None
                     self._notice(f"history: {shown(self._url)} answers again")
                 pause = 0.0
                 continue
             pause = min(max(2 * pause, PAUSE_S[0]), PAUSE_S[1])
 
     def _away(self, error: LineFailure) -> None:
-        if not self._is_away:
-            self._is_away = True
+        if self.lost is None:
+            self.lost = str(error)
             self._notice(f"history: {error}; what comes waits on this disk")
 
     def _write_next(self) -> bool:

@@ -78,7 +78,9 @@ class Guard:
             nonlocal has_begun
             if message["type"] == "http.response.start":
                 has_begun = True
-                message = {**message, "headers": [*message.get("headers", ()), *HEADERS]}
+                own = message.get("headers", ())
+                names = {name.lower() for name, _ in own}
+                message = {**message, "headers": [*own, *(header for header in HEADERS if header[0] not in names)]}
             await send(message)
 
         try:

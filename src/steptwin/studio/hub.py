@@ -22,13 +22,24 @@ from steptwin.later import start
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.studio.branchrequests import Branches
 from steptwin.studio.calculations import Calculations
+from steptwin.studio.campaignrequests import Campaigns
 from steptwin.studio.configurations import Configurations
 from steptwin.studio.drawingrequests import Arrangement
 from steptwin.studio.looking import KeptPast
 from steptwin.studio.machines import Sheets
+from steptwin.studio.plantrequests import PlantRecords
 from steptwin.studio.programs import ProgramTexts
 from steptwin.studio.recordingrequests import Recordings
-from steptwin.studio.requests import OF_BRANCHES, OF_DRAWINGS, OF_RECORDINGS, OF_THE_PAST, REQUESTS, permit_of
+from steptwin.studio.requests import (
+    OF_BRANCHES,
+    OF_CAMPAIGNS,
+    OF_DRAWINGS,
+    OF_PLANT,
+    OF_RECORDINGS,
+    OF_THE_PAST,
+    REQUESTS,
+    permit_of,
+)
 from steptwin.studio.streams import Streams
 from steptwin.studio.tools import tools
 from steptwin.studio.watches import Watches
@@ -198,6 +209,10 @@ class Surroundings:
     """Of the world, where there is one."""
     arrangement: Arrangement | None = None
     """Of the world, where there is one."""
+    plant: PlantRecords | None = None
+    """Of the world, where there is one."""
+    campaigns: Campaigns | None = None
+    """Of the description of the world, where it is in a file."""
     traffic: Callable[[], Sequence[Mapping[str, object]]] | None = None
     """Of the world, where there is one."""
     on_internal: Callable[[Exception], object] = lambda error: None
@@ -268,6 +283,20 @@ class Hub:
             raise Refusal("what is drawn is a world: there is none here")
         return self.around.arrangement
 
+    @property
+    def plant(self) -> PlantRecords:
+        """Raises `Refusal` where there is no world."""
+        if self.around.plant is None:
+            raise Refusal("gateways and a history are beside a world: there is none here")
+        return self.around.plant
+
+    @property
+    def campaigns(self) -> Campaigns:
+        """Raises `Refusal` where there is no file of a world."""
+        if self.around.campaigns is None:
+            raise Refusal("campaigns are beside the file of a world: there is none here")
+        return self.around.campaigns
+
     def traffic(self) -> dict[str, object]:
         """Raises `Refusal` where there is no world."""
         if self.around.traffic is None:
@@ -298,17 +327,17 @@ class Hub:
     def may(self, role: Role) -> list[str]:
         """Names of requests that a role may use here."""
         of_subject = [name for name in COMMANDS if name in self.subject.description.commands]
-        missing = frozenset[str]()
-        if self.around.lookback is None:
-            missing |= OF_THE_PAST
-        if self.around.recordings is None:
-            missing |= OF_RECORDINGS
-        if self.around.branches is None:
-            missing |= OF_BRANCHES
-        if self.around.arrangement is None:
-            missing |= OF_DRAWINGS
-        if self.around.traffic is None:
-            missing |= {"traffic"}
+        around = self.around
+        needed = (
+            (around.lookback, OF_THE_PAST),
+            (around.recordings, OF_RECORDINGS),
+            (around.branches, OF_BRANCHES),
+            (around.arrangement, OF_DRAWINGS),
+            (around.plant, OF_PLANT),
+            (around.campaigns, OF_CAMPAIGNS),
+            (around.traffic, frozenset({"traffic"})),
+        )
+        missing = frozenset[str]().union(*(names for part, names in needed if part is None))
         own = [name for name in REQUESTS if name not in missing]
         return [name for name in (*of_subject, *own) if permit_of(name).role <= role]
 

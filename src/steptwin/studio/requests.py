@@ -18,8 +18,10 @@ from steptwin.machine import Nanos
 from steptwin.nearmiss import NearMiss
 from steptwin.plaintypes import shown
 from steptwin.studio.branchrequests import BRANCHES, BranchRequest
+from steptwin.studio.campaignrequests import CAMPAIGNS, CampaignRequest
 from steptwin.studio.devicerequests import OF_DEVICES, DeviceRequest
 from steptwin.studio.drawingrequests import DRAWINGS, DrawingRequest
+from steptwin.studio.plantrequests import PLANT, PlantRequest
 from steptwin.studio.recordingrequests import RECORDINGS, RecordingRequest
 from steptwin.studio.requestrow import NOTHING, RequestRow
 from steptwin.studio.shapes import MOMENT
@@ -195,6 +197,8 @@ StudioRequest: TypeAlias = (
     | RecordingRequest
     | BranchRequest
     | DrawingRequest
+    | PlantRequest
+    | CampaignRequest
     | DeviceRequest
     | ListPorts
     | Connect
@@ -440,7 +444,7 @@ _ROWS = (
 )
 
 REQUESTS: Mapping[str, RequestRow] = {
-    row.name: row for row in (*_ROWS, *TOOLS, *WORKS, *RECORDINGS, *BRANCHES, *DRAWINGS, *OF_DEVICES)
+    row.name: row for row in (*_ROWS, *TOOLS, *WORKS, *RECORDINGS, *BRANCHES, *DRAWINGS, *PLANT, *CAMPAIGNS, *OF_DEVICES)
 }
 ALL: Mapping[str, RequestRow | CommandRow] = {**COMMANDS, **REQUESTS}
 """Every request by name."""
@@ -454,6 +458,10 @@ IN_THE_PAST = OF_THE_PAST | {"breakpoint", "clear_breakpoint", "stop_on", "step_
 """What changes something and is possible while the past is looked at: a debugger goes forwards from there, too."""
 OF_DRAWINGS = frozenset(row.name for row in DRAWINGS)
 """What needs a world."""
+OF_PLANT = frozenset(row.name for row in PLANT)
+"""What needs a world."""
+OF_CAMPAIGNS = frozenset(row.name for row in CAMPAIGNS)
+"""What needs a world of a file."""
 OF_CONNECTION = frozenset({"follow", "unfollow", *(row.name for row in _ROWS if row.is_of_connection)})
 
 

@@ -6,7 +6,8 @@ Routes and their descriptions are made from the tables of requests.
 from __future__ import annotations
 
 import json
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Coroutine, Mapping
+from pathlib import PurePath
 from typing import Any, TypeAlias
 
 from fastapi import FastAPI, Request, Response
@@ -119,6 +120,24 @@ class Rest:
                 responses={**RESPONSES, DONE: FILE_RESPONSE},
                 response_class=Response,
             )
+        if self._hub.around.campaigns is not None:
+            file = {
+                "name": "file",
+                "in": "path",
+                "required": True,
+                "description": "The folder of results in the answer to campaigns, and a file there: press.results/report.html.",
+                "schema": {"type": "string", "minLength": 1},
+            }
+            app.add_api_route(
+                "/api/campaigns/{file:path}",
+                self._result,
+                methods=["GET"],
+                name="get_result",
+                summary="A file of the results of a campaign.",
+                openapi_extra=_extra(parameters=[file]),
+                responses={**RESPONSES, DONE: FILE_RESPONSE},
+                response_class=Response,
+            )
 
     # ------------------------------------------------------------------ routes
 
@@ -153,16 +172,30 @@ class Rest:
 
     async def _recording(self, request: Request) -> Response:
         name = request.path_params["file"]
+        found = await self._file(request, lambda: self._hub.recordings.file(name))
+        return found if isinstance(found, Response) else FileResponse(found, filename=name, media_type=FILE_TYPE, headers=UNKEPT)
+
+    async def _result(self, request: Request) -> Response:
+        """Pages are shown, without access to the studio; other files are downloads."""
+        name = request.path_params["file"]
+        found = await self._file(request, lambda: self._hub.campaigns.file(name))
+        if isinstance(found, Response):
+            return found
+        if found.endswith(".html"):
+            return FileResponse(found, media_type="text/html", headers={**UNKEPT, "content-security-policy": PAGE_POLICY})
+        return FileResponse(found, filename=PurePath(found).name, media_type=FILE_TYPE, headers=UNKEPT)
+
+    async def _file(self, request: Request, find: Callable[[], Coroutine[Any, Any, str]]) -> str | Response:
+        """The path of a file, or the answer to a request that does not get one."""
         try:
             self._hub.around.gate.enter(_bearer(request))
         except Refusal as error:
             return _response(failure(error), NO_TOKEN)
         try:
-            path = await result_of(start(self._hub.recordings.file(name)))
+            return await result_of(start(find()))
         except SteptwinError as error:
             answer: Any = failure(error)
             return _response(answer, STATUS[answer["error"]["code"]])
-        return FileResponse(path, filename=name, media_type=FILE_TYPE, headers={"cache-control": "no-store"})
 
     async def _answer(self, request: Request, name: str, fields: Mapping[str, object]) -> Response:
         return _response(*await self._ask(request, name, fields))
@@ -258,6 +291,12 @@ RESPONSES: dict[int | str, dict[str, Any]] = {
 
 
 FILE_TYPE = "application/octet-stream"
+UNKEPT = {"cache-control": "no-store"}
+PAGE_POLICY = (
+    "sandbox allow-scripts allow-downloads; default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
+    "img-src data:"
+)
+"""Of pages that a campaign has made: they have no origin, and reach nothing."""
 FILE_RESPONSE: dict[str, Any] = {
     "description": "The file.",
     "content": {FILE_TYPE: {"schema": {"type": "string", "format": "binary"}}},

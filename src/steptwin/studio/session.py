@@ -18,8 +18,10 @@ from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.later import Later, start
 from steptwin.machine import SECOND, Nanos
 from steptwin.studio import branchrequests as branch
+from steptwin.studio import campaignrequests as campaign
 from steptwin.studio import devicerequests as device
 from steptwin.studio import drawingrequests as drawing
+from steptwin.studio import plantrequests as plant
 from steptwin.studio import recordingrequests as recording
 from steptwin.studio import requests as ask
 from steptwin.studio import workrequests as work
@@ -122,6 +124,12 @@ class ViewerSession:
             recording.ViewRecording: self._view_recording,
             branch.StartBranch: lambda wanted: hub.branches.start(wanted.moment),
             branch.EndBranch: lambda wanted: hub.branches.end(wanted.branch),
+            plant.ReadHistory: lambda _: hub.plant.history(),
+            plant.ReadHistoryValues: lambda one: hub.plant.values(one.points, one.run, one.from_s, one.to_s),
+            plant.CompareHistory: lambda one: hub.plant.compare(one.points, (one.run, one.other), one.from_s, one.to_s),
+            campaign.ListCampaigns: lambda _: hub.campaigns.plain(),
+            campaign.RunCampaign: lambda wanted: hub.campaigns.run(wanted.campaign),
+            campaign.EndCampaign: lambda wanted: hub.campaigns.end(wanted.campaign),
         }
 
     def _own_actions(self) -> Mapping[object, Callable[[Any], object]]:
@@ -140,6 +148,7 @@ class ViewerSession:
             work.Scan: lambda wanted: hub.around.work.scan(wanted.places, wanted.kind, wanted.units, wanted.baud, wanted.timeout),
             work.Verify: lambda wanted: hub.around.work.verify(wanted.address, write=wanted.write),
             branch.ListBranches: lambda _: hub.branches.plain(),
+            plant.ReadGateways: lambda _: hub.plant.gateways(),
             drawing.ReadDrawing: lambda _: hub.arrangement.plain(),
             drawing.SaveDrawing: lambda wanted: hub.arrangement.save(wanted.places),
             work.ReadWork: lambda _: hub.around.work.plain(),

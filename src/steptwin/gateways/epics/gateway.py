@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from steptwin.access.roles import ROLES, Role
 from steptwin.extras import libraries_of, missing
-from steptwin.gateways.contract import GatewaySubject
+from steptwin.gateways.contract import GatewayState, GatewaySubject
 from steptwin.gateways.epics.channels import PvDatabase
 from steptwin.gateways.epics.controller import EpicsController
 from steptwin.gateways.epics.records import Record
@@ -38,6 +38,8 @@ class EpicsGateway:
         self._server: ChannelAccessServer | None = None
         self._pv_server: PvAccessServer | None = None
         self._pv_place = ""
+        self._role = Role.VIEWER
+        self._shown = 0
         self._task: asyncio.Task[None] | None = None
         self._leaving: set[asyncio.Task[None]] = set()
 
@@ -53,7 +55,7 @@ class EpicsGateway:
         pva_beacons = parse_address(spec.pva_beacons, listen_any=listen_any)
         hosts = [one.host for one in (address, pva) if one is not None]
         open_to = Role.ENGINEER if all(map(is_loopback, hosts)) else Role.VIEWER
-        role = open_to if spec.role is None else ROLES[spec.role]
+        role = self._role = open_to if spec.role is None else ROLES[spec.role]
         registers = registers_by_machine("[gateway.epics]", spec.registers, self._subject.description)
         self._sampler = Sampler(self._subject, registers)
         for name in (*(part.name for part in self._subject.description.machines), CLOCK):
@@ -61,7 +63,7 @@ class EpicsGateway:
         records = make_records(spec.prefix, self._subject, self._controllers, registers)
         server = ChannelAccessServer(PvDatabase(records), address, beacons, self._leave)
         port = await server.open()
-        self._server = server
+        self._server, self._shown = server, len(records)
         found: dict[str, object] = {"host": address.host, "port": port, "prefix": spec.prefix}
         if pva is not None:
             try:
@@ -97,6 +99,11 @@ class EpicsGateway:
             wanted = [name for name, one in self._controllers.items() if one.is_wanted] if has_clients else []
             due = dict.fromkeys((*busy, *sampler.due(wanted)))
             await asyncio.gather(*(self._controllers[name].refresh() for name in due))
+
+    def state(self) -> GatewayState:
+        clients = () if self._server is None else tuple(self._server.clients(self._role.title))
+        unknown = "" if self._pv_server is None else "; clients of PV Access are not known"
+        return GatewayState(is_up=self._server is not None, text=f"listens{unknown}", shown=self._shown, clients=clients)
 
     async def close(self) -> None:
         if self._task is not None:

@@ -15,6 +15,8 @@ from caproto.asyncio.utils import _DatagramProtocol, _TransportWrapper, _UdpTran
 from caproto.server.common import DisconnectedCircuit
 
 from steptwin.errors import LineFailure
+from steptwin.gateways.clients import address_text
+from steptwin.gateways.contract import ClientState
 from steptwin.gateways.epics.channels import PvDatabase
 from steptwin.system import reason
 from steptwin.world.addresses import Address
@@ -141,6 +143,16 @@ class ChannelAccessServer(Context):
     def has_clients(self) -> bool:
         return bool(self.circuits)
 
+    def clients(self, role: str) -> list[ClientState]:
+        """Those that are connected, with the names that they give themselves."""
+        follows: dict[Any, dict[str, None]] = {circuit: {} for circuit in self.circuits}
+        for subscription in (one for many in self.subscriptions.values() for one in many):
+            follows.setdefault(subscription.circuit, {})[str(subscription.channel.name)] = None
+        return [
+            ClientState(_user(circuit), address_text(circuit.circuit.address), role, tuple(names))
+            for circuit, names in follows.items()
+        ]
+
     async def close(self) -> None:
         if self._listening is not None:
             self._listening.close()
@@ -156,3 +168,8 @@ class ChannelAccessServer(Context):
             transport.close()
         for _, transport in self.beacon_socks.values():
             transport.close()
+
+
+def _user(circuit: Any) -> str:
+    known = (circuit.client_username, circuit.client_hostname)
+    return "@".join(str(name) for name in known if name)

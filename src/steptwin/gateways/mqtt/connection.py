@@ -105,6 +105,8 @@ class BrokerConnection:
         self._notice = notice
         self._closing = asyncio.Event()
         self._task: asyncio.Task[None] | None = None
+        self.lost: str | None = "not connected yet"
+        """Why there is no session at present; None while there is one."""
         # The same for all sessions: the broker then ends the one before, and publishes its will, before this one says anything.
         self._client_id = f"steptwin-{secrets.token_hex(8)}"
 
@@ -127,6 +129,7 @@ class BrokerConnection:
 
         def connected() -> None:
             nonlocal told
+            self.lost = None
             if told:
                 self._notice(f"{self._where}: connected again")
             told = ""
@@ -136,8 +139,9 @@ class BrokerConnection:
             try:
                 await self._session(connected)
             except (MqttError, SessionOver, OSError, ssl.SSLError) as error:
-                if _words(error) != told:
-                    told = _words(error)
+                self.lost = _words(error)
+                if self.lost != told:
+                    told = self.lost
                     self._notice(f"{self._where}: {told}; it is tried again")
             if loop.time() - began >= STEADY_S:
                 pause = FIRST_PAUSE_S

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from steptwin.errors import Misuse
-from steptwin.gateways.contract import GatewaySubject
+from steptwin.gateways.contract import GatewayState, GatewaySubject
 from steptwin.gateways.mqtt.connection import Broker, BrokerConnection
 from steptwin.gateways.mqtt.jsoncommands import Doorkeeper, JsonCommands
 from steptwin.gateways.mqtt.jsonface import JsonFace
@@ -38,6 +38,7 @@ class MqttGateway:
         self._subject = subject
         self._sampler: Sampler | None = None
         self._face: JsonFace | SparkplugFace | None = None
+        self._shown = 0
         self._connection: BrokerConnection | None = None
 
     async def open(self, *, listen_any: bool, notice: Callable[[str], None]) -> Mapping[str, object]:
@@ -50,6 +51,7 @@ class MqttGateway:
         if spec.sparkplug is None:
             topics = Topics(spec.topic, spec.file, self._subject.description, registers)
             topic = topics.base
+            self._shown = sum(len(group.points) for groups in topics.groups.values() for group in groups)
             commands = JsonCommands(self._subject, door, asyncio.get_running_loop().time)
             self._face = JsonFace(spec, self._subject, topics, self._sampler, commands)
         else:
@@ -64,9 +66,11 @@ class MqttGateway:
     def _edge_node(self, spec: SparkplugSpec, registers: Mapping[str, list[str]], door: Doorkeeper) -> SparkplugFace:
         if self._sampler is None:
             raise AssertionError
+        rows = rows_of(self._subject.description, registers)
+        self._shown = sum(len(metrics) for metrics in rows.values())
         face = SparkplugFace(
             Namespace(spec.group, spec.node, spec.host),
-            rows_of(self._subject.description, registers),
+            rows,
             self._subject,
             self._sampler,
             replace(door.anybody, place="MQTT, Sparkplug B"),
@@ -75,6 +79,11 @@ class MqttGateway:
         )
         face.start()
         return face
+
+    def state(self) -> GatewayState:
+        """A broker does not tell who reads."""
+        lost = "closed" if self._connection is None else self._connection.lost
+        return GatewayState(is_up=lost is None, text=lost or "connected", shown=self._shown)
 
     async def close(self) -> None:
         if self._connection is not None:

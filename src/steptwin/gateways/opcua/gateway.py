@@ -11,7 +11,7 @@ from asyncua.server.server import Server
 
 from steptwin import __version__
 from steptwin.errors import LineFailure
-from steptwin.gateways.contract import GatewaySubject
+from steptwin.gateways.contract import GatewayState, GatewaySubject
 from steptwin.gateways.opcua.addressspace import NAMESPACE, NAMESPACE_URI, AddressSpaceBuilder
 from steptwin.gateways.opcua.notifications import Notifications
 from steptwin.gateways.opcua.past import PastNodes
@@ -38,6 +38,8 @@ class OpcUaGateway:
         self._folder = folder
         self._subject = subject
         self._server: Server | None = None
+        self._inside: GatewayServer | None = None
+        self._shown = 0
         self._sampler: Sampler | None = None
         self._notifications: Notifications | None = None
         self._service: NodeService | None = None
@@ -75,7 +77,7 @@ class OpcUaGateway:
             await server.start()
         except OSError as error:
             raise LineFailure(f"cannot listen on {address}: {reason(error)}") from error
-        self._server = server
+        self._server, self._inside, self._shown = server, inside, sum(map(len, builder.points.values()))
         self._task = asyncio.create_task(self._publish(service, self._notifications))
         port = _port(server)
         return {"host": address.host, "port": port, "url": f"opc.tcp://{Address(address.host, port)}/"}
@@ -88,6 +90,10 @@ class OpcUaGateway:
             await asyncio.sleep(self._spec.interval / SECOND)
             await service.publish()
             await notifications.publish()
+
+    def state(self) -> GatewayState:
+        clients = () if self._inside is None else tuple(self._inside.clients())
+        return GatewayState(is_up=self._server is not None, text="listens", shown=self._shown, clients=clients)
 
     async def close(self) -> None:
         if self._task is not None:

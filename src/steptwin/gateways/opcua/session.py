@@ -14,6 +14,7 @@ from asyncua.server.internal_session import InternalSession
 from steptwin.access.roles import Role
 from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
 from steptwin.gateways.clients import GatewayClient, NotPermitted, address_text
+from steptwin.gateways.contract import ClientState
 from steptwin.gateways.opcua.nodetypes import status
 
 CODES: tuple[tuple[type[SteptwinError], int], ...] = (
@@ -82,6 +83,11 @@ class GatewayServer(InternalServer):
     ) -> InternalSession:
         return GatewaySession(self, self.aspace, self.subscription_service, name, user=user, external=external)
 
+    def clients(self) -> list[ClientState]:
+        """Those whose sessions have been activated."""
+        sessions = self._external_sessions.values()
+        return [one.present() for one in sessions if isinstance(one, GatewaySession) and one.is_activated()]
+
 
 class GatewaySession(InternalSession):
     """A session of a client."""
@@ -94,6 +100,13 @@ class GatewaySession(InternalSession):
     def _client(self) -> GatewayClient:
         client = self.user.client if isinstance(self.user, GatewayUser) else NOBODY
         return replace(client, place=f"OPC UA, {address_text(self.name)}")
+
+    def present(self) -> ClientState:
+        client = self._client
+        own = (one for one in self.subscription_service.subscriptions.values() if one.session_id == self.session_id)
+        items = [item for one in own for item in one.monitored_item_srv._monitored_items.values()]  # no other way in the library
+        names = [str(item.read_value_id.NodeId.Identifier) for item in items if item.read_value_id is not None]
+        return ClientState(client.name, address_text(self.name), client.role.title, tuple(dict.fromkeys(names)))
 
     async def read(self, params: ua.ReadParameters) -> list[ua.DataValue]:
         await self._service.refresh(one.NodeId for one in params.NodesToRead if one.AttributeId == ua.AttributeIds.Value)

@@ -1,6 +1,6 @@
 // Made from docs/studio.schema.json by `npm run protocol`; not to be changed by hand.
 
-export type Request = DescribeRequest | ReadRequest | PinsRequest | StateRequest | EncodersRequest | FaultsRequest | FaultKindsRequest | TimeRequest | EndPointsRequest | FollowRequest | UnfollowRequest | SetRequest | PressRequest | ReleaseRequest | WriteRequest | SendRequest | RequestRequest | PowerCycleRequest | TurnRequest | CoupleRequest | FaultRequest | ClearFaultRequest | ExpectRequest | NoteRequest | SeeRequest | EnableRequest | MoveRequest | HomeRequest | JogRequest | StopRequest | ProgramRequest | DownloadRequest | PauseRequest | ResumeRequest | StepRequest | SnapshotRequest | SnapshotsRequest | RestoreRequest | DropSnapshotRequest | SaveRequest | DebugRequest | BreakpointRequest | ClearBreakpointRequest | BreakpointsRequest | StopOnRequest | StepProgramRequest | RunRequest | LookAtRequest | BranchRequest | StackRequest | ValuesRequest | EvaluateRequest | SetValueRequest | ProgramSourceRequest | WhyRequest | HelloRequest | ResyncRequest | WatchRequest | UnwatchRequest | TakeControlRequest | ReleaseControlRequest | RenewRequest | LetGoRequest | StopAllRequest | LookRequest | PastEventsRequest | GoBackRequest | ProgramsRequest | ProgramTextRequest | ProgramMemoryRequest | PortsRequest | ConnectRequest | DisconnectRequest | TrafficRequest | AuditRequest | CalculatorRequest | CalculateRequest | GearRequest | ConfigurationRequest | EditConfigurationRequest | ScanRequest | VerifyRequest | WorkRequest | CancelWorkRequest | RecordingsRequest | SaveRecordingRequest | ViewRecordingRequest | BranchesRequest | StartBranchRequest | EndBranchRequest | DrawingRequest | SaveDrawingRequest | SettingsRequest | ShadowRequest | ShadowStateRequest;
+export type Request = DescribeRequest | ReadRequest | PinsRequest | StateRequest | EncodersRequest | FaultsRequest | FaultKindsRequest | TimeRequest | EndPointsRequest | FollowRequest | UnfollowRequest | SetRequest | PressRequest | ReleaseRequest | WriteRequest | SendRequest | RequestRequest | PowerCycleRequest | TurnRequest | CoupleRequest | FaultRequest | ClearFaultRequest | ExpectRequest | NoteRequest | SeeRequest | EnableRequest | MoveRequest | HomeRequest | JogRequest | StopRequest | ProgramRequest | DownloadRequest | PauseRequest | ResumeRequest | StepRequest | SnapshotRequest | SnapshotsRequest | RestoreRequest | DropSnapshotRequest | SaveRequest | DebugRequest | BreakpointRequest | ClearBreakpointRequest | BreakpointsRequest | StopOnRequest | StepProgramRequest | RunRequest | LookAtRequest | BranchRequest | StackRequest | ValuesRequest | EvaluateRequest | SetValueRequest | ProgramSourceRequest | WhyRequest | HelloRequest | ResyncRequest | WatchRequest | UnwatchRequest | TakeControlRequest | ReleaseControlRequest | RenewRequest | LetGoRequest | StopAllRequest | LookRequest | PastEventsRequest | GoBackRequest | ProgramsRequest | ProgramTextRequest | ProgramMemoryRequest | PortsRequest | ConnectRequest | DisconnectRequest | TrafficRequest | AuditRequest | CalculatorRequest | CalculateRequest | GearRequest | ConfigurationRequest | EditConfigurationRequest | ScanRequest | VerifyRequest | WorkRequest | CancelWorkRequest | RecordingsRequest | SaveRecordingRequest | ViewRecordingRequest | BranchesRequest | StartBranchRequest | EndBranchRequest | DrawingRequest | SaveDrawingRequest | GatewaysRequest | HistoryRequest | HistoryValuesRequest | CompareHistoryRequest | CampaignsRequest | RunCampaignRequest | EndCampaignRequest | SettingsRequest | ShadowRequest | ShadowStateRequest;
 
 /** Every request has exactly one. */
 export type Answer = {
@@ -1568,6 +1568,84 @@ export type SaveDrawingRequest = {
   places: Record<string, number[]>;
 };
 
+/** The gateways of the world, and who uses them. */
+export type GatewaysRequest = {
+  do: "gateways";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+};
+
+/** Runs and points that the history beside the world has kept; null where there is none. */
+export type HistoryRequest = {
+  do: "history";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+};
+
+/** Values of points in a stretch of a run that has been kept, for a picture: of motions the ends of their parts, and about 800 positions between; at most 4000 of each point. */
+export type HistoryValuesRequest = {
+  do: "history_values";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Names as in the answer to history, at most 8. */
+  points: string[];
+  /** Number of the run; -1 is the last one. */
+  run?: number | null;
+  /** Begin of the stretch, since that of the run. [s] */
+  from_s?: number | null;
+  /** End of the stretch; that of the run without. [s] */
+  to_s?: number | null;
+};
+
+/** The points that differ between the same stretch of two runs, the greatest difference first. */
+export type CompareHistoryRequest = {
+  do: "compare_history";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Number of a run; -1 is the last one. */
+  run: number;
+  /** Number of the run that it is compared with. */
+  other: number;
+  /** Only these; all without. */
+  points?: string[] | null;
+  /** Begin of the stretch, since that of the run. [s] */
+  from_s?: number | null;
+  /** End of the stretch; that of the run without. [s] */
+  to_s?: number | null;
+};
+
+/** The campaigns of this world: files with a table [campaign] in the folder of its description or just below it. */
+export type CampaignsRequest = {
+  do: "campaigns";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+};
+
+/** Run a campaign, or what is left of it, in processes beside the studio. Nothing changes in the world here. */
+export type RunCampaignRequest = {
+  do: "run_campaign";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** As in the answer to campaigns. */
+  campaign: string;
+};
+
+/** End a campaign; run_campaign goes on with it. */
+export type EndCampaignRequest = {
+  do: "end_campaign";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** As in the answer to campaigns. */
+  campaign: string;
+};
+
 /** What can be read and written in a device, as the text that is kept before the first write. */
 export type SettingsRequest = {
   do: "settings";
@@ -2062,6 +2140,125 @@ export type SaveDrawingAnswer = {
   text: string;
 };
 
+export type GatewaysAnswer = ({
+  /** The name of its table: opcua, history. */
+  kind: string;
+  protocol: string;
+  /** Its address. */
+  place: string;
+  is_up: boolean;
+  /** Its state in words, such as why it is not up. */
+  text: string;
+  /** How many values it shows; null where that is no fixed number. */
+  shown: number | null;
+  clients: {
+    name: string;
+    /** Where it is, as far as that is known. */
+    place: string;
+    role: string;
+    /** Values that it is sent when they change, by the names of the protocol. */
+    follows: string[];
+  }[];
+})[];
+
+export type HistoryAnswer = {
+  database: string;
+  runs: {
+    run: number;
+    subject: string;
+    /** Whether its moments are virtual ones, of twins. */
+    is_virtual: boolean;
+    /** Wall clock, ISO 8601. */
+    began: string;
+    length_s: number;
+    /** False while it goes on, and where its process was killed. */
+    is_over: boolean;
+  }[];
+  points: {
+    point: string;
+    unit: string;
+    is_text: boolean;
+  }[];
+} | null;
+
+export type HistoryValuesAnswer = {
+  run: number;
+  from_s: number;
+  to_s: number;
+  series: ({
+    point: string;
+    unit: string;
+    is_text: boolean;
+    /** Whether values change between moments, too; otherwise each holds until the next. */
+    is_motion: boolean;
+    /** Whether it has been read in equal steps, because there are too many values. */
+    is_thinned: boolean;
+    /** Since the begin of the run. */
+    at_s: number[];
+    values: (number | string | null)[];
+  })[];
+};
+
+export type CompareHistoryAnswer = ({
+  point: string;
+  unit: string;
+  /** How far the two are apart at most; null for texts and unknown values. */
+  most: number | null;
+  /** Since the begin of the stretch. */
+  at_s: number;
+  values: (number | string | null)[];
+})[];
+
+export type CampaignsAnswer = ({
+  /** Path of its file from the folder of the description. */
+  campaign: string;
+  name: string;
+  /** Path of the folder of its results, for GET /api/campaigns/RESULTS/report.html. */
+  results: string;
+  /** Why its file cannot be read, or why it did not run. */
+  error: string | null;
+  /** Whether this studio runs it at present. */
+  is_running: boolean;
+  /** Runs whose results are there. */
+  done: number;
+  /** Those of them that failed. */
+  failed: number;
+  /** How many runs it has, where its file says so. */
+  total: number | null;
+  /** When its results changed last: wall clock, ISO 8601. */
+  changed: string | null;
+  /** Of the last one that ended; its report is among the files. */
+  result: {
+    runs: number;
+    failed: number;
+    pass_rate: number | null;
+    /** Of the pass rate, 95 %. */
+    interval: number[];
+    properties: ({
+      name: string;
+      /** Runs in which it did not hold. */
+      failed: number;
+      /** The least one: how far from violated, -1 to 1; negative where it was violated. */
+      robustness: number | null;
+    })[];
+    causes: ({
+      /** What failed. */
+      what: string;
+      /** The simplest case that fails so, in words. */
+      where: string | null;
+      runs: number;
+      /** The simplest run that fails in this way, among the files of the results. */
+      session: string | null;
+      /** Of that run. */
+      timeline: string | null;
+    })[];
+  } | null;
+})[];
+
+export type RunCampaignAnswer = null;
+
+export type EndCampaignAnswer = null;
+
 export type SettingsAnswer = {
   machine: string;
   text: string;
@@ -2346,6 +2543,13 @@ export interface Requests {
   end_branch: { request: EndBranchRequest; answer: EndBranchAnswer };
   drawing: { request: DrawingRequest; answer: DrawingAnswer };
   save_drawing: { request: SaveDrawingRequest; answer: SaveDrawingAnswer };
+  gateways: { request: GatewaysRequest; answer: GatewaysAnswer };
+  history: { request: HistoryRequest; answer: HistoryAnswer };
+  history_values: { request: HistoryValuesRequest; answer: HistoryValuesAnswer };
+  compare_history: { request: CompareHistoryRequest; answer: CompareHistoryAnswer };
+  campaigns: { request: CampaignsRequest; answer: CampaignsAnswer };
+  run_campaign: { request: RunCampaignRequest; answer: RunCampaignAnswer };
+  end_campaign: { request: EndCampaignRequest; answer: EndCampaignAnswer };
   settings: { request: SettingsRequest; answer: SettingsAnswer };
   shadow: { request: ShadowRequest; answer: ShadowAnswer };
   shadow_state: { request: ShadowStateRequest; answer: ShadowStateAnswer };

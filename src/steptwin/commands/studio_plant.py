@@ -1,0 +1,150 @@
+"""Gateways and the history beside the world of a studio."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Mapping, Sequence
+from math import isinf
+from typing import TYPE_CHECKING, TypeVar
+
+from steptwin.errors import Misuse, Refusal
+from steptwin.eventloop import later
+from steptwin.gateways.contract import OpenGateway
+from steptwin.machine import SECOND
+from steptwin.studio.plantrequests import MOST_POINTS
+from steptwin.world.historytable import HISTORY
+
+if TYPE_CHECKING:
+    from steptwin.history.reading import HistoryDatabase, KeptRun, PointSeries
+
+T = TypeVar("T")
+STEPS = 800
+"""Positions of a motion that are given for a stretch, beside the ends of its parts."""
+MOST_VALUES = 4000
+"""Of a point; where there are more, it is read in equal steps."""
+MOST_RUNS = 500
+"""The last ones."""
+
+
+class WorldPlant:
+    """See `steptwin.studio.plantrequests.PlantRecords`. ``opened``: the gateways that are open, which grow after the start."""
+
+    def __init__(self, opened: Sequence[OpenGateway]) -> None:
+        self._opened = opened
+
+    def gateways(self) -> Sequence[Mapping[str, object]]:
+        found: list[dict[str, object]] = []
+        for kind, place, gateway in self._opened:
+            state = gateway.state()
+            head = {"kind": kind, "protocol": gateway.protocol, "place": place}
+            clients = [{**client._asdict(), "follows": list(client.follows)} for client in state.clients]
+            found.append({**head, **state._asdict(), "clients": clients})
+        return found
+
+    async def history(self) -> Mapping[str, object] | None:
+        return None if self._url is None else await self._read(_contents)
+
+    async def values(self, points: Sequence[str], run: int, begin_s: float, end_s: float | None) -> Mapping[str, object]:
+        if not 0 < len(points) <= MOST_POINTS:
+            raise Misuse(f"points: {len(points)} are given: permitted are 1 to {MOST_POINTS}")
+        return await self._read(lambda past: _values(past, points, past.run(run), begin_s, end_s))
+
+    async def compare(
+        self, points: Sequence[str], runs: tuple[int, int], begin_s: float, end_s: float | None
+    ) -> Sequence[Mapping[str, object]]:
+        return await self._read(lambda past: _compare(past, points, runs, begin_s, end_s))
+
+    @property
+    def _url(self) -> str | None:
+        from steptwin.history.keeper import HistoryKeeper
+
+        for one in self._opened:
+            if one.kind == HISTORY and isinstance(one.gateway, HistoryKeeper):
+                return one.gateway.url
+        return None
+
+    async def _read(self, work: Callable[[HistoryDatabase], T]) -> T:
+        """What ``work`` reads, in a thread. Raises `Refusal` where there is no history."""
+        url = self._url
+        if url is None:
+            raise Refusal(f"nothing is kept here: the description of the world has no table [{HISTORY}]")
+
+        def read() -> T:
+            from steptwin.history.reading import HistoryDatabase
+
+            with HistoryDatabase(url) as past:
+                return work(past)
+
+        return await later(asyncio.to_thread(read))
+
+
+def _contents(past: HistoryDatabase) -> Mapping[str, object]:
+    from steptwin.history.reading import TEXTS
+
+    points = {point.name: point for point in past.points()}
+    return {
+        "database": past.shown,
+        "runs": [_run(run) for run in past.runs()[-MOST_RUNS:]],
+        "points": [{"point": one.name, "unit": one.unit, "is_text": one.type == TEXTS} for one in points.values()],
+    }
+
+
+def _run(run: KeptRun) -> Mapping[str, object]:
+    return {
+        "run": run.number,
+        "subject": run.subject,
+        "is_virtual": run.is_virtual,
+        "began": run.began.isoformat(timespec="seconds"),
+        "length_s": _length_s(run),
+        "is_over": run.is_over,
+    }
+
+
+def _length_s(run: KeptRun) -> float:
+    return (run.ended_ns - run.began_ns) / SECOND
+
+
+def _values(
+    past: HistoryDatabase, points: Sequence[str], run: KeptRun, begin_s: float, end_s: float | None
+) -> Mapping[str, object]:
+    until_s = _length_s(run) if end_s is None else end_s
+    if until_s < begin_s:
+        raise Misuse(f"to_s {until_s:g}: this is before from_s {begin_s:g}")
+    series = [_series(past, point, run, begin_s, until_s) for point in points]
+    return {"run": run.number, "from_s": begin_s, "to_s": until_s, "series": series}
+
+
+def _series(past: HistoryDatabase, point: str, run: KeptRun, begin_s: float, end_s: float) -> Mapping[str, object]:
+    step_s = max((end_s - begin_s) / STEPS, 1e-6)
+    found: PointSeries = past.series(point, begin_s, end_s, run=run.number, moving_s=step_s, most=MOST_VALUES + 1)
+    is_thinned = len(found) > MOST_VALUES
+    if is_thinned:
+        found = past.series(point, begin_s, end_s, run=run.number, every_s=step_s)
+    at_s = [max(at - run.began_ns / SECOND, begin_s) for at in found.seconds.tolist()]
+    values = [None if value is None or value != value else value for value in found.values.tolist()]  # noqa: PLR0124  NaN
+    head = {"point": point, "unit": found.unit, "is_text": found.is_text, "is_motion": found.is_motion}
+    return {**head, "is_thinned": is_thinned, "at_s": at_s, "values": values}
+
+
+def _compare(
+    past: HistoryDatabase, points: Sequence[str], runs: tuple[int, int], begin_s: float, end_s: float | None
+) -> Sequence[Mapping[str, object]]:
+    from steptwin.history.stretches import Stretch, compare
+
+    one, other = (Stretch(begin_s, end_s, past.run(number)) for number in runs)
+    chosen = points or sorted({point.name for point in past.points()})
+    return [
+        {
+            "point": found.point,
+            "unit": found.unit,
+            "most": None if isinf(found.most) else found.most,
+            "at_s": found.at_s,
+            "values": [_plain(value) for value in found.values],
+        }
+        for found in compare(past, chosen, one, other)
+    ]
+
+
+def _plain(value: object) -> object:
+    """Of numpy: for JSON."""
+    return None if value is None or value != value else value if isinstance(value, str) else float(value)  # type: ignore[arg-type]  # noqa: PLR0124
