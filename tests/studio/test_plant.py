@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+import subprocess
+import sys
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -67,6 +70,18 @@ def kept(process: Process, **stretch: float) -> Any:
     return found
 
 
+@contextmanager
+def reader_of(record: str, port: int) -> Generator[None]:
+    """A client of Channel Access, pyepics, in a process of its own."""
+    environment = {**os.environ, "EPICS_CA_ADDR_LIST": f"127.0.0.1:{port}", "EPICS_CA_AUTO_ADDR_LIST": "NO"}
+    program = f"import epics; epics.PV({record!r}, auto_monitor=True).wait_for_connection(60); input()"
+    with subprocess.Popen([sys.executable, "-c", program], env=environment, stdin=subprocess.PIPE) as process:
+        try:
+            yield
+        finally:
+            process.kill()
+
+
 def move(process: Process, to: float) -> None:
     ok(process, "enable", machine="table", axis=1)
     ok(process, "move", machine="table", axis=1, to=to)
@@ -105,13 +120,8 @@ def test_who_uses_the_gateways_and_what_has_been_kept(
         {"name": "Prometheus/3", "place": "127.0.0.1", "role": "viewer", "follows": []}
     ]
 
-    os.environ |= {"EPICS_CA_ADDR_LIST": f"127.0.0.1:{studio.end_points['epics']['port']}", "EPICS_CA_AUTO_ADDR_LIST": "NO"}
-    import epics
-
-    record = epics.PV("ST:table:M1.RBV", auto_monitor=True)
-    assert record.wait_for_connection(30)
-    until(lambda: [one["follows"] for one in gateways(studio)["epics"]["clients"]] == [["ST:table:M1.RBV"]], "it is listed")
-    record.disconnect()
+    with reader_of("ST:table:M1.RBV", studio.end_points["epics"]["port"]):
+        until(lambda: [one["follows"] for one in gateways(studio)["epics"]["clients"]] == [["ST:table:M1.RBV"]], "it is listed")
 
     move(studio, 5)
     until(lambda: kept(studio)["values"][-1:] == [5], "the motion has been kept")

@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import gc
 import json
+import logging
 import os
 import traceback
 from collections.abc import Callable, Mapping, Sequence
@@ -80,6 +81,9 @@ class Server:
         cell.on_lag = self._lagged
         loop = asyncio.get_running_loop()
         loop.set_exception_handler(self._trouble)
+        # its warning that a client has gone while it was written to is no news
+        logging.getLogger("asyncio").addHandler(logging.NullHandler())
+        logging.getLogger("asyncio").propagate = False
         on_end(loop, self._ended.set)
         self._clients = Clients(max(1, allow_many_files() - OTHER_FILES), self.notice)
 
