@@ -17,11 +17,12 @@ from typing import Any
 
 import pytest
 
-from steptwin.errors import SteptwinError
+from steptwin.cli import main
+from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
 from steptwin.files.world import World
 from steptwin.live.remote import RemoteSubject, ask
 from steptwin.live.world import LiveWorld, PlacePort
-from steptwin.machine import MILLISECOND
+from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.registermap import Space
 from steptwin.mic488.registers import register_map
 from steptwin.subject.commands import read_command
@@ -36,6 +37,10 @@ SERVED = {
     ],
     "m1486": ["--tcp", "127.0.0.1:0", "--rfc2217", "127.0.0.1:0", "--pty", "pty"],
 }
+
+
+def family(error: SteptwinError) -> str:
+    return next(family.__name__ for family in (Misuse, Refusal, LineFailure) if isinstance(error, family))
 
 
 class Twin:
@@ -67,18 +72,23 @@ class Twin:
         self.ready = json.loads(ready.read_text())
         self._sockets: dict[str, socket.socket] = {}
 
-    def command(self, *arguments: str) -> tuple[int, str, str]:
-        ended = subprocess.run(
-            [STEPTWIN, *arguments], cwd=self.directory, env=self.environment, capture_output=True, text=True, check=False
-        )
-        return ended.returncode, ended.stdout, ended.stderr
+    def command(self, *arguments: str) -> object:
+        """The exit code of a command of the shell, in this process."""
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("sys.argv", ["steptwin", *arguments])
+            patch.delenv("STEPTWIN_DEVICE", raising=False)
+            try:
+                main()
+            except SystemExit as end:
+                return end.code or 0
+        return 0
 
     def asked(self, **request: object) -> object:
         """The answer of the control endpoint, or the kind and text of its error."""
         try:
             return ask("twin", read_command(request.pop("do"), request))
         except SteptwinError as error:
-            return type(error).__name__, str(error)
+            return family(error), str(error)
 
     @cached_property
     def machine(self) -> str:
@@ -141,18 +151,6 @@ class Twin:
 
 
 Probe = Callable[[Twin], object]
-
-
-def bare(answer: object) -> object:
-    """Without what is known to differ: names of machines before pins, occasions of faults, words of errors."""
-    match answer:
-        case dict():
-            return {str(name).rpartition(".")[2]: value for name, value in answer.items() if name != "seen"}
-        case list():
-            return [bare(element) for element in answer]
-        case (kind, _):
-            return kind
-    return answer
 
 
 def without_time(state: object) -> object:
@@ -230,8 +228,8 @@ def vision_records(twin: Twin) -> object:
 
 def pins(twin: Twin) -> object:
     asked: list[dict[str, Any]] = [{}, {"IN1": 1}, {"in2": 1, "AIN1": 4.5}, {"IN99": 1}, {"IN1": 2}, {"AIN1": 11}, {"IN1": "x"}]
-    told = [bare(twin.set(changes)) for changes in asked]
-    return told, bare(twin.pins()), twin.settled("0213880014", "01 02 03 03 00 00")  # both have passed their filters
+    told = [twin.set(changes) for changes in asked]
+    return told, twin.pins(), twin.settled("0213880014", "01 02 03 03 00 00")  # both have passed their filters
 
 
 def names_of_pins(twin: Twin) -> object:
@@ -241,17 +239,17 @@ def names_of_pins(twin: Twin) -> object:
 
 
 def encoders(twin: Twin) -> object:
-    turns = [bare(twin.asked(do="turn", machine=twin.machine, axis=axis, counts=counts)) for axis, counts in ((1, 40), (9, 1))]
+    turns = [twin.asked(do="turn", machine=twin.machine, axis=axis, counts=counts) for axis, counts in ((1, 40), (9, 1))]
     return turns, twin.asked(do="encoders", machine=twin.machine)
 
 
 def coupling_of_encoders(twin: Twin) -> object:
     told = [twin.asked(do="couple", machine=twin.machine, axis=1, to=word) for word in ("blocked", "drive", "nothing")]
-    return [bare(answer) for answer in told], twin.asked(do="encoders", machine=twin.machine)
+    return told, twin.asked(do="encoders", machine=twin.machine)
 
 
 def requests_for_units(twin: Twin) -> object:
-    return bare(twin.asked(do="state", machine="nobody")), bare(twin.asked(do="state", machine=""))
+    return twin.asked(do="state", machine="nobody"), twin.asked(do="state", machine="")
 
 
 def faults(twin: Twin) -> object:
@@ -259,7 +257,7 @@ def faults(twin: Twin) -> object:
     told = [twin.asked(do="fault", fault="exception code=6 nth=1"), twin.pdu("0100000001"), twin.asked(do="faults")]
     told += [twin.asked(do="fault", fault=text) for text in ("nonsense", "stuck pin=IN99 value=1", "crc nth=x")]
     told += [twin.asked(do="clear_fault", name=name) for name in ("nobody", "exception")]
-    return [bare(answer) for answer in [*told, twin.asked(do="faults")]]
+    return [*told, twin.asked(do="faults")]
 
 
 def occasions_of_faults(twin: Twin) -> object:
@@ -280,7 +278,7 @@ def known_requests(twin: Twin) -> object:
 
 def wrong_requests(twin: Twin) -> object:
     asked: list[dict[str, Any]] = [{"do": "set", "levels": ["IN1"]}, {"do": "state", "machine": []}, {"do": "fault", "fault": 1}]
-    return [bare(twin.asked(**request)) for request in asked]
+    return [twin.asked(**request) for request in asked]
 
 
 def shell_codes(twin: Twin) -> object:
@@ -294,7 +292,7 @@ def shell_codes(twin: Twin) -> object:
         ["fault"],
         ["state", "--device", "other"],
     ]
-    return {" ".join(words): twin.command(*words)[0] for words in typed}
+    return {" ".join(words): twin.command(*words) for words in typed}
 
 
 def ready_file(twin: Twin) -> object:
@@ -316,7 +314,7 @@ def chip_state(twin: Twin) -> object:
 
 def chip_pins(twin: Twin) -> object:
     asked: list[dict[str, Any]] = [{}, {"B3": 0}, {"limit": 0}, {"B99": 1}, {"B3": 2}]
-    return [bare(twin.set(changes)) for changes in asked], bare(twin.pins())
+    return [twin.set(changes) for changes in asked], twin.pins()
 
 
 def chip_power_cycle(twin: Twin) -> object:
@@ -326,16 +324,16 @@ def chip_power_cycle(twin: Twin) -> object:
 def chip_faults(twin: Twin) -> object:
     given = ("crc nth=3", "nonsense", "noise every=1000", "slip axis=1 counts=5")
     told = [twin.asked(do="fault", fault=text) for text in given]
-    return [bare(answer) for answer in [*told, twin.asked(do="faults")]]
+    return [*told, twin.asked(do="faults")]
 
 
 def chip_encoder(twin: Twin) -> object:
-    return bare(twin.asked(do="encoders", machine=twin.machine))
+    return twin.asked(do="encoders", machine=twin.machine)
 
 
 def chip_shell_codes(twin: Twin) -> object:
     typed = ["pin", "pin B99=1", "state", "power-cycle", "encoder", "fault nonsense", "fault"]
-    return {words: twin.command(*words.split())[0] for words in typed}
+    return {words: twin.command(*words.split()) for words in typed}
 
 
 PROBES: dict[str, tuple[Probe, ...]] = {
@@ -376,11 +374,8 @@ PROBES: dict[str, tuple[Probe, ...]] = {
     ),
 }
 
-IN_PROCESS = {
-    "mic488": (all_registers, refused, units, names_of_pins, wrong_requests),
-    "m1486": (chip_answers, chip_encoder, wrong_requests),
-}
-"""Those that need no more than the line and the dispatcher, in this order after power-on."""
+OUTSIDE = (ready_file, rtu_over_tcp, network_requests, network_port, vision_records, shell_codes, chip_shell_codes)
+"""Those that need a process: addresses, other links, the shell."""
 
 
 class InProcess(Twin):
@@ -399,11 +394,16 @@ class InProcess(Twin):
         try:
             return json.loads(json.dumps(self.live.subject.do(read_command(request.pop("do"), request)).value))
         except SteptwinError as error:
-            return type(error).__name__, str(error)
+            return family(error), str(error)
 
     def pdu(self, pdu: str, unit: int = 1) -> str:
         data = bytes.fromhex(pdu)
         return self.port.exchange(struct.pack(">HHHB", 7, 0, len(data) + 1, unit) + data, self.live.now)[6:].hex(" ")
+
+    def settled(self, pdu: str, expected: str) -> str:
+        while (answer := self.pdu(pdu)) != expected and self.live.now < LIMIT_S * SECOND:
+            self.live.advance(self.live.now + MILLISECOND)
+        return answer
 
     def characters(self, text: str, answers: int) -> str:
         data = self.port.exchange(text.encode(), self.live.now)
@@ -439,7 +439,7 @@ def test_all_ways_answer_alike(twins: tuple[Twin, Twin], monkeypatch: pytest.Mon
         for way, twin in (("serve", served), ("up", up)):
             monkeypatch.setenv("XDG_RUNTIME_DIR", str(twin.directory))
             shown[way] = probe(twin)
-        if probe in IN_PROCESS[served.kind]:
+        if probe not in OUTSIDE:
             shown["World"] = probe(here)
         if any(answer != shown["serve"] for answer in shown.values()):
             differing.append("\n".join([probe.__name__, *(f"  {way}: {answer}" for way, answer in shown.items())]))
