@@ -69,7 +69,7 @@ def test_a_running_world_in_somebodys_hands(up: Up) -> None:
     up.send_signal(signal.SIGINT)
     told = (up.stdout or sys.stdin).read().splitlines()
     assert up.wait(60) == 0
-    assert "time goes on, 50 virtual seconds a second" in "\n".join(told)
+    assert "running, 50 virtual seconds per second" in "\n".join(told)
     assert f"1 inputs: the same, digest {told[-1].rpartition(' ')[2]}" in invoke("replay", "end.json")
 
 

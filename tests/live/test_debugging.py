@@ -272,7 +272,7 @@ def test_whoever_does_not_follow_is_not_stopped_for(run: Run) -> None:
         number = rig.line(line=3)["number"]
         await rig.stop()
         rig.following.close()
-        assert rig.notices == ["the debugger is gone and time stands: 'steptwin resume' has it go on"]
+        assert rig.notices == ["the debugger has disconnected and time is paused: 'steptwin resume' continues it"]
         rig.do("resume")
         await asyncio.sleep(3)
         assert not rig.pace.is_paused
@@ -302,7 +302,7 @@ def test_what_cannot_be_is_refused(run: Run) -> None:
             with pytest.raises(Misuse, match=message):
                 rig.do("breakpoint", **fields)
         assert rig.do("breakpoints") == {"breakpoints": [], "stop_on": [], "stop": None}
-        with pytest.raises(Refusal, match="time goes on"):
+        with pytest.raises(Refusal, match="the world is running"):
             rig.do("step_program", machine="table", way="in")
         with pytest.raises(Misuse, match="no breakpoint 5"):
             rig.do("clear_breakpoint", breakpoint=5)

@@ -159,11 +159,11 @@ def test_a_world_stands_while_it_is_paused_and_goes_on_from_there(run: Run) -> N
         assert rig.do("pause")["time_s"] == 15.0
         assert rig.lags == []
         assert [line.split(maxsplit=3)[3] for line in rig.told] == [
-            "time goes on, 2 virtual seconds a second",
-            "time stands",
-            "time goes on, 2 virtual seconds a second",
-            "time goes on, 10 virtual seconds a second",
-            "time stands",
+            "running, 2 virtual seconds per second",
+            "paused",
+            "running, 2 virtual seconds per second",
+            "running, 10 virtual seconds per second",
+            "paused",
         ]
         assert the_same_again(rig.close())
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
 import socket
 import stat
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,7 @@ from steptwin.errors import LineFailure, Misuse, Refusal
 from steptwin.live import control, remote
 from steptwin.live.control import ControlEndpoint
 from steptwin.live.remote import START, ask, running
+from steptwin.live.twins import running_twins
 from steptwin.subject import commands as command
 from steptwin.world import script as do
 
@@ -129,6 +132,28 @@ def test_a_twin_that_hangs(own_directory: Path, monkeypatch: pytest.MonkeyPatch)
         hanging.listen()
         with pytest.raises(LineFailure, match="the twin 'twin' does not answer: timed out"):
             ask(None, do.Note("a"), timeout_s=0.02)
+
+
+def test_a_twin_of_another_version_is_named_and_others_are_listed(own_directory: Path) -> None:
+    own_directory.mkdir(0o700)
+    with socket.socket(socket.AF_UNIX) as other, ThreadPoolExecutor() as pool:
+        other.bind(str(own_directory / "old.control"))
+        other.listen()
+
+        def answer() -> None:
+            with contextlib.suppress(OSError):  # the socket is shut down at the end
+                while True:
+                    client, _ = other.accept()
+                    with client:
+                        if client.recv(1000):  # else it only looks whether there is a twin
+                            client.sendall(b'{"error": "unknown request"}\n')
+
+        answers = pool.submit(answer)
+        with pytest.raises(LineFailure, match="'old' does not answer: 'unknown request' is no response of this version"):
+            ask("old", do.Note("a"))
+        assert running_twins() == []
+        other.shutdown(socket.SHUT_RDWR)
+        answers.result()
 
 
 def test_a_twin_without_local_sockets_is_found_by_its_announcement(monkeypatch: pytest.MonkeyPatch, own_directory: Path) -> None:

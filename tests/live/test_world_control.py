@@ -93,9 +93,9 @@ def test_who_follows_is_told_how_time_goes(run: Run) -> None:
         rig.control.do(command.Resume())
         events = following.take().events
         assert [event.text for event in events] == [
-            "time goes on, 2 virtual seconds a second",
-            "time stands",
-            "time goes on, 2 virtual seconds a second",
+            "running, 2 virtual seconds per second",
+            "paused",
+            "running, 2 virtual seconds per second",
         ]
         assert [event.time for event in events] == [SECOND] * 3
 

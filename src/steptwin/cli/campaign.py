@@ -20,20 +20,25 @@ File = Annotated[Path, typer.Argument(metavar="FILE", help="The campaign, TOML."
 @app.command("run")
 def run(
     file: File,
-    runs: Annotated[int | None, typer.Option(help="How many. Default: as the file says.")] = None,
-    jobs: Annotated[int | None, typer.Option(help="Processes. Default: one for each processor.")] = None,
+    runs: Annotated[int | None, typer.Option(help="Number of runs. Default: that of the file.")] = None,
+    jobs: Annotated[int | None, typer.Option(help="Number of processes. Default: one for each processor.")] = None,
     dask: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="A cluster of Dask, such as tcp://HOST:8786; 'local' for one here.")
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Address of a Dask cluster, such as tcp://HOST:8786; 'local' starts one."),
     ] = None,
-    seed: Annotated[int | None, typer.Option(help="Where all chance comes from. Default: as the file says.")] = None,
-    time: Annotated[str | None, typer.Option(metavar="TIME", help="No run begins later, such as '10 min'.")] = None,
-    until_failure: Annotated[bool, typer.Option("--until-failure", help="End with the first run that fails.")] = False,
+    seed: Annotated[int | None, typer.Option(help="Random seed. Default: that of the file.")] = None,
+    time: Annotated[
+        str | None, typer.Option(metavar="TIME", help="Begin no more runs after this time, such as '10 min'.")
+    ] = None,
+    until_failure: Annotated[bool, typer.Option("--until-failure", help="End after the first run that fails.")] = False,
     search: Annotated[
         str | None,
-        typer.Option(metavar="[random|exhaustive|guided]", help="How cases are chosen. Default: as the file says, else random."),
+        typer.Option(
+            metavar="[random|exhaustive|guided]", help="Method that selects the cases. Default: that of the file, or random."
+        ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", metavar="DIR", help="Folder of the results. Default: FILE with .results.")
+        Path | None, typer.Option("--out", "-o", metavar="DIR", help="Folder for the results. Default: FILE with .results.")
     ] = None,
     coverage: Annotated[
         list[str] | None,
@@ -70,17 +75,15 @@ def run(
 @app.command("faults")
 def faults(
     file: File,
-    jobs: Annotated[int | None, typer.Option(help="Processes. Default: one for each processor.")] = None,
-    phases: Annotated[
-        int | None, typer.Option(help="So many phases of the cycle at most. Default: as the file says, else 12.")
-    ] = None,
+    jobs: Annotated[int | None, typer.Option(help="Number of processes. Default: one for each processor.")] = None,
+    phases: Annotated[int | None, typer.Option(help="Largest number of phases. Default: that of the file, or 12.")] = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", metavar="DIR", help="Folder of the table and the sessions. Default: FILE with .faults."),
+        typer.Option("--out", "-o", metavar="DIR", help="Folder for the table and the sessions. Default: FILE with .faults."),
     ] = None,
     json: Json = False,
 ) -> None:
-    """Try every fault of sensors, actuators, logic, lines and power at every phase of the cycle, and tell what the machine did.
+    """Try every fault of sensors, actuators, logic, lines and power in every phase of the cycle: how does the machine react?
 
     Writes faults.html, faults.csv and a session of each run. Exit code 1 when one was unsafe.
     """
@@ -105,7 +108,7 @@ def compare(
 
 @app.command("show")
 def show(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of the results.")],
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder for the results.")],
     json: Json = False,
 ) -> None:
     """Show the summary of a campaign. Exit code 1 when a property failed in a run."""

@@ -24,7 +24,7 @@ def fault(
         list[str] | None,
         typer.Argument(
             metavar="KIND NAME=VALUE",
-            help="crc nth=3; without any, those that are set are shown.",
+            help="Such as crc nth=3. Without arguments the present faults are shown.",
             autocompletion=completion.faults,
         ),
     ] = None,

@@ -18,19 +18,21 @@ def history(
     points: Annotated[
         list[str] | None, typer.Argument(metavar="[POINT]...", help="Such as table.M1.position or 'table.pins.*'.")
     ] = None,
-    run: Annotated[int | None, typer.Option(help="Of this run; -1 is the last one.")] = None,
+    run: Annotated[int | None, typer.Option(help="Only this run; -1 is the last one.")] = None,
     begin: Annotated[
         str | None,
         typer.Option("--from", metavar="TIME", help="A date, or a time since the begin of the run: '2026-03-01 14:30', '10 s'."),
     ] = None,
     end: Annotated[str | None, typer.Option("--to", metavar="TIME", help="As --from.")] = None,
-    every: Annotated[str | None, typer.Option(metavar="TIME", help="A value in so much time. Default: each one.")] = None,
-    other: Annotated[
-        int | None, typer.Option("--with", metavar="RUN", help="Compare with this run. Exit code 1: it differs.")
+    every: Annotated[
+        str | None, typer.Option(metavar="TIME", help="Show a value at this interval. Default: every recorded one.")
     ] = None,
-    events: Annotated[bool, typer.Option("--events", help="What happened, instead of values.")] = False,
+    other: Annotated[
+        int | None, typer.Option("--with", metavar="RUN", help="Compare with this run. Exit code 1: they differ.")
+    ] = None,
+    events: Annotated[bool, typer.Option("--events", help="Show events instead of values.")] = False,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="A file: .csv, .parquet, or a picture, .png or .svg.")
+        Path | None, typer.Option("--output", "-o", help="Write a file: .csv, .parquet, or a picture, .png or .svg.")
     ] = None,
     json: Json = False,
 ) -> None:

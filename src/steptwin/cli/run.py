@@ -46,7 +46,7 @@ Properties = Annotated[
     typer.Option(
         "--property",
         metavar="PROPERTY",
-        help="What must hold in the run, such as 'never guard.open and table.M1.moving'; exit code 1 if not; repeatable. Worlds.",
+        help="A property that must hold, such as 'never guard.open and table.M1.moving'; exit code 1 if not; repeatable. Worlds.",
     ),
 ]
 Trace = Annotated[Path | None, typer.Option(help="Write a trace to a file (.jsonl, .html, .vcd, .csv, ...) or into a directory.")]

@@ -24,7 +24,7 @@ class PageOptions(OptionGroup):
 
     http: Annotated[
         str | None,
-        typer.Option(metavar="HOST:PORT", help="Where the page is. Default: 127.0.0.1:8488, or the next free port."),
+        typer.Option(metavar="HOST:PORT", help="Address of the page. Default: 127.0.0.1:8488, or the next free port."),
     ] = None
     remote: Annotated[
         bool, typer.Option("--remote", help="Permit an --http address that others can reach, without TLS; with tokens.")
@@ -35,7 +35,9 @@ class PageOptions(OptionGroup):
         Path | None,
         typer.Option(metavar="FILE", help="Lines ROLE NAME TOKEN; roles are viewer, operator, engineer. Default: new tokens."),
     ] = None
-    audit: Annotated[Path | None, typer.Option(metavar="FILE", help="Append who did what to a file of JSON lines.")] = None
+    audit: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Append every command and its user to a file of JSON lines.")
+    ] = None
     device: Annotated[
         list[str] | None,
         typer.Option(
@@ -43,12 +45,12 @@ class PageOptions(OptionGroup):
             "-d",
             metavar="DEVICE",
             help="A device to show, as for the other commands: /dev/ttyUSB0,unit=2, HOST:PORT, /dev/ttyUSB1,kind=m1486,chip=7. "
-            "Several times for several. Without MACHINE.toml there is no world then.",
+            "Repeatable. Without MACHINE.toml there is no world then.",
             autocompletion=completion.devices,
         ),
     ] = None
     view: Annotated[
-        bool, typer.Option("--view", help="Show a session as it was: time stands at its end, and nothing can be changed.")
+        bool, typer.Option("--view", help="Show a session as it was: paused at its end, and nothing can be changed.")
     ] = False
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page where there is a desktop.")] = True
 

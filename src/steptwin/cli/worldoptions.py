@@ -23,13 +23,13 @@ ReadyFile = Annotated[Path | None, typer.Option(help="JSON file with the end poi
 ListenAny = Annotated[bool, typer.Option("--listen-any", help="Permit addresses that other computers can reach.")]
 AuditInto = Annotated[
     Path | None,
-    typer.Option("--audit", metavar="FILE", help="Append who gave which command by a gateway to a file of JSON lines."),
+    typer.Option("--audit", metavar="FILE", help="Append every command of a gateway and its client to a file of JSON lines."),
 ]
 Coverage = Annotated[
     list[str] | None,
     typer.Option(
         metavar="PATH",
-        help="Report which statements of programs were executed, and which ways branches went: .info (lcov), .html, .json; "
+        help="Report which statements of programs were executed, and which branches were taken: .info (lcov), .html, .json; "
         "'-' prints a table. Repeatable.",
     ),
 ]
@@ -103,7 +103,7 @@ class WorldRunOptions(OptionGroup):
 class ShownOptions(OptionGroup):
     """What is shown of what happens in a world."""
 
-    heading = "Options of what is shown of worlds"
+    heading = "Options for the output of worlds"
 
     of: Of = None
     show: Show = None

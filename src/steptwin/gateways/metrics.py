@@ -73,7 +73,7 @@ class Metrics:
         time = cast("Mapping[str, Any]", (await self._subject.do(command.Time())).value)
         return [
             _gauge("time_seconds", "Time of the subject: virtual for twins.", (), [((), int(time["time_ns"]) / SECOND)]),
-            _gauge("paused", "Whether its time stands.", (), [((), time["paused"])]),
+            _gauge("paused", "Whether its time is paused.", (), [((), time["paused"])]),
         ]
 
     def _events(self) -> list[Metric]:

@@ -65,7 +65,7 @@ class Debugging:
             self._open.close()
             self._open = None
             if is_at_stop:
-                self._live.show("the debugger is gone and time stands: 'steptwin resume' has it go on")
+                self._live.show("the debugger has disconnected and time is paused: 'steptwin resume' continues it")
 
     @property
     def _is_followed(self) -> bool:
@@ -341,7 +341,7 @@ class _OpenDebugger:
     @property
     def _standing(self) -> Debugger:
         if self._goes:
-            raise Refusal("time goes on: pause it first")
+            raise Refusal("the world is running: pause it first")
         return self.looked_at
 
     # ------------------------------------------------------------------ through the past

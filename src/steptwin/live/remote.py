@@ -171,6 +171,8 @@ class RemoteSubject:
             if message.get("id") == identity and "event" not in message:
                 return _result(message)
             if "id" not in message and "error" in message:
+                if not isinstance(message["error"], Mapping):
+                    raise self._silent(f"{message['error']!r} is no response of this version of steptwin")
                 raise raised(message["error"])
             self._take_event(message)
         raise self._silent("timed out")

@@ -277,10 +277,10 @@ class PacePayload:
     @property
     def text(self) -> str:
         if self.paused:
-            return "time stands"
+            return "paused"
         if self.speed is None:
-            return "time goes on as fast as possible"
-        return "time goes on" + ("" if self.speed == 1.0 else f", {self.speed:g} virtual seconds a second")
+            return "running as fast as possible"
+        return "running" if self.speed == 1.0 else f"running, {self.speed:g} virtual seconds per second"
 
     def plain(self) -> dict[str, object]:
         return {"paused": self.paused, "speed": "max" if self.speed is None else self.speed}
