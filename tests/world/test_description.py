@@ -161,14 +161,14 @@ def wrong(text: str) -> str:
         (TABLE.replace("table", "world"), "w.toml:2:1: error D006: 'world' is what events of the whole world are recorded under"),
         (
             TABLE + '[[wire]]\nfrom = "table.IN1"\nto = "table.IN2"\n',
-            "w.toml:3:1: error D009: table.IN1 is not an output: outputs of 'table'",
+            "w.toml:4:1: error D009: table.IN1 is not an output: outputs of 'table'",
         ),
         (
             TABLE + '[[wire]]\nfrom = "table.OUT1"\nto = "table.AIN1"\n',
             "table.AIN1 is not a digital input: digital inputs of 'table' are IN1",
         ),
-        (TABLE + '[[button]]\nname = "b"\nto = "table.AIN2"\n', "w.toml:3:1: error D009: table.AIN2 is not a digital input"),
-        (AXIS + '[[axis.switch]]\nto = "table.AIN1"\nbelow = 0\n', "w.toml:6:1: error D009: table.AIN1 is not a digital input"),
+        (TABLE + '[[button]]\nname = "b"\nto = "table.AIN2"\n', "w.toml:5:1: error D009: table.AIN2 is not a digital input"),
+        (AXIS + '[[axis.switch]]\nto = "table.AIN1"\nbelow = 0\n', "w.toml:7:1: error D009: table.AIN1 is not a digital input"),
         (TABLE + '[[source]]\nto = "table.IN3"\n', "table.IN3 is not an analog input: analog inputs of 'table' are AIN1, AIN2"),
         (CHIP + '[[source]]\nto = "chip.B1"\n', "chip.B1 is not an analog input: analog inputs of 'chip' are none"),
         (CHIP + '[[wire]]\nfrom = "chip.JOG"\nto = "chip.B2"\n', "chip.JOG is not an output: outputs of 'chip' are B1, B2"),
@@ -286,9 +286,9 @@ steps = [{ turn = "table.M5", counts = 1 }, { fault = { kind = "stall", axis = 9
 def test_steps_that_speak_of_what_is_not_there_are_told_before_anything_runs() -> None:
     lines = [line for line in wrong(TABLE + STEPS).splitlines() if line.startswith("w.toml")]
     assert [line.partition(" ")[0] for line in lines] == [
-        "w.toml:8:3:",
+        "w.toml:8:5:",
         "w.toml:10:3:",
-        "w.toml:11:3:",
+        "w.toml:11:5:",
         "w.toml:11:37:",
         "w.toml:16:1:",
         "w.toml:17:10:",
@@ -438,7 +438,7 @@ def test_everything_is_told_in_one_round_and_nothing_that_only_follows() -> None
         ("18", "D003: [axis]: start: 'left': expected a number"),
         ("20", "D003: [axis.switch]: below: 'low': expected a number"),
         ("24", "D009: nothing is called 'nobody'"),
-        ("26", "D009: good.IN99 is not a digital input: digital inputs of 'g"),
+        ("28", "D009: good.IN99 is not a digital input: digital inputs of 'g"),
         ("33", "D003: [button]: bounce: 'soon' is not a time: expected a num"),
         ("41", "D003: [source]: kind: 'sinus': permitted are constant, ramp,"),
         ("46", "D003: [[fault]] (crc): nth = 0: permitted are whole numbers "),

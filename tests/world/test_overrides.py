@@ -43,7 +43,7 @@ def test_a_value_is_put_where_its_key_says(key: str, place: tuple[str | int, ...
         ("seed", "override 'seed': expected TABLE.KEY or TABLE.NAME.KEY, such as 'axis.x.pitch'"),
         ("axis.pitch", "override 'axis.pitch': expected TABLE.KEY or TABLE.NAME.KEY"),
         ("axes.x.pitch", r"override 'axes\.x\.pitch': there is no 'axes' \(did you mean 'axis'\?\)$"),
-        ("axis.zzzz.pitch", r"override 'axis\.zzzz\.pitch': there is no 'zzzz'$"),
+        ("axis.zzzz.pitch", r"override 'axis\.zzzz\.pitch': there is no 'zzzz'; there are 0, 1, 2, 3, x, y$"),
         ("axis.4.pitch", r"there is no '4'"),
         ("axis.x.pitch.more", r"override 'axis\.x\.pitch\.more': expected TABLE\.KEY"),
         ("axis.x.pitch.more.most", r"override 'axis\.x\.pitch\.more\.most': there is no 'more'$"),

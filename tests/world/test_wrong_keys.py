@@ -101,6 +101,16 @@ def test_a_misspelt_key_of_a_step(step: str, key: Key) -> None:
         ("[[axis]]\nname = 'x'\ndrive = 'a.M1'\nlead = 5.0\n", "[axis] has no 'lead' (did you mean 'pitch'?)"),
         ("[[axis]]\nname = 'x'\ndrive = 'a.M1'\nLimits = [0, 1]\n", "[axis] has no 'Limits' (did you mean 'travel'?)"),
         ("[[conveyor]]\nname = 'b'\nlength = 9\nvelocity = 5\n", "[conveyor] has no 'velocity' (did you mean 'speed'?)"),
+        ("[[gate]]\nname = 'g'\nkind = 'AND'\ninputs = 2\n", "kind: 'AND' (did you mean 'and'?): permitted are and, or"),
+        (
+            "[[mic488]]\nname = 'c'\n[[button]]\nname = 'b'\nto = 'c.INN5'\n",
+            "t.toml:5:1: error D009: c.INN5 is not a digital input (did you mean 'IN5'?)",
+        ),
+        (
+            "[[mic488]]\nname = 'c'\n[[button]]\nname = 'b'\nto = 'c.IN25'\n",
+            "t.toml:5:1: error D009: c.IN25 is not a digital input: digital",
+        ),
+        ("[[mic488]]\nname = 'c'\n[[axis]]\nname = 'x'\ndrive = 'c.M5'\n", "t.toml:5:1: error D009: drive = 'c.M5': c has M1"),
         ("[[cylinder]]\nname = 'c'\nstroke = '30 mm'\n", "stroke: '30 mm': expected a number, without quotes and unit"),
         ("[[cylinder]]\nname = 'c'\nstroke = 'long'\n", "stroke: 'long': expected a number\n"),
     ],

@@ -6,14 +6,17 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from string import digits
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeAlias, TypeVar
 
 from steptwin.errors import Misuse
 from steptwin.machine import MachineEvent, MotionController, Nanos
+from steptwin.nearmiss import NearMiss
 from steptwin.textcodec import decode
 from steptwin.world.kernel import Kernel
 from steptwin.world.links import LINK_KEYS
 from steptwin.world.mechanics import EncoderReader
+from steptwin.world.names import WrongTerminal
 from steptwin.world.reader import Key, Row, Table, TomlText
 from steptwin.world.scale import DriveScale
 from steptwin.world.spec import ControllerSpec, LineSpec, WorldSpec
@@ -87,7 +90,13 @@ class Terminals:
         if name.pin not in pins:
             there = ", ".join(pins) or "none"
             article = "an" if kind[0] in "ao" else "a"
-            raise Misuse(f"{name} is not {article} {kind}: {kind}s of {name.machine!r} are {there}")
+            # Of IN26, and of an output in the place of an input, nobody knows which one is meant.
+            is_other = name.pin in (*self.digital_inputs, *self.analog_inputs, *self.outputs)
+            others = [] if is_other else [pin for pin in pins if pin.rstrip(digits) != name.pin.rstrip(digits)]
+            near = NearMiss()
+            meant = near.of(name.pin, others)
+            text = f"{name} is not {article} {kind}{near.hint(name.pin, others)}: {kind}s of {name.machine!r} are {there}"
+            raise WrongTerminal(str(name), text, None if meant is None else f"{name.machine}.{meant}")
 
 
 class MotionEnds(NamedTuple):

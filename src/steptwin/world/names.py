@@ -31,6 +31,15 @@ class UnknownSignal(Misuse):
         super().__init__(text)
 
 
+class WrongTerminal(Misuse):
+    """``name`` is no terminal of the kind that is needed; ``meant``: the one that was probably meant."""
+
+    def __init__(self, name: str, text: str, meant: str | None) -> None:
+        self.name = name
+        self.meant = meant
+        super().__init__(text)
+
+
 RESERVED = {
     "time": "a signal",
     "idle": "a signal",

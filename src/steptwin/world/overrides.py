@@ -14,6 +14,8 @@ Overrides: TypeAlias = Mapping[str, Any]
 can be left out before a name that only one table has."""
 
 NO_OVERRIDES: Overrides = {}
+MOST_NAMED = 30
+"""Number of names listed in a message."""
 _WITH = "with"
 """The table of a use that has the values of its parameters."""
 
@@ -76,6 +78,12 @@ def _names(tables: object) -> Iterator[str]:
             yield table["name"]
 
 
+def _some(names: Iterable[str]) -> str:
+    """Names for a message, not more than fit into one."""
+    shown = list(names)
+    return f"{', '.join(shown[:MOST_NAMED])}{' and others' if len(shown) > MOST_NAMED else ''}"
+
+
 def _inside(holder: Any, wanted: str, key: str) -> Any:
     known: dict[str, Any] = {}
     if isinstance(holder, dict):
@@ -85,5 +93,6 @@ def _inside(holder: Any, wanted: str, key: str) -> Any:
         known |= {table["name"]: table for table in holder if isinstance(table, dict) and isinstance(table.get("name"), str)}
     if wanted not in known:
         names = known if holder is not known else {**known, **dict.fromkeys(name for of in known.values() for name in _names(of))}
-        raise Misuse(f"override {key!r}: there is no {wanted!r}{NearMiss().hint(wanted, names)}")
+        hint = NearMiss().hint(wanted, names) or (f"; there are {_some(names)}" if names else "")
+        raise Misuse(f"override {key!r}: there is no {wanted!r}{hint}")
     return known[wanted]

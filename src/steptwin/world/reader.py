@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, TypeAlias, TypeVar
 from steptwin.diagnostics import Diagnostic, Fix, Severity, SourceText, Span, in_order, render
 from steptwin.errors import Misuse, SourceErrors
 from steptwin.nearmiss import NearMiss
-from steptwin.world.names import Unknown, UnknownSignal
+from steptwin.world.names import Unknown, UnknownSignal, WrongTerminal
 from steptwin.world.tomlplaces import Path, UnsupportedToml, find_places
 from steptwin.world.values import Word
 
@@ -176,11 +176,23 @@ class TomlText:
     def wrong_reference(self, path: Path, error: Misuse, place: str = "") -> None:
         """What is at ``path`` does not fit the rest. Not reported where it only follows from something else that
         is wrong; then what the table would have been is not there either."""
+        named = error if isinstance(error, Unknown | UnknownSignal | WrongTerminal) else None
         if not (isinstance(error, Unknown) and self.may_be_broken(error.name)):
-            fix = self.replacement(path, error.name, error.meant) if isinstance(error, Unknown | UnknownSignal) else None
+            path = path if named is None else self._key_with(path, named.name)
+            fix = None if named is None else self.replacement(path, named.name, named.meant)
             self.wrong(path, "D009", f"{place}{error}", fix=fix)
         elif len(path) > 1 and (name := self._name_of(path[0], path[1])) is not None:
             self.leave_out(name)
+
+    def _key_with(self, path: Path, name: str) -> Path:
+        """The key of the table at ``path`` whose text has a name, if exactly one has it; else ``path``."""
+        table: Any = self.data
+        for step in path:
+            table = table[step]
+        if not isinstance(table, dict):
+            return path
+        keys = [key for key, value in table.items() if any(name.lower() in text.lower() for text in _texts(value))]
+        return (*path, keys[0]) if len(keys) == 1 else path
 
     def _name_of(self, kind: str | int, number: str | int) -> str | None:
         """The name in a table that may be several times."""
@@ -296,6 +308,11 @@ def _long_numbers(path: Path, value: object) -> Iterator[Path]:
             yield from _long_numbers((*path, number), item)
     elif isinstance(value, int) and value not in _WHOLE:
         yield path
+
+
+def _texts(value: object) -> Iterator[str]:
+    """A text, or those of a list."""
+    yield from (one for one in (value if isinstance(value, list) else [value]) if isinstance(one, str))
 
 
 def _copied(value: Any) -> Any:

@@ -91,13 +91,17 @@ class Word:
 
     def __call__(self, value: Any) -> str:
         if value not in self.words:
-            hint = NearMiss().hint(value, self.words) if isinstance(value, str) else ""
+            near = self.near(value)
+            hint = "" if near is None else f" (did you mean {near!r}?)"
             raise Misuse(f"{value!r}{hint}: permitted are {', '.join(self.words)}")
         return value
 
     def near(self, value: object) -> str | None:
-        """The word that was probably meant."""
-        return NearMiss().of(value, self.words) if isinstance(value, str) else None
+        """The word that was probably meant: the one in another case, or a near one."""
+        if not isinstance(value, str):
+            return None
+        same = next((word for word in self.words if word.lower() == value.lower()), None)
+        return same or NearMiss().of(value, self.words)
 
 
 def word(*words: str) -> Word:

@@ -18,7 +18,7 @@ from steptwin.world.elements.motor import MOTOR, MotorSpec, read_motor
 from steptwin.world.elements.switch import SWITCH, SwitchSpec, lane_of, put_switch, read_switches, zone_of
 from steptwin.world.kernel import Kernel, Source
 from steptwin.world.mechanics import Mechanism
-from steptwin.world.names import Unknown
+from steptwin.world.names import Unknown, WrongTerminal
 from steptwin.world.reader import Key, Row, Table, TomlText, optional
 from steptwin.world.scale import Scale, motor_of, scale_of
 from steptwin.world.sense import TableRows
@@ -108,7 +108,8 @@ def _checked(spec: AxisSpec, site: Site) -> tuple[int, Scale, Build]:
     number = axis_number(drive)
     axes = len(site.machine(machine).axes)
     if not 1 <= number <= axes:
-        raise Misuse(f"drive = '{machine}.{drive}': {machine} has {', '.join(f'M{n}' for n in range(1, axes + 1))}")
+        there = ", ".join(f"M{n}" for n in range(1, axes + 1))
+        raise WrongTerminal(f"{machine}.{drive}", f"drive = '{machine}.{drive}': {machine} has {there}", None)
     taken = [axis.spec.name for axis in site.parts.built(AXIS).values() if axis.spec.drive == spec.drive]
     if taken:
         raise Misuse(f"drive = '{machine}.{drive}' moves {taken[0]!r} already")
