@@ -7,6 +7,7 @@ import asyncio
 import pytest
 from gateway_rig import GatewayWorld
 
+from steptwin.errors import LineFailure, Refusal, SteptwinError
 from steptwin.gateways.points import CLOCK, CLOCK_POINTS
 from steptwin.gateways.sampling import MOST_EVENTS, RESTING_SAMPLES, Sampler
 from steptwin.machine import SECOND
@@ -73,8 +74,11 @@ def test_after_lost_events_everything_is_looked_at(world: GatewayWorld) -> None:
     assert changed(sampler) == ["table", "other"]
 
 
-def test_a_silent_controller_has_no_state(world: GatewayWorld) -> None:
+@pytest.mark.parametrize("silence", [LineFailure("no answer"), Refusal("illegal data address")])
+def test_a_silent_controller_has_no_state(world: GatewayWorld, silence: SteptwinError) -> None:
+    """Or one that refuses what it is asked: who asks goes on."""
     sampler = Sampler(world, {})
+    world.silence = silence
     world.silent.add("table")
     assert [asyncio.run(sampler.take(name)).state is None for name in MACHINES] == [True, False]
     world.silent.clear()

@@ -14,7 +14,7 @@ from typing import Any
 from tests.conftest import STEPTWIN, until
 
 from steptwin import World
-from steptwin.errors import LineFailure
+from steptwin.errors import LineFailure, SteptwinError
 from steptwin.gateways.contract import CommandLog, PastValues
 from steptwin.subject import commands as command
 from steptwin.subject.contract import Description, Reading, Result
@@ -34,6 +34,7 @@ class GatewayWorld:
         self.past: PastValues | None = None
         self.audit: CommandLog | None = None
         self.silent: set[str] = set()
+        self.silence: SteptwinError = LineFailure("no answer")
         self.done: list[command.Command] = []
 
     @property
@@ -46,7 +47,7 @@ class GatewayWorld:
     async def do(self, wanted: command.Command, /) -> Result:
         self.done.append(wanted)
         if isinstance(wanted, command.ReadState) and wanted.machine in self.silent:
-            raise LineFailure("no answer")
+            raise self.silence
         return self.inner.do(wanted)
 
     async def begin_jog(self, wanted: command.Jog, /) -> Held:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any, cast
 
-from steptwin.errors import LineFailure
+from steptwin.errors import LineFailure, Refusal
 from steptwin.gateways.contract import GatewaySubject
 from steptwin.gateways.points import CLOCK, State
 from steptwin.machine import Nanos
@@ -24,7 +24,7 @@ RESTING_SAMPLES = 10
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """``state`` at the moment ``at``; None for a controller that does not answer."""
+    """``state`` at the moment ``at``; None for a controller that does not answer, or refuses what it is asked."""
 
     machine: str
     state: State | None
@@ -54,7 +54,7 @@ class Sampler:
             answer = await self._subject.do(command.ReadState(machine))
             state = cast("Mapping[str, Any]", answer.value)
             registers = await self._read(machine)
-        except LineFailure:
+        except (LineFailure, Refusal):  # a device may refuse a register
             return Sample(machine, None, datetime.now(UTC))
         if _is_resting(state):
             self._resting[machine] = 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import Any
 
 import pytest
@@ -19,6 +20,8 @@ from steptwin.gateways.epics.records import FieldValue
 from steptwin.gateways.leases import JogLeases
 from steptwin.gateways.points import points_of
 from steptwin.gateways.sampling import Sampler
+from steptwin.subject.commands import Command, ReadState
+from steptwin.subject.contract import Result
 
 
 async def ends(rig: MotorRig, name: str) -> list[object]:
@@ -101,5 +104,30 @@ def test_a_point_refuses_what_is_no_value_of_it(value: float) -> None:
         with pytest.raises(Misuse, match=r"ST:velocity: .*(expected a number|permitted are numbers above 0)$"):
             await record.put(ME, "VAL", value)
         assert world.done == []
+
+    run_virtually(act())
+
+
+def test_a_controller_that_does_not_answer_holds_up_no_other() -> None:
+    async def act() -> None:
+        world = GatewayWorld('[[mic488]]\nname = "table"\n[[mic488]]\nname = "other"\n')
+        answers, do = asyncio.Event(), world.do
+
+        async def slow(wanted: Command) -> Result:
+            if isinstance(wanted, ReadState) and wanted.machine == "other":
+                await answers.wait()
+            return await do(wanted)
+
+        world.do = slow  # type: ignore[method-assign]
+        sampler = Sampler(world, {})
+        table, other = (EpicsController(name, world, sampler, JogLeases(world), Role.ENGINEER) for name in ("table", "other"))
+        looking = other.look()
+        await table.refresh()
+        assert not looking.done()
+        answers.set()
+        await other.refresh()
+        assert looking.done()
+        other.look()
+        await other.close()
 
     run_virtually(act())

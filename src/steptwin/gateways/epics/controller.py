@@ -67,9 +67,18 @@ class EpicsController:
 
     async def refresh(self) -> None:
         """Take a sample; those who ask while one is taken get that one."""
+        await asyncio.shield(self.look())
+
+    def look(self) -> asyncio.Task[None]:
+        """Begin to take a sample, without waiting for a device that may not answer."""
         if self._sampling is None:
             self._sampling = asyncio.create_task(self._sample())
-        await asyncio.shield(self._sampling)
+        return self._sampling
+
+    async def close(self) -> None:
+        if self._sampling is not None:
+            self._sampling.cancel()
+            await asyncio.wait((self._sampling,))
 
     async def _sample(self) -> None:
         try:

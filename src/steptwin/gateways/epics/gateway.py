@@ -97,8 +97,8 @@ class EpicsGateway:
             busy = [name for name, controller in self._controllers.items() if controller.is_busy]
             has_clients = server.has_clients or (self._pv_server is not None and self._pv_server.has_clients)
             wanted = [name for name, one in self._controllers.items() if one.is_wanted] if has_clients else []
-            due = dict.fromkeys((*busy, *sampler.due(wanted)))
-            await asyncio.gather(*(self._controllers[name].refresh() for name in due))
+            for name in dict.fromkeys((*busy, *sampler.due(wanted))):
+                self._controllers[name].look()
 
     def state(self) -> GatewayState:
         clients = () if self._server is None else tuple(self._server.clients(self._role.title))
@@ -109,6 +109,8 @@ class EpicsGateway:
         if self._task is not None:
             self._task.cancel()
             await asyncio.wait((self._task, *self._leaving))
+        for controller in self._controllers.values():
+            await controller.close()
         self._leases.close()
         if self._pv_server is not None:
             await self._pv_server.close()
