@@ -164,7 +164,7 @@ def test_a_pass_at_constant_velocity(table: Mic488Controller, engine: RunEngine,
     @stage_decorator([table.m1])
     @run_decorator()
     def fly() -> MsgGenerator:
-        yield from bps.prepare(table.m1, FlyMotorInfo(start_position=10.0, end_position=20.0, time_for_move=0.5), wait=True)
+        yield from bps.prepare(table.m1, FlyMotorInfo(start_position=10.0, end_position=30.0, time_for_move=2.0), wait=True)
         yield from bps.declare_stream(table.m1, name="pass", collect=True)
         yield from bps.kickoff(table.m1, wait=True)
         yield from bps.complete(table.m1, wait=True)
@@ -172,13 +172,13 @@ def test_a_pass_at_constant_velocity(table: Mic488Controller, engine: RunEngine,
 
     engine(fly())
     positions = told.column("table-m1")
-    assert len(positions) >= 5
+    assert len(positions) >= 3
     assert positions == sorted(positions)
-    assert 10.0 <= positions[0] < positions[-1] <= 20.0
+    assert 10.0 <= positions[0] < positions[-1] <= 30.0
     times = told.column("table-m1", "timestamps")
     velocity = (positions[-1] - positions[0]) / (times[-1] - times[0])
-    assert velocity == pytest.approx(20.0, rel=0.2)
-    assert of_driver(table.driver.axis(1).position()) > 20.0
+    assert velocity == pytest.approx(10.0, rel=0.3)
+    assert of_driver(table.driver.axis(1).position()) > 30.0
     assert of_driver(table.driver.get("M1_VMAX")) == {"M1_VMAX": before}
 
 
