@@ -14,6 +14,7 @@ from steptwin.debug.breakpoints import Breakpoint
 from steptwin.debug.debugger import Debugger
 from steptwin.debug.values import DataPoint, Events, LabelPoint, LinePoint, Stopped, StopReason
 from steptwin.errors import Misuse
+from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.world.plant import Plant
 
@@ -290,6 +291,41 @@ def test_a_program_error_is_an_event_to_stop_at() -> None:
     debugger.set_events([Events.PROGRAM_ERROR])
     stop = debugger.run()
     assert (stop.reason, stop.time, stop.text) == (StopReason.EXCEPTION, 2 * MILLISECOND, "line 2: division by zero")
+
+
+AN_AXIS = '[[mic488]]\nname = "m"\nprogram = "p"\nconfig = "c"\nstart = true\n'
+A_MOVE = {"p": b"M1 = ON\nPABS M1 -100\nWAITPOS\nEND\n"}
+TYPED = (
+    '[[line]]\nname = "bus"\nkind = "m1486"\n[[m1486]]\nname = "m"\nline = "bus"\nprogram = "p"\n'
+    '[[script]]\nname = "s"\nsteps = [{ wait = "1 s" }, { send = "bus", text = "V9\\r" }]\n'
+)
+
+
+@pytest.mark.parametrize(
+    ("event", "world", "files", "text"),
+    [
+        (
+            Events.LIMIT,
+            AN_AXIS + '[[axis]]\nname = "x"\ndrive = "m.M1"\n[[axis.switch]]\nto = "m.IN1"\nbelow = -5\n',
+            A_MOVE | {"c": b"[Axis0]\nLimitMode=1\nInKL=0\n"},
+            "M1 stopped by KL",
+        ),
+        (
+            Events.POSITION_ERROR,
+            AN_AXIS + '[[event]]\nat = 0\nsteps = [{ couple = "m.M1", to = "blocked" }]\n',
+            A_MOVE | {"c": b"[Axis0]\nPosCtrlMode=1\nErrCtrlMode=2\n"},
+            "M1 did not reach its position",
+        ),
+        (Events.WRONG_DATA, TYPED, {"p": b"[\n@1\nW1000\nJ1\n]\n"}, ""),
+    ],
+)
+def test_other_events_to_stop_at(event: Events, world: str, files: dict[str, bytes], text: str) -> None:
+    debugger = Debugger(World.from_toml(world, files, keep_trace=False, keep_inputs=False))
+    debugger.set_events([event])
+    stop = debugger.run(5 * SECOND)
+    assert stop.reason is StopReason.EXCEPTION
+    assert text in stop.text
+    assert debugger.evaluate("m", "M1.position" if text else "position").text
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
+import subprocess
 import sys
 from collections.abc import AsyncIterator
 from pathlib import Path
@@ -227,6 +229,24 @@ async def ask_everything(client: LanguageClient, uri: str, broken: str) -> None:
     await client.text_document_semantic_tokens_full_async(lsp.SemanticTokensParams(text))
     await client.text_document_document_link_async(lsp.DocumentLinkParams(text))
     await client.workspace_symbol_async(lsp.WorkspaceSymbolParams(""))
+
+
+def test_what_is_refused_leaves_nothing_on_standard_error(tmp_path: Path) -> None:
+    uri = (tmp_path / "x.prg").as_uri()
+    place = {"textDocument": {"uri": uri}, "position": {"line": 0, "character": 0}}
+    document = {"uri": uri, "languageId": "wbc", "version": 1, "text": "// x"}
+    asked = [
+        {"id": 1, "method": "initialize", "params": {"processId": None, "rootUri": None, "capabilities": {}}},
+        {"method": "textDocument/didOpen", "params": {"textDocument": document}},
+        {"id": 2, "method": "textDocument/prepareRename", "params": place},
+        {"id": 3, "method": "shutdown"},
+        {"method": "exit"},
+    ]
+    bodies = [json.dumps({"jsonrpc": "2.0", **one}) for one in asked]
+    given = "".join(f"Content-Length: {len(body)}\r\n\r\n{body}" for body in bodies)
+    done = subprocess.run(COMMAND, input=given.encode(), capture_output=True, timeout=60, check=False)
+    assert b"there is no name here" in done.stdout
+    assert done.stderr == b""
 
 
 @pytest.mark.asyncio

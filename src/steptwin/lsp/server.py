@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import gc
 import inspect
+import logging
 import typing
 from collections.abc import Callable, Generator, Sequence
 from contextlib import suppress
@@ -19,7 +20,7 @@ from lsprotocol import types as lsp
 from pygls.capabilities import ServerCapabilitiesBuilder, get_capability
 from pygls.exceptions import JsonRpcException, JsonRpcInvalidParams
 from pygls.lsp.server import LanguageServer
-from pygls.protocol import LanguageServerProtocol, default_converter, lsp_method
+from pygls.protocol import LanguageServerProtocol, default_converter, json_rpc, lsp_method
 
 from steptwin import __version__
 from steptwin.errors import Misuse
@@ -438,10 +439,16 @@ _HANDLERS: dict[str, tuple[Callable[[EditorServer, Any], Any], Any]] = {
 
 def server(files: Files | None = None) -> EditorServer:
     """A server that is ready for one client; without ``files`` it reads those of this machine."""
+    logging.getLogger(json_rpc.__name__).addFilter(_is_fault)
     made = EditorServer(files)
     for method, (handler, options) in _HANDLERS.items():
         made.feature(method, options)(_bound(made, handler))
     return made
+
+
+def _is_fault(record: logging.LogRecord) -> bool:
+    """Refusals go to the client; pygls would log each with a traceback, too."""
+    return record.exc_info is None or not isinstance(record.exc_info[1], JsonRpcInvalidParams)
 
 
 def _bound(made: EditorServer, handler: Callable[[EditorServer, Any], Any]) -> Callable[[Any], Any]:
