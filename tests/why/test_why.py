@@ -7,9 +7,14 @@ from why_worlds import CHIP, CHIP_PROGRAM, LINE, PROGRAM, WAITS
 
 from steptwin.errors import Misuse
 from steptwin.files.world import World
+from steptwin.machine import MILLISECOND
+from steptwin.why import kept
+from steptwin.why.kept import PastQuestions
+from steptwin.why.question import finish
 from steptwin.wire.rtu import encode_frame
 from steptwin.world import script as do
 from steptwin.world.actions import Bytes, Download
+from steptwin.world.history import History
 from steptwin.world.kinds.mic488.writes import encode_write
 
 
@@ -284,6 +289,26 @@ def test_a_program_that_was_replaced() -> None:
     past.ask("OUT4")  # it is known up to the end now
     assert past.ask("OUT1", 2_000_000_000).links[0].text == "cell.OUT1 became 1"
     assert past.ask("cell", 2_000_000_000).state.startswith("cell does not wait: a statement of a program that was replaced")
+
+
+def test_a_past_of_many_statements_is_known_near_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As far as the limit permits, also for a second question."""
+    world = World.from_toml(
+        '[[mic488]]\nname = "m"\nprogram = "p"\nstart = true\nstatement_time = "1 us"\n',
+        {"p": b"n = 0\nOUT1 = ON\nMAIN:\n    n = n + 1\nJUMP MAIN\n"},
+        keep_trace=False,
+    )
+    monkeypatch.setattr(kept, "MOST_NOTED", 20_000)
+    history = History(world)
+    for moment in range(1, 11):
+        world.run_to(moment * 5 * MILLISECOND)
+        history.take()
+    questions = PastQuestions(history)
+    for _ in range(2):
+        answer = finish(questions.asking("OUT2"))
+        assert answer.is_cut
+        assert answer.known_from == 40 * MILLISECOND
+        assert finish(questions.asking("m")).state.startswith("m does not wait: line ")
 
 
 def test_contacts_are_signals_too() -> None:

@@ -8,6 +8,7 @@ from steptwin.diagnostics import Diagnostic
 from steptwin.wbc import findings as f
 from steptwin.wbc.findings import ProgramFinding, Spanned
 from steptwin.wbc.foreign import IF_UNKNOWN
+from steptwin.wbc.tree import KeywordStatement
 
 
 @dataclass(slots=True)
@@ -66,7 +67,8 @@ class BlockMatcher:
     def _continue(self, keyword: str, step: int, place: Spanned) -> None:
         finding, opening = _NOT_OPENED[keyword]
         if not self._open[opening]:
-            self._diagnostics.append(finding.at(place, f"{keyword} without {opening}", f"no {opening} is open here", ""))
+            fix = "" if isinstance(place, KeywordStatement) else None  # else another word was meant
+            self._diagnostics.append(finding.at(place, f"{keyword} without {opening}", f"no {opening} is open here", fix))
             return
         while self._stack[-1][0] != opening:
             self._abandon()

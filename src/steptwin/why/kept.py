@@ -89,7 +89,8 @@ class _Known:
         """Whether a question about a moment can be answered from it. ``not_before``: up to when it must have come."""
         history, log = self._history, self._why.log
         is_same = history.branch == self._branch and history.keeps_inputs_from(self._taken)
-        return is_same and log.begin <= at and not_before <= self._why.end and log.noted < self._most // 2
+        has_room = log.noted < self._most // 2 or at <= self._why.end
+        return is_same and log.begin <= at and not_before <= self._why.end and has_room
 
     def asking(self, question: str, at: Nanos) -> Asking:
         inputs = self._history.inputs_from(self._taken)
