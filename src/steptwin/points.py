@@ -43,6 +43,8 @@ class LivePoint:
     turns: TurningPoints | None = None
     version: Callable[[], object] | None = None
     """A value that changes whenever ``turns`` may have changed; None if that is unknown."""
+    freeze: Callable[[Nanos], Callable[[Nanos], float]] | None = None
+    """Gives the course at a moment as a function that stays as it is; None where there is none."""
     is_kept: bool = False
     """Whether a write only keeps the value, which is not an event of the controller."""
     memory: MemoryCells | None = None

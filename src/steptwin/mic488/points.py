@@ -229,8 +229,13 @@ def _live(point: Point, owner: Any, key: str, read: Callable[[Any, Nanos], float
     if follows is None:
         return LivePoint(point=point, read=partial(read, owner), is_kept=is_kept)
     turns, has_version = follows(owner)
-    version = partial(_version, owner) if has_version else None
-    return LivePoint(point=point, read=partial(read, owner), turns=turns, version=version)
+    if not has_version:
+        return LivePoint(point=point, read=partial(read, owner), turns=turns)
+
+    def freeze(now: Nanos) -> Callable[[Nanos], float]:
+        return partial(read, _AxisCourse(owner.profile, owner.offset_p, owner.gear))
+
+    return LivePoint(point=point, read=partial(read, owner), turns=turns, version=partial(_version, owner), freeze=freeze)
 
 
 def _bit(device: Mic488Device, read: Callable[[Mic488Device], bool]) -> Callable[[Nanos], float]:
@@ -256,6 +261,14 @@ def _user_words(device: Mic488Device, item: RegisterItem) -> MemoryCells:
 
 
 # ---------------------------------------------------------------------- between events
+
+
+class _AxisCourse(NamedTuple):
+    """All that points with a version read of an axis."""
+
+    profile: Profile
+    offset_p: int
+    gear: float
 
 
 def _profile(axis: Axis) -> Profile:

@@ -14,6 +14,7 @@ from steptwin.errors import Misuse, Runaway, TimeReversal
 from steptwin.machine import Drive, Fact, MotionController, Nanos, PinEdge
 from steptwin.state import Plain
 from steptwin.world.board import Board
+from steptwin.world.followers import KernelFollowers
 from steptwin.world.order import successors, update_order
 from steptwin.world.recordedplans import RecordedPlans
 from steptwin.world.trace import RecordSink, TraceRecord
@@ -87,6 +88,8 @@ class Kernel:
         """Whether a condition depends on values that a request may change without an event; then every request counts as one."""
         self.on_change: Callable[[Kernel], None] | None = None
         """Called with the kernel after each of its events and after each change from outside."""
+        self.followers: KernelFollowers | None = None
+        """Who is told of each event; None: nobody ever was."""
         self._changed: set[str] = set()
         """The machines, lines and elements that were looked at since the last `take_changed`."""
         self._is_checked, self.is_blank = is_checked, is_blank
@@ -333,6 +336,8 @@ class Kernel:
         due = self._due
         if due is not None and due <= now:
             self._run(now)
+        if self.followers is not None and self.followers.leaving and now > self.now:
+            self.followers.leave(now)  # something may come from outside next
         self.now = now
 
     def _run(self, now: Nanos) -> None:
@@ -343,6 +348,8 @@ class Kernel:
                 self.on_change(self)
             return
         while self._due is not None and self._due <= now:
+            if self.followers is not None and self.followers.leaving:
+                self.followers.leave(self._due)
             self.now = self._due
             self._advance_machines(now)
             for number in self._part_dues.take(self.now):
@@ -374,12 +381,17 @@ class Kernel:
         machine, due = self.machines[name], self._due
         self._changed.add(name)
         while due is not None and due <= now:
+            if self.followers is not None:
+                self.followers.leave(due)
             if self.is_attentive:
                 machine.advance(due)
                 self.now = due
             else:
                 self.now = machine.advance_to_change(now)
             self._settle_alone(name, plans)
+            if self.followers is not None:
+                self.followers.news |= self.followers.by_name.get(name, {})
+                self.followers.tell(self.now)
             due = self._due
             if self.is_attentive and self.on_change is not None:
                 self.on_change(self)
@@ -405,8 +417,12 @@ class Kernel:
         if self._alone is not None:
             self._changed.add(self._alone[0])
             self._settle_alone(*self._alone)
+            if self.followers is not None:
+                self.followers.news |= self.followers.by_name.get(self._alone[0], {})
         else:
             self._settle_joined()
+        if self.followers is not None and self.followers.news:
+            self.followers.tell(self.now)
         if self.on_change is not None:
             self.on_change(self)
 
@@ -437,16 +453,21 @@ class Kernel:
 
     def _find_deadlines(self) -> None:
         """Record new plans of the machines that were looked at, and find when anything is due next."""
+        followers = self.followers
         for number in sorted(self._machines_looked_at):
             if self._record is not None:
                 self._plans[number].report(self._record, self.now)
             name = self._names[number]
             self._changed.add(name)
+            if followers is not None and name in followers.by_name:
+                followers.news |= followers.by_name[name]
             self._machine_dues.put(number, self.machines[name].deadline())
         for number in self._parts_looked_at:
             of = self._part_names[number]
             if of is not None:
                 self._changed.add(of)
+                if followers is not None and of in followers.by_name:
+                    followers.news |= followers.by_name[of]
             self._part_dues.put(number, self.parts[number].deadline())
         self._machines_looked_at.clear()
         self._parts_looked_at.clear()

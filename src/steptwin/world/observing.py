@@ -1,4 +1,8 @@
-"""Observers of a running world: they see its signals at every moment at which these change, and change nothing."""
+"""Observers of a running world: they see its signals at every moment at which these change, and change nothing.
+
+A `KernelFollower` is told by one kernel, event by event, however far that runs at once. A `WorldObserver` is for what depends on
+several kernels: the world brings them to each moment together.
+"""
 
 from __future__ import annotations
 
@@ -20,8 +24,8 @@ class WorldObserver(Protocol):
         """Before anything happens at ``moment``: what moves is still on the way that it had before."""
         ...
 
-    def look(self, now: Nanos) -> tuple[tuple[Source, ...], Nanos | None]:
-        """After everything of ``now`` so far. Returns what it depends on, and when it looks next if none of these changes."""
+    def look(self, now: Nanos) -> tuple[Source, ...]:
+        """After everything of ``now`` so far. Returns what it depends on: it looks again when one of these changes."""
         ...
 
     def rewind(self, now: Nanos) -> None:

@@ -8,7 +8,7 @@ from fractions import Fraction
 from heapq import merge
 from itertools import chain
 from math import fmod, inf, isfinite, isnan, nan
-from typing import Protocol, TypeAlias
+from typing import NamedTuple, Protocol, TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
@@ -234,6 +234,23 @@ def next_change(
     return _Search(quantity, moving, at_rest).first(now)
 
 
+def change_between(quantity: Quantity, reads: Mapping[str, Callable[[Nanos], float]], begin: Nanos, end: Nanos) -> Nanos | None:
+    """As `next_change` of a quantity all of whose signals are read by ``reads``, after ``begin`` and up to ``end``, between which
+    none of them turns."""
+    return _Search(quantity, {name: _Read(read) for name, read in reads.items()}, _unknown).between(begin, end)
+
+
+class _Read(NamedTuple):
+    value: Callable[[Nanos], float]
+
+    def turns(self, now: Nanos) -> Iterator[Nanos]:
+        yield from ()
+
+
+def _unknown(name: str) -> float:
+    raise KeyError(name)
+
+
 class _Search:
     __slots__ = ("_at_rest", "_looks", "_moving", "_quantity")
 
@@ -255,6 +272,11 @@ class _Search:
                     return found
                 begin, values = end, there
         return None
+
+    def between(self, begin: Nanos, end: Nanos) -> Nanos | None:
+        """In a time without turns."""
+        values = self._values(begin)
+        return self._within(begin, values, end, self._values(end), self._side(values))
 
     @property
     def _finest(self) -> Nanos:

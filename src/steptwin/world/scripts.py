@@ -107,9 +107,7 @@ class Scripts:
     def look(self) -> None:
         """Let observers look that are due now."""
         for observer in self._observed.take_watching(self._plant.now):
-            sources, due = observer.look(self._plant.now)
-            self._watchers.set(observer, sources)
-            self._observed.watch(observer, due)
+            self._watchers.set(observer, observer.look(self._plant.now))
 
     # ------------------------------------------------------------------ scheduling
 

@@ -39,6 +39,8 @@ class SignalOf:
     """The lowest and highest value, where that is known."""
     is_kept: bool = False
     """Whether a request may change it without an event of its kernel."""
+    freeze: Callable[[Nanos], Callable[[Nanos], float]] | None = None
+    """Gives the course at a moment as a function that stays as it is, also when the signal goes another way; None: it cannot."""
     check: Callable[[], None] = lambda: None
     """Raises `Misuse` if conditions cannot use it, because it changes between events at unknown moments."""
 
@@ -85,6 +87,7 @@ class Idle:
     continuous = False
     is_readable = True
     unit = ""
+    freeze = None
 
     def __init__(self, plan: WorldParts) -> None:
         at_rest: dict[str, Callable[[Nanos], bool]] = {
@@ -124,7 +127,7 @@ class Idle:
 def find_signal(plan: WorldParts, name: str) -> SignalOf | Idle:
     """The signal called ``name``. Raises `Misuse` with the existing names."""
     if name == "time":
-        return SignalOf((), lambda now: now / SECOND, lambda now: (), lambda: name, unit="s")
+        return SignalOf((), _seconds, lambda now: (), lambda: name, unit="s", freeze=lambda now: _seconds)
     if name == "idle":
         return Idle(plan)
     owner, _, rest = name.partition(".")
@@ -143,6 +146,10 @@ def find_signal(plan: WorldParts, name: str) -> SignalOf | Idle:
     return _of_machine(plan.kind_of[owner], machine, plan.kernel_of[owner].source(owner), rest, name)
 
 
+def _seconds(now: Nanos) -> float:
+    return now / SECOND
+
+
 def _of_machine(kind: AnyKind, machine: MotionController, source: Source, rest: str, name: str) -> SignalOf:
     """The signal of a pin, otherwise of a point of the data sheet."""
     pin = rest.upper()
@@ -152,7 +159,9 @@ def _of_machine(kind: AnyKind, machine: MotionController, source: Source, rest: 
     point = kind.point(machine, rest) if rest else None
     if point is None:
         raise _unknown([point.path for point in kind.datasheet(machine).points], rest, name, ", and pins")
-    return SignalOf((source,), point.read, point.turns, point.version, point.point.unit, is_kept=point.is_kept)
+    return SignalOf(
+        (source,), point.read, point.turns, point.version, point.point.unit, is_kept=point.is_kept, freeze=point.freeze
+    )
 
 
 def _quiet(line: Line, source: Source) -> SignalOf:

@@ -20,6 +20,7 @@ from steptwin.campaign.properties.tree import (
     CycleTime,
     Holding,
     Lasting,
+    Later,
     PropertyFormula,
     Tally,
     nodes,
@@ -58,6 +59,8 @@ def truth(node: PropertyFormula, signals: dict[Any, Values], t: int, *, open_is:
             if decided:
                 return word == "eventually"
             return (word == "always") if t + length <= end else open_is
+        case Later(length, inner):
+            return of(inner, t + length, open_is) if t + length <= end else open_is
         case Holding(first, then, released):
             if released:
                 opposite = Holding(first.negated(), then.negated())
@@ -116,6 +119,7 @@ def formulas(*, windows: bool) -> st.SearchStrategy[str]:
         if windows:
             kinds += [
                 st.tuples(time, inner).map(lambda two: f"within {two[0]} ({two[1]})"),
+                st.tuples(time, inner).map(lambda two: f"at {two[0]} ({two[1]})"),
                 st.tuples(inner, time).map(lambda two: f"({two[0]}) for {two[1]}"),
                 st.tuples(inner, time, inner).map(lambda three: f"after ({three[0]}) within {three[1]} ({three[2]})"),
                 st.tuples(inner, time, inner).map(lambda three: f"({three[0]}) until within {three[1]} ({three[2]})"),
@@ -195,8 +199,13 @@ def test_straight_stretches_are_true_and_false_where_their_moments_are(text: str
         assert (value_at(found, t) > 0) is truth(formula, signals, t, open_is=True), t
 
 
+def meeting_at_a_moment(*eighths: int) -> list[tuple[int, Fraction]]:
+    return [(7, Fraction(one, 8)) for one in eighths]
+
+
 @settings(max_examples=200)
 @given(formulas(windows=False), KNOTS, KNOTS)
+@example("(a.x > 0) implies (b.x > 0)", meeting_at_a_moment(3, 1, 1), meeting_at_a_moment(-7, 2, 1))
 def test_straight_stretches_have_the_distances_of_their_moments(text: str, a: Any, b: Any) -> None:
     formula = parse_property(text)
     (slopes_a, values_a), (slopes_b, values_b) = line_of(a), line_of(b)

@@ -211,3 +211,35 @@ name = "d"
 drive = "drum.M1"
 pitch = 4.0
 """
+
+
+def test_a_moment_of_standstill_is_no_stop() -> None:
+    """It stands when the guard opens, and goes on before the time is over."""
+    run = world()
+    watches = [read_property(f"stops-within {time} after guard.pressed").watch(run) for time in ("50 ms", "400 ms")]
+    run.run(until=0.5)
+    run.press("guard")
+    run.mic488["table"].axis[1].stop()
+    run.run(until=0.6)
+    run.mic488["table"].axis[1].move_to(100.0)
+    run.run(until=2.0)
+    assert [watch.verdict().holds for watch in watches] == [True, False]
+    assert watches[1].verdict().at_ns == 900_000_000
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("always x.position < 6 cm", "x.position is 60 mm, not < 60 mm at 1.25 s"),
+        ("never abs(x.position - 100) <= 0.1", "abs(x.position - 100) is 0.1 mm, not > 0.1 mm at 2.08 s"),
+        ("always table.OUT1", "table.OUT1 is 0 at 0 s"),
+        ("always not table.M1.moving", "table.M1.moving is not 0 at 0 s"),
+        ("always table.M1.status == 3", "table.M1.status is 1 away from 3 at 2.1 s"),
+        ("always x.position < table.M1.position - 5 mm", "x.position is 5 mm above (table.M1.position - 5 mm) at 0 s"),
+        ("eventually table.OUT1", "eventually table.OUT1: not come true by 4 s"),
+        ("after table.M1.moving within 1 s not table.M1.moving", "within 1 s not table.M1.moving: not come true by 1 s"),
+        ("count(table.M1.moving) < 1", "count(table.M1.moving) < 1: not so at 0 s"),
+    ],
+)
+def test_a_violation_says_what_there_was(text: str, why: str) -> None:
+    assert said(text).why == why

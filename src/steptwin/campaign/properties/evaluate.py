@@ -17,6 +17,7 @@ from steptwin.campaign.properties.slopes import (
     from_on,
     greatest,
     held_until,
+    later,
     least,
     negative,
     rises,
@@ -24,7 +25,17 @@ from steptwin.campaign.properties.slopes import (
     value_at,
     within,
 )
-from steptwin.campaign.properties.tree import Atom, Becoming, Combination, CycleTime, Holding, Lasting, PropertyFormula, Tally
+from steptwin.campaign.properties.tree import (
+    Atom,
+    Becoming,
+    Combination,
+    CycleTime,
+    Holding,
+    Lasting,
+    Later,
+    PropertyFormula,
+    Tally,
+)
 from steptwin.machine import Nanos
 from steptwin.world.expression import COMPARE
 
@@ -60,6 +71,8 @@ class Evaluation:
                 return reduce(least if word == "and" else greatest, parts)
             case Lasting():
                 return self._lasting(node, undecided)
+            case Later(length, inner):
+                return later(self.course(inner, undecided=undecided), length, 1.0 if undecided else -1.0)
             case Holding(first, then, released):
                 a, b = self.course(first, undecided=not released), self.course(then, undecided=released)
                 return negative(held_until(negative(a), negative(b))) if released else held_until(a, b)
@@ -157,6 +170,8 @@ class Evaluation:
                     return (end, node) if reached is None else self.decided(inner, reached, undecided=below)
                 failed = _first(course, moment, end, lambda one: one <= 0.0) if value <= 0.0 else None
                 return self.decided(inner, _lowest(course, moment, end) if failed is None else failed, undecided=below)
+            case Later(length, inner) if moment + length <= self.end:
+                return self.decided(inner, moment + length, undecided=undecided)
             case Holding(first, _, released) if value <= 0.0 and not released:
                 failed = _first(self.course(first), moment, self.end, lambda one: one <= 0.0)
                 return (self.end, node) if failed is None else self.decided(first, failed)

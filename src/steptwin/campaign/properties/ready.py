@@ -68,7 +68,7 @@ def _stops(rest: str, world: Plant | None) -> str:
     condition = "" if found is None else found[2].strip()
     if found is None or not condition.startswith("after "):
         raise Misuse(f"property 'stops-within': {rest!r}: expected TIME after CONDITION, such as 300 ms after stop.pressed")
-    return f"after ({condition.removeprefix('after ')}) within {found[1]} not ({_any_moving(world)})"
+    return f"after ({condition.removeprefix('after ')}) at {found[1]} not ({_any_moving(world)})"
 
 
 def _returns(rest: str, world: Plant | None) -> str:
@@ -117,9 +117,7 @@ READY: Mapping[str, ReadyProperty] = {
             _no_lost_step,
         ),
         ReadyProperty("never-moves-while", "CONDITION", "no axis of a controller moves while CONDITION is true", _never_moves),
-        ReadyProperty(
-            "stops-within", "TIME after CONDITION", "all axes stand at some moment within TIME after CONDITION came true", _stops
-        ),
+        ReadyProperty("stops-within", "TIME after CONDITION", "all axes stand TIME after CONDITION came true", _stops),
         ReadyProperty("returns-to-safe", "CONDITION [within TIME]", "in the end CONDITION is true and stays so", _returns),
     )
 }

@@ -1,57 +1,136 @@
-"""The course of one comparison in a running world, exact at every event, turn and crossing."""
+"""The course of one comparison in a running world, exact at every event, turn and crossing.
+
+While signals go on as they did, nothing is computed: a way is looked at as a whole once another one follows. Signals of one
+kernel are followed by that kernel (`steptwin.world.followers`).
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from heapq import merge
 from math import isnan
+from typing import TypeGuard
 
 from steptwin.campaign.properties.evaluate import forced
 from steptwin.campaign.properties.slopes import Shape, Slope
 from steptwin.campaign.properties.tree import Atom
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
-from steptwin.points import FARTHEST_NS
-from steptwin.world.condition import SignalCondition
 from steptwin.world.expression import COMPARE, value_of
-from steptwin.world.kernel import Source
+from steptwin.world.followers import KernelFollowers
+from steptwin.world.kernel import Kernel, Source
 from steptwin.world.plant import Plant
-from steptwin.world.quantities import Absolute, NumberLiteral, Product, Quantity, Remainder, Sum
-from steptwin.world.signals import SignalOf
+from steptwin.world.quantities import (
+    NO_NUMBER,
+    Absolute,
+    NumberLiteral,
+    Product,
+    Quantity,
+    Remainder,
+    SignalName,
+    Sum,
+    change_between,
+    unit_of_all,
+)
+from steptwin.world.signals import Idle, SignalOf
 
 FINEST_NS: Nanos = 1000
 """Stretches are not divided further."""
 DEVIATION = 0.001
 """By how much of the scale a straight stretch may deviate from what moves, where its shape counts."""
 SHARES = (0.25, 0.5, 0.75)
+PROBES = (0.0625, *SHARES, 0.9375)
+"""Where a stretch is looked at for a place where it turns back: one that these miss is less than a hundredth of `DEVIATION`."""
 
 
 class ComparisonRecord:
-    """``is_fine``: between its turns its shape counts, too, because it meets others or a window."""
+    """``is_fine``: between its turns its shape counts, too, because it meets others or a window.
+
+    It is told of events by `leave` and `look`, as a `KernelFollower`: by its ``kernel``, or, where that is None because its
+    signals have several, by who observes the world.
+    """
 
     def __init__(self, world: Plant, atom: Atom, *, is_fine: bool) -> None:
         """Raises `Misuse` for unknown signals, and for a number in a unit that its signals do not have."""
-        signals = {name: world.watched(name) for name in atom.comparison.names()}
-        self.node = atom.comparison.in_unit("", lambda name: signals[name].unit)
-        self._condition = SignalCondition(repr(atom), signals.__getitem__, self.node)
-        self._signals = signals
-        self._moving = [one for one in signals.values() if one.continuous]
-        reads = {name: signal.value for name, signal in signals.items()}
-        self._left, self._right = value_of(self.node.left, reads), value_of(self.node.right, reads)
+        self._signals = {name: world.watched(name) for name in dict.fromkeys(atom.comparison.names())}
+        self.node = atom.comparison.in_unit("", lambda name: self._signals[name].unit)
+        self._reads: dict[str, Callable[[Nanos], float]] = {name: signal.value for name, signal in self._signals.items()}
         self._compare = COMPARE[self.node.sign]
+        self._read()
+        self.unit = unit_of_all(self.node, lambda name: self._signals[name].unit)
         self.scale = _scale(world, self.node.left, self.node.right)
-        self._is_fine = is_fine or len(self._moving) > 1
+        self._moving = {name: signal for name, signal in self._signals.items() if _moves(signal)}
+        self._only = next(iter(self._moving.values())).versions if len(self._signals) == len(self._moving) == 1 else None
+        """The version of all, where that is one signal."""
+        self._stays = all(signal.freeze is not None for signal in self._moving.values())
+        """Whether a way can be read after another one has followed."""
+        self._is_monotonic = len(self._moving) == 1 and _is_alone(self.node.left, self.node.right, *self._moving)
+        """Whether it goes one way between turns, so that its extremes are there."""
+        self._is_fine = is_fine or not self._is_monotonic
+        self.kernel, self.names = self._followed()
         self._closed: Shape = []
-        self._begin: Nanos | None = None
-        self._first = self._last = 0.0
-        self._due: Nanos | None = None
-        self._is_still = True
         self._known: object = None
+        """What the present way depends on."""
+        self._begin: Nanos | None = None
+        """Of the stretch that is not closed."""
+        self._first = 0.0
+        """The value at `_begin`."""
+        self._seen: Nanos = 0
+        """Up to here the way has been looked at since `_begin`: it has crossed nothing, nor turned back."""
+        self._there, self._side = 0.0, 0
+        """The value at `_seen`, and on which side of its limit that is."""
+        self._left: Nanos = -1
+        """The moment before which `_last` was read."""
+        self._last = 0.0
+        self._turns: Iterator[Nanos] = iter(())
+        self._turn: Nanos | None = None
+
+    def _followed(self) -> tuple[Kernel | None, tuple[str, ...]]:
+        """The only kernel on which it depends, and the names there."""
+        sources: set[Source] = set()
+        for signal in self._signals.values():
+            if isinstance(signal, Idle):
+                return None, ()
+            sources.update(signal.sources)
+        kernels = {source.kernel for source in sources}
+        return (kernels.pop(), tuple(sorted(source.name for source in sources))) if len(kernels) == 1 else (None, ())
+
+    def follow(self, world: Plant) -> None:
+        """Be told by its kernel from now on."""
+        kernel = self.kernel
+        if kernel is None:
+            return
+        if kernel.now < world.now:
+            kernel.advance(world.now)
+        if not all(_is_event(world, name, signal) for name, signal in self._signals.items()):
+            kernel.is_attentive = True
+        if kernel.followers is None:
+            kernel.followers = KernelFollowers()
+        kernel.followers.add(self, self.names, leaves=not self._stays)
+
+    def unfollow(self) -> None:
+        if self.kernel is not None and self.kernel.followers is not None:
+            self.kernel.followers.remove(self)
+
+    def bring(self, now: Nanos) -> tuple[Source, ...]:
+        """Advance its kernels to ``now`` and return what it depends on."""
+        return tuple(dict.fromkeys(source for signal in self._signals.values() for source in signal.bring(now)))
 
     # ------------------------------------------------------------------ values
 
+    def _read(self) -> None:
+        """Take `_reads` for all values from now on."""
+        self._left_at, self._right_at = value_of(self.node.left, self._reads), value_of(self.node.right, self._reads)
+
     def _value(self, now: Nanos) -> float:
-        left, right = self._left(now), self._right(now)
+        return self._look_at(now)[0]
+
+    def _look_at(self, now: Nanos) -> tuple[float, int]:
+        """The value, and the side of 0 on which the difference is."""
+        left, right = self._left_at(now), self._right_at(now)
         holds = bool(self._compare(left, right))
-        away = (left - right) / self.scale
+        difference = left - right
+        away = difference / self.scale
         match self.node.sign:
             case "==":
                 value = 1.0 if holds else -abs(away)
@@ -61,102 +140,214 @@ class ComparisonRecord:
                 value = -away
             case _:
                 value = away
-        return forced(0.0 if isnan(value) else value, holds=holds)
+        if isnan(value):
+            return forced(0.0, holds=holds), NO_NUMBER
+        return forced(value, holds=holds), (difference > 0.0) - (difference < 0.0)
 
     # ------------------------------------------------------------------ following
 
     def leave(self, moment: Nanos) -> None:
-        if not self._is_still and self._begin is not None and moment - 1 > self._begin:
-            self._last = self._value(moment - 1)
+        if not self._stays and self._begin is not None and moment > self._begin:
+            self._last, self._left = self._go_to(moment - 1), moment
 
-    def look(self, now: Nanos) -> tuple[tuple[Source, ...], Nanos | None]:
-        sources = self._condition.bring(now)
+    def look(self, now: Nanos) -> None:
+        if self._begin is not None and now < self._begin:
+            return  # a snapshot was restored: `rewind` comes next
+        if not self._moving:
+            self._note(now)
+            return
         known = self._version(now)
-        if known is not None and known == self._known and self._begin is not None and (self._due is None or now < self._due):
-            return sources, self._due
+        if self._begin is not None and known is not None and known == self._known:
+            return
+        if self._begin is not None and now > self._begin:
+            last = self._last if self._left == now else self._go_to(now - 1)
+            self._closed += self._stretch(now - 1, last)
         self._known = known
-        value = self._value(now)
-        is_still, due = (True, None) if not self._moving else self._ahead(now, value)
-        if self._begin is None or now > self._begin:
-            if self._begin is not None:
-                if is_still and self._is_still and value == self._first:
-                    return sources, None
-                self._closed.append(Slope(self._begin, now - 1, self._first, self._last))
-            self._begin = now
-        self._first = self._last = value
-        self._is_still, self._due = is_still, due
-        return sources, due
+        self._go_on(now)
+
+    def _note(self, now: Nanos) -> None:
+        """What changes with events only."""
+        sides = self._left_at(now), self._right_at(now)
+        if self._begin is not None:
+            if sides == self._known:
+                return
+            if now > self._begin:
+                self._closed.append(Slope(self._begin, now - 1, self._first, self._first))
+        self._begin, self._first, self._known = now, self._value(now), sides
 
     def _version(self, now: Nanos) -> object:
-        """What the course depends on; None if that is unknown, or nothing moves."""
-        if not self._moving:
-            return None
-        versions = [one.version() for one in self._moving]
+        """What the way depends on; None if that is unknown."""
+        if self._only is not None:
+            return self._only()
+        versions = [one.version() for one in self._moving.values()]
         if None in versions:
             return None
-        return (*versions, *(one.value(now) for one in self._signals.values() if not one.continuous))
+        return (*versions, *(one.value(now) for one in self._signals.values() if not _moves(one)))
 
-    def _ahead(self, now: Nanos, value: float) -> tuple[bool, Nanos | None]:
-        """Whether it stands still, and the end of the stretch that begins now."""
-        turns = [turn for one in self._moving if (turn := next(iter(one.turns(now)), None)) is not None]
-        if not turns and self._value(now + FARTHEST_NS) == value:
-            return True, None
-        change = self._condition.change(now)
-        dues = turns if change is None else [*turns, change]
-        due = min(dues, default=None)
-        if self._is_fine:
-            due = self._straight(now, value, now + FARTHEST_NS if due is None else due)
-        return False, due
+    def _go_on(self, now: Nanos) -> None:
+        """Begin another way."""
+        for name, signal in self._signals.items():
+            if not _moves(signal):
+                self._reads[name] = _constant(signal.value(now))
+            elif signal.freeze is not None:
+                self._reads[name] = signal.freeze(now)
+        self._read()
+        turns = merge(*(one.turns(now) for one in self._moving.values()))
+        self._turns = iter(tuple(turns)) if self._stays else turns
+        self._turn = next(self._turns, None)
+        self._begin_at(now)
 
-    def _straight(self, begin: Nanos, first: float, end: Nanos) -> Nanos:
-        """The end of a stretch that is as good as straight."""
+    def _begin_at(self, now: Nanos) -> None:
+        self._begin = self._seen = now
+        self._there, self._side = self._look_at(now)
+        self._first = self._there
+
+    def _go_to(self, last: Nanos) -> float:
+        """Close all stretches that end before ``last`` on the present way. Returns the value there, to which it has come or
+        further."""
+        if last < self._seen:
+            return self._value(last)
+        while self._seen < last:
+            while self._turn is not None and self._turn <= self._seen:
+                self._turn = next(self._turns, None)
+            end = last if self._turn is None else min(self._turn, last)
+            there, side = self._look_at(end)
+            change = self._change(end, side)
+            if change is not None:
+                self._closed += self._stretch(change - 1, self._value(change - 1))
+                self._begin_at(change)
+            elif self._is_fine and end == self._turn:
+                self._closed += self._stretch(end - 1, self._value(end - 1))
+                self._begin_at(end)
+            else:
+                if (there - self._there) * (self._there - self._first) < 0.0:  # it turned back where it was seen last
+                    self._closed += self._stretch(self._seen, self._there)
+                    self._begin_at(self._seen + 1)
+                self._seen, self._there, self._side = end, there, side
+        return self._there
+
+    def _change(self, end: Nanos, side: int) -> Nanos | None:
+        """The first moment after `_seen`, up to ``end``, at which it is on another side of its limit; it does not turn before."""
+        if not self._is_monotonic:
+            return change_between(Sum(self.node.left, -1, self.node.right), self._reads, self._seen, end)
+        if side == self._side:
+            return None
+        low, high = self._seen, end
+        while high - low > 1:
+            middle = (low + high) // 2
+            low, high = (middle, high) if self._look_at(middle)[1] == self._side else (low, middle)
+        return high
+
+    def _stretch(self, end: Nanos, last: float) -> Shape:
+        """The stretch that is not closed, up to ``end``."""
+        begin, first = self._begin or 0, self._first
+        if not self._is_fine or end - begin < FINEST_NS or (self._is_monotonic and first == last):
+            return [Slope(begin, end, first, last)]
+        found: Shape = []
+        while True:
+            until, there = self._straight(begin, first, end, last)
+            found.append(Slope(begin, until, first, there))
+            if until == end:
+                break
+            begin, first = until + 1, self._value(until + 1)
+        return found if self._is_monotonic else list(self._with_extremes(found))
+
+    def _straight(self, begin: Nanos, first: float, end: Nanos, last: float) -> tuple[Nanos, float]:
+        """The end of a stretch that is as good as straight, and the value there."""
         while end - begin > FINEST_NS:
-            last = self._value(end - 1)
-            length = end - 1 - begin
+            length = end - begin
             at = [(share, self._value(begin + int(length * share))) for share in SHARES]
             if all(abs(value - first - (last - first) * share) <= DEVIATION for share, value in at):
                 break
-            end = begin + (end - begin) // 2
-        return end
+            end = begin + length // 2
+            last = self._value(end)
+        return end, last
+
+    def _with_extremes(self, course: Shape) -> Iterator[Slope]:
+        """With joints where it turns back within a stretch."""
+        for slope in course:
+            begin, end, first, last = slope
+            length = end - begin
+            if length > FINEST_NS:
+                moments = [begin, *(begin + int(length * share) for share in PROBES), end]
+                values = [first, *map(self._value, moments[1:-1]), last]
+                for n in sorted({values.index(max(values)), values.index(min(values))} - {0, len(values) - 1}):
+                    top = self._top(moments[n - 1], moments[n + 1], values[n] > first)
+                    if top > begin:
+                        yield Slope(begin, top - 1, first, self._value(top - 1))
+                        begin, first = top, self._value(top)
+            yield Slope(begin, end, first, last)
+
+    def _top(self, low: Nanos, high: Nanos, is_highest: bool) -> Nanos:
+        """Where it is highest, or lowest, between two moments between which it goes up, then down, or down, then up."""
+        while high - low > 2:
+            third = (high - low) // 3
+            one, other = self._value(low + third), self._value(high - third)
+            low, high = (low + third, high) if (one < other) is is_highest else (low, high - third)
+        return (low + high) // 2
 
     def course(self, now: Nanos) -> Shape:
         """Up to ``now``, to which the world has come."""
         if self._begin is None:
             raise Misuse("nothing was watched yet")
-        last = self._first if self._is_still or now == self._begin else self._value(now)
-        return [*self._closed, Slope(self._begin, now, self._first, last)]
+        if not self._moving:
+            return [*self._closed, Slope(self._begin, now, self._first, self._first)]
+        here = self._value(now)
+        if now == self._begin:
+            return [*self._closed, Slope(now, now, here, here)]
+        last = self._go_to(now - 1)
+        return [*self._closed, *self._stretch(now - 1, last), Slope(now, now, here, here)]
 
     # ------------------------------------------------------------------ the past
 
     def rewind(self, now: Nanos) -> None:
         """Forget everything from ``now`` on."""
-        self._condition.forget()
-        self._known = None
+        self._known, self._left = None, -1
         while self._closed and self._closed[-1].begin >= now:
             self._closed.pop()
         if self._begin is not None and self._begin < now:
-            if not self._is_still:
-                self._closed.append(Slope(self._begin, now - 1, self._first, self._here(now, self._first)))
-                self._begin = None
-            return
-        self._begin = None
-        if self._closed:
+            last = self._go_to(now - 1)
+            self._closed += self._stretch(now - 1, forced(last, holds=self._first > 0.0))
+        elif self._closed and self._closed[-1].end >= now:
             begin, _, first, last = self._closed[-1]
             self._closed[-1] = Slope(begin, now - 1, first, last if first == last else self._here(now, first))
+        self._begin = None
 
     def _here(self, now: Nanos, first: float) -> float:
         """The end of a stretch that now goes no further."""
-        self._condition.bring(now)
+        self._reads |= {name: signal.value for name, signal in self._signals.items()}
+        self._read()
+        self.bring(now)
         return forced(self._value(now), holds=first > 0.0)
 
     def state(self, now: Nanos) -> Shape:
         """All before ``now``."""
-        course = self.course(now)
-        return [one.cut(one.begin, min(one.end, now - 1)) for one in course if one.begin < now]
+        return [one.cut(one.begin, min(one.end, now - 1)) for one in self.course(now) if one.begin < now]
 
     def begin_after(self, course: Shape) -> None:
         """Go on after what another one has recorded."""
         self._closed = list(course)
+
+
+def _moves(signal: SignalOf | Idle) -> TypeGuard[SignalOf]:
+    return signal.continuous
+
+
+def _constant(value: float) -> Callable[[Nanos], float]:
+    return lambda now: value
+
+
+def _is_alone(left: Quantity, right: Quantity, name: str) -> bool:
+    """Whether one side is this signal, with which the other has nothing to do."""
+    sides = ((left, right), (right, left))
+    return any(side == SignalName(name) and name not in other.names() for side, other in sides)
+
+
+def _is_event(world: Plant, name: str, signal: SignalOf | Idle) -> bool:
+    """Whether its changes are seen from outside of programs, so that a program may calculate ahead of it."""
+    owner, _, rest = name.partition(".")
+    machine = world.machines.get(owner)
+    return signal.freeze is not None or (not signal.continuous and (machine is None or rest.upper() in machine.pins()))
 
 
 def _scale(world: Plant, left: Quantity, right: Quantity) -> float:

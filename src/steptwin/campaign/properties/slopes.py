@@ -66,7 +66,7 @@ def shortest(course: Iterable[Slope]) -> Shape:
 
 
 def together(one: Shape, other: Shape) -> Iterator[tuple[Slope, Slope]]:
-    """Both in the same stretches, in each of which the same one is not below the other."""
+    """Both in the same stretches, in each of which the same one is not below the other, but for rounding where they meet."""
     i = j = 0
     while i < len(one) and j < len(other):
         a, b = one[i], other[j]
@@ -83,11 +83,11 @@ def together(one: Shape, other: Shape) -> Iterator[tuple[Slope, Slope]]:
 
 
 def least(one: Shape, other: Shape) -> Shape:
-    return shortest(a if a.first <= b.first and a.last <= b.last else b for a, b in together(one, other))
+    return shortest(a if a.first + a.last <= b.first + b.last else b for a, b in together(one, other))
 
 
 def greatest(one: Shape, other: Shape) -> Shape:
-    return shortest(a if a.first >= b.first and a.last >= b.last else b for a, b in together(one, other))
+    return shortest(a if a.first + a.last >= b.first + b.last else b for a, b in together(one, other))
 
 
 def from_on(course: Shape) -> Shape:
@@ -154,6 +154,23 @@ def _highest(courses: list[Shape]) -> Shape:
         pairs = [greatest(*courses[n : n + 2]) if n + 1 < len(courses) else courses[n] for n in range(0, len(courses), 2)]
         courses = pairs
     return courses[0]
+
+
+def later(course: Shape, length: Nanos, open_value: float) -> Shape:
+    """At each moment the value ``length`` ns after it, by no more than the share of this time for which it has been true, or
+    false, by then; ``open_value`` where that is after the end."""
+    begin, end = course[0].begin, course[-1].end
+    found: Shape = []
+    since, before = begin, course[0].first > 0.0
+    for slope in course:
+        is_true = slope.first > 0.0
+        if is_true is not before:
+            since, before = slope.begin, is_true
+        ramp = Slope(since, since + length, TINY, 1.0)
+        most = _filled([ramp] if length else [], slope.begin, slope.end, 1.0)
+        found += least([slope], most) if is_true else negative(least(negative([slope]), most))
+    shifted = [Slope(one.begin - length, one.end - length, one.first, one.last) for one in found]
+    return _filled(shifted, begin, end, open_value)
 
 
 def held_until(first: Shape, then: Shape) -> Shape:

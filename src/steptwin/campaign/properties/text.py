@@ -6,7 +6,8 @@
     both    = one { "and" one }
     one     = "not" one
             | "always" formula | "never" formula | "eventually" [ "within" TIME ] formula | "within" TIME formula
-            | "after" either "within" TIME formula
+            | "at" TIME formula
+            | "after" either ( "within" | "at" ) TIME formula
             | "count" "(" formula ")" SIGN number
             | "time" "between" either "and" either SIGN TIME
             | comparison
@@ -20,7 +21,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import lru_cache
 
-from steptwin.campaign.properties.tree import Atom, Becoming, Combination, CycleTime, Holding, Lasting, PropertyFormula, Tally
+from steptwin.campaign.properties.tree import (
+    Atom,
+    Becoming,
+    Combination,
+    CycleTime,
+    Holding,
+    Lasting,
+    Later,
+    PropertyFormula,
+    Tally,
+)
 from steptwin.durations import UNITS, duration
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
@@ -33,6 +44,7 @@ WORDS = (
     "never",
     "eventually",
     "within",
+    "at",
     "after",
     "until",
     "for",
@@ -48,7 +60,7 @@ SIGNALS = ("time", "idle")
 """Signals whose names have no dot."""
 SIGNS = ("==", "!=", "<=", ">=", "<", ">")
 _BESIDE = (*SIGNS, "+", "-", "*", "/", "%")
-_FORMULAS = (Atom, Combination, Lasting, Holding, Becoming, Tally, CycleTime)
+_FORMULAS = (Atom, Combination, Lasting, Later, Holding, Becoming, Tally, CycleTime)
 
 
 @lru_cache(maxsize=512)
@@ -155,9 +167,9 @@ class _PropertyParser(ConditionParser):
                 self._at += 1
                 within = self._time() if self._accept("within") else None
                 return Lasting("eventually", within, self._formula(self._implied()))
-            case "within":
+            case "within" | "at" as word:
                 self._at += 1
-                return Lasting("eventually", self._time(), self._formula(self._implied()))
+                return self._timed(word, self._time())
             case "after":
                 self._at += 1
                 return self._response()
@@ -171,11 +183,16 @@ class _PropertyParser(ConditionParser):
                 return self._cycle()
         return self._compare()
 
+    def _timed(self, word: str, length: Nanos) -> PropertyFormula:
+        inner = self._formula(self._implied())
+        return Lasting("eventually", length, inner) if word == "within" else Later(length, inner)
+
     def _response(self) -> PropertyFormula:
         trigger = self._formula(self._either())
-        if not self._accept("within"):
-            raise self._wrong("'within' with a time")
-        then = Lasting("eventually", self._time(), self._formula(self._implied()))
+        word = self._accept("within", "at")
+        if not word:
+            raise self._wrong("'within' or 'at' with a time")
+        then = self._timed(word, self._time())
         return Lasting("always", None, Combination("or", (Becoming(trigger, never=True), then)))
 
     def _cycle(self) -> PropertyFormula:

@@ -55,6 +55,20 @@ class Lasting:
 
 
 @dataclass(frozen=True, slots=True)
+class Later:
+    """``inner`` at the moment ``length`` ns after each moment."""
+
+    length: Nanos
+    inner: PropertyFormula
+
+    def negated(self) -> Later:
+        return Later(self.length, self.inner.negated())
+
+    def parts(self) -> tuple[PropertyFormula, ...]:
+        return (self.inner,)
+
+
+@dataclass(frozen=True, slots=True)
 class Holding:
     """``first`` at every moment before ``then``, which must come; ``released``: ``then`` up to and with ``first``, or always."""
 
@@ -118,7 +132,7 @@ class CycleTime:
         return self.begin, self.end
 
 
-PropertyFormula: TypeAlias = Atom | Combination | Lasting | Holding | Becoming | Tally | CycleTime
+PropertyFormula: TypeAlias = Atom | Combination | Lasting | Later | Holding | Becoming | Tally | CycleTime
 
 
 def nodes(formula: PropertyFormula) -> Iterator[PropertyFormula]:

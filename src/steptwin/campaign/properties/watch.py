@@ -11,8 +11,8 @@ from steptwin.campaign.properties.ready import check_ready, formula_of
 from steptwin.campaign.properties.recording import ComparisonRecord
 from steptwin.campaign.properties.slopes import TINY, Shape, Slope, shortest, value_at
 from steptwin.campaign.properties.text import parse_property
-from steptwin.campaign.properties.tree import Atom, Becoming, CycleTime, Holding, Lasting, PropertyFormula, Tally, measured, nodes
-from steptwin.campaign.properties.words import formula_text
+from steptwin.campaign.properties.tree import Atom, CycleTime, Holding, Lasting, Later, PropertyFormula, Tally, measured, nodes
+from steptwin.campaign.properties.words import formula_text, found_text
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.world.kernel import Source
@@ -52,6 +52,7 @@ class PropertyWatch:
     """An observer of a world (`steptwin.world.observing`). It ends with `close`."""
 
     number, entry = 0, 0
+    _begins = True
     sources: tuple[Source, ...] = ()
 
     def __init__(self, which: Property, world: Plant, earlier: WatchState | None) -> None:
@@ -67,6 +68,10 @@ class PropertyWatch:
         if earlier is not None:
             self._go_on(earlier)
         self._all = tuple(self._recordings.values())
+        self._spread = tuple(one for one in self._all if one.kernel is None)
+        """Those that no kernel follows alone."""
+        for recording in self._all:
+            recording.follow(world)
         world.observe(self)
 
     def _go_on(self, earlier: WatchState) -> None:
@@ -81,41 +86,48 @@ class PropertyWatch:
 
     def close(self) -> None:
         """The world is no longer watched."""
+        for recording in self._all:
+            recording.unfollow()
         self._world.unobserve(self)
 
     # ------------------------------------------------------------------ as an observer
 
     def leave(self, moment: Nanos) -> None:
-        for recording in self._all:
+        for recording in self._spread:
             recording.leave(moment)
 
-    def look(self, now: Nanos) -> tuple[tuple[Source, ...], Nanos | None]:
-        if len(self._all) == 1:
-            return self._all[0].look(now)
+    def look(self, now: Nanos) -> tuple[Source, ...]:
+        """All look where the watch begins; later only those that no kernel follows."""
         found: dict[Source, None] = {}
-        first: Nanos | None = None
-        for recording in self._all:
-            sources, due = recording.look(now)
-            found.update(dict.fromkeys(sources))
-            if due is not None and (first is None or due < first):
-                first = due
-        return tuple(found), first
+        for recording in self._all if self._begins else self._spread:
+            sources = recording.bring(now)
+            if recording.kernel is None:
+                found.update(dict.fromkeys(sources))
+            recording.look(now)
+        self._begins = False
+        return tuple(found)
 
     def rewind(self, now: Nanos) -> None:
+        self._begins = True
         for recording in self._all:
             recording.rewind(now)
 
     # ------------------------------------------------------------------ what it says
 
     def _courses(self) -> dict[Atom, Shape]:
-        world = self._world
-        world.advance(world.now)
+        world = self._at_present()
         return {atom: shortest(recording.course(world.now)) for atom, recording in self._recordings.items()}
+
+    def _at_present(self) -> Plant:
+        """The world, all of which has come to its present moment."""
+        self._world.advance(self._world.now)
+        for recording in self._all:
+            recording.bring(self._world.now)
+        return self._world
 
     def state(self) -> WatchState:
         """For a branch from the present moment."""
-        world = self._world
-        world.advance(world.now)
+        world = self._at_present()
         courses: Any = tuple(tuple(map(tuple, one.state(world.now))) for one in self._all)
         return WatchState(self.which.text, world.now, courses)
 
@@ -126,16 +138,18 @@ class PropertyWatch:
         moment, by = found.decided(self._formula, found.begin)
         holds = value > 0.0
         robustness = 0.0 if abs(value) <= TINY else value
-        return Verdict(self.which.name, holds, robustness, moment, "" if holds else self._why(by, moment))
+        return Verdict(self.which.name, holds, robustness, moment, "" if holds else self._why(found, by, moment))
 
-    def _why(self, by: PropertyFormula, moment: Nanos) -> str:
+    def _why(self, found: Evaluation, by: PropertyFormula, moment: Nanos) -> str:
+        at = f"{moment / SECOND:.9g} s"
+        if isinstance(by, Atom):
+            recording = self._recordings[by]
+            value = value_at(found.course(by), moment)
+            return f"{found_text(recording.node, value, recording.scale, recording.unit)} at {at}"
         text = formula_text(by)
-        at = f"at {moment / SECOND:.9g} s"
-        if isinstance(by, Lasting | Holding):
-            return f"{text}: not come true {at}"
-        if isinstance(by, Becoming):
-            return f"{text}: not so {at}"
-        return f"not {text} {at}"
+        if isinstance(by, Lasting | Holding | Later):
+            return f"{text}: not come true by {at}"
+        return f"{text}: not so at {at}"
 
     def measures(self) -> dict[str, float]:
         """Of each cycle time in the property: the least, greatest and mean, s, and how many cycles there were."""
@@ -156,5 +170,5 @@ def _shaped(formula: PropertyFormula) -> frozenset[Atom]:
     the moments at which they change."""
     counted = {one for node in nodes(formula) if isinstance(node, CycleTime | Tally) for one in nodes(node)}
     atoms = {node for node in nodes(formula) if isinstance(node, Atom)} - counted
-    windows = any(isinstance(node, Lasting) and node.length is not None for node in nodes(formula))
+    windows = any(isinstance(node, Later) or (isinstance(node, Lasting) and node.length is not None) for node in nodes(formula))
     return frozenset(atoms) if windows or len(atoms) > 1 else frozenset()

@@ -2,7 +2,17 @@
 
 from __future__ import annotations
 
-from steptwin.campaign.properties.tree import Atom, Becoming, Combination, CycleTime, Holding, Lasting, PropertyFormula, Tally
+from steptwin.campaign.properties.tree import (
+    Atom,
+    Becoming,
+    Combination,
+    CycleTime,
+    Holding,
+    Lasting,
+    Later,
+    PropertyFormula,
+    Tally,
+)
 from steptwin.durations import duration_text
 from steptwin.world.expression import Comparison
 from steptwin.world.quantities import Absolute, NumberLiteral, Product, Quantity, Remainder, SignalName, Sum
@@ -22,9 +32,34 @@ def quantity_text(node: Quantity) -> str:
             return f"({quantity_text(left)} % {quantity_text(right)})"
         case Absolute(inner):
             return f"abs({quantity_text(inner).removeprefix('(').removesuffix(')')})"
+        case Comparison(SignalName(text), ("!=" | "==") as sign, NumberLiteral(0.0, "")):
+            return text if sign == "!=" else f"not {text}"
         case Comparison(left, sign, right):
             return f"{quantity_text(left)} {sign} {quantity_text(right)}"
     return "(...)"
+
+
+def found_text(comparison: Comparison, value: float, scale: float, unit: str) -> str:
+    """What there was where a comparison did not hold: ``value`` is its distance from holding, as a share of ``scale``."""
+    left, limit = quantity_text(comparison.left), quantity_text(comparison.right)
+    is_alone = isinstance(comparison.left, SignalName)
+    off = abs(value) * scale
+    if comparison.sign == "!=":
+        return f"{left} is {limit}"
+    if comparison.sign == "==":
+        if is_alone and comparison.right == NumberLiteral(0.0):
+            return f"{left} is not 0"
+        return f"{left} is {_measure(off, unit)} away from {limit}"
+    is_below = comparison.sign in (">", ">=")
+    if isinstance(comparison.right, NumberLiteral):
+        there = comparison.right.number + (-off if is_below else off)
+        shown = quantity_text(NumberLiteral(comparison.right.number, unit))
+        return f"{left} is {_measure(there, unit)}, not {comparison.sign} {shown}"
+    return f"{left} is {_measure(off, unit)} {'below' if is_below else 'above'} {limit}"
+
+
+def _measure(number: float, unit: str) -> str:
+    return f"{number:.6g} {unit}".rstrip()
 
 
 def formula_text(node: PropertyFormula) -> str:
@@ -35,10 +70,11 @@ def formula_text(node: PropertyFormula) -> str:
             return f" {word} ".join(map(_inner_text, inner))
         case Lasting(word, None, inner):
             return f"{word} {_inner_text(inner)}"
-        case Lasting("eventually", length, inner):
-            return f"within {duration_text(length or 0)} {_inner_text(inner)}"
-        case Lasting(_, length, inner):
-            return f"{_inner_text(inner)} for {duration_text(length or 0)}"
+        case Lasting(word, int() as length, inner):
+            text, time = _inner_text(inner), duration_text(length)
+            return f"within {time} {text}" if word == "eventually" else f"{text} for {time}"
+        case Later(length, inner):
+            return f"at {duration_text(length)} {_inner_text(inner)}"
         case Holding(first, then, released):
             return f"{_inner_text(first)} {'unless' if released else 'until'} {_inner_text(then)}"
         case Becoming(inner, never):

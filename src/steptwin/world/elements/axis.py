@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 
@@ -11,7 +11,7 @@ from steptwin.machine import Nanos
 from steptwin.motion.divisions import profile_of
 from steptwin.points import turns_of
 from steptwin.world.contacts import Zone
-from steptwin.world.course import Build
+from steptwin.world.course import Build, Course
 from steptwin.world.element import Element, NamedSpec, Reference
 from steptwin.world.elements.encoder import ENCODER, EncoderSpec, fit_encoder, read_encoder
 from steptwin.world.elements.motor import MOTOR, MotorSpec, read_motor
@@ -161,9 +161,20 @@ def turns_of_axis(fitted: BuiltAxis, now: Nanos) -> Iterator[Nanos]:
 def _signals(fitted: BuiltAxis) -> Mapping[str, SignalOf]:
     mechanism, turning = fitted.mechanism, partial(turns_of_axis, fitted)
     source, version = (fitted.source,), mechanism.version
-    position = SignalOf(source, lambda now: fitted.units(mechanism.place(now)), turning, version, fitted.scale.unit)
-    lost = SignalOf(source, lambda now: float(mechanism.lost(now)), turning, version)
-    stalled = SignalOf(source, lambda now: float(mechanism.at(now).stalled), turning, version)
+
+    def signal(of: Callable[[Course, Nanos], float], unit: str = "") -> SignalOf:
+        return SignalOf(
+            source,
+            lambda now: of(mechanism.course(now), now),
+            turning,
+            version,
+            unit,
+            freeze=lambda now: partial(of, mechanism.course(now)),
+        )
+
+    position = signal(lambda course, now: fitted.units(course.at(now).load), fitted.scale.unit)
+    lost = signal(lambda course, now: float(course.field(now) - course.at(now).rotor))
+    stalled = signal(lambda course, now: float(course.at(now).stalled))
     return dict(zip(MECHANICS, (position, lost, stalled), strict=True))
 
 

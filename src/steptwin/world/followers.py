@@ -1,0 +1,56 @@
+"""Who follows the signals of one kernel, and is told of each of its events."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Protocol
+
+from steptwin.machine import Nanos
+
+
+class KernelFollower(Protocol):
+    """It reads signals of one kernel only, and changes nothing."""
+
+    def leave(self, moment: Nanos) -> None:
+        """Before anything happens at ``moment``: what moves is still on the way that it had before."""
+        ...
+
+    def look(self, now: Nanos) -> None:
+        """After an event at ``now`` by which one of its sources may have changed, once the signals have settled."""
+        ...
+
+
+class KernelFollowers:
+    """Of one kernel."""
+
+    __slots__ = ("by_name", "leaving", "news")
+
+    def __init__(self) -> None:
+        self.by_name: dict[str, dict[KernelFollower, None]] = {}
+        """By the machines, lines and elements on which they depend."""
+        self.leaving: list[KernelFollower] = []
+        """Who is told before each event."""
+        self.news: dict[KernelFollower, None] = {}
+        """Who will be told."""
+
+    def add(self, follower: KernelFollower, names: Iterable[str], *, leaves: bool) -> None:
+        """Tell it of events at machines, lines and elements with these names; ``leaves``: and before each event."""
+        for name in names:
+            self.by_name.setdefault(name, {})[follower] = None
+        if leaves:
+            self.leaving.append(follower)
+
+    def remove(self, follower: KernelFollower) -> None:
+        for there in (*self.by_name.values(), self.news):
+            there.pop(follower, None)
+        if follower in self.leaving:
+            self.leaving.remove(follower)
+
+    def leave(self, moment: Nanos) -> None:
+        for follower in self.leaving:
+            follower.leave(moment)
+
+    def tell(self, now: Nanos) -> None:
+        """The signals have settled."""
+        while self.news:
+            self.news.popitem()[0].look(now)
