@@ -8,7 +8,7 @@ from fractions import Fraction
 from heapq import merge
 from itertools import chain
 from math import fmod, inf, isfinite, isnan, nan
-from typing import NamedTuple, Protocol, TypeAlias
+from typing import Protocol, TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
@@ -240,8 +240,14 @@ def change_between(quantity: Quantity, reads: Mapping[str, Callable[[Nanos], flo
     return _Search(quantity, {name: _Read(read) for name, read in reads.items()}, _unknown).between(begin, end)
 
 
-class _Read(NamedTuple):
-    value: Callable[[Nanos], float]
+class _Read:
+    __slots__ = ("_read",)
+
+    def __init__(self, read: Callable[[Nanos], float]) -> None:
+        self._read = read
+
+    def value(self, now: Nanos) -> float:
+        return self._read(now)
 
     def turns(self, now: Nanos) -> Iterator[Nanos]:
         yield from ()

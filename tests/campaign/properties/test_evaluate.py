@@ -20,7 +20,7 @@ from steptwin.campaign.properties.tree import (
     CycleTime,
     Holding,
     Lasting,
-    Later,
+    Delayed,
     PropertyFormula,
     Tally,
     nodes,
@@ -59,7 +59,7 @@ def truth(node: PropertyFormula, signals: dict[Any, Values], t: int, *, open_is:
             if decided:
                 return word == "eventually"
             return (word == "always") if t + length <= end else open_is
-        case Later(length, inner):
+        case Delayed(length, inner):
             return of(inner, t + length, open_is) if t + length <= end else open_is
         case Holding(first, then, released):
             if released:

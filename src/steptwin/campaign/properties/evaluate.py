@@ -32,7 +32,7 @@ from steptwin.campaign.properties.tree import (
     CycleTime,
     Holding,
     Lasting,
-    Later,
+    Delayed,
     PropertyFormula,
     Tally,
 )
@@ -71,7 +71,7 @@ class Evaluation:
                 return reduce(least if word == "and" else greatest, parts)
             case Lasting():
                 return self._lasting(node, undecided)
-            case Later(length, inner):
+            case Delayed(length, inner):
                 return later(self.course(inner, undecided=undecided), length, 1.0 if undecided else -1.0)
             case Holding(first, then, released):
                 a, b = self.course(first, undecided=not released), self.course(then, undecided=released)
@@ -170,7 +170,7 @@ class Evaluation:
                     return (end, node) if reached is None else self.decided(inner, reached, undecided=below)
                 failed = _first(course, moment, end, lambda one: one <= 0.0) if value <= 0.0 else None
                 return self.decided(inner, _lowest(course, moment, end) if failed is None else failed, undecided=below)
-            case Later(length, inner) if moment + length <= self.end:
+            case Delayed(length, inner) if moment + length <= self.end:
                 return self.decided(inner, moment + length, undecided=undecided)
             case Holding(first, _, released) if value <= 0.0 and not released:
                 failed = _first(self.course(first), moment, self.end, lambda one: one <= 0.0)

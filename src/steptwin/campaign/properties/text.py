@@ -28,7 +28,7 @@ from steptwin.campaign.properties.tree import (
     CycleTime,
     Holding,
     Lasting,
-    Later,
+    Delayed,
     PropertyFormula,
     Tally,
 )
@@ -60,7 +60,7 @@ SIGNALS = ("time", "idle")
 """Signals whose names have no dot."""
 SIGNS = ("==", "!=", "<=", ">=", "<", ">")
 _BESIDE = (*SIGNS, "+", "-", "*", "/", "%")
-_FORMULAS = (Atom, Combination, Lasting, Later, Holding, Becoming, Tally, CycleTime)
+_FORMULAS = (Atom, Combination, Lasting, Delayed, Holding, Becoming, Tally, CycleTime)
 
 
 @lru_cache(maxsize=512)
@@ -185,7 +185,7 @@ class _PropertyParser(ConditionParser):
 
     def _timed(self, word: str, length: Nanos) -> PropertyFormula:
         inner = self._formula(self._implied())
-        return Lasting("eventually", length, inner) if word == "within" else Later(length, inner)
+        return Lasting("eventually", length, inner) if word == "within" else Delayed(length, inner)
 
     def _response(self) -> PropertyFormula:
         trigger = self._formula(self._either())

@@ -55,14 +55,14 @@ class Lasting:
 
 
 @dataclass(frozen=True, slots=True)
-class Later:
+class Delayed:
     """``inner`` at the moment ``length`` ns after each moment."""
 
     length: Nanos
     inner: PropertyFormula
 
-    def negated(self) -> Later:
-        return Later(self.length, self.inner.negated())
+    def negated(self) -> Delayed:
+        return Delayed(self.length, self.inner.negated())
 
     def parts(self) -> tuple[PropertyFormula, ...]:
         return (self.inner,)
@@ -132,7 +132,7 @@ class CycleTime:
         return self.begin, self.end
 
 
-PropertyFormula: TypeAlias = Atom | Combination | Lasting | Later | Holding | Becoming | Tally | CycleTime
+PropertyFormula: TypeAlias = Atom | Combination | Lasting | Delayed | Holding | Becoming | Tally | CycleTime
 
 
 def nodes(formula: PropertyFormula) -> Iterator[PropertyFormula]:

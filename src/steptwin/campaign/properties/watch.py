@@ -11,7 +11,7 @@ from steptwin.campaign.properties.ready import check_ready, formula_of
 from steptwin.campaign.properties.recording import ComparisonRecord
 from steptwin.campaign.properties.slopes import TINY, Shape, Slope, shortest, value_at
 from steptwin.campaign.properties.text import parse_property
-from steptwin.campaign.properties.tree import Atom, CycleTime, Holding, Lasting, Later, PropertyFormula, Tally, measured, nodes
+from steptwin.campaign.properties.tree import Atom, CycleTime, Holding, Lasting, Delayed, PropertyFormula, Tally, measured, nodes
 from steptwin.campaign.properties.words import formula_text, found_text
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
@@ -147,7 +147,7 @@ class PropertyWatch:
             value = value_at(found.course(by), moment)
             return f"{found_text(recording.node, value, recording.scale, recording.unit)} at {at}"
         text = formula_text(by)
-        if isinstance(by, Lasting | Holding | Later):
+        if isinstance(by, Lasting | Holding | Delayed):
             return f"{text}: not come true by {at}"
         return f"{text}: not so at {at}"
 
@@ -170,5 +170,5 @@ def _shaped(formula: PropertyFormula) -> frozenset[Atom]:
     the moments at which they change."""
     counted = {one for node in nodes(formula) if isinstance(node, CycleTime | Tally) for one in nodes(node)}
     atoms = {node for node in nodes(formula) if isinstance(node, Atom)} - counted
-    windows = any(isinstance(node, Later) or (isinstance(node, Lasting) and node.length is not None) for node in nodes(formula))
+    windows = any(isinstance(node, Delayed) or (isinstance(node, Lasting) and node.length is not None) for node in nodes(formula))
     return frozenset(atoms) if windows or len(atoms) > 1 else frozenset()

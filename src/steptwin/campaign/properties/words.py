@@ -9,7 +9,7 @@ from steptwin.campaign.properties.tree import (
     CycleTime,
     Holding,
     Lasting,
-    Later,
+    Delayed,
     PropertyFormula,
     Tally,
 )
@@ -73,7 +73,7 @@ def formula_text(node: PropertyFormula) -> str:
         case Lasting(word, int() as length, inner):
             text, time = _inner_text(inner), duration_text(length)
             return f"within {time} {text}" if word == "eventually" else f"{text} for {time}"
-        case Later(length, inner):
+        case Delayed(length, inner):
             return f"at {duration_text(length)} {_inner_text(inner)}"
         case Holding(first, then, released):
             return f"{_inner_text(first)} {'unless' if released else 'until'} {_inner_text(then)}"
