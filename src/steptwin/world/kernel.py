@@ -6,39 +6,23 @@ advanced only when an event concerns it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple
 
 from steptwin.errors import Misuse, Runaway, TimeReversal
 from steptwin.machine import Drive, Fact, MotionController, Nanos, PinEdge
-from steptwin.state import Plain
 from steptwin.world.board import Board
 from steptwin.world.followers import KernelFollowers
+from steptwin.world.kernelpart import KernelPart, KernelState
 from steptwin.world.order import successors, update_order
 from steptwin.world.recordedplans import RecordedPlans
 from steptwin.world.trace import RecordSink, TraceRecord
 from steptwin.world.turns import Dues, Turns
-from steptwin.world.wires import DelayedLevel, PinName, Wire, Wires
+from steptwin.world.wires import PinName, Wire, Wires
 
 MAX_ROUNDS_PER_INSTANT = 1000
 """Signals propagate in zero time; more rounds than this at one moment mean a feedback loop of wires."""
-
-
-class KernelPart(Protocol):
-    """A part between machines: mechanics, a switch, a source, a line. Its state is plain (`steptwin.state.Stateful`)."""
-
-    def deadline(self) -> Nanos | None:
-        """The time of its next event of its own, as for a machine."""
-        ...
-
-    def update(self, now: Nanos) -> None:
-        """Process events due by ``now`` and changes of what it watches, repeatedly until nothing changes. Levels go to
-        `Kernel.drive`."""
-        ...
-
-    def copy_state(self) -> Plain: ...
-    def set_state(self, plain: Plain) -> None: ...
 
 
 class Source(NamedTuple):
@@ -46,16 +30,6 @@ class Source(NamedTuple):
 
     kernel: Kernel
     name: str
-
-
-class KernelState(NamedTuple):
-    """State of a kernel, its machines and its parts."""
-
-    now: Nanos
-    machines: tuple[Any, ...]
-    parts: tuple[Plain, ...]
-    levels: Mapping[PinName, float]
-    delayed: tuple[DelayedLevel, ...]
 
 
 class Kernel:

@@ -10,7 +10,7 @@ from steptwin.machine import Nanos
 from steptwin.world.actions import ExternalInput
 from steptwin.world.blueprint import FileContents
 from steptwin.world.faults import Fault
-from steptwin.world.kernel import KernelState
+from steptwin.world.kernelpart import KernelState
 from steptwin.world.overrides import Overrides
 from steptwin.world.reports import ReportsState
 from steptwin.world.scripts import ScriptsState

@@ -30,9 +30,9 @@ from steptwin.campaign.properties.tree import (
     Becoming,
     Combination,
     CycleTime,
+    Delayed,
     Holding,
     Lasting,
-    Delayed,
     PropertyFormula,
     Tally,
 )

@@ -26,9 +26,9 @@ from steptwin.campaign.properties.tree import (
     Becoming,
     Combination,
     CycleTime,
+    Delayed,
     Holding,
     Lasting,
-    Delayed,
     PropertyFormula,
     Tally,
 )

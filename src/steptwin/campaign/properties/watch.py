@@ -11,7 +11,7 @@ from steptwin.campaign.properties.ready import check_ready, formula_of
 from steptwin.campaign.properties.recording import ComparisonRecord
 from steptwin.campaign.properties.slopes import TINY, Shape, Slope, shortest, value_at
 from steptwin.campaign.properties.text import parse_property
-from steptwin.campaign.properties.tree import Atom, CycleTime, Holding, Lasting, Delayed, PropertyFormula, Tally, measured, nodes
+from steptwin.campaign.properties.tree import Atom, CycleTime, Delayed, Holding, Lasting, PropertyFormula, Tally, measured, nodes
 from steptwin.campaign.properties.words import formula_text, found_text
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
