@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from steptwin.nearmiss import NearMiss
+from steptwin.nearmiss import NearMiss, alike
 
 
 @pytest.mark.parametrize(
@@ -44,3 +44,8 @@ def test_the_longest_word_and_the_most_words_that_are_looked_up() -> None:
     near = NearMiss()
     assert [near.of(f"abc{n:02d}x", [f"abc{n:02d}"]) for n in range(41)] == [*(f"abc{n:02d}" for n in range(40)), None]
     assert near.of("abc00x", []) == "abc00"  # known already
+
+
+def test_names_of_several_parts_are_compared_as_a_whole() -> None:
+    assert alike("M1_POSACT", ["M2_POS_ACT", "M1_POS_ACT", "M1_VEL_ACT", "OUT1"], 2) == ["M1_POS_ACT", "M2_POS_ACT"]
+    assert alike("M1_POSACT", ["OUT1"]) == []

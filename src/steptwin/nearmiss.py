@@ -6,6 +6,8 @@ from collections.abc import Iterable
 
 _BUDGET = 40
 """Most words looked up for one text: a text of unknown words only must not take quadratic time."""
+LIKE = 0.6
+"""The share of equal characters from which names are alike."""
 
 
 class NearMiss:
@@ -27,6 +29,14 @@ class NearMiss:
         """`` (did you mean 'pause'?)``, to follow the word, or nothing."""
         found = self.of(word, candidates)
         return "" if found is None else f" (did you mean {found!r}?)"
+
+
+def alike(word: str, candidates: Iterable[str], most: int = 3) -> list[str]:
+    """The candidates that are similar to a word as a whole, the most similar first: for names of several parts."""
+    from difflib import SequenceMatcher
+
+    likeness = {candidate: SequenceMatcher(None, word, candidate).ratio() for candidate in candidates}
+    return sorted((name for name in likeness if likeness[name] > LIKE), key=lambda name: (-likeness[name], name))[:most]
 
 
 def _nearest(key: str, candidates: Iterable[str]) -> str | None:

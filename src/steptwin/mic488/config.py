@@ -23,6 +23,7 @@ from steptwin.mic488.inifile import IniEntry, IniFile
 from steptwin.mic488.ranges import ValueRange
 from steptwin.mic488.registermap import Firmware
 from steptwin.mic488.registers import AXES, DEFAULT_FIRMWARE, INPUTS, firmware
+from steptwin.nearmiss import NearMiss
 
 PORTS = 2
 ANALOG_INPUTS = 2
@@ -353,14 +354,14 @@ class _ConfigReader:
         meant: set[str] = set()
         for header in file.headers:
             if header.section.lower() not in by_lower:
-                near = _near(header.section, missing)
+                near = NearMiss().of(header.section, missing)
                 yield _unknown(header.span, f"the section [{header.section}]", None if near is None else f"[{near}]")
                 meant |= set() if near is None else {header.section.lower()}
         for entry in file.entries:
             section = by_lower.get(entry.section.lower())
             names = known[section] if section is not None else set()
             if entry.section.lower() not in meant and entry.key.lower() not in {name.lower() for name in names}:
-                near = _near(entry.key, sorted(name for name in names if file.find(entry.section, name) is None))
+                near = NearMiss().of(entry.key, sorted(name for name in names if file.find(entry.section, name) is None))
                 yield _unknown(entry.key_span, f"[{section or entry.section}] {entry.key}", near)
 
 
@@ -371,12 +372,6 @@ def _no_configuration(file: IniFile) -> Diagnostic:
     line = text[first:].split("\n", 1)[0].rstrip()
     hint = f"expected: sections such as [Axis0]…[Axis{AXES - 1}], [IN0]…[IN{INPUTS - 1}], [AIN0], [AIN1], [WBC_PROGRAM]"
     return Diagnostic("C011", Severity.ERROR, Span(first, first + len(line)), "this is not a configuration of a MIC488", hint)
-
-
-def _near(name: str, there: list[str]) -> str | None:
-    import difflib
-
-    return next(iter(difflib.get_close_matches(name, there, n=1, cutoff=0.75)), None)
 
 
 def _unknown(span: Span, what: str, near: str | None) -> Diagnostic:

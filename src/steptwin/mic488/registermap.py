@@ -17,6 +17,7 @@ from typing import NamedTuple, Self
 from steptwin.errors import Misuse
 from steptwin.mic488.encoding import DINT_MAX, DINT_MIN, WORD_MAX
 from steptwin.mic488.ranges import FINITE, ValueRange
+from steptwin.nearmiss import alike
 from steptwin.wire import pdu
 
 LAST_ADDRESS = 0xFFFF
@@ -325,10 +326,7 @@ class RegisterMap:
         found = self._names.get(name.upper())
         if found is not None:
             return found
-        from difflib import SequenceMatcher
-
-        likeness = {known: SequenceMatcher(None, name.upper(), known).ratio() for known in self._names}
-        near = sorted((known for known in likeness if likeness[known] > 0.6), key=lambda known: (-likeness[known], known))[:3]
+        near = alike(name.upper(), self._names)
         hint = f"; did you mean {', '.join(near)}?" if near else ""
         raise UnknownRegister(f"firmware {self.firmware.name} has no register named {name!r}{hint}")
 
