@@ -77,7 +77,7 @@ def clients(live: LiveWorld) -> Generator[Callable[[], None]]:
 def test_clients_that_ask_leave_nothing_behind() -> None:
     live = live_world()
     with clients(live) as work:
-        assert grown(work, scaled(REQUESTS) // 3 + 1) < FEW_BLOCKS
+        assert grown(work, scaled(10 * REQUESTS) // 3 + 1) < FEW_BLOCKS
     assert live.world.inputs == []
 
 
