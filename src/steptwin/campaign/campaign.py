@@ -45,7 +45,7 @@ SUFFIX = ".results"
 
 
 class CampaignProgress(NamedTuple):
-    """``total``: None where nobody knows. ``rate``: runs per second of the wall, since the begin."""
+    """``total``: None if it is unknown. ``rate``: runs per second of the wall, since the begin."""
 
     done: int
     failed: int

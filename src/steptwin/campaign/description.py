@@ -54,7 +54,7 @@ class Measure:
 
 @dataclass(frozen=True, slots=True)
 class MatrixRules:
-    """How effects are told. ``done``: a condition that is true at the end of a run that made its parts; None: the run ends as
+    """Rules for effects. ``done``: a condition that is true at the end of a run that made its parts; None: the run ends as
     that without a fault, and no wait of a script has run out of time. ``alarm``: how the machine says that it noticed something.
     """
 

@@ -15,7 +15,7 @@ from steptwin.motion.profile import Profile
 from steptwin.world.trace import TraceRecord
 
 LATER = 0.01
-"""A run that takes a greater share longer than that without a fault is told to be later."""
+"""A run is later if it exceeds the duration of the run without a fault by more than this share."""
 COLLISION = "collision"
 
 

@@ -18,7 +18,7 @@ from steptwin.campaign.case import EXPECTATIONS, WAITS, Case, CaseResult, FaultA
 T = TypeVar("T")
 
 MOST_RUNS = 400
-"""Runs that shrinking one failure takes at most, unless told otherwise."""
+"""The largest number of runs for shrinking one failure, by default."""
 ADDED = -1
 """The table of faults and steps that are of no table of the description of a campaign."""
 ERROR = "error"

@@ -13,7 +13,7 @@ from steptwin.inputfiles import read_recorded
 
 REPORT = "report.json"
 SURE = 0.05
-"""A difference of pass rates that chance makes less often than this is told as one."""
+"""A difference of pass rates is reported if its probability by chance is below this."""
 
 
 def compare(before: Path, after: Path) -> dict[str, Any]:

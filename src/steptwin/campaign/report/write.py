@@ -20,7 +20,7 @@ from steptwin.files.textfiles import write_bytes
 SHRINKING_S = 60.0
 """The wall time for making failures simpler."""
 MOST_FAILED = 2000
-"""Failed runs whose causes are told apart."""
+"""Failed runs whose causes are distinguished."""
 FAILURES = "failures"
 
 

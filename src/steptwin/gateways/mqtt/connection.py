@@ -125,7 +125,7 @@ class BrokerConnection:
         loop = asyncio.get_running_loop()
         pause = FIRST_PAUSE_S
         told = ""
-        """Why there is no connection; the same reason is told once."""
+        """Why there is no connection; the same reason is reported once."""
 
         def connected() -> None:
             nonlocal told

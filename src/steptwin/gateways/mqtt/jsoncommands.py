@@ -61,7 +61,7 @@ class Doorkeeper:
 
 @dataclass(frozen=True, slots=True)
 class JsonRequest:
-    """``sender``: whatever tells one client from another, such as where it wants the answer."""
+    """``sender``: what distinguishes one client from another, such as where it wants the answer."""
 
     payload: bytes
     is_retained: bool

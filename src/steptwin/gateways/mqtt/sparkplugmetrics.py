@@ -27,7 +27,7 @@ TYPES: Mapping[PointType, SparkplugType] = {
 
 @dataclass(frozen=True, slots=True)
 class MetricRow:
-    """A metric as its birth tells it. ``alias`` is unique in the edge node."""
+    """A metric as the birth message describes it. ``alias`` is unique in the edge node."""
 
     name: str
     alias: int
