@@ -7,7 +7,8 @@ from typing import Any, cast
 
 import pytest
 
-from steptwin.devices.device import ConnectedDevice, DeviceSurroundings
+from steptwin.devices.device import MOST_WAITING, ConnectedDevice, DeviceSurroundings
+from steptwin.drivers.subject import RawEffect
 from steptwin.errors import Refusal
 from steptwin.machine import SECOND
 from steptwin.subject import commands as command
@@ -23,6 +24,9 @@ class Device:
     def __init__(self) -> None:
         self.is_read = asyncio.Event()
         self.is_asked = asyncio.Event()
+
+    def effect_of(self, request: steps.Request) -> RawEffect:
+        return {3: RawEffect.LOOK, 5: RawEffect.STOP}.get(request.pdu[0], RawEffect.WRITE)
 
     async def settings_text(self) -> str:
         self.is_asked.set()
@@ -110,6 +114,31 @@ def test_settings_that_took_long_do_not_begin_a_motion() -> None:
         with pytest.raises(Refusal, match="it has waited more than 5 s; repeat it"):
             await task
         assert rig.subject.done == []
+        await rig.shown.close()
+
+    asyncio.run(story())
+
+
+def request(function: int) -> steps.Request:
+    return steps.Request("line", 1, bytes((function, 0, 0, 0, 1)), SECOND)
+
+
+def test_raw_requests_wait_in_order_reads_do_not_and_a_stop_overtakes_them() -> None:
+    async def story() -> None:
+        rig = Rig()
+        task, _ = await rig.write()
+        waiting = [asyncio.create_task(rig.shown._do(request(6))) for _ in range(MOST_WAITING)]
+        await asyncio.sleep(0)
+        with pytest.raises(Refusal, match="request was not sent: 16 commands wait already"):
+            await rig.shown._do(request(6))
+        await rig.shown._do(request(3))
+        await rig.shown._do(request(5))
+        assert rig.subject.done == [request(3), request(5)]
+        rig.device.is_read.set()
+        ended = await asyncio.gather(task, *waiting, return_exceptions=True)
+        assert {str(one).partition(": ")[2] for one in ended} == {"a stop was requested meanwhile"}
+        await rig.shown._do(request(6))
+        assert rig.subject.done == [request(3), request(5), request(6)]
         await rig.shown.close()
 
     asyncio.run(story())

@@ -15,10 +15,11 @@ from steptwin.drivers.blocking import finish
 from steptwin.drivers.m1486.subject import M1486Part
 from steptwin.drivers.mic488.subject import Mic488Part
 from steptwin.drivers.mic488.sync import Mic488
-from steptwin.drivers.subject import AsyncDeviceSubject, DeviceSubject
+from steptwin.drivers.subject import AsyncDeviceSubject, DeviceSubject, RawEffect
 from steptwin.errors import LineFailure, Misuse, Refusal
 from steptwin.machine import SECOND
 from steptwin.mic488.device import Mic488Device
+from steptwin.mic488.registers import register_map
 from steptwin.mic488.status import ControllerStatus
 from steptwin.subject import commands as command
 from steptwin.subject.commands import row_of
@@ -344,3 +345,29 @@ def test_what_a_program_does_is_an_event(table: DeviceSubject, rig: Rig) -> None
 def test_a_request_that_is_none_is_not_sent(table: DeviceSubject, request_: bytes) -> None:
     with pytest.raises(Misuse, match=f"pdu = {request_.hex()}: "):
         table.do(do.Request("bus", 1, request_, SECOND))
+
+
+@pytest.mark.parametrize(
+    ("pdu", "effect"),
+    [
+        ("0300000001", RawEffect.LOOK),
+        ("0507d4ff00", RawEffect.STOP),  # M1_STOP ON
+        ("0507d40000", RawEffect.WRITE),
+        ("0507d80000", RawEffect.STOP),  # M1_JOG_PLUS OFF
+        ("0507d8ff00", RawEffect.WRITE),
+        ("100064000102", RawEffect.WRITE),  # cut
+    ],
+)
+def test_raw_requests_that_stop_are_known(rig: Rig, pdu: str, effect: RawEffect) -> None:
+    part = Mic488Part(rig.mic._driver)
+    assert part.effect_of(do.Request("bus", 1, bytes.fromhex(pdu), SECOND)) is effect
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "effect"), [("M_STOP", 1, "stop"), ("PROGRAM_CTRL", 0, "stop"), ("PROGRAM_CTRL", 1, "write")]
+)
+def test_writes_of_words_that_stop_are_known(rig: Rig, key: str, value: int, effect: str) -> None:
+    part = Mic488Part(rig.mic._driver)
+    address = register_map("1.70").of(key).address
+    pdu = bytes((6,)) + address.to_bytes(2, "big") + value.to_bytes(2, "big")
+    assert part.effect_of(do.Request("bus", 1, pdu, SECOND)).value == effect

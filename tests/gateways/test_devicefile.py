@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from steptwin.gateways.devicefile import DeviceSpec, read_device_file
@@ -35,3 +37,18 @@ def test_mistakes_are_reported(text: str, message: str) -> None:
     with pytest.raises(WorldError) as error:
         read_device_file("cell.toml", text)
     assert message in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("address", "found"),
+    [
+        ("/dev/ttyUSB0,unit=2,config=a.cfg", "/dev/ttyUSB0,unit=2,config=/cell/a.cfg"),
+        ("COM3, config=/b/a.cfg", "COM3,config=/b/a.cfg"),
+        (
+            "tls://host:802?certificate=a.pem&key=keys/a%20b.pem&trusted=/c.pem,unit=3",
+            "tls://host:802?certificate=/cell/a.pem&key=/cell/keys/a+b.pem&trusted=/c.pem,unit=3",
+        ),
+    ],
+)
+def test_files_of_an_address_are_beside_the_file(address: str, found: str) -> None:
+    assert DeviceSpec("table", address).beside(Path("/cell")).address == found

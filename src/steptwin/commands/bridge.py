@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,10 +15,11 @@ from steptwin.commands.keptsettings import keep_settings
 from steptwin.commands.without_world import serve_without_world
 from steptwin.devices.composite import CompositeSubject
 from steptwin.devices.connections import Computer, DeviceConnections
-from steptwin.devices.device import DeviceSurroundings
+from steptwin.devices.device import RECONNECT_S, DeviceSurroundings
+from steptwin.errors import LineFailure
 from steptwin.eventloop import result_of
 from steptwin.gateways.contract import CommandLog, PastValues
-from steptwin.gateways.devicefile import DeviceFile, read_device_file
+from steptwin.gateways.devicefile import DeviceFile, DeviceSpec, read_device_file
 from steptwin.inputfiles import read_bytes
 from steptwin.later import start
 from steptwin.live.server import Server
@@ -61,10 +62,28 @@ async def _open(server: Server, wanted: DeviceFile, file: Path, audit: Audit | N
     connections = DeviceConnections(subject, around, Computer(ports=_no_ports, find=find_device))
     server.join(connections)
     for device in wanted.devices:
-        await connections.open(device.address, device.name)
+        await open_device(connections, device.beside(file.parent), server.notice)
     devices = _Devices(wanted.name, subject)
     devices.audit = recording(audit, now)
     await open_gateways(server, wanted.gateways, wanted.history, file.parent, devices, listen_any=listen_any)
+
+
+async def open_device(connections: DeviceConnections, device: DeviceSpec, notice: Callable[[str], None]) -> None:
+    """Waits for a device that does not answer: what is served begins with its description."""
+    pause_s, is_told = RECONNECT_S[0], False
+    while True:
+        try:
+            await connections.open(device.address, device.name)
+        except LineFailure as failure:
+            if not is_told:
+                notice(f"{device.name}: {failure}; nothing is served before it is there")
+            is_told = True
+            await asyncio.sleep(pause_s)
+            pause_s = min(2.0 * pause_s, RECONNECT_S[1])
+        else:
+            if is_told:
+                notice(f"{device.name}: it is there")
+            return
 
 
 def _no_ports() -> Sequence[dict[str, object]]:

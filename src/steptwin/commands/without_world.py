@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable, Coroutine
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
@@ -29,7 +30,7 @@ class _Nothing:
         return None
 
 
-async def serve_without_world(ready_file: Path | None, addition: Callable[[Server], Awaitable[None]]) -> None:
+async def serve_without_world(ready_file: Path | None, addition: Callable[[Server], Coroutine[Any, Any, None]]) -> None:
     """Serve what ``addition`` opens until SIGINT, SIGTERM or SIGHUP."""
     with ExitStack() as stack:
         output = Output(sys.stdout)
@@ -38,7 +39,8 @@ async def serve_without_world(ready_file: Path | None, addition: Callable[[Serve
             clear_ready_file(ready_file)
         server = Server(Cell(_Nothing(), Clock()), output.line)
         try:
-            await addition(server)
+            if not await server.unless_ended(addition(server)):
+                return
             if ready_file is not None:
                 server.write_ready_file(ready_file)
             for end_point in server.end_points:

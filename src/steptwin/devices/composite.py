@@ -16,6 +16,7 @@ from steptwin.subject.contract import UNKNOWN, Description, Reading, Result
 from steptwin.subject.events import Event, Numbering
 from steptwin.subject.following import Filter, Followers, Following
 from steptwin.subject.jogs import Held
+from steptwin.world import script as steps
 
 TIME = "time"
 
@@ -74,6 +75,9 @@ class CompositeSubject:
     def _describe(self) -> None:
         all_of = [part.description for part in self._parts]
         self._of_machine = {machine.name: part for part in self._parts for machine in part.description.machines}
+        self._of_unit = {
+            (machine.line, machine.unit): part for part in self._parts for machine in part.description.machines if machine.is_real
+        }
         self._of_line = {line.name: part for part in reversed(self._parts) for line in part.description.lines}
         can = {name for one in all_of for name in one.commands}
         machines = tuple(machine for one in all_of for machine in one.machines)
@@ -97,6 +101,8 @@ class CompositeSubject:
     def _part_of(self, wanted: Command) -> SubjectPart:
         """Raises `Misuse`, and `Refusal` if no part can execute it."""
         found: list[SubjectPart] = []
+        if isinstance(wanted, steps.Request) and (there := self._of_unit.get((wanted.line, wanted.unit))) is not None:
+            return there  # several devices share the line
         for field in row_of(wanted).fields:
             value: Any = getattr(wanted, field.key)
             if field.name == "machine" and value is not None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from steptwin.devices.jog import LeasedJog
 from steptwin.devices.shadow import Known, Shadow
-from steptwin.drivers.subject import AsyncDeviceSubject, DevicePart
+from steptwin.drivers.subject import AsyncDeviceSubject, DevicePart, RawEffect
 from steptwin.errors import LineFailure, Refusal, SteptwinError
 from steptwin.eventloop import later
 from steptwin.machine import SECOND, Nanos
@@ -31,6 +31,8 @@ WATCHED_NS: Nanos = 2 * SECOND
 """A point that was not read for so long is asked for no more."""
 RECONNECT_S = (0.5, 5.0)
 """Pause after the first failure, doubled after each further one, up to the second."""
+MOST_WAITING = 16
+"""Commands that wait for those before them; further ones are refused."""
 PATIENCE_NS: Nanos = 5 * SECOND
 """A command that has waited longer for those before it is not sent."""
 REGISTERS_NS: Nanos = 5 * SECOND
@@ -64,6 +66,7 @@ class ConnectedDevice:
         """Points, and when they were read last."""
         self._turn = asyncio.Lock()
         self._stops = 0
+        self._waiting = 0
         self._is_kept = False
         self._jogs: dict[int, LeasedJog] = {}
         self._jog_turns: dict[int, asyncio.Lock] = {}
@@ -158,21 +161,35 @@ class ConnectedDevice:
 
     async def _do(self, wanted: Command) -> Result:
         try:
-            if _is_stop(wanted):
+            if self._is_stop(wanted):
                 self._stops += 1
                 return await self._execute(wanted)
             if self.lost is not None:
                 raise LineFailure(f"{row_of(wanted).name} was not sent: the connection is lost ({self.lost})")
-            if type(wanted) in LOOKS:
+            if type(wanted) in LOOKS or self._effect_of(wanted) is RawEffect.LOOK:
                 return await self._subject.do(wanted)
             return await self._in_turn(wanted)
         finally:
             self._wanted.set()  # what it has changed is looked at soon
 
+    def _is_stop(self, wanted: Command) -> bool:
+        return _is_stop(wanted) or self._effect_of(wanted) is RawEffect.STOP
+
+    def _effect_of(self, wanted: Command) -> RawEffect | None:
+        """Of a raw request."""
+        return self._device.effect_of(wanted) if isinstance(wanted, steps.Request) else None
+
     async def _in_turn(self, wanted: Command) -> Result:
         """One after the other, in the order in which they came."""
         stops, asked = self._stops, self._around.clock()
-        async with self._turn:
+        if self._waiting >= MOST_WAITING:
+            raise Refusal(f"{row_of(wanted).name} was not sent: {MOST_WAITING} commands wait already")
+        self._waiting += 1
+        try:
+            await self._turn.acquire()
+        finally:
+            self._waiting -= 1
+        try:
             self._refuse_late(wanted, stops, asked)
             if type(wanted) in WRITES and not self._is_kept:
                 await self._keep_settings()
@@ -181,6 +198,8 @@ class ConnectedDevice:
             if type(wanted) is command.Move:
                 self._look_away()
             return result
+        finally:
+            self._turn.release()
 
     async def _execute(self, wanted: Command) -> Result:
         """Also by the twin beside it."""

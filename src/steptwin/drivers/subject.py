@@ -12,6 +12,7 @@ are followers.
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Mapping, Sequence
+from enum import Enum
 from types import TracebackType
 from typing import Any, Protocol, TypeAlias
 
@@ -30,12 +31,21 @@ from steptwin.subject.devicetwin import DeviceTwin
 from steptwin.subject.events import Event, Numbering
 from steptwin.subject.following import EventBatch, Filter, Followers, Following
 from steptwin.subject.payloads import Payload, SamplePayload
+from steptwin.world import script as steps
 
 PERIOD_S = 0.2
 PERIODS_S = (0.02, 60.0)
 DeviceAction: TypeAlias = Callable[[Any], Awaitable[object]]
 ValueAndUnit: TypeAlias = tuple[float | None, str]
 """The value of a point, None if unknown; and its unit."""
+
+
+class RawEffect(Enum):
+    """What a raw request does."""
+
+    LOOK = "look"
+    WRITE = "write"
+    STOP = "stop"
 
 
 class DevicePart(Protocol):
@@ -76,6 +86,10 @@ class DevicePart(Protocol):
 
     def unit_of(self, point: str) -> str:
         """The unit of a point. Raises `Misuse` for an unknown point."""
+        ...
+
+    def effect_of(self, request: steps.Request) -> RawEffect:
+        """Of a raw request, of which nothing else is known."""
         ...
 
     def actions(self) -> Mapping[type, DeviceAction]:

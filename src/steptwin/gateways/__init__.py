@@ -31,6 +31,7 @@ KINDS: Mapping[str, _GatewayModule] = complete(
         "prometheus": _GatewayModule("steptwin.gateways.prometheus", "metrics"),
         "opcua": _GatewayModule("steptwin.gateways.opcua.gateway", "opcua"),
         "epics": _GatewayModule("steptwin.gateways.epics.gateway", "epics"),
+        "modbus": _GatewayModule("steptwin.gateways.modbus", ""),
         "mqtt": _GatewayModule("steptwin.gateways.mqtt.gateway", "mqtt"),
     },
 )

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import parse_qsl, urlencode, urlsplit
 
 from steptwin.world.gateways import GATEWAY, GatewaySpec, read_gateways
 from steptwin.world.historytable import HISTORY, HistorySpec, read_history
@@ -22,6 +24,16 @@ BRIDGE_KEYS = (optional(name_value, "name", "how the devices are called together
 class DeviceSpec:
     name: str
     address: str
+
+    def beside(self, folder: Path) -> DeviceSpec:
+        """The same, with files in its address relative to ``folder``."""
+        place, *options = self.address.split(",")
+        if place.startswith("tls://"):
+            parts = urlsplit(place)
+            files = {name: str(folder / value) for name, value in parse_qsl(parts.query)}
+            place = parts._replace(query=urlencode(files, safe="/")).geturl()
+        moved = [f"config={folder / one.strip()[7:]}" if one.strip().startswith("config=") else one for one in options]
+        return DeviceSpec(self.name, ",".join([place, *moved]))
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ import json
 import logging
 import os
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -177,6 +177,18 @@ class Server:
         """End the server with an error."""
         self._failure = self._failure or reason
         self._ended.set()
+
+    async def unless_ended(self, work: Coroutine[Any, Any, None]) -> bool:
+        """Wait for ``work``, which is cancelled if the server is to end before. Returns whether it was done; raises its error."""
+        task, ended = asyncio.create_task(work), asyncio.create_task(self._ended.wait())
+        await asyncio.wait((task, ended), return_when=asyncio.FIRST_COMPLETED)
+        ended.cancel()
+        is_done = task.done()
+        task.cancel()
+        await asyncio.wait((task, ended))
+        if is_done:
+            task.result()
+        return is_done
 
     async def until_ended(self) -> None:
         """Serve until SIGINT, SIGTERM or SIGHUP. Raises `LineFailure` when the server could not go on."""

@@ -123,6 +123,14 @@ class EpicsSpec(ListeningSpec):
     otherwise viewer."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModbusSpec(ListeningSpec):
+    units: Mapping[str, int]
+    """Of controllers by name, for those that have another one here than on their line."""
+    role: str | None
+    """Of masters; None: engineer where only this computer is served, otherwise viewer."""
+
+
 class _GatewayReader(NamedTuple):
     rows: TableRows
     make: Callable[..., GatewaySpec]
@@ -188,6 +196,18 @@ def _sparkplug(value: Any) -> SparkplugSpec:
     return SparkplugSpec(**{name: _id(given) for name, given in value.items()})
 
 
+MOST_UNIT = 247
+
+
+def _units(value: Any) -> Mapping[str, int]:
+    if not isinstance(value, Mapping):
+        raise Misuse(f"{value!r}: expected {{ CONTROLLER = UNIT, ... }}")
+    for name, unit in value.items():
+        if not isinstance(unit, int) or isinstance(unit, bool) or not 1 <= unit <= MOST_UNIT:
+            raise Misuse(f"{name} = {unit!r}: units are 1 to {MOST_UNIT}")
+    return dict(value)
+
+
 _KINDS: Mapping[str, _GatewayReader] = {
     "prometheus": _GatewayReader(_rows("prometheus", "127.0.0.1:9488"), ListeningSpec),
     "opcua": _GatewayReader(
@@ -219,6 +239,15 @@ _KINDS: Mapping[str, _GatewayReader] = {
             need={"pva_beacons": "pva"},
         ),
         EpicsSpec,
+    ),
+    "modbus": _GatewayReader(
+        _rows(
+            "modbus",
+            "127.0.0.1:5020",
+            optional(_units, "units", "{ CONTROLLER = UNIT } of those that have another one here than on their line", {}),
+            optional(word(*ROLES), "role", "role of all masters"),
+        ),
+        ModbusSpec,
     ),
     "mqtt": _GatewayReader(
         TableRows(

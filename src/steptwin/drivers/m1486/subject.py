@@ -18,7 +18,7 @@ from steptwin.drivers.m1486.driver import AsyncM1486
 from steptwin.drivers.m1486.failures import Busy, PositionUnknown
 from steptwin.drivers.m1486.jog import AsyncM1486Jog
 from steptwin.drivers.m1486.talk import ChipRequest
-from steptwin.drivers.subject import DeviceAction, ValueAndUnit
+from steptwin.drivers.subject import DeviceAction, RawEffect, ValueAndUnit
 from steptwin.errors import Misuse, Refusal
 from steptwin.m1486.datasheet import axis, datasheet_of
 from steptwin.m1486.microsteps import FULL_STEP
@@ -123,6 +123,10 @@ class M1486Part:
         )
 
     # ------------------------------------------------------------------ commands
+
+    def effect_of(self, request: steps.Request) -> RawEffect:
+        """It takes none."""
+        return RawEffect.WRITE
 
     def actions(self) -> Mapping[type, DeviceAction]:
         return {

@@ -281,10 +281,10 @@ class AsyncMic488:
         """Raw holding registers."""
         return words(await self._unit.look(pdu.READ_HOLDING_REGISTERS, address, count))
 
-    async def request(self, request: pdu.ModbusRequest) -> pdu.ModbusResponse:
+    async def request(self, request: pdu.ModbusRequest, *, urgent: bool = False) -> pdu.ModbusResponse:
         """Send any request and return its answer. A write is sent only once, unless its registers are known to permit
-        repetition."""
-        return pdu.answer(request, await self._unit.ask(request))
+        repetition. ``urgent``: before those that wait."""
+        return pdu.answer(request, await self._unit.ask(request, urgent=urgent))
 
     # ------------------------------------------------------------------ snapshots
 

@@ -16,7 +16,7 @@ from steptwin.drivers.mic488.motion import MOVING, status_text
 from steptwin.drivers.mic488.program import ProgramState
 from steptwin.drivers.mic488.snapshot import COUNTERS
 from steptwin.drivers.modbus import ModbusQuery
-from steptwin.drivers.subject import DeviceAction, ValueAndUnit
+from steptwin.drivers.subject import DeviceAction, RawEffect, ValueAndUnit
 from steptwin.errors import Misuse, Refusal
 from steptwin.inputfiles import read_bytes
 from steptwin.mic488.datasheet import datasheet_of
@@ -186,6 +186,29 @@ class Mic488Part:
         for _, name, value in wanted.values:
             await self._mic.set(name, value)
 
+    def effect_of(self, request: steps.Request) -> RawEffect:
+        if request.pdu[:1] and request.pdu[0] in pdu.READS:
+            return RawEffect.LOOK
+        try:
+            decoded = pdu.decode_request(request.pdu)
+        except pdu.ModbusException:
+            return RawEffect.WRITE
+        return RawEffect.STOP if self._stops(decoded) else RawEffect.WRITE
+
+    def _stops(self, request: pdu.ModbusRequest) -> bool:
+        """Whether it stops axes or a program, or ends a jog."""
+        match request:
+            case pdu.WriteCoilRequest(address=address, on=on):
+                register = self._registers.find(Space.COIL, address)
+                return register is not None and register.key in (("STOP",) if on else ("JOG_PLUS", "JOG_MINUS"))
+            case pdu.WriteRegisterRequest(address=address, value=value):
+                register = self._registers.find(Space.HOLDING, address)
+                return register is not None and (
+                    register.key == "M_STOP" or (register.key == "PROGRAM_CTRL" and value != ProgramState.RUNNING)
+                )
+            case _:
+                return False
+
     async def _request(self, wanted: steps.Request) -> object:
         if wanted.unit != self.address:
             raise Misuse(f"unit = {wanted.unit}: this subject is the device with address {self.address}")
@@ -194,7 +217,8 @@ class Mic488Part:
         except pdu.ModbusException as error:
             raise Misuse(f"pdu = {wanted.pdu.hex()}: {error.detail or error}") from None
         try:
-            return {"pdu": pdu.encode_response(await self._mic.request(request)).hex()}
+            answer = await self._mic.request(request, urgent=self.effect_of(wanted) is RawEffect.STOP)
+            return {"pdu": pdu.encode_response(answer).hex()}
         except ModbusRefusal as refused:
             return {"pdu": pdu.exception_pdu(wanted.pdu[0], refused.code).hex()}
 
