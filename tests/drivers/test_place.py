@@ -11,8 +11,9 @@ from collections.abc import Callable
 
 import pytest
 
-from steptwin.drivers import LineLost, place
-from steptwin.drivers.place import SerialEndpoint, SocketChannel, TcpEndpoint, TimedSocketChannel, parse_line_address
+from steptwin.drivers import LineLost, tcp
+from steptwin.drivers.place import SerialEndpoint, parse_line_address
+from steptwin.drivers.tcp import SocketChannel, TcpEndpoint, TimedSocketChannel
 from steptwin.errors import Misuse
 from steptwin.wire.line import SerialLine
 
@@ -89,7 +90,7 @@ def listener() -> Callable[[Callable[[socket.socket], None]], str]:
 def test_a_socket_is_read_with_a_time_out(
     kind: type[SocketChannel], listener: Callable[..., str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(place, "CHANNEL", kind)
+    monkeypatch.setattr(tcp, "CHANNEL", kind)
     go = threading.Event()
 
     def talk(client: socket.socket) -> None:
@@ -122,7 +123,7 @@ def test_a_socket_is_read_with_a_time_out(
 def test_a_socket_that_was_closed_is_not_written_to(
     kind: type[SocketChannel], listener: Callable[..., str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(place, "CHANNEL", kind)
+    monkeypatch.setattr(tcp, "CHANNEL", kind)
     address = listener(lambda client: None)
     channel = parse_line_address(address, 38400).endpoint.open()
     with pytest.raises(LineLost, match="the other end closed the connection"):

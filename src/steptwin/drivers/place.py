@@ -6,14 +6,13 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import errno
-import socket
-import struct
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol, cast
+from typing import TYPE_CHECKING, cast
 from urllib.parse import parse_qsl, urlsplit
 
 from steptwin.drivers.exchange import LineLost
+from steptwin.drivers.tcp import READ_BYTES, Channel, Endpoint, TcpEndpoint
 from steptwin.errors import Misuse
 from steptwin.system import reason
 from steptwin.wire.line import SerialLine
@@ -21,39 +20,13 @@ from steptwin.wire.line import SerialLine
 if TYPE_CHECKING:
     from serialx import BaseSerial, BaseSerialTransport
 
-CONNECT_S = 3.0
 MODBUS_PORT, SECURE_PORT = 502, 802
-READ_BYTES = 4096
 BAUDS = (300, 1_000_000)
 FORMS = (
     "expected a serial port such as /dev/ttyUSB0 or COM3, tcp://HOST:PORT, rtu-tcp://HOST:PORT, rfc2217://HOST:PORT or "
     "tls://HOST:PORT?certificate=FILE&key=FILE&trusted=FILE"
 )
 TLS_FILES = ("certificate", "key", "trusted")
-
-
-class Channel(Protocol):
-    """Bytes to and from a line, for a thread that waits. All methods raise `LineLost` if the line is lost."""
-
-    def write(self, data: bytes) -> None: ...
-
-    def read(self, timeout_s: float) -> bytes:
-        """The received bytes; empty after ``timeout_s``."""
-        ...
-
-    def close(self) -> None: ...
-
-
-class Endpoint(Protocol):
-    """An address that can be opened. Its text is the address."""
-
-    def open(self) -> Channel:
-        """Open it for a thread. Raises `LineLost` with the address."""
-        ...
-
-    async def connect(self, make: Callable[[], asyncio.Protocol]) -> asyncio.Transport:
-        """Open it for a task. Raises `LineLost` with the address."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,111 +66,10 @@ def parse_line_address(text: str, baud: int) -> LineAddress:
             raise Misuse(f"{text!r} names no port: {FORMS}")
         port = MODBUS_PORT if scheme == "tcp" else SECURE_PORT
     if scheme == "tls":
-        from steptwin.drivers.tls import TlsEndpoint
+        from steptwin.drivers.tls import TlsEndpoint  # its library takes a while to import
 
         return LineAddress(TlsEndpoint(scheme, host, port, **dict(files)), framed=True)
     return LineAddress(TcpEndpoint(scheme, host, port), framed=scheme == "tcp")
-
-
-# ---------------------------------------------------------------------- TCP
-
-
-@dataclass(frozen=True, slots=True)
-class TcpEndpoint:
-    scheme: str
-    host: str
-    port: int
-
-    def __str__(self) -> str:
-        host = f"[{self.host}]" if ":" in self.host else self.host
-        return f"{self.scheme}://{host}:{self.port}"
-
-    def open(self) -> Channel:
-        try:
-            return CHANNEL(socket.create_connection((self.host, self.port), CONNECT_S), str(self))
-        except OSError as error:
-            raise self._failed(error) from error
-
-    async def connect(self, make: Callable[[], asyncio.Protocol]) -> asyncio.Transport:
-        loop = asyncio.get_running_loop()
-        try:
-            async with asyncio.timeout(CONNECT_S):
-                transport, _ = await loop.create_connection(make, self.host, self.port)
-        except OSError as error:
-            raise self._failed(error) from error
-        return transport
-
-    def _failed(self, error: OSError) -> LineLost:
-        why = f"no answer within {CONNECT_S:g} s" if isinstance(error, TimeoutError) else reason(error)
-        return LineLost(f"cannot connect to {self}: {why}")
-
-
-class SocketChannel:
-    """A connection with the time-out of the operating system, which saves a call for each exchange."""
-
-    def __init__(self, connected: socket.socket, place: str) -> None:
-        connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        connected.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-        connected.setblocking(True)
-        self._socket = connected
-        self._place = place
-        self._timeout_us = 0
-
-    def write(self, data: bytes) -> None:
-        try:
-            if self._send(data) < len(data):
-                raise BlockingIOError(errno.EAGAIN, "")
-        except BlockingIOError:
-            raise LineLost(f"{self._place}: the other end takes nothing any more") from None
-        except OSError as error:
-            raise LineLost(f"{self._place}: {reason(error)}") from error
-
-    def read(self, timeout_s: float) -> bytes:
-        try:
-            data = self._receive(timeout_s)
-        except BlockingIOError:
-            return b""
-        except OSError as error:
-            raise LineLost(f"{self._place}: {reason(error)}") from error
-        if not data:
-            raise LineLost(f"{self._place}: the other end closed the connection")
-        return data
-
-    def close(self) -> None:
-        self._socket.close()
-
-    def _send(self, data: bytes) -> int:
-        """Send without waiting; returns the number of bytes sent. Raises `BlockingIOError` if none can be."""
-        return self._socket.send(data, socket.MSG_DONTWAIT)
-
-    def _receive(self, timeout_s: float) -> bytes:
-        """Received bytes. Raises `BlockingIOError` if there are none within ``timeout_s``."""
-        timeout_us = int(timeout_s * 1e6)
-        flags = 0
-        if timeout_us <= 0:
-            flags = socket.MSG_DONTWAIT
-        elif timeout_us != self._timeout_us:
-            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, struct.pack("ll", *divmod(timeout_us, 1_000_000)))
-            self._timeout_us = timeout_us
-        return self._socket.recv(READ_BYTES, flags)
-
-
-class TimedSocketChannel(SocketChannel):
-    """The same for systems without non-blocking single calls (Windows)."""
-
-    def _send(self, data: bytes) -> int:
-        self._socket.settimeout(0.0)
-        return self._socket.send(data)
-
-    def _receive(self, timeout_s: float) -> bytes:
-        self._socket.settimeout(max(timeout_s, 0.0))
-        try:
-            return self._socket.recv(READ_BYTES)
-        except TimeoutError:
-            raise BlockingIOError(errno.EAGAIN, "") from None
-
-
-CHANNEL = SocketChannel if hasattr(socket, "MSG_DONTWAIT") else TimedSocketChannel
 
 
 # ---------------------------------------------------------------------- serial ports

@@ -10,7 +10,7 @@ from typing import Any, Generic, Self, cast
 
 from steptwin.drivers.exchange import A, Exchanger, Job, LineLost, Q
 from steptwin.drivers.line import LOCK_SLICE_S
-from steptwin.drivers.place import Endpoint
+from steptwin.drivers.tcp import Endpoint
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.system import reason

@@ -16,7 +16,7 @@ from typing import Any, Generic
 
 from steptwin.drivers.exchange import A, Exchanger, Job, LineLost, Q
 from steptwin.drivers.line import LOCK_SLICE_S
-from steptwin.drivers.place import Channel, Endpoint
+from steptwin.drivers.tcp import Channel, Endpoint
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 

@@ -8,7 +8,7 @@ import ssl
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from steptwin.drivers.place import CONNECT_S, Channel, TcpEndpoint, TimedSocketChannel
+from steptwin.drivers.tcp import CONNECT_S, Channel, TcpEndpoint, TimedSocketChannel
 from steptwin.errors import Misuse
 from steptwin.system import reason
 

@@ -12,7 +12,8 @@ import pytest
 
 from steptwin.drivers import m1486 as host
 from steptwin.drivers.address import parse_device
-from steptwin.drivers.place import Channel, parse_line_address
+from steptwin.drivers.place import parse_line_address
+from steptwin.drivers.tcp import Channel
 from steptwin.errors import Misuse
 from steptwin.files.beginning import set_faults
 from steptwin.files.world import World

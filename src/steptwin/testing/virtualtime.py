@@ -12,7 +12,8 @@ from steptwin.drivers import LineLost, Mic488
 from steptwin.drivers.m1486 import M1486
 from steptwin.drivers.m1486.lines import BAUD, TALK, talking
 from steptwin.drivers.mic488.lines import FRAMES_PER_SECOND, modbus_exchanger
-from steptwin.drivers.place import Channel, LineAddress
+from steptwin.drivers.place import LineAddress
+from steptwin.drivers.tcp import Channel
 from steptwin.drivers.threads import ThreadLine
 from steptwin.live.cell import Advanceable
 from steptwin.machine import MILLISECOND, SECOND, Nanos, Port

@@ -11,7 +11,8 @@ from typing import Any, Literal, NamedTuple, TypeVar
 
 from steptwin.drivers import Mic488
 from steptwin.drivers.address import parse_device
-from steptwin.drivers.place import Channel, parse_line_address
+from steptwin.drivers.place import parse_line_address
+from steptwin.drivers.tcp import Channel
 from steptwin.durations import duration
 from steptwin.errors import Misuse
 from steptwin.files.textfiles import read_text

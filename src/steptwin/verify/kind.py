@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Generic, NamedTuple
 
 from steptwin.drivers.kind import DeviceAddress
-from steptwin.drivers.place import Endpoint
+from steptwin.drivers.tcp import Endpoint
 from steptwin.verify.check import Check, CheckNeed
 from steptwin.verify.running import T
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from steptwin.drivers.kind import DeviceAddress
-from steptwin.drivers.place import Channel
+from steptwin.drivers.tcp import Channel
 from steptwin.errors import LineFailure
 from steptwin.verify.check import CheckNeed, CheckResult, CheckSteps, NotRestored
 from steptwin.verify.kind import ReadyChecks

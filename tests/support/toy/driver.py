@@ -21,7 +21,8 @@ from steptwin.drivers.kind import (
     WantedMoves,
 )
 from steptwin.drivers.kinds import DRIVERS, register
-from steptwin.drivers.place import Channel, parse_line_address
+from steptwin.drivers.place import parse_line_address
+from steptwin.drivers.tcp import Channel
 from steptwin.errors import LineFailure, Misuse, Refusal
 from toy.machine import STEP_P
 

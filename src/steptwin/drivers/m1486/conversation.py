@@ -11,7 +11,7 @@ from steptwin.drivers.m1486.failures import NoEcho
 from steptwin.drivers.m1486.lines import line_endpoint
 from steptwin.drivers.m1486.terminal import ChipTerminal, command_of
 from steptwin.drivers.m1486.wake import wake
-from steptwin.drivers.place import Channel
+from steptwin.drivers.tcp import Channel
 from steptwin.drivers.typed import number_of
 from steptwin.errors import LineFailure, Misuse, Refusal
 from steptwin.m1486.variants import variant

@@ -22,7 +22,7 @@ from steptwin.drivers.exchange import Exchanger, Job, NoAnswer
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.m1486.lines import line_endpoint
 from steptwin.drivers.m1486.talk import LETTERS, TYPE_QUERY
-from steptwin.drivers.place import Endpoint
+from steptwin.drivers.tcp import Endpoint
 from steptwin.drivers.threads import ThreadLine
 from steptwin.m1486.receiver import EMPTY, NO_ROOM, THREE_FREE
 from steptwin.m1486.variants import VARIANTS, Store, variant

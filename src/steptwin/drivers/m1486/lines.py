@@ -6,8 +6,9 @@ from collections.abc import Callable
 
 from steptwin.drivers.exchange import Exchanger
 from steptwin.drivers.m1486.talk import CharacterTalk, ChipRequest
-from steptwin.drivers.place import Endpoint, parse_line_address
+from steptwin.drivers.place import parse_line_address
 from steptwin.drivers.tasks import TaskLine
+from steptwin.drivers.tcp import Endpoint
 from steptwin.drivers.threads import ThreadLine
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos

@@ -8,7 +8,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 
-from steptwin.drivers.place import Channel
+from steptwin.drivers.tcp import Channel
 from steptwin.errors import LineFailure, Misuse
 from steptwin.m1486.functions import CARRY, FUNCTIONS, USER_FLAGS
 from steptwin.m1486.lines import INTERFACES

@@ -9,7 +9,7 @@ from steptwin.drivers.blocking import finish
 from steptwin.drivers.m1486.lines import TALK, talking
 from steptwin.drivers.m1486.talk import ChipRequest
 from steptwin.drivers.m1486.unit import ChipUnit
-from steptwin.drivers.place import Channel
+from steptwin.drivers.tcp import Channel
 from steptwin.drivers.threads import ThreadLine
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, Nanos
