@@ -268,6 +268,21 @@ to = "jaws.pick"
 name = "jaws"
 close = "table.OUT1"
 """
+VOLTAGE = """
+[[button]]
+name = "start"
+to = "table.IN5"
+[[source]]
+name = "oven"
+to = "table.AIN1"
+kind = "table"
+points = [[0, 1.0], [2, 6.0], [3, 5.5]]
+[[fault]]
+kind = "broken-wire"
+element = "oven"
+from_s = 2.2
+until_s = 2.7
+"""
 GAP = """
 [[transducer]]
 name = "gap"
@@ -299,6 +314,7 @@ def main() -> None:
     feeds = ((0.1, "OUT1=1"), (0.2, "OUT2=1"), (0.9, "OUT2=0"), (1.0, "OUT2=1"), (1.6, "OUT1=0"), (2.2, "OUT1=1"))
     fronts = "infeed.place1", "outfeed.place1"
     draw("conveyor", CONVEYOR, feeds, 3.4, fronts, ("table.OUT1", "table.OUT2", "table.IN5"))
+    draw("source", VOLTAGE, ((0.5, "start+"), (1.2, "start-")), 3.5, ("oven.volts",), ("start.pressed",))
     held = ((0.0, "OUT1=1"), (1.0, "OUT2=1"), (4.6, "OUT2=0"))
     draw("stop", STOP, held, 5.5, ("line.place1", "line.place2", "line.place3"), ("table.OUT2",))
     tries = ((0.1, "OUT1=1"), (0.5, "OUT1=0"), (0.6, "part+"), (0.8, "OUT1=1"), (1.3, "OUT1=0"))

@@ -129,6 +129,7 @@ name = "start"
 to = "table.IN9"
 bounce = "5 ms"
 [[source]]
+name = "oven"
 to = "table.AIN1"
 kind = "sine"
 value = 5.0

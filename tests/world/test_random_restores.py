@@ -128,7 +128,10 @@ PARTS = (
         "[[load]]\nname = 'i'\naxis = 'x'\nfriction_force = 60\nof = 'x.position'\npoints = [[10, 0.2], [60, 1]]\n"
         "[[fault]]\nkind = 'other-load'\nelement = 'm'\nfactor = 4\nfrom_s = 1.1\n"
     ),
-    "[[source]]\nto = 'c.AIN2'\nkind = 'sine'\nvalue = 5\namplitude = 2\nfrequency = 3\nperiod = '20 ms'\n",
+    (
+        "[[source]]\nname = 'vo'\nto = 'c.AIN2'\nkind = 'sine'\nvalue = 5\namplitude = 2\nfrequency = 3\nperiod = '20 ms'\n"
+        "[[fault]]\nkind = 'drift'\nelement = 'vo'\nfrom_s = 0.6\nuntil_s = 1.2\n"
+    ),
     (
         "[[button]]\nname = 'e'\nto = 'c.IN8'\nbounce = '3 ms'\n"
         "[[event]]\nevery = '370 ms'\nsteps = [{ press = 'e', for = '90 ms' }]\n"

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from mic488_rig import controller
 
 from steptwin.errors import Misuse
+from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.device import Mic488Device
 from steptwin.world.kernel import Kernel
@@ -126,3 +127,35 @@ def test_what_an_input_does_not_take_is_misuse(waveform: Waveform, period: int, 
         AnalogSource(kernel, PinName("m", "AIN2"), ConstantWaveform(bound), 1)
     with pytest.raises(Misuse, match="no pin 'AIN9'"):
         AnalogSource(kernel, PinName("m", "AIN9"), ConstantWaveform(1.0), 1)
+
+
+NAMED = """
+[[mic488]]
+name = "c"
+[[source]]
+name = "oven"
+to = "c.AIN1"
+kind = "ramp"
+end = 10
+over = "10 s"
+[[source]]
+to = "c.AIN2"
+value = 3.0
+"""
+
+
+def test_a_named_source_is_a_signal_and_has_faults() -> None:
+    world = World.from_toml(NAMED)
+    world.run(until="oven.volts > 2.5", for_="9 s")
+    # Renewed every 10 ms, by 10 mV.
+    assert (world.now, world.read("c.AIN1")) == (2510 * MILLISECOND, pytest.approx(2.51))
+    world.fault("drift element=oven volts=-1 until_s=1")
+    world.fault("broken-wire element=oven from_s=2 until_s=2.5")
+    for until, volts in ((3.0, 2.0), (4.0, 4.0), (4.6, 0.0), (5.5, 5.5)):
+        world.run(until=until)
+        assert world.read("c.AIN1") == world.read("oven.volts") == pytest.approx(volts)
+    assert world.read("c.AIN2") == 3.0
+    with pytest.raises(Misuse, match=r"no signal 'source\.volts'"):
+        world.read("source.volts")
+    with pytest.raises(Misuse, match="those that can fail are oven"):
+        world.fault("drift element=AIN2")

@@ -43,7 +43,7 @@ def describe(
 ) -> WorldSpec:
     """As `read_world`, but raises `WorldError` only for text that is not TOML. Other errors are kept in ``text`` of the result,
     because building the world may find more."""
-    named = ("line", *(element.name for element in ELEMENTS.values() if element.is_named))
+    named = ("line", *(element.name for element in ELEMENTS.values() if element.needs_name))
     toml = TomlText(name, text, tuple(KINDS), named)
     data = toml.data
     if is_piece(toml):
@@ -108,7 +108,7 @@ def _tables(toml: TomlText, kind: str, also: tuple[str, ...] = ()) -> list[tuple
         if any(key.is_required and (key.attribute or key.name) not in values for key in rows.keys):
             continue
         check_sense(toml, path, rows, table)
-        if values.get("name") is not None and values["name"] in names:
+        if values.get("name") and values["name"] in names:
             toml.wrong((*path, "name"), "D006", f"there is a [[{kind}]] named {values['name']!r} already")
         names.add(values.get("name", ""))
         found.append((values | {"path": path}, table))

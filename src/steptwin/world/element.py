@@ -35,7 +35,7 @@ class ElementSpec:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NamedSpec(ElementSpec):
-    """The specification of an element with a name."""
+    """The specification of an element with a name, which may be empty where its key is optional."""
 
     name: str
 
@@ -89,9 +89,14 @@ class Element(Generic[S, B]):
     is_named: bool = field(init=False)
     """Whether its table has a ``name``."""
 
+    @property
+    def needs_name(self) -> bool:
+        """Whether none of its tables is without a name."""
+        return any(key.name == "name" and key.is_required for key in self.rows.keys)
+
     def named(self, specs: Sequence[ElementSpec]) -> Sequence[NamedSpec]:
-        """``specs`` as named ones; empty for a kind without names."""
-        return cast("Sequence[NamedSpec]", specs) if self.is_named else ()
+        """Those of ``specs`` that have a name; none of a kind without names."""
+        return [spec for spec in cast("Sequence[NamedSpec]", specs) if spec.name] if self.is_named else ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "is_named", any(key.name == "name" for key in self.rows.keys))

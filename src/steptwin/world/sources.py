@@ -10,7 +10,7 @@ from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion.trig import sine
 from steptwin.state import Stateful
-from steptwin.world.kernel import Kernel
+from steptwin.world.kernel import Kernel, Source
 from steptwin.world.wires import PinName
 
 LOWEST_V, HIGHEST_V = 0.0, 10.0
@@ -103,10 +103,10 @@ class SineWaveform:
 class AnalogSource(Stateful):
     """Drives an analog input with the voltage of a waveform, updated every ``period``."""
 
-    __slots__ = ("_due", "_kernel", "_waveform", "period", "target")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_kernel", "_waveform", "period", "target"})
+    __slots__ = ("_due", "_kernel", "_plain", "_waveform", "is_broken", "name", "offset", "period", "target")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_kernel", "_waveform", "name", "period", "target"})
 
-    def __init__(self, kernel: Kernel, target: PinName, waveform: Waveform, period: Nanos) -> None:
+    def __init__(self, kernel: Kernel, target: PinName, waveform: Waveform, period: Nanos, name: str = "") -> None:
         kernel.check(target)
         if period < 1:
             raise Misuse(f"source of {target}: a period of {period} ns is not positive")
@@ -116,18 +116,34 @@ class AnalogSource(Stateful):
             raise Misuse(f"source of {target}: {volts} V: an analog input takes {LOWEST_V:g} to {HIGHEST_V:g} V")
         self._kernel = kernel
         self._waveform = waveform
+        self.name = name
         self.target = target
+        self.is_broken = False
+        """Fault: its wire is broken."""
+        self.offset = 0.0
+        """Fault: volts by which it is too high."""
+        self._plain = 0.0
+        """Volts of the waveform when it was renewed last."""
         self.period = period
         self._due: Nanos | None = kernel.now
 
+    @property
+    def source(self) -> Source:
+        return self._kernel.source(self.name)
+
+    def volts(self, now: Nanos) -> float:
+        """The voltage that it gives."""
+        if self.is_broken:
+            return LOWEST_V
+        volts = min(max(self._plain + self.offset, LOWEST_V), HIGHEST_V)
+        return int(volts / RESOLUTION_V + 0.5) * RESOLUTION_V
+
     def update(self, now: Nanos) -> None:
-        if self._due is None or self._due > now:
-            return
-        t_s = now / SECOND
-        # The bounds were checked: only rounding can exceed them.
-        volts = min(max(self._waveform.volts(t_s), LOWEST_V), HIGHEST_V)
-        self._kernel.drive(self.target, int(volts / RESOLUTION_V + 0.5) * RESOLUTION_V)
-        self._due = None if self._waveform.rests(t_s) else now + self.period
+        if self._due is not None and self._due <= now:
+            t_s = now / SECOND
+            self._plain = self._waveform.volts(t_s)
+            self._due = None if self._waveform.rests(t_s) else now + self.period
+        self._kernel.drive(self.target, self.volts(now))
 
     def deadline(self) -> Nanos | None:
         return self._due

@@ -39,7 +39,7 @@ def connections(parts: WorldParts) -> Iterator[Connection]:
         else:
             kind, number = str(path[0]), path[1]
             spec = parts.spec.elements[kind][int(number)]
-            yield Connection(spec.name if isinstance(spec, NamedSpec) else kind, target)
+            yield Connection((spec.name if isinstance(spec, NamedSpec) else "") or kind, target)
 
 
 def terminal_name(parts: WorldParts, pin: PinName) -> str:

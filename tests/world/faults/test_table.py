@@ -54,8 +54,8 @@ def test_shared_parameters_say_which_kinds_have_them() -> None:
     ]
     assert {parameter.name: of for parameter, of in found}["from_s"] == (
         "each byte, each delivery, each answer, each request, each change, each save, stuck, master-error, "
-        "stuck-output, welded-contact, open-coil, no-air, jam, belt-stop, empty-feeder, leak, worn-jaws, worn-brake, "
-        "stuck-brake, slipping-coupling, stuck-follower, worn-cam, slack-belt, broken-wire, drift, "
+        "broken-wire, drift, stuck-output, welded-contact, open-coil, no-air, jam, belt-stop, empty-feeder, leak, worn-jaws, "
+        "worn-brake, stuck-brake, slipping-coupling, stuck-follower, worn-cam, slack-belt, "
         "stiff-guides, brown-out, other-load"
     )
     assert len({parameter for parameter, _ in found}) == len(found)
@@ -113,6 +113,7 @@ def test_which_faults_elements_have() -> None:
     """An output that is stuck: every element with outputs that are calculated."""
     there = {name: {kind.name for kind in element.faults} for name, element in ELEMENTS.items() if element.faults}
     assert there == {
+        "source": {"broken-wire", "drift"},
         "gate": {"stuck-output"},
         "latch": {"stuck-output"},
         "timer": {"stuck-output"},

@@ -7,17 +7,19 @@ from dataclasses import dataclass
 
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, SECOND, Nanos
-from steptwin.world.element import Element, ElementSpec, Reference
+from steptwin.world.element import Element, NamedSpec, Reference
+from steptwin.world.elements.voltage import BROKEN_WIRE, DRIFT
 from steptwin.world.reader import Key, Row, Table, TomlText, optional
 from steptwin.world.sense import TableRows
+from steptwin.world.signals import SignalOf
 from steptwin.world.site import Site, Terminal
-from steptwin.world.sources import AnalogSource, ConstantWaveform, SineWaveform, TableWaveform, Waveform
+from steptwin.world.sources import HIGHEST_V, LOWEST_V, AnalogSource, ConstantWaveform, SineWaveform, TableWaveform, Waveform
 from steptwin.world.spec import WorldSpec
-from steptwin.world.values import ANALOG_INPUT, PinOf, number, points, positive_time, time_value, word
+from steptwin.world.values import ANALOG_INPUT, PinOf, name_value, number, points, positive_time, time_value, word
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SourceSpec(ElementSpec):
+class SourceSpec(NamedSpec):
     target: Terminal
     kind: str
     value: float
@@ -68,8 +70,8 @@ def _refers(spec: SourceSpec, world: WorldSpec) -> Iterator[Reference]:
 def _build(spec: SourceSpec, site: Site) -> AnalogSource:
     kernel = site.kernel(spec.target[0])
     target = site.input(spec.target, spec.path, ANALOG_INPUT)
-    source = AnalogSource(kernel, target, WAVEFORMS[spec.kind](spec), spec.period)
-    kernel.add_part(source, ())
+    source = AnalogSource(kernel, target, WAVEFORMS[spec.kind](spec), spec.period, spec.name)
+    kernel.add_part(source, (), spec.name or None)
     return source
 
 
@@ -79,6 +81,7 @@ SOURCE: Element[SourceSpec, AnalogSource] = Element(
     rows=TableRows(
         written="[[source]]",
         keys=(
+            optional(name_value, "name", "how conditions and faults name it; without it they cannot", ""),
             Key("to", PinOf(ANALOG_INPUT), "the analog input: MACHINE.AIN1 or AIN2", attribute="target"),
             optional(word(*WAVEFORMS), "kind", "constant, ramp, sine or table", "constant"),
             optional(number(), "value", "volts; of a sine its mean", 0.0),
@@ -108,4 +111,6 @@ SOURCE: Element[SourceSpec, AnalogSource] = Element(
     read=_read,
     refers=_refers,
     build=_build,
+    signals=lambda built: {"volts": SignalOf((built.source,), built.volts, unit="V", bounds=(LOWEST_V, HIGHEST_V))},
+    faults=(BROKEN_WIRE, DRIFT),
 )

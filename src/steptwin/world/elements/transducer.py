@@ -12,8 +12,7 @@ from steptwin.state import Stateful
 from steptwin.world.condition import Signal
 from steptwin.world.curve import Stepped
 from steptwin.world.element import Element, NamedSpec, Reference
-from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
-from steptwin.world.faults.table import ElementEffect, number
+from steptwin.world.elements.voltage import BROKEN_WIRE, DRIFT
 from steptwin.world.kernel import Kernel, Source
 from steptwin.world.reader import Key, Row, Table, TomlText, optional
 from steptwin.world.sense import TableRows
@@ -71,16 +70,6 @@ class Transducer(Stateful):
         return self._level.due
 
 
-def _break(active: ActiveFault, transducer: Transducer, begins: bool, now: Nanos) -> str:
-    transducer.is_broken = begins
-    return f"the wire of {transducer.name} is {'broken' if begins else 'whole again'}"
-
-
-def _drift(active: ActiveFault, transducer: Transducer, begins: bool, now: Nanos) -> str:
-    transducer.offset = active.fault.number("volts") if begins else 0.0
-    return f"{transducer.name} reads {transducer.offset:+g} V" if begins else f"{transducer.name} reads right again"
-
-
 def _read(text: TomlText, row: Row, table: Table) -> TransducerSpec:
     spec = TransducerSpec(**row)
     volts = [volts for _, volts in spec.points]
@@ -125,21 +114,5 @@ TRANSDUCER: Element[TransducerSpec, Transducer] = Element(
     refers=_refers,
     build=_build,
     signals=lambda built: {"volts": SignalOf((built.source,), built.volts, unit="V", bounds=(LOWEST_V, HIGHEST_V))},
-    faults=(
-        FaultKind(
-            "broken-wire",
-            Layer.ELEMENT,
-            Occasion.ALWAYS,
-            "The wire of an analog sensor is broken: 0 V.",
-            effect=ElementEffect(_break),
-        ),
-        FaultKind(
-            "drift",
-            Layer.ELEMENT,
-            Occasion.ALWAYS,
-            "An analog sensor reads too high or too low.",
-            own=(number("volts", "Too high; negative: too low.", -10.0, 10.0, default=0.5),),
-            effect=ElementEffect(_drift),
-        ),
-    ),
+    faults=(BROKEN_WIRE, DRIFT),
 )
