@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 from collections.abc import Callable
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any
 import httpx
 import pytest
 from playwright.sync_api import expect
-from studio_page import Studio, button, show
+from studio_page import Studio, button, serious, show
 from tests.conftest import until
 from tests.studio.conftest import Process, StudioWorld
 
@@ -150,7 +151,8 @@ def test_the_time_panel_branches_from_the_moment_that_is_shown(studio: Studio) -
     with page.context.expect_page() as opened:
         page.get_by_role("link", name="Open branch 1").click()
     branch = opened.value
-    expect(branch.get_by_role("heading", level=1)).to_contain_text("cell, branch 1 from 1.000 s")
+    expect(branch.get_by_role("heading", level=1)).to_have_text("steptwin cell")
+    expect(branch.get_by_role("banner")).to_contain_text("Branch 1 from 1.000 s")
     expect(branch.get_by_role("group", name="Virtual time")).to_contain_text("paused")
     show(branch, "I/O")
     button(branch, "Set IN3").click()
@@ -164,6 +166,10 @@ def test_the_time_panel_branches_from_the_moment_that_is_shown(studio: Studio) -
 
 
 def test_the_branches_in_polish(studio: Studio) -> None:
-    page = studio.page("pl-PL", panel="Czas")
+    page = studio.page("pl-PL", panel="Czas", bypass_csp=True, color_scheme="dark")
     button(page, "Odgałęzienie od teraz").click()
-    expect(page.get_by_role("link", name="Otwórz odgałęzienie 1")).to_be_visible()
+    with page.context.expect_page() as opened:
+        page.get_by_role("link", name="Otwórz odgałęzienie 1").click()
+    branch = opened.value
+    expect(branch.get_by_role("banner")).to_contain_text(re.compile(r"Odgałęzienie 1 od \d+\.\d{3} s"))
+    assert [*serious(page), *serious(branch)] == []

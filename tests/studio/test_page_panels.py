@@ -233,7 +233,7 @@ def test_frames_are_shown_in_words_and_sent(studio: Studio, tmp_path: Path, requ
     studio.master.words(10020, 2)
     expect(frames.get_by_role("row", name=re.compile("read M1_POS_ACT = 0 mm"))).to_be_visible()
     assert studio.master.client.read_holding_registers(9000, count=1, device_id=1).isError()
-    expect(page.get_by_text("1 errors")).to_be_visible()
+    expect(page.get_by_text("errors: 1")).to_be_visible()
     page.get_by_label("Errors only").check()
     expect(frames.get_by_role("row")).to_have_count(2)
     page.get_by_label("Errors only").uncheck()

@@ -115,11 +115,11 @@ POLISH = dict(
 )
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_nothing_serious_is_wrong_for_assistive_technology(studio: Studio, theme: str) -> None:
-    page = studio.page(color_scheme=theme, bypass_csp=True)
+@pytest.mark.parametrize(("theme", "language"), [("light", "en-US"), ("dark", "pl-PL")])
+def test_nothing_serious_is_wrong_for_assistive_technology(studio: Studio, theme: str, language: str) -> None:
+    page = studio.page(language, panel=None, color_scheme=theme, bypass_csp=True)
     found: list[str] = []
-    for panel in PANELS:
+    for panel in PANELS if language == "en-US" else POLISH.values():
         show(page, panel)
         found += [f"{panel}: {what}" for what in serious(page)]
     assert found == []
@@ -132,7 +132,11 @@ def test_nor_with_the_panels_of_a_machine_open(start_studio: Callable[..., Proce
     button(page, "Save session").click()
     expect(page.get_by_role("button", name=re.compile("^Open a view of "))).to_have_count(1)
     found = [f"Recordings: {what}" for what in serious(page)]
+    show(page, "Program")
+    expect(page.get_by_text("JUMP MAIN").first).to_be_visible()
+    found += [f"Program: {what}" for what in serious(page)]
     show(page, "Machine")
+    button(page, "Arrange").click()
     found += [f"Machine: {what}" for what in serious(page)]
     show(page, "I/O")
     button(page, "Wiring").click()

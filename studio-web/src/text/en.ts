@@ -13,6 +13,8 @@ export const en = {
   virtualTime: "Virtual time",
   real: "REAL",
   realDevice: "This is a real device",
+  branch: "Branch {number} from {time} s",
+  branchHelp: "A second world without ports. The machine that it comes from does not notice it.",
   control: "Control",
   controlYou: "you have control",
   controlNobody: "nobody has control",

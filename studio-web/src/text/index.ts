@@ -5,4 +5,5 @@ import { texts } from "./texts.svelte";
 /** Texts that several parts of the page share. */
 export const t = texts(en, pl);
 export { LANGUAGES, chooseLanguage, language, restoreLanguage, texts, type Language } from "./texts.svelte";
+export { sentence } from "./sentences";
 export { inWords } from "./words";

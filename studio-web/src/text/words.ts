@@ -32,6 +32,8 @@ export const POLISH: Readonly<Record<string, string>> = {
   coil: "cewka",
   input: "wejście",
   command: "polecenie",
+  "RTU over TCP": "RTU przez TCP",
+  "M1486 line": "linia M1486",
 };
 
 export function inWords(words: string): string {

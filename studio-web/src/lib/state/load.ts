@@ -27,7 +27,14 @@ export class Load {
       if (!axis.isMoving(now_ns - STOOD_NS)) this.offset = seen * this.pulses_per_unit - axis.pulses(now_ns);
       return seen;
     }
-    const planned = (axis.pulses(now_ns) + this.offset) / this.pulses_per_unit;
+    const planned = this.planned(axis, now_ns);
     return Number.isNaN(planned) ? seen : planned;
+  }
+
+  /** With the drive, as at present: NaN until the drive has stood once, and before its first plan that is known. */
+  planned(axis: AxisState, at_ns: bigint): number {
+    const first = axis.stretches[0]?.from_ns;
+    if (first === undefined || at_ns < first) return NaN;
+    return (axis.pulses(at_ns) + this.offset) / this.pulses_per_unit;
   }
 }

@@ -17,7 +17,7 @@ export const t = texts(
     answered: "from the controller",
     rate: "{rate}/s",
     count: "{count} frames",
-    errors: "{count} errors",
+    errors: "errors: {count}",
     answer: "answer {mean} ms, longest {longest} ms",
     forgotten: "the oldest are forgotten beyond {most}",
     empty: "No frames yet. They appear when a program asks the controllers of a line.",

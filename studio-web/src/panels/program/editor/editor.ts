@@ -73,6 +73,8 @@ export class ProgramEditor {
     private readonly events: EditorEvents,
   ) {
     this.client = new LSPClient({
+      // The 3 s of the library are too short for a computer that has other work.
+      timeout: 30_000,
       rootUri: "steptwin:///",
       workspace: (client) => {
         const display = async (uri: string) => {
@@ -234,7 +236,7 @@ export class ProgramEditor {
         ...jumpToDefinitionKeymap,
         ...findReferencesKeymap,
       ]),
-      EditorView.contentAttributes.of({ "aria-label": label, spellcheck: "false" }),
+      EditorView.contentAttributes.of({ "aria-label": label, spellcheck: "false", tabindex: "0" }),
       EditorState.phrases.of(this.phrases),
       EditorState.readOnly.of(!isEditable),
       EditorView.updateListener.of((update) => {
