@@ -20,11 +20,11 @@ from tests.peers.conftest import Master
 
 def test_a_device_is_found_checked_and_connected(studio: Studio, serve: Callable[..., Any], tmp_path: Path) -> None:
     twin = serve("--lenient")
-    place = f"tcp://127.0.0.1:{twin.tcp_port}"
+    place, typed = f"tcp://127.0.0.1:{twin.tcp_port}", f"127.0.0.1:{twin.tcp_port}"
     page = studio.page(panel="Devices", viewport={"width": 1280, "height": 1000})
-    page.get_by_label("Address of the device").fill(place)
+    page.get_by_label("Address of the device").fill(typed)
     page.get_by_label("Units").fill("1-3")
-    button(page, f"Search {place}").click()
+    button(page, f"Search {typed}").click()
     found = page.get_by_role("table", name="Found")
     expect(found).to_contain_text(f"{place},unit=1MIC488, firmware 1.70")
     expect(page.get_by_text(f"Tried: {place}")).to_contain_text("unit")

@@ -68,8 +68,20 @@ def test_inputs_registers_time_and_frames(studio: Studio) -> None:
     until(lambda: int(ask(studio, "time")["time_ns"]) >= stood + 250_000_000, "time has gone on")
 
 
-def test_configuration_faults_recordings_and_devices(studio: Studio) -> None:
+def test_calculator_configuration_faults_recordings_and_devices(studio: Studio) -> None:
     page = studio.page(panel=None)
+    go(page, "Calculator")
+    for _ in range(300):
+        page.keyboard.press("Tab")
+        if page.evaluate("document.activeElement.id") == "calc-velocity":
+            break
+    page.keyboard.press("Control+a")
+    page.keyboard.type("25")
+    expect(button(page, "Send to M1")).to_be_enabled()
+    tab_to_text(page, "Send to M1")
+    page.keyboard.press("Enter")
+    until(lambda: ask(studio, "read", points=["table.M1_VMAX"])[0]["value"] == 25, "the register has it")
+
     go(page, "Configuration")
     enter(page, "M1 Acc", "300")
     expect(page.get_by_role("row", name="M1_ACC 400 300 mm/s²")).to_be_visible()
@@ -95,9 +107,15 @@ def test_configuration_faults_recordings_and_devices(studio: Studio) -> None:
     expect(page.get_by_role("alert").last).to_contain_text("127.0.0.1:1")
 
 
-def test_program_scope_and_overview(start_studio: Callable[..., Process], browser: Browser) -> None:
+def test_machine_program_scope_and_overview(start_studio: Callable[..., Process], browser: Browser) -> None:
     studio = Studio(start_studio("--demo"), browser)
     page = studio.page(panel=None)
+    go(page, "Machine")
+    tab_to(page, "Press part")
+    page.keyboard.down("Enter")
+    until(lambda: studio.master.inputs(5008, 1) == [True], "the master sees the button")
+    page.keyboard.up("Enter")
+    until(lambda: studio.master.inputs(5008, 1) == [False], "it is released")
     go(page, "Program")
     press(page, "Stop the program of table")
     until(lambda: not running(studio), "the program has stopped")

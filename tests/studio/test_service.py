@@ -10,6 +10,7 @@ import socket
 import subprocess
 import sys
 import textwrap
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -320,17 +321,46 @@ def test_who_reads_nothing_slows_nobody(shared: Process) -> None:
 # ---------------------------------------------------------------------- jogs
 
 
+class Cable:
+    """Forwards a connection to a port, until it is cut: then nothing passes, and no end is told."""
+
+    def __init__(self, port: int) -> None:
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self.port: int = self._listener.getsockname()[1]
+        self._cut = threading.Event()
+        self._ends = [socket.create_connection(("127.0.0.1", port))]
+        threading.Thread(target=self._join, daemon=True).start()
+
+    def _join(self) -> None:
+        self._ends.append(self._listener.accept()[0])
+        for here, there in (self._ends, self._ends[::-1]):
+            threading.Thread(target=self._carry, args=(here, there), daemon=True).start()
+
+    def _carry(self, here: socket.socket, there: socket.socket) -> None:
+        with contextlib.suppress(OSError):
+            while (data := here.recv(65_536)) and not self._cut.is_set():
+                there.sendall(data)
+
+    def cut(self) -> None:
+        self._cut.set()
+
+    def close(self) -> None:
+        for end in (*self._ends, self._listener):
+            end.close()
+
+
 JOGGING = """
-import json, sys
+import json, socket, sys
 from websockets.sync.client import connect
 
-socket = connect(sys.argv[1], max_size=None).__enter__()
+cable = socket.create_connection(("127.0.0.1", int(sys.argv[2])))
+studio = connect(sys.argv[1], sock=cable, max_size=None).__enter__()
 
 
 def ask(**message):
-    socket.send(json.dumps({**message, "id": message["do"]}))
+    studio.send(json.dumps({**message, "id": message["do"]}))
     while True:
-        answer = json.loads(socket.recv())
+        answer = json.loads(studio.recv())
         if answer.get("id") == message["do"]:
             return answer.get("ok")
 
@@ -350,19 +380,28 @@ while True:
 """
 
 
-@pytest.mark.parametrize("fate", ["stopped", "killed"])
+@pytest.mark.parametrize("fate", ["stopped", "killed", "cut off"])
 def test_an_axis_stands_in_time_when_the_page_is_gone(start_studio: Start, fate: str) -> None:
     studio = start_studio()
     watcher = page(studio)
     watcher.ok("follow", id="plans", kinds=["plan"], machines=["table"], axes=["1"])
+    cable = Cable(studio.end_points["http"]["port"])
     url = f"{studio.url.replace('http', 'ws', 1)}/ws"
-    jogging = subprocess.Popen([sys.executable, "-c", textwrap.dedent(JOGGING), url], stdout=subprocess.PIPE, text=True)
+    jogging = subprocess.Popen(
+        [sys.executable, "-c", textwrap.dedent(JOGGING), url, str(cable.port)], stdout=subprocess.PIPE, text=True
+    )
     try:
         assert jogging.stdout is not None
         for _ in range(20):
             assert jogging.stdout.readline() == "renewed\n"
         until(lambda: watcher.ok("read", points=["table.M1.velocity"])[0]["value"] == 20.0, "the axis runs")
-        jogging.send_signal(signal.SIGSTOP if fate == "stopped" else signal.SIGKILL)
+        match fate:
+            case "cut off":
+                cable.cut()
+            case "stopped":
+                jogging.send_signal(signal.SIGSTOP)
+            case "killed":
+                jogging.kill()
         watcher.ask("time")  # with it, what was sent before is done
         gone = int(watcher.ask("time")["time_ns"])  # no renewal comes later
         until(lambda: watcher.ok("read", points=["table.M1.velocity"])[0]["value"] == 0.0, "the axis stands")
@@ -377,6 +416,7 @@ def test_an_axis_stands_in_time_when_the_page_is_gone(start_studio: Start, fate:
         jogging.kill()
         jogging.wait()
         jogging.stdout.close()
+        cable.close()
     watcher.socket.close()
 
 

@@ -11,6 +11,7 @@ from typing import Any, TypeAlias
 from steptwin.drivers.kind import AnyDriverKind, DeviceSearch, FoundDevice
 from steptwin.drivers.kinds import DRIVERS, clear_line
 from steptwin.errors import LineFailure, Misuse
+from steptwin.live.twins import address_of
 
 ANY = "any"
 SearchProgress: TypeAlias = Callable[[str, int, str], AbstractContextManager[Callable[[int], object]]]
@@ -67,7 +68,12 @@ def found_at(
     report: Callable[[str], object],
 ) -> list[FoundAt]:
     """The devices that respond at an address, of the first kind that does. An address that cannot be opened is reported and
-    gives none."""
+    gives none. ``HOST:PORT`` is what it is for ``--device``."""
+    try:
+        place = address_of(place)
+    except LineFailure as failure:
+        report(str(failure))
+        return []
     searches = [(kind, kind.search, _rates(place, bauds or list(kind.search.bauds))) for kind in kinds if kind.search]
     rows: list[FoundAt] = []
     try:

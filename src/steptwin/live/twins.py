@@ -181,7 +181,7 @@ def find_device(text: str | None, *, whole_line: bool = False) -> DeviceAddress:
     shown = text or ""
     of_twin = _named(place)
     if of_twin is None:
-        address = _address(place or "")
+        address = address_of(place or "")
         there = _controllers_at(address) if "kind" not in options else ()
         found = device_at(shown, address, {**({"kind": there[0].kind} if there else {}), **options})
         return replace(found, scales=next((each.scales for each in there if each.address == found.number), ()))
@@ -206,7 +206,7 @@ def controller_of(text: str | None) -> TwinController | None:
     place, options = (None, dict[str, Any]()) if text is None else split_device(text)
     of_twin = _named(place)
     if of_twin is None:
-        of_twin = _controllers_at(_address(place or ""))
+        of_twin = _controllers_at(address_of(place or ""))
         if not of_twin:
             return None
     meant = [each for each in of_twin if each.is_meant(options)]
@@ -223,7 +223,7 @@ def find_controller(text: str | None) -> tuple[str, str | None]:
     place, options = (None, dict[str, Any]()) if text is None else split_device(text)
     of_twin = _named(place)
     if of_twin is None:
-        of_twin = _controllers_at(_address(place or ""))
+        of_twin = _controllers_at(address_of(place or ""))
         if not of_twin:
             raise Misuse(f"{text} is not a running twin, and this command is for twins: {_there()}")
     meant = [each for each in of_twin if each.is_meant(options)]
@@ -259,7 +259,7 @@ def _named(place: str | None) -> Sequence[TwinController] | None:
     return found
 
 
-def _address(place: str) -> str:
+def address_of(place: str) -> str:
     """Parse ``place`` as an address. Raises `LineFailure` for text that can only be a name."""
     if "://" in place:
         return place.replace("//localhost:", "//127.0.0.1:")

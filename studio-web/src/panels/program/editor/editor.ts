@@ -66,6 +66,8 @@ export class ProgramEditor {
   private readonly documents: Documents;
   private view: EditorView | null = null;
   private syncTimer = 0;
+  private isOpen = false;
+  private isEnding = false;
 
   constructor(
     url: string,
@@ -104,11 +106,14 @@ export class ProgramEditor {
     this.documents = this.client.workspace as Documents;
     this.socket = new EditorSocket(url, {
       opened: () => {
+        this.isOpen = true;
         this.documents.opensAnew();
         this.client.connect(this.socket);
         events.connected(true, "");
       },
       closed: (why) => {
+        this.isOpen = false;
+        if (this.isEnding) this.socket.close();
         if (this.client.connected) this.client.disconnect();
         events.connected(false, why);
       },
@@ -207,8 +212,12 @@ export class ProgramEditor {
 
   close(): void {
     clearTimeout(this.syncTimer);
-    this.socket.close();
     this.view?.destroy();
+    this.isEnding = true;
+    const end = () => this.socket.close();
+    // The client reports an error where its first question is never answered.
+    if (this.isOpen) this.client.initializing.then(end, end);
+    else end();
   }
 
   private extensions(uri: string, language: string, label: string, isEditable: boolean): Extension {
