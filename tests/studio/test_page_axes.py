@@ -81,6 +81,20 @@ def seconds(studio: Studio) -> float:
     return answer["ok"][0]["value"]
 
 
+def test_a_jog_is_as_fast_as_the_one_before(studio: Studio) -> None:
+    """A jog sets the greatest velocity to its own until the axis stands; the next one is a part of what it was before."""
+    page = studio.page()
+    enable(page)
+    full = page.get_by_label("Velocity at 100 % of M1")
+    expect(full).to_have_attribute("placeholder", "40")
+    for name in ("Jog M1 +", "Jog M1 −", "Jog M1 +"):
+        button(page, name).hover()
+        page.mouse.down()
+        until(lambda: abs(studio.master.sample(1).velocity) == 10.0, "a quarter of 40 mm/s")
+        expect(full).to_have_attribute("placeholder", "40")
+        page.mouse.up()
+
+
 def test_closing_the_page_ends_a_jog(studio: Studio) -> None:
     page = studio.page()
     enable(page)

@@ -163,8 +163,8 @@ def test_pictures(start_studio: Callable[..., Process], browser: Browser, theme:
     PICTURES.mkdir(parents=True, exist_ok=True)
     for size, (width, height) in SIZES.items():
         page = studio.page(language, panel=None, viewport={"width": width, "height": height}, color_scheme=theme)
-        for number, panel in enumerate(PANELS, 1):
-            show(page, panel if language == "en-US" else POLISH[panel])
+        for number, panel in enumerate((*PANELS, "Machine"), 1):
+            show(page, panel if language == "en-US" else {**POLISH, "Machine": "Maszyna"}[panel])
             page.screenshot(path=PICTURES / f"{size}-{theme}-{language[:2]}-{number}.png")
             assert page.evaluate("document.documentElement.scrollWidth") <= width, (size, panel)
             box = button(page, "Stop all" if language == "en-US" else "Zatrzymaj wszystko").bounding_box()

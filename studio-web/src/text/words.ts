@@ -32,6 +32,7 @@ export const POLISH: Readonly<Record<string, string>> = {
   coil: "cewka",
   input: "wejście",
   command: "polecenie",
+  switch: "0 lub 1",
   "RTU over TCP": "RTU przez TCP",
   "M1486 line": "linia M1486",
 };

@@ -19,6 +19,8 @@ export class Jogging {
   /** Full velocities that were typed, by axis. */
   full = $state<Record<string, string>>(restore("jog.full", VERSION, isTexts) ?? {});
   private readonly held = new Map<string, HeldJog>();
+  /** Greatest velocities, by axis, as they were before a jog. */
+  private readonly greatest = new Map<string, number>();
 
   constructor(
     private readonly studio: Studio,
@@ -39,8 +41,18 @@ export class Jogging {
   fullOf(axis: AxisModel): number {
     const typed = Number(this.full[axis.id]);
     if (typed > 0) return typed;
-    const usual = this.watch()?.get(axis.fastest) ?? USUAL_PULSES / (axis.pulses_per_unit ?? 1);
+    const usual = this.greatestOf(axis) ?? USUAL_PULSES / (axis.pulses_per_unit ?? 1);
     return Math.min(usual, axis.velocities?.high ?? Infinity);
+  }
+
+  /** A jog of anybody sets the register of the greatest velocity to its own, until the axis stands again. */
+  private greatestOf(axis: AxisModel): number | null {
+    const found = this.watch()?.get(axis.fastest) ?? null;
+    const isJogged = this.studio.leases.some((lease) => lease.machine === axis.machine && lease.axis === axis.number);
+    const before = this.greatest.get(axis.id) ?? null;
+    if (before !== null && (isJogged || this.studio.axis(axis).isMoving(this.studio.now()) === true)) return before;
+    if (found !== null) this.greatest.set(axis.id, found);
+    return found;
   }
 
   begin(axis: AxisModel, sign: number, percent = this.percent): void {
