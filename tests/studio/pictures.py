@@ -17,7 +17,7 @@ from playwright.sync_api import Page, sync_playwright
 from steptwin.commands.demo import describe_demo
 
 IMAGES = Path(__file__).parents[2] / "docs/images"
-COLOURS = 128
+COLOURS = 256
 BEGUN_MS = 25_000
 """Until the machine works in its cycle, and the curves fill the scope."""
 ALONE = [["machine"]]
@@ -36,8 +36,7 @@ def opened(page: Page, url: str, columns: list[list[str]]) -> None:
 
 def picture(page: Page, name: str) -> None:
     shot = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
-    palette = shot.quantize(COLOURS, Image.Quantize.MAXCOVERAGE)
-    shot.quantize(palette=palette, dither=Image.Dither.NONE).save(IMAGES / f"{name}.png", optimize=True)
+    shot.quantize(COLOURS, kmeans=2, dither=Image.Dither.NONE).save(IMAGES / f"{name}.png", optimize=True)
 
 
 def main() -> None:
