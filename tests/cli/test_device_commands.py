@@ -223,7 +223,7 @@ def test_scanning(twin: Any, shell: Shell) -> None:
         (pty_path, 9600, 1, "1.70"),
         (tcp, None, 1, "1.70"),
     ]
-    assert shell("scan", f"127.0.0.1:{twin.tcp_port}", "--units", "1").split() == [tcp, "unit", "1", "MIC488,", "firmware", "1.70"]
+    assert shell("scan", tcp.removeprefix("tcp://"), "--units", "1").split() == [tcp, "unit", "1", "MIC488,", "firmware", "1.70"]
     shell("scan", tcp, "--units", "2,3")
     assert (shell.code, shell.errors) == (1, f"no device responded on {tcp}\n")
     shell("scan", "/dev/none")

@@ -1,4 +1,4 @@
-"""Pictures of the demo machine for README and docs: ``python tests/studio/pictures.py``.
+"""Pictures of the demo machine for README and docs: ``python -m tests.studio.pictures``.
 
 Those of other states are made by the tests, in build/studio.
 """
@@ -10,9 +10,9 @@ import json
 import shutil
 from pathlib import Path
 
-from measure_page import show, studio
 from PIL import Image
 from playwright.sync_api import Page, sync_playwright
+from tests.studio.measure_page import show, studio
 
 from steptwin.commands.demo import describe_demo
 
