@@ -158,6 +158,57 @@ def test_the_labeller_by_hand(tmp_path: Path) -> None:
     assert {one.fault.kind.name for one in matrix.left_out} >= {"power-cut", "wear", "busy"}
 
 
+PRESSES = """M1 = ON
+PABS M1 10
+WAITPOS
+OUT2 = ON
+WAIT IN1 = ON
+OUT2 = OFF
+PABS M1 0
+WAITPOS
+OUT1 = ON
+DELAY 60
+"""
+WAITS_FOR_EVER = """
+[[mic488]]
+name = "cell"
+program = "presses.prg"
+start = true
+[[axis]]
+name = "x"
+drive = "cell.M1"
+pitch = 4.0
+[[cylinder]]
+name = "punch"
+stroke = 20
+extend_time = "200 ms"
+retract_time = "200 ms"
+valve = "single"
+[[wire]]
+from = "cell.OUT2"
+to = "punch.extend"
+[[cylinder.switch]]
+above = 19
+to = "cell.IN1"
+"""
+
+
+def test_a_program_that_waits_for_ever_hangs(tmp_path: Path) -> None:
+    """It has no time limit for the sensor of its punch, and nobody else looks."""
+    (tmp_path / "presses.prg").write_text(PRESSES)
+    (tmp_path / "world.toml").write_text(WAITS_FOR_EVER)
+    text = '[campaign]\nworld = "world.toml"\nend = "5 s"\n[matrix]\ndone = "cell.OUT1"\nphases = 3\n'
+    (tmp_path / "campaign.toml").write_text(text)
+    matrix = fault_matrix(load_campaign(tmp_path / "campaign.toml"), tmp_path / "out")
+    assert effects(matrix, "stuck machine=cell pin=IN1 value=0")[0] == "hangs"
+    assert effects(matrix, "stuck machine=cell pin=IN1 value=1")[-1] == "unaffected"
+    (row,) = (row for row in matrix.rows if row.possible.text == "stuck machine=cell pin=IN1 value=0")
+    assert row.cells[0].judgement.why == "not done; everything stands, and nothing noticed"
+    (tmp_path / "campaign.toml").write_text(text.replace('"5 s"', '"100 ms"'))
+    with pytest.raises(Misuse, match=r"done = 'cell.OUT1': it is false at the end of the run without a fault"):
+        fault_matrix(load_campaign(tmp_path / "campaign.toml"), tmp_path / "out")
+
+
 def test_a_run_without_a_fault_that_is_refused_is_an_error(tmp_path: Path) -> None:
     shutil.copytree(EXAMPLES / "press", tmp_path, dirs_exist_ok=True)
     text = '[campaign]\nworld = "press.toml"\nruns = 1\nend = "1 s"\n[matrix]\nalarm = "cell.OUT77"\n'

@@ -21,7 +21,7 @@ from steptwin.campaign.description import SEARCHES, CampaignDescription
 from steptwin.campaign.execution import CaseExecution, Done
 from steptwin.campaign.reading import load_campaign, read_campaign
 from steptwin.campaign.runner import CaseRunner
-from steptwin.campaign.search.exhaustive import ExhaustiveCases
+from steptwin.campaign.search.exhaustive import ExhaustiveCases, without_faults
 from steptwin.campaign.search.guided import WAVE, GuidedSearch, distance
 from steptwin.campaign.summary import CampaignSummary
 from steptwin.campaign.workers import Workers, workers
@@ -126,6 +126,12 @@ class Campaign:
     def world(self, case: Case | int) -> World:
         """The world of a case before it begins to vary, with its trace and session: ``run`` it as long as you like."""
         return self.runner.begin(case if isinstance(case, Case) else self._chosen[case], keep=True)
+
+    def units(self) -> dict[str, str]:
+        """The unit of each measure by its name; empty where it has none."""
+        measures = self.description.measures
+        world = self.world(without_faults(self.description)) if any(one.value is not None for one in measures) else None
+        return {one.name: "s" if world is None or one.value is None else world.signal(one.value).unit for one in measures}
 
     # ------------------------------------------------------------------ all of them
 

@@ -142,6 +142,8 @@ def fault_matrix(
     world, nominal = _run(runner, nominal_case, rules, coverage)
     if nominal.result.error is not None:
         raise Misuse(f"the run without a fault fails: {nominal.result.error}")
+    if nominal.is_done is False:
+        raise Misuse(f"done = {rules.done!r}: it is false at the end of the run without a fault, so that no cell could tell more")
     begin = description.start_ns or 0
     phases = cycle_phases(world, begin, MOST_PHASES if rules.phases is None else rules.phases)
     possible = possible_faults(runner.begin(nominal_case))

@@ -15,6 +15,7 @@ from steptwin.campaign.properties import Verdict, read_property
 from steptwin.commands.program_run import report_causes
 from steptwin.controllerstate import ControllerState
 from steptwin.datasheet import plain
+from steptwin.durations import duration
 from steptwin.errors import Misuse
 from steptwin.files import session as sessions
 from steptwin.files.beginning import begin_world, set_faults
@@ -102,7 +103,17 @@ def run(options: WorldRun, out: Print, warn: Print) -> bool:
         return _run_and_report(world, options, reports, out)
 
 
+def _check_until(text: str | None) -> None:
+    """Raises `Misuse` for a time in the place of a condition."""
+    try:
+        duration(text if text is not None else "")
+    except Misuse:
+        return
+    raise Misuse(f"--until {text}: this is a time, where a condition is expected; --for {text} ends the run then")
+
+
 def _run_and_report(world: World, options: WorldRun, reports: CoverageReports, out: Print) -> bool:
+    _check_until(options.until)
     began = world.now
     before = filter(is_shown, world.trace) if began else ()  # what happens at power-on is part of the run
     known = Counter(record.machine for record in before)

@@ -122,7 +122,8 @@ def _figure(one: Histogram) -> str:
         height = count / most * (HEIGHT - 24)
         y = HEIGHT - 18 - height
         bars += f'<rect x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="{height:.1f}"><title>{count}</title></rect>'
-    caption = f"{escape(one.name)}: {one.count} runs, {one.least:.6g} to {one.most:.6g}, mean {one.mean:.6g}"
+    unit = f" {escape(one.unit)}" if one.unit else ""
+    caption = f"{escape(one.name)}: {one.count} runs, {one.least:.6g} to {one.most:.6g}{unit}, mean {one.mean:.6g}{unit}"
     return (
         f'<figure><svg width="{WIDTH}" height="{HEIGHT}" role="img" aria-label="{escape(one.name, quote=True)}">{bars}'
         f'<text x="0" y="{HEIGHT - 4}">{one.edges[0]:.6g}</text>'

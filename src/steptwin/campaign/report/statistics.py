@@ -33,6 +33,7 @@ class Histogram(NamedTuple):
     most: float
     edges: tuple[float, ...]
     counts: tuple[int, ...]
+    unit: str = ""
 
 
 @dataclass(slots=True)
@@ -91,7 +92,7 @@ def influences(columns: RunColumns) -> list[Influence]:
     return sorted(found, key=lambda one: -abs(one.correlation))[:MOST_MATTERING]
 
 
-def histogram(name: str, numbers: Iterable[float]) -> Histogram | None:
+def histogram(name: str, numbers: Iterable[float], unit: str = "") -> Histogram | None:
     """None where there are no numbers."""
     import numpy as np
 
@@ -107,4 +108,5 @@ def histogram(name: str, numbers: Iterable[float]) -> Histogram | None:
         float(given.max()),
         tuple(edges.tolist()),
         tuple(counts.tolist()),
+        unit,
     )

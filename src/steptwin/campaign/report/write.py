@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import islice
 from pathlib import Path
 
@@ -42,7 +42,8 @@ def write_report(campaign: Campaign, summary: CampaignSummary, folder: Path, fil
         )
     finally:
         store.close()
-    shown = (histogram(name, numbers) for name, numbers in columns.measures.items())
+    units = campaign.units() if columns.measures else {}
+    shown = (histogram(name, numbers, _unit(name, units)) for name, numbers in columns.measures.items())
     report = CampaignReport(
         summary=summary,
         found=found,
@@ -58,3 +59,8 @@ def write_report(campaign: Campaign, summary: CampaignSummary, folder: Path, fil
     }.items():
         write_bytes(folder / name, content)
     return report
+
+
+def _unit(name: str, units: Mapping[str, str]) -> str:
+    """Of a measure of the description, or of a cycle time of a property."""
+    return units.get(name, "" if name.endswith(" cycles") else "s")
