@@ -13,6 +13,7 @@ from steptwin import __version__
 from steptwin.errors import LineFailure
 from steptwin.gateways.contract import GatewayState, GatewaySubject
 from steptwin.gateways.opcua.addressspace import NAMESPACE, NAMESPACE_URI, AddressSpaceBuilder
+from steptwin.gateways.opcua.nodes import NodeMaker
 from steptwin.gateways.opcua.notifications import Notifications
 from steptwin.gateways.opcua.past import PastNodes
 from steptwin.gateways.opcua.security import Security
@@ -62,8 +63,7 @@ class OpcUaGateway:
             raise AssertionError
         await security.apply(server)
         builder = AddressSpaceBuilder(self._subject.description, registers, is_kept=self._subject.past is not None)
-        for result in await inside.isession.add_nodes(builder.items):
-            result.StatusCode.check()
+        NodeMaker(inside.aspace).add(builder.items)
         for code in await inside.isession.add_references(builder.references):
             code.check()
         self._sampler = Sampler(self._subject, registers)

@@ -1,0 +1,57 @@
+"""Nodes are those that the library would make."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+import pytest
+from asyncua import ua
+from asyncua.server.address_space import AddressSpace
+from asyncua.server.server import Server
+from gateway_rig import GatewayWorld
+
+from steptwin.gateways.opcua.addressspace import NAMESPACE_URI, AddressSpaceBuilder
+from steptwin.gateways.opcua.nodes import NodeMaker
+
+HALL = '[[mic488]]\nname = "one"\n[[m1486]]\nname = "two"\n[[axis]]\nname = "x"\ndrive = "one.M1"\npitch = 5\n'
+
+
+async def space_with(*, by_library: bool) -> AddressSpace:
+    world = GatewayWorld(HALL)
+    server = Server()
+    await server.init()
+    await server.register_namespace(NAMESPACE_URI)
+    builder = AddressSpaceBuilder(world.description, {"one": ["M1_VMAX"]}, is_kept=True)
+    if by_library:
+        for result in await server.iserver.isession.add_nodes(builder.items):
+            result.StatusCode.check()
+    else:
+        NodeMaker(server.iserver.aspace).add(builder.items)
+        with pytest.raises(AssertionError, match="is there already"):
+            NodeMaker(server.iserver.aspace).add(builder.items[:1])
+    for code in await server.iserver.isession.add_references(builder.references):
+        code.check()
+    return server.iserver.aspace
+
+
+def contents(space: AddressSpace) -> dict[ua.NodeId, tuple[dict[Any, Any], list[Any]]]:
+    """Of each node its attributes, without moments, and its references."""
+    found = {}
+    for node in [*space.keys()]:
+        data = space[node]
+        values = {key: one.value for key, one in data.attributes.items()}
+        found[node] = (
+            {key: None if value is None else (value.Value, value.StatusCode) for key, value in values.items()},
+            [str(one) for one in data.references],
+        )
+    return found
+
+
+def test_they_are_those_of_the_service_of_the_library() -> None:
+    expected = contents(asyncio.run(space_with(by_library=True)))
+    found = contents(asyncio.run(space_with(by_library=False)))
+    assert found.keys() == expected.keys()
+    different = [str(node) for node in expected if found[node] != expected[node] and node.NamespaceIndex == 2]
+    assert different == []
+    assert sum(node.NamespaceIndex == 2 for node in found) > 200
