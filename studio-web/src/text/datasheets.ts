@@ -205,8 +205,8 @@ export const DATASHEETS: Readonly<Record<string, string>> = {
   // Parameters of faults.
   "Which bit, 0 is the lowest.": "Który bit, 0 jest najmłodszy.",
   "Towards the twin, or from it.": "Do bliźniaka albo od niego.",
-  "On this link alone, such as tcp-1, rtu-1, pty, serial.":
-    "Tylko na tym łączu, na przykład tcp-1, rtu-1, pty, serial.",
+  "On this link alone, such as tcp-1, pty, serial; tcp: each tcp-N.":
+    "Tylko na tym łączu, na przykład tcp-1, pty, serial; tcp: każde tcp-N.",
   "On this line of a world alone.": "Tylko na tej linii świata.",
   "Only this time, counted from 1.": "Tylko ten raz, licząc od 1.",
   "Each time this number has come round.": "Za każdym razem, gdy minie tyle.",
