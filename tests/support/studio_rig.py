@@ -19,10 +19,11 @@ from steptwin.devices.worldpart import WorldPart
 from steptwin.errors import Misuse, Refusal
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND, Nanos
-from steptwin.studio.hub import Hub, PresentMoment, Surroundings
+from steptwin.studio.hub import Hub
 from steptwin.studio.looking import KeptPast
 from steptwin.studio.schema import schema
 from steptwin.studio.session import ViewerSession
+from steptwin.studio.surroundings import PresentMoment, Surroundings
 from steptwin.subject.jogs import WorldJogs
 from steptwin.subject.world import WorldSubject
 from steptwin.world.programtexts import WorldPrograms, configuration_text

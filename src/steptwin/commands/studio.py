@@ -50,8 +50,9 @@ from steptwin.live.ports import serial_ports, twin_ports
 from steptwin.live.server import EndPoint, Server
 from steptwin.live.twins import find_device
 from steptwin.live.world import LiveWorld
-from steptwin.studio.hub import Hub, PresentMoment, Surroundings
+from steptwin.studio.hub import Hub
 from steptwin.studio.service import StudioService
+from steptwin.studio.surroundings import PresentMoment, Surroundings
 from steptwin.studio.work import DeviceWork
 from steptwin.subject.events import Numbering
 from steptwin.subject.jogs import WorldJogs

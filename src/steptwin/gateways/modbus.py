@@ -15,7 +15,7 @@ from steptwin.access.modbusroles import permit_of
 from steptwin.access.roles import ROLES, Role
 from steptwin.errors import LineFailure, Misuse, SteptwinError
 from steptwin.gateways.clients import GatewayClient, NotPermitted, address_text
-from steptwin.gateways.contract import GatewaySubject
+from steptwin.gateways.contract import ClientState, GatewayState, GatewaySubject
 from steptwin.machine import SECOND
 from steptwin.subject.contract import MachinePart, Result
 from steptwin.system import reason
@@ -143,6 +143,11 @@ class MasterGateway:
             return _pdu(await self._subject.do(wanted))
         finally:
             self._reads -= 1
+
+    def state(self) -> GatewayState:
+        places = (address_text(writer.get_extra_info("peername")) for writer in self._masters.values())
+        clients = tuple(ClientState("master", place, self._role.title) for place in places)
+        return GatewayState(is_up=self._server is not None, text="listens", clients=clients)
 
     async def close(self) -> None:
         if self._server is not None:

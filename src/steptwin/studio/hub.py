@@ -9,14 +9,9 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
-from math import inf
-from typing import Any, NamedTuple, Protocol
 
-from steptwin.access.audit import Audit
 from steptwin.access.control import Control, Viewer
 from steptwin.access.roles import Role
-from steptwin.access.tokens import AccessGate
-from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.later import start
 from steptwin.machine import MILLISECOND, SECOND, Nanos
@@ -25,10 +20,8 @@ from steptwin.studio.calculations import Calculations
 from steptwin.studio.campaignrequests import Campaigns
 from steptwin.studio.configurations import Configurations
 from steptwin.studio.drawingrequests import Arrangement
-from steptwin.studio.looking import KeptPast
 from steptwin.studio.machines import Sheets
 from steptwin.studio.plantrequests import PlantRecords
-from steptwin.studio.programs import ProgramTexts
 from steptwin.studio.recordingrequests import Recordings
 from steptwin.studio.requests import (
     OF_BRANCHES,
@@ -41,13 +34,13 @@ from steptwin.studio.requests import (
     permit_of,
 )
 from steptwin.studio.streams import Streams
+from steptwin.studio.surroundings import Served, Surroundings
 from steptwin.studio.tools import tools
 from steptwin.studio.watches import Watches
 from steptwin.subject import commands as command
-from steptwin.subject.commands import COMMANDS, Command
+from steptwin.subject.commands import COMMANDS
 from steptwin.subject.contract import Description, Reading, Result
-from steptwin.subject.events import Event
-from steptwin.subject.following import Filter, Following, filter_of
+from steptwin.subject.following import filter_of
 from steptwin.subject.jogs import Held, Jogs
 
 MOST_VIEWERS = 64
@@ -59,53 +52,6 @@ FASTEST_JOG = 5.0
 LONGEST_LEASE_MS = 250
 IDLE_NS: Nanos = 60 * SECOND
 """Control that was taken over REST ends after this time without a request."""
-
-
-class PresentMoment(NamedTuple):
-    """The present moment of a subject and the speed of its time; ``speed`` infinite: as fast as possible."""
-
-    time: Nanos
-    running: bool
-    speed: float
-
-    def plain(self) -> dict[str, object]:
-        return {"time_ns": str(self.time), "running": self.running, "speed": "max" if self.speed == inf else self.speed}
-
-
-class Served(Protocol):
-    """The subject of the studio. Reading returns the values known now; commands may be answered later."""
-
-    @property
-    def description(self) -> Description:
-        """A new object after devices were connected or disconnected."""
-        ...
-
-    @property
-    def lost(self) -> str | None:
-        """The reason why a device does not respond; None while all devices respond."""
-        ...
-
-    def read(self, *points: str) -> tuple[Reading, ...]:
-        """The newest known values. Points that are read repeatedly are polled from devices. Raises `Misuse`."""
-        ...
-
-    async def do(self, wanted: Command, /) -> Result:
-        """Execute a command; awaits only `steptwin.later.Later`. Raises `Misuse`, `Refusal`, `LineFailure`."""
-        ...
-
-    def result_of(self, value: object) -> Result:
-        """A result, at the present moment, of a request that is not a command of the subject."""
-        ...
-
-    def present(self) -> dict[str, Any]:
-        """``state`` by machine and ``faults``, if known."""
-        ...
-
-    def follow(self, what: Filter, bound: int) -> Following: ...
-
-    def plans(self, what: Filter) -> list[Event]:
-        """The present plans of axes as events of now, and the newest samples of those that have none."""
-        ...
 
 
 @dataclass(slots=True)
@@ -120,52 +66,6 @@ class Lease:
     def plain(self) -> dict[str, object]:
         head = {"lease": self.number, "viewer": self.viewer.number, "machine": self.jog.machine, "axis": self.jog.axis}
         return {**head, "velocity": self.jog.velocity}
-
-
-class Connections(Protocol):
-    """Connects and disconnects devices of the subject. Awaits only `steptwin.later.Later`."""
-
-    async def ports(self) -> Sequence[Mapping[str, object]]:
-        """``address`` and ``what`` of the serial ports of this computer."""
-        ...
-
-    async def connect(self, address: str, name: str | None) -> str:
-        """Connect a device; returns its machine name. Raises `Misuse`, `Refusal`, `LineFailure`."""
-        ...
-
-    async def disconnect(self, machine: str) -> None:
-        """Disconnect a device. Raises `Misuse` for a machine that is not a device."""
-        ...
-
-    async def settings(self, machine: str) -> str:
-        """As text. Raises as `disconnect`, `Refusal` and `LineFailure`."""
-        ...
-
-    async def shadow(self, machine: str, *, on: bool) -> None:
-        """Put a twin beside a device, or remove it. Raises as `settings`."""
-        ...
-
-    def shadow_of(self, machine: str, after: Nanos) -> Mapping[str, object] | None:
-        """See `steptwin.studio.devicerequests`. Raises `Misuse`."""
-        ...
-
-
-class LongWork(Protocol):
-    """Searches for devices and checks of one, one at a time."""
-
-    def scan(self, places: Sequence[str], kind: str, units: str, baud: str | None, timeout: float) -> None:
-        """Begin a search. Raises `Misuse`, and `Refusal` while another work is running."""
-        ...
-
-    def verify(self, address: str, *, write: bool) -> None:
-        """Begin the checks of a device. Raises `Refusal` while another work is running."""
-        ...
-
-    def plain(self) -> dict[str, object] | None:
-        """What was begun last, as JSON."""
-        ...
-
-    def cancel(self) -> None: ...
 
 
 class Shared:
@@ -185,37 +85,6 @@ class Shared:
         """Send it, also if it has not changed."""
         self.text = json.dumps(value)
         self.version += 1
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Surroundings:
-    """What a hub is given besides its subject."""
-
-    moment: Callable[[], PresentMoment]
-    gate: AccessGate
-    audit: Audit
-    program: str
-    """Version of steptwin."""
-    programs: ProgramTexts
-    connections: Connections
-    work: LongWork
-    configuration: Callable[[str], SourceText | None] = lambda machine: None
-    """The configuration file of a controller by name; None without one."""
-    lookback: KeptPast | None = None
-    """The past, where one is kept."""
-    recordings: Recordings | None = None
-    """Of the world, where there is one."""
-    branches: Branches | None = None
-    """Of the world, where there is one."""
-    arrangement: Arrangement | None = None
-    """Of the world, where there is one."""
-    plant: PlantRecords | None = None
-    """Of the world, where there is one."""
-    campaigns: Campaigns | None = None
-    """Of the description of the world, where it is in a file."""
-    traffic: Callable[[], Sequence[Mapping[str, object]]] | None = None
-    """Of the world, where there is one."""
-    on_internal: Callable[[Exception], object] = lambda error: None
 
 
 class Hub:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 from collections.abc import Awaitable, Callable, Coroutine, Mapping
 from pathlib import PurePath
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from fastapi import FastAPI, Request, Response
 from fastapi.responses import FileResponse
@@ -67,77 +67,19 @@ class Rest:
                     openapi_extra=_extra(body=_body(name)),
                     responses=RESPONSES,
                 )
-        app.add_api_route(
-            "/api/describe",
-            self._describe,
-            methods=["GET"],
-            name="get_describe",
-            summary="What there is.",
-            openapi_extra=_extra(),
-            responses=RESPONSES,
+        reading = (
+            _Reading("/api/describe", self._describe, "get_describe", "What there is."),
+            _Reading("/api/state", self._state, "get_state", "Everything about a machine, or about all.", MACHINE),
+            _Reading("/api/points", self._points, "get_points", "The present values of points.", POINT_NAMES),
         )
-        machine = {"name": "machine", "in": "query", "required": False, "schema": {"type": "string", "minLength": 1}}
-        app.add_api_route(
-            "/api/state",
-            self._state,
-            methods=["GET"],
-            name="get_state",
-            summary="Everything about a machine, or about all.",
-            openapi_extra=_extra(parameters=[machine]),
-            responses=RESPONSES,
-        )
-        names = {
-            "name": "names",
-            "in": "query",
-            "required": True,
-            "description": "Points with commas between them, such as table.M1.position,time.",
-            "schema": {"type": "string", "minLength": 1},
-        }
-        app.add_api_route(
-            "/api/points",
-            self._points,
-            methods=["GET"],
-            name="get_points",
-            summary="The present values of points.",
-            openapi_extra=_extra(parameters=[names]),
-            responses=RESPONSES,
-        )
+        for one in reading:
+            one.add_to(app)
         if self._hub.around.recordings is not None:
-            file = {
-                "name": "file",
-                "in": "path",
-                "required": True,
-                "description": "NAME.json: a saved session; NAME.vcd and so on: what is made of it.",
-                "schema": {"type": "string", "minLength": 1},
-            }
-            app.add_api_route(
-                "/api/recordings/{file}",
-                self._recording,
-                methods=["GET"],
-                name="get_recording",
-                summary="A saved session, or an export of one, as a file.",
-                openapi_extra=_extra(parameters=[file]),
-                responses={**RESPONSES, DONE: FILE_RESPONSE},
-                response_class=Response,
-            )
+            what = "A saved session, or an export of one, as a file."
+            _Reading("/api/recordings/{file}", self._recording, "get_recording", what, SESSION_FILE, is_file=True).add_to(app)
         if self._hub.around.campaigns is not None:
-            file = {
-                "name": "file",
-                "in": "path",
-                "required": True,
-                "description": "The folder of results in the answer to campaigns, and a file there: press.results/report.html.",
-                "schema": {"type": "string", "minLength": 1},
-            }
-            app.add_api_route(
-                "/api/campaigns/{file:path}",
-                self._result,
-                methods=["GET"],
-                name="get_result",
-                summary="A file of the results of a campaign.",
-                openapi_extra=_extra(parameters=[file]),
-                responses={**RESPONSES, DONE: FILE_RESPONSE},
-                response_class=Response,
-            )
+            what = "A file of the results of a campaign."
+            _Reading("/api/campaigns/{file:path}", self._result, "get_result", what, RESULT_FILE, is_file=True).add_to(app)
 
     # ------------------------------------------------------------------ routes
 
@@ -220,6 +162,47 @@ class Rest:
             viewer = Viewer(self._hub.number(), name or "REST", role)
             found = self._sessions[role, name] = ViewerSession(self._hub, viewer.name, entered=viewer)
         return found
+
+
+_Parameter: TypeAlias = Mapping[str, object]
+
+
+def _parameter(name: str, place: str, meaning: str | None = None, *, is_required: bool = True) -> _Parameter:
+    head = {"name": name, "in": place, "required": is_required, "schema": {"type": "string", "minLength": 1}}
+    return head if meaning is None else {**head, "description": meaning}
+
+
+MACHINE = _parameter("machine", "query", is_required=False)
+POINT_NAMES = _parameter("names", "query", "Points with commas between them, such as table.M1.position,time.")
+SESSION_FILE = _parameter("file", "path", "NAME.json: a saved session; NAME.vcd and so on: what is made of it.")
+RESULT_FILE = _parameter(
+    "file", "path", "The folder of results in the answer to campaigns, and a file there: press.results/report.html."
+)
+
+
+class _Reading(NamedTuple):
+    """A route that is read."""
+
+    path: str
+    endpoint: _RestEndpoint
+    name: str
+    summary: str
+    parameter: _Parameter | None = None
+    is_file: bool = False
+
+    def add_to(self, app: FastAPI) -> None:
+        parameters = [] if self.parameter is None else [dict(self.parameter)]
+        file: dict[str, Any] = {"response_class": Response} if self.is_file else {}
+        app.add_api_route(
+            self.path,
+            self.endpoint,
+            methods=["GET"],
+            name=self.name,
+            summary=self.summary,
+            openapi_extra=_extra(parameters=parameters),
+            responses={**RESPONSES, DONE: FILE_RESPONSE} if self.is_file else RESPONSES,
+            **file,
+        )
 
 
 OWN = ("do", "id", "version")

@@ -1,0 +1,148 @@
+"""What a studio is about and what is around it: its subject, and the parts that it is given by the program that serves it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import inf
+from typing import Any, NamedTuple, Protocol
+
+from steptwin.access.audit import Audit
+from steptwin.access.tokens import AccessGate
+from steptwin.diagnostics import SourceText
+from steptwin.machine import Nanos
+from steptwin.studio.branchrequests import Branches
+from steptwin.studio.campaignrequests import Campaigns
+from steptwin.studio.drawingrequests import Arrangement
+from steptwin.studio.looking import KeptPast
+from steptwin.studio.plantrequests import PlantRecords
+from steptwin.studio.programs import ProgramTexts
+from steptwin.studio.recordingrequests import Recordings
+from steptwin.subject.commands import Command
+from steptwin.subject.contract import Description, Reading, Result
+from steptwin.subject.events import Event
+from steptwin.subject.following import Filter, Following
+
+
+class PresentMoment(NamedTuple):
+    """The present moment of a subject and the speed of its time; ``speed`` infinite: as fast as possible."""
+
+    time: Nanos
+    running: bool
+    speed: float
+
+    def plain(self) -> dict[str, object]:
+        return {"time_ns": str(self.time), "running": self.running, "speed": "max" if self.speed == inf else self.speed}
+
+
+class Served(Protocol):
+    """The subject of the studio. Reading returns the values known now; commands may be answered later."""
+
+    @property
+    def description(self) -> Description:
+        """A new object after devices were connected or disconnected."""
+        ...
+
+    @property
+    def lost(self) -> str | None:
+        """The reason why a device does not respond; None while all devices respond."""
+        ...
+
+    def read(self, *points: str) -> tuple[Reading, ...]:
+        """The newest known values. Points that are read repeatedly are polled from devices. Raises `Misuse`."""
+        ...
+
+    async def do(self, wanted: Command, /) -> Result:
+        """Execute a command; awaits only `steptwin.later.Later`. Raises `Misuse`, `Refusal`, `LineFailure`."""
+        ...
+
+    def result_of(self, value: object) -> Result:
+        """A result, at the present moment, of a request that is not a command of the subject."""
+        ...
+
+    def present(self) -> dict[str, Any]:
+        """``state`` by machine and ``faults``, if known."""
+        ...
+
+    def follow(self, what: Filter, bound: int) -> Following: ...
+
+    def plans(self, what: Filter) -> list[Event]:
+        """The present plans of axes as events of now, and the newest samples of those that have none."""
+        ...
+
+
+class Connections(Protocol):
+    """Connects and disconnects devices of the subject. Awaits only `steptwin.later.Later`."""
+
+    async def ports(self) -> Sequence[Mapping[str, object]]:
+        """``address`` and ``what`` of the serial ports of this computer."""
+        ...
+
+    async def connect(self, address: str, name: str | None) -> str:
+        """Connect a device; returns its machine name. Raises `Misuse`, `Refusal`, `LineFailure`."""
+        ...
+
+    async def disconnect(self, machine: str) -> None:
+        """Disconnect a device. Raises `Misuse` for a machine that is not a device."""
+        ...
+
+    async def settings(self, machine: str) -> str:
+        """As text. Raises as `disconnect`, `Refusal` and `LineFailure`."""
+        ...
+
+    async def shadow(self, machine: str, *, on: bool) -> None:
+        """Put a twin beside a device, or remove it. Raises as `settings`."""
+        ...
+
+    def shadow_of(self, machine: str, after: Nanos) -> Mapping[str, object] | None:
+        """See `steptwin.studio.devicerequests`. Raises `Misuse`."""
+        ...
+
+
+class LongWork(Protocol):
+    """Searches for devices and checks of one, one at a time."""
+
+    def scan(self, places: Sequence[str], kind: str, units: str, baud: str | None, timeout: float) -> None:
+        """Begin a search. Raises `Misuse`, and `Refusal` while another work is running."""
+        ...
+
+    def verify(self, address: str, *, write: bool) -> None:
+        """Begin the checks of a device. Raises `Refusal` while another work is running."""
+        ...
+
+    def plain(self) -> dict[str, object] | None:
+        """What was begun last, as JSON."""
+        ...
+
+    def cancel(self) -> None: ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Surroundings:
+    """What a hub is given besides its subject."""
+
+    moment: Callable[[], PresentMoment]
+    gate: AccessGate
+    audit: Audit
+    program: str
+    """Version of steptwin."""
+    programs: ProgramTexts
+    connections: Connections
+    work: LongWork
+    configuration: Callable[[str], SourceText | None] = lambda machine: None
+    """The configuration file of a controller by name; None without one."""
+    lookback: KeptPast | None = None
+    """The past, where one is kept."""
+    recordings: Recordings | None = None
+    """Of the world, where there is one."""
+    branches: Branches | None = None
+    """Of the world, where there is one."""
+    arrangement: Arrangement | None = None
+    """Of the world, where there is one."""
+    plant: PlantRecords | None = None
+    """Of the world, where there is one."""
+    campaigns: Campaigns | None = None
+    """Of the description of the world, where it is in a file."""
+    traffic: Callable[[], Sequence[Mapping[str, object]]] | None = None
+    """Of the world, where there is one."""
+    on_internal: Callable[[Exception], object] = lambda error: None
