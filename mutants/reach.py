@@ -13,7 +13,10 @@ CORE = ("motion", "wire", "mic488", "m1486", "wbc", "world", "drivers")
 """Packages that are mutated; tests/<package> mirrors each of them."""
 USERS = ("commands", "coverage", "debug", "explain", "files", "lsp", "subject", "why")
 """Packages above them whose tests run in one process and do not wait for real time."""
-FOLDERS = tuple(f"tests/{name}" for name in (*CORE, *USERS))
+WHOLE = ("test_branches.py", "test_state.py")
+"""Tests of all state of a world with everything in it."""
+FOLDERS = tuple(f"tests/{name}" for name in (*CORE, *USERS, *WHOLE))
+"""Folders of tests, and single files."""
 
 FEW = 3
 """What no more tests than these execute may be kept by a cache or a fixture, and be used by others."""
@@ -99,7 +102,8 @@ def digest(root: Path, folder: str) -> str:
 @cache
 def imported_files(root: Path, folder: str) -> set[Path]:
     """The test files of a folder and all modules of the project that they import, at once or later."""
-    waiting = list((root / folder).rglob("*.py"))
+    place = root / folder
+    waiting = [place] if place.is_file() else list(place.rglob("*.py"))
     found = set(waiting)
     while waiting:
         new = _imports(root, waiting.pop()) - found
@@ -125,4 +129,4 @@ def _imports(root: Path, path: Path) -> set[Path]:
 
 
 def _folder(test: str) -> str:
-    return "/".join(test.split("/")[:2])
+    return "/".join(test.partition("::")[0].split("/")[:2])

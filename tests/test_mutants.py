@@ -75,7 +75,7 @@ def test_nearly_all_mutations_of_a_module_compile() -> None:
 
 def test_all_packages_of_the_core_and_all_folders_of_tests_are_there() -> None:
     assert [name for name in CORE if not (ROOT / "src/steptwin" / name).is_dir()] == []
-    assert [folder for folder in FOLDERS if not (ROOT / folder).is_dir()] == []
+    assert [folder for folder in FOLDERS if not (ROOT / folder).exists()] == []
 
 
 def test_what_is_mutated_is_a_package_a_folder_of_one_or_a_module() -> None:
@@ -122,10 +122,12 @@ FILES = {
         def test_nothing(): pass
         def test_total(): assert total(1, 2) == 3
     """,
+    "tests/test_state.py": "from steptwin.wire.sums import total\ndef test_state(): assert total(2, 2) == 4\n",
     "tests/world/test_use.py": "from steptwin.world.use import use\ndef test_use(): assert use() == 3\n",
 }
 SUMS = Path("src/steptwin/wire/sums.py")
 IN_WIRE, IN_WORLD = "tests/wire/test_sums.py::test_total", "tests/world/test_use.py::test_use"
+IN_STATE = "tests/test_state.py::test_state"
 
 
 @pytest.fixture
@@ -143,14 +145,14 @@ def tree(tmp_path: Path) -> Tree:
 
 def test_tests_that_execute_a_line_are_run_for_it(tree: Tree, tmp_path: Path) -> None:
     records = {folder: tmp_path / f"{Path(folder).name}.json" for folder in folders(tree.path, ["wire"])}
-    assert list(records) == ["tests/wire", "tests/world"]
-    assert [tree.record(folder, file) for folder, file in records.items()] == [True, True]
+    assert list(records) == ["tests/wire", "tests/world", "tests/test_state.py"]
+    assert [tree.record(folder, file) for folder, file in records.items()] == [True, True, True]
     reach = Reach(tree.path, records)
 
     def stages(line: int) -> list[tuple[str, list[str]]]:
         return [(name, sorted(seconds)) for name, seconds in reach.stages(SUMS, line, line)]
 
-    everything = [("folder", ["tests/wire/test_sums.py::test_nothing", IN_WIRE]), ("others", [IN_WORLD])]
+    everything = [("folder", ["tests/wire/test_sums.py::test_nothing", IN_WIRE]), ("others", [IN_STATE, IN_WORLD])]
     assert stages(1) == everything, "executed on import"
     assert stages(2) == everything, "executed on import"
     assert stages(4) == stages(5) == stages(6) == [], "executed by no test"

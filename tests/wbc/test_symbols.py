@@ -6,7 +6,7 @@ import pytest
 
 from steptwin.wbc.check import check_program
 from steptwin.wbc.dialect import DEFAULT
-from steptwin.wbc.symbols import uses
+from steptwin.wbc.symbols import name_problem, uses
 from steptwin.wbc.syntax import parse
 
 
@@ -40,3 +40,32 @@ def found(text: str) -> list[str]:
 def test_names_of_a_line(line: str, expected: list[str]) -> None:
     names = found(f"#LEN 12\nmain:\n{line}\n")
     assert names == ["LEN CONSTANT DEFINE", "main LABEL DEFINE", *expected]
+
+
+@pytest.mark.parametrize(
+    ("name", "problem"),
+    [
+        ("other", None),
+        ("LEN2", None),
+        ("Len", "Len is a constant already"),
+        ("n", "n is a variable already"),
+        ("MAIN", "MAIN is a label already"),
+        ("INT_IN3", "INT_IN3 is an interrupt label already"),
+        ("2nd", "'2nd' is not a name: letters without accents, digits and _, no digit first"),
+        ("żar", "'żar' is not a name: letters without accents, digits and _, no digit first"),
+    ],
+)
+def test_names_that_a_symbol_may_be_given(name: str, problem: str | None) -> None:
+    text = "#LEN 12\nmain:\nn = LEN\n"
+    program, diagnostics = parse(text)
+    _, scope = check_program(text, program, diagnostics, None, None, DEFAULT)
+    assert name_problem(name, scope, {"MAIN": 2}) == problem
+
+
+@pytest.mark.parametrize("word", ["JUMP", "OUT1", "SQRT"])
+def test_words_of_the_language_are_no_names(word: str) -> None:
+    program, diagnostics = parse("")
+    _, scope = check_program("", program, diagnostics, None, None, DEFAULT)
+    found = name_problem(word, scope, {})
+    assert found is not None
+    assert found.startswith(f"{word} is ")

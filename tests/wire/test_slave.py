@@ -478,3 +478,21 @@ def test_requests_and_exceptions_are_counted(new_bank: NewBank, unit: int, pdu: 
     response = port.exchange(mbap.encode_frame(5, unit, bytes.fromhex(pdu)), 0)
     assert (response[7] >= 0x80) is bool(exceptions)
     assert (port.requests, port.exceptions) == (1, exceptions)
+
+
+@pytest.mark.parametrize(
+    ("unit", "pdu", "exceptions"),
+    [(1, "03 03 FC 00 02", 0), (1, "03 03 FC 00 00", 1), (1, "00 00", 0), (1, "7F 00", 1), (0, "05 17 71 00 00", 0)],
+)
+@pytest.mark.parametrize("at", [None, 1, 3])
+def test_requests_and_exceptions_of_a_line_are_counted(
+    new_bank: NewBank, unit: int, pdu: str, exceptions: int, at: int | None
+) -> None:
+    """Whether a frame comes at once or in two pieces. Function 0 is not answered (MIC-1)."""
+    port = RtuSlavePort({1: new_bank()})
+    frame = rtu.encode_frame(unit, bytes.fromhex(pdu))
+    port.exchange(frame[:at], 0)
+    if at is not None:
+        port.exchange(frame[at:], 1)
+    port.to_send(GAP + 1)
+    assert (port.requests, port.exceptions) == (1, exceptions)

@@ -154,6 +154,16 @@ def test_run_and_up_have_it(tmp_path: Path, capfd: pytest.CaptureFixture[str], m
     assert "it has been replaced" in capfd.readouterr().out
 
 
+def test_a_fault_of_an_element_happens_once_from_its_beginning_to_its_end() -> None:
+    world = World.from_toml(TEXT)
+    (active,) = world.parts.faults.active
+    happened = []
+    for moment in (0.199, 0.2, 0.25, 0.3, 0.9):
+        world.run(until=moment)
+        happened.append(active.struck)
+    assert happened == [0, 1, 1, 1, 1]
+
+
 EDGES = """
 beam.skewed belt.sensor1 both.out box.acts bump.hit clamp.extended clamp.retracted cup.held cycles.out
 hold.released jaws.closed jaws.held jaws.opened knife.switch1

@@ -22,6 +22,7 @@ from steptwin.subject.world import WorldSubject
 from steptwin.world import script as do
 from steptwin.world.heldjog import STANDS_NS
 from steptwin.world.kinds.m1486.heldjog import M1486HeldJog
+from steptwin.world.kinds.mic488.heldjog import Mic488HeldJog
 
 MIC = """
     [[line]]
@@ -375,3 +376,21 @@ def test_a_jog_that_is_over_asks_for_nothing_more() -> None:
             held.extend()
         rig.run(1000)
         assert [event for event in rig.followed.take().events if isinstance(event.payload, PlanPayload)] == []
+
+
+def test_a_jog_that_is_cut_says_so_and_asks_for_nothing_more() -> None:
+    for rig, kind, wanted in ((mic(), Mic488HeldJog, Jog("a", 1, 10.0)), (chip(), M1486HeldJog, Jog("drum", 1, 6400.0))):
+        machine = rig.world.machine(wanted.machine)
+        for begun in (False, True):
+            held = kind(machine, "line", wanted)
+            if begun:
+                held.extend(rig.world.now)
+            held.cut()
+            assert held.over == "stopped"
+            assert held.extend(rig.world.now) == ()
+            held.cut()
+            assert held.over == "stopped"
+        ended = kind(machine, "line", wanted)
+        ended.release(rig.world.now)
+        ended.cut()
+        assert ended.over == "let go"

@@ -347,3 +347,16 @@ def test_what_is_not_there_is_named() -> None:
     with pytest.raises(Misuse) as caught:
         small("").touch("nix")
     assert str(caught.value) == "no machine or line is called 'nix'; there are a, b, c"
+
+
+def test_scripts_that_watch_are_resumed_in_their_order_also_where_one_makes_the_other_go_on() -> None:
+    """The first comes true by a timed one, and what it does concerns the second, before the turn of the third."""
+    events = (
+        ("a.IN5", 'set = { "a.IN6" = 1 } }, { note = "first"'),
+        ("a.IN6", 'note = "second"'),
+        ("a.IN5", 'note = "third"'),
+    )
+    text = "".join(f"[[event]]\nwhen = '{when}'\nsteps = [{{ {steps} }}]\n" for when, steps in events)
+    world = small(text + '[[event]]\nat = "1 s"\nsteps = [{ set = { "a.IN5" = 1 } }]\n')
+    world.run(for_="2 s")
+    assert [record.value for record in world.trace.events("world")] == ["first", "second", "third"]

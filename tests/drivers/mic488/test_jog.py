@@ -244,8 +244,9 @@ def test_a_stop_ends_it_for_good(stop: Callable[[Mic488], None], reason: Reason)
 
 
 def test_a_stop_between_two_tasks() -> None:
-    """One task holds, another stops: after the stop nothing is renewed."""
+    """One task holds, another stops: after the stop nothing is renewed. It comes before, during or after a request of the hold."""
     wire = Wire()
+    details = set()
 
     async def main() -> None:
         async with async_driver(task_line(wire), wire) as mic:
@@ -257,6 +258,7 @@ def test_a_stop_between_two_tasks() -> None:
                         pass
                 assert jog.end is not None
                 assert jog.end.reason is Reason.STOPPED
+                details.add(jog.end.detail)
 
             for delay in range(0, 400, 7):
                 task = asyncio.create_task(hold())
@@ -267,6 +269,7 @@ def test_a_stop_between_two_tasks() -> None:
                 assert not wire.moving()
 
     run_virtual(wire, main())
+    assert details == {"by this program", "on at rest"}
 
 
 def test_somebody_else_is_noticed() -> None:
