@@ -16,6 +16,7 @@ from steptwin.drivers.m1486.jog import LINK_S
 from steptwin.drivers.m1486.kind import LOST, M1486_DRIVER
 from steptwin.drivers.m1486.sync import M1486
 from steptwin.errors import Misuse, Refusal
+from steptwin.machine import Nanos
 
 ADDRESS = DeviceAddress("memory", "m1486", 7, 4800, 1.0)
 
@@ -223,7 +224,10 @@ def test_a_chip_as_a_subject(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_server_of_modbus_tcp_has_no_chips(monkeypatch: pytest.MonkeyPatch) -> None:
     """It closes the connection when it receives characters; a serial port that is lost is a failure."""
 
-    def lost(*arguments: object, **options: object) -> NoReturn:
+    waited = []
+
+    def lost(*arguments: object, timeout_ns: Nanos, **options: object) -> NoReturn:
+        waited.append(timeout_ns)
         raise LineLost("closed by the other end")
 
     at_every_address(monkeypatch, ChipWire(addresses=(7,)))
@@ -232,7 +236,8 @@ def test_a_server_of_modbus_tcp_has_no_chips(monkeypatch: pytest.MonkeyPatch) ->
     assert search is not None
     assert search.find("tcp://memory:1", 4800, range(16), 0.1, lambda number: None) == []
     with pytest.raises(LineLost):
-        search.find("memory", 4800, range(16), 0.1, lambda number: None)
+        search.find("memory", 4800, range(16), 0.25, lambda number: None)
+    assert waited == [100_000_000, 250_000_000]
 
 
 def test_what_it_takes() -> None:

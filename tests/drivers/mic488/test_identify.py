@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import pytest
@@ -14,7 +14,7 @@ from steptwin.drivers.blocking import finish
 from steptwin.drivers.mic488.failures import ModbusRefusal
 from steptwin.drivers.mic488.identify import SCAN_NS, Found, scan
 from steptwin.errors import LineFailure
-from steptwin.machine import SECOND
+from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.wire import rtu
 
 
@@ -125,3 +125,21 @@ def test_a_gateway_that_reaches_nobody_is_not_asked_for_other_addresses(code: in
     with pytest.raises(ModbusRefusal, match=f"exception {code:02X}"):
         opened(wire)
     assert len(wire.sent) == 1
+
+
+@pytest.mark.parametrize(("answers", "units", "time_outs"), [(False, range(1, 4), 3), (True, (1,), 4 * 2)])
+def test_a_search_waits_once_for_each_unit_and_twice_as_long_for_what_one_that_is_there_does_not_say(
+    answers: bool, units: Sequence[int], time_outs: int
+) -> None:
+    """Two firmwares are tried twice."""
+
+    def took(timeout_ns: Nanos) -> Nanos:
+        wire = Wire()
+        answering(wire, lambda request: b"\x02\x01\x00" if answers and request[0] == 2 else None)
+        line = thread_line(wire)
+        finish(line.open())
+        begin = line.now()
+        assert finish(scan(line, units, timeout_ns=timeout_ns)) == ([Found(1, None)] if answers else [])
+        return line.now() - begin
+
+    assert took(90 * MILLISECOND) - took(50 * MILLISECOND) == time_outs * 40 * MILLISECOND

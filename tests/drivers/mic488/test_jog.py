@@ -244,7 +244,7 @@ def test_a_stop_ends_it_for_good(stop: Callable[[Mic488], None], reason: Reason)
 
 
 def test_a_stop_between_two_tasks() -> None:
-    """One task holds, another stops: after the stop nothing is renewed. It comes before, during or after a request of the hold."""
+    """One task holds, another stops: after the stop nothing is renewed. It comes at any moment of a request of the hold."""
     wire = Wire()
     details = set()
 

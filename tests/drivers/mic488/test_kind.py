@@ -15,6 +15,7 @@ from steptwin.drivers.mic488.kind import MIC488_DRIVER, RUNS_ON, of_mic488, unit
 from steptwin.drivers.mic488.sync import Mic488
 from steptwin.errors import Misuse, Refusal
 from steptwin.files.world import World
+from steptwin.machine import MILLISECOND
 from steptwin.mic488.configtext import config_text
 from steptwin.mic488.registers import FIRMWARES
 from steptwin.subject.devicetwin import DeviceTwin
@@ -194,6 +195,7 @@ def test_controllers_on_a_line_are_found(monkeypatch: pytest.MonkeyPatch) -> Non
     found = MIC488_DRIVER.search.find("memory", 38400, [1, 2, 5], 0.2, asked.append)
     assert found == [FoundDevice(2, "1.70", "MIC488, firmware 1.70"), FoundDevice(5, "1.70", "MIC488, firmware 1.70")]
     assert asked == [1, 2, 5]
+    assert 200 * MILLISECOND < wire.now < 400 * MILLISECOND, "one unit does not answer"
     assert (MIC488_DRIVER.search.disturbs, MIC488_DRIVER.search.numbers) == (True, None)
 
 
