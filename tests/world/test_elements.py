@@ -22,7 +22,7 @@ from steptwin.files.world import World
 from steptwin.machine import MILLISECOND
 from steptwin.tables import IncompleteTable
 from steptwin.world.element import ElementSpec
-from steptwin.world.elements import register
+from steptwin.world.elements import ELEMENTS, register
 from steptwin.world.elements.button import BUTTON
 from steptwin.world.elements.source import SOURCE
 from steptwin.world.elements.wire import WIRE
@@ -162,6 +162,17 @@ def test_a_fault_of_an_element_happens_once_from_its_beginning_to_its_end() -> N
         world.run(until=moment)
         happened.append(active.struck)
     assert happened == [0, 1, 1, 1, 1]
+
+
+def test_what_elements_of_a_kind_do() -> None:
+    world = everything()
+    found = {
+        name: element.function(built)
+        for element in ELEMENTS.values()
+        if element.function is not None
+        for name, built in world.parts.built(element).items()
+    }
+    assert found == {"both": "or", "start-time": "pulse"}
 
 
 EDGES = """

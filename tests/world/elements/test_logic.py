@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 from steptwin.errors import Misuse, Runaway
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND
+from steptwin.world.elements.gate import FUNCTIONS
+from steptwin.world.elements.timer import TIMER
 from steptwin.world.reader import WorldError
 
 BASE = """
@@ -63,6 +65,13 @@ def test_truth_tables(kind: str, levels: tuple[int, ...]) -> None:
         assert there.read("it.out") == level, (one, two)
 
 
+@pytest.mark.parametrize("levels", [*product((False, True), repeat=4)])
+def test_more_inputs(levels: tuple[bool, ...]) -> None:
+    on = levels.count(True)
+    expected = {"and": on == 4, "or": on > 0, "nand": on < 4, "nor": on == 0, "xor": on in (1, 3), "not": not levels[0]}
+    assert {kind: function(list(levels)) for kind, function in FUNCTIONS.items()} == expected
+
+
 def test_a_gate_joins_outputs_of_controllers_and_elements() -> None:
     text = """
 [[mic488]]
@@ -103,11 +112,11 @@ delay = "5 ms"
 def test_a_latch_keeps_what_was_last() -> None:
     for priority, level in (("reset", 0), ("set", 1)):
         there = world(f'[[latch]]\nname = "it"\npriority = "{priority}"', "set", "reset")
-        seen = []
+        seen = [there.read("it.out")]
         for name, pressed in (("one", 1), ("one", 0), ("two", 1), ("one", 1), ("two", 0), ("one", 0)):
             press(there, name, bool(pressed))
             seen.append(there.read("it.out"))
-        assert seen == [1, 1, 0, level, 1, 1]
+        assert seen == [0, 1, 1, 0, level, 1, 1]
 
 
 TIMERS = {
@@ -129,6 +138,26 @@ def test_timers_are_those_of_the_standard(kind: str, expected: list[tuple[float,
         press(there, "one", pressed)
     there.run(until=1.0)
     assert edges(there, "it.out") == expected
+
+
+def test_a_timer_whose_time_is_broken_off_is_not_due() -> None:
+    text = '[[mic488]]\nname = "a"\n[[button]]\nname = "one"\nto = "it.in"\n[[timer]]\nname = "it"\n'
+    there = World.from_toml(text + 'kind = "on-delay"\ntime = "100 ms"\n')
+    timer = there.parts.built(TIMER)["it"]
+    dues = []
+    for pressed in (True, False):
+        press(there, "one", pressed)
+        dues.append(timer.deadline())
+    assert dues == [100 * MILLISECOND, None]
+
+
+@pytest.mark.parametrize(("up", "down", "count"), [(True, False, 1), (False, True, 0), (True, True, 0)])
+def test_an_input_that_is_on_from_the_beginning_is_an_edge(up: bool, down: bool, count: int) -> None:
+    keys = [f'{key} = "on.out"\n' for key, is_on in (("up", up), ("down", down)) if is_on]
+    counter = f'[[counter]]\nname = "it"\npreset = 1\n{"".join(keys)}'
+    there = World.from_toml(f'[[mic488]]\nname = "a"\n[[gate]]\nname = "on"\nkind = "not"\ninputs = ["a.OUT1"]\n{counter}')
+    there.run(for_=0.1)
+    assert there.read("it.count") == count
 
 
 @given(st.lists(st.tuples(st.sampled_from(["one", "two"]), st.booleans()), max_size=30))
