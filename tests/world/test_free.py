@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
-from math import sqrt
+from math import inf, sqrt
 from typing import Any
 
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
-from steptwin.machine import SECOND
+from steptwin.machine import SECOND, Nanos
 from steptwin.motion import Profile
 from steptwin.world.free import FreeMotion, slow_from
 from steptwin.world.wells import Wells
@@ -169,3 +172,127 @@ def test_a_body_at_rest_is_slow() -> None:
     rest = Profile(NOW, BASE, (), 0.0)
     assert slow_from(rest, NOW + 5, 0.0) == NOW + 5
     assert slow_from(replace(BODY, load=0.0, friction=0.0).profile(NOW, BASE, 0.0, 100.0), NOW, 99.0) is None
+
+
+# ---------------------------------------------------------------------- energy, without integration
+
+
+def moments(found: Profile, begin: Nanos) -> Iterator[tuple[Nanos, Nanos]]:
+    """The whole nanoseconds at which each segment begins and is there for the last time."""
+    for end in found.ends:
+        last = begin + SECOND if end == inf else found.start + int(end) - 1
+        yield begin, last
+        begin = last + 1
+
+
+@given(
+    velocity=st.floats(2.0, 800.0),
+    direction=st.sampled_from([1, -1]),
+    load=st.integers(-300, 300).map(lambda n: n / 1000.0),
+    friction=st.integers(0, 300).map(lambda n: n / 1000.0),
+    phase=st.floats(0.01, 0.9),
+    stops=st.sampled_from([(None, None), (-7, 5), (-150, 200), (-1, 1)]),
+)
+@example(velocity=300.0, direction=-1, load=0.0, friction=0.15, phase=0.5, stops=(-100, None))
+def test_what_it_loses_is_the_work_of_load_and_friction(
+    velocity: float, direction: int, load: float, friction: float, phase: float, stops: tuple[int | None, int | None]
+) -> None:
+    """In each segment, which ends at rest or at a stop; velocities are those of the positions."""
+    low, high = (None if stop is None else BASE + stop for stop in stops)
+    body = replace(BODY, load=load, friction=friction, low=low, high=high)
+    found = body.profile(NOW, BASE, phase, direction * velocity)
+    assert found.position(NOW) == pytest.approx(BASE + phase)
+    assert found.velocity(NOW) == pytest.approx(direction * velocity)
+    for begin, last in moments(found, NOW):
+        x, v = found.position(begin), found.velocity(begin)
+        for n in range(1, 5):
+            at = begin + (last - begin) * n // 4
+            way = found.position(at) - x
+            left = v * v - 2.0 * (load * way + friction * abs(way)) / body.inertia
+            assert found.velocity(at) ** 2 == pytest.approx(left, abs=1e-3, rel=1e-6)
+        if found.end is not None or last < NOW + 100 * SECOND:
+            rests = abs(found.velocity(last)) < 1e-3
+            stands = any(stop is not None and abs(found.position(last) - stop) < 1e-5 for stop in (low, high))
+            assert rests or stands or found.end is None
+    if found.end is not None:
+        assert low is None or found.count(found.end) >= low
+        assert high is None or found.count(found.end) <= high
+
+
+def test_the_moment_of_rest_and_that_of_a_stop() -> None:
+    """300 pulses/s less 150 pulses/s²: after 2 s and 300 pulses. A stop is come to in the nanosecond after."""
+    body = replace(BODY, load=0.05)
+    for high, end in ((None, 2 * SECOND), (BASE + 300, 2 * SECOND), (BASE + 301, 2 * SECOND)):
+        assert replace(body, high=high).profile(NOW, BASE, 0.0, 300.0).end == NOW + end
+    before = replace(body, high=BASE + 225).profile(NOW, BASE, 0.0, 300.0)
+    assert before.end is not None
+    assert before.end - NOW - SECOND in (1, 2)
+    assert before.velocity(NOW + SECOND - 1) == pytest.approx(150.0)
+    back = replace(BODY, load=-0.05, low=BASE - 225).profile(NOW, BASE, 0.0, -300.0)
+    assert back.end == before.end
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize("share", [0.04, 0.5, 0.96])
+@pytest.mark.parametrize("periods", [1, 2, 5])
+def test_how_long_it_runs_on(direction: int, share: float, periods: int) -> None:
+    """With its mean energy, which a constant torque takes on the way to the last well, or a part of it up to its edge."""
+    body = replace(BODY, load=0.0, friction=0.2)
+    energy = FIELD.to_leave(0.2) + (periods - 1 + share) * 0.2 * 64.0
+    mean = sqrt(2.0 * (energy - FIELD.deep(0.2)) / body.inertia)
+    found = body.overrun(FIELD, NOW, BASE, direction * sqrt(2.0 * energy / body.inertia))
+    assert found is not None
+    assert found.end is not None
+    assert found.velocity(NOW) == pytest.approx(direction * mean)
+    way = 64.0 * periods
+    rate = min(0.2 / body.inertia, mean * mean / (2.0 * way))
+    seconds = (mean - sqrt(max(mean * mean - 2.0 * rate * way, 0.0))) / rate
+    assert (found.end - NOW) / SECOND == pytest.approx(seconds, rel=1e-4)
+    assert found.count(found.end) == BASE + direction * 64 * periods
+
+
+def test_it_also_runs_on_slowly() -> None:
+    """In a field that hardly holds it."""
+    weak = Wells(1e-7, 64.0)
+    body = replace(BODY, load=0.0, friction=1e-8)
+    found = body.overrun(weak, NOW, BASE, 0.5)
+    assert found is not None
+    assert found.end is not None
+    assert found.count(found.end) > BASE
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize(("speed", "load"), [(60.0, 0.0), (200.0, 0.0), (300.0, 0.05), (300.0, -0.05)])
+def test_a_detent_catches_it_once_it_is_slow(speed: float, load: float, direction: int) -> None:
+    """Before, only load and friction act; from then on it goes evenly slower to the nearest full step."""
+    body = replace(BODY, detent=Wells(0.3, 16.0), load=load * direction)
+    slow = Wells(0.3, 16.0).catches_below(body.inertia, 0.1 + load)
+    rate = (0.1 + load) / body.inertia
+    found = body.profile(NOW, BASE, 0.25, direction * speed)
+    assert found.end is not None
+    end = found.count(found.end)
+    assert end % 16 == 0
+    way, time = 0.0, 0.0
+    if speed > slow:
+        way, time = (speed * speed - slow * slow) / (2.0 * rate), (speed - slow) / rate
+    left = (end - BASE - 0.25) * direction - way
+    if left <= 0.0:  # the nearest one is passed before, and holds it
+        fast = sqrt(speed * speed - 2.0 * rate * (way + left))
+        assert (found.end - NOW) / SECOND == pytest.approx((speed - fast) / rate, rel=1e-6)
+        return
+    half = NOW + round(0.5 * time * SECOND)
+    assert abs(found.velocity(half)) == pytest.approx(0.5 * (speed + slow) if way else speed, rel=1e-6)
+    assert found.position(half) == pytest.approx(BASE + 0.25 + direction * 0.125 * (3.0 * speed + slow) * time, abs=1e-3)
+    assert left <= 24.0
+    assert (found.end - NOW) / SECOND == pytest.approx(time + 2.0 * left / min(speed, slow), rel=1e-6)
+
+
+def test_a_detent_does_not_catch_what_nothing_brakes_or_what_comes_to_a_stop_first() -> None:
+    still = replace(BODY, detent=Wells(0.3, 16.0), load=0.0, friction=0.0)
+    slow = Wells(0.3, 16.0).catches_below(still.inertia, 0.0)
+    assert still.profile(NOW, BASE, 0.0, slow * 1.01).end is None
+    assert still.profile(NOW, BASE, 0.0, slow * 0.99).end is not None
+    held = replace(BODY, detent=Wells(0.3, 16.0), load=0.0, high=BASE + 100).profile(NOW, BASE, 0.0, 300.0)
+    assert held.end is not None
+    assert held.count(held.end) == BASE + 100
+    assert (held.end - NOW) / SECOND == pytest.approx((300.0 - sqrt(300.0**2 - 2.0 * 100.0 * 100.0)) / 100.0)
