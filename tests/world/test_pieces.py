@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,11 +13,13 @@ import pytest
 from steptwin.errors import Misuse
 from steptwin.files import session as sessions
 from steptwin.files.world import World
+from steptwin.world import pieces
 from steptwin.world.check import diagnose
 from steptwin.world.description import describe
 from steptwin.world.kinds import KINDS
-from steptwin.world.pieces import FILE_KEYS, MOST_NESTED, given_files, normal
-from steptwin.world.reader import WorldError
+from steptwin.world.pieces import FILE_KEYS, MOST_NESTED, Pieces, beside, given_files, no_files, normal
+from steptwin.world.reader import TomlText, WorldError
+from steptwin.world.tables import tables
 
 STATION = """\
 [parameters]
@@ -292,3 +295,157 @@ def test_files_of_controllers_have_known_keys() -> None:
 )
 def test_paths_have_one_spelling(path: str, expected: str) -> None:
     assert normal(path) == expected
+
+
+WHOLE = """\
+[parameters]
+on = "m.OUT1"
+n = {}
+[[mic488]]
+name = "unit"
+unit = 3
+program = "p.prg"
+[mic488.M1]
+unit = "mm"
+[[mic488]]
+name = "b"
+[[line]]
+name = "to"
+[[gate]]
+name = "g"
+kind = "or"
+inputs = ["b.OUT1", "unit.OUT1", "{on}", "other.OUT1"]
+[[use]]
+name = "in"
+file = "inner/i.toml"
+with = { to = "b.IN1" }
+[[fault]]
+name = "late"
+kind = "delay"
+for_ms = "{n}"
+[[script]]
+name = "s"
+steps = [
+  { set = { "b.IN1" = 1, "in_k.x" = 0 } },
+  { write = { "unit.M1_EN" = 1 } },
+  { clear_fault = "late" },
+  { note = "b, {{b}} and {n} of g" },
+  { until = "g.out and b.unit-g > {n} or in_k.pressed" },
+  { repeat = 2, steps = [{ press = "in_k" }, { wait = "1 s" }] },
+]
+"""
+INNER = '[parameters]\nto = {}\n[[button]]\nname = "k"\nto = "{to}"\n[[mic488]]\nname = "i"\nconfig = "../c.cfg"\n'
+WRITTEN_OUT = """\
+[[mic488]]
+name = "u_unit"
+unit = 3
+program = "d/p.prg"
+[mic488.M1]
+unit = "mm"
+[[mic488]]
+name = "u_b"
+[[mic488]]
+name = "u_in_i"
+config = "d/c.cfg"
+[[line]]
+name = "u_to"
+[[gate]]
+name = "u_g"
+kind = "or"
+inputs = ["u_b.OUT1", "u_unit.OUT1", "m.OUT1", "other.OUT1"]
+[[fault]]
+name = "u_late"
+kind = "delay"
+for_ms = 5
+[[script]]
+name = "u_s"
+steps = [
+  { set = { "u_b.IN1" = 1, "u_in_k.x" = 0 } },
+  { write = { "u_unit.M1_EN" = 1 } },
+  { clear_fault = "u_late" },
+  { note = "b, {b} and 5 of g" },
+  { until = "u_g.out and u_b.unit-g > 5 or u_in_k.pressed" },
+  { repeat = 2, steps = [{ press = "u_in_k" }, { wait = "1 s" }] },
+]
+[[button]]
+name = "u_in_k"
+to = "u_b.IN1"
+"""
+
+
+def put_in(text: str, files: Mapping[str, str]) -> TomlText:
+    found = TomlText("m.toml", text)
+    read = given_files({name: content.encode() for name, content in files.items()})
+    Pieces(read, tables(), ("mic488",), ()).put_into(found)
+    return found
+
+
+def test_a_use_is_what_it_stands_for_written_out() -> None:
+    """Only what names something is renamed: not keys, not units, not parts of longer words."""
+    found = put_in('[[use]]\nname = "u"\nfile = "d/w.toml"\nwith = { n = 5 }\n', {"d/w.toml": WHOLE, "d/inner/i.toml": INNER})
+    assert found.findings == []
+    assert found.data == tomllib.loads(WRITTEN_OUT)
+
+
+def test_as_many_uses_as_are_permitted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pieces, "MOST_PIECES", 3)
+    one = '[[use]]\nname = "u{n}"\nfile = "p.toml"\n'
+    for number, findings in ((3, 0), (4, 1)):
+        text = "".join(one.replace("{n}", str(n)) for n in range(number))
+        assert len(put_in(text, {"p.toml": '[[button]]\nname = "b"\n'}).findings) == findings
+
+
+@pytest.mark.parametrize(
+    ("text", "files", "findings"),
+    [
+        ("[use]\nname = 'u'\nfile = 'p'\n", {}, ["D002 [use] stands once"]),
+        ("[[use]]\nname = 'u'\nfile = 'p'\n", {"p": "mic488 = ['x']\nbutton = [3, 'b']\n"}, []),
+        (
+            "[[use]]\nname = 'u'\nfile = 'p'\n",
+            {"p": "parameters = 3\n"},
+            ["D010 a file has errors: p:1:1: error D002: parameters is 3"],
+        ),
+        (
+            "[[use]]\nname = 'u'\nfile = 'q'\n",
+            {},
+            ["D009 file = 'q': the content of the file 'q' is not given with the description"],
+        ),
+        ("[[use]]\nname = 'u'\nfile = 'p'\nwith = 3\n", {"p": ""}, ["D002 with is 3"]),
+    ],
+)
+def test_what_is_wrong_with_a_use_is_told_once(text: str, files: dict[str, str], findings: list[str]) -> None:
+    assert [f"{found.code} {found.message}" for found in put_in(text, files).findings] == findings
+
+
+@pytest.mark.parametrize("file", ["[[button", None])
+def test_what_a_use_would_have_given_is_not_missed(file: str | None) -> None:
+    """Only the file is told, not each name that it would have given."""
+    text = (
+        '[[mic488]]\nname = "t"\n[[use]]\nname = "left"\nfile = "p.toml"\n[[event]]\nwhen = "left_x.position > 1"\nsteps = []\n'
+    )
+    found = wrong(text, {} if file is None else {"p.toml": file})
+    assert "left_x" not in found
+    assert found.count("error ") == 1
+
+
+def test_without_files_a_description_uses_none() -> None:
+    with pytest.raises(Misuse, match=r"the content of the file 'p\.toml' is not given"):
+        no_files("p.toml")
+
+
+@pytest.mark.parametrize(
+    ("file", "name", "found"),
+    [
+        ("a/b.toml", "c", "a/c"),
+        ("a\\b.toml", "c", "a\\c"),
+        ("a/b/c.toml", "../d", "a/b/../d"),
+        ("b.toml", "c", "c"),
+        ("a/b.toml", "/c", "/c"),
+        ("a/b.toml", "\\c", "\\c"),
+        ("a/b.toml", "C:c", "C:c"),
+        ("a/b.toml", "C:", "C:"),
+        ("a/b.toml", "cC:x", "a/cC:x"),
+    ],
+)
+def test_a_file_beside_another(file: str, name: str, found: str) -> None:
+    assert beside(file, name) == found

@@ -10,7 +10,9 @@ import pytest
 from steptwin.diagnostics import Fix, Span
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND
-from steptwin.world.reader import TomlText
+from steptwin.world.names import Unknown
+from steptwin.world.reader import MOST_FINDINGS, TomlText, WorldError
+from steptwin.world.tomlplaces import Path
 from steptwin.world.values import flag, number, pair, pin_name, points, positive_time, text_value, whole, whole_seconds, word
 
 
@@ -83,3 +85,61 @@ def test_values_at_their_limits(read: Callable[[Any], Any], value: object, expec
 def test_the_fix_of_a_misspelt_key_replaces_it_alone(text: str, path: tuple[str, ...], start: int) -> None:
     fix = TomlText("w", text).key_replacement(path, "nmae", ("name", "other"))
     assert fix == Fix(Span(start, start + 4), "name")
+
+
+@pytest.mark.parametrize(
+    ("text", "path", "removed"),
+    [
+        ("a = 1", ("a",), (0, 5)),
+        ("a = 1\n", ("a",), (0, 6)),
+        ("\n  a = [\n1]  \nb = 2\n", ("a",), (1, 14)),
+        ("a = 1 # why\n", ("a",), None),
+        ("x = { a = 1 }\n", ("x", "a"), None),
+        ("a = 1\n", ("b",), None),
+    ],
+)
+def test_the_fix_that_removes_a_key_takes_its_whole_line(
+    text: str, path: tuple[str, ...], removed: tuple[int, int] | None
+) -> None:
+    assert TomlText("w", text).removal(path) == (None if removed is None else Fix(Span(*removed), ""))
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("[ab]\n", Fix(Span(0, 4), "[[ab]]")),
+        ("x = 1\n \t[ ab ]\n", Fix(Span(8, 14), "[[ ab ]]")),
+        ("[[ab]]\n", None),
+        ("[ab.c]\n", None),
+        ("[abc]\n", None),
+    ],
+)
+def test_the_fix_that_makes_a_table_one_of_several(text: str, found: Fix | None) -> None:
+    assert TomlText("w", text).doubled("ab") == found
+
+
+def test_findings_have_the_place_of_what_holds_them_and_no_more_words_than_anybody_reads() -> None:
+    text = TomlText("w", "[a]\nb = 1\n[[c]]\nd = 2\n")
+    paths: list[Path] = [("a", "b"), ("a", "b", "x", 3), ("a", "z"), ("c",), ("c", 0, "d"), ("c", 0, "e"), ("q",), ()]
+    for path in paths:
+        text.wrong(path, "D003", "?")
+    starts = [4, 4, 0, 10, 16, 10, 0, 0]
+    assert [found.span.start for found in text.findings] == starts
+    assert [found.span for found in text.findings[-2:]] == [Span(0, 0)] * 2
+    for length, shown in ((400, "x" * 400), (401, f"{'x' * 339}…{'x' * 60}")):
+        text.wrong(("q",), "D003", "x" * length)
+        assert text.findings[-1].message == shown
+    text.wrong(("q",), "D003", "x\n" * 300)
+    assert len(text.findings[-1].message) == 600
+    for _ in range(MOST_FINDINGS - 1 - len(text.findings)):
+        text.wrong(("q",), "D003", "?")
+    with pytest.raises(WorldError):
+        text.wrong(("q",), "D003", "?")
+    assert len(text.findings) == MOST_FINDINGS
+
+
+def test_a_reference_that_is_probably_another_has_a_fix() -> None:
+    text = TomlText("w", 'axis = "tabel"\n')
+    text.wrong_reference(("axis",), Unknown("tabel", "no axis is called 'tabel'", "table"))
+    (found,) = text.findings
+    assert (found.code, found.message, found.fix) == ("D009", "no axis is called 'tabel'", Fix(Span(8, 13), "table"))
