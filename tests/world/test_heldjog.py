@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from textwrap import dedent
 from typing import Any
 
@@ -379,10 +380,14 @@ def test_a_jog_that_is_over_asks_for_nothing_more() -> None:
 
 
 def test_a_jog_that_is_cut_says_so_and_asks_for_nothing_more() -> None:
-    for rig, kind, wanted in ((mic(), Mic488HeldJog, Jog("a", 1, 10.0)), (chip(), M1486HeldJog, Jog("drum", 1, 6400.0))):
-        machine = rig.world.machine(wanted.machine)
+    of_mic, of_chip = mic(), chip()
+    makers: list[tuple[Rig, Callable[[], Mic488HeldJog | M1486HeldJog]]] = [
+        (of_mic, lambda: Mic488HeldJog(of_mic.world.mic488["a"].device, "bus", Jog("a", 1, 10.0))),
+        (of_chip, lambda: M1486HeldJog(of_chip.world.m1486["drum"].chip, "chips", Jog("drum", 1, 6400.0))),
+    ]
+    for rig, make in makers:
         for begun in (False, True):
-            held = kind(machine, "line", wanted)
+            held = make()
             if begun:
                 held.extend(rig.world.now)
             held.cut()
@@ -390,7 +395,7 @@ def test_a_jog_that_is_cut_says_so_and_asks_for_nothing_more() -> None:
             assert held.extend(rig.world.now) == ()
             held.cut()
             assert held.over == "stopped"
-        ended = kind(machine, "line", wanted)
+        ended = make()
         ended.release(rig.world.now)
         ended.cut()
         assert ended.over == "let go"
