@@ -18,6 +18,7 @@ from steptwin.subject.commands import ControlProgram
 from steptwin.subject.world import WorldSubject
 from steptwin.world import script as do
 from steptwin.world.actions import Download
+from steptwin.world.kinds.m1486.build import keep_memory
 from steptwin.world.programs import StatementFollower
 from steptwin.world.programtexts import WorldPrograms, configuration_text, program_texts
 
@@ -263,6 +264,23 @@ def test_what_a_text_takes_of_the_memory_of_its_place() -> None:
     assert [one["used"] for one in (part, longer)] == [5, 10]
     (wrong,) = texts.memory("c", place, "[\n")
     assert wrong["used"] == 0
+
+
+def test_what_positions_take_of_the_memory() -> None:
+    texts = WorldPrograms(world())
+    used = [texts.memory("table", "positions 0", rows)[0]["used"] for rows in ("A;1;2;3;4\n", "A;1;2;3;4\nB;1;2;3;4\n")]
+    assert used[1] == 2 * used[0] > 0
+
+
+@pytest.mark.parametrize(("variant", "kept"), [("B", False), ("E1", True)])
+def test_a_program_to_switch_on_with_stays_in_an_eeprom(variant: str, kept: bool) -> None:
+    text = f'[[m1486]]\nname = "c"\nvariant = "{variant}"\nprogram = "p"\n'
+    chip = World.from_toml(text, {"p": b"[\nf64\nr\n]\n"}).m1486["c"].chip
+    images: list[bytes] = []
+    keep_memory(chip, chip.image, images.append)
+    assert images == []
+    keep_memory(chip, None, images.append)
+    assert images == ([chip.image] if kept else [])
 
 
 def test_positions_have_a_place_even_while_none_are_there() -> None:

@@ -58,6 +58,10 @@ def test_the_state_of_an_m1486_is_known_at_rest(drum: DeviceSubject, rig: Rig) -
     drum.do(command.Move("drum", 1, by=5000.0))
     found = read_state(drum.do(command.ReadState("drum")).value)
     assert (found.program.state, found.axes[0].position, found.axes[0].moving) == (None, None, None)
+    assert {found.status.text, found.axes[0].status.text, found.program.text} == {"moves, waits or runs its program"}
+    rig.time.sleep(60.0)
+    found = read_state(drum.do(command.ReadState("drum")).value)
+    assert {found.status.text, found.axes[0].status.text, found.program.text} == {"is at rest"}
     rig.time.sleep(60.0)
     found = read_state(drum.do(command.ReadState("drum")).value)
     assert (found.axes[0].position, found.axes[0].velocity, found.axes[0].moving) == (5000.0, 0.0, False)

@@ -111,3 +111,14 @@ def test_a_write_of_data_type_tells_how_values_travel(address: int, is_learnt: b
     words.observe(0, FrameDirection.IN, mbap.encode_frame(1, 1, request))
     words.observe(1, FrameDirection.OUT, mbap.encode_frame(1, 1, request))
     assert (words._wordings[1].data_type is DataType.DINT) is is_learnt
+
+
+@pytest.mark.parametrize("gap_ms", [4, 35])
+def test_the_gap_that_ends_a_frame_is_a_choice(gap_ms: int) -> None:
+    ear = RtuListener(FrameWords(), gap_ms * MILLISECOND)
+    ear.feed(READ[:3], 0)
+    due = ear.deadline()
+    assert due is not None
+    assert gap_ms * MILLISECOND <= due <= gap_ms * MILLISECOND + 1
+    ear.expire(due)
+    assert ear.deadline() is None
