@@ -106,6 +106,13 @@ def test_each_axis_is_within_one_pulse_of_the_arc_and_ends_exactly(
 
 
 @settings(max_examples=60)
+@given(arc=circles, acc=rates, dec=rates, speed=speeds)
+def test_ramps_end_at_the_same_moments_on_both_axes(arc: Arc, acc: float, dec: float, speed: float) -> None:
+    run = run_arc(arc, acc, dec, speed)
+    for profile in (run.x, run.y):
+        assert {s.end_s for s in run.way.segments} <= {s.end_s for s in profile.segments}
+
+
 @given(arc=circles, speed=speeds)
 def test_the_speed_along_an_arc_is_that_of_the_way(arc: Arc, speed: float) -> None:
     run = run_arc(arc, 50_000.0, 50_000.0, speed)
