@@ -101,6 +101,7 @@ def failed(arguments: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest
         ["migrate", "missing.prg", "--to", "1.40"],
         ["run", "missing.m1486"],
         ["run", "missing.toml"],
+        ["send", "missing.m1486"],
         ["run", "missing.json"],
         ["up", "missing.toml"],
         ["replay", "missing.json"],
@@ -110,7 +111,6 @@ def failed(arguments: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest
         ["serve", "m1486", "--program", "missing.m1486"],
         ["record", "missing.txt"],
         ["diff", "missing.txt", "other.txt"],
-        ["send", "missing.m1486", "-d", "/dev/none,chip=1"],
         ["info", "-d", "/dev/none,config=missing.cfg"],
     ],
 )

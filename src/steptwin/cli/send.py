@@ -30,13 +30,13 @@ def send(
     from steptwin.drivers.kinds import DRIVERS
     from steptwin.files.textfiles import read_text
 
+    text = read_text(file).source.text
     # A program that no device of its kind takes needs no device.
     refused = [kind for kind in DRIVERS.values() if file.suffix.lower() in kind.programs and kind.send is None]
     address = None if refused else find(device, whole_line=True)
     kind = refused[0] if address is None else kind_of(address)
     if address is None or kind.send is None:
         raise Refusal(f"{file} was not sent: {kind.cannot_send or f'{kind.title} takes no programs'}")
-    text = read_text(file).source.text
     held_up = SuspensionDetector()
     with _progress(file.name) as progress:
         sent = kind.send(address, file, text, progress, held_up.check, log_of(log_frames))
