@@ -53,7 +53,7 @@ def test_a_violation_has_its_moment_and_exit_code_1(shell: Shell, world: str) ->
     out = shell("run", world, "--for", "4s", "--property", "never table.IN1")
     assert shell.code == 1
     (line,) = [one for one in out.splitlines() if one.startswith("property ")]
-    assert line == "property violated at 3 s, robustness -1: never table.IN1: not table.IN1 == 0 at 3 s"
+    assert line == "property violated at 3 s, robustness -1: never table.IN1: table.IN1 is not 0 at 3 s"
 
 
 def test_one_of_several_properties_is_enough_for_exit_code_1(shell: Shell, world: str) -> None:
@@ -75,7 +75,7 @@ def test_json_has_verdicts_and_measures(shell: Shell, world: str) -> None:
         "holds": False,
         "robustness": -1.0,
         "time_s": 3.0,
-        "why": "not table.IN1 == 0 at 3 s",
+        "why": "table.IN1 is not 0 at 3 s",
     }
     assert (second["property"], second["holds"]) == (cycle, True)
     assert second["robustness"] == pytest.approx(0.3, abs=0.001)  # 0.9 of 3 s are left

@@ -54,7 +54,8 @@ def test_a_condition_that_never_comes_true_is_waited_for_an_hour_and_told(tmp_pa
     world = tmp_path / "w.toml"
     world.write_text('[[mic488]]\nname = "a"\n')
     assert "warning: a.M1.position > 3 did not come true in 3600 s\n" in invoke("run", str(world), "--until", "a.M1.position > 3")
-    assert "--for 2s ends the run then" in invoke("run", str(world), "--until", "2s", code=2)
+    with pytest.raises(Misuse, match="--for 2s ends the run then"):
+        invoke("run", str(world), "--until", "2s")
     told = json.loads(invoke("run", str(world), "--until", "a.M1.position > 3", "--for", "2s", "--json"))
     assert (told["in_vain"], told["ended_by"], told["time_s"]) == ("a.M1.position > 3", None, 2.0)
     told = json.loads(invoke("run", str(world), "--for", "2s", "--json"))

@@ -40,7 +40,7 @@ class SubjectPart(Protocol):
 
 
 class CompositeSubject:
-    """Satisfies `steptwin.studio.hub.Served` and `steptwin.subject.jogs.Jogs`.
+    """Satisfies `steptwin.studio.surroundings.Served` and `steptwin.subject.jogs.Jogs`.
 
     A command goes to the part whose machine or line it names; one that names none to ``world``, or to the only device.
 

@@ -48,7 +48,7 @@ class _Connected:
 
 
 class DeviceConnections:
-    """See `steptwin.studio.hub.Connections`."""
+    """See `steptwin.studio.surroundings.Connections`."""
 
     def __init__(self, subject: CompositeSubject, around: DeviceSurroundings, computer: Computer) -> None:
         self._subject = subject

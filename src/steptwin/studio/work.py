@@ -79,7 +79,7 @@ class Worker(Protocol):
 
 
 class DeviceWork:
-    """See `steptwin.studio.hub.LongWork`."""
+    """See `steptwin.studio.surroundings.LongWork`."""
 
     def __init__(self, worker: Worker, on_internal: Callable[[Exception], object]) -> None:
         self._worker = worker
