@@ -56,11 +56,11 @@ class WorldPlant:
 
     @property
     def _url(self) -> str | None:
-        from steptwin.history.keeper import HistoryKeeper
-
         for one in self._opened:
-            if one.kind == HISTORY and isinstance(one.gateway, HistoryKeeper):
-                return one.gateway.url
+            if one.kind == HISTORY:
+                from steptwin.history.keeper import HistoryKeeper  # its libraries are there, because it is open
+
+                return one.gateway.url if isinstance(one.gateway, HistoryKeeper) else None
         return None
 
     async def _read(self, work: Callable[[HistoryDatabase], T]) -> T:
