@@ -294,8 +294,10 @@ def test_recording_and_comparing(twin: Any, shell: Shell, tmp_path: Path) -> Non
     assert (shell.code, "cannot read" in shell.errors) == (2, True)
 
 
-def test_what_cannot_be_downloaded(shell: Shell) -> None:
-    shell("send", "machine.prg")
+def test_what_cannot_be_downloaded(shell: Shell, tmp_path: Path) -> None:
+    program = tmp_path / "machine.prg"
+    program.write_text("EOP\n")
+    shell("send", str(program))
     assert shell.code == 1
     assert "protocol of the MIC488 is not documented" in shell.errors
     assert "steptwin build" in shell.errors

@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Iterator
 from io import StringIO
+from pathlib import Path
 
 import pytest
 from shell import Shell
@@ -83,7 +84,11 @@ def test_a_terminal_takes_its_commands(place: str, shell: Shell, monkeypatch: py
         (["verify"], 2, "there are no checks of a toy: permitted is a MIC488 or an M1486"),
     ],
 )
-def test_what_it_does_not_offer_is_refused(place: str, shell: Shell, arguments: list[str], code: int, message: str) -> None:
+def test_what_it_does_not_offer_is_refused(
+    place: str, shell: Shell, arguments: list[str], code: int, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("program.toy").write_text("M 1, P 10\n")
     shell(*arguments, "-d", place)
     assert (shell.code, message in shell.errors) == (code, True), shell.errors
 
