@@ -18,6 +18,9 @@ WEB := $(BIN)/python studio-web/build.py
 PAGE := src/steptwin/studio/page/index.html
 PAGE_SOURCES := $(shell find studio-web -type f -not -path '*/node_modules/*' -not -path '*/__pycache__/*')
 
+# Tools that its tests need beside what it is built with.
+WEB_STAMP := .venv/.ready-web
+
 # The extension for VS Code.
 EXTENSION := editors/vscode
 EXTENSION_STAMP := $(EXTENSION)/node_modules/.steptwin
@@ -44,7 +47,7 @@ run: $(RUN_STAMP)  ## Show a demo machine in the browser (ARGS="MACHINE.toml --s
 	@$(MAKE) --no-print-directory page || echo "the page of the studio could not be built; the service runs without it" >&2
 	@exec $(BIN)/steptwin studio $(ARGS)
 
-test: $(DEV_STAMP) $(PAGE) $(EXTENSION_STAMP) $(CLIENTS_STAMP)  ## Run the tests (ARGS="-k mic_7 ..."); peers that are missing are skipped
+test: $(DEV_STAMP) $(WEB_STAMP) $(PAGE) $(EXTENSION_STAMP) $(CLIENTS_STAMP)  ## Run the tests (ARGS="-k mic_7 ..."); peers that are missing are skipped
 	$(BIN)/pytest -n auto $(ARGS)
 
 golden: $(DEV_STAMP)  ## Make the golden files of tests anew (ARGS=tests/mic488/test_registers_golden.py): read the diff
@@ -148,6 +151,11 @@ $(NODE_STAMP): $(PYTHON_STAMP) requirements/node.txt
 $(PAGE): $(NODE_STAMP) $(PAGE_SOURCES)
 	@echo "building the page of the studio"
 	@$(WEB) build
+	@touch $@
+
+$(WEB_STAMP): $(NODE_STAMP) studio-web/package-lock.json
+	@echo "installing what the tests of the page need"
+	@$(WEB) install
 	@touch $@
 
 $(EXTENSION_STAMP): $(NODE_STAMP) $(EXTENSION)/package-lock.json
