@@ -26,9 +26,12 @@ def test_a_number_with_a_unit(unit: str, whole: int, thousandths: int, blank: bo
 
 @pytest.mark.parametrize(
     ("value", "nanoseconds"),
-    [("1.5", SECOND * 3 // 2), (".5 s", SECOND // 2), (2, 2 * SECOND), (0, 0), (0.25, SECOND // 4), (1e-5, 10_000)],
+    [
+        *(("1.5s", SECOND * 3 // 2), (".5 s", SECOND // 2), (2, 2 * SECOND), (0.25, SECOND // 4), (1e-5, 10_000)),
+        *((0, 0), ("0", 0), ("0.0", 0)),
+    ],
 )
-def test_a_number_alone_is_of_seconds(value: object, nanoseconds: int) -> None:
+def test_a_number_that_is_no_text_is_of_seconds(value: object, nanoseconds: int) -> None:
     assert duration(value) == nanoseconds
 
 
@@ -42,4 +45,10 @@ def test_the_longest_is_a_leap_year() -> None:
 @pytest.mark.parametrize("value", ["", "ms", "5 parsec", "-1 s", "1.", True, None, [1], -1e-5, float("inf"), float("nan")])
 def test_what_is_no_duration_is_misuse(value: object) -> None:
     with pytest.raises(Misuse, match=r"is not a time: expected a number with us, ms, s, min, h, such as '90 s' or '500 ms'$"):
+        duration(value)
+
+
+@pytest.mark.parametrize("value", ["400", " 1.5", "0.1", ".5"])
+def test_a_text_needs_a_unit(value: str) -> None:
+    with pytest.raises(Misuse, match=rf"^{value!r} has no unit: expected a number with us, ms, s, min, h, such as '90 s'"):
         duration(value)

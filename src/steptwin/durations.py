@@ -1,4 +1,4 @@
-"""Times as people write them: ``5 ms``, ``1.5s``, ``2 min``, or a number of seconds."""
+"""Times as people write them: ``5 ms``, ``1.5s``, ``2 min``. A number that is no text is of seconds."""
 
 from __future__ import annotations
 
@@ -17,12 +17,14 @@ _DURATION = re.compile(r"(\d{1,30}(?:\.\d{1,30})?|\.\d{1,30}) *([a-z]*)\Z", re.A
 def duration(value: object) -> Nanos:
     """Nanoseconds of a text or of a number of seconds. Raises `Misuse` with what is permitted."""
     if isinstance(value, int | float) and not isinstance(value, bool) and 0 <= value < float("inf"):
-        text: object = f"{Decimal(str(value)):f}"
+        text: object = f"{Decimal(str(value)):f}s"
     else:
         text = value
     found = _of_text(text.strip().lower()) if isinstance(text, str) else None
     if found is None:
-        raise Misuse(f"{value!r} is not a time: expected a number with {', '.join(UNITS)}, such as '90 s' or '500 ms'")
+        is_bare = isinstance(text, str) and _of_text(f"{text.strip()}s") is not None
+        what = "has no unit" if is_bare else "is not a time"
+        raise Misuse(f"{value!r} {what}: expected a number with {', '.join(UNITS)}, such as '90 s' or '500 ms'")
     if found > LONGEST_NS:
         raise Misuse(f"{value!r} is too long: permitted are 0 to {LONGEST_NS // UNITS['h']} h")
     return found
@@ -30,10 +32,12 @@ def duration(value: object) -> Nanos:
 
 @lru_cache(maxsize=1024)
 def _of_text(text: str) -> Nanos | None:
-    """Nanoseconds; None for what is no time."""
+    """Nanoseconds; None for what is no time. 0 is 0 in any unit."""
     match = _DURATION.match(text)
-    unit = UNITS.get(match[2] or "s") if match else None
-    return None if match is None or unit is None else int(Decimal(match[1]) * unit)
+    if match is None or not (match[2] or Decimal(match[1]) == 0):
+        return None
+    unit = UNITS.get(match[2] or "s")
+    return None if unit is None else int(Decimal(match[1]) * unit)
 
 
 def duration_text(time: Nanos) -> str:

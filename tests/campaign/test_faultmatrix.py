@@ -139,6 +139,7 @@ def test_a_property_in_time_tells_what_is_unsafe(tmp_path: Path) -> None:
     found = [(fault, judged.effect) for fault, judged in cells if "guarded" in judged.why]
     assert {fault for fault, _ in found} == {
         "welded-contact element=safety",
+        "stuck-input element=safety input=coil level=1",
         "stuck-output element=safety output=no level=1",
         "stuck-output element=valve output=out level=1",
     }

@@ -46,7 +46,7 @@ def test_files_are_named_after_the_trace(run: Run, trace: Path) -> None:
 
 def test_a_window_of_time_into_a_named_file(run: Run, trace: Path, tmp_path: Path) -> None:
     target = tmp_path / "there" / "part.csv"
-    assert run(trace, "-o", target, "--from", "0.5", "--until", "1500ms", "--period", "500ms")[0] == 0
+    assert run(trace, "-o", target, "--from", "0.5s", "--until", "1500ms", "--period", "500ms")[0] == 0
     lines = target.read_text().splitlines()
     assert [line.partition(",")[0] for line in lines] == ["time_s", "0.5", "1.0", "1.5"]
     assert SECOND == 1_000_000_000

@@ -212,9 +212,9 @@ def test_the_keys_of_a_description_have_their_defaults_with_units() -> None:
     from steptwin.cli.up import sections
 
     (source,) = [section for section in sections() if "[[source]]" in section.title]
-    assert {row[0]: row[2] for row in source.rows}["period"] == "10 ms"
+    assert {row[0]: row[3] for row in source.rows}["period"] == "10 ms"
     (broker,) = [section for section in sections() if section.title == "[gateway.mqtt]"]
-    assert {row[0]: row[2] for row in broker.rows}["keep_alive"] == "15000 ms"
+    assert {row[0]: row[3] for row in broker.rows}["keep_alive"] == "15000 ms"
 
 
 WITH_PROGRAM = """

@@ -144,7 +144,7 @@ def test_run_and_up_have_it(tmp_path: Path, capfd: pytest.CaptureFixture[str], m
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     place = tmp_path / "lamp.toml"
     place.write_text(TEXT, "utf-8")
-    ended = CliRunner().invoke(app, ["run", str(place), "--for", "2", "--trace", str(tmp_path / "t.csv")])
+    ended = CliRunner().invoke(app, ["run", str(place), "--for", "2s", "--trace", str(tmp_path / "t.csv")])
     assert "it is burnt out" in ended.output
     assert "expectation failed" in ended.output
     assert "busy.lit == 1" in ended.output

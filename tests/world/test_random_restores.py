@@ -94,6 +94,7 @@ PARTS = (
     ),
     (
         "[[conveyor]]\nname = 'w'\nlength = 200\naxis = 'y'\nfeed_every = '300 ms'\n[[conveyor.sensor]]\nat = 60\nto = 'c.IN4'\n"
+        "[[conveyor.stop]]\nat = 66\nhold = 'c.OUT1'\n"
         "[[fault]]\nkind = 'empty-feeder'\nelement = 'w'\nfrom_s = 0.5\nuntil_s = 1.3\n"
     ),
     "[[cylinder]]\nname = 'z'\nextend = 'c.OUT1'\n[[cylinder.switch]]\nabove = 40\nto = 'c.IN5'\n",
@@ -104,6 +105,7 @@ PARTS = (
     (
         "[[relay]]\nname = 'r'\ncoil = 'c.OUT1'\npull_in = '9 ms'\ndrop_out = '5 ms'\n"
         "[[wire]]\nfrom = 'r.no'\nto = 'c.IN6'\ndelay = '3 ms'\n"
+        "[[fault]]\nkind = 'stuck-input'\nelement = 'r'\ninput = 'coil'\nfrom_s = 0.8\nuntil_s = 1.2\n"
     ),
     (
         "[[gate]]\nname = 'ga'\nkind = 'xor'\ninputs = ['c.OUT1', 'la.out']\n"

@@ -13,7 +13,7 @@ import pytest
 from steptwin.errors import Misuse
 from steptwin.world.reader import Key
 from steptwin.world.steptable import ACTIONS, REPEAT, STEPS
-from steptwin.world.tables import all_keys
+from steptwin.world.tables import all_keys, written_tables
 
 GOLDEN = Path(__file__).parent / "golden" / "tables.txt"
 PROBES: tuple[object, ...] = (None, -(10**30), 10**30, "?", "", [], 0, -1, True)
@@ -51,6 +51,22 @@ def test_keys_are_the_reviewed_ones(table: str) -> None:
     expected = {name: lines for name, *lines in (text.rstrip().splitlines() for text in texts)}
     assert expected.keys() == everything().keys()
     assert everything()[table] == expected[table]
+
+
+@pytest.mark.parametrize("table", [*written_tables(), "step"])
+def test_each_key_says_what_it_means_and_what_is_permitted(table: str) -> None:
+    steps = [key for action in ACTIONS.values() for key in (action.main, *action.others)]
+    for key in written_tables().get(table, steps):
+        assert key.meaning, key.name
+        assert key.permitted, key.name
+
+
+def test_axes_and_inputs_of_controllers_are_among_the_tables() -> None:
+    tables = {name: {key.name: key for key in keys} for name, keys in written_tables().items()}
+    velocity = tables["[mic488.M1] to [mic488.M4]"]["vel"]
+    assert (velocity.meaning, velocity.permitted) == ("velocity, u/s", "a number > 0 in units/s")
+    assert tables["[mic488.IN1] to [mic488.IN20]"]["filter"].permitted.startswith("10 ms (0), 50 ms (1)")
+    assert "[gateway.modbus]" in tables
 
 
 if __name__ == "__main__":

@@ -166,7 +166,7 @@ def test_what_goes_over_its_line_is_put_into_words() -> None:
 def test_run_checks_and_runs_it(tmp_path: Path) -> None:
     place = tmp_path / "toys.toml"
     place.write_text(TEXT, "utf-8")
-    ended = CliRunner().invoke(app, ["run", str(place), "--for", "2", "--trace", str(tmp_path / "t.csv")])
+    ended = CliRunner().invoke(app, ["run", str(place), "--for", "2s", "--trace", str(tmp_path / "t.csv")])
     assert "past 20" in ended.output
     assert "expectation failed" in ended.output
     assert ended.exit_code == 1
@@ -203,9 +203,9 @@ def test_its_end_of_a_run_is_printed_and_is_json(tmp_path: Path) -> None:
     place = tmp_path / "toys.toml"
     free = TEXT.partition("[[axis]]")[0] + "[[script]]" + TEXT.partition("[[script]]")[2].partition("  { expect")[0] + "]\n"
     place.write_text(free, "utf-8")
-    shown = CliRunner().invoke(app, ["run", str(place), "--for", "2"])
+    shown = CliRunner().invoke(app, ["run", str(place), "--for", "2s"])
     assert "t.M1           100.0000 pulse" in shown.output
-    data = json.loads(CliRunner().invoke(app, ["run", str(place), "--for", "2", "--json"]).output)
+    data = json.loads(CliRunner().invoke(app, ["run", str(place), "--for", "2s", "--json"]).output)
     assert data["controllers"]["t"]["axes"][0]["position"] == 100.0
     assert data["controllers"]["t"]["details"] == {"commands": 1}
 

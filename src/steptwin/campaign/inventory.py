@@ -14,10 +14,11 @@ from steptwin.world.lines import SCRIPTS
 from steptwin.world.plant import Plant
 from steptwin.world.script import Repeat, Set, Step
 
-STUCK_OUTPUT = "stuck-output"
+STUCK_INPUT, STUCK_OUTPUT = "stuck-input", "stuck-output"
 TRIED: dict[str, tuple[dict[str, FaultValue], ...]] = {
     "stuck": ({"value": 0.0}, {"value": 1.0}),
-    "stuck-output": ({"level": 0}, {"level": 1}),
+    STUCK_OUTPUT: ({"level": 0}, {"level": 1}),
+    STUCK_INPUT: ({"level": 0}, {"level": 1}),
     "drift": ({"volts": 0.5}, {"volts": -0.5}),
     "no-answer": ({"lost": "answer"}, {"lost": "request"}),
     "bounce": ({},),
@@ -39,6 +40,7 @@ class FaultyPart(enum.StrEnum):
 
 _OF_KIND = {
     "stuck": FaultyPart.SENSOR,
+    STUCK_INPUT: FaultyPart.SENSOR,
     "bounce": FaultyPart.SENSOR,
     "slip": FaultyPart.SENSOR,
     "broken-wire": FaultyPart.SENSOR,
@@ -127,20 +129,25 @@ def _places(world: Plant, kind: FaultKind) -> Iterator[tuple[dict[str, FaultValu
 
 
 def _elements(world: Plant, kind: FaultKind) -> Iterator[tuple[dict[str, FaultValue], str]]:
-    used = _sources(world)
+    key, used = {STUCK_OUTPUT: ("output", _sources(world)), STUCK_INPUT: ("input", _contacted(world))}.get(kind.name, ("", []))
     for name in world.parts.faults.elements:
-        if kind.name != STUCK_OUTPUT:
+        if not key:
             yield {"element": name}, name
             continue
-        terminals = world.parts.terminals.get(name)
-        for output in () if terminals is None else terminals.outputs:
-            if (name, output) in used:
-                yield {"element": name, "output": output.lower()}, f"{name}.{output.lower()}"
+        for terminal in (pin for owner, pin in used if owner == name):
+            yield {"element": name, key: terminal.lower()}, f"{name}.{terminal.lower()}"
 
 
-def _sources(world: Plant) -> set[tuple[str, str]]:
-    """The outputs that a wire leads away from: what is stuck elsewhere has no effect."""
-    return {tuple(wire.source) for kernel in world.kernels for wire in kernel.wires}
+def _sources(world: Plant) -> list[tuple[str, str]]:
+    """The outputs that a wire leads away from, in the order of terminals: what is stuck elsewhere has no effect."""
+    led = {tuple(wire.source) for kernel in world.kernels for wire in kernel.wires}
+    outputs = ((name, pin) for name, its in world.parts.terminals.items() for pin in its.outputs)
+    return [one for one in outputs if one in led]
+
+
+def _contacted(world: Plant) -> list[tuple[str, str]]:
+    """The inputs of elements with contacts: one that a wire drives is stuck where the output is."""
+    return [tuple(pin) for pin in world.parts.circuits if pin.machine in world.parts.terminals]
 
 
 def _machines(world: Plant, kind: FaultKind) -> Iterator[tuple[dict[str, FaultValue], str]]:

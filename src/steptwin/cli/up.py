@@ -60,25 +60,22 @@ def up(
 
 def sections() -> list[PageSection]:
     """The tables of a description, for people."""
-    from steptwin.world.gateways import GATEWAYS
     from steptwin.world.steptable import ACTIONS, REPEAT, STEPS
-    from steptwin.world.tables import all_keys, written
+    from steptwin.world.tables import written_tables
 
-    tables = {written(name): keys for name, keys in all_keys().items()} | {rows.written: rows.keys for rows in GATEWAYS.values()}
     found = [
         PageSection(
             name,
-            ("key", "meaning", "default"),
-            [(key.name, key.meaning, "required" if key.is_required else _default(key)) for key in keys],
+            ("key", "meaning", "permitted", "default"),
+            [(key.name, key.meaning, key.permitted, "required" if key.is_required else _default(key)) for key in keys],
         )
-        for name, keys in tables.items()
+        for name, keys in written_tables().items()
     ]
     steps = [
-        (action.main.name, action.main.meaning, ", ".join(f"{key.name}: {key.meaning}" for key in action.others))
-        for action in ACTIONS.values()
+        (main.name, main.meaning, main.permitted, ", ".join(f"{key.name}: {key.meaning} ({key.permitted})" for key in others))
+        for main, others in (*((action.main, action.others) for action in ACTIONS.values()), (REPEAT, (STEPS,)))
     ]
-    steps.append((REPEAT.name, REPEAT.meaning, f"{STEPS.name}: {STEPS.meaning}"))
-    return [*found, PageSection("Steps of events and scripts", ("first key", "meaning", "more keys"), steps)]
+    return [*found, PageSection("Steps of events and scripts", ("first key", "meaning", "permitted", "more keys"), steps)]
 
 
 def _default(key: Key) -> str:

@@ -21,7 +21,7 @@ class TimedInput(NamedTuple):
 
 
 def parse_duration(text: str, option: str) -> Nanos:
-    """``10s``, ``1.5 s``, ``500ms``, ``2min``, ``1h``; a bare number is in seconds. Raises `Misuse` in the name of ``option``."""
+    """``10s``, ``1.5 s``, ``500ms``, ``2min``, ``1h``. Raises `Misuse` in the name of ``option``."""
     try:
         return duration(text)
     except Misuse as error:

@@ -159,6 +159,8 @@ class ConfigKey:
 
     name: str
     attribute: str
+    meaning: str
+    """What it sets, with its unit."""
     permitted: ValueRange
     whole: bool = True
     choices: Mapping[int, str] = field(default_factory=dict)
@@ -180,24 +182,31 @@ class ConfigKey:
         return None if found is None or not self.permits(found) else f"{found:.10g}"
 
     @property
-    def hint(self) -> str:
+    def values(self) -> str:
+        """The permitted values."""
         if self.note:
-            return f"permitted: {self.note}"
+            return self.note
         if self.choices:
-            return "permitted: " + ", ".join(f"{v} = {text}" if text else str(v) for v, text in self.choices.items())
-        return f"permitted: {'a whole number' if self.whole else 'a number'} {self.permitted}"
+            return ", ".join(f"{v} = {text}" if text else str(v) for v, text in self.choices.items())
+        return f"{'a whole number' if self.whole else 'a number'} {self.permitted}"
+
+    @property
+    def hint(self) -> str:
+        return f"permitted: {self.values}"
 
 
-def _choice(name: str, attribute: str, *texts: str) -> ConfigKey:
-    return ConfigKey(name, attribute, ValueRange(0, len(texts) - 1), choices=MappingProxyType(dict(enumerate(texts))))
+def _choice(name: str, attribute: str, meaning: str, *texts: str) -> ConfigKey:
+    choices = MappingProxyType(dict(enumerate(texts)))
+    return ConfigKey(name, attribute, meaning, ValueRange(0, len(texts) - 1), choices=choices)
 
 
-def _positive(name: str, attribute: str, unit: str) -> ConfigKey:
-    return ConfigKey(name, attribute, ValueRange(0, REAL_MAX, above=True), whole=False, note=f"a number > 0 in {unit}")
+def _positive(name: str, attribute: str, meaning: str, unit: str) -> ConfigKey:
+    permitted = ValueRange(0, REAL_MAX, above=True)
+    return ConfigKey(name, attribute, meaning, permitted, whole=False, note=f"a number > 0 in {unit}")
 
 
-def _number(name: str, attribute: str) -> ConfigKey:
-    return ConfigKey(name, attribute, ValueRange(-REAL_MAX, REAL_MAX), whole=False, note="a number")
+def _number(name: str, attribute: str, meaning: str) -> ConfigKey:
+    return ConfigKey(name, attribute, meaning, ValueRange(-REAL_MAX, REAL_MAX), whole=False, note="a number")
 
 
 _SWITCHES = f"0…7 (IN1…IN8), 8…19 (channels C, B, A of encoders 1…4), {NO_INPUT} (none)"
@@ -205,45 +214,73 @@ _COUNT = ValueRange(1, DINT_MAX)
 _DURATION_MS = ValueRange(1, 3_600_000)
 
 AXIS_KEYS = (
-    _choice("Unit", "unit", *UNITS),
-    _positive("Gear", "gear", "pulses per unit"),
-    _positive("Acc", "acc", "units/s²"),
-    _positive("Dec", "dec", "units/s²"),
-    _positive("Vel", "vel", "units/s"),
-    ConfigKey("MotResol", "mot_resol", _COUNT, note="a whole number ≥ 1 in pulses per motor revolution"),
-    ConfigKey("EncResol", "enc_resol", _COUNT, note="a whole number ≥ 1 in encoder counts per drive revolution"),
-    ConfigKey("EncOffset", "enc_offset", ValueRange(DINT_MIN, DINT_MAX)),
-    _choice("HomeMode", "home_mode", "HOME0", "HOME1", "HOME2", "HOME3", "HOME4"),
-    _choice("LimitMode", "limit_mode", "OFF", "KL", "KR", "KL+KR"),
-    ConfigKey("InKL", "in_kl", ValueRange(0, NO_INPUT), note=_SWITCHES),
-    ConfigKey("InKR", "in_kr", ValueRange(0, NO_INPUT), note=_SWITCHES),
-    _choice("PosCtrlMode", "pos_ctrl_mode", "OFF", "ENCODER", "ENCFOLLOW"),
-    _choice("ErrCtrlMode", "err_ctrl_mode", "NONE", "ERRMODE0", "ERRMODE1", "ERRMODE2"),
-    ConfigKey("Kp", "kp", ValueRange(0, REAL_MAX), whole=False, note="a number ≥ 0"),
-    ConfigKey("EncTolerance", "enc_tolerance", ValueRange(0, DINT_MAX), note="a whole number ≥ 0 in encoder counts"),
-    ConfigKey("EncSettle", "enc_settle_ms", _DURATION_MS, note=f"a whole number {_DURATION_MS} in ms"),
-    ConfigKey("ErrTime", "err_time_ms", _DURATION_MS, note=f"a whole number {_DURATION_MS} in ms"),
-    _choice("EnWired", "en_wired", "not wired", "wired"),
+    _choice("Unit", "unit", "the unit of positions, u", *UNITS),
+    _positive("Gear", "gear", "pulses per u", "pulses per unit"),
+    _positive("Acc", "acc", "acceleration, u/s²", "units/s²"),
+    _positive("Dec", "dec", "deceleration, u/s²", "units/s²"),
+    _positive("Vel", "vel", "velocity, u/s", "units/s"),
+    ConfigKey(
+        "MotResol", "mot_resol", "pulses per motor revolution", _COUNT, note="a whole number ≥ 1 in pulses per motor revolution"
+    ),
+    ConfigKey(
+        "EncResol",
+        "enc_resol",
+        "encoder counts per drive revolution, after ×4 quadrature",
+        _COUNT,
+        note="a whole number ≥ 1 in encoder counts per drive revolution",
+    ),
+    ConfigKey("EncOffset", "enc_offset", "encoder counts after reset", ValueRange(DINT_MIN, DINT_MAX)),
+    _choice("HomeMode", "home_mode", "how it is homed", "HOME0", "HOME1", "HOME2", "HOME3", "HOME4"),
+    _choice("LimitMode", "limit_mode", "which limit switches stop it", "OFF", "KL", "KR", "KL+KR"),
+    ConfigKey("InKL", "in_kl", "input of the left switch, for homing and as limit", ValueRange(0, NO_INPUT), note=_SWITCHES),
+    ConfigKey("InKR", "in_kr", "input of the right switch, for homing and as limit", ValueRange(0, NO_INPUT), note=_SWITCHES),
+    _choice("PosCtrlMode", "pos_ctrl_mode", "what it does with its encoder", "OFF", "ENCODER", "ENCFOLLOW"),
+    _choice("ErrCtrlMode", "err_ctrl_mode", "what it does when it is blocked", "NONE", "ERRMODE0", "ERRMODE1", "ERRMODE2"),
+    ConfigKey("Kp", "kp", "gain of the position correction", ValueRange(0, REAL_MAX), whole=False, note="a number ≥ 0"),
+    ConfigKey(
+        "EncTolerance",
+        "enc_tolerance",
+        "encoder counts by which a position may be missed",
+        ValueRange(0, DINT_MAX),
+        note="a whole number ≥ 0 in encoder counts",
+    ),
+    ConfigKey(
+        "EncSettle",
+        "enc_settle_ms",
+        "ms from the end of a move to the correction",
+        _DURATION_MS,
+        note=f"a whole number {_DURATION_MS} in ms",
+    ),
+    ConfigKey(
+        "ErrTime",
+        "err_time_ms",
+        "ms for which it may be blocked, or a correction make no progress",
+        _DURATION_MS,
+        note=f"a whole number {_DURATION_MS} in ms",
+    ),
+    _choice("EnWired", "en_wired", "whether EN controls the drive", "not wired", "wired"),
 )
 INPUT_KEYS = (
-    _choice("Filter", "filter", "10 ms", "50 ms", "100 ms", "250 ms", "500 ms"),
-    _choice("Level", "level", "active high", "active low"),
-    _choice("Int", "interrupt", "off", "rising", "falling", "both edges"),
+    _choice("Filter", "filter", "how long a level must last", "10 ms", "50 ms", "100 ms", "250 ms", "500 ms"),
+    _choice("Level", "level", "which level is 1", "active high", "active low"),
+    _choice("Int", "interrupt", "which edges call the interrupt at first", "off", "rising", "falling", "both edges"),
 )
-ANALOG_KEYS = (_number("LoVal", "lo_val"), _number("HiVal", "hi_val"))
-BAUD_KEY = ConfigKey("Baud", "baud", ValueRange(BAUDS[0], BAUDS[-1]), choices=MappingProxyType(dict.fromkeys(BAUDS, "")))
-ADDRESS_KEY = ConfigKey("ID", "address", ValueRange(1, 247))
+ANALOG_KEYS = (_number("LoVal", "lo_val", "the value at 0 V"), _number("HiVal", "hi_val", "the value at 10 V"))
+BAUD_KEY = ConfigKey("Baud", "baud", "bit/s", ValueRange(BAUDS[0], BAUDS[-1]), choices=MappingProxyType(dict.fromkeys(BAUDS, "")))
+ADDRESS_KEY = ConfigKey("ID", "address", "slave address on both ports", ValueRange(1, 247))
 
 
-TRIGGER_KEYS = (_choice("Keep", "trigger_keeps", "a trigger uses values up", "values are kept"),)
+TRIGGER_KEYS = (
+    _choice("Keep", "trigger_keeps", "what a trigger does with stored values", "a trigger uses values up", "values are kept"),
+)
 
 
 def program_keys(generation: Firmware) -> tuple[ConfigKey, ...]:
     banks = ValueRange(0, generation.banks - 1)
     return (
-        _choice("Activate", "activate", "no program", "run at power-on"),
-        ConfigKey("ProgBankToRun", "prog_bank", banks),
-        ConfigKey("PosBankToRun", "pos_bank", banks),
+        _choice("Activate", "activate", "what runs at power-on", "no program", "run at power-on"),
+        ConfigKey("ProgBankToRun", "prog_bank", "bank of the program", banks),
+        ConfigKey("PosBankToRun", "pos_bank", "bank of its positions", banks),
     )
 
 

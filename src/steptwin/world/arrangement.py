@@ -12,7 +12,7 @@ from steptwin.errors import Misuse, Refusal
 from steptwin.world.names import Unknown
 from steptwin.world.reader import Key, TomlText
 from steptwin.world.sense import TableRows
-from steptwin.world.values import text_value, whole
+from steptwin.world.values import permitting, text_value, whole
 
 DRAWING = "drawing"
 OTHERS = ("tool path", "all buttons")
@@ -30,6 +30,7 @@ class DrawnPlace(NamedTuple):
     y: int
 
 
+@permitting("[x, y], whole numbers")
 def _corner(value: Any) -> tuple[int, int]:
     if not isinstance(value, list) or len(value) != 2:
         raise Misuse(f"{value!r}: expected [x, y]")

@@ -18,18 +18,18 @@ class Board(Stateful):
     Its element reads inputs in `KernelPart.update`, never earlier, so that a loop of elements is found by the kernel.
     """
 
-    __slots__ = ("_held", "_recorded", "_wanted", "kernel", "levels", "name", "outputs")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"kernel", "name", "outputs"})
+    __slots__ = ("_held", "_recorded", "_wanted", "inputs", "kernel", "levels", "name", "outputs")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"inputs", "kernel", "name", "outputs"})
 
     def __init__(self, kernel: Kernel, name: str, inputs: Iterable[str], outputs: Iterable[str]) -> None:
         self.kernel = kernel
         self.name = name
-        self.outputs = tuple(outputs)
-        self.levels: dict[str, float] = dict.fromkeys((*inputs, *self.outputs), 0.0)
+        self.inputs, self.outputs = tuple(inputs), tuple(outputs)
+        self.levels: dict[str, float] = dict.fromkeys((*self.inputs, *self.outputs), 0.0)
         self._wanted: dict[str, float] = {}
-        """What the element gives its outputs."""
+        """What the element gives its outputs, and its inputs are driven to."""
         self._held: dict[str, float] = {}
-        """Outputs that a fault holds."""
+        """Terminals that faults hold."""
         self._recorded: tuple[str, ...] = ()
         """Outputs whose first level has been recorded."""
 
@@ -40,7 +40,8 @@ class Board(Stateful):
 
     def set_pin(self, pin: str, level: float, now: Nanos) -> None:
         """Drive an input. The element sees it when signals settle."""
-        self.levels[pin] = level
+        self._wanted[pin] = level
+        self.levels[pin] = self._held.get(pin, level)
 
     def is_on(self, terminal: str) -> bool:
         return self.levels[terminal] != 0.0
@@ -50,13 +51,17 @@ class Board(Stateful):
         self._wanted[output] = level
         self._show(output, self._held.get(output, level))
 
-    def hold(self, output: str, level: float | None) -> None:
-        """Hold an output at a level, whatever its element gives it; None lets it go."""
+    def hold(self, terminal: str, level: float | None) -> None:
+        """Hold a terminal at a level, whatever its element gives it, or drives it; None lets it go."""
         if level is None:
-            self._held.pop(output, None)
+            self._held.pop(terminal, None)
         else:
-            self._held[output] = level
-        self._show(output, self._held.get(output, self._wanted.get(output, 0.0)))
+            self._held[terminal] = level
+        shown = self._held.get(terminal, self._wanted.get(terminal, 0.0))
+        if terminal in self.outputs:
+            self._show(terminal, shown)
+        else:
+            self.levels[terminal] = shown
 
     def _show(self, output: str, level: float) -> None:
         if level == self.levels[output] and output in self._recorded:

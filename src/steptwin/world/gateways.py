@@ -15,7 +15,7 @@ from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.world.reader import Key, TomlText, optional, read_table
 from steptwin.world.sense import TableRows, check_sense
 from steptwin.world.tomlplaces import Path
-from steptwin.world.values import address_value, flag, positive_time, text_value, texts, whole, whole_seconds, word
+from steptwin.world.values import address_value, flag, permitting, positive_time, text_value, texts, whole, whole_seconds, word
 
 GATEWAY = "gateway"
 ROLES = ("viewer", "operator", "engineer")
@@ -141,24 +141,28 @@ def _rows(kind: str, listen: str, *keys: Key, need: Mapping[str, str] | None = N
     return TableRows(written=f"[{GATEWAY}.{kind}]", keys=(where, *keys), need=need or {})
 
 
+@permitting("HOST:PORT")
 def _broker(value: Any) -> str:
     if address_value(value).endswith(":0"):
         raise Misuse(f"{value!r}: the port of a broker is 1 to 65535, usually 1883")
     return value
 
 
+@permitting("HOST:PORT")
 def _beacons(value: Any) -> str:
     if address_value(value).endswith(":0"):
         raise Misuse(f"{value!r}: the port for beacons is 1 to 65535, usually 5065, of PV Access 5076")
     return value
 
 
+@permitting("HOST:PORT")
 def _pv_access(value: Any) -> str:
     if address_value(value).endswith(":65535"):
         raise Misuse(f"{value!r}: the port is at most 65534, because the next one is for searches")
     return value
 
 
+@permitting("text without + and #, not from / or to /")
 def _topic(value: Any) -> str:
     if any(sign in text_value(value) for sign in "+#\0") or value.startswith(("/", "$")) or value.endswith("/"):
         raise Misuse(f"{value!r}: a topic has no + and #, and begins and ends without /")
@@ -174,6 +178,7 @@ def _id(value: Any) -> str:
 _RECORD_NAME = re.compile(r"[A-Za-z0-9_:;<>\[\]-]*\Z")
 
 
+@permitting("letters from A to Z, digits and _-:;<>[]")
 def _prefix(value: Any) -> str:
     if not isinstance(value, str) or not _RECORD_NAME.match(value):
         raise Misuse(f"{value!r}: names of records have letters from A to Z, digits and _-:;<>[]")
@@ -184,6 +189,7 @@ _SPARKPLUG_KEYS = {"group": True, "node": True, "host": False}
 """And whether they are required."""
 
 
+@permitting("{ group = text, node = text, host = text }")
 def _sparkplug(value: Any) -> SparkplugSpec:
     if not isinstance(value, Mapping):
         raise Misuse(f"{value!r}: expected {{ group = ..., node = ... }}")
@@ -199,6 +205,7 @@ def _sparkplug(value: Any) -> SparkplugSpec:
 MOST_UNIT = 247
 
 
+@permitting("{ CONTROLLER = whole number, ... }")
 def _units(value: Any) -> Mapping[str, int]:
     if not isinstance(value, Mapping):
         raise Misuse(f"{value!r}: expected {{ CONTROLLER = UNIT, ... }}")

@@ -340,6 +340,11 @@ class Key:
     def is_required(self) -> bool:
         return self.default is _MISSING
 
+    @property
+    def permitted(self) -> str:
+        """What its value may be, in words; empty where what reads it does not say."""
+        return getattr(self.read, "permitted", "")
+
 
 def optional(read: Callable[[Any], Any], name: str, meaning: str, default: Any = None, attribute: str = "") -> Key:
     """A key that may be left out."""

@@ -36,26 +36,30 @@ from steptwin.world.script import (
     Wait,
     Write,
 )
-from steptwin.world.values import axis_number, name_value, number, pin_name, text_value, time_value, whole
+from steptwin.world.values import axis_number, name_value, number, permitting, pin_name, text_value, time_value, whole
 
 
+@permitting("condition")
 def _condition(value: Any) -> str:
     parse_condition(text_value(value))
     return value
 
 
+@permitting("{ 'MACHINE.NAME' = number, ... }")
 def _levels(value: Any) -> tuple[tuple[str, str, float], ...]:
     if not isinstance(value, Mapping) or not value:
         raise Misuse(f"{value!r}: expected {{ 'MACHINE.NAME' = NUMBER }}")
     return tuple((*pin_name(name), float(level) if isinstance(level, bool) else number()(level)) for name, level in value.items())
 
 
+@permitting("{ kind = ... }")
 def _fault(value: Any) -> Fault:
     if not isinstance(value, Mapping):
         raise Misuse(f"{value!r}: expected {{ kind = ... }}")
     return parse_fault(value)
 
 
+@permitting("MACHINE.M1 to M4")
 def _turned(value: Any) -> tuple[str, int]:
     machine, axis = pin_name(value)
     number = axis_number(axis)
@@ -64,6 +68,7 @@ def _turned(value: Any) -> tuple[str, int]:
     return machine, number
 
 
+@permitting("number other than 0")
 def _home_velocity(value: Any) -> float:
     found = number()(value)
     if found == 0.0:
@@ -71,6 +76,7 @@ def _home_velocity(value: Any) -> float:
     return found
 
 
+@permitting("sign and input, such as '-B8'")
 def _sought(value: Any) -> tuple[int, str]:
     """The direction, 1 or -1, and the input."""
     text = value.strip() if isinstance(value, str) else ""
@@ -79,6 +85,7 @@ def _sought(value: Any) -> tuple[int, str]:
     return (1 if text[0] == "+" else -1), text[1:].strip().upper()
 
 
+@permitting("text")
 def _characters(value: Any) -> bytes:
     if not isinstance(value, str) or not value:
         raise Misuse(f"{value!r}: expected characters")
@@ -194,6 +201,7 @@ ACTIONS: Mapping[str, StepKind] = dict(
 REPEAT = Key("repeat", whole(1, 10**9), "how often")
 
 
+@permitting("list of steps")
 def _list(value: Any) -> Any:
     return value
 

@@ -16,7 +16,9 @@ from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.world.arrangement import DRAWING, DRAWING_TABLE
 from steptwin.world.elements import ELEMENTS
+from steptwin.world.gateways import GATEWAYS
 from steptwin.world.historytable import HISTORY, HISTORY_TABLE
+from steptwin.world.kind import AnyKind
 from steptwin.world.kinds import KINDS, line_kinds
 from steptwin.world.links import LINK_KEYS, TLS_KEYS, TLS_NEED
 from steptwin.world.pieces import USE, USES
@@ -27,6 +29,7 @@ from steptwin.world.values import (
     flag,
     name_value,
     number,
+    permitting,
     positive_time,
     text_value,
     time_value,
@@ -37,16 +40,13 @@ from steptwin.world.values import (
 MOST_GAP_MS = 10_000
 
 
+@permitting("more than 0 to 10000 ms: number of ms, or text with unit")
 def _gap(value: Any) -> Nanos:
     """Milliseconds, as the command line takes them, or a text such as ``"5 ms"``."""
     found = duration(value) if isinstance(value, str) else round(number(0.0, MOST_GAP_MS, above=True)(value) * MILLISECOND)
     if not 0 < found <= MOST_GAP_MS * MILLISECOND:
         raise Misuse(f"{value!r}: permitted are more than 0 and at most {MOST_GAP_MS} ms")
     return found
-
-
-def _line_kind(value: Any) -> str:
-    return word(*line_kinds())(value)
 
 
 SEED = whole(0, 2**63 - 1)
@@ -60,7 +60,7 @@ KEYS: Mapping[str, tuple[Key, ...]] = {
     ),
     "line": (
         Key("name", name_value, "how controllers and scripts name it"),
-        optional(_line_kind, "kind", "", "modbus"),
+        optional(text_value, "kind", "", "modbus"),
         optional(
             whole(300, 1_000_000),
             "baud",
@@ -121,7 +121,7 @@ def _tables_with(registered: tuple[int, ...]) -> Mapping[str, TableRows]:
 def _line_keys() -> tuple[Key, ...]:
     """What kinds of lines and links there are is known when all are registered."""
     meaning = " or ".join(kind.meaning for kind in line_kinds().values())
-    own = (replace(key, meaning=meaning) if key.name == "kind" else key for key in KEYS["line"])
+    own = (replace(key, read=word(*line_kinds()), meaning=meaning) if key.name == "kind" else key for key in KEYS["line"])
     return (*own, *(link.key for link in LINK_KEYS.values()), *TLS_KEYS)
 
 
@@ -134,3 +134,24 @@ def written(table: str) -> str:
     """How a table is written."""
     rows = tables().get(table)
     return f"[[{table}]]" if rows is None else rows.written
+
+
+def written_tables() -> dict[str, tuple[Key, ...]]:
+    """The rows of every table by how it is written, those in tables of controllers and those of gateways too."""
+    found: dict[str, tuple[Key, ...]] = {}
+    for name, keys in all_keys().items():
+        found[written(name)] = keys
+        if name in KINDS:
+            found |= _inner_tables(KINDS[name])
+    return found | {rows.written: rows.keys for rows in GATEWAYS.values()}
+
+
+def _inner_tables(kind: AnyKind) -> dict[str, tuple[Key, ...]]:
+    """Those that differ by their numbers alone are together."""
+    groups: dict[str, list[str]] = {}
+    for name in kind.inner_tables:
+        groups.setdefault(name.rstrip("0123456789"), []).append(f"[{kind.name}.{name}]")
+    return {
+        " to ".join(dict.fromkeys((names[0], names[-1]))): kind.inner_keys(names[0][len(kind.name) + 2 : -1])
+        for names in groups.values()
+    }

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from math import isnan
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from steptwin.durations import duration
 from steptwin.errors import Misuse
@@ -18,19 +18,40 @@ from steptwin.world.addresses import parse_address
 MOST = 1e300
 """Numbers beyond it would overflow in products."""
 
+T = TypeVar("T")
 
+
+@dataclass(frozen=True, slots=True)
+class ValueReader(Generic[T]):
+    """How a value is read, and what is permitted, in words."""
+
+    read: Callable[[Any], T]
+    permitted: str
+
+    def __call__(self, value: Any) -> T:
+        return self.read(value)
+
+
+def permitting(what: str) -> Callable[[Callable[[Any], T]], ValueReader[T]]:
+    """Says what the decorated function takes."""
+    return lambda read: ValueReader(read, what)
+
+
+@permitting("text")
 def text_value(value: Any) -> str:
     if not isinstance(value, str) or not value.strip():
         raise Misuse(f"{value!r}: expected a text{' that is not empty' if isinstance(value, str) else ''}")
     return value
 
 
+@permitting("list of texts")
 def texts(value: Any) -> tuple[str, ...]:
     if not isinstance(value, list):
         raise Misuse(f"{value!r}: expected a list of texts")
     return tuple(map(text_value, value))
 
 
+@permitting("HOST:PORT")
 def address_value(value: Any) -> str:
     """HOST:PORT as it is written; whether it may be reached by others is decided where it is opened."""
     parse_address(text_value(value), listen_any=True)
@@ -40,6 +61,7 @@ def address_value(value: Any) -> str:
 _NAME = re.compile(r"[A-Za-z_][\w-]*\Z", re.ASCII)
 
 
+@permitting("name")
 def name_value(value: Any) -> str:
     if not isinstance(value, str) or not _NAME.match(value):
         raise Misuse(f"{value!r} is not a name: expected a letter from A to Z, then letters, digits, '-' and '_'")
@@ -50,37 +72,61 @@ _NUMERIC = re.compile(r"\s*[-+]?[0-9.]+\s*[A-Za-z/²µ%·]*\s*\Z")
 """A number as text, perhaps with a unit."""
 
 
+@permitting("true or false")
 def flag(value: Any) -> bool:
     if not isinstance(value, bool):
         raise Misuse(f"{value!r}: expected true or false")
     return value
 
 
-def number(least: float | None = None, most: float | None = None, *, above: bool = False) -> Callable[[Any], float]:
+@dataclass(frozen=True, slots=True)
+class Number:
     """A number from ``least`` (not itself with ``above``) to ``most``."""
 
-    def read(value: Any) -> float:
+    least: float | None = None
+    most: float | None = None
+    above: bool = False
+
+    @property
+    def permitted(self) -> str:
+        low = "" if self.least is None else f" above {self.least:g}" if self.above else f" from {self.least:g}"
+        return f"number{low}{'' if self.most is None else f' to {self.most:g}'}"
+
+    def __call__(self, value: Any) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float) or (isinstance(value, float) and isnan(value)):
             is_quoted = isinstance(value, str) and _NUMERIC.match(value) is not None
             raise Misuse(f"{value!r}: expected a number{', without quotes and unit' if is_quoted else ''}")
         if abs(value) > MOST:
             raise Misuse(f"{value!r}: permitted are numbers from {-MOST:g} to {MOST:g}")
-        low = least is not None and (value <= least if above else value < least)
-        if low or (most is not None and value > most):
-            bounds = (f"above {least:g}" if above else f"from {least:g}") if least is not None else ""
-            raise Misuse(f"{value!r}: permitted are numbers {bounds}{f' to {most:g}' if most is not None else ''}")
+        low = self.least is not None and (value <= self.least if self.above else value < self.least)
+        if low or (self.most is not None and value > self.most):
+            raise Misuse(f"{value!r}: permitted are {self.permitted.replace('number', 'numbers', 1)}")
         return float(value)
 
-    return read
+
+def number(least: float | None = None, most: float | None = None, *, above: bool = False) -> Number:
+    return Number(least, most, above)
 
 
-def whole(least: int, most: int) -> Callable[[Any], int]:
-    def read(value: Any) -> int:
-        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-            raise Misuse(f"{value!r}: permitted are whole numbers from {least} to {most}")
+@dataclass(frozen=True, slots=True)
+class WholeNumber:
+    """A whole number from ``least`` to ``most``."""
+
+    least: int
+    most: int
+
+    @property
+    def permitted(self) -> str:
+        return f"whole number from {self.least} to {self.most}"
+
+    def __call__(self, value: Any) -> int:
+        if isinstance(value, bool) or not isinstance(value, int) or not self.least <= value <= self.most:
+            raise Misuse(f"{value!r}: permitted are whole numbers from {self.least} to {self.most}")
         return value
 
-    return read
+
+def whole(least: int, most: int) -> WholeNumber:
+    return WholeNumber(least, most)
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,11 +135,15 @@ class Word:
 
     words: tuple[str, ...]
 
+    @property
+    def permitted(self) -> str:
+        return ", ".join(self.words)
+
     def __call__(self, value: Any) -> str:
         if value not in self.words:
             near = self.near(value)
             hint = "" if near is None else f" (did you mean {near!r}?)"
-            raise Misuse(f"{value!r}{hint}: permitted are {', '.join(self.words)}")
+            raise Misuse(f"{value!r}{hint}: permitted are {self.permitted}")
         return value
 
     def near(self, value: object) -> str | None:
@@ -108,10 +158,12 @@ def word(*words: str) -> Word:
     return Word(words)
 
 
+@permitting("0 and more, in us, ms, s, min or h")
 def time_value(value: Any) -> int:
     return duration(value)
 
 
+@permitting("more than 0, in us, ms, s, min or h")
 def positive_time(value: Any) -> int:
     found = duration(value)
     if found == 0:
@@ -119,6 +171,7 @@ def positive_time(value: Any) -> int:
     return found
 
 
+@permitting("1 s to 3600 s, whole seconds")
 def whole_seconds(value: Any) -> int:
     """ns, of a time in seconds from 1 s to an hour."""
     found = duration(value)
@@ -127,6 +180,7 @@ def whole_seconds(value: Any) -> int:
     return found
 
 
+@permitting("[low, high]")
 def pair(value: Any) -> tuple[float, float]:
     if not isinstance(value, list) or len(value) != 2:
         raise Misuse(f"{value!r}: expected [low, high]")
@@ -136,6 +190,7 @@ def pair(value: Any) -> tuple[float, float]:
     return low, high
 
 
+@permitting("[[x, y], ...], x growing")
 def points(value: Any) -> tuple[tuple[float, float], ...]:
     if not isinstance(value, list) or not value or any(not isinstance(item, list) or len(item) != 2 for item in value):
         raise Misuse(f"{value!r}: expected [[x, y], [x, y], ...]")
@@ -149,6 +204,7 @@ DIGITAL_INPUT, ANALOG_INPUT, OUTPUT = "digital input", "analog input", "output"
 """Kinds of terminals."""
 
 
+@permitting("MACHINE.PIN")
 def pin_name(value: Any) -> tuple[str, str]:
     """``MACHINE.PIN``."""
     machine, dot, pin = value.partition(".") if isinstance(value, str) else ("", "", "")
@@ -173,6 +229,11 @@ class PinOf:
     kind: str
     most: int = 1
 
+    @property
+    def permitted(self) -> str:
+        there = f"{self.kind}: MACHINE.PIN" + ("" if self.kind == ANALOG_INPUT else " or ELEMENT.TERMINAL")
+        return there if self.most == 1 else f"{there}, or a list of up to {self.most}"
+
     def __call__(self, value: Any) -> Any:
         """One name, or a tuple of names with ``most`` > 1."""
         if self.most == 1:
@@ -188,6 +249,10 @@ class NameOf:
     """The name of an element of a kind."""
 
     element: str
+
+    @property
+    def permitted(self) -> str:
+        return f"name of a {self.element}" if self.element[0] not in "aeiou" else f"name of an {self.element}"
 
     def __call__(self, value: Any) -> str:
         return name_value(value)

@@ -35,6 +35,8 @@ export const MEANINGS: Readonly<Record<string, string>> = {
   "The memory is worn out: with each save one more byte, chosen by chance, keeps what it has for ever.":
     "Pamięć jest zużyta: przy każdym zapisie jeszcze jeden losowy bajt na zawsze zachowuje to, co ma.",
   "An output of an element keeps its level.": "Wyjście elementu trzyma poziom.",
+  "An input of an element keeps a level, whatever its contacts or its wire do.":
+    "Wejście elementu trzyma poziom, cokolwiek robią jego zestyki lub przewód.",
   "The contact NO of a relay stays closed once it is.": "Zestyk NO przekaźnika, raz zamknięty, zostaje zamknięty.",
   "The coil of a relay is interrupted.": "Cewka przekaźnika ma przerwę.",
   "A cylinder has no compressed air: a spring retracts it, without one it stands.":

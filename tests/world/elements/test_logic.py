@@ -305,6 +305,27 @@ def test_an_output_that_is_stuck() -> None:
         there.fault("stuck-output element=it output=no")
 
 
+def test_a_contact_that_is_stuck_at_an_input_of_an_element() -> None:
+    there = World.from_toml(
+        '[[mic488]]\nname = "a"\n[[button]]\nname = "stop1"\nto = "safety.coil"\ncontact = "NC"\n'
+        '[[relay]]\nname = "safety"\ndrop_out = "8 ms"\n[[wire]]\nfrom = "safety.no"\nto = "a.IN1"'
+    )
+    there.fault("stuck-input element=safety input=coil level=1 until_s=0.5")
+    press(there, "stop1", True)
+    there.run(until=0.499999999)
+    assert (there.read("safety.coil"), there.read("a.IN1")) == (1, 1)  # welded: the button stops nothing
+    held = there.snapshot()
+    for _ in range(2):
+        there.run(until=0.507999999)
+        assert (there.read("safety.coil"), there.read("a.IN1")) == (0, 1)
+        there.run(until=0.508)
+        assert there.read("a.IN1") == 0
+        there.restore(held)
+        assert there.read("safety.coil") == 1
+    with pytest.raises(Misuse, match=r"fault stuck-input: input = 'no': inputs of 'safety' are coil$"):
+        there.fault("stuck-input element=safety input=no")
+
+
 GATE = """
 [[mic488]]
 name = "a"

@@ -178,7 +178,6 @@ def test_a_sensor_sees_the_marks_on_both_belts() -> None:
     ("old", "new", "text"),
     [
         ("at = 100.0\nhold", "at = 500.0\nhold", "at = 500 is beyond length = 400"),
-        ("speed = 125.0\nrun", 'axis = "x"\nrun', "a conveyor that an axis moves has no stops: workpieces are held back on one"),
         ('hold = "a.OUT2"', 'hold = "a.IN2"', "a.IN2 is not an output"),
         ('hold = "a.OUT2"', 'holt = "a.OUT2"', r"\[conveyor.stop\] has no 'holt' \(did you mean 'hold'\?\)"),
         ("mass = 1.5", "marks = [39]", "a mark from 39 to 41 mm is beyond workpiece = 40"),

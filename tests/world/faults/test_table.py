@@ -54,8 +54,8 @@ def test_shared_parameters_say_which_kinds_have_them() -> None:
     ]
     assert {parameter.name: of for parameter, of in found}["from_s"] == (
         "each byte, each delivery, each answer, each request, each change, each save, stuck, master-error, "
-        "broken-wire, drift, stuck-output, welded-contact, open-coil, no-air, jam, belt-stop, empty-feeder, leak, worn-jaws, "
-        "worn-brake, stuck-brake, slipping-coupling, stuck-follower, worn-cam, slack-belt, "
+        "broken-wire, drift, stuck-output, stuck-input, welded-contact, open-coil, no-air, jam, belt-stop, empty-feeder, leak, "
+        "worn-jaws, worn-brake, stuck-brake, slipping-coupling, stuck-follower, worn-cam, slack-belt, "
         "stiff-guides, brown-out, other-load"
     )
     assert len({parameter for parameter, _ in found}) == len(found)
@@ -110,27 +110,27 @@ def test_what_a_parameter_takes(
 
 
 def test_which_faults_elements_have() -> None:
-    """An output that is stuck: every element with outputs that are calculated."""
+    """An output that is stuck: every element with outputs that are calculated; an input: every one with inputs."""
     there = {name: {kind.name for kind in element.faults} for name, element in ELEMENTS.items() if element.faults}
     assert there == {
         "source": {"broken-wire", "drift"},
-        "gate": {"stuck-output"},
-        "latch": {"stuck-output"},
-        "timer": {"stuck-output"},
-        "counter": {"stuck-output"},
-        "relay": {"stuck-output", "welded-contact", "open-coil"},
-        "cylinder": {"stuck-output", "no-air", "jam"},
-        "conveyor": {"belt-stop", "empty-feeder"},
-        "vacuum": {"stuck-output", "leak"},
-        "gripper": {"stuck-output", "worn-jaws"},
-        "brake": {"stuck-output", "worn-brake", "stuck-brake"},
+        "gate": {"stuck-input", "stuck-output"},
+        "latch": {"stuck-input", "stuck-output"},
+        "timer": {"stuck-input", "stuck-output"},
+        "counter": {"stuck-input", "stuck-output"},
+        "relay": {"stuck-input", "stuck-output", "welded-contact", "open-coil"},
+        "cylinder": {"stuck-input", "stuck-output", "no-air", "jam"},
+        "conveyor": {"stuck-input", "belt-stop", "empty-feeder"},
+        "vacuum": {"stuck-input", "stuck-output", "leak"},
+        "gripper": {"stuck-input", "stuck-output", "worn-jaws"},
+        "brake": {"stuck-input", "stuck-output", "worn-brake", "stuck-brake"},
         "carriage": {"slack-belt"},
         "transducer": {"broken-wire", "drift"},
-        "collision": {"stuck-output"},
+        "collision": {"stuck-input", "stuck-output"},
         "shaft": {"slipping-coupling"},
         "follower": {"worn-cam", "stuck-follower"},
-        "gantry": {"stuck-output", "stiff-guides"},
-        "supply": {"stuck-output", "brown-out"},
+        "gantry": {"stuck-input", "stuck-output", "stiff-guides"},
+        "supply": {"stuck-input", "stuck-output", "brown-out"},
         "load": {"other-load"},
     }
 

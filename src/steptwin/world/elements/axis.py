@@ -186,7 +186,7 @@ AXIS: Element[AxisSpec, BuiltAxis] = Element(
         keys=(
             Key("name", name_value, "how scripts and conditions name it"),
             Key("drive", pin_name, "what drives it: an axis of a controller, such as table.M1"),
-            optional(word("linear", "rotary"), "kind", "linear or rotary", "linear"),
+            optional(word("linear", "rotary"), "kind", "what moves", "linear"),
             optional(
                 text_value, "unit", "of its positions: mm, cm, m, degree, rev or anything; default mm, degree or its drive's"
             ),
@@ -198,9 +198,9 @@ AXIS: Element[AxisSpec, BuiltAxis] = Element(
             optional(number(0.0, above=True), "pitch", "units per motor revolution, instead of pulses_per_unit"),
             optional(whole(1, 10**7), "pulses_per_rev", "pulses per motor revolution; default mot_resol; M1486: 64 × full_steps"),
             optional(flag, "inverted", "whether positive pulses go down", False),
-            optional(pair, "travel", "[low, high]: hard stops"),
-            optional(number(), "start", "where it stands when the world begins", 0.0),
-            optional(number(0.0), "backlash", "play between motor and load", 0.0),
+            optional(pair, "travel", "hard stops, in its unit"),
+            optional(number(), "start", "where it stands when the world begins, in its unit", 0.0),
+            optional(number(0.0), "backlash", "play between motor and load, in its unit", 0.0),
         ),
         exclude=(("pulses_per_unit", "pitch"),),
     ),

@@ -10,7 +10,7 @@ from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.world.board import Board
 from steptwin.world.elements.axis import find_axis
-from steptwin.world.elements.logic import STUCK_OUTPUT, BoardPart, BoardSpec, Joint, with_terminals
+from steptwin.world.elements.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.table import ElementEffect, number
 from steptwin.world.kind import Terminals
@@ -127,7 +127,7 @@ BRAKE = with_terminals(
     ),
     make=_make,
     faults=(
-        STUCK_OUTPUT,
+        *STUCK,
         FaultKind(
             "worn-brake",
             Layer.ELEMENT,

@@ -13,7 +13,7 @@ from steptwin.world.condition import SignalCondition
 from steptwin.world.elements.axis import AXIS
 from steptwin.world.elements.carriage import CARRIAGE
 from steptwin.world.elements.follower import FOLLOWER
-from steptwin.world.elements.logic import STUCK_OUTPUT, BoardPart, BoardSpec, Joint, with_terminals
+from steptwin.world.elements.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
 from steptwin.world.elements.quantity import TIME, check_condition, condition_of, owners_of
 from steptwin.world.elements.shaft import SHAFT
 from steptwin.world.kind import Terminals
@@ -163,5 +163,5 @@ COLLISION = with_terminals(
     ),
     make=_make,
     signals=lambda collision: {"count": SignalOf((collision.board.source,), lambda now: float(collision.count))},
-    faults=(STUCK_OUTPUT,),
+    faults=STUCK,
 )

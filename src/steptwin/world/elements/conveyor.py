@@ -1,12 +1,12 @@
 """``[[conveyor]]``: a belt that carries workpieces, with sensors that see them.
 
 A workpiece enters with its front at 0, when FEED is switched on or at a fixed period, unless another one is there; it leaves when
-its front comes to the end of the belt. Stops hold workpieces back on a belt with its own drive.
+its front comes to the end of the belt. Stops hold workpieces back while the belt slides below them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from fractions import Fraction
 from functools import partial
 from math import ceil, floor, nan
@@ -18,10 +18,10 @@ from steptwin.world.belt import BeltDrive, ConstantDrive, Load, Workpiece, next_
 from steptwin.world.board import Board
 from steptwin.world.drawing import BELT, Drawing, SensorZone
 from steptwin.world.element import Reference
-from steptwin.world.elements.axis import find_axis
+from steptwin.world.elements.axis import find_axis, turns_of_axis
 from steptwin.world.elements.beltsensor import SENSOR, Sensor, SensorSpec, read_inner
 from steptwin.world.elements.conveyortable import FEED, RUN, STOP, ConveyorSpec, StopSpec, mark_places, stop_terminal
-from steptwin.world.elements.logic import BoardPart, Inner, with_terminals
+from steptwin.world.elements.logic import STUCK_INPUT, BoardPart, Inner, with_terminals
 from steptwin.world.faults import ActiveFault, Fault, FaultKind, Layer, Occasion
 from steptwin.world.faults.table import ElementEffect
 from steptwin.world.names import Unknown
@@ -37,6 +37,8 @@ MOST_PLACES = 24
 """Limit of the workpieces of a conveyor whose places are signals."""
 PICOMETRES = 10**9
 """In a millimetre: places of a belt that no axis moves."""
+_PULSE = 1
+"""The most that an axis moves a belt within a nanosecond, in its pulses."""
 
 
 # ---------------------------------------------------------------------- what is built
@@ -45,9 +47,9 @@ PICOMETRES = 10**9
 class Conveyor(BoardPart):
     """A belt with its workpieces. ``drive`` moves it, in places of which ``per_mm`` are a millimetre.
 
-    What leaves it is put at the beginning of the following one, or is gone. On a belt with its own drive workpieces stand before
-    a stop that is on, behind one that stands, and at the end while the beginning of the following conveyor is occupied. A belt
-    that an axis moves backwards loses workpieces at its beginning.
+    What leaves it is put at the beginning of the following one, or is gone. Workpieces stand before a stop that is on, behind
+    one that stands, and at the end while the beginning of the following conveyor is occupied. A belt that an axis moves
+    backwards takes back what stands, and loses workpieces at its beginning.
     """
 
     __slots__ = (
@@ -59,6 +61,8 @@ class Conveyor(BoardPart):
         "_own",
         "_seen",
         "_stops",
+        "_then",
+        "_turns",
         "delivered",
         "drive",
         "fed",
@@ -71,7 +75,7 @@ class Conveyor(BoardPart):
         "spec",
     )
     FIXED: ClassVar[frozenset[str]] = (
-        frozenset({"_length", "_moved_by", "_seen", "_stops", "drive", "following", "per_mm", "spec"}) | BoardPart.FIXED
+        frozenset({"_length", "_moved_by", "_seen", "_stops", "_turns", "drive", "following", "per_mm", "spec"}) | BoardPart.FIXED
     )
 
     def __init__(
@@ -82,8 +86,10 @@ class Conveyor(BoardPart):
         per_mm: Fraction,
         own: ConstantDrive | None,
         moved_by: tuple[str, ...] = (),
+        turns: Callable[[Nanos], Iterator[Nanos]] = lambda now: iter(()),
     ) -> None:
-        """``own``: the drive, where it is the conveyor's own; ``moved_by``: otherwise the machine that moves it."""
+        """``own``: the drive, where it is the conveyor's own; ``moved_by``: otherwise the machine that moves it, between
+        ``turns`` one way."""
         super().__init__(board)
         self.spec = spec
         self.drive = drive
@@ -92,6 +98,9 @@ class Conveyor(BoardPart):
         self._stops = tuple((stop_terminal(n), self.places(stop.at)) for n, stop in enumerate(spec.stops, start=1))
         self._own = own
         self._moved_by = moved_by
+        self._turns = turns
+        self._then = drive.place(board.kernel.now)
+        """The place of the belt when it was looked at last: since then it has moved one way while anything stands."""
         self.following: Conveyor | None = None
         self.load = Load()
         self.fed = 0
@@ -107,7 +116,7 @@ class Conveyor(BoardPart):
         self._is_fed = False
         self._next_feed = spec.feed_every
         self._due: Nanos | None = None
-        """When a workpiece comes to an end of the belt."""
+        """When a workpiece comes to an end of the belt, to what holds it, or is taken back."""
         self._seen: object = None
 
     @property
@@ -164,6 +173,7 @@ class Conveyor(BoardPart):
 
     def put(self, piece: Workpiece, front: float, now: Nanos) -> None:
         """Put a workpiece, whose lengths are places of this belt, with its front ``front`` mm from the beginning."""
+        self._then = self.drive.place(now)
         self.load.put(piece._replace(origin=self.drive.place(now) - self.places(front), held=None))
         self.report(f"{piece.name} is on {self.spec.name}", piece.name, "on")
         self.board.kernel.mark(self.board.name)
@@ -201,9 +211,13 @@ class Conveyor(BoardPart):
 
     def _hold(self, now: Nanos) -> None:
         """Let workpieces stand where they cannot go on, and let those go on that can."""
-        if self._own is None:
-            return
-        belt, stride = self.drive.place(now), self._own.stride
+        belt, stride = self.drive.place(now), _PULSE if self._own is None else self._own.stride
+        back, self._then = self._then - belt, belt
+        if back > 0:
+            for piece in self.load.pieces:
+                if piece.held is not None:
+                    self.load.release(piece, belt + back)
+                    self.report(f"{piece.name} goes back on {self.spec.name}", piece.name, "goes back")
         ahead: int | None = None
         for piece in sorted(self.load.pieces, key=lambda one: one.front(belt), reverse=True):
             front = piece.front(belt)
@@ -234,7 +248,7 @@ class Conveyor(BoardPart):
     def _is_blocked(self, now: Nanos) -> bool:
         """Whether there is no room for a workpiece at the beginning of the following conveyor."""
         following = self.following
-        return following is not None and self._own is not None and following.covers_beginning(now)
+        return following is not None and following.covers_beginning(now)
 
     def covers_beginning(self, now: Nanos) -> bool:
         return self.load.covering(0, self.drive.place(now)) is not None
@@ -261,6 +275,8 @@ class Conveyor(BoardPart):
         below = max((piece.origin for piece in moving), default=None)
         above = min((piece.origin + self._way(piece, belt, now) for piece in moving), default=None)
         due = next_change(self.drive, None if below is None else below - 1, above, now)
+        if len(moving) < len(self.load.pieces):
+            due = min(filter(None, (due, next(self._turns(now), None), self.drive.reaches(belt - 1, now, -1))), default=None)
         following = self.following
         if following is None or not self.load.pieces or not self._is_blocked(now):
             return due
@@ -272,7 +288,7 @@ class Conveyor(BoardPart):
         front = piece.front(belt)
         before = [one for one in self.load.pieces if one.held is not None and one.held > front]
         ahead = min((one.front(belt) - one.length - 1 for one in before), default=None)
-        found = self._limit(front, 0, ahead, now) if self._own is not None else None
+        found = self._limit(front, 0, ahead, now)
         return self._length if found is None else min(found, self._length)
 
     def deadline(self) -> Nanos | None:
@@ -309,7 +325,8 @@ def _make(spec: ConveyorSpec, site: Site) -> Conveyor:
     else:
         axis = find_axis(spec.axis, site)
         per_mm = axis.scale.pulses_per_unit / exact_fraction(spec.mm_per_unit)
-        conveyor = Conveyor(board, spec, axis.mechanism, per_mm, None, (axis.mechanism.machine,))
+        turns = partial(turns_of_axis, axis)
+        conveyor = Conveyor(board, spec, axis.mechanism, per_mm, None, (axis.mechanism.machine,), turns)
     if conveyor.places(spec.length) < 1:
         raise Misuse(
             f"length = {spec.length:g} mm: the belt is shorter than one step of its drive, {float(1 / conveyor.per_mm):g} mm"
@@ -405,6 +422,7 @@ CONVEYOR = with_terminals(
     drawing=_drawing,
     connect=_connect,
     faults=(
+        STUCK_INPUT,
         FaultKind(
             "belt-stop",
             Layer.ELEMENT,

@@ -16,7 +16,7 @@ from steptwin.world.sense import TableRows
 from steptwin.world.site import Terminal
 from steptwin.world.spec import WorldSpec
 from steptwin.world.tomlplaces import Path
-from steptwin.world.values import OUTPUT_PIN, number
+from steptwin.world.values import OUTPUT_PIN, number, permitting
 
 RUN, FEED = "RUN", "FEED"
 
@@ -85,15 +85,13 @@ class ConveyorSpec(BoardSpec):
         for one in (*self.sensors, *self.stops):
             if one.at > self.length:
                 text.wrong((*one.path, "at"), "D007", f"at = {one.at:g} is beyond length = {self.length:g}")
-        if self.speed is None and self.stops:
-            message = "a conveyor that an axis moves has no stops: workpieces are held back on one with a speed"
-            text.wrong(self.stops[0].path, "D007", message)
         for mark in self.marks:
             if mark + self.mark_width > self.workpiece:
                 message = f"a mark from {mark:g} to {mark + self.mark_width:g} mm is beyond workpiece = {self.workpiece:g}"
                 text.wrong((*self.path, "marks"), "D007", message)
 
 
+@permitting("list of numbers from 0")
 def mark_places(value: Any) -> tuple[float, ...]:
     if not isinstance(value, list):
         raise Misuse(f"{value!r}: expected a list of numbers, mm from the front")

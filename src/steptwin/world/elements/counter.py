@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from steptwin.machine import Nanos
 from steptwin.world.board import Board
-from steptwin.world.elements.logic import STUCK_OUTPUT, BoardPart, BoardSpec, Joint, with_terminals
+from steptwin.world.elements.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
 from steptwin.world.kind import Terminals
 from steptwin.world.reader import Key, optional
 from steptwin.world.signals import SignalOf
@@ -69,7 +69,7 @@ COUNTER = with_terminals(
         optional(OUTPUT_PIN, "down", "output joined to DOWN, whose edges from 0 to 1 count down"),
         optional(OUTPUT_PIN, "reset", "output joined to RESET; the count is 0 while it is on"),
     ),
-    faults=(STUCK_OUTPUT,),
+    faults=STUCK,
     make=lambda spec, site: Counter(site.board(spec.name), spec.preset),
     signals=_signals,
 )

@@ -13,7 +13,7 @@ from steptwin.machine import MILLISECOND, Nanos
 from steptwin.world.board import Board
 from steptwin.world.drawing import ROD, Drawing
 from steptwin.world.element import Reference
-from steptwin.world.elements.logic import STUCK_OUTPUT, BoardPart, BoardSpec, Inner, Joint, with_terminals
+from steptwin.world.elements.logic import STUCK, BoardPart, BoardSpec, Inner, Joint, with_terminals
 from steptwin.world.elements.switch import SWITCH, SwitchSpec, lane_of, put_switch, read_switches, zone_of
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.table import ElementEffect
@@ -196,7 +196,7 @@ CYLINDER = with_terminals(
     signals=_signals,
     drawing=lambda cylinder: cylinder.drawing,
     faults=(
-        STUCK_OUTPUT,
+        *STUCK,
         FaultKind(
             "no-air",
             Layer.ELEMENT,

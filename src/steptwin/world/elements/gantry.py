@@ -14,7 +14,7 @@ from steptwin.world.condition import SignalCondition
 from steptwin.world.drawing import Drawing, rail
 from steptwin.world.elements.axis import BuiltAxis, find_axis
 from steptwin.world.elements.collision import JAM, REPORT, RESET, Touch
-from steptwin.world.elements.logic import STUCK_OUTPUT, BoardSpec, Joint, with_terminals
+from steptwin.world.elements.logic import STUCK, BoardSpec, Joint, with_terminals
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.table import ElementEffect, number
 from steptwin.world.kind import Terminals
@@ -185,7 +185,7 @@ _GANTRY = with_terminals(
     signals=_signals,
     drawing=lambda gantry: gantry.drawing,
     faults=(
-        STUCK_OUTPUT,
+        *STUCK,
         FaultKind(
             "stiff-guides",
             Layer.ELEMENT,

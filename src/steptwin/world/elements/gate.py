@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 from steptwin.machine import Nanos
 from steptwin.world.board import Board
-from steptwin.world.elements.logic import STUCK_OUTPUT, BoardPart, BoardSpec, Joint, with_terminals
+from steptwin.world.elements.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
 from steptwin.world.kind import Terminals
 from steptwin.world.reader import Key, TomlText
 from steptwin.world.site import Terminal
@@ -87,7 +87,7 @@ _GATE = with_terminals(
             "outputs joined to IN1, IN2 ...: MACHINE.PIN or ELEMENT.TERMINAL; or how many inputs, for wires and contacts",
         ),
     ),
-    faults=(STUCK_OUTPUT,),
+    faults=STUCK,
     make=lambda spec, site: Gate(site.board(spec.name), spec.kind, spec.names),
 )
 GATE = replace(_GATE, function=lambda gate: gate.kind)

@@ -12,7 +12,7 @@ from steptwin.machine import MILLISECOND, Nanos
 from steptwin.world.board import Board
 from steptwin.world.drawing import ROD, Drawing
 from steptwin.world.elements.carrier import CARRIER_KEYS, HELD, PICK, PLACE, Carrier, CarrierSpec, carrier_signals
-from steptwin.world.elements.logic import STUCK_OUTPUT, Joint, with_terminals
+from steptwin.world.elements.logic import STUCK, Joint, with_terminals
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.table import ElementEffect
 from steptwin.world.kind import Terminals
@@ -132,7 +132,7 @@ GRIPPER = with_terminals(
     signals=_signals,
     drawing=lambda gripper: Drawing(ROD, gripper.stroke, ("position",)),
     faults=(
-        STUCK_OUTPUT,
+        *STUCK,
         FaultKind(
             "worn-jaws",
             Layer.ELEMENT,

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from steptwin.machine import Nanos
 from steptwin.world.board import Board
-from steptwin.world.elements.logic import STUCK_OUTPUT, BoardPart, BoardSpec, Joint, with_terminals
+from steptwin.world.elements.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
 from steptwin.world.kind import Terminals
 from steptwin.world.reader import optional
 from steptwin.world.site import Terminal
@@ -63,6 +63,6 @@ LATCH = with_terminals(
         optional(OUTPUT_PIN, "reset", "output joined to RESET; without it wires and contacts may be"),
         optional(word("set", "reset"), "priority", "what wins while both are on", "reset"),
     ),
-    faults=(STUCK_OUTPUT,),
+    faults=STUCK,
     make=lambda spec, site: Latch(site.board(spec.name), spec.priority),
 )

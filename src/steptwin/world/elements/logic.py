@@ -1,5 +1,5 @@
 """What elements with terminals have in common: a board, keys that join outputs of others to it, its levels as signals,
-and the fault of an output that is stuck."""
+and the faults of terminals that are stuck."""
 
 from __future__ import annotations
 
@@ -112,17 +112,26 @@ def _wires(spec: BoardSpec) -> Iterator[tuple[Wire, Path]]:
 # ---------------------------------------------------------------------- faults
 
 
-def _check_stuck(part: BoardPart, fault: Fault) -> None:
-    output = str(fault.get("output")).upper()
-    if output not in part.board.outputs:
-        there = ", ".join(name.lower() for name in part.board.outputs)
-        raise Misuse(f"fault {fault.kind.name}: output = {fault.get('output')!r}: outputs of {part.board.name!r} are {there}")
+def _check_terminal(part: BoardPart, fault: Fault, key: str, permitted: tuple[str, ...]) -> None:
+    board, given = part.board, str(fault.get(key))
+    if given.upper() not in permitted:
+        there = ", ".join(name.lower() for name in permitted) or "none"
+        raise Misuse(f"fault {fault.kind.name}: {key} = {given!r}: {key}s of {board.name!r} are {there}")
+
+
+def _check_output(part: BoardPart, fault: Fault) -> None:
+    _check_terminal(part, fault, "output", part.board.outputs)
+
+
+def _check_input(part: BoardPart, fault: Fault) -> None:
+    _check_terminal(part, fault, "input", part.board.inputs)
 
 
 def _stick(active: ActiveFault, part: BoardPart, begins: bool, now: Nanos) -> str:
-    output, level = str(active.fault.get("output")), active.fault.whole("level") or 0
-    part.board.hold(output.upper(), float(level) if begins else None)
-    return f"{part.board.name}.{output} is stuck at {level}" if begins else f"{part.board.name}.{output} is free again"
+    terminal, level = str(active.fault.get("output") or active.fault.get("input")), active.fault.whole("level") or 0
+    part.board.hold(terminal.upper(), float(level) if begins else None)
+    name = f"{part.board.name}.{terminal.lower()}"
+    return f"{name} is stuck at {level}" if begins else f"{name} is free again"
 
 
 STUCK_OUTPUT = FaultKind(
@@ -135,9 +144,24 @@ STUCK_OUTPUT = FaultKind(
         whole("level", "The level it keeps.", 0, 1, default=0),
     ),
     effect=ElementEffect(_stick),
-    check=_check_stuck,
+    check=_check_output,
 )
 """Of elements with outputs."""
+STUCK_INPUT = FaultKind(
+    "stuck-input",
+    Layer.ELEMENT,
+    Occasion.ALWAYS,
+    "An input of an element keeps a level, whatever its contacts or its wire do.",
+    own=(
+        Parameter("input", ParameterForm.TEXT, "Which input.", is_required=True),
+        whole("level", "The level it keeps.", 0, 1, default=0),
+    ),
+    effect=ElementEffect(_stick),
+    check=_check_input,
+)
+"""Of elements with inputs."""
+STUCK = (STUCK_OUTPUT, STUCK_INPUT)
+"""Of elements with both."""
 
 
 # ---------------------------------------------------------------------- an element

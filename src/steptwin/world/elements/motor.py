@@ -10,12 +10,13 @@ from steptwin.machine import MILLISECOND, Nanos
 from steptwin.world.reader import Key, Table, TomlText, optional, read_table
 from steptwin.world.sense import TableRows, check_sense
 from steptwin.world.tomlplaces import Path
-from steptwin.world.values import flag, number, pair, points, time_value, whole, word
+from steptwin.world.values import flag, number, pair, permitting, points, time_value, whole, word
 
 _not_negative = number(0.0)
 _rate = number(0.001, 10_000.0)
 
 
+@permitting("[low, high] from 0")
 def _band(value: Any) -> tuple[float, float]:
     low, high = pair(value)
     if low < 0.0:

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from steptwin.machine import Nanos
 from steptwin.world.board import Board
-from steptwin.world.elements.logic import STUCK_OUTPUT, BoardPart, BoardSpec, Joint, with_terminals
+from steptwin.world.elements.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.table import ElementEffect
 from steptwin.world.kind import Terminals
@@ -100,7 +100,7 @@ RELAY = with_terminals(
     ),
     make=lambda spec, site: Relay(site.board(spec.name), spec.pull_in, spec.drop_out),
     faults=(
-        STUCK_OUTPUT,
+        *STUCK,
         FaultKind(
             "welded-contact",
             Layer.ELEMENT,

@@ -28,7 +28,7 @@ from steptwin.world.signals import SignalOf
 from steptwin.world.site import Site, Terminal
 from steptwin.world.spec import WorldSpec
 from steptwin.world.tomlplaces import Path
-from steptwin.world.values import INPUT_PIN, NameOf, name_value, number
+from steptwin.world.values import INPUT_PIN, NameOf, name_value, number, permitting
 
 TURN = 360
 
@@ -202,6 +202,7 @@ def _slip(active: ActiveFault, shaft: GearedShaft, begins: bool, now: Nanos) -> 
     return f"the coupling of {name} slips" if begins else f"the coupling of {name} grips, {shaft.behind:g} degrees behind"
 
 
+@permitting("number other than 0")
 def _ratio(value: Any) -> float:
     found = number()(value)
     if found == 0.0:

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, NamedTuple
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.world.board import Board
-from steptwin.world.elements.logic import STUCK_OUTPUT, BoardPart, BoardSpec, Joint, with_terminals
+from steptwin.world.elements.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.machine import FaultyMachine
 from steptwin.world.faults.table import ElementEffect
@@ -21,7 +21,7 @@ from steptwin.world.rigging import Rigging
 from steptwin.world.signals import SignalOf
 from steptwin.world.site import Site, Terminal
 from steptwin.world.spec import WorldSpec
-from steptwin.world.values import OUTPUT_PIN, flag, name_value, number, time_value
+from steptwin.world.values import OUTPUT_PIN, flag, name_value, number, permitting, time_value
 
 ON, GOOD = "ON", "GOOD"
 USUAL_SHARE = 0.75
@@ -204,6 +204,7 @@ def _signals(supply: Supply) -> Mapping[str, SignalOf]:
     return {"volts": of}
 
 
+@permitting("name, or list of names")
 def _names(value: Any) -> tuple[str, ...]:
     names = value if isinstance(value, list) else [value]
     if not 1 <= len(names) <= MOST_FED:
@@ -231,7 +232,7 @@ SUPPLY = with_terminals(
     make=_make,
     signals=_signals,
     faults=(
-        STUCK_OUTPUT,
+        *STUCK,
         FaultKind(
             "brown-out",
             Layer.ELEMENT,

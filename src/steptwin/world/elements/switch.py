@@ -52,14 +52,12 @@ SWITCH = TableRows(
     written="[[axis.switch]]",
     keys=(
         Key("to", INPUT_PIN, "the input: MACHINE.PIN", attribute="target"),
-        optional(number(), "below", "on at and below this position"),
-        optional(number(), "above", "on at and above this position"),
-        optional(number(), "position", "on around this position, with width"),
-        optional(number(0.0), "width", "how wide the zone around position is", 0.0),
-        optional(
-            number(0.0, above=True), "period", "the zone comes again after each; default a turn of a rotary axis in degree or rev"
-        ),
-        optional(number(0.0), "hysteresis", "how much further it stays on", 0.0),
+        optional(number(), "below", "on at and below this position, in the unit of what moves"),
+        optional(number(), "above", "on at and above this position, likewise"),
+        optional(number(), "position", "on around this position, likewise"),
+        optional(number(0.0), "width", "how wide the zone around position is, likewise", 0.0),
+        optional(number(0.0, above=True), "period", "the zone comes again after each, likewise; default a turn of a rotary axis"),
+        optional(number(0.0), "hysteresis", "how much further it stays on, likewise", 0.0),
         *CONTACT_KEYS,
     ),
     need={"width": "position", "period": "position", "bounces": "bounce"},

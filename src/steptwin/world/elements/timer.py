@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from steptwin.machine import Nanos
 from steptwin.world.board import Board
-from steptwin.world.elements.logic import STUCK_OUTPUT, BoardPart, BoardSpec, Joint, with_terminals
+from steptwin.world.elements.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
 from steptwin.world.kind import Terminals
 from steptwin.world.reader import Key, optional
 from steptwin.world.site import Terminal
@@ -90,7 +90,7 @@ _TIMER = with_terminals(
         Key("time", positive_time, "such as '200 ms'"),
         optional(OUTPUT_PIN, "input", "output joined to IN; without it wires and contacts may be"),
     ),
-    faults=(STUCK_OUTPUT,),
+    faults=STUCK,
     make=lambda spec, site: Timer(site.board(spec.name), spec.kind, spec.time),
 )
 TIMER = replace(_TIMER, function=lambda timer: timer.kind)

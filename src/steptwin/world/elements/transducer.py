@@ -107,7 +107,7 @@ TRANSDUCER: Element[TransducerSpec, Transducer] = Element(
             Key("of", text_value, "the signal that it measures, such as x.position, clamp.position, cup.pressure"),
             Key("to", PinOf(ANALOG_INPUT), "the analog input: MACHINE.AIN1 or AIN2", attribute="target"),
             Key("points", points, "[[value, volts], ...] in the unit of the signal, linear between"),
-            optional(number_value(0.0001, 10.0), "resolution", "steps in which the voltage changes", 0.01),
+            optional(number_value(0.0001, 10.0), "resolution", "V: steps in which the voltage changes", 0.01),
         ),
     ),
     read=_read,

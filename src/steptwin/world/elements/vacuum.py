@@ -11,7 +11,7 @@ from steptwin.machine import MILLISECOND, Nanos
 from steptwin.motion.exponential import decay, logarithm
 from steptwin.world.board import Board
 from steptwin.world.elements.carrier import CARRIER_KEYS, HELD, PICK, PLACE, Carrier, CarrierSpec, carrier_signals
-from steptwin.world.elements.logic import STUCK_OUTPUT, Joint, with_terminals
+from steptwin.world.elements.logic import STUCK, Joint, with_terminals
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.table import ElementEffect
 from steptwin.world.kind import Terminals
@@ -153,7 +153,7 @@ VACUUM = with_terminals(
     make=lambda spec, site: Vacuum(site.board(spec.name), spec, site),
     signals=_signals,
     faults=(
-        STUCK_OUTPUT,
+        *STUCK,
         FaultKind("leak", Layer.ELEMENT, Occasion.ALWAYS, "A suction cup does not hold a vacuum.", effect=ElementEffect(_leak)),
     ),
 )

@@ -11,7 +11,7 @@ from steptwin.m1486.variants import VARIANTS
 from steptwin.machine import Nanos
 from steptwin.world.reader import Key, Row, TomlText, optional
 from steptwin.world.spec import ControllerSpec
-from steptwin.world.values import name_value, text_value, time_value, whole, word
+from steptwin.world.values import name_value, permitting, text_value, time_value, whole, word
 
 DEFAULT_VARIANT = "B"
 
@@ -26,12 +26,14 @@ class M1486Spec(ControllerSpec):
     program: str | None
 
 
+@permitting(", ".join(v.name for v in VARIANTS))
 def _variant(value: Any) -> str:
     names = {v.name.upper(): v.name for v in VARIANTS}
     wanted = value.upper().removeprefix("M1486") if isinstance(value, str) else value
     return word(*names.values())(names.get(wanted, value) if isinstance(wanted, str) else value)
 
 
+@permitting("whole number from 0 to 15, or a hexadecimal digit as text")
 def _address(value: Any) -> int:
     if isinstance(value, str) and len(value) == 1 and value in "0123456789ABCDEFabcdef":
         return int(value, 16)
@@ -41,9 +43,9 @@ def _address(value: Any) -> int:
 KEYS = (
     Key("name", name_value, "how the rest of the file names it"),
     optional(name_value, "line", "the line it is on"),
-    optional(_variant, "variant", f"one of {', '.join(v.name for v in VARIANTS)}", DEFAULT_VARIANT),
+    optional(_variant, "variant", "which type", DEFAULT_VARIANT),
     optional(_address, "address", "0 to 15, or a hexadecimal digit as text", 15),
-    optional(word(*(i.name for i in INTERFACES)), "interface", "driver interface: sd, dual or two", "sd"),
+    optional(word(*(i.name for i in INTERFACES)), "interface", "driver interface", "sd"),
     optional(whole(300, 1_000_000), "baud", "bit/s; default the highest"),
     optional(time_value, "statement_time", "what a command takes; default 1 ms"),
     optional(text_value, "program", "a program it is switched on with; types with RAM lose it when they are switched off"),

@@ -13,7 +13,7 @@ from steptwin.mic488.registers import AXES, FIRMWARES
 from steptwin.wire.rtu import MAX_UNIT
 from steptwin.world.reader import Key, Path, Row, TomlText, optional, read_table
 from steptwin.world.spec import ControllerSpec
-from steptwin.world.values import address_value, flag, name_value, text_value, time_value, whole, word
+from steptwin.world.values import ValueReader, address_value, flag, name_value, permitting, text_value, time_value, whole, word
 
 BankFiles: TypeAlias = tuple[tuple[int, str], ...]
 """Numbers of banks and the files that are for them."""
@@ -42,6 +42,7 @@ class Mic488Spec(ControllerSpec):
         return self.programs if self.program is None else ((0, self.program), *self.programs)
 
 
+@permitting(", ".join(FIRMWARES))
 def _firmware(value: Any) -> str:
     """A number as well, and without the last zero."""
     text = str(value) if isinstance(value, float) else value
@@ -49,6 +50,7 @@ def _firmware(value: Any) -> str:
     return short[0] if short else word(*FIRMWARES)(text)
 
 
+@permitting("file, list of files, or { BANK = file }")
 def banks_value(value: Any) -> tuple[tuple[int, str], ...]:
     """Files by bank: a text is for bank 0, a list for 0, 1 …, a table names the banks."""
     if isinstance(value, str):
@@ -67,7 +69,7 @@ KEYS = (
     Key("name", name_value, "how the rest of the file names it"),
     optional(name_value, "line", "the line it is on"),
     optional(whole(1, MAX_UNIT), "unit", "slave address; default that of its configuration"),
-    optional(_firmware, "firmware", f"one of {', '.join(FIRMWARES)}", "1.70"),
+    optional(_firmware, "firmware", "its firmware", "1.70"),
     optional(text_value, "config", "the vendor tool's .cfg file"),
     optional(text_value, "program", "a WBC program for bank 0"),
     optional(banks_value, "programs", "WBC programs by bank: ['a.prg', 'b.prg'] for 0 and 1, or { 3 = 'd.prg' }", ()),
@@ -95,7 +97,7 @@ def _config(toml: TomlText, path: Path, table: Mapping[str, Any], rows: tuple[Co
 
 
 def _config_keys(rows: tuple[ConfigKey, ...]) -> tuple[Key, ...]:
-    return tuple(Key(row.attribute, _configured(row), row.hint, None) for row in rows)
+    return tuple(Key(row.attribute, ValueReader(_configured(row), _values(row)), row.meaning, None) for row in rows)
 
 
 def inner_keys(table: str) -> tuple[Key, ...]:
@@ -103,24 +105,27 @@ def inner_keys(table: str) -> tuple[Key, ...]:
     return _config_keys(AXIS_KEYS if table.startswith("M") else INPUT_KEYS)
 
 
+_SWITCHES = f"IN1 to IN{INPUTS} or 'none', or the number of the vendor's file, 0 for IN1 to {NO_INPUT} for none"
+
+
+def _values(row: ConfigKey) -> str:
+    """The permitted values."""
+    if row.attribute in ("in_kl", "in_kr"):
+        return _SWITCHES
+    return ", ".join(f"{text} ({number})" for number, text in row.choices.items()) or row.values
+
+
 def _configured(row: ConfigKey) -> Callable[[Any], Any]:
     words = {text.upper(): number for number, text in row.choices.items() if text}
     if row.attribute in ("in_kl", "in_kr"):
         words = {f"IN{number}": number - 1 for number in range(1, INPUTS + 1)} | {"NONE": NO_INPUT}
-        permitted = f"IN1 to IN{INPUTS} or 'none', or the number of the vendor's file, 0 for IN1 to {NO_INPUT} for none"
-    else:
-        permitted = ", ".join(words)
 
     def read(value: Any) -> Any:
-        number = value
-        if isinstance(value, str):
-            if value.upper() not in words:
-                raise Misuse(f"{value!r}: permitted are {permitted}" if words else f"{value!r} is not a number")
-            number = words[value.upper()]
+        number = words.get(value.upper()) if isinstance(value, str) else value
         if isinstance(number, bool) or not isinstance(number, int | float) or not row.permits(number):
-            raise Misuse(f"{value!r}: permitted are {permitted}" if words else f"{value!r} is not permitted")
+            raise Misuse(f"{value!r}: permitted: {_values(row)}")
         if row.whole and number != int(number):
-            raise Misuse(f"{value!r} is not a whole number")
+            raise Misuse(f"{value!r}: permitted: {_values(row)}")
         return int(number) if row.whole else number
 
     return read
