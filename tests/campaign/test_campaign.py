@@ -21,9 +21,13 @@ from tests.conftest import until
 
 from steptwin.campaign import execution
 from steptwin.campaign.campaign import RESULTS, SUMMARY, Campaign, CampaignProgress
+from steptwin.campaign.case import Case
 from steptwin.campaign.execution import CaseExecution
+from steptwin.campaign.runner import CaseRunner
+from steptwin.campaign.store import StoredCase
 from steptwin.campaign.workers import LOCAL, Workers, run_batch, workers
 from steptwin.errors import LineFailure, Misuse
+from steptwin.files.world import World
 
 
 @pytest.fixture
@@ -330,3 +334,32 @@ def test_what_the_file_leaves_open_is_given_with_the_call(tmp_path: Path) -> Non
     assert campaign.changed(until_failure=True).run().failed == 1
     hypercube = Campaign.load(campaign_file(tmp_path, text.replace("seed = 7", 'design = "latin-hypercube"')))
     assert hypercube.changed(runs=4).run().runs == 4
+
+
+def test_a_campaign_that_was_killed_before_its_first_failure_was_sure_fills_the_gaps(doors: Campaign, tmp_path: Path) -> None:
+    """Another process had a later failing case done, and one before it not."""
+    failing = [n for n in range(40) if float(doors.cases[n].values["t"]) <= 1.0]
+    stopping = doors.changed(until_failure=True)
+    store = stopping.open_store(tmp_path / "out")
+    store.add([StoredCase(doors.cases[failing[1]], doors.run_case(failing[1]))])
+    store.close()
+    seen: list[CampaignProgress] = []
+    assert stopping.run(tmp_path / "out", progress=seen.append).plain() == stopping.run().plain()
+    assert seen[-1].failed == 2  # with the one that was known
+
+
+def test_a_mistake_in_the_twin_is_an_error_of_one_run(doors: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
+    begin = CaseRunner.begin
+
+    def faulty(self: CaseRunner, case: Case, *, keep: bool = False) -> World:
+        return begin(self, case, keep=keep) if case.number != 3 else _divide()
+
+    monkeypatch.setattr(CaseRunner, "begin", faulty)
+    summary = doors.run()
+    assert (summary.runs, summary.errors) == (40, 1)
+    why = next(one.why for one in summary.failures if one.number == 3)
+    assert why == "steptwin itself failed: ZeroDivisionError: division by zero (test_campaign.py, _divide)"
+
+
+def _divide() -> World:
+    raise ZeroDivisionError("division by zero")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from itertools import product
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import pytest
 from campaigns import campaign_file
 
 from steptwin.campaign.case import FaultAt
-from steptwin.campaign.cases import Cases, filled, names_in
+from steptwin.campaign.cases import Cases, filled, filled_step, names_in
 from steptwin.campaign.reading import load_campaign
 from steptwin.errors import Misuse
 
@@ -102,3 +103,17 @@ def test_a_case_can_be_made_of_values_and_faults(tmp_path: Path) -> None:
     made = found.made(0, found[0].seed, {"t": 0.5}, [], None)
     assert made.steps[0].at_ns == 500_000_000
     assert found.made(0, 1, {"t": 0.5}, [], []).steps == ()
+
+
+def test_values_in_steps_are_data_whatever_they_contain() -> None:
+    step = '{"note": "say {a}", "set": {"{pin}": "{b}"}, "steps": [{"wait": "{t}"}]}'
+    values = {"a": 'a"b\\ {pin}', "pin": "x.IN1", "b": True, "t": 0.5}
+    assert json.loads(filled_step(step, values)) == {
+        "note": 'say a"b\\ {pin}',
+        "set": {"x.IN1": True},
+        "steps": [{"wait": 0.5}],
+    }
+
+
+def test_a_number_can_be_part_of_a_key() -> None:
+    assert filled_step('{"set": {"x.IN{n}": 1}}', {"n": 3}) == '{"set": {"x.IN3": 1}}'

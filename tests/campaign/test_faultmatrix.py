@@ -64,7 +64,7 @@ def failing(name: str = "guard", at: int | None = 4 * SECOND) -> CaseResult:
     ],
 )
 def test_effects(facts: RunFacts, effect: FaultEffect, why: str, detection: str, after: float | None) -> None:
-    found = judge(facts, NOMINAL, 3 * SECOND, product=("size",))
+    found = judge(facts, NOMINAL, 3 * SECOND, product=("size",), made=("made",))
     assert found.effect is effect
     assert why in found.why
     assert bool(why) is bool(found.why)
@@ -216,3 +216,9 @@ def test_a_run_without_a_fault_that_is_refused_is_an_error(tmp_path: Path) -> No
     (tmp_path / "campaign.toml").write_text(text, encoding="utf-8")
     with pytest.raises(Misuse, match="OUT77"):
         fault_matrix(load_campaign(tmp_path / "campaign.toml"), tmp_path / "out")
+
+
+def test_what_comes_later_is_no_wrong_part() -> None:
+    nominal = replace(NOMINAL, result=replace(NOMINAL.result, measures={"made": 5.0, "down": 1.0, "cycle max": 2.0}))
+    late = replace(nominal, result=replace(nominal.result, measures={"made": 5.0, "down": 1.5, "cycle max": 2.5}))
+    assert judge(late, nominal, 0, made=("made",)).effect is FaultEffect.UNAFFECTED

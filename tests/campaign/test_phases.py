@@ -46,3 +46,11 @@ def test_a_phase_ends_when_its_motion_does() -> None:
 
 def test_without_a_run_there_is_none() -> None:
     assert cycle_phases(World.load(EXAMPLES / "labeller" / "labeller.toml")) == []
+
+
+def test_what_was_before_the_common_beginning_names_no_phase() -> None:
+    world = World.load(EXAMPLES / "labeller" / "labeller.toml")
+    world.run(for_="3010 ms")
+    found = cycle_phases(world, begin=3 * SECOND)
+    assert found[0].begin == 3 * SECOND
+    assert found[0].name == "at the beginning"

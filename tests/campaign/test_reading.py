@@ -113,6 +113,29 @@ def test_files_that_vary_are_read(tmp_path: Path) -> None:
         (HEAD + '[[vary]]\nname = "a"\nnormal = { mean = 1 }\n', "expected { mean = NUMBER, deviation = NUMBER }"),
         (HEAD + '[[vary]]\nname = "a"\nchoose = []\n', "expected a list of numbers, texts or truth values"),
         (HEAD + '[[vary]]\nname = "a"\ngrid = [1]\n[[vary]]\nname = "a"\ngrid = [1]\n', "D006: 'a' varies already"),
+        (
+            HEAD + '[[vary]]\npath = "x.start"\ngrid = [1]\n[[vary]]\npath = "axis.0.start"\ngrid = [1]\n',
+            "9:1: error D006: 'axis.0.start' is the same as 'x.start', which varies already",
+        ),
+        (HEAD + '[[vary]]\nname = "a"\nchoose = [1, nan]\n', "nan: expected a number"),
+        (HEAD + '[[vary]]\nname = "a"\ngrid = [inf]\n', "inf: permitted are numbers from -1e+300 to 1e+300"),
+        (
+            HEAD + '[[vary]]\nname = "a"\nnormal = { mean = 0, deviation = 1 }\nbetween = [10, 11]\n',
+            "between = [10.0, 11.0]: next to nothing of this distribution, 0, is there",
+        ),
+        (HEAD + '[[fault]]\ndo = "stall axis=1"\nat = "3 s"\n', "7:1: error D007: this is after end"),
+        (
+            HEAD + '[[vary]]\nname = "a"\nchoose = [3, 4]\n[[step]]\ndo = { note = "n" }\nat = "a"\n',
+            "D007: 'a' is at least 3 s: this is after end",
+        ),
+        (
+            HEAD + '[[vary]]\nname = "a"\nbetween = [0, 1e300]\n[[step]]\ndo = { note = "n" }\nat = "a"\n',
+            "D007: 'a' varies, but is no time: 1e+300 is",
+        ),
+        (
+            HEAD + '[[vary]]\nname = "a"\nnormal = { mean = 1, deviation = 1 }\n[[step]]\ndo = { note = "n" }\nat = "a"\n',
+            "D007: 'a' is no time, because it may be below 0",
+        ),
         (HEAD + '[[vary]]\npath = "x.strat"\nchoose = [1]\n', "'x.strat': [axis] has no 'strat' (did you mean 'start'?)"),
         (HEAD + '[[vary]]\npath = "y.start"\nchoose = [1]\n', "override 'y.start': there is no 'y'"),
         (HEAD + '[[fault]]\ndo = "stal machine=table"\n', "fault: kind = 'stal'"),

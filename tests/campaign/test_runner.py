@@ -9,6 +9,8 @@ import pytest
 from campaigns import CAMPAIGN, WORLD, campaign_file
 
 from steptwin.campaign.campaign import Campaign
+from steptwin.campaign.findings import shrinker
+from steptwin.campaign.shrink import failures_of
 from steptwin.coverage.counts import Coverage
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND
@@ -171,3 +173,42 @@ def test_coverage_counts_what_programs_execute(tmp_path: Path, start: str) -> No
         counts.append({found.source.position(at)[0]: count for at, count in found.hits.items()})
     assert counts[0] == counts[1]
     assert counts[0][2] in {10, 11}  # a delay of 100 ms in 1 s, also in the common beginning
+
+
+COUNTED = """
+[campaign]
+world = "world.toml"
+runs = 1
+end = "1500 ms"
+expectations = false
+[[vary]]
+name = "t"
+between = ["0 s", "1 s"]
+[[step]]
+at = "t"
+do = { set = { "table.IN1" = 1 } }
+[[fault]]
+at = "10 ms"
+do = "stall machine=table axis=1"
+[[property]]
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "needs_fault"),
+    [
+        ("eventually x.position > 39", True),
+        ("table.IN2 == 0 until x.position > 39", True),
+        ("(always table.IN1 == 0) or (eventually x.position > 39)", True),
+        ("count(x.position > 39) >= 1", True),
+        ("not (time between table.IN1 and x.position > 39 <= 1 s)", False),
+        ("count(table.IN2) == 2", False),
+    ],
+)
+def test_what_never_comes_is_not_made_simpler_by_an_early_end(tmp_path: Path, text: str, needs_fault: bool) -> None:
+    campaign = Campaign.load(campaign_file(tmp_path, f'{COUNTED}holds = "{text}"\n'))
+    case = campaign.cases[0]
+    (failure,) = failures_of(campaign.run_case(case))
+    found = shrinker(campaign.description, campaign.run_case)(case, failure)
+    assert found.case.end_ns == case.end_ns
+    assert bool(found.case.faults) is needs_fault

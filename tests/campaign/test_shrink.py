@@ -180,3 +180,8 @@ def test_rounder_numbers_have_fewer_digits_and_are_near() -> None:
     assert list(rounder_numbers(1289)) == [0, 1000, 2000, 1300, 1200, 1290, 1280]
     assert list(rounder_numbers(-3.7)) == [-0.0, -4.0, -3.0]
     assert all(isinstance(one, int) for one in rounder_numbers(1289))
+
+
+def test_a_failure_at_the_first_moment_is_a_run_without_length() -> None:
+    found = shrink(case_of(steps=2), SAFE, Toy(lambda case: True, at=0))
+    assert (found.case.end_ns, found.case.steps, found.is_complete) == (0, (), True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from steptwin.campaign.case import Case, CaseResult, Verdict
-from steptwin.campaign.summary import CampaignSummary, why, wilson
+from steptwin.campaign.summary import CampaignSummary, percent, why, wilson
 
 
 @pytest.mark.parametrize(("passed", "runs"), [(0, 1), (1, 1), (7, 10), (999, 1000), (0, 50), (50, 50)])
@@ -51,3 +51,10 @@ def test_the_digest_is_that_of_all_results_in_order() -> None:
 def test_a_reason_is_one_line() -> None:
     assert why(result(1, -1.0, "x" * 1000)) == "x" * 299 + "…"
     assert why(CaseResult(1, (), "", 0, {}, "")) == "an error"
+
+
+@pytest.mark.parametrize(
+    ("share", "text"), [(0.0, "0.00%"), (1.0, "100.00%"), (0.5, "50.00%"), (1 - 1e-5, "99.999%"), (1e-6, "0.0001%")]
+)
+def test_a_share_is_all_or_none_only_where_it_is(share: float, text: str) -> None:
+    assert percent(share) == text

@@ -48,3 +48,20 @@ def test_a_normal_distribution_has_its_quantiles_and_can_be_cut_off() -> None:
 
 def test_a_choice_has_each_value_as_often() -> None:
     assert [Choice(("a", 2, True)).value(u) for u in (0.0, 0.34, 0.67, 0.999999)] == ["a", 2, True, True]
+
+
+def test_the_logarithm_of_a_very_wide_range() -> None:
+    spread = Between(1e-300, 1e300, is_log=True)
+    assert [spread.value(u) for u in (0.0, 0.5, 1.0)] == [1e-300, 1.0, 1e300]
+
+
+def test_many_levels_are_made_once() -> None:
+    spread = Between(0.0, 1.0, steps=10_000)
+    assert spread.levels is Between(0.0, 1.0, steps=10_000).levels
+    assert len(spread.levels) == 10_000
+
+
+def test_the_share_of_a_normal_distribution_that_is_left() -> None:
+    assert Normal(0.0, 1.0).share == 1.0
+    assert Normal(0.0, 1.0, 0.0, None).share == pytest.approx(0.5)
+    assert Normal(0.0, 1.0, 10.0, 11.0).share == 0.0

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from steptwin.errors import Misuse
-from steptwin.world.overrides import override, read_overrides
+from steptwin.world.overrides import override, place_of, read_overrides
 
 DATA: dict[str, Any] = {
     "world": {"seed": 1},
@@ -110,3 +110,13 @@ def test_the_kind_of_table_may_be_left_out() -> None:
     assert found["axis"] == [{"name": "x"}, {"name": "y", "pitch": 2}]
     with pytest.raises(Misuse, match=r"^override 'x\.pitch': 'x' is in axis and line: begin with one of these$"):
         override(found, {"x.pitch": 2})
+
+
+@pytest.mark.parametrize("key", ["axis.x.pitch", "axis.0.pitch", "x.pitch"])
+def test_a_place_is_the_same_in_whatever_way_its_tables_are_chosen(key: str) -> None:
+    assert place_of(DATA, key) == ("axis", "x", "pitch")
+
+
+@pytest.mark.parametrize(("key", "place"), [("axis.2.pitch", ("axis", "2", "pitch")), ("no.thing.here", ("no", "thing", "here"))])
+def test_a_place_without_a_name_is_as_it_is_written(key: str, place: tuple[str, ...]) -> None:
+    assert place_of(DATA, key) == place

@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -201,23 +202,24 @@ class Campaign:
         description = self.description
         first = store.first_failure() if description.until_failure else None
         done = store.numbers()
-        known, failed = len(done), 0
+        known, failed = len(done), store.failed()
         began = time.monotonic()
         counted = store.coverage()[0] if coverage else None
 
         def is_over() -> bool:
-            late = description.time_ns is not None and (time.monotonic() - began) * SECOND >= description.time_ns
-            return late or (first is not None and description.until_failure)
+            return description.time_ns is not None and (time.monotonic() - began) * SECOND >= description.time_ns
 
-        def cases() -> Iterator[Case]:
-            limit = total if first is None else first
-            return (self._chosen[number] for number in gaps(done, limit))
+        def is_wanted(number: int) -> bool:
+            """Until the first failure all before it are, also such as another process left out when it was ended."""
+            return first is None or not description.until_failure or number < first
 
         finished = 0
         if description.search == "guided":
-            batches = self._guided(there, {case.number: distance(result) for case, result in store.results()}, is_over, coverage)
+            told = {case.number: distance(result) for case, result in store.results()}
+            batches = self._guided(there, told, is_wanted, is_over, counts=coverage)
         else:
-            batches = iter(CaseExecution(description, there, cases(), is_over, counts=coverage))
+            cases = (self._chosen[number] for number in takewhile(is_wanted, gaps(done, total)))
+            batches = iter(CaseExecution(description, there, cases, is_over, counts=coverage))
         for batch in batches:
             if counted is not None:
                 for text in Coverage.of_plain(batch.coverage or ()):
@@ -231,12 +233,20 @@ class Campaign:
         before = total if first is None or not description.until_failure else first + 1
         return CampaignSummary.of(description.name, description.digest, description.seed, store.results(before))
 
-    def _guided(self, there: Workers, known: dict[int, float], is_over: Callable[[], bool], counts: bool) -> Iterator[Done]:
+    def _guided(
+        self,
+        there: Workers,
+        known: dict[int, float],
+        is_wanted: Callable[[int], bool],
+        is_over: Callable[[], bool],
+        *,
+        counts: bool,
+    ) -> Iterator[Done]:
         """Runs waves of cases; ``known`` are the distances of those that ran before, by number."""
         search, left = GuidedSearch(self.cases), self.cases.count
         while left is None or left > 0:
             wave = search.ask(WAVE if left is None else min(WAVE, left))
-            unknown = (case for case in wave if case.number not in known)
+            unknown = (case for case in wave if case.number not in known and is_wanted(case.number))
             for batch in CaseExecution(self.description, there, unknown, is_over, counts=counts):
                 known.update((result.number, distance(result)) for result in batch.results)
                 yield batch

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from math import prod
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from steptwin.campaign.case import Case, FaultAt, StepAt, VariedValue
-from steptwin.campaign.description import CampaignDescription
+from steptwin.campaign.description import CampaignDescription, step_text
 from steptwin.campaign.designs import Design, design_of
 from steptwin.campaign.variation import Choice
 from steptwin.durations import duration
@@ -110,7 +111,7 @@ class Cases:
                 text = f"{text} name={text.split()[0]}-{n + 1}-{seed:x}"
             found.append(FaultAt(self._moment(fault.at, values), text, n))
         done = [
-            StepAt(self._moment(step.at, values), filled(step.do, values, is_json=True), n)
+            StepAt(self._moment(step.at, values), filled_step(step.do, values), n)
             for n, step in enumerate(description.steps)
             if steps is None or n in steps
         ]
@@ -121,12 +122,23 @@ class Cases:
         return duration(values[at]) if isinstance(at, str) else at
 
 
-def filled(text: str, values: Mapping[str, VariedValue], *, is_json: bool = False) -> str:
-    """With values in the place of ``{name}``; in JSON a text that is nothing else becomes the value, of its type."""
-    if is_json:
-        for name in set(re.findall(r'"\{([A-Za-z_][\w-]*)\}"', text)) & set(values):
-            text = text.replace(f'"{{{name}}}"', _json(values[name]))
+def filled(text: str, values: Mapping[str, VariedValue]) -> str:
+    """With values in the place of ``{name}``."""
     return _NAME.sub(lambda found: _plain(values[found[1]]) if found[1] in values else found[0], text)
+
+
+def filled_step(step: str, values: Mapping[str, VariedValue]) -> str:
+    """As `filled`, of a step as JSON; a text that is nothing but ``{name}`` becomes the value, of its type."""
+    return step_text(_filled(json.loads(step), values)) if "{" in step[1:] else step
+
+
+def _filled(part: Any, values: Mapping[str, VariedValue]) -> Any:
+    if isinstance(part, str):
+        whole = _NAME.fullmatch(part)
+        return values[whole[1]] if whole is not None and whole[1] in values else filled(part, values)
+    if isinstance(part, dict):
+        return {filled(key, values): _filled(one, values) for key, one in part.items()}
+    return [_filled(one, values) for one in part] if isinstance(part, list) else part
 
 
 def names_in(text: str) -> list[str]:
@@ -136,9 +148,3 @@ def names_in(text: str) -> list[str]:
 
 def _plain(value: VariedValue) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
-
-
-def _json(value: VariedValue) -> str:
-    import json
-
-    return json.dumps(value, ensure_ascii=False)

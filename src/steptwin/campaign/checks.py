@@ -7,19 +7,19 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from steptwin.campaign.cases import filled, names_in
+from steptwin.campaign.cases import filled, filled_step, names_in
 from steptwin.campaign.description import Measure, NamedProperty, VariedFault, VariedStep
 from steptwin.campaign.properties import read_property
 from steptwin.campaign.runner import read_step
 from steptwin.campaign.variation import Between, Choice, Normal, Varied, VariedValue
-from steptwin.durations import duration
+from steptwin.durations import LONGEST_NS, duration
 from steptwin.errors import Misuse
 from steptwin.files.world import World, read_beside
 from steptwin.machine import SECOND
 from steptwin.world import script as do
 from steptwin.world.description import describe
 from steptwin.world.faults import read as read_fault
-from steptwin.world.overrides import override
+from steptwin.world.overrides import override, place_of
 from steptwin.world.pieces import FILE_KEYS, USE, given_files
 from steptwin.world.reader import TomlText
 from steptwin.world.references import check_step
@@ -29,6 +29,7 @@ CAMPAIGN, VARY, FAULT, STEP, PROPERTY, MEASURE = "campaign", "vary", "fault", "s
 MATRIX = "matrix"
 """The tables."""
 UNKNOWN_KEY = "D004"
+_LATE = "this is after end, so that it never happens"
 
 
 class CampaignChecks:
@@ -57,6 +58,8 @@ class CampaignChecks:
                     self._check_moment((kind, n, "at"), one.at)
                 elif one.at < (self._head.get("start_ns") or 0):
                     toml.wrong((kind, n, "at"), "D007", "this is before start, up to which all runs have one beginning")
+                elif one.at > self._head.get("end_ns", one.at):
+                    toml.wrong((kind, n, "at"), "D007", _LATE)
 
     def _check_moment(self, place: TomlPath, name: str) -> None:
         spread = self._by_name.get(name)
@@ -65,12 +68,17 @@ class CampaignChecks:
             self._toml.wrong(place, "D009", f"{name!r} is no time, and no [[vary]] has this name{near}")
             return
         start = (self._head.get("start_ns") or 0) / SECOND
+        ends = spread.values if isinstance(spread, Choice) else (spread.low, spread.high)
+        if isinstance(spread, Normal) and spread.low is None:
+            self._toml.wrong(place, "D007", f"{name!r} is no time, because it may be below 0", "give times, or between")
+            return
         try:
-            values = spread.values if isinstance(spread, Choice) else (spread.low or 0.0,)
-            earliest = min(duration(value) for value in values) / SECOND
+            earliest = min(duration(value) for value in ends if value is not None) / SECOND
         except Misuse as error:
             self._toml.wrong(place, "D007", f"{name!r} varies, but is no time: {error}")
             return
+        if earliest > self._head.get("end_ns", LONGEST_NS) / SECOND:
+            self._toml.wrong(place, "D007", f"{name!r} is at least {earliest:g} s: {_LATE}")
         if earliest < start:
             self._toml.wrong(
                 place, "D007", f"{name!r} may be {earliest:g} s, before start, up to which all runs have one beginning"
@@ -110,9 +118,13 @@ class CampaignChecks:
     ) -> None:
         """Whether the world has all that is named. Values that only some cases have are left to these."""
         text, toml = world.spec.text.source.text, self._toml
+        places: dict[tuple[str, ...], str] = {}
         for n, one in enumerate(self._vary):
             if one.is_path:
                 toml.unless_wrong((VARY, n, "path"), partial(_check_path, text, files, one))
+                earlier = places.setdefault(place_of(world.spec.text.data, one.name), one.name)
+                if earlier != one.name:
+                    toml.wrong((VARY, n, "path"), "D006", f"{one.name!r} is the same as {earlier!r}, which varies already")
         for n, fault in enumerate(faults):
             toml.unless_wrong((FAULT, n, "do"), partial(self._check_fault, world, fault.do))
         for n, step in enumerate(steps):
@@ -138,7 +150,7 @@ class CampaignChecks:
 
     def _check_step(self, world: World, text: str) -> None:
         for values in self._samples(text):
-            check_step(world, read_step(filled(text, values, is_json=True)))
+            check_step(world, read_step(filled_step(text, values)))
 
     def _samples(self, text: str) -> Iterator[Mapping[str, VariedValue]]:
         """Values of the names in a text: each that can be chosen, with the middle of the others."""

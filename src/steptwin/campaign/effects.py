@@ -97,15 +97,18 @@ def _is_moving(world: World) -> bool:
     return any(plan.moving(world.now) for plan in plans if isinstance(plan, Profile))
 
 
-def judge(facts: RunFacts, nominal: RunFacts, set_ns: Nanos, product: Collection[str] = ()) -> Judgement:
-    """The effect of a fault that was set at a moment. ``product``: as in `MatrixRules`."""
+def judge(
+    facts: RunFacts, nominal: RunFacts, set_ns: Nanos, product: Collection[str] = (), made: Collection[str] = ()
+) -> Judgement:
+    """The effect of a fault that was set at a moment. ``product``: as in `MatrixRules`; ``made``: the measures that tell what was
+    made, while those of moments and cycle times tell only how late."""
     detection, noticed = _detection(facts, nominal)
     after = None if noticed is None else max(noticed - set_ns, 0)
-    effect, why = _effect(facts, nominal, frozenset(product))
+    effect, why = _effect(facts, nominal, frozenset(product), made)
     return Judgement(effect, why, detection, after)
 
 
-def _effect(facts: RunFacts, nominal: RunFacts, product: frozenset[str]) -> tuple[FaultEffect, str]:
+def _effect(facts: RunFacts, nominal: RunFacts, product: frozenset[str], made: Collection[str]) -> tuple[FaultEffect, str]:
     result = facts.result
     if result.error is not None:
         return FaultEffect.UNSAFE, f"the run ended with an error: {result.error.strip().partition(chr(10))[0]}"
@@ -137,7 +140,7 @@ def _effect(facts: RunFacts, nominal: RunFacts, product: frozenset[str]) -> tupl
     different += [
         f"{name} is {value:g} instead of {nominal.result.measures.get(name, float('nan')):g}"
         for name, value in result.measures.items()
-        if value != nominal.result.measures.get(name)
+        if name in made and value != nominal.result.measures.get(name)
     ]
     if different:
         return FaultEffect.WRONG_PART, "; ".join(different)

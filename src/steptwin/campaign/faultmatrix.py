@@ -144,6 +144,7 @@ def fault_matrix(
         raise Misuse(f"the run without a fault fails: {nominal.result.error}")
     if nominal.is_done is False:
         raise Misuse(f"done = {rules.done!r}: it is false at the end of the run without a fault, so that no cell could tell more")
+    made = [one.name for one in description.measures if one.value is not None]
     begin = description.start_ns or 0
     phases = cycle_phases(world, begin, MOST_PHASES if rules.phases is None else rules.phases)
     possible = possible_faults(runner.begin(nominal_case))
@@ -163,7 +164,7 @@ def fault_matrix(
             MatrixCell(
                 task.phase,
                 task.case.faults[0].fault,
-                judge(found.facts, nominal, task.case.faults[0].at_ns, rules.product),
+                judge(found.facts, nominal, task.case.faults[0].at_ns, rules.product, made),
                 found.facts.struck_ns is not None,
                 found.session,
             )

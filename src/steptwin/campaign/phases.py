@@ -109,10 +109,11 @@ def _spans(
         if (name in on) is is_on:
             continue
         if at > since:
-            if since >= begin:
-                yield since, at, frozenset(on), _named(news)
+            yield since, at, frozenset(on), _named(news)
             since, news = at, []
         (on.add if is_on else on.discard)(name)
+        if at < begin:
+            continue
         news.append(f"{name}{'' if is_on else ' off'}")
     if end > since:
         yield since, end, frozenset(on), _named(news)

@@ -37,6 +37,8 @@ from steptwin.world.values import flag, name_value, number, positive_time, text_
 
 MOST_RUNS = 1_000_000_000
 MOST_PHASES = 1000
+LEAST_SHARE = 1e-6
+"""Of a normal distribution must be left where it is cut off: far out its values cannot be told apart."""
 
 
 def _condition(value: Any) -> str:
@@ -47,6 +49,9 @@ def _condition(value: Any) -> str:
 def _list(value: Any) -> tuple[Any, ...]:
     if not isinstance(value, list) or not value or any(not isinstance(item, bool | int | float | str) for item in value):
         raise Misuse(f"{value!r}: expected a list of numbers, texts or truth values")
+    for item in value:
+        if isinstance(item, int | float) and not isinstance(item, bool):
+            number()(item)  # neither nan nor beyond what is permitted
     return tuple(value)
 
 
@@ -273,11 +278,13 @@ def _spread(row: Mapping[str, Any]) -> Between | Normal | Choice:
     between = row["between"]
     if row["normal"] is not None:
         mean, deviation, is_time = row["normal"]
-        if between is None:
-            return Normal(mean, deviation, 0.0 if is_time else None, None, is_time=is_time)
-        if between[2] is not is_time:
+        if between is not None and between[2] is not is_time:
             raise Misuse("between and normal: expected numbers in both, or times")
-        return Normal(mean, deviation, between[0], between[1], is_time=is_time)
+        low, high = (0.0 if is_time else None, None) if between is None else between[:2]
+        found = Normal(mean, deviation, low, high, is_time=is_time)
+        if found.share < LEAST_SHARE:
+            raise Misuse(f"between = {[low, high]}: next to nothing of this distribution, {found.share:.1g}, is there")
+        return found
     if between is not None:
         low, high, is_time = between
         if row["log"] and low <= 0.0:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import traceback
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from steptwin.campaign.case import EXPECTATIONS, WAITS, Case, CaseResult, Verdict
@@ -126,6 +128,8 @@ class CaseRunner:
             return self.finish(case, world, coverage)
         except SteptwinError as error:
             return self.refused(case, world, error)
+        except Exception as error:  # noqa: BLE001 - a mistake of ours in one run is no reason to lose the others
+            return self.refused(case, world, Misuse(f"steptwin itself failed: {_told(error)}"))
 
     @staticmethod
     def refused(case: Case, world: World | None, error: SteptwinError) -> CaseResult:
@@ -181,6 +185,12 @@ class _Measures:
         ends = {one.name: self._world.read(one.value) for one in self._measures if one.value is not None}
         found = self._found | ends
         return {one.name: found[one.name] for one in self._measures if one.name in found}
+
+
+def _told(error: Exception) -> str:
+    """What it is and where it is from, in a line."""
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{type(error).__name__}: {error} ({Path(place.filename).name}, {place.name})".replace("\n", " ")
 
 
 def read_step(text: str) -> do.Step:

@@ -158,6 +158,12 @@ class CampaignStore:
             for given, result in connection.execute(wanted, execution_options={"yield_per": _STREAMED}):
                 yield StoredCase(Case.of_plain(json.loads(given)), CaseResult.of_plain(json.loads(result)))
 
+    def failed(self) -> int:
+        """How many of the cases failed."""
+        wanted = select(func.count()).where(CASE.c.campaign_id == self._id, CASE.c.failed)
+        with self._begin() as connection:
+            return connection.execute(wanted).scalar_one()
+
     def first_failure(self) -> int | None:
         """The lowest number of a case that failed."""
         wanted = select(CASE.c.number).where(CASE.c.campaign_id == self._id, CASE.c.failed).order_by(CASE.c.number).limit(1)

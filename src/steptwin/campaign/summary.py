@@ -125,6 +125,12 @@ class CampaignSummary:
         }
 
 
+def percent(share: float) -> str:
+    """With two decimals, or as many as tell it from none and from all."""
+    digits = next((n for n in range(2, 12) if 0.0 < round(share, n + 2) < 1.0), 2)
+    return f"{share:.{digits}%}"
+
+
 def why(result: CaseResult) -> str:
     """Why a run failed, in a line."""
     if result.error is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from math import exp, log
 from statistics import NormalDist
 from typing import Protocol
@@ -48,21 +49,28 @@ class Between:
     def value(self, u: float) -> VariedValue:
         if self.is_whole:
             return min(int(self.low) + int(u * (self.high - self.low + 1)), int(self.high))
-        width = self.high - self.low
-        found = self.low * exp(u * log(self.high / self.low)) if self.is_log else self.low + u * width
+        low, high = (log(self.low), log(self.high)) if self.is_log else (self.low, self.high)
+        found = low + u * (high - low)
+        found = exp(found) if self.is_log else found
         return rounded(min(max(found, self.low), self.high), is_time=self.is_time)
 
     @property
     def levels(self) -> tuple[VariedValue, ...]:
-        if self.is_whole and not self.steps and self.high - self.low < MOST_LEVELS:
-            return tuple(range(int(self.low), int(self.high) + 1))
-        if self.steps < 2:
-            return (self.value(0.5),) if self.steps else ()
-        return tuple(dict.fromkeys(self.value(n / (self.steps - 1)) for n in range(self.steps)))
+        return _levels(self)
 
     @property
     def is_grid(self) -> bool:
         return False
+
+
+@lru_cache(maxsize=64)
+def _levels(of: Between) -> tuple[VariedValue, ...]:
+    """May be a million, and each case asks for them."""
+    if of.is_whole and not of.steps and of.high - of.low < MOST_LEVELS:
+        return tuple(range(int(of.low), int(of.high) + 1))
+    if of.steps < 2:
+        return (of.value(0.5),) if of.steps else ()
+    return tuple(dict.fromkeys(of.value(n / (of.steps - 1)) for n in range(of.steps)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,10 +83,21 @@ class Normal:
     high: float | None = None
     is_time: bool = False
 
+    @property
+    def _shares(self) -> tuple[float, float]:
+        """Of the whole distribution that are below ``low``, and below ``high``."""
+        curve = NormalDist(self.mean, self.deviation)
+        return 0.0 if self.low is None else curve.cdf(self.low), 1.0 if self.high is None else curve.cdf(self.high)
+
+    @property
+    def share(self) -> float:
+        """So much of the whole distribution is left."""
+        below, above = self._shares
+        return above - below
+
     def value(self, u: float) -> VariedValue:
         curve = NormalDist(self.mean, self.deviation)
-        below = 0.0 if self.low is None else curve.cdf(self.low)
-        above = 1.0 if self.high is None else curve.cdf(self.high)
+        below, above = self._shares
         share = below + u * (above - below)
         found = curve.inv_cdf(min(max(share, 1e-16), 1.0 - 1e-16))
         if self.low is not None:

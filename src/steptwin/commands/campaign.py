@@ -15,6 +15,7 @@ from steptwin.campaign.campaign import RESULTS, SUFFIX, SUMMARY, Campaign, Campa
 from steptwin.campaign.report import comparison
 from steptwin.campaign.report.campaignpage import told
 from steptwin.campaign.report.write import write_report
+from steptwin.campaign.summary import percent
 from steptwin.errors import Misuse
 from steptwin.extras import libraries_of, missing
 from steptwin.files.coverage import CoverageReports
@@ -114,7 +115,7 @@ def _print(plain: Any, out: Print, causes: Sequence[str] = ()) -> None:
     if not runs:
         out(f"{plain['name']}: no runs")
         return
-    out(f"{plain['name']}: {runs} runs, {failed} failed: {plain['pass_rate']:.2%} pass (95 %: {low:.2%} to {high:.2%})")
+    out(f"{plain['name']}: {runs} runs, {failed} failed: {percent(plain['pass_rate'])} pass (95 %: {low:.2%} to {high:.2%})")
     for name, one in plain["properties"].items():
         worst = "" if one["robustness"] is None else f"; least robustness {one['robustness']:.4g} in case {one['case']}"
         held = f"violated in {one['failed']}" if one["failed"] else "holds"

@@ -58,6 +58,20 @@ def override(data: dict[str, Any], overrides: Overrides, only: str | None = None
     return left
 
 
+def place_of(data: Mapping[str, Any], key: str) -> tuple[str, ...]:
+    """Equal for keys of the same value, in whatever way their tables are chosen."""
+    path = key.split(".")
+    if path[0] not in data:
+        kinds = [kind for kind in data if path[0] in _names(data[kind])]
+        path = [*kinds, *path]
+    found: list[str] = []
+    inner: Any = data
+    for part in path[:-1]:
+        inner = _known(inner).get(part)
+        found.append(inner["name"] if isinstance(inner, dict) and isinstance(inner.get("name"), str) else part)
+    return (*found, path[-1])
+
+
 def _whole_path(data: Mapping[str, Any], path: list[str], only: str | None) -> list[str]:
     """With the kind of table, where it was left out, and with the table of parameters of a use."""
     if path[0] in data or len(path) < 2:
@@ -85,14 +99,19 @@ def _some(names: Iterable[str]) -> str:
 
 
 def _inside(holder: Any, wanted: str, key: str) -> Any:
-    known: dict[str, Any] = {}
-    if isinstance(holder, dict):
-        known = holder
-    elif isinstance(holder, list):
-        known = {str(number): table for number, table in enumerate(holder)}
-        known |= {table["name"]: table for table in holder if isinstance(table, dict) and isinstance(table.get("name"), str)}
+    known = _known(holder)
     if wanted not in known:
         names = known if holder is not known else {**known, **dict.fromkeys(name for of in known.values() for name in _names(of))}
         hint = NearMiss().hint(wanted, names) or (f"; there are {_some(names)}" if names else "")
         raise Misuse(f"override {key!r}: there is no {wanted!r}{hint}")
     return known[wanted]
+
+
+def _known(holder: Any) -> Mapping[str, Any]:
+    """What is in a table, or the tables of a list by their numbers and names."""
+    if isinstance(holder, dict):
+        return holder
+    known: dict[str, Any] = {str(number): table for number, table in enumerate(holder if isinstance(holder, list) else ())}
+    return known | {
+        table["name"]: table for table in known.values() if isinstance(table, dict) and isinstance(table.get("name"), str)
+    }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import random
 from fractions import Fraction
 from typing import Any
 
@@ -277,3 +278,41 @@ def test_values_are_forced_to_the_side_of_their_truth() -> None:
 def test_cycle_times_are_found_in_a_formula() -> None:
     found = [node for node in nodes(parse_property("always a.x and count(b.x) > 1")) if isinstance(node, Tally | CycleTime)]
     assert found == [Tally(parse_property("b.x"), ">", 1.0)]
+
+
+# ---------------------------------------------------------------------- by which moment something is violated
+
+
+def counted() -> st.SearchStrategy[str]:
+    sign, inner = st.sampled_from(["<", "<=", ">", ">="]), formulas(windows=True)
+    return st.one_of(
+        inner,
+        st.tuples(inner, st.sampled_from(["<", "<=", ">", ">=", "==", "!="]), st.integers(0, 3)).map(
+            lambda three: f"count({three[0]}) {three[1]} {three[2]}"
+        ),
+        st.tuples(st.sampled_from(["", "not "]), inner, inner, sign, TIMES).map(
+            lambda five: f"{five[0]}(time between ({five[1]}) and ({five[2]}) {five[3]} {five[4]} ns)"
+        ),
+    )
+
+
+@settings(max_examples=300)
+@given(counted(), BOTH, st.randoms(use_true_random=False))
+@example("count(a.x > 0) >= 2", ([Fraction(-1)] * 2, [Fraction(1)] * 2), random.Random(1))
+@example("count(a.x > 0) < 0", ([Fraction(-1)] * 2, [Fraction(1)] * 2), random.Random(1))
+@example("(always a.x > 0) or (eventually b.x > 0)", ([Fraction(-1)] * 3, [Fraction(-1)] * 3), random.Random(1))
+def test_what_is_violated_at_a_moment_stays_so_whatever_comes_later(
+    text: str, both: tuple[Values, Values], chance: random.Random
+) -> None:
+    def value(a: Values, b: Values) -> tuple[float, int]:
+        found = Evaluation({atom: steps_of(values) for atom, values in signals_of(formula, a, b).items()})
+        return value_at(found.course(formula), 0), found.decided(formula, 0)[0]
+
+    formula = parse_property(text)
+    (present, at), end = value(*both), len(both[0])
+    assert 0 <= at < end
+    if present <= 0.0:
+        assert value(both[0][: at + 1], both[1][: at + 1])[0] <= 0.0
+        for _ in range(3 if at + 1 < end else 0):
+            a, b = ([*one[: at + 1], *(chance.choice((1, -1)) * later for later in one[at + 1 :])] for one in both)
+            assert value(a, b)[0] <= 0.0

@@ -17,6 +17,8 @@ from steptwin.campaign.report.campaignpage import CampaignReport
 from steptwin.campaign.report.comparison import compare, lines
 from steptwin.campaign.report.statistics import RunColumns, histogram, influences
 from steptwin.campaign.report.write import write_report
+from steptwin.campaign.store import StoredCase
+from steptwin.campaign.summary import CampaignSummary
 from steptwin.errors import Misuse
 
 EXAMPLES = Path(__file__).parents[3] / "examples" / "worlds"
@@ -165,3 +167,26 @@ def test_a_campaign_inside_of_a_test(chance: str, shown: str, tmp_path: Path) ->
     ran = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert shown in ran.stdout
     assert ("jam element=ram" in ran.stdout) is (chance == "1.0")
+
+
+def test_files_for_ci_are_xml_whatever_names_contain() -> None:
+    summary = CampaignSummary.of(
+        "a\x1b<&>", "d", 1, [(Case(0, {}, (), (), 1, 100), CaseResult(0, (Verdict("p\x07", True, 1.0, 0, ""),), "", 100, {}))]
+    )
+    page = CampaignReport(summary=summary, found=(), influences=(), histograms=(), search="random")
+    suite = ET.fromstring(page.junit())
+    assert (suite.get("name"), suite.find("testcase").get("name")) == ("a\ufffd<&>", "p\ufffd")  # type: ignore[union-attr]
+
+
+def test_a_report_of_what_ended_by_failure_has_nothing_after_it(tmp_path: Path) -> None:
+    shutil.copytree(EXAMPLES / "press", tmp_path, dirs_exist_ok=True)
+    text = CAMPAIGN.replace("runs = 20", "runs = 20\nuntil_failure = true") + '[[property]]\nalways = "ram.position < 1"\n'
+    (tmp_path / "campaign.toml").write_text(text, encoding="utf-8")
+    campaign = Campaign.load(tmp_path / "campaign.toml")
+    summary = campaign.run(tmp_path / "out")
+    store = campaign.open_store(tmp_path / "out")
+    store.add([StoredCase(campaign.cases[n], campaign.run_case(n)) for n in (1, 2)])  # of another process, meanwhile
+    store.close()
+    report = write_report(campaign, summary, tmp_path / "out", None)
+    assert [one.numbers for one in report.found] == [(0,)]
+    assert report.histograms[0].count == 1

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import reduce
+from math import ceil, floor
+from operator import itemgetter
 
 from steptwin.campaign.properties.slopes import (
     TINY,
@@ -155,37 +157,96 @@ class Evaluation:
     # ------------------------------------------------------------------ where it is decided
 
     def decided(self, node: PropertyFormula, moment: Nanos, *, undecided: bool = True) -> tuple[Nanos, PropertyFormula]:
-        """The moment, and the part of a formula, by which its value at ``moment`` is decided."""
-        value = value_at(self.course(node, undecided=undecided), moment)
+        """The moment, and the part of a formula, by which its value at ``moment`` is decided.
+
+        What is false stays false whatever comes after that moment.
+        """
         match node:
-            case Combination(_, inner):
-                close = [one for one in inner if abs(value_at(self.course(one, undecided=undecided), moment) - value) < TINY]
-                return self.decided((close or list(inner))[-1], moment, undecided=undecided)
-            case Lasting(word, length, inner):
-                below = undecided if length is not None else word == "always"
-                end = self.end if length is None else min(self.end, moment + length)
-                course = self.course(inner, undecided=below)
-                if word == "eventually":
-                    reached = _first(course, moment, end, lambda one: one > 0.0) if value > 0.0 else None
-                    return (end, node) if reached is None else self.decided(inner, reached, undecided=below)
-                failed = _first(course, moment, end, lambda one: one <= 0.0) if value <= 0.0 else None
-                return self.decided(inner, _lowest(course, moment, end) if failed is None else failed, undecided=below)
+            case Combination():
+                return self._joined(node, moment, undecided)
+            case Lasting():
+                return self._lasted(node, moment, undecided)
             case Delayed(length, inner) if moment + length <= self.end:
                 return self.decided(inner, moment + length, undecided=undecided)
-            case Holding(first, _, released) if value <= 0.0 and not released:
-                failed = _first(self.course(first), moment, self.end, lambda one: one <= 0.0)
-                return (self.end, node) if failed is None else self.decided(first, failed)
-            case CycleTime(limit=limit):
-                closed, begun = self.cycles(node)
-                every = [(_timed(end - begin, node.sign, limit), begin, end) for begin, end in closed]
-                if begun is not None and node.sign in ("<", "<="):
-                    every.append((_timed(self.end - begun, node.sign, limit), begun, self.end))
-                worst = min(every, default=(0.0, moment, moment))
-                return min(worst[2], worst[1] + limit) if node.sign in ("<", "<=") and worst[0] < 0 else worst[2], node
-            case Tally(inner, sign, number) if sign in ("<", "<=") and value <= 0.0:
-                moments = [one for one in rises(self.course(inner, undecided=False)) if one >= moment]
-                return moments[min(int(number), len(moments) - 1)], node
+            case Delayed():
+                return self.end, node
+            case Holding() if value_at(self.course(node), moment) <= 0.0:
+                return self._not_held(node, moment)
+            case CycleTime(begin, end):
+                return self._known_by(self._cycle_decided(node), begin, end), node
+            case Tally() if value_at(self.course(node), moment) <= 0.0:
+                return self._miscounted(node, moment), node
+            case Becoming(inner):
+                return self._known_by(moment, inner), node
         return moment, node
+
+    def _joined(self, node: Combination, moment: Nanos, undecided: bool) -> tuple[Nanos, PropertyFormula]:
+        value = value_at(self.course(node, undecided=undecided), moment)
+        if node.word == "or" and value <= 0.0:  # once the last of them is false
+            every = [self.decided(one, moment, undecided=undecided) for one in node.inner]
+            return max(reversed(every), key=itemgetter(0))
+        close = [one for one in node.inner if abs(value_at(self.course(one, undecided=undecided), moment) - value) < TINY]
+        return self.decided((close or list(node.inner))[-1], moment, undecided=undecided)
+
+    def _lasted(self, node: Lasting, moment: Nanos, undecided: bool) -> tuple[Nanos, PropertyFormula]:
+        value = value_at(self.course(node, undecided=undecided), moment)
+        word, length, inner = node.word, node.length, node.inner
+        below = undecided if length is not None else word == "always"
+        end = self.end if length is None else min(self.end, moment + length)
+        course = self.course(inner, undecided=below)
+        if word == "eventually":
+            reached = _first(course, moment, end, lambda one: one > 0.0) if value > 0.0 else None
+            return (self._known_by(end, inner), node) if reached is None else self.decided(inner, reached, undecided=below)
+        failed = _first(course, moment, end, lambda one: one <= 0.0) if value <= 0.0 else None
+        return self.decided(inner, _lowest(course, moment, end) if failed is None else failed, undecided=below)
+
+    def _miscounted(self, node: Tally, moment: Nanos) -> Nanos:
+        """When it came once too often; if too seldom, that is sure at the end."""
+        moments = [one for one in rises(self.course(node.inner, undecided=False)) if one >= moment]
+        most = {"<": ceil(node.number) - 1, "<=": floor(node.number), "==": floor(node.number)}.get(node.sign)
+        if most is None or len(moments) <= most:
+            return self.end
+        return self._known_by(moments[most] if most >= 0 else moment, node.inner)
+
+    def _not_held(self, node: Holding, moment: Nanos) -> tuple[Nanos, PropertyFormula]:
+        """Where ``until`` failed: its first part did too early; or what it is the opposite of came true."""
+        way = node.released
+        failing, other = (node.then, node.first) if way else (node.first, node.then)
+        failed = _first(self.course(failing, undecided=True), moment, self.end, lambda one: one <= 0.0)
+        if failed is None:
+            return self.end, node
+        at, by = self.decided(failing, failed)
+        return max(at, self._known_by(failed, other)), by
+
+    def _cycle_decided(self, node: CycleTime) -> Nanos:
+        is_upper = node.sign in ("<", "<=")
+        closed, begun = self.cycles(node)
+        every = [(_timed(end - begin, node.sign, node.limit), begin, end) for begin, end in closed]
+        if begun is not None and is_upper:
+            every.append((_timed(self.end - begun, node.sign, node.limit), begun, self.end))
+        if not every:
+            return self.end
+        worst, begin, end = min(every)
+        if node.some and self._cycles(node) <= 0.0:  # none of them, which the end decides
+            return self.end
+        return min(end, begin + node.limit + (node.sign == "<=")) if is_upper and worst < 0.0 else end
+
+    def _known_by(self, moment: Nanos, *parts: PropertyFormula) -> Nanos:
+        """When it is known what parts are up to a moment."""
+        ahead = [_ahead(part) for part in parts]
+        return self.end if None in ahead else min(self.end, moment + max(one for one in ahead if one is not None))
+
+
+def _ahead(node: PropertyFormula) -> Nanos | None:
+    """How far after a moment its value there may be decided; None: at the end of the run."""
+    parts = [_ahead(part) for part in node.parts()]
+    known = [one for one in parts if one is not None]
+    if len(known) < len(parts) or isinstance(node, Holding | Tally | CycleTime):
+        return None
+    most = max(known, default=0)
+    if isinstance(node, Lasting | Delayed):
+        return None if node.length is None else most + node.length
+    return most
 
 
 def _first(course: Shape, begin: Nanos, end: Nanos, test: Callable[[float], bool]) -> Nanos | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
@@ -13,9 +14,11 @@ from steptwin.campaign.findings import FoundFailure
 from steptwin.campaign.report.html import link, page, table
 from steptwin.campaign.report.statistics import Histogram, Influence
 from steptwin.campaign.reproduce import summary, where
-from steptwin.campaign.summary import CampaignSummary
+from steptwin.campaign.summary import CampaignSummary, percent
 
 WIDTH, HEIGHT = 340, 130
+_NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+"""Characters that XML 1.0 cannot have, even escaped."""
 _STYLE = "rect { fill: var(--note); } .bad { color: var(--bad); } .good { color: var(--good); }"
 
 
@@ -51,12 +54,12 @@ class CampaignReport:
             if found:
                 texts = [f"{len(one.numbers)} of {self.summary.runs} runs: {told(one)}" for one in found]
                 ET.SubElement(case, "failure", message=texts[0]).text = "\n".join(texts)
-        return ET.tostring(suite, encoding="utf-8", xml_declaration=True)
+        return _NOT_XML.sub("\N{REPLACEMENT CHARACTER}", ET.tostring(suite, encoding="unicode", xml_declaration=True)).encode()
 
     def html(self, folder: Path) -> str:
         one = self.summary
         low, high = one.interval
-        rate = "no runs" if one.pass_rate is None else f"{one.pass_rate:.2%} pass"
+        rate = "no runs" if one.pass_rate is None else f"{percent(one.pass_rate)} pass"
         chosen = "" if self.search == "random" else f"; no probability: cases were chosen by a search, {self.search}"
         body = (
             f'<p class="big {"bad" if one.failed else "good"}">{rate}</p>\n'

@@ -27,15 +27,17 @@ FAILURES = "failures"
 def write_report(campaign: Campaign, summary: CampaignSummary, folder: Path, file: Path | None) -> CampaignReport:
     """``file``: the description, for the tests of what failed. Raises `Misuse`."""
     store = campaign.open_store(folder)
+    # Workers went on meanwhile with cases after the first failure: these are no part of the campaign.
+    before = summary.failures[-1].number + 1 if campaign.description.until_failure and summary.failures else None
     cases: dict[int, Case] = {}
 
     def failed() -> Iterator[CaseResult]:
-        for case, result in islice(store.results(failed=True), MOST_FAILED):
+        for case, result in islice(store.results(before, failed=True), MOST_FAILED):
             cases[case.number] = case
             yield result
 
     try:
-        columns = RunColumns.of(store.results(), [one.do for one in campaign.description.faults])
+        columns = RunColumns.of(store.results(before), [one.do for one in campaign.description.faults])
         end = time.monotonic() + SHRINKING_S
         found = find(
             campaign.runner, failed(), cases.__getitem__, folder / FAILURES, file, is_over=lambda: time.monotonic() > end
