@@ -1,19 +1,24 @@
-"""Questions with `why`: the first one about a past, and the longest of others; of a world that moves and one that calculates."""
+"""Questions with `why`: the first one about a past, those about what never changed, and the same again; of sessions and in a
+debugger."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from time import process_time
 
+from steptwin.debug.debugger import Debugger
 from steptwin.files.world import World
+from steptwin.machine import SECOND
 
 GOAL_S = 0.1
-"""Of each question once the whole past is noted, which the second one needs: what it asks about never changed."""
 MOVES = (
     "M1 = ON\nn = 0\nMAIN:\n"
     "    n = n + 1\n    $I4 = n\n    PABS M1 500\n    WAITPOS\n    OUT1 = ON\n    PABS M1 0\n    WAITPOS\n    OUT1 = OFF\n"
     "JUMP MAIN\n"
 )
 CALCULATES = "n = 0\nMAIN:\n" + "    n = n + 1\n" * 20 + "    $I4 = n\n    OUT1 = ON\n    DELAY 0.1\n    OUT1 = OFF\nJUMP MAIN\n"
+ONLY = "n = 0\nMAIN:\n" + "    n = n + 1\n" * 90 + "    $I4 = n\nJUMP MAIN\n"
+ACTS = "n = 0\nMAIN:\n" + "    n = n + 1\n" * 90 + "    $I4 = n\n    OUT1 = ON\n    M1 = ON\n    OUT1 = OFF\nJUMP MAIN\n"
 WORLD = """
 [[mic488]]
 name = "m"
@@ -30,33 +35,41 @@ drive = "m.M1"
 unit = "mm"
 pulses_per_unit = 40
 """
-QUESTIONS = (
-    *("m.OUT1", "m.M_STATUS", "m.M2_ACC", "m.M1_POSLIM_L", "m.M1.status", "m.USER_REGISTER[4]", "m.USER_REGISTER[400]:real"),
-    *("m.M1_VMAX == 5", "m.M3.status == 3 and m.IN1 == 0", "m", "m.IN1"),
-)
-MOVING = "x.position > 9 m"
-"""Of a quantity that moves, and never true."""
+FIRST = "m.OUT1"
+EDGES = ("m.OUT7", "go", "m.IN1 == 1 or m.OUT7 == 1", "x.position > 9 m")
+POINTS = ("m.M_STATUS", "m.M2_ACC", "m.M3.status", "m.USER_REGISTER[400]:real", "m.M3.status == 3 and m.IN1 == 0")
 
 
-def measure(name: str, program: str, seconds: float) -> None:
+def measure(name: str, ask: Callable[[str], object]) -> None:
+    def longest(*questions: str) -> str:
+        found: list[tuple[float, str]] = []
+        for question in questions:
+            begin = process_time()
+            ask(question)
+            found.append((process_time() - begin, question))
+        seconds, question = max(found)
+        return f"{seconds:.3f} s ({question})"
+
+    first, edges, points, again = longest(FIRST), longest(*EDGES), longest(*POINTS), longest(FIRST, *EDGES, *POINTS)
+    print(f"{name}: first {first}; of what never changed: pins {edges}, points {points}; again {again} (goal {GOAL_S:g} s)")
+
+
+def session(name: str, program: str) -> None:
     world = World.from_toml(WORLD, {"m.prg": program.encode()})
-    begin = process_time()
-    world.run(seconds)
-    ran = process_time() - begin
-    past = world.past
-    found: list[tuple[float, str]] = []
-    for question in (*QUESTIONS, MOVING):
-        begin = process_time()
-        past.ask(question)
-        found.append((process_time() - begin, question))
-    (first, _), (whole, _), *others, (moving, _) = found
-    longest, question = max(others)
-    print(
-        f"{name}: {seconds:g} s run in {ran:.2f} s; first question {first:.2f} s, of the whole past {whole:.2f} s,"
-        f" longest of {len(others)} others {longest:.4f} s, {question!r} (goal {GOAL_S:g} s); {MOVING!r} {moving:.2f} s"
-    )
+    world.run(300.0)
+    measure(name, world.past.ask)
+
+
+def debugger(name: str, program: str) -> None:
+    text = WORLD.replace("start = true", 'start = true\nstatement_time = "1 us"')
+    world = World.from_toml(text, {"m.prg": program.encode()}, keep_trace=False, keep_inputs=False)
+    debugger = Debugger(world)
+    debugger.run(SECOND)
+    measure(name, debugger.why)
 
 
 def main() -> None:
-    measure("moves", MOVES, 300.0)
-    measure("calculates", CALCULATES, 300.0)
+    session("300 s, moves", MOVES)
+    session("300 s, calculates", CALCULATES)
+    debugger("debugger, 1 000 000 statements that calculate", ONLY)
+    debugger("debugger, 1 000 000 statements, some of which act", ACTS)

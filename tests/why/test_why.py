@@ -295,7 +295,7 @@ def test_a_past_of_many_statements_is_known_near_its_end(monkeypatch: pytest.Mon
     """As far as the limit permits, also for a second question."""
     world = World.from_toml(
         '[[mic488]]\nname = "m"\nprogram = "p"\nstart = true\nstatement_time = "1 us"\n',
-        {"p": b"n = 0\nOUT1 = ON\nMAIN:\n    n = n + 1\nJUMP MAIN\n"},
+        {"p": b"n = 0\nMAIN:\n    n = n + 1\n    IF n = 12000\n        OUT3 = ON\n    ENDIF\nJUMP MAIN\n"},
         keep_trace=False,
     )
     monkeypatch.setattr(kept, "MOST_NOTED", 20_000)
@@ -305,9 +305,10 @@ def test_a_past_of_many_statements_is_known_near_its_end(monkeypatch: pytest.Mon
         history.take()
     questions = PastQuestions(history)
     for _ in range(2):
-        answer = finish(questions.asking("OUT2"))
+        answer = finish(questions.asking("OUT3"))
+        assert answer.links[1].text == "line 5 `OUT3 = ON` was executed"
         assert answer.is_cut
-        assert answer.known_from == 40 * MILLISECOND
+        assert answer.known_from == 25 * MILLISECOND
         assert finish(questions.asking("m")).state.startswith("m does not wait: line ")
 
 

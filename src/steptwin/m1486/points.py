@@ -18,6 +18,8 @@ from steptwin.points import LivePoint, TurningPoints, turns_of, turns_of_round
 
 """The smallest unit, 1/64 of a full step."""
 POSITION_BITS = 24
+FLAGS_UPLOAD = 14
+"""The byte with the user flags, which commands set without an event (``T``, ``C``)."""
 
 
 class _PointRow(NamedTuple):
@@ -28,6 +30,8 @@ class _PointRow(NamedTuple):
     bits: int | None = None
     """Number of low bits of the position in a count that wraps."""
     has_version: bool = False
+    is_kept: bool = False
+    """As in `steptwin.points.LivePoint`."""
 
 
 def _sentence(text: str) -> str:
@@ -129,7 +133,8 @@ def _uploads() -> Iterator[_PointRow]:
             source="VII.1",
         )
         is_of_position = number <= POSITION_BITS // 8
-        yield _PointRow(point, UPLOADED[number], follows=is_of_position, bits=8 * number if is_of_position else None)
+        bits = 8 * number if is_of_position else None
+        yield _PointRow(point, UPLOADED[number], is_of_position, bits, is_kept=number == FLAGS_UPLOAD)
 
 
 _ROWS: Mapping[str, _PointRow] = {row.point.path.upper(): row for row in (*_values(), *_registers(), *_uploads())}
@@ -143,7 +148,8 @@ def live_point(chip: M1486Chip, text: str) -> LivePoint | None:
     if row is None:
         return None
     version = partial(_version, chip) if row.has_version else None
-    return LivePoint(point=row.point, read=partial(row.read, chip), turns=_turns(chip, row), version=version)
+    read = partial(row.read, chip)
+    return LivePoint(point=row.point, read=read, turns=_turns(chip, row), version=version, is_kept=row.is_kept)
 
 
 def _turns(chip: M1486Chip, row: _PointRow) -> TurningPoints | None:

@@ -55,6 +55,8 @@ class Causes:
         self._uses: dict[tuple[str, Place], StatementUse] = {}
         built = log.world.parts.elements
         self._at_begin = nothing if log.is_whole else unknown
+        self.is_far = False
+        """Whether the chain that was followed last ends because nothing older was looked at (`MOST_LOOKED_BACK`)."""
         self._parts: dict[str, BoardPart] = {
             name: part for kind, parts in built.items() if ELEMENTS[kind].terminals is not None for name, part in parts.items()
         }
@@ -214,7 +216,7 @@ class Causes:
 
     def _statement_at(self, machine: str, change: Change, wanted: Resource | None) -> int | None:
         """The number of the statement that was executed at the moment of a change, before it, and changes what is wanted."""
-        executed = self._log.executed.get(machine, [])
+        executed = self._log.executed[machine]
         for index in range(self._log.last_executed(machine, change.time), -1, -1):
             if executed[index].time < change.time:
                 break
@@ -268,7 +270,7 @@ class Causes:
         """The last statement before a moment that changes something: what it began has ended."""
         if wanted is None:
             return None
-        executed = self._log.executed.get(machine, [])
+        executed = self._log.executed[machine]
         last = self._log.last_executed(machine, time)
         for index in range(last, max(-1, last - MOST_LOOKED_BACK), -1):
             if executed[index].time < time and _matches(self.use(machine, index).writes, wanted):
@@ -364,7 +366,8 @@ class Causes:
                 return self._decided(machine, earlier, ended, "ended")
             if number in use.governs or (use.is_loop and executed[earlier + 1].place.number >= use.governs.stop):
                 return self._decided(machine, earlier, executed[earlier].time, "decided")
-        return self._started(machine)
+        self.is_far = index >= MOST_LOOKED_BACK
+        return None if self.is_far else self._started(machine)
 
     def _decided(self, machine: str, index: int, time: Nanos, how: str) -> Cause:
         executed, use = self._log.executed[machine][index], self.use(machine, index)

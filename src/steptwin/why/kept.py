@@ -12,7 +12,9 @@ from typing import Protocol
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
+from steptwin.why.answer import Answer
 from steptwin.why.question import Asking, Why
+from steptwin.why.search import Asked, LastChanges
 from steptwin.world.history import PastState, outside_past
 from steptwin.world.plant import Plant
 from steptwin.world.plantsnapshot import PlantSnapshot, RecordedInput
@@ -47,6 +49,7 @@ class PastQuestions:
         self._history = history
         self._most = MOST_NOTED if most is None else most
         self._known: _Known | None = None
+        self._changes = LastChanges(history, _second_world)
 
     def asking(self, question: str, at: Nanos | None = None) -> Asking:
         """The answer for a moment, by default the present. Raises `Misuse` for what is no question here."""
@@ -59,14 +62,30 @@ class PastQuestions:
         if known is None or not known.fits(at, now - span):
             known = self._known = _Known(history, max(history.begin, at - span), self._most)
         answer = yield from known.asking(question, at)
+        if answer.is_cut and answer.since is None and (asked := known.asked(question)) is not None:
+            found = yield from self._changes.before(asked, known.begin)
+            if found.since is None:
+                begin = found.known_from
+                return answer._replace(known_from=begin, is_cut=begin > 0, is_complete=begin == 0)
+            then = _Known(history, max(history.begin, found.since - span), self._most)
+            before = yield from self._further(then, question, found.since)
+            if before.since == found.since:
+                return before._replace(at=at)
+        return (yield from self._further(known, question, at, answer))
+
+    def _further(self, known: _Known, question: str, at: Nanos, answer: Answer | None = None) -> Asking:
+        """The answer from what is known, and from older states as long as causes are older."""
+        is_near = known is self._known
+        answer = (yield from known.asking(question, at)) if answer is None else answer
         while answer.is_cut and (older := known.older(at)) is not None:
             yield
             try:
-                known = _Known(history, older, self._most)
+                known = _Known(self._history, older, self._most)
                 answer = yield from known.asking(question, at)
             except Misuse:
                 break
-            self._known = known
+            if is_near:
+                self._known = known
         return answer
 
     def _first_span(self) -> Nanos:
@@ -79,11 +98,12 @@ class _Known:
     """What is known of the past from a state of it on. ``moment``: from the newest state at or before it."""
 
     def __init__(self, history: StatesAndInputs, moment: Nanos, most: int) -> None:
-        snapshot, self._taken = history.state_at(moment)
+        state = history.state_at(moment)
+        self._taken = state.inputs
         self._history = history
         self._branch = history.branch
         self._most = most
-        self._why = Why(partial(_second_world, history.world, snapshot), (), snapshot.now, most)
+        self._why = Why(partial(_second_world, history.world, state.snapshot), (), state.snapshot.now, most)
 
     def fits(self, at: Nanos, not_before: Nanos) -> bool:
         """Whether a question about a moment can be answered from it. ``not_before``: up to when it must have come."""
@@ -91,6 +111,15 @@ class _Known:
         is_same = history.branch == self._branch and history.keeps_inputs_from(self._taken)
         has_room = log.noted < self._most // 2 or at <= self._why.end
         return is_same and log.begin <= at and not_before <= self._why.end and has_room
+
+    @property
+    def begin(self) -> Nanos:
+        """From when on it is known."""
+        return self._why.log.begin
+
+    def asked(self, question: str) -> Asked | None:
+        """See `Why.asked`."""
+        return self._why.asked(question)
 
     def asking(self, question: str, at: Nanos) -> Asking:
         inputs = self._history.inputs_from(self._taken)

@@ -5,11 +5,12 @@ A running world does not note this. Its past is run again with the inputs that i
 
 from __future__ import annotations
 
+from array import array
 from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from itertools import takewhile
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
@@ -36,6 +37,27 @@ class Executed(NamedTuple):
     machine: str
     place: Place
     position: int
+
+
+class ExecutedStatements:
+    """Those of one controller, in their order; in columns, because there are many."""
+
+    def __init__(self, machine: str) -> None:
+        self._machine = machine
+        self._times, self._positions = array("q"), array("q")
+        self._places: list[Place] = []
+
+    def add(self, time: Nanos, place: Place, position: int) -> None:
+        self._times.append(time)
+        self._places.append(place)
+        self._positions.append(position)
+
+    def __getitem__(self, index: int) -> Executed:
+        return Executed(self._times[index], self._machine, self._places[index], self._positions[index])
+
+    def last(self, until: Nanos) -> int:
+        """The number of the last one by a moment; -1 if there is none."""
+        return bisect_right(self._times, until) - 1
 
 
 class Act(NamedTuple):
@@ -70,15 +92,17 @@ class CauseLog:
         numbers = {id(kernel): number for number, kernel in enumerate(world.kernels)}
         self._group_of = {name: numbers[id(kernel)] for name, kernel in parts.kernel_of.items()}
         self._pins = {name: frozenset(machine.pins()) for name, machine in world.machines.items()}
-        self.first_levels = _levels(world)
+        self.first_levels = levels_of(world)
         self.records: dict[int, list[TraceRecord]] = defaultdict(list)
         self.changes: dict[str, list[Change]] = defaultdict(list)
-        self.executed: dict[str, list[Executed]] = defaultdict(list)
+        self.executed = {name: ExecutedStatements(name) for name in world.machines}
         self.plans: dict[tuple[str, str], list[Change]] = defaultdict(list)
         """Moments and positions of the plans of an axis, by controller and number."""
         self.acts: list[Act] = []
         self._replaced: dict[str, Nanos] = {}
         """When the program of a controller was last replaced by a download."""
+        self._keeping: dict[str, dict[Place, bool]] = defaultdict(dict)
+        """Whether statements may change points without an event, by controller."""
         self.noted = 0
         self.inputs = 0
         """Number of inputs that were applied."""
@@ -86,13 +110,14 @@ class CauseLog:
             self._take(record)
         world.trace.stop()  # it is noted here
         self._built = {group: len(records) for group, records in self.records.items()}
+        self.points = points.PointTurns(world)
         world.trace.watchers.append(self._take)
         world.act_watchers.append(self._act)
         for name, programs in world.programs.items():
             if not self.is_whole:
-                self.executed[name] += [Executed(self.begin, name, frame.place, 0) for frame in programs.stack(self.begin)[:1]]
+                for frame in programs.stack(self.begin)[:1]:
+                    self.executed[name].add(self.begin, frame.place, 0)
             programs.hook(self._hook(name, programs))
-        self.points = points.PointTurns(world)
 
     @property
     def is_whole(self) -> bool:
@@ -109,7 +134,10 @@ class CauseLog:
     def _count(self) -> None:
         self.noted += 1
         if self.noted > self._most:
-            raise Misuse(f"more than {self._most} records and statements since {self.begin / SECOND:g} s: too many to look at")
+            self._refuse()
+
+    def _refuse(self) -> NoReturn:
+        raise Misuse(f"more than {self._most} records and statements since {self.begin / SECOND:g} s: too many to look at")
 
     def _take(self, record: TraceRecord) -> None:
         self._count()
@@ -130,15 +158,23 @@ class CauseLog:
         match what:
             case Download(machine=machine):
                 self._replaced[machine] = self.world.now
+                self._keeping[machine].clear()
 
     def _hook(self, name: str, programs: Programs) -> StatementHook:
-        executed, records = self.executed[name], self.records[self._group_of[name]]
+        add, records, executes = self.executed[name].add, self.records[self._group_of[name]], self.points.executes
+        keeping = self._keeping[name]
 
         def hook(now: Nanos, number: int) -> None:
             place = programs.place(number)
             if place is not None:
-                self._count()
-                executed.append(Executed(now, name, place, len(records)))
+                self.noted += 1
+                if self.noted > self._most:
+                    self._refuse()
+                add(now, place, len(records))
+                keeps = keeping.get(place)
+                if keeps is None:
+                    keeps = keeping[place] = programs.use(place).keeps
+                executes(name, now, keeps=keeps)
 
         return hook
 
@@ -190,7 +226,7 @@ class CauseLog:
 
     def is_in_progress(self, executed: Executed) -> bool:
         """Whether a statement was in execution when the log began, after the beginning of the world."""
-        return not self.is_whole and executed is self.executed[executed.machine][0]
+        return not self.is_whole and executed == self.executed[executed.machine][0]
 
     def since(self, signal: str, until: Nanos) -> Nanos | None:
         """Since when a signal has the level of a moment; None: from the beginning."""
@@ -239,7 +275,7 @@ class CauseLog:
 
     def last_executed(self, machine: str, until: Nanos) -> int:
         """The number of the last statement of a controller by a moment; -1 if there is none."""
-        return bisect_right(self.executed.get(machine, []), until, key=lambda executed: executed.time) - 1
+        return self.executed[machine].last(until)
 
 
 def in_parts(world: Plant, inputs: Sequence[RecordedInput], end: Nanos) -> Iterator[bool]:
@@ -248,7 +284,7 @@ def in_parts(world: Plant, inputs: Sequence[RecordedInput], end: Nanos) -> Itera
     return replay(world, inputs, end, min(SLICE_NS, STATEMENTS_AT_ONCE * min(times, default=SLICE_NS)))
 
 
-def _levels(world: Plant) -> dict[str, float]:
+def levels_of(world: Plant) -> dict[str, float]:
     """The present levels of all that has edges: pins, outputs of elements, contacts."""
     found = {f"{name}.{pin}": level for name, machine in world.machines.items() for pin, level in machine.pins().items()}
     for kind, parts in world.parts.elements.items():

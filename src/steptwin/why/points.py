@@ -3,48 +3,51 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from typing import TypeAlias
 
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
+from steptwin.machine import MotionController, Nanos
 from steptwin.points import LivePoint, MemoryCells
-from steptwin.world.kernel import Kernel
 from steptwin.world.plant import Plant
 
 MOST_TURNS = 1_000_000
 """Limit of the changes that are noted, which are kept in memory."""
 MOST_LOOKS = 100_000
-"""Limit of the events after which the points are compared: a run takes some 2 s longer by it. Where there is more of either,
-nothing is noted any more, and all is forgotten."""
+"""Limit of the events and statements after which the points are compared: a run takes some 2 s longer by it. Where there is
+more of either, nothing is noted any more, and all is forgotten."""
 
 PointTurn: TypeAlias = tuple[Nanos, float]
 """A moment, and the value from then on."""
 
 
 class PointTurns:
-    """Notes the changes of all such points of ``world`` from now on."""
+    """Notes the changes of all such points of ``world`` from now on: after each event of their controller, and after each
+    statement of which `executes` is told."""
 
     def __init__(self, world: Plant) -> None:
         self._world = world
-        self._readers = {owner: _Reader(world, owner) for owner in world.machines}
-        self._of_kernel: dict[Kernel, list[_Reader]] = {}
+        self._readers = {owner: _Reader(self, world, owner) for owner in world.machines}
         self._noted = self._looks = 0
         for owner, reader in self._readers.items():
             kernel = world.parts.kernel_of[owner]
-            self._of_kernel.setdefault(kernel, []).append(reader)
-            kernel.is_attentive = True
-        world.watch_kernels(self._look)
+            kernel.hears_requests = True
+            kernel.follow(reader, (owner,))
 
-    def _look(self, kernel: Kernel) -> None:
-        if kernel.stale or kernel not in self._of_kernel:
-            return
-        for reader in self._of_kernel[kernel]:
-            self._noted += reader.look(kernel.now)
+    def executes(self, owner: str, now: Nanos, *, keeps: bool) -> None:
+        """A controller executes a statement next, which may change points without an event if it ``keeps``."""
+        reader = self._readers.get(owner)
+        if reader is not None:
+            reader.executes(now, keeps=keeps)
+
+    def looked(self, noted: int) -> None:
+        """A reader has noted so many changes."""
+        self._noted += noted
         self._looks += 1
         if self._noted > MOST_TURNS or self._looks > MOST_LOOKS:
-            self._of_kernel.clear()
+            for owner, reader in self._readers.items():
+                self._world.parts.kernel_of[owner].unfollow(reader)
             self._readers.clear()
 
     def turns(self, name: str) -> Sequence[PointTurn] | None:
@@ -61,28 +64,61 @@ class PointTurns:
 
 
 class _Reader:
-    """Of one controller. ``points``: the turns of each."""
+    """Of one controller. ``points``: the turns of each. As `steptwin.world.followers.KernelFollower`."""
 
-    def __init__(self, world: Plant, owner: str) -> None:
-        found = dict(_readable(world, owner))
-        now = world.now
-        self._reads = list(found.values())
-        self._values = [float(read(now)) for read in self._reads]
-        self.points = {path: [(now, value)] for path, value in zip(found, self._values, strict=True)}
-        self._turns = list(self.points.values())
+    def __init__(self, noted: PointTurns, world: Plant, owner: str) -> None:
+        self._all = noted
         sheet = world.kind(owner).datasheet(world.machine(owner))
-        memories = [memory for point in sheet.points if (memory := _memory(world, owner, f"{point.path}[0]")) is not None]
-        self.cells = _Cells(memories[0], now) if memories else None
+        points = {point.path: _point(world, owner, point.path) for point in sheet.points}
+        found = dict(_readable(world.machine(owner), points))
+        now = world.now
+        self.points: dict[str, list[PointTurn]] = {}
+        self._kept = _Compared({path: point for path, point in found.items() if point.is_kept}, self.points, now)
+        self._others = _Compared({path: point for path, point in found.items() if not point.is_kept}, self.points, now)
+        rows = (_memory(world, owner, f"{path}[0]") for path, point in points.items() if point is None)
+        memory = next((row for row in rows if row is not None), None)
+        self.cells = None if memory is None else _Cells(memory, now)
+        self._keeping: Nanos | None = None
+        """The moment of a statement that may have changed what is kept, and has not been looked at."""
+
+    def executes(self, now: Nanos, *, keeps: bool) -> None:
+        if self._keeping is not None:
+            self._all.looked(self._look_at_kept(self._keeping))
+        self._keeping = now if keeps else None
+
+    def leave(self, moment: Nanos) -> None:
+        """It need not know."""
+
+    def look(self, now: Nanos) -> None:
+        """Note what has another value after an event."""
+        noted = self._look_at_kept(now if self._keeping is None else self._keeping)
+        self._keeping = None
+        self._all.looked(noted + self._others.look(now))
+
+    def _look_at_kept(self, now: Nanos) -> int:
+        return self._kept.look(now) + (0 if self.cells is None else self.cells.look(now))
+
+
+class _Compared:
+    """Points that are compared together."""
+
+    def __init__(self, found: Mapping[str, LivePoint], points: dict[str, list[PointTurn]], now: Nanos) -> None:
+        """Their turns come into ``points``."""
+        self._reads = [point.read for point in found.values() if point.read is not None]
+        self._values = [float(read(now)) for read in self._reads]
+        own = {path: [(now, value)] for path, value in zip(found, self._values, strict=True)}
+        points.update(own)
+        self._turns = list(own.values())
 
     def look(self, now: Nanos) -> int:
         """Note what has another value at the present moment; how many changes that are."""
-        noted = 0 if self.cells is None else self.cells.look(now)
         values = [read(now) for read in self._reads]
         if values == self._values:
-            return noted
+            return 0
+        noted = 0
         for turns, value, before in zip(self._turns, values, self._values, strict=True):
             if value != before:
-                _note(turns, now, float(value))
+                note_turn(turns, now, float(value))
                 noted += 1
         self._values = values
         return noted
@@ -103,7 +139,7 @@ class _Cells:
             return 0
         changed = [cell for cell, (word, before) in enumerate(zip(words, self._last, strict=True)) if word != before]
         for cell in changed:
-            _note(self._of(cell), now, words[cell])
+            note_turn(self._of(cell), now, words[cell])
         self._last = words[:]
         return len(changed)
 
@@ -117,26 +153,24 @@ class _Cells:
         changes = [(time, number, word) for number, cell in enumerate(memory.cells) for time, word in self._turns.get(cell, ())]
         for time, number, word in sorted(changes):
             words[number] = int(word)
-            _note(found, time, float(memory.value(words)))
+            note_turn(found, time, float(memory.value(words)))
         return found
 
 
-def _note(turns: list[PointTurn], now: Nanos, value: float) -> None:
-    """What lasts for no time is no value."""
+def note_turn(turns: list[PointTurn], now: Nanos, value: float) -> None:
+    """Add a turn. What lasts for no time is no value."""
     if turns[-1][0] == now:
         turns.pop()
     if not turns or turns[-1][1] != value:
         turns.append((now, value))
 
 
-def _readable(world: Plant, owner: str) -> Iterator[tuple[str, Callable[[Nanos], float]]]:
+def _readable(machine: MotionController, points: Mapping[str, LivePoint | None]) -> Iterator[tuple[str, LivePoint]]:
     """The points of a controller that keep their value between events; pins have their edges."""
-    kind, machine = world.kind(owner), world.machine(owner)
     pins = machine.pins()
-    for point in kind.datasheet(machine).points:
-        found = _point(world, owner, point.path)
-        if found is not None and found.read is not None and found.turns is None and point.path not in pins:
-            yield point.path, found.read
+    for path, found in points.items():
+        if found is not None and found.read is not None and found.turns is None and path not in pins:
+            yield path, found
 
 
 def _point(world: Plant, owner: str, path: str) -> LivePoint | None:

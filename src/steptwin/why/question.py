@@ -10,10 +10,12 @@ from typing import TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
+from steptwin.why import points
 from steptwin.why.answer import MOST_LINKS, Answer, ChainLink, since_before
 from steptwin.why.causes import Cause, Causes, nothing
-from steptwin.why.courses import Courses, watch_truth, watch_value
+from steptwin.why.courses import Courses, CourseTurns, watch_truth, watch_value
 from steptwin.why.log import MOST_NOTED, CauseLog, in_parts
+from steptwin.why.search import Asked
 from steptwin.why.sentences import statement
 from steptwin.why.states import Interval, StatesOnTheWay
 from steptwin.world.condition import Signal, SignalCondition
@@ -63,6 +65,16 @@ class _Level:
         return None
 
 
+def _text_of(question: str) -> str:
+    return question.strip().removeprefix("why ").strip()
+
+
+def _last_flip(condition: SignalCondition, times: Iterable[Nanos], at: Nanos) -> Nanos | None:
+    """The last of the moments at which something changed that made a condition what it is at a moment."""
+    value = condition.holds(at)
+    return next((time for time in sorted(times, reverse=True) if condition.holds(time - 1) is not value), None)
+
+
 class Why:
     """Answers questions about the past of a world.
 
@@ -95,8 +107,7 @@ class Why:
         moment, begin = self.end if at is None else at, self.log.begin
         if not begin <= moment <= self.end:
             raise Misuse(outside_past(moment, begin, self.end))
-        text = question.strip().removeprefix("why ").strip()
-        text = text or self._only_program()
+        text = _text_of(question) or self._only_program()
         for _ in self.log.run(self._inputs, self.end):
             self._on_the_way.pass_by(self.log.inputs)
             yield
@@ -113,6 +124,38 @@ class Why:
         return machines[0]
 
     # ------------------------------------------------------------------ signals and conditions
+
+    def asked(self, question: str) -> Asked | None:
+        """What `LastChanges` looks for; None for a controller, for a bare quantity that moves all the time, and where `idle` is
+        asked about. Raises `Misuse`."""
+        text = _text_of(question)
+        if not text or text in self.log.world.machines:
+            return None
+        text = self._named(text)
+        names = tuple(dict.fromkeys(parse_condition(text).names()))
+        is_bare = len(names) == 1 and text == names[0]
+        moving = {name for name in names if not self.log.has(name) and self.log.world.signal(name).continuous}
+        if (is_bare and moving) or "idle" in names:
+            return None
+        canonical = {name: self._canonical(name) for name in names}
+        edges = frozenset(full for full in canonical.values() if self._has_edges(full))
+        # Elements know their signals by the names in the question only.
+        signals = {name: full if full in edges or self._is_signal(full) else name for name, full in canonical.items()}
+
+        def flip(turns: Mapping[str, CourseTurns], at: Nanos) -> Nanos | None:
+            courses = {name: turns[signal] for name, signal in signals.items()}
+            if is_bare:
+                return points.since(courses[text], at)
+            condition = SignalCondition(text, lambda name: _Level(partial(points.level, courses[name]), self._unit(name)))
+            times = {time for course in courses.values() for time in points.changes(course, -1, at)}
+            return _last_flip(condition, times, at)
+
+        moving = frozenset(signals[name] for name in moving)
+        return Asked(text, frozenset(signals.values()), edges, moving, flip)
+
+    def _has_edges(self, signal: str) -> bool:
+        owner, _, pin = signal.partition(".")
+        return self.log.has(signal) or (owner in self.log.world.machines and pin in self.log.world.machines[owner].pins())
 
     def _condition(self, text: str, at: Nanos) -> Asking:
         asked = self._named(text)
@@ -187,12 +230,8 @@ class Why:
             (name,) = canonical.values()
             return log.level(name, at), log.since(name, at)
         condition = SignalCondition(text, lambda name: _Level(partial(log.level, canonical[name]), self._unit(name)))
-        times = sorted({time for name in canonical.values() for time in log.changes_in(name, -1, at)})
-        value = condition.holds(at)
-        for time in reversed(times):
-            if condition.holds(time - 1) is not value:
-                return float(value), time
-        return float(value), None
+        times = {time for name in canonical.values() for time in log.changes_in(name, -1, at)}
+        return float(condition.holds(at)), _last_flip(condition, times, at)
 
     def _from_run(self, text: str, canonical: dict[str, str], at: Nanos, *, is_bare: bool) -> FoundValue:
         """As `_from_log`, from courses that are in no trace: from interval to interval back to the last change."""
@@ -345,6 +384,6 @@ class Why:
             links.append(cause.link)
             cause, last = cause.before(), cause
             yield
-        is_followed = cause is None or cause.link in links
+        is_followed = (cause is None or cause.link in links) and not self._causes.is_far
         is_cut = is_followed and not self.log.is_whole and (last is None or last.before is not nothing)
         return Answer(question, at, state, since, tuple(links), is_followed and not is_cut, self.log.begin, is_cut)

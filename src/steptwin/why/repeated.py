@@ -11,7 +11,7 @@ from steptwin.why.answer import Answer
 from steptwin.why.kept import FIRST_SPAN_NS, PastQuestions
 from steptwin.why.log import MOST_NOTED, in_parts
 from steptwin.why.question import Asking, finish
-from steptwin.world.history import PastState, outside_past
+from steptwin.world.history import ChangedSince, PastState, outside_past
 from steptwin.world.plant import Plant
 from steptwin.world.plantsnapshot import RecordedInput
 
@@ -57,6 +57,7 @@ class StatesOfRun:
     def run(self) -> Iterator[None]:
         """Run the world, in parts."""
         self.world.stop_recording()
+        changed = ChangedSince(self.world)
         span = self._end - self.begin
         moments = {self.begin + span * number // STATES for number in range(1, STATES + 1)}
         while span > FIRST_SPAN_NS:
@@ -67,7 +68,7 @@ class StatesOfRun:
             for is_input in in_parts(self.world, self._inputs[done:], moment):
                 done += is_input
                 yield
-            self._states.append(PastState(self.world.snapshot(with_inputs=False), done))
+            self._states.append(PastState(self.world.snapshot(with_inputs=False), done, changed.take()))
 
     def state_at(self, moment: Nanos) -> PastState:
         index = bisect_right(self._states, moment, key=lambda state: state.snapshot.now)

@@ -50,15 +50,17 @@ class StatesOnTheWay:
             return
         self._states.append(PastState(self._world.snapshot(with_inputs=False), inputs))
         now = self._world.now
-        self._rests[now] = {name: rest for name, signal in self._moving.items() if (rest := _rest(signal, now)) is not None}
+        self._rests[now] = {name: rest for name, signal in self._moving.items() if (rest := rest_of(signal, now)) is not None}
         if len(self._states) > MOST_KEPT:
             del self._states[1::2]
             self._distance *= 2
 
     def rest(self, name: str, interval: Interval) -> float | None:
         """The value of a moving quantity that stands during an interval; None where it does not, or that is not known."""
-        begin = self._rests[interval.state.snapshot.now].get(name)
-        return begin.value if begin is not None and begin == self._rests.get(interval.end, {}).get(name) else None
+        begin, end = self._rests[interval.state.snapshot.now].get(name), self._rests.get(interval.end, {}).get(name)
+        if interval.end == self._world.now and name in self._moving:
+            end = rest_of(self._moving[name], self._world.now)
+        return begin.value if begin is not None and begin == end else None
 
     def until(self, moment: Nanos) -> Iterator[PastState]:
         """The states by a moment, the last one first."""
@@ -77,15 +79,20 @@ def _moving(world: Plant) -> Iterator[tuple[str, SignalOf]]:
     elements = (name for built in world.parts.elements.values() for name in built)
     names = [f"{name}.{signal}" for name in elements for signal in world.parts.element_signals(name) or ()]
     for owner, machine in world.machines.items():
-        names += [f"{owner}.{point.path}" for point in world.kind(owner).datasheet(machine).points]
+        kind = world.kind(owner)
+        for point in kind.datasheet(machine).points:
+            with suppress(Misuse):  # of a row of registers one must be chosen
+                live = kind.point(machine, point.path)
+                if live is not None and live.turns is not None and live.version is not None:
+                    names.append(f"{owner}.{point.path}")
     for name in names:
-        with suppress(Misuse):  # of a row of registers one must be chosen
-            found = world.signal(name)
-            if isinstance(found, SignalOf) and found.continuous and found.read is not None and found.version() is not None:
-                yield name, found
+        found = world.signal(name)
+        if isinstance(found, SignalOf) and found.continuous and found.read is not None and found.version() is not None:
+            yield name, found
 
 
-def _rest(signal: SignalOf, now: Nanos) -> Standing | None:
+def rest_of(signal: SignalOf, now: Nanos) -> Standing | None:
+    """What it stands at; None while it moves."""
     if next(signal.turns(now), None) is not None:
         return None
     value = signal.value(now)

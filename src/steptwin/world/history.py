@@ -11,7 +11,7 @@ from bisect import bisect_right
 from collections import deque
 from collections.abc import Iterable, Iterator
 from itertools import islice
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from steptwin.durations import duration_text
 from steptwin.errors import Misuse
@@ -19,6 +19,7 @@ from steptwin.machine import SECOND, Nanos
 from steptwin.world.actions import size_of
 from steptwin.world.plant import Plant
 from steptwin.world.plantsnapshot import PlantSnapshot, RecordedInput
+from steptwin.world.trace import TraceRecord
 
 MOST_STATES = 256
 MOST_CONTROLLER_STATES = 4096
@@ -66,10 +67,46 @@ def outside_past(moment: Nanos, begin: Nanos, end: Nanos) -> str:
     return f"{duration_text(moment)}: the past is kept from {duration_text(begin)} to {duration_text(end)}"
 
 
+MOVED = ""
+"""Instead of a subject: an axis got another plan or position, or a fault began or ended."""
+_MOTIONS = frozenset({"plan", "load", "free", "coordinate", "fault", "input"})
+
+Changed: TypeAlias = tuple[str, str]
+"""Machine and subject of the records of what has edges, or machine and `MOVED`."""
+
+
 class PastState(NamedTuple):
     snapshot: PlantSnapshot
     inputs: int
     """Number of inputs before it."""
+    changed: frozenset[Changed] = frozenset()
+    """What has changed since the state before, or may have."""
+
+
+class ChangedSince:
+    """Notes what changes in ``world``, from one state to the next."""
+
+    def __init__(self, world: Plant) -> None:
+        self._world = world
+        self._names: set[Changed] = set()
+        world.trace.watchers.append(self._take)
+
+    def close(self) -> None:
+        self._world.trace.watchers.remove(self._take)
+
+    def _take(self, record: TraceRecord) -> None:
+        if record.kind == "edge":
+            self._names.add((record.machine, record.subject))
+        elif record.kind in _MOTIONS:
+            self._names.add((record.machine, MOVED))
+
+    def add(self, names: Iterable[Changed]) -> None:
+        self._names.update(names)
+
+    def take(self) -> frozenset[Changed]:
+        """The names since the last call."""
+        names, self._names = frozenset(self._names), set()
+        return names
 
 
 class History:
@@ -88,12 +125,14 @@ class History:
         self._bytes = 0
         self._dropped = 0
         """Number of inputs that were removed."""
+        self._changed = ChangedSince(world)
         world.input_watchers.append(self._noted)
         self.take()
 
     def close(self) -> None:
         """End the recording."""
         self.world.input_watchers.remove(self._noted)
+        self._changed.close()
 
     def __len__(self) -> int:
         """The number of snapshots."""
@@ -113,9 +152,12 @@ class History:
         """Take a snapshot, unless there is one of this moment."""
         if self._states and self._states[-1].snapshot.now == self.world.now:
             return
-        self._states.append(PastState(self.world.snapshot(with_inputs=False), self.inputs_so_far))
+        self._states.append(PastState(self.world.snapshot(with_inputs=False), self.inputs_so_far, self._changed.take()))
         if len(self._states) > self._most:
-            del self._states[self._least_missed()]
+            index = self._least_missed()
+            missed = self._states.pop(index)
+            after = self._states[index]
+            self._states[index] = after._replace(changed=after.changed | missed.changed)
 
     def _least_missed(self) -> int:
         """Index of the snapshot whose neighbours are closest for their age; never the oldest or the newest."""
@@ -141,7 +183,7 @@ class History:
         """Must be called after the world has gone back: snapshots and inputs of its present moment and later are removed."""
         now = self.world.now
         while self._states and self._states[-1].snapshot.now >= now:
-            self._states.pop()
+            self._changed.add(self._states.pop().changed)
         while self._inputs and self._inputs[-1].time >= now:
             self._bytes -= size_of(self._inputs.pop().what)
         self.branch += 1

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from steptwin.errors import Misuse, Runaway, TimeReversal
 from steptwin.machine import Drive, Fact, MotionController, Nanos, PinEdge
 from steptwin.world.board import Board
-from steptwin.world.followers import KernelFollowers
+from steptwin.world.followers import KernelFollower, KernelFollowers
 from steptwin.world.kernelpart import KernelPart, KernelState
 from steptwin.world.order import successors, update_order
 from steptwin.world.recordedplans import RecordedPlans
@@ -59,7 +59,10 @@ class Kernel:
         self.stale = False
         """Whether something changed since the signals last settled."""
         self.is_attentive = False
-        """Whether a condition depends on values that a request may change without an event; then every request counts as one."""
+        """Whether a condition depends on values that a request or a statement may change without an event; then each of them
+        counts as one."""
+        self.hears_requests = False
+        """Whether every request counts as an event, because what one may change is noted."""
         self.on_change: Callable[[Kernel], None] | None = None
         """Called with the kernel after each of its events and after each change from outside."""
         self.followers: KernelFollowers | None = None
@@ -224,6 +227,17 @@ class Kernel:
         if not 1 <= axis <= len(axes):
             raise Misuse(f"no axis {axis} of {machine!r}, which has {len(axes)} axes")
         return axes[axis - 1]
+
+    def follow(self, follower: KernelFollower, names: Iterable[str], *, leaves: bool = False) -> None:
+        """Tell it of events from now on, as `KernelFollowers.add`."""
+        if self.followers is None:
+            self.followers = KernelFollowers()
+        self.followers.add(follower, names, leaves=leaves)
+
+    def unfollow(self, follower: KernelFollower) -> None:
+        """Tell it no more."""
+        if self.followers is not None:
+            self.followers.remove(follower)
 
     def take_changed(self) -> set[str]:
         """The machines, lines and elements whose signals may have changed since the last call, as far as signals have settled."""

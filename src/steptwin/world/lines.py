@@ -237,7 +237,7 @@ class Line(Stateful, ABC):
         if place in self._busy or found.port.deadline() is not None:
             self._busy[place] = found
             self._kernel.mark(self.name)
-        if self._kernel.is_attentive:
+        if self._kernel.is_attentive or self._kernel.hears_requests:
             self._kernel.mark()
         if self._followers:
             self._count_unframed(place, found, now)

@@ -71,6 +71,8 @@ class StatementUse(NamedTuple):
     """Whether it also decides when those after them are executed."""
     jumps: int | None = None
     """Where the program goes on, if that depends on nothing."""
+    keeps: bool = False
+    """Whether it may change a point of the controller without an event of that (`steptwin.points.LivePoint.is_kept`)."""
 
 
 class Programs(Protocol):

@@ -17,7 +17,6 @@ from steptwin.campaign.properties.tree import Atom
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.world.expression import COMPARE, value_of
-from steptwin.world.followers import KernelFollowers
 from steptwin.world.kernel import Kernel, Source
 from steptwin.world.plant import Plant
 from steptwin.world.quantities import (
@@ -104,9 +103,7 @@ class ComparisonRecord:
             kernel.advance(world.now)
         if not all(_is_event(world, name, signal) for name, signal in self._signals.items()):
             kernel.is_attentive = True
-        if kernel.followers is None:
-            kernel.followers = KernelFollowers()
-        kernel.followers.add(self, self.names, leaves=not self._stays)
+        kernel.follow(self, self.names, leaves=not self._stays)
 
     def unfollow(self) -> None:
         if self.kernel is not None and self.kernel.followers is not None:

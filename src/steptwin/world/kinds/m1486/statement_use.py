@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from steptwin.m1486.functions import USER_FLAGS
 from steptwin.m1486.lines import LINES
 from steptwin.m1486.syntax import ChipCommand
 from steptwin.world.programs import Resource, ResourceKind, StatementUse
@@ -21,7 +22,7 @@ def use_of(command: ChipCommand) -> StatementUse:
         case "O" | "Z":
             return StatementUse(pin, waits=True)
         case "T" | "C":
-            return StatementUse(writes=pin)
+            return StatementUse(writes=pin, keeps=line in USER_FLAGS)
         case "!":
             return StatementUse((_VARIABLE,), (_ANY_PIN,))
         case "?":

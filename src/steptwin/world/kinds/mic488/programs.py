@@ -42,6 +42,8 @@ class WbcPrograms:
         self._device = device
         self._banks: dict[str, _Bank] = {}
         """Their content at the last request."""
+        self._places: dict[tuple[int, int], Place] = {}
+        """By bank and number."""
 
     @property
     def statement_time(self) -> Nanos:
@@ -82,7 +84,13 @@ class WbcPrograms:
 
     def place(self, number: int) -> Place | None:
         control = self._device.program
-        return None if control.running is None else Place(bank_text(control.running_bank), number)
+        if control.running is None:
+            return None
+        bank = control.running_bank
+        found = self._places.get((bank, number))
+        if found is None:
+            found = self._places[bank, number] = Place(bank_text(bank), number)
+        return found
 
     def depth(self) -> int:
         return len(self._device.program.interpreter.stack)

@@ -44,6 +44,12 @@ def _end_of_while(step: s.EndWhileStep, number: int) -> StatementUse:
     return StatementUse(reads, governs=range(step.open + 1, number), is_loop=True)
 
 
+def _sets(step: s.SetStep, number: int) -> StatementUse:
+    (target,) = _operands((step.target,))
+    is_register = isinstance(step.target, s.RegisterOperand)
+    return StatementUse(writes=(target,), keeps=is_register and target.kind is not ResourceKind.PIN)
+
+
 def _of_axis(step: s.MotionStep | s.HaltStep, number: int) -> StatementUse:
     return StatementUse(writes=(Resource(ResourceKind.AXIS, str(step.axis)),))
 
@@ -57,7 +63,7 @@ _USES: Mapping[type[s.ProgramStep], Callable[[Any, int], StatementUse]] = comple
     s.STEPS,
     "use",
     {
-        s.SetStep: lambda step, number: StatementUse(writes=tuple(_operands((step.target,)))),
+        s.SetStep: _sets,
         s.PulseStep: lambda step, number: StatementUse(writes=(Resource(ResourceKind.PIN, f"OUT{step.output}"),)),
         **dict.fromkeys((s.MotionStep, s.HaltStep), _of_axis),
         s.RowMotionStep: lambda step, number: StatementUse(writes=(_ANY_AXIS,)),

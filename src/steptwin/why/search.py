@@ -1,0 +1,254 @@
+"""When what is asked about changed last, looked for in the past at full speed: only that is noted, and parts of the past without
+an edge of it are passed over."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Generator, Iterator, Mapping
+from contextlib import ExitStack
+from functools import partial
+from typing import NamedTuple, Protocol, TypeAlias
+
+from steptwin.machine import Nanos
+from steptwin.statements import StatementHook
+from steptwin.why import points
+from steptwin.why.courses import CourseTurns, watch_truth
+from steptwin.why.log import in_parts, levels_of
+from steptwin.why.states import rest_of
+from steptwin.world.actions import Bytes, Download
+from steptwin.world.history import MOVED, PastState
+from steptwin.world.plant import Plant
+from steptwin.world.plantsnapshot import PlantSnapshot, RecordedInput
+from steptwin.world.programs import Place, Programs, ResourceKind
+from steptwin.world.signals import SignalOf
+from steptwin.world.trace import TraceRecord
+
+MOST_PARTS = 20_000
+"""Limit of the parts of a past that are run again for one question: over an hour of virtual time, or 40 million statements."""
+
+
+class Asked(NamedTuple):
+    """A signal or condition. ``flip``: since when it is what it is at a moment, by the turns of its signals; None: in all of
+    them."""
+
+    text: str
+    signals: frozenset[str]
+    edges: frozenset[str]
+    """Those of the signals that change by edges only."""
+    moving: frozenset[str]
+    """Those that also change between events."""
+    flip: Callable[[Mapping[str, CourseTurns], Nanos], Nanos | None]
+
+
+class Found(NamedTuple):
+    """``since``: the last change, None if there was none since ``known_from``."""
+
+    since: Nanos | None
+    known_from: Nanos
+
+
+class PastStates(Protocol):
+    """As `steptwin.why.kept.StatesAndInputs`."""
+
+    @property
+    def world(self) -> Plant: ...
+    @property
+    def begin(self) -> Nanos: ...
+    @property
+    def branch(self) -> int: ...
+    def state_at(self, moment: Nanos) -> PastState: ...
+    def inputs_from(self, number: int) -> Collection[RecordedInput]: ...
+
+
+Searching: TypeAlias = Generator[None, None, Found]
+FoundTurn: TypeAlias = Generator[None, None, "Nanos | None"]
+
+
+class LastChanges:
+    """Of the past in ``history``. ``second_world`` makes one like it, at a snapshot."""
+
+    def __init__(self, history: PastStates, second_world: Callable[[Plant, PlantSnapshot], Plant]) -> None:
+        self._history = history
+        self._make = second_world
+        self._branch = history.branch
+        self._known: dict[str, tuple[Nanos, Found]] = {}
+        """What was found before a moment, by question."""
+        self._world: Plant | None = None
+
+    def before(self, asked: Asked, moment: Nanos) -> Searching:
+        """The last change before ``moment``, that of a state, in parts."""
+        history = self._history
+        if history.branch != self._branch:
+            self._branch = history.branch
+            self._known.clear()
+        until, found = self._known.get(asked.text, (history.begin, Found(None, history.begin)))
+        if found.since is not None and not history.begin <= found.since <= moment:
+            until, found = history.begin, Found(None, history.begin)
+        if until < moment:
+            try:
+                found = yield from self._search(asked, until, moment, found)
+            finally:
+                self._world = None
+            self._known[asked.text] = moment, found
+        return found
+
+    def _search(self, asked: Asked, lower: Nanos, upper: Nanos, before: Found) -> Searching:
+        """Between two moments, from the later one back; ``before``: what is known of the time before the earlier one."""
+        history, after = self._history, self._history.state_at(upper)
+        tried, parts = 0, 0
+        while after.snapshot.now > lower:
+            first, changes = after, False
+            for _ in range(max(1, tried)):
+                before_it = history.state_at(first.snapshot.now - 1)
+                if not changes and self._may_change(asked, before_it, first):
+                    if first is not after:
+                        break  # what is after it does not change
+                    changes = True
+                first = before_it
+                if first.snapshot.now <= lower:
+                    break
+            tried += 1
+            if changes:
+                since: Nanos | None = None
+                run = self._run(asked, first, after.snapshot.now)
+                while True:
+                    try:
+                        next(run)
+                    except StopIteration as end:
+                        since = end.value
+                        break
+                    parts += 1
+                    if parts > MOST_PARTS:
+                        run.close()
+                        return Found(None, after.snapshot.now)
+                    yield
+                if since is not None:
+                    return Found(since, since)
+            after = first
+        return before
+
+    def _may_change(self, asked: Asked, state: PastState, after: PastState) -> bool:
+        """Whether something that is asked about may change between two states, one after the other."""
+        if asked.signals != asked.edges | asked.moving:
+            return True
+        if any(name in asked.edges for machine, subject in after.changed for name in (subject, f"{machine}.{subject}")):
+            return True
+        return bool(asked.moving) and not self._stands(asked, state, after)
+
+    def _stands(self, asked: Asked, state: PastState, after: PastState) -> bool:
+        """Whether all that may move stands at the moment of a state, and nothing begins to move until the next one."""
+        world = self._at(state)
+        signals = [signal for name in asked.moving if isinstance(signal := world.signal(name), SignalOf)]
+        kernels = {source.kernel for signal in signals for source in signal.bring(world.now)}
+        moved = {machine for machine, subject in after.changed if subject == MOVED}
+        if len(signals) < len(asked.moving) or not kernels or any(not moved.isdisjoint(kernel.machines) for kernel in kernels):
+            return False
+        return all(rest_of(signal, world.now) is not None for signal in signals)
+
+    def _at(self, state: PastState) -> Plant:
+        """The second world at a state."""
+        world = self._world = self._world or self._make(self._history.world, state.snapshot)
+        world.restore(state.snapshot)
+        return world
+
+    def _run(self, asked: Asked, state: PastState, end: Nanos) -> FoundTurn:
+        """The last change from a state to a moment."""
+        history = self._history
+        world = self._at(state)
+        inputs = list(history.inputs_from(state.inputs))
+        if asked.moving:
+            turns: CourseTurns = []
+            world.start("why", partial(watch_truth, world, asked.text, turns), is_external=True)
+            for _ in in_parts(world, inputs, end):
+                yield
+            return turns[-1][0] if len(turns) > 1 else None
+        with ExitStack() as stack:
+            noted = _Noted(world, asked, stack, is_replaced=any(isinstance(one.what, Download | Bytes) for one in inputs))
+            for _ in in_parts(world, inputs, end):
+                yield
+        return asked.flip(noted.turns, end)
+
+
+class _Noted:
+    """The turns of some signals of ``world`` from now on, until ``stack`` is closed."""
+
+    def __init__(self, world: Plant, asked: Asked, stack: ExitStack, *, is_replaced: bool) -> None:
+        levels = levels_of(world) if asked.edges else {}
+        self.turns: dict[str, CourseTurns] = {name: [(world.now, levels.get(name, 0.0))] for name in asked.edges}
+        if asked.edges:
+            world.trace.watchers.append(self._take)
+            stack.callback(world.trace.watchers.remove, self._take)
+        for name in asked.signals:
+            if name not in self.turns:
+                follower = _Follower(world, name)
+                self.turns[name] = follower.turns
+                follower.follow(stack, is_replaced=is_replaced)
+
+    def _take(self, record: TraceRecord) -> None:
+        if record.kind == "edge":
+            turns = self.turns.get(record.subject) or self.turns.get(f"{record.machine}.{record.subject}")
+            if turns is not None:
+                points.note_turn(turns, record.time, record.level())
+
+
+class _Follower:
+    """Notes the turns of a signal that has no edges. As `steptwin.world.followers.KernelFollower`."""
+
+    def __init__(self, world: Plant, name: str) -> None:
+        signal = world.signal(name)
+        self._world, self._read = world, signal.value
+        self._sources = signal.bring(world.now)
+        self._owner, _, rest = name.partition(".")
+        self._value = self._read(world.now)
+        self.turns: CourseTurns = [(world.now, self._value)]
+        machine = world.machines.get(self._owner)
+        point = None if machine is None else world.kind(self._owner).point(machine, rest)
+        self._is_kept = point is not None and point.is_kept
+        self._keeping: Nanos | None = None
+        """The moment of a statement that may have changed it, and after which was not looked at it."""
+
+    def follow(self, stack: ExitStack, *, is_replaced: bool) -> None:
+        """``is_replaced``: whether programs may get other statements meanwhile."""
+        for kernel, name in self._sources:
+            kernel.follow(self, (name,))
+            stack.callback(kernel.unfollow, self)
+            kernel.hears_requests |= self._is_kept
+        programs = self._world.programs.get(self._owner)
+        if self._is_kept and programs is not None:
+            hook = self._hook(programs, {} if is_replaced else dict(_acting(programs)))
+            programs.hook(hook, None if is_replaced else frozenset(dict(_acting(programs))))
+            stack.callback(programs.unhook, hook)
+
+    def _hook(self, programs: Programs, keeping: Mapping[Place, bool]) -> StatementHook:
+        """``keeping``: whether a statement keeps something, as far as that is known."""
+
+        def hook(now: Nanos, number: int) -> None:
+            if self._keeping is not None:
+                self._compare(self._keeping)
+            place = programs.place(number)
+            keeps = place is None or (keeping[place] if place in keeping else programs.use(place).keeps)
+            self._keeping = now if keeps else None
+
+        return hook
+
+    def leave(self, moment: Nanos) -> None:
+        """It need not know."""
+
+    def look(self, now: Nanos) -> None:
+        self._compare(now if self._keeping is None else self._keeping)
+        self._keeping = None
+
+    def _compare(self, now: Nanos) -> None:
+        value = self._read(now)
+        if value != self._value:
+            self._value = value
+            points.note_turn(self.turns, now, value)
+
+
+def _acting(programs: Programs) -> Iterator[tuple[Place, bool]]:
+    """The statements that may change more than variables, and whether they keep something."""
+    for text in programs.texts:
+        for number in range(len(programs.statements(text))):
+            place = Place(text, number)
+            use = programs.use(place)
+            if use.keeps or use.waits or any(one.kind is not ResourceKind.VALUE for one in use.writes):
+                yield place, use.keeps

@@ -1,0 +1,138 @@
+"""When something changed last is found by running the past again, whatever has been noted of it."""
+
+from __future__ import annotations
+
+import pytest
+
+from steptwin.files.world import World
+from steptwin.machine import MILLISECOND, SECOND
+from steptwin.why import kept, search
+from steptwin.why.kept import PastQuestions
+from steptwin.why.question import Why, finish
+from steptwin.world import script as do
+from steptwin.world.history import History
+
+PROGRAM = """\
+n = 0
+M1 = ON
+$I5 = 3
+MAIN:
+    n = n + 1
+    IF n = 40
+        $I4 = n
+        VMAXM1 = 300
+        OUT2 = ON
+    ENDIF
+    IF n = 60
+        PABS M1 20
+        WAITPOS
+    ENDIF
+    DELAY 0.05
+JUMP MAIN
+"""
+WORLD = """
+[[mic488]]
+name = "m"
+program = "m.prg"
+start = true
+
+[[mic488]]
+name = "other"
+
+[[button]]
+name = "go"
+to = "m.IN1"
+
+[[axis]]
+name = "x"
+drive = "m.M1"
+unit = "mm"
+pulses_per_unit = 40
+"""
+QUESTIONS = (
+    *("m.OUT2", "m.OUT3", "go", "go.pressed", "m.IN1", "m.USER_REGISTER[4]", "m.USER_REGISTER[5]:int", "m.M1_VMAX", "m.M2_ACC"),
+    *("m.M1.status", "m.M_STATUS", "other.OUT1", "m.OUT2 == 1 and other.OUT1 == 1", "m.USER_REGISTER[4] > 7 or go.pressed"),
+    *("other.M1_ACC", "x.position > 100 mm", "x.position < 1 mm", "m.M2.position > 5 and m.OUT2"),
+)
+
+
+@pytest.fixture(autouse=True)
+def noted_little(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kept, "FIRST_SPAN_NS", 100 * MILLISECOND)
+
+
+def past_of(world: World, end: int, step: int = 150 * MILLISECOND) -> PastQuestions:
+    history = History(world)
+    inputs = {
+        1_000: do.Press("go"),
+        1_100: do.Release("go"),
+        1_300: do.Set((("other", "IN4", 1.0),)),
+        1_700: do.Write((("other", "OUT1", 1.0), ("other", "M1_ACC", 700.0))),
+    }
+    for moment in range(0, end + 1, step):
+        for time in [time for time in inputs if moment - step < time * MILLISECOND <= moment]:
+            world.run_to(time * MILLISECOND)
+            world.apply_input(inputs.pop(time))
+        world.run_to(moment)
+        history.take()
+    return PastQuestions(history)
+
+
+def test_answers_are_those_of_what_is_noted_from_the_beginning() -> None:
+    world = World.from_toml(WORLD, {"m.prg": PROGRAM.encode()})
+    end = 5 * SECOND
+    past = past_of(world, end - 200 * MILLISECOND)
+    whole = Why(lambda: World(world.blueprint), world.inputs, world.now)
+    moments = [world.now, 1_250 * MILLISECOND]
+    for question in QUESTIONS:
+        for at in moments:
+            found, expected = finish(past.asking(question, at)), whole.ask(question, at)
+            assert (found.state, found.since) == (expected.state, expected.since), (question, at)
+            assert found.links[:2] == expected.links[:2], (question, at)
+            if expected.since is None:
+                assert (found.known_from, found.is_cut, found.is_complete) == (0, False, True), question
+
+
+def test_flags_of_a_chip_are_set_without_an_event() -> None:
+    """``U14`` is the byte with the user flags."""
+    program = b"[\nW50\nT81\n@1\nW1\nJ1\n]\n"
+    world = World.from_toml('[[m1486]]\nname = "chip"\nprogram = "p.m1486"\n', {"p.m1486": program})
+    history = History(world)
+    for moment in range(50, 1000, 50):
+        world.run_to(moment * MILLISECOND)
+        history.take()
+    whole = Why(lambda: World(world.blueprint), world.inputs, world.now).ask("chip.U14")
+    found = finish(PastQuestions(history).asking("chip.U14"))
+    assert (found.state, found.since, found.links) == (whole.state, whole.since, whole.links)
+    assert found.since is not None
+    assert found.since < 100 * MILLISECOND
+
+
+def test_an_unchanged_part_of_the_past_is_not_run_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = World.from_toml(WORLD, {"m.prg": PROGRAM.encode()})
+    past = past_of(world, 2_850 * MILLISECOND)
+    runs: list[int] = []
+    run = search.in_parts
+    monkeypatch.setattr(search, "in_parts", lambda world, inputs, end: runs.append(end) or run(world, inputs, end))
+    assert finish(past.asking("m.OUT7")).since is None
+    assert runs == []
+    assert finish(past.asking("x.position > 9 m")).since is None
+    assert len(runs) <= 2, "near inputs it might move"
+    runs.clear()
+    assert finish(past.asking("m.IN1")).since == 1_100 * MILLISECOND
+    assert len(runs) == 1
+    assert finish(past.asking("m.M2_DEC")).since is None
+    number = len(runs)
+    assert number > 2
+    assert finish(past.asking("m.M2_DEC")).since is None
+    assert len(runs) == number
+
+
+def test_a_search_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = World.from_toml(WORLD, {"m.prg": PROGRAM.encode()})
+    past = past_of(world, 2_850 * MILLISECOND)
+    monkeypatch.setattr(search, "MOST_PARTS", 2)
+    answer = finish(past.asking("m.M2_DEC"))
+    assert (answer.since, answer.is_cut) == (None, True)
+    assert 0 < answer.known_from < 2_800 * MILLISECOND
+    assert f"(what was before {answer.known_from / SECOND:.6f} s is not known)" in answer.text()
