@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
-from steptwin.datasheet import Limits
+from steptwin.datasheet import Datasheet, Limits
 from steptwin.diagnostics import Diagnostic, SourceText
 
 
@@ -49,3 +50,13 @@ class Form:
     diagnostics: Sequence[Diagnostic]
     points: Mapping[str, float]
     """The values to write to points so that a running controller has those of the file; in its present units."""
+
+
+class ConfigurationFormat(Protocol):
+    """How the configuration file of a kind of controllers becomes a form. Both raise `Misuse`."""
+
+    def form(self, text: str, name: str, sheet: Datasheet) -> Form: ...
+
+    def with_values(self, text: str, name: str, changes: Mapping[str, str]) -> str:
+        """A text with other values of its settings."""
+        ...

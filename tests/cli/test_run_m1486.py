@@ -193,4 +193,4 @@ def test_an_input_of_one_of_several_chips_is_named(run: Run) -> None:
 def test_files_of_other_kinds() -> None:
     result = CliRunner().invoke(app, ["run", "p.txt"])
     assert isinstance(result.exception, Misuse)
-    assert str(result.exception).startswith("p.txt: unknown suffix: permitted are .m1486")
+    assert str(result.exception).startswith("p.txt: unknown suffix: permitted are .prg, .wbc, .m1486, .toml, .json")

@@ -9,8 +9,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from shell import Shell
 
-from steptwin.commands.sniff import Decoder, M1486Decoder, ModbusDecoder, sniff
+from steptwin.commands.sniff import sniff
+from steptwin.drivers.kind import Decoder
+from steptwin.drivers.m1486.decoder import M1486Decoder
+from steptwin.drivers.mic488.decoder import ModbusDecoder
 from steptwin.drivers.place import parse_line_address
 from steptwin.errors import LineFailure, Misuse
 from steptwin.wire.frameline import FrameLine
@@ -195,3 +199,17 @@ def test_a_device_that_cannot_be_reached() -> None:
         place = parse_line_address(f"rtu-tcp://127.0.0.1:{s.getsockname()[1]}", 38400)
     with pytest.raises(LineFailure, match="connection refused"):
         asyncio.run(sniff(place, ModbusDecoder(print, "1.70", tcp=False), listen=ANYWHERE))
+
+
+def test_options_of_another_language_and_unknown_languages(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shell = Shell(monkeypatch, capsys)
+    for options, problem in (
+        (("--language", "canopen"), "--language canopen: permitted are modbus, m1486"),
+        (("--variant", "B"), "--variant is not for a MIC488"),
+        (("--language", "m1486", "--firmware", "1.70"), "--firmware is not for an M1486"),
+        (("--firmware", "9"), "unknown firmware '9'"),
+    ):
+        shell("sniff", "/dev/none", *options)
+        assert (shell.code, problem in shell.errors) == (2, True)

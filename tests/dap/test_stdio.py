@@ -212,7 +212,7 @@ def test_an_example_with_its_files(client: DapClient) -> None:
         ({}, "launch: give 'program' .* or 'world'"),
         ({"program": 5}, "launch: program = 5: expected a text"),
         ({"program": "/nowhere/x.prg"}, "nowhere"),
-        ({"program": "x.prg", "variant": "E1"}, "only programs of an M1486"),
+        ({"program": "x.prg", "variant": "E1"}, "launch: variant is not for WBC programs"),
         ({"world": "x.toml", "config": "x.cfg"}, "config cannot be given with a world"),
     ],
 )

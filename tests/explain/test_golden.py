@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from steptwin.commands.explain import ExplainOptions, explanations
+from steptwin.commands.explain import explanations
 from steptwin.explain.picture import picture
 from steptwin.explain.plain import plain
 from steptwin.explain.text import text
@@ -33,7 +33,7 @@ PICTURE = REPOSITORY / "docs" / "images" / "explain-feeder.svg"
 
 def made(name: str) -> str:
     path = CASES[name]
-    found = explanations(path, ExplainOptions())
+    found = explanations(path, {})
     if name.endswith(".json"):
         return json.dumps([plain(one) for one in found], ensure_ascii=False, indent=1) + "\n"
     return "\n".join(text(one) for one in found).replace(str(path), path.name)
@@ -42,7 +42,7 @@ def made(name: str) -> str:
 def made_picture() -> str:
     path = CASES["feeder.txt"]
     with chdir(path.parent):  # the width depends on the title, in which the path is
-        return picture(explanations(Path(path.name), ExplainOptions()))
+        return picture(explanations(Path(path.name), {}))
 
 
 @pytest.mark.parametrize("name", CASES)

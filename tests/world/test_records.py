@@ -35,6 +35,30 @@ steps = [
 ]
 """
 
+STALLING = """
+[[mic488]]
+name = "a"
+[mic488.M1]
+gear = 3200.0
+acc = 1000.0
+vel = 10.0
+mot_resol = 3200
+[[axis]]
+name = "slide"
+drive = "a.M1"
+pitch = 5.0
+[axis.motor]
+torque = [[0, 0.01], [1500, 0.005]]
+inertia = 0.0002
+start_speed = 60
+[[script]]
+name = "s"
+steps = [
+  { note = "slide has no load" },
+  { write = { "a.M1_EN" = 1, "a.M1_POS_ABS" = 5 } },
+]
+"""
+
 
 @pytest.fixture(scope="module")
 def ran() -> World:
@@ -67,6 +91,14 @@ def test_by_name(ran: World) -> None:
     assert shown(ran, "start") == ["a          start: pressed"]
     assert shown(ran, "world", "note") == ["world      note: pressed"]
     assert shown(ran, "clamp", "note") == []
+
+
+def test_names_are_no_words_of_a_text() -> None:
+    """A note may begin with the name of an element, and an axis that stalls has its name among the facts."""
+    world = World.from_toml(STALLING)
+    world.run(for_=3)
+    assert shown(world, "slide")[0] == "a          slide loses the field"
+    assert shown(world, "world") == ["world      note: slide has no load"]
 
 
 def test_unknown_ones_are_refused(ran: World) -> None:

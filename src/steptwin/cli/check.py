@@ -7,43 +7,44 @@ The JSON is described in docs/reference/check-json.md.
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from steptwin.cli import completion
+from steptwin.cli.languageoptions import M1486FileOptions, WbcFileOptions, given_of
+from steptwin.cli.optiongroups import grouped, option_of
 
 #: Raised when a member of the JSON changes its meaning or goes away.
 JSON_VERSION = 1
 
 
+@dataclass(frozen=True, kw_only=True)
+class M1486CheckOptions(M1486FileOptions):
+    memory: Annotated[bool, typer.Option("--memory", help="Show the command memory each command takes.")] = False
+
+
+@grouped
 def check(
     file: Annotated[Path, typer.Argument(help="File to check.")],
-    variant: Annotated[
-        str | None,
-        typer.Option(help="Type of M1486: A, B, C, E1, E2, or A2x and so on. Default A.", autocompletion=completion.variants),
-    ] = None,
-    interface: Annotated[str | None, typer.Option(help="Driver interface of the M1486: sd, dual or two. Default sd.")] = None,
-    memory: Annotated[bool, typer.Option("--memory", help="Show the command memory each M1486 command takes.")] = False,
-    positions: Annotated[
-        Path | None, typer.Option(help="Position table of a WBC program. Default: the .csv of the same name.")
-    ] = None,
-    config: Annotated[Path | None, typer.Option(help="Configuration of its MIC488. Default: the .cfg of the same name.")] = None,
-    firmware: Annotated[
-        str | None, typer.Option(help="Firmware of the MIC488. Default 1.70.", autocompletion=completion.firmwares)
-    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    *,
+    wbc: WbcFileOptions,
+    chip: M1486CheckOptions,
 ) -> None:
     """Check a file and report everything wrong or doubtful in it: WBC programs (.prg), position tables (.csv), configurations
     (.cfg), worlds (.toml); all others are M1486 programs."""
-    from steptwin.commands.check import CheckOptions, checker_of, count
+    from steptwin.commands.languages import ability
+    from steptwin.commands.languages.contract import count
     from steptwin.diagnostics import Severity, render, to_json
     from steptwin.files.textfiles import read_text
 
-    checker = checker_of(file)
+    language, checker = ability(file, "check", lambda one: one.check)
+    given = given_of(wbc, chip)
+    language.refuse_others(given, option_of)
     source = read_text(file).source
-    report = checker(source, CheckOptions(variant, interface, memory, positions, config, firmware))
+    report = checker(source, given)
     findings = [(source, report.diagnostics), *report.companions]
     errors = sum(d.severity is Severity.ERROR for _, found in findings for d in found)
     warnings = sum(d.severity is Severity.WARNING for _, found in findings for d in found)
@@ -51,7 +52,7 @@ def check(
         data = {
             "version": JSON_VERSION,
             "file": source.name,
-            "language": report.language,
+            "language": language.name,
             "errors": errors,
             "warnings": warnings,
             "diagnostics": [row for where, found in findings for row in to_json(where, found)],

@@ -10,30 +10,26 @@ from typing import Annotated
 
 import typer
 
-from steptwin.cli import completion
 from steptwin.cli.device import Json
+from steptwin.cli.languageoptions import M1486FileOptions, WbcFileOptions, given_of
+from steptwin.cli.optiongroups import grouped, option_of
 
 
+@grouped
 def explain(
     file: Annotated[Path, typer.Argument(help="WBC program (.prg) or M1486 program.")],
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="A picture of the control flow: FILE.svg, instead of the text.")
     ] = None,
-    variant: Annotated[str | None, typer.Option(help="Type of M1486. Default A.", autocompletion=completion.variants)] = None,
-    interface: Annotated[str | None, typer.Option(help="Driver interface of the M1486: sd, dual or two. Default sd.")] = None,
-    positions: Annotated[
-        Path | None, typer.Option(help="Position table of a WBC program. Default: the .csv of the same name.")
-    ] = None,
-    config: Annotated[Path | None, typer.Option(help="Configuration of its MIC488. Default: the .cfg of the same name.")] = None,
-    firmware: Annotated[
-        str | None, typer.Option(help="Firmware of the MIC488. Default 1.70.", autocompletion=completion.firmwares)
-    ] = None,
     json: Json = False,
+    *,
+    wbc: WbcFileOptions,
+    chip: M1486FileOptions,
 ) -> None:
     """Explain a program without running it: control flow, durations, memory, inputs and outputs, where it can wait for ever.
 
     Also loops that it never leaves, interrupts that can be lost, and lines that are never reached.
     """
-    from steptwin.commands.explain import ExplainOptions, show
+    from steptwin.commands.explain import show
 
-    show(file, ExplainOptions(variant, interface, positions, config, firmware), output, typer.echo, as_json=json)
+    show(file, given_of(wbc, chip), option_of, output, typer.echo, as_json=json)

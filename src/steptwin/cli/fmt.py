@@ -11,9 +11,6 @@ from typing import Annotated
 import typer
 
 from steptwin.cli.device import Json, print_json
-from steptwin.errors import Misuse
-
-SUFFIX = ".prg"
 
 
 def fmt(
@@ -22,15 +19,14 @@ def fmt(
     json: Json = False,
 ) -> None:
     """Write WBC programs in one style: blanks, indentation, keywords in capitals. Lines with errors stay as they are."""
+    from steptwin.commands.languages import ability
     from steptwin.files.textfiles import read_text, write_bytes
-    from steptwin.wbc.printer import format_text
 
     changed: list[str] = []
     for path in files:
-        if path.suffix.lower() != SUFFIX:
-            raise Misuse(f"cannot format {path}: permitted are WBC programs ({SUFFIX})")
+        _, in_style = ability(path, "format", lambda one: one.format)
         file = read_text(path)
-        text = format_text(file.source.text)
+        text = in_style(file.source.text)
         if text == file.source.text:
             continue
         changed.append(str(path))

@@ -26,9 +26,7 @@ def migrate(
 
     Exit code 1 if errors are left."""
     from steptwin.commands.migrate import migrate as migrate_file
-    from steptwin.commands.migrate import refuse
 
-    refuse(file)
     fits, data = migrate_file(file, to, old, output, (lambda _: None) if json else typer.echo)
     if json:
         print_json(data)

@@ -51,7 +51,7 @@ def step(
     from steptwin.subject.commands import Advance, Describe
     from steptwin.subject.contract import read_description
     from steptwin.subject.events import read_event
-    from steptwin.subject.payloads import STEP_KINDS
+    from steptwin.subject.payloads import STEP_KINDS, named_in
     from steptwin.world.records import ALL, read_selection
 
     selection = ALL
@@ -68,7 +68,7 @@ def step(
         else:
             for event in there["events"]:
                 found = read_event(event)
-                if selection.takes(found.kind, found.machine, found.text):
+                if selection.takes(found.kind, (found.machine, *named_in(found.payload))):
                     typer.echo(str(found))
             if there["missed"]:
                 typer.echo(f"... and {there['missed']} more", err=True)

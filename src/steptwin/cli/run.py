@@ -5,22 +5,25 @@ From Python: `steptwin.commands.run_m1486.run` and its neighbours.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict
 
 import typer
 
-from steptwin.cli import completion
 from steptwin.cli.device import Json, complain
-from steptwin.cli.optiongroups import OptionGroup, grouped
+from steptwin.cli.languageoptions import M1486FileOptions, WbcFileOptions, given_of
+from steptwin.cli.optiongroups import OptionGroup, grouped, option_of
 from steptwin.cli.worldoptions import Coverage, ShownOptions, WorldRunOptions
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
     from steptwin.files.timedinputs import TimedInput
     from steptwin.machine import Nanos
+
+WORLDS = (".toml", ".json")
+"""Suffixes of worlds and sessions; all other files are programs (`steptwin.commands.languages`)."""
 
 File = Annotated[Path, typer.Argument(help="File to run: a program (.prg, .wbc, .m1486), a world (.toml) or a session (.json).")]
 Duration = Annotated[
@@ -62,14 +65,7 @@ class ProgramOptions(OptionGroup):
 
 
 @dataclass(frozen=True, kw_only=True)
-class WbcOptions(OptionGroup):
-    heading = "Options of MIC488 programs"
-
-    positions: Annotated[Path | None, typer.Option(help="Position table. Default: the .csv of the same name.")] = None
-    config: Annotated[Path | None, typer.Option(help="Configuration. Default: the .cfg of the same name.")] = None
-    firmware: Annotated[
-        str | None, typer.Option(help="1.23, 1.40 or 1.70. Default 1.70.", autocompletion=completion.firmwares)
-    ] = None
+class WbcRunOptions(WbcFileOptions):
     travel: Annotated[
         list[str] | None,
         typer.Option(
@@ -83,42 +79,21 @@ class WbcOptions(OptionGroup):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ChipProgramOptions(OptionGroup):
-    heading = "Options of M1486 programs"
-
-    variant: Annotated[
-        str | None,
-        typer.Option(help="Type A, B, C, E1, E2, or A2x and so on. Default A.", autocompletion=completion.variants),
-    ] = None
-    interface: Annotated[str | None, typer.Option(help="Driver interface sd, dual or two. Default sd.")] = None
+class M1486RunOptions(M1486FileOptions):
     wire: Annotated[
         list[str] | None, typer.Option(help="Wire from a pin of one chip to an input of another, 0.B1=7.B3; repeatable.")
     ] = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _RunOptions:
-    """What applies to every file, and the groups of options of which a file has some. None: not given."""
+class _CommonOptions(TypedDict):
+    """Those of programs and worlds."""
 
     limit: Nanos | None
-    until: str | None
-    inputs: tuple[TimedInput, ...]
+    inputs: Sequence[TimedInput]
     trace: Path | None
-    coverage: tuple[str, ...]
-    questions: tuple[str, ...]
-    properties: tuple[str, ...]
+    coverage: Sequence[str]
+    questions: Sequence[str]
     as_json: bool
-    program: ProgramOptions
-    wbc: WbcOptions
-    chip: ChipProgramOptions
-    world: WorldRunOptions
-    shown: ShownOptions
-
-    def until_idle(self) -> bool:
-        """Of a program. Raises `Misuse` for a condition, which only a world has."""
-        if self.until not in (None, "idle"):
-            raise Misuse(f"--until {self.until}: permitted is 'idle'")
-        return self.until is not None
 
 
 @grouped
@@ -134,17 +109,15 @@ def run(
     json: Json = False,
     *,
     program: ProgramOptions,
-    wbc: WbcOptions,
-    chip: ChipProgramOptions,
+    wbc: WbcRunOptions,
+    chip: M1486RunOptions,
     world: WorldRunOptions,
     shown: ShownOptions,
 ) -> None:
     """Run a program or a world in virtual time and print its moves, waits, outputs and uploads. A session is continued."""
     from steptwin.files.timedinputs import parse_duration, parse_inputs
 
-    runner = _RUNNERS.get(file.suffix.lower())
-    if runner is None:
-        raise Misuse(f"{file}: unknown suffix: permitted are {', '.join(_RUNNERS)}")
+    run_program = None if file.suffix.lower() in WORLDS else _program_runner(file)
     limit = None if duration is None else parse_duration(duration, "--for")
     if limit == 0:
         raise Misuse(f"--for {duration}: must be more than 0")
@@ -154,24 +127,23 @@ def run(
     if json and why:
         raise Misuse("--why and --json both print on standard output: ask 'steptwin why' about a --session instead")
     changes = parse_inputs(",".join(inputs or []))
-    wanted = _RunOptions(
+    if properties and run_program is not None:
+        raise Misuse(f"--property is for worlds: {file} is a program")
+    common = _CommonOptions(
         limit=limit,
-        until=until,
         inputs=tuple(changes),
         trace=trace,
         coverage=tuple(coverage or ()),
         questions=tuple(why or ()),
-        properties=tuple(properties or ()),
         as_json=json,
-        program=program,
-        wbc=wbc,
-        chip=chip,
-        world=world,
-        shown=shown,
     )
-    if wanted.properties and runner is not _run_world:
-        raise Misuse(f"--property is for worlds: {file} is a program")
-    if not runner(file, wanted):
+    if run_program is not None:
+        went_well = run_program(common, until, program, given_of(wbc, chip, world, shown))
+    else:
+        for group in (wbc, chip, program):
+            group.refuse("worlds, whose file has these settings")
+        went_well = _run_world(file, common, until, properties or (), world, shown)
+    if not went_well:
         raise typer.Exit(1)
 
 
@@ -187,93 +159,54 @@ def _check_targets(trace: Path | None, session: Path | None) -> None:
         check_session_target(session)
 
 
-def _run_m1486(file: Path, given: _RunOptions) -> bool:
-    from steptwin.commands.run_m1486 import M1486Run
-    from steptwin.commands.run_m1486 import run as run_program
-    from steptwin.m1486.variants import DEFAULT
+def _program_runner(
+    file: Path,
+) -> Callable[[_CommonOptions, str | None, ProgramOptions, Mapping[str, Any]], bool]:
+    """What runs a program. Raises `Misuse` for what is none."""
+    from steptwin.commands.languages import LANGUAGES, by_suffix
+    from steptwin.commands.program_run import ProgramRun
 
-    for group in (given.wbc, given.world, given.shown):
-        group.refuse("M1486 programs")
-    wanted = M1486Run(
-        program=file,
-        variant=given.chip.variant or DEFAULT.name,
-        interface=given.chip.interface or "sd",
-        wires=tuple(given.chip.wire or ()),
-        limit=given.limit,
-        until_idle=given.until_idle(),
-        inputs=given.inputs,
-        trace=given.trace,
-        coverage=given.coverage,
-        questions=given.questions,
-        as_json=given.as_json,
-        print_world=given.program.print_world,
-    )
-    return run_program(wanted, typer.echo, complain)
+    language = by_suffix(file)
+    run_language = None if language is None else language.run
+    if language is None or run_language is None:
+        suffixes = [suffix for one in LANGUAGES.values() if one.run is not None for suffix in one.suffixes]
+        raise Misuse(f"{file}: unknown suffix: permitted are {', '.join((*suffixes, *WORLDS))}")
 
+    def run_program(common: _CommonOptions, until: str | None, program: ProgramOptions, given: Mapping[str, Any]) -> bool:
+        language.refuse_others(given, option_of)
+        if until not in (None, "idle"):
+            raise Misuse(f"--until {until}: permitted is 'idle'")
+        wanted = ProgramRun(program=file, until_idle=until is not None, print_world=program.print_world, **common)
+        return run_language(wanted, given, typer.echo, complain)
 
-def _run_wbc(file: Path, given: _RunOptions) -> bool:
-    from steptwin.commands.run_wbc import WbcRun
-    from steptwin.commands.run_wbc import run as run_program
-    from steptwin.commands.travels import parse_travel
-    from steptwin.files.timedinputs import parse_duration
-    from steptwin.wbc.dialect import DEFAULT
-
-    for group in (given.chip, given.world, given.shown):
-        group.refuse("WBC programs")
-    wanted = WbcRun(
-        program=file,
-        positions=given.wbc.positions,
-        config=given.wbc.config,
-        firmware=given.wbc.firmware or DEFAULT.firmware,
-        statement_time=parse_duration(given.wbc.statement_time or "1ms", "--statement-time"),
-        travels=parse_travel(",".join(given.wbc.travel or [])),
-        limit=given.limit,
-        until_idle=given.until_idle(),
-        inputs=given.inputs,
-        trace=given.trace,
-        coverage=given.coverage,
-        questions=given.questions,
-        as_json=given.as_json,
-        print_world=given.program.print_world,
-    )
-    return run_program(wanted, typer.echo, complain)
+    return run_program
 
 
-def _run_world(file: Path, given: _RunOptions) -> bool:
+def _run_world(
+    file: Path,
+    common: _CommonOptions,
+    until: str | None,
+    properties: Sequence[str],
+    world: WorldRunOptions,
+    shown: ShownOptions,
+) -> bool:
     from steptwin.commands.run_world import WorldRun
     from steptwin.commands.run_world import run as run_world
 
-    for group in (given.wbc, given.chip, given.program):
-        group.refuse("worlds, whose file has these settings")
     wanted = WorldRun(
         world=file,
-        moment=given.world.moment,
-        seed=given.world.seed,
-        overrides=given.world.overrides,
-        state=given.world.state,
-        limit=given.limit,
-        until=given.until,
-        inputs=given.inputs,
-        faults=tuple(given.world.fault or ()),
-        trace=given.trace,
-        coverage=given.coverage,
-        questions=given.questions,
-        properties=given.properties,
-        session=given.world.session,
-        allow_outside=given.world.allow_outside,
-        strict=given.world.strict,
-        as_json=given.as_json,
-        names=tuple(given.shown.of or ()),
-        kinds=tuple(given.shown.show or ()),
+        moment=world.moment,
+        seed=world.seed,
+        overrides=world.overrides,
+        state=world.state,
+        until=until,
+        faults=tuple(world.fault or ()),
+        properties=tuple(properties),
+        session=world.session,
+        allow_outside=world.allow_outside,
+        strict=world.strict,
+        names=tuple(shown.of or ()),
+        kinds=tuple(shown.show or ()),
+        **common,
     )
     return run_world(wanted, typer.echo, complain)
-
-
-#: What runs each kind of file; True when nothing went wrong.
-_RUNNERS: dict[str, Callable[[Path, _RunOptions], bool]] = {
-    ".m1486": _run_m1486,
-    ".prg": _run_wbc,
-    ".wbc": _run_wbc,
-    ".toml": _run_world,
-    ".json": _run_world,
-}

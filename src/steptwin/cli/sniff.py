@@ -6,7 +6,7 @@ From Python: `steptwin.commands.sniff.sniff`.
 from __future__ import annotations
 
 import contextlib
-import enum
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,14 +14,11 @@ import typer
 
 from steptwin.cli import completion
 from steptwin.cli.device import complain
+from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
+    from steptwin.drivers.kind import Decoder
     from steptwin.wire.frameline import FrameLine
-
-
-class SniffedLanguage(enum.StrEnum):
-    MODBUS = "modbus"
-    M1486 = "m1486"
 
 
 def sniff(
@@ -30,10 +27,12 @@ def sniff(
         str | None, typer.Option(metavar="HOST:PORT", help="Relay: programs connect here instead of to the device.")
     ] = None,
     pty: Annotated[Path | None, typer.Option(help="Stand in the line: programs open the pseudo terminal PATH instead.")] = None,
-    language: Annotated[SniffedLanguage, typer.Option(help="Protocol on the line.")] = SniffedLanguage.MODBUS,
+    language: Annotated[str, typer.Option(help="Protocol on the line: modbus or m1486.")] = "modbus",
     baud: Annotated[int, typer.Option(help="Baud rate of a serial port.")] = 38400,
-    firmware: Annotated[str, typer.Option(help="Register map of the MIC488.", autocompletion=completion.firmwares)] = "1.70",
-    variant: Annotated[str, typer.Option(help="Type of the M1486.", autocompletion=completion.variants)] = "A",
+    firmware: Annotated[
+        str | None, typer.Option(help="Register map of the MIC488. Default: 1.70.", autocompletion=completion.firmwares)
+    ] = None,
+    variant: Annotated[str | None, typer.Option(help="Type of M1486. Default: A.", autocompletion=completion.variants)] = None,
     json: Annotated[bool, typer.Option("--json", help="Print a line of JSON for each frame.")] = False,
 ) -> None:
     """Log the traffic between a master and a device in words.
@@ -43,7 +42,6 @@ def sniff(
     """
     import asyncio
 
-    from steptwin.commands.sniff import Decoder, M1486Decoder, ModbusDecoder
     from steptwin.commands.sniff import sniff as run
     from steptwin.drivers.place import parse_line_address
     from steptwin.world.addresses import parse_address
@@ -51,17 +49,26 @@ def sniff(
     place = parse_line_address(address, baud)
     where = None if listen is None else parse_address(listen, listen_any=False)
     show = _print_json if json else _print
-    decoder: Decoder
-    if language is SniffedLanguage.M1486:
-        decoder = M1486Decoder(show, variant)
-    else:
-        decoder = ModbusDecoder(show, firmware, tcp=place.framed)
+    decoder = _decoder(show, language, {"firmware": firmware, "variant": variant}, tcp=place.framed)
 
     async def main() -> None:
         await run(place, decoder, listen=where, pty=pty, ready=complain)
 
     with contextlib.suppress(KeyboardInterrupt):
         asyncio.run(main())
+
+
+def _decoder(show: Callable[[FrameLine], None], protocol: str, variants: Mapping[str, str | None], *, tcp: bool) -> Decoder:
+    from steptwin.drivers.kinds import DRIVERS
+
+    known = {kind.decoding.protocol: (kind, kind.decoding) for kind in DRIVERS.values() if kind.decoding is not None}
+    if protocol not in known:
+        raise Misuse(f"--language {protocol}: permitted are {', '.join(known)}")
+    kind, decoding = known[protocol]
+    for option, value in variants.items():
+        if value is not None and option != kind.selection.variant:
+            raise Misuse(f"--{option} is not for {kind.title}")
+    return decoding.make(show, variants.get(kind.selection.variant), tcp)
 
 
 def _print(frame: FrameLine) -> None:

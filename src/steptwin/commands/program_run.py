@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple, Self
 
 from steptwin.files.coverage import CoverageReports
 from steptwin.files.export import axis_views, bar, write_trace
@@ -44,6 +44,11 @@ class ProgramRun:
     """What is asked at the end (`steptwin.why`)."""
     as_json: bool = False
     print_world: bool = False
+
+    @classmethod
+    def of(cls, given: ProgramRun, **own: Any) -> Self:
+        """With these options, and those that only programs in one language have."""
+        return cls(**{field.name: getattr(given, field.name) for field in fields(ProgramRun)}, **own)
 
     @property
     def longest(self) -> Nanos:

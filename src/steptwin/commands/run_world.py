@@ -250,7 +250,7 @@ def _print_happened(
         elif selection.shows(record):
             shown.append((record.time, describe(record)))
     for name, watch in watches.items():
-        if not selection.takes(PROGRAM, name):
+        if not selection.takes(PROGRAM, (name,)):
             continue
         shown += [(each.time, _with_statement(name, each)) for each in watch.happened]
     for _, text in sorted(shown, key=itemgetter(0)):

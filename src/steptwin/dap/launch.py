@@ -2,29 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from steptwin.commands.chips import Chain, check_chain
-from steptwin.commands.run_m1486 import describe_chips
-from steptwin.commands.run_wbc import WbcRun, prepare
+from steptwin.commands.languages import LANGUAGES, ability
+from steptwin.commands.languages.contract import GivenOptions, Print
 from steptwin.errors import Misuse
 from steptwin.files.world import World
-from steptwin.inputfiles import read_bytes
-from steptwin.m1486.chip import OPEN_ADDRESS
-from steptwin.m1486.lines import STEP_DIRECTION
-from steptwin.m1486.variants import DEFAULT, variant
 from steptwin.nearmiss import NearMiss
 
-CHIP_SUFFIX = ".m1486"
-#: Arguments of our own, and the type of each; editors add others.
+OPTIONS: Mapping[str, type] = {"positions": Path, "config": Path, "variant": str}
+"""Arguments that are options of the language of the program."""
 ARGUMENTS: Mapping[str, type] = {
-    "program": str, "positions": str, "config": str, "variant": str, "world": str, "stopOnEntry": bool, "stopAtEnd": bool,
-    "noDebug": bool,
+    "program": Path, "world": Path, "stopOnEntry": bool, "stopAtEnd": bool, "noDebug": bool, **OPTIONS,
 }  # fmt: skip
-Print = Callable[[str], None]
+"""Arguments of our own, and the type of each; editors add others."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,10 +26,8 @@ class Launch:
     """The arguments of ``launch``."""
 
     program: Path | None
-    positions: Path | None
-    config: Path | None
-    variant: str | None
     world: Path | None
+    options: GivenOptions
     stop_on_entry: bool
     stop_at_end: bool
     """Stand at the end of the program, from where one can go back, instead of ending the session."""
@@ -49,55 +41,39 @@ class Launch:
 
 def read_launch(arguments: Mapping[str, Any]) -> Launch:
     """Raises `Misuse` for what is missing, or of another type."""
+    given: dict[str, Any] = {}
     for name, kind in ARGUMENTS.items():
         value = arguments.get(name)
-        if value is not None and not isinstance(value, kind):
-            raise Misuse(f"launch: {name} = {value!r}: expected {'a text' if kind is str else 'true or false'}")
-    paths = {name: Path(arguments[name]) if arguments.get(name) else None for name in ("program", "positions", "config", "world")}
-    if paths["program"] is None and paths["world"] is None:
+        if value is not None and not isinstance(value, bool if kind is bool else str):
+            raise Misuse(f"launch: {name} = {value!r}: expected {'true or false' if kind is bool else 'a text'}")
+        if value:
+            given[name] = kind(value)
+    if "program" not in given and "world" not in given:
         near = NearMiss()
         hints = [f"{name!r}{hint}" for name in arguments if name not in ARGUMENTS and (hint := near.hint(name, ARGUMENTS))]
-        raise Misuse(f"launch: give 'program' (.prg, .wbc, .m1486) or 'world' (.toml){': ' + ', '.join(hints) if hints else ''}")
+        suffixes = [suffix for one in LANGUAGES.values() if one.world is not None for suffix in one.suffixes]
+        needed = f"launch: give 'program' ({', '.join(suffixes)}) or 'world' (.toml)"
+        raise Misuse(f"{needed}{': ' + ', '.join(hints) if hints else ''}")
     return Launch(
-        **paths,
-        variant=arguments.get("variant"),
-        stop_on_entry=bool(arguments.get("stopOnEntry")),
-        stop_at_end=bool(arguments.get("stopAtEnd")),
-        no_debug=bool(arguments.get("noDebug")),
+        program=given.get("program"),
+        world=given.get("world"),
+        options={name: given[name] for name in OPTIONS if name in given},
+        stop_on_entry="stopOnEntry" in given,
+        stop_at_end="stopAtEnd" in given,
+        no_debug="noDebug" in given,
     )
 
 
 def open_world(asked: Launch, show: Print) -> World:
     """``show`` gets what a person should know: files that were found, warnings. Raises `Misuse`, and `SourceErrors`."""
     if asked.world is not None:
-        given = {"positions": asked.positions, "config": asked.config, "variant": asked.variant}
-        refused = [name for name, value in given.items() if value is not None]
-        if refused:
-            raise Misuse(f"launch: {' and '.join(refused)} cannot be given with a world, which names its own")
+        if asked.options:
+            raise Misuse(f"launch: {' and '.join(asked.options)} cannot be given with a world, which names its own")
         return World.load(asked.world, keep_trace=False, keep_inputs=False)
     program = asked.program
     if program is None:
         raise Misuse("launch: there is no program")
-    if program.suffix.lower() == CHIP_SUFFIX:
-        return _chip(asked, program)
-    if asked.variant is not None:
-        raise Misuse(f"launch: variant = {asked.variant!r}: only programs of an M1486 ({CHIP_SUFFIX}) have one")
-    given = prepare(WbcRun(program=program, positions=asked.positions, config=asked.config), show)
-    if given.companions.found:
-        show(str(given.companions))
-    files = {str(path): read_bytes(path) for path in given.paths}
-    return _world(given.describe(str), files, program)
-
-
-def _chip(asked: Launch, program: Path) -> World:
-    if asked.positions is not None or asked.config is not None:
-        raise Misuse("launch: positions and config are of a MIC488; a program of an M1486 has none")
-    kind = DEFAULT if asked.variant is None else variant(asked.variant)
-    chain = Chain(variant=kind, addresses=[OPEN_ADDRESS], interface=STEP_DIRECTION, wires=[])
-    check_chain(chain, has_program=True)
-    text = describe_chips(chain, program.stem, program, [], [])
-    return _world(text, {str(program): read_bytes(program)}, program)
-
-
-def _world(text: str, files: Mapping[str, bytes], program: Path) -> World:
+    language, describe = ability(program, "debug", lambda one: one.world)
+    language.refuse_others(asked.options, lambda name: f"launch: {name}")
+    text, files = describe(program, asked.options, show)
     return World.from_toml(text, files, name=f"debug {program}", keep_trace=False, keep_inputs=False)

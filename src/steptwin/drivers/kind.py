@@ -16,6 +16,9 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeAlias, TypeVar
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.subject import DevicePart
 from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.wire.frameline import FrameLine
+from steptwin.wire.slave import FrameDirection
 
 D = TypeVar("D")
 Log: TypeAlias = Callable[[str], object]
@@ -192,6 +195,25 @@ class SentProgram(NamedTuple):
     text: str
 
 
+class Decoder(Protocol):
+    """Decodes bytes. ``direction`` is None if both directions share one wire."""
+
+    def feed(self, data: bytes, now: Nanos, direction: FrameDirection | None) -> None: ...
+    def deadline(self) -> Nanos | None: ...
+    def expire(self, now: Nanos) -> None: ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Decoding:
+    """How the traffic between other programs and devices of a kind is put into words."""
+
+    protocol: str
+    """``--language`` of ``steptwin sniff``."""
+    make: Callable[[Callable[[FrameLine], None], str | None, bool], Decoder]
+    """A decoder that gives its lines to the function. The text is the variant (None: the usual one), the flag says whether the
+    frames are those of Modbus TCP. Raises `Misuse`."""
+
+
 class FoundDevice(NamedTuple):
     number: int
     variant: str | None
@@ -245,6 +267,9 @@ class DriverKind(Generic[D]):
     clear: Callable[[str, int], None] | None = None
     """End bytes of other protocols on the line, so that devices of this kind read their next command correctly; None where they
     do no harm."""
+
+    decoding: Decoding | None = None
+    """None: the traffic cannot be put into words."""
 
     # For a thread.
     opened: Callable[[DeviceAddress, bool, Log | None], AbstractContextManager[D]]

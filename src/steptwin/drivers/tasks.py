@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Mapping
 from contextlib import AbstractAsyncContextManager
 from types import TracebackType
 from typing import Any, Generic, Self, cast
@@ -22,8 +22,8 @@ CLOSE_S = 1.0
 class TaskLine(Generic[Q, A]):
     """See `steptwin.drivers.line.DriverLine`. It belongs to one event loop; ``async with`` opens and closes it."""
 
-    def __init__(self, endpoint: Endpoint, exchanger: Exchanger[Q, A]) -> None:
-        self.notes: dict[Hashable, Any] = {}
+    def __init__(self, endpoint: Endpoint, exchanger: Exchanger[Q, A], notes: Mapping[Hashable, Any] | None = None) -> None:
+        self.notes: dict[Hashable, Any] = {} if notes is None else dict(notes)
         self._endpoint = endpoint
         self._engine = exchanger
         self._loop: asyncio.AbstractEventLoop | None = None

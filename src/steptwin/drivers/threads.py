@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Mapping
 from typing import Any, Generic
 
 from steptwin.drivers.exchange import A, Exchanger, Job, LineLost, Q
@@ -28,11 +28,12 @@ class ThreadLine(Generic[Q, A]):
         self,
         endpoint: Endpoint,
         exchanger: Exchanger[Q, A],
+        notes: Mapping[Hashable, Any] | None = None,
         *,
         clock: Callable[[], Nanos] = time.monotonic_ns,
         sleeping: Callable[[float], None] = time.sleep,
     ) -> None:
-        self.notes: dict[Hashable, Any] = {}
+        self.notes: dict[Hashable, Any] = {} if notes is None else dict(notes)
         self.now = clock
         self._endpoint = endpoint
         self._engine = exchanger

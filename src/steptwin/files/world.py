@@ -110,7 +110,7 @@ class World(Plant):
         """The controllers of a kind by name."""
         view: Callable[[Plant, str, Any], V] = kind.view
         there = {name: view(self, name, machine) for name, machine in self.machines.items() if self.kind(name) is kind}
-        return Views(self, kind.title.partition(" ")[2], there)
+        return Views(self, kind.model, there)
 
     # ------------------------------------------------------------------ making one
 

@@ -92,9 +92,8 @@ def title_of(world: World) -> str:
 
 def _titled(world: World, name: str) -> str:
     kind, on = world.kind(name), world.parts.line_of.get(name)
-    _, _, title = kind.title.partition(" ")  # the article
     where = {} if on is None else kind.announced(world.machines[name], on[1])
-    return ", ".join([title, *(f"{key} {value}" for key, value in where.items() if key != "kind")])
+    return ", ".join([kind.model, *(f"{key} {value}" for key, value in where.items() if key != "kind")])
 
 
 def remarks_on(world: World, *, listen_any: bool) -> list[str]:

@@ -1,50 +1,34 @@
-"""Which language a text is in: as the client calls it, else by the ending of its name."""
+"""The languages of the editor server, and which of them a text is in: as the client calls it, else by the ending of its name."""
 
 from __future__ import annotations
 
-import enum
-import re
-
+from steptwin.errors import Misuse
 from steptwin.lsp.files import suffix_of
+from steptwin.lsp.language import EditorLanguage
+from steptwin.lsp.m1486.language import M1486_PROGRAMS
+from steptwin.lsp.wbc.language import CONFIGURATIONS, POSITION_TABLES, WBC_PROGRAMS
+from steptwin.lsp.world.language import WORLDS
+
+LANGUAGES: dict[str, EditorLanguage] = {}
+"""By name. `register` adds to it."""
 
 
-class Language(enum.Enum):
-    """The values are the names for clients (``languageId``)."""
-
-    WBC = "wbc"
-    M1486 = "m1486"
-    POSITIONS = "mic488-positions"
-    CONFIG = "mic488-config"
-    WORLD = "steptwin-world"
+def register(language: EditorLanguage) -> None:
+    """From now on, texts may be in it. Raises `Misuse` if a registered language has its name or suffix."""
+    for other in LANGUAGES.values():
+        if language.name == other.name or language.suffix == other.suffix:
+            raise Misuse(f"{other.name} has this name or {other.suffix} already")
+    LANGUAGES[language.name] = language
 
 
-SUFFIXES = {
-    ".prg": Language.WBC,
-    ".m1486": Language.M1486,
-    ".csv": Language.POSITIONS,
-    ".cfg": Language.CONFIG,
-    ".toml": Language.WORLD,
-}
-_BY_NAME = {language.value: language for language in Language}
-_WORLD = re.compile(r"^[ \t]*\[\[?[ \t]*(?:world|mic488|m1486)[ \t]*[\].]", re.MULTILINE)
-_SECTION = re.compile(r"^[ \t]*\[(?:Axis[0-3]|IN[0-9]|AIN[01]|WBC_PROGRAM)\]", re.MULTILINE | re.IGNORECASE)
-_BEGINNING = 4000
-"""Characters in which a position table shows its first row."""
-
-
-def language_of(name: str, uri: str, text: str) -> Language | None:
+def language_of(name: str, uri: str, text: str) -> EditorLanguage | None:
     """None for a text in an unknown language."""
-    if name in _BY_NAME:
-        return _BY_NAME[name]
-    language = SUFFIXES.get(suffix_of(uri))
-    return language if language is None or _looks_like(language, text) else None
+    if name in LANGUAGES:
+        return LANGUAGES[name]
+    suffix = suffix_of(uri)
+    found = next((one for one in LANGUAGES.values() if one.suffix == suffix), None)
+    return found if found is not None and found.is_meant(text) else None
 
 
-def _looks_like(language: Language, text: str) -> bool:
-    """Whether a text is one of these, because other programs use some of the endings too."""
-    if language is Language.WORLD:
-        return _WORLD.search(text) is not None
-    if language is Language.CONFIG:
-        return _SECTION.search(text) is not None
-    beginning = text[:_BEGINNING].lstrip()
-    return language is not Language.POSITIONS or not beginning or ";" in re.split("[\r\n]", beginning, maxsplit=1)[0]
+for _language in (WBC_PROGRAMS, M1486_PROGRAMS, POSITION_TABLES, CONFIGURATIONS, WORLDS):
+    register(_language)

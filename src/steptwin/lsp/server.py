@@ -30,7 +30,7 @@ from steptwin.lsp.answers import TextLocation
 from steptwin.lsp.convert import SYMBOL_KINDS, TOKEN_MODIFIERS, TOKEN_TYPES, Converter, changes_of
 from steptwin.lsp.documents import TextChange
 from steptwin.lsp.files import DiskFiles, Files, normal
-from steptwin.lsp.languages import SUFFIXES
+from steptwin.lsp.languages import LANGUAGES
 from steptwin.lsp.positions import Encoding
 from steptwin.lsp.session import EditorSession
 from steptwin.symbols import SymbolRole
@@ -180,7 +180,7 @@ async def _initialized(server: EditorServer, params: lsp.InitializedParams) -> N
     capabilities = server.client_capabilities
     if not get_capability(capabilities, "workspace.did_change_watched_files.dynamic_registration", False):
         return
-    watchers = [lsp.FileSystemWatcher(f"**/*{suffix}") for suffix in SUFFIXES]
+    watchers = [lsp.FileSystemWatcher(f"**/*{one.suffix}") for one in LANGUAGES.values()]
     options = lsp.DidChangeWatchedFilesRegistrationOptions(watchers)
     registration = lsp.Registration("files", lsp.WORKSPACE_DID_CHANGE_WATCHED_FILES, options)
     # A client that refuses is asked nothing: files are looked at anyway when an answer depends on them.

@@ -3,36 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Protocol
 
-from steptwin.configuration import ConfigurationKey, Form, Section
+from steptwin.configuration import ConfigurationFormat, ConfigurationKey, Form, Section
 from steptwin.datasheet import Datasheet, plain
 from steptwin.diagnostics import SourceText, to_json
 from steptwin.errors import Refusal
-from steptwin.mic488.configform import config_form, with_values
 from steptwin.studio.machines import Sheets
+from steptwin.world.kinds import KINDS
 from steptwin.world.programtexts import FINDING
-
-
-class ConfigurationFormat(Protocol):
-    """How the file of a kind of controller becomes a form."""
-
-    def form(self, text: str, name: str, sheet: Datasheet) -> Form: ...
-    def with_values(self, text: str, name: str, changes: Mapping[str, str]) -> str: ...
-
-
-class _Mic488:
-    """The vendor's ``.cfg``."""
-
-    def form(self, text: str, name: str, sheet: Datasheet) -> Form:
-        return config_form(text, name, sheet.variant, [axis.pulses_per_unit for axis in sheet.axes])
-
-    def with_values(self, text: str, name: str, changes: Mapping[str, str]) -> str:
-        return with_values(text, name, changes)
-
-
-KINDS: Mapping[str, ConfigurationFormat] = {"mic488": _Mic488()}
-"""By kind of controller; others have no configuration file."""
 
 
 class Configurations:
@@ -56,9 +34,10 @@ class Configurations:
 
     def _kind(self, machine: str) -> tuple[ConfigurationFormat, Datasheet]:
         sheet = self._sheets.of(machine)
-        if sheet.kind not in KINDS:
+        kind = KINDS.get(sheet.kind)
+        if kind is None or kind.configuration_format is None:
             raise Refusal(f"{machine} is of the kind {sheet.kind}, which has no configuration file: it is set up by commands")
-        return KINDS[sheet.kind], sheet
+        return kind.configuration_format, sheet
 
 
 def _plain(form: Form) -> Mapping[str, object]:

@@ -31,7 +31,7 @@ from steptwin.subject.commands import COMMANDS, CommandRow
 from steptwin.subject.fields import FLAG, NAMES, PROGRAM, TEXT, TIME, Field, Schema, choices, number, read_fields, whole
 from steptwin.subject.payloads import KINDS
 from steptwin.subject.shapes import members
-from steptwin.world.programtexts import LANGUAGES
+from steptwin.world.kinds import KINDS as CONTROLLERS
 
 FASTEST_RATE = 30.0
 """Updates in a second of the wall clock."""
@@ -220,7 +220,7 @@ _PROGRAM: Mapping[str, object] = {
     "machine": _TEXT,
     "place": {**_TEXT, "description": "Unlike all others of the machine, such as program 0."},
     "name": {**_TEXT, "description": "Of the file."},
-    "language": {"enum": list(LANGUAGES)},
+    "language": {"enum": [language.name for kind in CONTROLLERS.values() for language in kind.languages]},
     "address": {**_TEXT, "description": "At the editor server."},
     "empty": {"type": "boolean", "description": "Whether nothing is there yet."},
     "running": {"type": "boolean"},

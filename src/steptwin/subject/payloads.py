@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, TypeAlias, get_args
 
@@ -403,3 +403,17 @@ STEP_KINDS = SHOWN_KINDS | {"edge", "plan"}
 
 def is_shown(payload: Payload) -> bool:
     return payload.kind in SHOWN_KINDS and not (isinstance(payload, InputPayload) and payload.what == "request")
+
+
+def named_in(payload: Payload) -> Sequence[str]:
+    """The names of buttons, pins, signals and elements that it is about, besides its machine."""
+    match payload:
+        case EdgePayload():
+            return (payload.pin,)
+        case ButtonPayload():
+            return (payload.button,)
+        case InputPayload():
+            return (payload.what,)
+        case StatusPayload():
+            return [fact for _, fact in payload.facts if isinstance(fact, str)]
+    return ()

@@ -134,14 +134,12 @@ def joined_driver(
 ) -> Mic488:
     """A driver; while it waits, the time of the twin advances. ``framed``: Modbus TCP rather than RTU."""
     exchanger, notes = modbus_exchanger(LineAddress(endpoint, framed=framed), FRAMES_PER_SECOND, None)
-    line = ThreadLine(endpoint, exchanger, clock=time.now, sleeping=time.sleep)
-    line.notes.update(notes)
+    line = ThreadLine(endpoint, exchanger, notes, clock=time.now, sleeping=time.sleep)
     return Mic488(line, unit, firmware=firmware, config=config)
 
 
 def joined_chip(endpoint: MemoryEndpoint, time: VirtualTime, address: int) -> M1486:
     """A driver of a chip; while it waits, the time of the twin advances."""
     exchanger, talk = talking(endpoint, BAUD, None)
-    line = ThreadLine(endpoint, exchanger, clock=time.now, sleeping=time.sleep)
-    line.notes[TALK] = talk
+    line = ThreadLine(endpoint, exchanger, {TALK: talk}, clock=time.now, sleeping=time.sleep)
     return M1486(line, address)

@@ -24,6 +24,7 @@ from steptwin.world.values import ANALOG_INPUT, DIGITAL_INPUT, OUTPUT
 from steptwin.world.wires import PinName
 
 if TYPE_CHECKING:
+    from steptwin.configuration import ConfigurationFormat
     from steptwin.controllerstate import ControllerState
     from steptwin.datasheet import Datasheet
     from steptwin.diagnostics import Diagnostic, SourceText
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
     from steptwin.world.lines import Line, LineWords
     from steptwin.world.plant import Plant
     from steptwin.world.programs import Programs
-    from steptwin.world.programtexts import Destination, Downloading, ProgramText
+    from steptwin.world.programtexts import Destination, Downloading, ProgramText, TextLanguage
     from steptwin.world.script import Step
     from steptwin.world.trace import RecordSink
 
@@ -164,8 +165,9 @@ class ControllerKind(Generic[S, M, V]):
 
     name: str
     """The name of its table in a description: ``[[name]]``."""
-    title: str
-    """With its article, for messages: ``a MIC488``."""
+    model: str
+    """For people: ``MIC488``."""
+    article: str = "a"
     keys: tuple[Key, ...]
     """Of its table; ``name`` and ``line`` are among them."""
     inner_tables: tuple[str, ...] = ()
@@ -233,6 +235,10 @@ class ControllerKind(Generic[S, M, V]):
     """Whether it has non-volatile memory."""
     watch_program: Callable[[M, Kernel, str], ProgramReport | None] = lambda machine, kernel, name: None
     """Watch the programs of the machine, which has that name in its kernel; None without any."""
+    languages: Sequence[TextLanguage] = ()
+    """Those of the texts in its program memory."""
+    dialect_keys: Sequence[str] = ()
+    """Keys of its table on which depends what these texts may contain."""
     texts: Callable[[S, M, TextContext], Sequence[ProgramText]] = lambda spec, machine, context: ()
     """What is in its program memory, one text for each place there; the machine is at the present."""
     programs: Callable[[S, M, TextContext], Programs | None] = lambda spec, machine, context: None
@@ -242,11 +248,18 @@ class ControllerKind(Generic[S, M, V]):
     `Refusal` for what cannot be done now."""
     configuration: Callable[[S, M, BuildContext], SourceText | None] = lambda spec, machine, context: None
     """Its configuration file: as it was given, else made of its settings; None for a kind that has none."""
+    configuration_format: ConfigurationFormat | None = None
+    """How this file becomes a form; None for a kind that has none."""
     remarks: Callable[[str, M], Sequence[str]] = lambda name, machine: ()
     """Notices for the user who starts it, under a name."""
     encoders: EncoderInputs[M] | None = None
     registers: NamedRegisters[M] | None = None
     vision: Vision[S, M] | None = None
+
+    @property
+    def title(self) -> str:
+        """With its article, for messages: ``a MIC488``."""
+        return f"{self.article} {self.model}"
 
 
 class ProgramAct(Protocol):

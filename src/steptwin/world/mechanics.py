@@ -229,7 +229,12 @@ class Mechanism(Stateful):
             self._stalled = stalled
             why = " by resonance" if self._course.is_shaken(now) else ""
             text = f"{self._name} loses the field{why}" if stalled else f"{self._name} is caught, {self.lost(now)} pulses behind"
-            facts = ("axis", self.number), ("stalled", stalled), ("lost", 0 if stalled else self.lost(now))
+            facts = (
+                ("axis", self.number),
+                ("element", self._name),
+                ("stalled", stalled),
+                ("lost", 0 if stalled else self.lost(now)),
+            )
             self._kernel.report(self.machine, "event", "stall", text, *facts)
         self._stall_due = self._course.next_stall(now)
 
@@ -286,7 +291,7 @@ class Mechanism(Stateful):
             self._falls = falls
             lost = self.lost(now)
             text = f"{self._name} {self._loose.why}" if falls else f"{self._name} stands, {lost} pulses behind"
-            facts = ("axis", self.number), ("falls", falls), ("lost", lost)
+            facts = ("axis", self.number), ("element", self._name), ("falls", falls), ("lost", lost)
             self._kernel.report(self.machine, "event", "fall", text, *facts)
         self._rest_due = free.end if free is not None and falls else None
 

@@ -15,18 +15,25 @@ from steptwin.world.script import Step
 if TYPE_CHECKING:
     from steptwin.explain.model import MemoryPart
     from steptwin.world.plant import Plant
-    from steptwin.world.spec import WorldSpec
-
-WBC, CHIP, CSV = "wbc", "m1486", "csv"
-LANGUAGES = (WBC, CHIP, CSV)
+    from steptwin.world.spec import ControllerSpec, WorldSpec
 
 FINDING = ("line", "column", "end_line", "end_column", "severity", "code", "message", "hint")
 """Of a diagnostic as plain values (`steptwin.diagnostics.to_json`)."""
 
 
-_SUFFIXES = {WBC: ".prg", CHIP: ".m1486", CSV: ".csv"}
-_TYPE_KEYS = ("name", "firmware", "variant", "interface")
-"""What editors need to know of a controller besides its texts."""
+class TextLanguage(NamedTuple):
+    """A language of the texts in the program memory of a kind of controllers."""
+
+    name: str
+    """For editors."""
+    suffix: str
+    """Of files in it."""
+    key: str
+    """Of the table of a controller, which names these files."""
+    in_banks: bool = False
+    """Whether the value of the key is a table with the number of the bank of each."""
+    is_shared: bool = False
+    """Whether one file that is alone in its key is that of all banks."""
 
 
 def bank_text(bank: int) -> str:
@@ -40,8 +47,8 @@ class ProgramText:
 
     place: str
     """Unlike all others of the controller: ``program 0``, ``positions 0``, ``program``."""
-    language: str
-    """One of `LANGUAGES`."""
+    language: TextLanguage
+    """One of those of the kind of its controller."""
     source: SourceText
     check: Callable[[], Sequence[Diagnostic]]
     """What the checker of its language finds, in the order of the text."""
@@ -91,9 +98,9 @@ class GivenFiles:
         return self._plant.downloaded.get((machine, place))
 
 
-def address_of(machine: str, place: str, language: str) -> str:
+def address_of(machine: str, place: str, language: TextLanguage) -> str:
     """The address under which editors know a text."""
-    return f"steptwin:///{machine}/{place.replace(' ', '-')}{_SUFFIXES[language]}"
+    return f"steptwin:///{machine}/{place.replace(' ', '-')}{language.suffix}"
 
 
 def program_texts(plant: Plant, machine: str) -> Sequence[ProgramText]:
@@ -155,7 +162,8 @@ class WorldPrograms:
         for spec in plant.spec.controllers:
             kind, index = spec.path
             table = data[kind][index]
-            lines = [f"[[{kind}]]", *(f"{key} = {json.dumps(table[key])}" for key in _TYPE_KEYS if key in table)]
+            known = [key for key in ("name", *spec.kind.dialect_keys) if key in table]
+            lines = [f"[[{kind}]]", *(f"{key} = {json.dumps(table[key])}" for key in known)]
             for name, key in spec.kind.files(spec):
                 if key == "config":
                     found[f"steptwin:///{spec.name}/config.cfg"] = plant.files[name]
@@ -164,24 +172,23 @@ class WorldPrograms:
             for text in texts:
                 if not text.is_empty:
                     found[address_of(spec.name, text.place, text.language)] = text.source.text.encode()
-            tables += [*lines, *_keys(spec.name, texts)]
+            tables += [*lines, *_keys(spec, texts)]
         found["steptwin:///world.toml"] = "\n".join(tables).encode()
         return found
 
 
-def _keys(machine: str, texts: Sequence[ProgramText]) -> Iterator[str]:
-    """The keys of a table that name the places of its program memory. The only table of positions is that of all banks, so others
-    are left out while they are empty."""
-    for key, language in (("programs", WBC), ("positions", CSV)):
+def _keys(spec: ControllerSpec, texts: Sequence[ProgramText]) -> Iterator[str]:
+    """The keys of a table that name the places of its program memory. A file that is alone in its key may be that of all banks,
+    so empty ones are left out there."""
+    for language in spec.kind.languages:
         of_key = [text for text in texts if text.language == language]
-        if language == CSV:
+        if language.is_shared:
             of_key = [text for text in of_key if not text.is_empty] or of_key[:1]
-        banks = (f'{text.place.rpartition(" ")[2]} = "{_name(machine, text)}"' for text in of_key)
-        if of_key:
-            yield f"{key} = {{ {', '.join(banks)} }}"
-    for text in texts:
-        if text.language == CHIP:
-            yield f'program = "{_name(machine, text)}"'
+        if language.in_banks and of_key:
+            banks = (f'{text.place.rpartition(" ")[2]} = "{_name(spec.name, text)}"' for text in of_key)
+            yield f"{language.key} = {{ {', '.join(banks)} }}"
+        elif of_key:
+            yield f'{language.key} = "{_name(spec.name, of_key[0])}"'
 
 
 def _name(machine: str, text: ProgramText) -> str:
@@ -194,7 +201,7 @@ def _plain(machine: str, text: ProgramText) -> Mapping[str, object]:
         "machine": machine,
         "place": text.place,
         "name": text.source.name,
-        "language": text.language,
+        "language": text.language.name,
         "address": address_of(machine, text.place, text.language),
         "empty": text.is_empty,
         "running": text.is_running,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from steptwin.errors import Misuse
@@ -50,22 +50,23 @@ class Selection:
     names: frozenset[str] | None = None
     kinds: frozenset[str] | None = None
 
-    def takes(self, kind: str, name: str, text: str = "", facts: Iterable[object] = ()) -> bool:
-        """Whether something of a kind is wanted that ``name`` reports. An element is meant, too, where the text begins with its
-        name, or a fact is it."""
-        return (self.kinds is None or kind in self.kinds) and self.takes_of(name, text, facts)
+    def takes(self, kind: str, names: Iterable[str]) -> bool:
+        """Whether something of a kind is wanted that is about one of these names, or about a part of it (``clamp.position``)."""
+        return (self.kinds is None or kind in self.kinds) and self.takes_of(*names)
 
-    def takes_of(self, name: str, text: str = "", facts: Iterable[object] = ()) -> bool:
-        if self.names is None or name in self.names:
-            return True
-        about = (text.partition(" ")[0].rstrip(":"), *(fact for fact in facts if isinstance(fact, str)))
-        return any(one in self.names or one.partition(".")[0] in self.names for one in about)
+    def takes_of(self, *names: str) -> bool:
+        return self.names is None or any(one in self.names or one.partition(".")[0] in self.names for one in names)
 
     def shows(self, record: TraceRecord) -> bool:
-        if not is_shown(record):
-            return False
-        text = record.subject if record.kind != "event" else str(record.value)
-        return self.takes(shown_kind(record), record.machine, text, (value for _, value in record.facts))
+        return is_shown(record) and self.takes(shown_kind(record), names_of(record))
+
+
+def names_of(record: TraceRecord) -> Iterator[str]:
+    """What a record is about: who reports it, the button or pin of an input, what its facts name."""
+    yield record.machine
+    if record.kind == "input":
+        yield record.subject
+    yield from (fact for _, fact in record.facts if isinstance(fact, str))
 
 
 ALL = Selection()

@@ -195,7 +195,7 @@ TOYS = LineKind(
 )
 TOY: ControllerKind[ToySpec, Toy, ToyView] = ControllerKind(
     name="toy",
-    title="a toy",
+    model="toy",
     keys=(
         Key("name", name_value, "how the rest of the file names it"),
         optional(name_value, "line", "the line it is on"),

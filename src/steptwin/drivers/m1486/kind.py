@@ -12,6 +12,7 @@ from steptwin.drivers.blocking import finish
 from steptwin.drivers.exchange import LineLost
 from steptwin.drivers.kind import (
     AddressSelection,
+    Decoding,
     DeviceAddress,
     DeviceMotion,
     DeviceSearch,
@@ -25,6 +26,7 @@ from steptwin.drivers.line import DriverLine
 from steptwin.drivers.m1486 import named
 from steptwin.drivers.m1486.chip import TIMEOUT_S
 from steptwin.drivers.m1486.conversation import ChipConversation
+from steptwin.drivers.m1486.decoder import M1486Decoder
 from steptwin.drivers.m1486.driver import AsyncM1486
 from steptwin.drivers.m1486.identify import CHIP_BAUDS, SearchLine, end_line, scan_chips, select_all
 from steptwin.drivers.m1486.jog import LINK_S, RELEASED
@@ -35,6 +37,7 @@ from steptwin.drivers.m1486.subject import M1486Part
 from steptwin.drivers.m1486.sync import M1486, M1486Jog
 from steptwin.drivers.m1486.talk import chip_name
 from steptwin.errors import LineFailure, Misuse
+from steptwin.m1486.variants import DEFAULT as DEFAULT_VARIANT
 from steptwin.machine import SECOND
 
 LOST = "; the chip has counted the whole move, so its position is wrong: home the axis, or set POSITION"
@@ -237,6 +240,9 @@ M1486_DRIVER: DriverKind[M1486] = DriverKind(
     part=_part,
     search=DeviceSearch(bauds=CHIP_BAUDS, numbers=16, title="M1486 chip", form="X", find=_find, disturbs=False, leave=_leave),
     clear=_clear,
+    decoding=Decoding(
+        protocol="m1486", make=lambda sink, kind, tcp: M1486Decoder(sink, DEFAULT_VARIANT.name if kind is None else kind)
+    ),
     opened=opened,
     info=named.overview,
     names=lambda: named.NAMES,

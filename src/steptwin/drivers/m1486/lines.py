@@ -52,8 +52,7 @@ class AsyncM1486Line(TaskLine[ChipRequest, bytes]):
     def __init__(self, address: str, *, baud: int = BAUD, log: Callable[[str], object] | None = None) -> None:
         endpoint = line_endpoint(address, baud)
         exchanger, talk = talking(endpoint, baud, log)
-        super().__init__(endpoint, exchanger)
-        self.notes[TALK] = talk
+        super().__init__(endpoint, exchanger, {TALK: talk})
 
 
 class ThreadM1486Line(ThreadLine[ChipRequest, bytes]):
@@ -62,5 +61,4 @@ class ThreadM1486Line(ThreadLine[ChipRequest, bytes]):
     def __init__(self, address: str, *, baud: int = BAUD, log: Callable[[str], object] | None = None) -> None:
         endpoint = line_endpoint(address, baud)
         exchanger, talk = talking(endpoint, baud, log)
-        super().__init__(endpoint, exchanger)
-        self.notes[TALK] = talk
+        super().__init__(endpoint, exchanger, {TALK: talk})

@@ -24,8 +24,7 @@ def wake(channel: Channel, place: str, address: int | None, baud: int, log: Call
     """
     endpoint = _Opened(channel, place)
     exchanger, talk = talking(endpoint, baud, log)
-    line: ThreadLine[ChipRequest, bytes] = ThreadLine(endpoint, exchanger)
-    line.notes[TALK] = talk
+    line: ThreadLine[ChipRequest, bytes] = ThreadLine(endpoint, exchanger, {TALK: talk})
     finish(line.open())
     finish(ChipUnit(line, address, timeout_ns=TIMEOUT_NS).wake())
 

@@ -11,6 +11,7 @@ from typing import Any
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.kind import (
     AddressSelection,
+    Decoding,
     DeviceAddress,
     DeviceMotion,
     DeviceSearch,
@@ -23,6 +24,7 @@ from steptwin.drivers.kind import (
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.mic488 import named
 from steptwin.drivers.mic488.conversation import Mic488Terminal
+from steptwin.drivers.mic488.decoder import ModbusDecoder
 from steptwin.drivers.mic488.driver import TIMEOUT_S, AsyncMic488
 from steptwin.drivers.mic488.identify import scan
 from steptwin.drivers.mic488.lines import AsyncModbusLine
@@ -34,7 +36,7 @@ from steptwin.drivers.mic488.sync import Mic488, Mic488Axis, Mic488Jog, ModbusLi
 from steptwin.drivers.typed import tied
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND
-from steptwin.mic488.registers import AXES
+from steptwin.mic488.registers import AXES, DEFAULT_FIRMWARE
 
 BAUD = 38400
 BAUDS = (38400, 9600, 19200, 57600, 115200)
@@ -217,6 +219,10 @@ MIC488_DRIVER: DriverKind[Mic488] = DriverKind(
     line=_line,
     part=_part,
     search=DeviceSearch(bauds=BAUDS, numbers=None, title="unit", form="d", find=_find, disturbs=True),
+    decoding=Decoding(
+        protocol="modbus",
+        make=lambda sink, firmware, tcp: ModbusDecoder(sink, DEFAULT_FIRMWARE if firmware is None else firmware, tcp=tcp),
+    ),
     opened=opened,
     info=overview,
     names=named.names,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 
 from steptwin.drivers.exchange import Exchanger
 from steptwin.drivers.mic488.frames import FrameWords
@@ -19,12 +19,12 @@ FRAMES_PER_SECOND = 100.0
 
 def modbus_exchanger(
     place: LineAddress, frames_per_second: float | None, log: Callable[[str], object] | None
-) -> tuple[Exchanger[ModbusQuery, bytes], dict[str, object]]:
+) -> tuple[Exchanger[ModbusQuery, bytes], dict[Hashable, object]]:
     """The exchanger of a Modbus line, and the notes of its drivers. ``frames_per_second`` to each device; None: any."""
     if frames_per_second is not None and frames_per_second <= 0.0:
         raise Misuse(f"{frames_per_second:g} frames per second: must be above 0")
     interval: Nanos = 0 if frames_per_second is None else round(SECOND / frames_per_second)
-    notes: dict[str, object] = {"tcp": place.framed}
+    notes: dict[Hashable, object] = {"tcp": place.framed}
     observer = None
     if log is not None:
         frames = FrameWords(tcp=place.framed)
@@ -48,9 +48,7 @@ class AsyncModbusLine(TaskLine[ModbusQuery, bytes]):
         log: Callable[[str], object] | None = None,
     ) -> None:
         place = parse_line_address(address, baud)
-        exchanger, notes = modbus_exchanger(place, frames_per_second, log)
-        super().__init__(place.endpoint, exchanger)
-        self.notes.update(notes)
+        super().__init__(place.endpoint, *modbus_exchanger(place, frames_per_second, log))
 
 
 class ThreadModbusLine(ThreadLine[ModbusQuery, bytes]):
@@ -65,6 +63,4 @@ class ThreadModbusLine(ThreadLine[ModbusQuery, bytes]):
         log: Callable[[str], object] | None = None,
     ) -> None:
         place = parse_line_address(address, baud)
-        exchanger, notes = modbus_exchanger(place, frames_per_second, log)
-        super().__init__(place.endpoint, exchanger)
-        self.notes.update(notes)
+        super().__init__(place.endpoint, *modbus_exchanger(place, frames_per_second, log))

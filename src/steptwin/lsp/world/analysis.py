@@ -6,13 +6,13 @@ import re
 from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from functools import cached_property
-from typing import Protocol
 
 from steptwin.diagnostics import Diagnostic, Span
 from steptwin.errors import Misuse
 from steptwin.lsp.analysis import Analysis
 from steptwin.lsp.answers import Completions, DocumentLink, Fold, Hover, OutlineItem, SemanticToken, TokenKind
 from steptwin.lsp.files import name_of, relative
+from steptwin.lsp.language import OtherTexts
 from steptwin.lsp.positions import LineIndex
 from steptwin.lsp.world.built import ElementSignals, UnitsOfSignals
 from steptwin.lsp.world.items import ItemBuilder, keys_of
@@ -41,22 +41,10 @@ _KINDS = {
 }
 
 
-class Around(Protocol):
-    """The other files of a world."""
-
-    def read(self, uri: str) -> bytes:
-        """The content of a file, as it is in the editor where it is open. Raises `Misuse`."""
-        ...
-
-    def beside(self, uri: str) -> Sequence[str]:
-        """Addresses of the files in the same folder that a world could name."""
-        ...
-
-
 class WorldAnalysis(Analysis):
     """The other files are read when an answer depends on them."""
 
-    def __init__(self, uri: str, lines: LineIndex, around: Around, elements: ElementSignals) -> None:
+    def __init__(self, uri: str, lines: LineIndex, around: OtherTexts, elements: ElementSignals) -> None:
         """``elements`` belongs to all states of the text."""
         super().__init__(uri, lines)
         self._around = around
@@ -116,7 +104,7 @@ class WorldAnalysis(Analysis):
         before = self.text[self.lines.starts[number] : place]
         table = self._outline.table_at(place)
         present = () if table is None else self._present(table, number)
-        files = [name_of(uri) for uri in self._around.beside(self.uri)]
+        files = [name_of(uri) for uri in self._around.in_folder(self.uri)]
         return ItemBuilder(self._outline, self._signals, files).items(before, place, present)
 
     def _present(self, table: TableOutline, without: int) -> Iterator[str]:

@@ -1750,7 +1750,7 @@ export type ProgramsAnswer = ({
   place: string;
   /** Of the file. */
   name: string;
-  language: "wbc" | "m1486" | "csv";
+  language: "wbc" | "csv" | "m1486";
   /** At the editor server. */
   address: string;
   /** Whether nothing is there yet. */
@@ -1766,7 +1766,7 @@ export type ProgramTextAnswer = {
   place: string;
   /** Of the file. */
   name: string;
-  language: "wbc" | "m1486" | "csv";
+  language: "wbc" | "csv" | "m1486";
   /** At the editor server. */
   address: string;
   /** Whether nothing is there yet. */

@@ -1,4 +1,4 @@
-"""What a host types to command an M1486. Positions are in microsteps, as in its data sheet: the smallest ones."""
+"""What a host types to command an M1486. Positions are in minimum microsteps, as in its data sheet."""
 
 from __future__ import annotations
 

@@ -20,12 +20,13 @@ from steptwin.world import script as do
 from steptwin.world.kind import TextContext, text_of
 from steptwin.world.kinds.m1486.build import sound
 from steptwin.world.kinds.m1486.table import M1486Spec
-from steptwin.world.programtexts import CHIP, Destination, Downloading, ProgramText
+from steptwin.world.programtexts import Destination, Downloading, ProgramText, TextLanguage
 
 if TYPE_CHECKING:
     from steptwin.explain.model import MemoryPart
 
 PLACE = "program"
+COMMANDS = TextLanguage("m1486", ".m1486", "program")
 _AT_WORK = (ProgramActivity.RUNNING, ProgramActivity.WAITING)
 
 
@@ -47,7 +48,7 @@ def texts(spec: M1486Spec, chip: M1486Chip, context: TextContext) -> tuple[Progr
     return (
         ProgramText(
             place=PLACE,
-            language=CHIP,
+            language=COMMANDS,
             source=source,
             check=lambda: findings,
             memory=lambda text: _memory(chip, text),

@@ -14,6 +14,7 @@ from steptwin.mic488.status import ProgramState
 from steptwin.mic488.vision import VisionReceiver, VisionRecord
 from steptwin.world.kind import ControllerKind, LineKind, LinkKind, NamedRegisters, Terminals, Vision
 from steptwin.world.kinds.mic488 import axes, build, control, faults, line, memory, programs, table
+from steptwin.world.kinds.mic488.configuration import Mic488Configuration
 from steptwin.world.kinds.mic488.heldjog import Mic488HeldJog
 from steptwin.world.kinds.mic488.program_watch import watch_program
 from steptwin.world.kinds.mic488.table import Mic488Spec
@@ -66,7 +67,7 @@ MODBUS = LineKind(
 
 MIC488: ControllerKind[Mic488Spec, Mic488Device, Mic488View] = ControllerKind(
     name="mic488",
-    title="a MIC488",
+    model="MIC488",
     keys=table.KEYS,
     inner_tables=table.INNER_TABLES,
     inner_keys=table.inner_keys,
@@ -98,10 +99,13 @@ MIC488: ControllerKind[Mic488Spec, Mic488Device, Mic488View] = ControllerKind(
     body=faults.body,
     keeps_memory=lambda device: device.firmware.stored_user_registers is not None,
     watch_program=watch_program,
+    languages=(memory.WBC, memory.TABLES),
+    dialect_keys=("firmware",),
     texts=memory.texts,
     download=memory.download,
     programs=programs.programs,
     configuration=build.configuration,
+    configuration_format=Mic488Configuration(),
     remarks=empty_banks,
     encoders=axes.ENCODERS,
     registers=NamedRegisters(

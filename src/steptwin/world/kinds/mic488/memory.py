@@ -16,11 +16,13 @@ from steptwin.wbc.positions import PositionTable, parse_positions
 from steptwin.world.kind import TextContext
 from steptwin.world.kinds.mic488.build import table_for
 from steptwin.world.kinds.mic488.table import Mic488Spec
-from steptwin.world.programtexts import CSV, WBC, Destination, Downloading, ProgramText, bank_text
+from steptwin.world.programtexts import Destination, Downloading, ProgramText, TextLanguage, bank_text
 
 if TYPE_CHECKING:
     from steptwin.explain.model import MemoryPart
 
+WBC = TextLanguage("wbc", ".prg", "programs", in_banks=True)
+TABLES = TextLanguage("csv", ".csv", "positions", in_banks=True, is_shared=True)
 PROGRAM, POSITIONS = "program", "positions"
 
 
@@ -54,7 +56,7 @@ def _positions(spec: Mic488Spec, device: Mic488Device, context: TextContext) -> 
         source = SourceText(names.get(bank, place), "" if table is None else table.text)
         yield ProgramText(
             place=place,
-            language=CSV,
+            language=TABLES,
             source=source,
             check=lambda text=source.text: parse_positions(text)[1],
             memory=lambda text: _position_memory(device, text),

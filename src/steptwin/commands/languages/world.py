@@ -1,0 +1,18 @@
+"""Descriptions of worlds: `WORLDS`. They are run by `steptwin.commands.run_world`, with options of their own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from steptwin.commands.languages.contract import CheckReport, FileLanguage, GivenOptions
+from steptwin.diagnostics import SourceText
+from steptwin.files.world import read_beside
+from steptwin.world.check import diagnose
+
+
+def _check(source: SourceText, options: GivenOptions) -> CheckReport:
+    folder = Path(source.name).parent
+    return CheckReport(list(diagnose(source.name, source.text, lambda name: read_beside(folder, name))))
+
+
+WORLDS = FileLanguage(name="world", title="worlds", suffixes=(".toml",), check=_check)

@@ -1,0 +1,34 @@
+"""The traffic between a master and MIC488 controllers, for `steptwin sniff`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from steptwin.drivers.mic488.frames import FrameWords
+from steptwin.drivers.mic488.listening import RtuListener, TcpListener
+from steptwin.machine import Nanos
+from steptwin.mic488.registers import register_map
+from steptwin.wire.frameline import FrameLine
+from steptwin.wire.slave import FrameDirection
+
+
+class ModbusDecoder:
+    """Decodes Modbus RTU or TCP, with the register names of a MIC488."""
+
+    def __init__(self, sink: Callable[[FrameLine], None], firmware: str, *, tcp: bool) -> None:
+        words = FrameWords(register_map(firmware), tcp=tcp)
+        words.sinks.append(lambda h: sink(FrameLine(h.time, "", h.direction or FrameDirection.OUT, h.raw, h.meaning)))
+        self._tcp = TcpListener(words) if tcp else None
+        self._rtu = RtuListener(words)
+
+    def feed(self, data: bytes, now: Nanos, direction: FrameDirection | None) -> None:
+        if self._tcp is not None and direction is not None:
+            self._tcp.feed(data, now, direction)
+        else:
+            self._rtu.feed(data, now)
+
+    def deadline(self) -> Nanos | None:
+        return self._rtu.deadline()
+
+    def expire(self, now: Nanos) -> None:
+        self._rtu.expire(now)

@@ -1,0 +1,40 @@
+"""A language of files that only the tests know: each line is a target, in pulses."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from contextlib import contextmanager
+
+from steptwin.commands.languages import LANGUAGES, register
+from steptwin.commands.languages.contract import CheckReport, FileLanguage, GivenOptions, Print, count
+from steptwin.commands.program_run import ProgramRun
+from steptwin.diagnostics import Diagnostic, Severity, SourceText, Span
+from steptwin.files.textfiles import read_text
+
+
+def _check(source: SourceText, options: GivenOptions) -> CheckReport:
+    found = [
+        Diagnostic("T1", Severity.ERROR, Span(place, place + len(word)), f"{word!r} is no number")
+        for word in source.text.split()
+        if not word.isdecimal() and (place := source.text.index(word)) >= 0
+    ]
+    return CheckReport(found, {"targets": len(source.text.split())}, [count(len(source.text.split()), "target")])
+
+
+def _run(given: ProgramRun, options: GivenOptions, out: Print, warn: Print) -> bool:
+    targets = read_text(given.program).source.text.split()
+    out(f"moves to {', '.join(targets)}")
+    return bool(targets)
+
+
+TARGETS = FileLanguage(name="targets", title="lists of targets", suffixes=(".targets",), check=_check, run=_run)
+
+
+@contextmanager
+def registered_language() -> Generator[None]:
+    """Commands take its files meanwhile."""
+    register(TARGETS)
+    try:
+        yield
+    finally:
+        del LANGUAGES[TARGETS.name]
