@@ -210,6 +210,20 @@ def _address(rig: Rig, name: str) -> Any:
     return rig.subject.description.machines[0].datasheet.point(name).addresses[0].place
 
 
+def test_a_jog_whose_first_request_is_still_on_its_way_is_extended() -> None:
+    """The axis has been enabled long before, and its status becomes that of a move only when the request has arrived."""
+    rig = mic(timing=TIMED)
+    rig.run(5000)
+    held = rig.begin(Jog("a", 1, 10.0))
+    held.extend()
+    rig.run(1)
+    assert rig.position("a.M1.velocity") == 0
+    held.extend()
+    rig.run(60)
+    assert rig.position("a.M1.velocity") > 0
+    assert held.over is None
+
+
 def test_who_stops_the_axis_otherwise_ends_the_jog() -> None:
     rig = mic()
     held = rig.begin(Jog("a", 1, 10.0))

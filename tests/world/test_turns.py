@@ -43,3 +43,10 @@ def test_moments_that_are_put_off_for_ever_take_no_memory() -> None:
         dues.put(0, 10**9 + moment)
     assert len(dues._entries) < 200
     assert dues.first() == 10**9 + 9_999
+
+
+def test_outdated_moments_are_removed_many_at_once() -> None:
+    dues = Dues()
+    for moment in range(60):
+        dues.put(0, moment)
+    assert len(dues._entries) == 60

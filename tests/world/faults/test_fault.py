@@ -198,6 +198,8 @@ def test_the_schema_has_a_table_for_each_kind_with_all_it_takes() -> None:
     for name, table in objects.items():
         assert set(table["properties"]) == {"kind", "name", *(p.name for p in KINDS[name].parameters)}
         assert table["additionalProperties"] is False
+        assert all("type" in one or "const" in one for one in table["properties"].values())
+    assert objects["stuck"]["properties"]["pin"]["type"] == "string"
     assert objects["stuck"]["required"] == ["kind", "pin"]
     assert objects["crc"]["properties"]["probability"] == {
         "description": "How probable it is each time.", "type": "number", "minimum": 0, "maximum": 1, "default": 1.0

@@ -338,6 +338,14 @@ def test_what_is_stored_outside_is_what_the_memory_has() -> None:
     assert kept == [device.memory] == [b"\x55\x55\x55".ljust(len(device.memory), b"\0")]
 
 
+def test_a_memory_may_be_worn_from_the_beginning() -> None:
+    rig = FaultRig("wear writes=0")
+    fill(rig, 0x1111)
+    assert rig.ask(SAVE) == rtu(1, SAVE)
+    assert [byte != 0x11 for byte in stored(rig)].count(True) == 1
+    assert rig.told()[0].startswith("wear: after 1 saves byte")
+
+
 def test_worn_bytes_keep_what_they_have() -> None:
     rig = FaultRig("wear writes=2")
     words = (0x1111, 0x2222, 0x3333, 0x4444)
