@@ -12,6 +12,7 @@ from steptwin.machine import MILLISECOND
 from steptwin.wire.crc import with_crc
 from steptwin.world.actions import Download, SetVariable
 from steptwin.world.kinds import line_kinds
+from steptwin.world.lines import LineTraffic
 
 READ_STATUS = bytes.fromhex("03 27 1A 00 01")
 """M1_STATUS with firmware 1.70."""
@@ -119,6 +120,24 @@ def test_answers_of_a_line_with_timing_come_later(kind: str) -> None:
         assert (moment == 0) is early
         assert outputs == [1]
         assert place.take(there.now) == []
+
+
+def test_traffic_is_counted_for_all_programs_even_those_that_have_gone() -> None:
+    there = world()
+    bus, chips = there.lines["bus"], there.lines["chips"]
+    bus.connect("p", "rtu")
+    for data in (rtu(READ_STATUS), rtu(ON), rtu(READ_STATUS), rtu(bytes.fromhex("03 FF 00 00 01")), b"\xff\xff", rtu(ON)):
+        bus.receive("p", data, there.now)
+        there.run(for_="50 ms")
+    assert bus.traffic == LineTraffic(requests=5, errors=1, unframed=2)
+    bus.leave("p")
+    bus.connect("q", "tcp")
+    bus.receive("q", tcp(READ_STATUS), there.now)
+    assert bus.traffic == LineTraffic(requests=6, errors=1, unframed=2)
+    chips.connect("r")
+    chips.receive("r", b"x7\rp\r", there.now)
+    there.run(for_="50 ms")
+    assert chips.traffic == LineTraffic(requests=2)
 
 
 def test_what_cannot_change_anything_is_not_recorded() -> None:
