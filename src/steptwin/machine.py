@@ -174,3 +174,12 @@ class SendingPort(Port, Protocol):
     def on_output(self) -> Callable[[], None] | None: ...
     @on_output.setter
     def on_output(self, call: Callable[[], None] | None) -> None: ...
+
+
+@runtime_checkable
+class SourcedPort(Port, Protocol):
+    """A port for which it matters who uses it."""
+
+    def used_by(self, source: str) -> None:
+        """``source``: the program at the other end, as far as the link knows it: an address, the owner of a certificate."""
+        ...

@@ -175,6 +175,19 @@ def test_a_refusal_is_an_answer_and_not_tried_again() -> None:
     assert not e.busy
 
 
+def test_what_is_sent_refused_and_lost_is_counted() -> None:
+    e = engine()
+    submit(e, "one")
+    e.step(0)
+    e.receive(b"one!", 1)
+    assert e.counts == (1, 0)
+    submit(e, "two", most_attempts=2)
+    e.step(1)
+    e.step(1 + 10 * TIMEOUT)
+    e.receive(b"two!", 2 + 10 * TIMEOUT)
+    assert e.counts == (3, 1)
+
+
 def test_each_device_has_its_pace_and_others_go_first_meanwhile() -> None:
     e = engine(interval=10 * MILLISECOND)
     for text, device in (("a1", "a"), ("a2", "a"), ("b1", "b")):

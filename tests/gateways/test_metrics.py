@@ -55,6 +55,15 @@ def test_axes_have_position_and_velocity_with_their_unit() -> None:
     assert found["steptwin_pin_level", ("table", "M1_EN")] == 1.0
 
 
+def test_lines_have_their_traffic() -> None:
+    subject = GatewayWorld(TEXT.replace('name = "table"', 'name = "table"\nline = "bus"') + '[[line]]\nname = "bus"\n')
+    subject.inner.do(steps.Write((("table", "M1_VMAX", 500.0),)))
+    subject.world.advance(SECOND)
+    found = samples(Metrics(subject))
+    assert found["steptwin_line_requests_total", ("bus",)] == 1.0
+    assert found["steptwin_line_errors_total", ("bus",)] == 0.0
+
+
 def test_what_is_unknown_has_no_sample() -> None:
     found = samples(Metrics(GatewayWorld(TEXT)))
     assert ("steptwin_axis_enabled", ("table", "M1")) in found

@@ -74,6 +74,16 @@ def test_overview(kept: Path) -> None:
     assert {"subject": "cell", "name": "table.M1.position", "unit": "imp", "type": "number"} in listed["points"]
 
 
+def test_writes_and_the_traffic_of_the_line(kept: Path) -> None:
+    code, text = shown(kept, "--writes", "--run", "1")
+    assert code == 0
+    assert [line.split(" s  ")[1] for line in text.splitlines()] == ["table      pty: write M1_EN = ON"]
+    assert json.loads(shown(kept, "--events", "--run", "1", "--json")[1])[-1]["kind"] == "write"
+    assert shown(kept, "--writes", "--run", "2") == (0, "")
+    rows = json.loads(shown(kept, "bus.requests", "--run", "1", "--json")[1])
+    assert rows[-1]["value"] == 1.0
+
+
 def test_values(kept: Path) -> None:
     code, text = shown(kept, "table.pins.M1_EN", "--run", "1")
     assert code == 0

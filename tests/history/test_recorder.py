@@ -7,6 +7,9 @@ import json
 import pytest
 from history_rig import BEGAN_US, RecordedWorld
 
+from steptwin.access.audit import Audit
+from steptwin.access.roles import Role
+from steptwin.gateways.clients import GatewayClient
 from steptwin.machine import SECOND
 from steptwin.motion.plain import read_plan
 from steptwin.subject import commands as command
@@ -92,6 +95,79 @@ def test_events_are_kept_with_their_content() -> None:
     made.look()
     (event,) = made.batches[-1].events
     assert (event.kind, event.text, json.loads(event.content)) == ("note", "note: shift begins", {"note": "shift begins"})
+
+
+LINE = (
+    CELL.replace('"table"', '"table"\nline = "bus"')
+    + """
+[[mic488]]
+name = "feeder"
+line = "bus"
+unit = 2
+[[line]]
+name = "bus"
+"""
+)
+
+
+def test_writes_are_kept_with_their_source_and_lines_with_their_traffic() -> None:
+    made = RecordedWorld(LINE)
+    made.look()
+    line, now = made.world.lines["bus"], made.world.now
+    made.subject.inner.sources["bus", "tcp-1"] = "127.0.0.1:5000"
+    port = line.connect("tcp-1", "tcp")
+    for frame in ("000100000006020300000001", "000200000006020507d0ff00", "0003000000060206270f0001"):
+        line.exchange("tcp-1", port, bytes.fromhex(frame), now)
+    made.subject.inner.do(Write((("feeder", "M1_VMAX", 500.0),)))
+    made.world.run(for_=1.0)
+    made.look()
+    writes = [event for batch in made.batches for event in batch.events if event.kind == "write"]
+    assert [(event.machine, event.text) for event in writes] == [
+        ("feeder", "127.0.0.1:5000: unit 2: write M1_EN = ON"),
+        ("feeder", "127.0.0.1:5000: unit 2: write 9999 (unmapped) = 0001 (refused)"),
+        ("feeder", "script: unit 2: write M1_VMAX = 500 imp/s"),
+    ]
+    assert json.loads(writes[0].content) == {
+        "client": "tcp-1", "source": "127.0.0.1:5000", "words": "unit 2: write M1_EN = ON", "outcome": "done"
+    }  # fmt: skip
+    assert [value for _, value in made.rows("samples", "bus.requests")] == [0.0, 4.0]
+    assert [value for _, value in made.rows("samples", "bus.errors")] == [0.0, 1.0]
+    assert [value for _, value in made.rows("samples", "bus.unframed")] == [0.0]
+
+
+def test_what_a_host_sends_to_chips_is_kept_but_not_what_it_asks() -> None:
+    made = RecordedWorld('[[m1486]]\nname = "drum"\nline = "chips"\n[[line]]\nname = "chips"\nkind = "m1486"\n')
+    line = made.world.lines["chips"]
+    port = line.connect("pty", "raw")
+    for number, text in enumerate((b"F 100\r", b"U 1\r", b"\r", b"Xq\r")):
+        made.world.run(for_=0.1)
+        line.exchange("pty", port, text, made.world.now)
+        assert made.world.lines["chips"].traffic.requests == number + 1
+    made.world.run(for_=1.0)
+    made.look()
+    writes = [event for batch in made.batches for event in batch.events if event.kind == "write"]
+    assert [(event.machine, event.text.partition("  ")[0]) for event in writes] == [("chips", "pty: F100"), ("chips", "pty: Xq")]
+
+
+def test_writes_are_not_observed_without_a_history() -> None:
+    made = RecordedWorld(LINE)
+    place = made.world.lines["bus"].connect("tcp-1", "tcp")
+    assert place.framed is not None
+    assert place.framed.on_write is not None
+    made.end()
+    assert place.framed.on_write is None
+
+
+def test_commands_are_kept_with_who_gave_them() -> None:
+    made = RecordedWorld(CELL)
+    audit = Audit(lambda: "2026-03-01T12:00:00.000+00:00")
+    audit.watchers.append(made.recorder.note)
+    client = GatewayClient("anna", Role.OPERATOR, "OPC UA, 127.0.0.1:5000")
+    audit.add(client, made.world.now, "move", {"machine": "table", "axis": 1, "to": 5.0}, "done")
+    made.look()
+    (row,) = [event for event in made.batches[-1].events if event.kind == "command"]
+    assert (row.machine, row.text) == ("table", "anna (OPC UA, 127.0.0.1:5000): move machine=table axis=1 to=5.0: done")
+    assert json.loads(row.content)["role"] == "operator"
 
 
 def test_time_that_goes_back_begins_a_run() -> None:

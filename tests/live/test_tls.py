@@ -16,6 +16,7 @@ from pymodbus.simulator import DataType, SimData, SimDevice
 from tests.conftest import until
 from tls_files import Authority
 
+from steptwin.access.roles import Role
 from steptwin.commands.certificate import make_certificate
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.exchange import Job
@@ -65,11 +66,18 @@ def context_of(folder: Path, name: str | None) -> ssl.SSLContext:
 
 
 @pytest.fixture
-def served(run: Any, make_cell: Any, folder: Path) -> Callable[..., Any]:
+def audited() -> list[tuple[Any, ...]]:
+    """What the audit log has been told: who, role, what, fields, outcome."""
+    return []
+
+
+@pytest.fixture
+def served(run: Any, make_cell: Any, folder: Path, audited: list[tuple[Any, ...]]) -> Callable[..., Any]:
     """``served(play)``: the value of ``await play(port, device)`` beside a twin whose line is encrypted, and its notices."""
 
     def serve(play: Callable[[int, Mic488Device], Any], files: TlsFiles | None = None, most: int = 10) -> tuple[Any, list[str]]:
         notices: list[str] = []
+        audited.clear()
 
         async def scene() -> Any:
             cell, device = make_cell()
@@ -82,6 +90,8 @@ def served(run: Any, make_cell: Any, folder: Path) -> Callable[..., Any]:
                     cell=cell,
                     clients=clients,
                     tls=files or files_in(folder),
+                    audit=lambda who, do, fields, outcome: audited.append((str(who), who.role, do, dict(fields), outcome)),
+                    line_name="bus",
                 )
             )
             try:
@@ -125,6 +135,24 @@ def test_a_role_permits_requests(served: Any, folder: Path, name: str, expected:
     assert [f"client {name} (" in notice for notice in notices] == [True] * sum(code == 1 for code in expected)
 
 
+@pytest.mark.parametrize(
+    ("name", "role", "outcome"),
+    [("operator", Role.OPERATOR, "done"), ("viewer", Role.VIEWER, "refusal"), ("nobody", None, "refusal")],
+)
+def test_writes_are_in_the_audit_log(
+    served: Any, folder: Path, audited: list[tuple[Any, ...]], name: str, role: Role | None, outcome: str
+) -> None:
+    async def play(port: int, device: Mic488Device) -> None:
+        await asked_with(context_of(folder, name), port)
+
+    served(play)
+    writes = [entry for entry in audited if entry[3]["pdu"] == "0600000007"]
+    assert [(one[1:]) for one in writes] == [(role, "request", {"line": "bus", "unit": 1, "pdu": "0600000007"}, outcome)]
+    assert writes[0][0].startswith(f"{name} (")
+    assert ", 127.0.0.1:" in writes[0][0]
+    assert len(audited) == (2 if role is None else 1)  # who has no role may not even read
+
+
 def test_requests_that_come_together_are_answered_in_their_order(served: Any, folder: Path) -> None:
     """A read, a write and a read of a viewer, the last with the bytes in two records."""
 
@@ -140,6 +168,26 @@ def test_requests_that_come_together_are_answered_in_their_order(served: Any, fo
 
     answer, _ = served(play)
     assert answer.hex() == "0001000000050103020000" + "000200000003018601" + "0003000000050103020000"
+
+
+@pytest.mark.parametrize(("name", "alert"), [("expired", "CERTIFICATE_EXPIRED"), ("other/stranger", "UNKNOWN_CA")])
+@pytest.mark.parametrize("version", [ssl.TLSVersion.TLSv1_2, ssl.TLSVersion.TLSv1_3])
+def test_who_is_not_admitted_is_told_why(served: Any, folder: Path, name: str, alert: str, version: ssl.TLSVersion) -> None:
+    """By an alert of TLS. With TLS 1.3 it comes after the end of the client's own handshake."""
+
+    async def play(port: int, device: Mic488Device) -> str:
+        context = context_of(folder, name)
+        context.minimum_version = context.maximum_version = version
+        try:
+            reader, writer = await asyncio.open_connection("127.0.0.1", port, ssl=context)
+            await reader.read(1)
+            writer.close()
+        except ssl.SSLError as error:
+            return str(error)
+        return "no alert"
+
+    told, _ = served(play)
+    assert f"ALERT_{alert}" in told
 
 
 @pytest.mark.parametrize(
@@ -177,7 +225,7 @@ def test_old_versions_are_refused(served: Any, folder: Path) -> None:
         context.set_ciphers("ALL:@SECLEVEL=0")
         with pytest.warns(DeprecationWarning, match="TLSv1_1"):
             context.minimum_version = context.maximum_version = ssl.TLSVersion.TLSv1_1
-        with pytest.raises(ConnectionError):
+        with pytest.raises(ssl.SSLError, match="ALERT_PROTOCOL_VERSION"):
             await asyncio.open_connection("127.0.0.1", port, ssl=context)
 
     _, notices = served(play)
@@ -225,13 +273,15 @@ def test_certificates_that_the_command_makes_and_nobody_signs_for_another(served
         context = ssl.create_default_context(cafile=str(own))
         context.load_cert_chain(tmp_path / "chain.pem", tmp_path / "forged.key")
         reader, writer = await asyncio.open_connection("127.0.0.1", port, ssl=context)
-        answer = await reader.read(1)
+        with pytest.raises(ssl.SSLError, match="ALERT"):
+            await reader.read(1)
         writer.close()
-        return as_viewer, answer
+        return as_viewer
 
     seen, notices = served(play, files)
-    assert seen == (([0, 0], ILLEGAL_FUNCTION), b"")
-    assert notices[0] == "client screen 3 (viewer): a request with function 6 is refused"
+    assert seen == ([0, 0], ILLEGAL_FUNCTION)
+    assert notices[0].startswith("client screen 3 (viewer, 127.0.0.1:")
+    assert notices[0].endswith("): a request with function 6 is refused")
     assert "not admitted: " in notices[1]
 
 

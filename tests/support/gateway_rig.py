@@ -14,14 +14,16 @@ from typing import Any
 from tests.conftest import STEPTWIN, until
 
 from steptwin import World
+from steptwin.access.audit import CommandLog
 from steptwin.errors import LineFailure, SteptwinError
-from steptwin.gateways.contract import CommandLog, PastValues
+from steptwin.gateways.contract import PastValues
 from steptwin.subject import commands as command
 from steptwin.subject.contract import Description, Reading, Result
 from steptwin.subject.events import Event
 from steptwin.subject.following import Filter, Following
 from steptwin.subject.jogs import Held, WorldJogs
 from steptwin.subject.world import WorldSubject
+from steptwin.world.lines import LineTraffic
 
 
 class GatewayWorld:
@@ -55,6 +57,9 @@ class GatewayWorld:
 
     def follow(self, what: Filter, bound: int) -> Following:
         return self.inner.follow(what, bound)
+
+    def traffic(self) -> Mapping[str, LineTraffic]:
+        return {name: line.traffic for name, line in self.world.lines.items()}
 
     def plans(self, what: Filter) -> list[Event]:
         return self.inner.plans(what)

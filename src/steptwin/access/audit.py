@@ -20,12 +20,21 @@ class Acting(Protocol):
     """Who gives commands: a viewer of the studio, or a client of a gateway. As text: the name, and where it is."""
 
     @property
-    def role(self) -> Role: ...
+    def role(self) -> Role | None:
+        """None of one who proves no role that is known."""
+        ...
+
+
+class CommandLog(Protocol):
+    """The audit log at the present moment of a subject."""
+
+    def __call__(self, who: Acting, do: str, fields: Mapping[str, object], outcome: str, /) -> None: ...
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """``at`` is the wall clock as text (ISO 8601). ``outcome``: done, misuse, refusal, failure, internal."""
+    """``at`` is the wall clock as text (ISO 8601). ``outcome``: done, misuse, refusal, failure, internal; sent where there is no
+    answer."""
 
     at: str
     time: Nanos
@@ -34,6 +43,11 @@ class Entry:
     do: str
     fields: Mapping[str, object]
     outcome: str
+
+    def __str__(self) -> str:
+        return (
+            f"{self.viewer}: {' '.join([self.do, *(f'{name}={value}' for name, value in self.fields.items())])}: {self.outcome}"
+        )
 
     def plain(self) -> dict[str, object]:
         head = {"at": self.at, "time_ns": str(self.time), "viewer": self.viewer, "role": self.role}
@@ -47,18 +61,21 @@ def _short(value: object) -> object:
 
 
 class Audit:
-    """``clock`` gives the wall clock as text; ``sink`` is called with every entry, to keep it elsewhere."""
+    """``clock`` gives the wall clock as text; ``sink`` is the first of `watchers`, to keep entries elsewhere."""
 
     def __init__(self, clock: Callable[[], str], sink: Callable[[Entry], None] = lambda _: None) -> None:
         self._entries: deque[Entry] = deque(maxlen=MOST_ENTRIES)
         self._clock = clock
-        self._sink = sink
+        self.watchers = [sink]
+        """Called with every entry."""
 
     def add(self, viewer: Acting, time: Nanos, do: str, fields: Mapping[str, object], outcome: str) -> None:
         kept = fields if len(str(fields)) <= LONGEST_FIELDS else {name: _short(value) for name, value in fields.items()}
-        entry = Entry(self._clock(), time, str(viewer), viewer.role.title, do, kept, outcome)
+        role = "none" if viewer.role is None else viewer.role.title
+        entry = Entry(self._clock(), time, str(viewer), role, do, kept, outcome)
         self._entries.append(entry)
-        self._sink(entry)
+        for watch in self.watchers:
+            watch(entry)
 
     def last(self, most: int) -> list[Entry]:
         """The newest last."""

@@ -31,6 +31,9 @@ def history(
         int | None, typer.Option("--with", metavar="RUN", help="Compare with this run. Exit code 1: they differ.")
     ] = None,
     events: Annotated[bool, typer.Option("--events", help="Show events instead of values.")] = False,
+    writes: Annotated[
+        bool, typer.Option("--writes", help="Show what programs have written and commanded, and who they are.")
+    ] = False,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Write a file: .csv, .parquet, or a picture, .png or .svg.")
     ] = None,
@@ -51,6 +54,7 @@ def history(
         every=every,
         output=output,
         events=events,
+        writes=writes,
         as_json=json,
     )
     if not show(database, options, typer.echo):

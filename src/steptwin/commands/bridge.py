@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from steptwin.access.audit import Audit
-from steptwin.commands.auditfile import audit_into
+from steptwin.access.audit import Audit, CommandLog
+from steptwin.commands.auditfile import audit_into, wall_clock
 from steptwin.commands.gateways import open_gateways, recording
 from steptwin.commands.keptsettings import keep_settings
 from steptwin.commands.without_world import serve_without_world
@@ -18,7 +18,7 @@ from steptwin.devices.connections import Computer, DeviceConnections
 from steptwin.devices.device import RECONNECT_S, DeviceSurroundings
 from steptwin.errors import LineFailure
 from steptwin.eventloop import result_of
-from steptwin.gateways.contract import CommandLog, PastValues
+from steptwin.gateways.contract import PastValues
 from steptwin.gateways.devicefile import DeviceFile, DeviceSpec, read_device_file
 from steptwin.inputfiles import read_bytes
 from steptwin.later import start
@@ -32,6 +32,7 @@ from steptwin.subject.following import Filter, Following
 from steptwin.subject.jogs import Held
 from steptwin.textcodec import decode
 from steptwin.world.addresses import check_addresses
+from steptwin.world.lines import LineTraffic
 
 
 def bridge(file: Path, *, listen_any: bool, ready_file: Path | None, audit: Path | None = None) -> None:
@@ -63,9 +64,11 @@ async def _open(server: Server, wanted: DeviceFile, file: Path, audit: Audit | N
     server.join(connections)
     for device in wanted.devices:
         await open_device(connections, device.beside(file.parent), server.notice)
-    devices = _Devices(wanted.name, subject)
+    devices = _Devices(wanted.name, subject, connections)
+    if audit is None and wanted.history is not None:
+        audit = Audit(wall_clock)
     devices.audit = recording(audit, now)
-    await open_gateways(server, wanted.gateways, wanted.history, file.parent, devices, listen_any=listen_any)
+    await open_gateways(server, wanted.gateways, wanted.history, file.parent, devices, audit, listen_any=listen_any)
 
 
 async def open_device(connections: DeviceConnections, device: DeviceSpec, notice: Callable[[str], None]) -> None:
@@ -93,11 +96,12 @@ def _no_ports() -> Sequence[dict[str, object]]:
 class _Devices:
     """Devices for gateways. See `steptwin.gateways.contract.GatewaySubject`."""
 
-    def __init__(self, name: str, subject: CompositeSubject) -> None:
+    def __init__(self, name: str, subject: CompositeSubject, connections: DeviceConnections) -> None:
         self.past: PastValues | None = None
         self.audit: CommandLog | None = None
         self._name = name
         self._subject = subject
+        self._connections = connections
 
     @property
     def description(self) -> Description:
@@ -114,6 +118,9 @@ class _Devices:
 
     def follow(self, what: Filter, bound: int) -> Following:
         return self._subject.follow(what, bound)
+
+    def traffic(self) -> Mapping[str, LineTraffic]:
+        return {f"{name}.line": LineTraffic(*counts) for name, counts in self._connections.traffic().items()}
 
     def plans(self, what: Filter) -> list[Event]:
         return self._subject.plans(what)

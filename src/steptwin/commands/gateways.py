@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from steptwin.access.audit import Audit
+from steptwin.access.audit import Audit, CommandLog
 from steptwin.extras import libraries_of, missing
 from steptwin.gateways import make_gateway
-from steptwin.gateways.contract import CommandLog, GatewaySubject, OpenGateway, PastValues
+from steptwin.gateways.contract import GatewaySubject, OpenGateway, PastValues
 from steptwin.live.server import EndPoint, Server
 from steptwin.live.world import LiveWorld
 from steptwin.live.world_control import WorldControl
@@ -21,6 +21,7 @@ from steptwin.subject.following import Filter, Following
 from steptwin.subject.jogs import Held, WorldJogs
 from steptwin.world.gateways import GatewaySpec
 from steptwin.world.historytable import HISTORY, HistorySpec
+from steptwin.world.lines import LineTraffic
 
 if TYPE_CHECKING:
     from steptwin.history.keeper import HistoryKeeper
@@ -39,10 +40,14 @@ async def open_gateways(
     history: HistorySpec | None,
     folder: Path,
     subject: KeptSubject,
+    audit: Audit | None,
     *,
     listen_any: bool,
 ) -> list[OpenGateway]:
-    """Open those of a file in ``folder``. Raises `Misuse` or `LineFailure` for one that cannot be opened."""
+    """Open those of a file in ``folder``. The history keeps what ``audit`` is told.
+
+    Raises `Misuse` or `LineFailure` for one that cannot be opened.
+    """
     opened: list[OpenGateway] = []
     if history is not None:
         keeper = _make_keeper(history, subject, folder)
@@ -50,6 +55,8 @@ async def open_gateways(
         server.join(keeper, EndPoint(HISTORY, str(details["url"]), keeper.protocol, details))
         opened.append(OpenGateway(HISTORY, str(details["url"]), keeper))
         subject.past = keeper.past
+        if audit is not None:
+            audit.watchers.append(keeper.note)
     for spec in specs:
         gateway = make_gateway(spec, subject, folder)
         details = await gateway.open(listen_any=listen_any, notice=server.notice)
@@ -100,6 +107,9 @@ class LiveWorldSubject:
 
     def follow(self, what: Filter, bound: int) -> Following:
         return self._control.follow(what, bound)
+
+    def traffic(self) -> Mapping[str, LineTraffic]:
+        return {name: line.traffic for name, line in self._live.world.lines.items()}
 
     def plans(self, what: Filter) -> list[Event]:
         return self._control.plans(what)

@@ -19,6 +19,8 @@ from steptwin.machine import SECOND
 
 FORMATS = {".csv": "numpy", ".parquet": "pyarrow", ".png": "matplotlib", ".svg": "matplotlib"}
 MOST_LINES = 1000
+WRITTEN = ("write", "command")
+"""Kinds of events."""
 HEAD = ("run", "time", "seconds", "point", "value", "unit")
 
 
@@ -33,6 +35,7 @@ class HistoryOptions:
     every: str | None
     output: Path | None
     events: bool
+    writes: bool
     as_json: bool
 
 
@@ -77,8 +80,8 @@ class _Shown:
         if self._stretch is None:
             self._out(f"{self._past.shown}: nothing has been kept yet")
             return True
-        if options.events:
-            self._events()
+        if options.events or options.writes:
+            self._events(WRITTEN if options.writes else None)
             return True
         if not options.points:
             self._overview()
@@ -141,10 +144,10 @@ class _Shown:
         for name, units in _grouped(points).items():
             self._out(f"  {name}: {', '.join(units)}")
 
-    def _events(self) -> None:
+    def _events(self, kinds: Sequence[str] | None) -> None:
         stretch = self._stretch
         assert stretch is not None  # noqa: S101
-        found = self._past.events(stretch.begin, stretch.end, run=stretch.number, most=MOST_LINES)
+        found = self._past.events(stretch.begin, stretch.end, run=stretch.number, kinds=kinds, most=MOST_LINES)
         if self._options.as_json:
             plain = [{**event._asdict(), "at": event.at.isoformat(), "time": str(event.time)} for event in found]
             self._out(json.dumps(plain, ensure_ascii=False, indent=2))

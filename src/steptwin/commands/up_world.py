@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from steptwin.access.audit import Audit
+from steptwin.commands.auditfile import wall_clock
 from steptwin.commands.gateways import LiveWorldSubject, open_gateways, recording
 from steptwin.errors import Misuse
 from steptwin.files import session as sessions
@@ -281,6 +282,9 @@ async def _open(server: Server, live: LiveWorld, pace: Pace, options: UpOptions,
     name = options.name or live.world.spec.name
     control = WorldControl(server.cell, live, pace, server.announcement)
     server.introduce(name, partial(announced, live.world), options.world)
+    if options.audit is None and live.world.spec.history is not None:
+        options = replace(options, audit=Audit(wall_clock))
+    server.audit = recording(options.audit, lambda: live.world.now)
     if not options.is_closed:
         await _open_for_others(server, live, control, options)
     if options.past:
@@ -291,8 +295,10 @@ async def _open(server: Server, live: LiveWorld, pace: Pace, options: UpOptions,
     if not options.is_closed:
         folder = Path() if options.world is None else options.world.parent
         spec, subject = live.world.spec, LiveWorldSubject(control, live)
-        subject.audit = recording(options.audit, lambda: live.world.now)
-        opened = await open_gateways(server, spec.gateways, spec.history, folder, subject, listen_any=options.listen_any)
+        subject.audit = server.audit
+        opened = await open_gateways(
+            server, spec.gateways, spec.history, folder, subject, options.audit, listen_any=options.listen_any
+        )
         running.gateways.extend(opened)
     if options.ready_file is not None:
         server.write_ready_file(options.ready_file)
@@ -317,7 +323,8 @@ async def _open_line(server: Server, live: LiveWorld, line: LineSpec, options: U
 
     on = "" if len(live.world.spec.lines) == 1 else f", {line.name}"
     links = line_kinds()[line.kind].opened_by
-    how = {"listen_any": options.listen_any, "tls": line.tls, "folder": Path() if options.world is None else options.world.parent}
+    folder = Path() if options.world is None else options.world.parent
+    how = {"listen_any": options.listen_any, "tls": line.tls, "folder": folder}
     for key, where in line.links.items():
         link, transport = links[key], TRANSPORTS[key]
         make_port = maker(link, several=transport.has_several)

@@ -10,7 +10,7 @@ from typing import Any
 
 from steptwin.devices.composite import CompositeSubject
 from steptwin.devices.device import ConnectedDevice, DeviceSurroundings
-from steptwin.drivers.exchange import NoAnswer
+from steptwin.drivers.exchange import ExchangeCounts, NoAnswer
 from steptwin.drivers.kind import DeviceAddress
 from steptwin.drivers.kinds import DRIVERS, others_there
 from steptwin.drivers.line import DriverLine
@@ -79,6 +79,10 @@ class DeviceConnections:
 
     def shadow_of(self, machine: str, after: Nanos) -> Mapping[str, object] | None:
         return self._connected(machine).device.shadow_state(after)
+
+    def traffic(self) -> dict[str, ExchangeCounts]:
+        """What has been sent over the line of each device, by the name of the device."""
+        return {name: self._lines[one.key].line.counts for name, one in self._devices.items()}
 
     def _connected(self, machine: str) -> _Connected:
         """Raises `Misuse`."""

@@ -50,6 +50,13 @@ class SendNext(NamedTuple):
     may_wait: bool
 
 
+class ExchangeCounts(NamedTuple):
+    """Of a line since it was made: ``requests`` that were sent, also again, and ``errors``: those that were refused or failed."""
+
+    requests: int
+    errors: int
+
+
 class Discipline(Protocol[Q_contra, A_co]):
     """The protocol of a line: encoding of requests, matching of answers, resynchronisation."""
 
@@ -221,9 +228,11 @@ class Exchanger(Generic[Q, A]):
         "_current",
         "_deadline",
         "_due",
+        "_errors",
         "_interval_ns",
         "_more",
         "_next",
+        "_requests",
         "_urgent",
         "_waiting",
         "discipline",
@@ -241,6 +250,11 @@ class Exchanger(Generic[Q, A]):
         self._deadline: Nanos  # of the current exchange
         self._due: Nanos | None = None  # when the next one may begin
         self._next: dict[Hashable, Nanos] = {}  # when a device may be asked again
+        self._requests = self._errors = 0
+
+    @property
+    def counts(self) -> ExchangeCounts:
+        return ExchangeCounts(self._requests, self._errors)
 
     @property
     def in_flight(self) -> bool:
@@ -301,6 +315,7 @@ class Exchanger(Generic[Q, A]):
         if job is None:
             return b""
         request = job.request
+        self._requests += 1
         data = self.discipline.start(request, now, urgent=job.urgent)
         self._current = job
         self._sent(job, now)
@@ -359,6 +374,7 @@ class Exchanger(Generic[Q, A]):
 
     def _missed(self, job: Job[Q, A], error: LineFailure) -> None:
         """Handle a failed attempt: repeat it before jobs of the same rank, or give up."""
+        self._errors += 1
         job.attempts += 1
         job.missed = error
         if job.done:
@@ -383,6 +399,7 @@ class Exchanger(Generic[Q, A]):
         except LineLost:
             raise
         except (Refusal, LineFailure) as error:
+            self._errors += 1
             self._current = None
             if not job.done:
                 job.fail(error)

@@ -9,7 +9,7 @@ from collections.abc import Callable, Hashable
 from contextlib import AbstractAsyncContextManager
 from typing import Any, Protocol
 
-from steptwin.drivers.exchange import A, Job, Q
+from steptwin.drivers.exchange import A, ExchangeCounts, Job, Q
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 
@@ -31,6 +31,11 @@ class DriverLine(Protocol[Q, A]):
     @property
     def place(self) -> str:
         """The address as text."""
+        ...
+
+    @property
+    def counts(self) -> ExchangeCounts:
+        """What has been sent over it."""
         ...
 
     async def open(self) -> None:

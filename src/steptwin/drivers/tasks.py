@@ -8,7 +8,7 @@ from contextlib import AbstractAsyncContextManager
 from types import TracebackType
 from typing import Any, Generic, Self, cast
 
-from steptwin.drivers.exchange import A, Exchanger, Job, LineLost, Q
+from steptwin.drivers.exchange import A, ExchangeCounts, Exchanger, Job, LineLost, Q
 from steptwin.drivers.line import LOCK_SLICE_S
 from steptwin.drivers.tcp import Endpoint
 from steptwin.errors import Misuse
@@ -39,6 +39,10 @@ class TaskLine(Generic[Q, A]):
     @property
     def place(self) -> str:
         return str(self._endpoint)
+
+    @property
+    def counts(self) -> ExchangeCounts:
+        return self._engine.counts
 
     def now(self) -> Nanos:
         return round(self._running().time() * SECOND)

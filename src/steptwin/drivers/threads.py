@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Hashable, Mapping
 from typing import Any, Generic
 
-from steptwin.drivers.exchange import A, Exchanger, Job, LineLost, Q
+from steptwin.drivers.exchange import A, ExchangeCounts, Exchanger, Job, LineLost, Q
 from steptwin.drivers.line import LOCK_SLICE_S
 from steptwin.drivers.tcp import Channel, Endpoint
 from steptwin.errors import Misuse
@@ -47,6 +47,10 @@ class ThreadLine(Generic[Q, A]):
     @property
     def place(self) -> str:
         return str(self._endpoint)
+
+    @property
+    def counts(self) -> ExchangeCounts:
+        return self._engine.counts
 
     async def open(self) -> None:
         with self._changed:

@@ -6,12 +6,13 @@ from collections.abc import Callable, Mapping
 from datetime import datetime
 from typing import NamedTuple, Protocol
 
-from steptwin.access.audit import Acting
+from steptwin.access.audit import CommandLog
 from steptwin.subject.commands import Command, Jog
 from steptwin.subject.contract import Description, Reading, Result
 from steptwin.subject.events import Event
 from steptwin.subject.following import Filter, Following
 from steptwin.subject.jogs import Held
+from steptwin.world.lines import LineTraffic
 
 
 class PastValue(NamedTuple):
@@ -29,12 +30,6 @@ class OpenGateway(NamedTuple):
     place: str
     """Its address for people."""
     gateway: Gateway
-
-
-class CommandLog(Protocol):
-    """The audit log (`steptwin.access.audit`) at the present moment of a subject."""
-
-    def __call__(self, who: Acting, do: str, fields: Mapping[str, object], outcome: str, /) -> None: ...
 
 
 class PastValues(Protocol):
@@ -77,6 +72,10 @@ class GatewaySubject(Protocol):
         ...
 
     def follow(self, what: Filter, bound: int) -> Following: ...
+
+    def traffic(self) -> Mapping[str, LineTraffic]:
+        """What has been sent over each line, by its name; of a device by ``NAME.line``."""
+        ...
 
     def plans(self, what: Filter) -> list[Event]:
         """The present plans of the axes of twins that ``what`` selects."""

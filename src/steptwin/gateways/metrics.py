@@ -58,6 +58,7 @@ class Metrics:
             *_of_controllers(known),
             *_of_axes(known),
             *self._events(),
+            *self._lines(),
         ]
 
     async def _state(self, machine: str) -> Mapping[str, Any] | None:
@@ -84,6 +85,15 @@ class Metrics:
         for labels, count in sorted(self._counts.items()):
             counted.add_metric(labels, count)
         return [counted, CounterMetricFamily(f"{PREFIX}events_missed", "Events that were not counted.", value=self._missed)]
+
+    def _lines(self) -> list[Metric]:
+        traffic = self._subject.traffic()
+        requests = CounterMetricFamily(f"{PREFIX}line_requests", "Requests that programs have sent.", labels=("line",))
+        errors = CounterMetricFamily(f"{PREFIX}line_errors", "Those that were refused, lost or not answered.", labels=("line",))
+        for line, counts in traffic.items():
+            requests.add_metric((line,), counts.requests)
+            errors.add_metric((line,), counts.errors)
+        return [requests, errors]
 
 
 def _of_controllers(states: Mapping[str, Mapping[str, Any]]) -> list[Metric]:

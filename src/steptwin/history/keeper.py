@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
+from steptwin.access.audit import Entry
 from steptwin.errors import LineFailure, SteptwinError
 from steptwin.gateways.contract import GatewayState, GatewaySubject
 from steptwin.gateways.points import registers_by_machine
@@ -92,6 +93,11 @@ class HistoryKeeper:
             self._notice(f"history: nothing is kept: {why} ({self._folder})")
             self._has_room = False
         return lost
+
+    def note(self, entry: Entry) -> None:
+        """Keep a command that the audit log has been told."""
+        if self._recorder is not None:
+            self._recorder.note(entry)
 
     @property
     def url(self) -> str:

@@ -328,14 +328,17 @@ class HistoryDatabase:
         *,
         run: int | None = None,
         machine: str | None = None,
+        kinds: Sequence[str] | None = None,
         most: int | None = None,
     ) -> list[KeptEvent]:
-        """In order of time; the last ``most`` of them."""
+        """In order of time; the last ``most`` of them. ``kinds``: only these, such as ``write`` and ``command``."""
         e = EVENT.c
         wanted = select(e.run_id, e.at_us, e.t_ns, e.machine, e.kind, e.text, e.number, e.cause, e.content)
         for condition, column in ((run, e.run_id), (machine, e.machine)):
             if condition is not None:
                 wanted = wanted.where(column == condition)
+        if kinds is not None:
+            wanted = wanted.where(e.kind.in_(kinds))
         wanted = self._bounds(begin, end, run).within(wanted, EVENT)
         rows = self._rows(wanted.order_by(e.at_us.desc(), e.id.desc()).limit(most))
         return [

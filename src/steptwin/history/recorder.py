@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import uuid
 from collections.abc import Callable, Iterable, Mapping
+from operator import itemgetter
 from typing import NamedTuple
 
+from steptwin.access.audit import Entry
 from steptwin.gateways.contract import GatewaySubject
 from steptwin.gateways.points import CLOCK, CLOCK_POINTS, GatewayPoint, PointType, PointValue, points_of
 from steptwin.gateways.sampling import Sample, Sampler
@@ -20,7 +22,7 @@ from steptwin.subject.payloads import SHOWN_KINDS, CoordinatePayload, EdgePayloa
 
 MOST_EVENTS = 100_000
 """Between two looks."""
-TWIN_KINDS = SHOWN_KINDS | {"plan", "coordinate", "edge"}
+TWIN_KINDS = SHOWN_KINDS | {"plan", "coordinate", "edge", "write"}
 REST_NS: Nanos = SECOND
 """Twins whose events tell most of it are looked at so often without one."""
 ALIVE_US = 60_000_000
@@ -28,6 +30,15 @@ ALIVE_US = 60_000_000
 FROM_PLANS = ("position", "velocity", "moving")
 PASSING = ("program.line", "program.statement", "virtual_time")
 """Too quick to be looked at now and then."""
+LINES, COMMAND = "lines", "command"
+TRAFFIC_POINTS = tuple(
+    GatewayPoint(path=(name,), meaning=meaning, type=PointType.WHOLE, read=itemgetter(name))
+    for name, meaning in (
+        ("requests", "Requests of programs, or lines of characters, since the line was opened."),
+        ("errors", "Those that were answered with an exception, lost, or not answered."),
+        ("unframed", "Bytes that belonged to no frame."),
+    )
+)
 SHARED_CLOCK_POINTS = tuple(point for point in CLOCK_POINTS if point.name not in PASSING)
 
 
@@ -69,6 +80,7 @@ class Recorder:
         self._pins: dict[tuple[str, str], int] = {}
         for part in self._machines.values():
             self._add_machine(part, registers.get(part.name, ()))
+        self._traffic = {line: self._add(line, TRAFFIC_POINTS) for line in subject.traffic()}
         self._last: dict[int, _Last] = {}
         self._plans: dict[tuple[str, str], tuple[str, int]] = {}
         """Plan and origin of axes."""
@@ -137,6 +149,7 @@ class Recorder:
 
     async def _take_all(self, now: Nanos, wall: int) -> None:
         """All values of all machines, also levels, of which events tell."""
+        self._take_traffic(now, wall)
         for name in self._machines:
             sample = await self._sampler.take(name)
             self._take_sample(sample, now, wall)
@@ -170,6 +183,8 @@ class Recorder:
         self._take_sample(clock, now, wall)
         if missed or found:
             await self._take_all(now, wall)
+        if not 0 <= now - self._looked.get(LINES, -REST_NS) < REST_NS:
+            self._take_traffic(now, wall)
         await self._take_changed(events, now, wall)
         self._looked_at = now, wall
         return [*found, *self._full(now, wall)]
@@ -181,6 +196,12 @@ class Recorder:
         for name in self._due(events, now):
             self._take_sample(await self._sampler.take(name), now, wall)
 
+    def note(self, entry: Entry) -> None:
+        """Keep a command, with who gave it and what became of it."""
+        content = json.dumps(entry.plain(), ensure_ascii=False, separators=(",", ":"))
+        machine = str(entry.fields.get("machine") or "")
+        self._batch.events.append(EventRow(entry.time, self._wall_us(), 0, machine, COMMAND, None, str(entry), content))
+
     def lost(self, batches: Iterable[RowBatch]) -> None:
         """These could not be kept: say so in the next one."""
         rows = sum(map(len, batches))
@@ -188,6 +209,7 @@ class Recorder:
 
     def end(self) -> RowBatch:
         """The last batch of the run, up to the last look."""
+        self._take_traffic(*self._looked_at)
         self._batch.is_last = True
         self._batch.time, self._batch.at_us = self._looked_at
         return self._batch
@@ -232,7 +254,7 @@ class Recorder:
             case EdgePayload(pin, level):
                 if (event.machine, pin) in self._pins:
                     self._keep(self._pins[event.machine, pin], time, at_us, level, is_stepwise=True)
-            case payload if event.is_shown:
+            case payload if event.is_shown or event.kind == "write":
                 content = json.dumps(payload.plain(), separators=(",", ":"))
                 row = EventRow(time, at_us, event.number, event.machine, event.kind, event.cause, event.text, content)
                 self._batch.events.append(row)
@@ -257,6 +279,13 @@ class Recorder:
             value = None if sample.state is None else point.read(sample.state)
             stepwise = point.type is not PointType.NUMBER
             self._keep(number, now, wall, _kept(value), is_stepwise=stepwise)
+
+    def _take_traffic(self, now: Nanos, wall: int) -> None:
+        self._looked[LINES] = now
+        for line, traffic in self._subject.traffic().items():
+            counts = traffic._asdict()
+            for number, point in self._traffic.get(line, ()):
+                self._keep(number, now, wall, _kept(point.read(counts)), is_stepwise=True)
 
     def _keep(self, number: int, time: Nanos, at_us: int, value: KeptValue, *, is_stepwise: bool) -> None:
         """Keep a value that is another one; of a number that is measured now and then also where it was before, because it

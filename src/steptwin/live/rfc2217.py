@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from steptwin.machine import Nanos, Port, SendingPort
+from steptwin.machine import Nanos, Port, SendingPort, SourcedPort
 
 IAC, DONT, DO, WONT, WILL, SB, SE = 255, 254, 253, 252, 251, 250, 240
 BINARY, SUPPRESS_GO_AHEAD, COM_PORT = 0, 3, 44
@@ -191,6 +191,10 @@ class Rfc2217Port:
         self._telnet = Telnet(line.baud())
         self._reported = ""
         """The settings of the last event."""
+
+    def used_by(self, source: str) -> None:
+        if isinstance(self._port, SourcedPort):
+            self._port.used_by(source)
 
     @property
     def broken(self) -> str | None:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from steptwin.access.audit import CommandLog
 from steptwin.errors import LineFailure, Misuse, SteptwinError
 from steptwin.inputfiles import read_bytes
 from steptwin.live.cell import Cell
@@ -68,6 +69,8 @@ class Server:
 
     def __init__(self, cell: Cell, show: Callable[[str], None]) -> None:
         self.cell = cell
+        self.audit: CommandLog | None = None
+        """Records what clients write that prove who they are; of links that are opened from then on."""
         self.end_points: list[EndPoint] = []
         self._show = show
         self._reported: dict[str, float] = {}
@@ -123,6 +126,8 @@ class Server:
                 listen_any=listen_any,
                 tls=tls,
                 folder=folder,
+                audit=self.audit,
+                line_name=line or "",
             )
         )
         self._links.append(opened.link)

@@ -12,7 +12,7 @@ from weakref import WeakSet
 from steptwin.live.cell import Cell
 from steptwin.live.clients import BACKLOG, Clients, set_up
 from steptwin.live.links import SLICE_BYTES, Feed
-from steptwin.machine import Port
+from steptwin.machine import Port, SourcedPort
 from steptwin.world.addresses import Address
 
 
@@ -82,6 +82,8 @@ class AsyncioConnection(asyncio.Protocol):
             set_up(transport.get_extra_info("socket"))
         host, port, *_ = transport.get_extra_info("peername") or ("unknown", 0)
         self._peer = Address(host, port)
+        if isinstance(self.port, SourcedPort):
+            self.port.used_by(str(self._peer))
         self._is_open = True
 
     def data_received(self, data: bytes) -> None:

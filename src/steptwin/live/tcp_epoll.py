@@ -12,7 +12,7 @@ from steptwin.live.cell import Cell
 from steptwin.live.clients import RETRY_S, Clients
 from steptwin.live.descriptors import descriptors
 from steptwin.live.links import SLICE_BYTES, Feed
-from steptwin.machine import Port
+from steptwin.machine import Port, SourcedPort
 from steptwin.system import reason
 from steptwin.world.addresses import Address
 
@@ -47,6 +47,8 @@ class EpollConnection:
         self._unsent = b""
         self._ending = False
         self._feed = Feed(cell, port, self)
+        if isinstance(port, SourcedPort):
+            port.used_by(str(peer))
         self._descriptors = descriptors()
         self._descriptors.await_input(client.fileno(), self._serve)
         clients.present.add(self)

@@ -336,6 +336,10 @@ class PlacePort:
             self._live.stale = True
             self._connected()
 
+    def used_by(self, source: str) -> None:
+        """See `steptwin.machine.SourcedPort`."""
+        self._live.subject.sources[self.line, self._name] = source
+
     def _connected(self) -> LineEndPoint:
         place = self._line.connect(self._name, self._kind)
         place.on_output = self._came
@@ -411,4 +415,5 @@ class PlacePort:
 
     def close(self) -> None:
         self._live.ports.discard(self)
+        self._live.subject.sources.pop((self.line, self._name), None)
         self._live.apply_input(Leave(self._line.name, self._name))

@@ -14,6 +14,7 @@ from steptwin.machine import Nanos
 from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection
 
+UPLOAD = "U"
 LONGEST_LINE = 256
 """More characters than this without CR are logged as an incomplete line."""
 UPLOADS_WAITING = 1000
@@ -90,6 +91,12 @@ def _typed(raw: bytes, variant: Variant) -> str:
     if found:
         return f"{text}  {found[0].message}"
     return "a comment" if line.comment is not None else "an empty line"
+
+
+def changes_nothing(raw: bytes) -> bool:
+    """Whether a line that a host has sent asks for a byte only, or is empty or a comment."""
+    line, found = parse_line(raw.decode("latin-1").strip())
+    return (line.command is None and not found) or (line.command is not None and line.command.key == UPLOAD)
 
 
 def in_words(command: ChipCommand, variant: Variant) -> str:

@@ -39,6 +39,10 @@ class FrameLog:
 
         return observe
 
+    def request(self, unit: int, pdu: bytes, *, tcp: bool) -> str:
+        """A request in words."""
+        return self._meaning(unit, pdu, FrameDirection.IN, {}, tcp=tcp)
+
     def unframed(self, now: Nanos, link: str, count: int) -> None:
         """Log received bytes that belong to no frame."""
         words = "1 byte that belongs to no frame" if count == 1 else f"{count} bytes that belong to no frame"

@@ -34,6 +34,7 @@ from steptwin.subject.payloads import (
     StatementPayload,
     StatusPayload,
     StoppedPayload,
+    WritePayload,
     is_shown,
 )
 from steptwin.tables import complete
@@ -174,6 +175,7 @@ _READ: Mapping[str, Callable[[Mapping[str, Any]], Payload]] = complete(
         "free": lambda data: FreePayload(data["axis"], read_plan(data["plan"])),
         "edge": lambda data: EdgePayload(data["pin"], data["level"]),
         "frame": lambda data: FramePayload(data["client"], data["direction"], bytes.fromhex(data["data"]), data["words"]),
+        "write": lambda data: WritePayload(data["client"], data["source"], data["words"], data["outcome"]),
         "statement": lambda data: StatementPayload(data["program"], data["line"]),
         "status": lambda data: StatusPayload(data["code"], data["text"], tuple(data["facts"].items())),
         "note": lambda data: NotePayload(data["note"]),

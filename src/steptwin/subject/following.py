@@ -10,9 +10,9 @@ from typing import NamedTuple
 from steptwin.subject.events import Event
 from steptwin.subject.payloads import KINDS
 
-USUAL = frozenset(KINDS) - {"frame", "statement", "stopped", "log", "breakpoints"}
-"""What is followed where no kinds are named: frames are as frequent as requests, statements as milliseconds; a debugger is there
-for followers that name its events."""
+USUAL = frozenset(KINDS) - {"frame", "write", "statement", "stopped", "log", "breakpoints"}
+"""What is followed where no kinds are named: frames and writes are as frequent as requests, statements as milliseconds; a
+debugger is there for followers that name its events."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -142,6 +142,29 @@ class FramePayload:
 
 
 @dataclass(frozen=True, slots=True)
+class WritePayload:
+    """A request of a program on a line that is no read, or a line of characters that a host has sent to M1486 chips.
+
+    ``client``: its place on the line; ``source``: who is there: an address, the owner of a certificate; ``script`` for scripts
+    and commands of the world, ``pty`` for a pseudo terminal. ``outcome``: ``done``, ``refusal``; empty where there is no answer.
+    """
+
+    kind: ClassVar[str] = "write"
+    axis: ClassVar[None] = None
+    client: str
+    source: str
+    words: str
+    outcome: str
+
+    @property
+    def text(self) -> str:
+        return f"{self.source}: {self.words}{' (refused)' if self.outcome == 'refusal' else ''}"
+
+    def plain(self) -> dict[str, object]:
+        return {"client": self.client, "source": self.source, "words": self.words, "outcome": self.outcome}
+
+
+@dataclass(frozen=True, slots=True)
 class StatementPayload:
     """A program executes the statement in a line of its source."""
 
@@ -381,6 +404,7 @@ Payload: TypeAlias = (
     | FreePayload
     | EdgePayload
     | FramePayload
+    | WritePayload
     | StatementPayload
     | StatusPayload
     | NotePayload

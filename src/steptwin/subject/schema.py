@@ -73,6 +73,12 @@ _PAYLOADS: Mapping[str, Mapping[str, object]] = complete(
             "data": {**_TEXT, "description": "Hexadecimal; empty for bytes that belong to no frame."},
             "words": {**_TEXT, "description": "Its meaning."},
         },
+        "write": {
+            "client": {**_TEXT, "description": "Its place on the line."},
+            "source": {**_TEXT, "description": "Who is there: an address, the owner of a certificate, a path, or script."},
+            "words": {**_TEXT, "description": "What was written."},
+            "outcome": {"enum": ["done", "refusal", ""], "description": "Empty where there is no answer."},
+        },
         "statement": {"program": _TEXT, "line": _WHOLE},
         "status": {"code": _TEXT, "axis": _TEXT_OR_NULL, "facts": {"type": "object"}},
         "note": {"note": _TEXT},

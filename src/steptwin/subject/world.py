@@ -16,7 +16,7 @@ from steptwin.subject.describe import describe
 from steptwin.subject.dispatch import Action, Dispatcher
 from steptwin.subject.events import Event, Numbering, payload_of
 from steptwin.subject.following import Filter, Followers, Following, filter_of
-from steptwin.subject.payloads import FramePayload, PacePayload, Payload, PlanPayload, RestoredPayload
+from steptwin.subject.payloads import FramePayload, PacePayload, Payload, PlanPayload, RestoredPayload, WritePayload
 from steptwin.subject.snapshots import Snapshots
 from steptwin.subject.time import advance
 from steptwin.wire.frameline import FrameLine
@@ -27,7 +27,7 @@ from steptwin.world.elements import failing
 from steptwin.world.faults.kinds import rows
 from steptwin.world.heldjog import HeldJog
 from steptwin.world.kinds import line_kinds
-from steptwin.world.lines import LineWords
+from steptwin.world.lines import LineWords, LineWrite
 from steptwin.world.motions import ordered
 from steptwin.world.plant import WORLD, Plant
 from steptwin.world.plantsnapshot import PlantSnapshot
@@ -55,7 +55,12 @@ class WorldSubject:
         """Called when other kinds of events are followed than before."""
         self.snapshots = Snapshots()
         self.dispatcher = Dispatcher(self._actions(), self._begin, self._end)
+        self.sources: dict[tuple[str, str], str] = {}
+        """Who is at a place of a line, for writes; a place that is not named here stands for itself."""
         self._words: dict[str, LineWords] = {}
+        self._writes: list[Callable[[], None]] = []
+        """What ends the observation of writes; empty while they are not followed."""
+        self._machine_of = {(line.name, unit): name for name, (line, unit) in world.parts.line_of.items()}
         self._is_watching = False
         self._statements: StatementFollower | None = None
 
@@ -267,6 +272,7 @@ class WorldSubject:
             else:
                 self._statements.close()
                 self._statements = None
+        self._follow_writes(is_wanted="write" in self.followers.kinds)
         wanted = "frame" in self.followers.kinds
         if wanted is bool(self._words):
             return
@@ -277,6 +283,23 @@ class WorldSubject:
                 line.follow_frames(self._words[line.name])
             else:
                 line.unfollow_frames(self._words.pop(line.name))
+
+    def _follow_writes(self, *, is_wanted: bool) -> None:
+        if is_wanted is bool(self._writes):
+            return
+        for end in self._writes:
+            end()
+        self._writes.clear()
+        for spec in self.world.spec.lines if is_wanted else ():
+            writes = line_kinds()[spec.kind].writes
+            if writes is not None:
+                self._writes.append(writes(self.world.lines[spec.name], partial(self._written, spec.name)))
+
+    def _written(self, line: str, seen: LineWrite) -> None:
+        machines = [self._machine_of[line, unit] for unit in seen.units]
+        source = self.sources.get((line, seen.place), seen.place)
+        payload = WritePayload(seen.place, source, seen.words, seen.outcome)
+        self.publish(seen.time, machines[0] if len(machines) == 1 else line, payload)
 
     def _framed(self, line: str, frame: FrameLine) -> None:
         self.publish(frame.time, line, FramePayload(frame.link, frame.direction.value, frame.raw, frame.meaning))

@@ -17,7 +17,7 @@ from steptwin.machine import Nanos
 from steptwin.state import Plain, Stateful
 from steptwin.wire import mbap, rtu
 from steptwin.wire.crc import with_crc
-from steptwin.wire.pdu import DEVICE_BUSY, GATEWAY_TARGET_FAILED, REFUSED, exception_pdu
+from steptwin.wire.pdu import DEVICE_BUSY, GATEWAY_TARGET_FAILED, READS, REFUSED, exception_pdu
 from steptwin.wire.slave import FrameDirection, FrameObserver, SlavePort, tcp_response
 from steptwin.wire.timed import TimedUnits
 
@@ -93,7 +93,10 @@ class ModbusGateway(Stateful):
         self._free = moment
         for unit in request.units:
             response = self.units.devices[unit].execute(request.pdu, now)
-            if not port.is_broadcast(request.raw):
+            is_answered = not port.is_broadcast(request.raw)
+            if port.on_write is not None and request.pdu[0] not in READS:
+                port.on_write(moment, unit, request.pdu, response if is_answered else b"")
+            if is_answered:
                 self._free = moment + timing.turnaround_ns + timing.line.duration(len(response) + RTU_BYTES)
                 port.respond(request.raw, response, self._free)
             self.units.done(unit, moment, self._free)

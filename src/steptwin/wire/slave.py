@@ -41,6 +41,10 @@ class FrameDirection(enum.Enum):
 FrameObserver: TypeAlias = Callable[[Nanos, FrameDirection, bytes], None]
 """Called with the moment, the direction and the bytes of every whole frame on the wire, also of foreign units and broadcasts."""
 
+WriteObserver: TypeAlias = Callable[[Nanos, int, bytes, bytes], None]
+"""Called with the moment, the unit, the request PDU and the response PDU of every request that was executed and is no read. Unit
+0 is a broadcast, whose response PDU is empty."""
+
 PauseObserver: TypeAlias = Callable[[int, Nanos], None]
 """Called after a request with a pause of more than 750 µs, for which the device drops a frame (MIC-15): with its unit
 (0: broadcast) and the pause, ns."""
@@ -52,11 +56,12 @@ PAUSE_REPORT_NS: Nanos = SECOND
 class SlavePort(Stateful):
     """Base of the ports with devices behind them."""
 
-    __slots__ = ("exceptions", "on_frame", "requests")
-    FIXED = frozenset({"exceptions", "on_frame", "requests"})
+    __slots__ = ("exceptions", "on_frame", "on_write", "requests")
+    FIXED = frozenset({"exceptions", "on_frame", "on_write", "requests"})
 
     def __init__(self, on_frame: FrameObserver | None) -> None:
         self.on_frame = on_frame
+        self.on_write: WriteObserver | None = None
         self.requests = 0
         """Number of whole requests received so far, also of foreign units. Counters are no state: a restore leaves them."""
         self.exceptions = 0
@@ -89,7 +94,9 @@ def check_units(devices: Mapping[int, SlaveDevice]) -> None:
             raise Misuse(f"unit {unit} is outside 1 to {rtu.MAX_UNIT}")
 
 
-def execute_frame(devices: Mapping[int, SlaveDevice], frame: rtu.RtuFrame, now: Nanos) -> bytes:
+def execute_frame(
+    devices: Mapping[int, SlaveDevice], frame: rtu.RtuFrame, now: Nanos, on_write: WriteObserver | None = None
+) -> bytes:
     """Execute an RTU frame on the devices to which it is addressed; returns the response frame, empty if there is none.
 
     Foreign units and function codes that no request can have are ignored (MIC-1). A broadcast write is executed by every
@@ -101,11 +108,16 @@ def execute_frame(devices: Mapping[int, SlaveDevice], frame: rtu.RtuFrame, now: 
         return b""
     if unit == rtu.BROADCAST:
         broadcast(devices.values(), raw[1:-2], now)
+        if on_write is not None and function in WRITES:
+            on_write(now, unit, raw[1:-2], b"")
         return b""
     device = devices.get(unit)
     if device is None:
         return b""
-    return with_crc(raw[:1] + device.execute(raw[1:-2], now))
+    response = device.execute(raw[1:-2], now)
+    if on_write is not None and function not in READS:
+        on_write(now, unit, raw[1:-2], response)
+    return with_crc(raw[:1] + response)
 
 
 def broadcast(devices: Iterable[SlaveDevice], pdu: bytes, now: Nanos) -> None:
@@ -188,6 +200,8 @@ class RtuSlavePort(SlavePort):
                     self.requests += 1
                     if response[1] >= REFUSED:
                         self.exceptions += 1
+                    if self.on_write is not None and function not in READS:
+                        self.on_write(now, data[0], data[1:-2], response[1:])
                     response += crc16(response).to_bytes(2, "little")
                     if self.on_frame is not None:
                         self.on_frame(now, FrameDirection.IN, data)
@@ -199,7 +213,7 @@ class RtuSlavePort(SlavePort):
     def _execute(self, frames: list[rtu.RtuFrame], now: Nanos) -> bytes:
         responses = []
         for frame in frames:
-            response = execute_frame(self._devices, frame, now)
+            response = execute_frame(self._devices, frame, now, self.on_write)
             self.requests += 1
             if response and response[1] >= REFUSED:
                 self.exceptions += 1
@@ -252,7 +266,7 @@ class TcpSlavePort(SlavePort):
         framer = self._framer
         if data[2:6] == _HEADERS.get(len(data)) and not framer.held and not framer.broken:
             device = self._devices.get(data[6])
-            if device is not None and self.on_frame is None:
+            if device is not None and self.on_frame is None and (self.on_write is None or data[7] in READS):
                 pdu = device.execute(data[7:], now)
                 self.requests += 1
                 if pdu[0] >= REFUSED:
@@ -266,10 +280,15 @@ class TcpSlavePort(SlavePort):
         unit, pdu = raw[6], raw[7:]
         device = self._devices.get(unit)
         if device is not None:
-            response = tcp_response(raw, device.execute(pdu, now))
+            answer = device.execute(pdu, now)
+            response = tcp_response(raw, answer)
+            if self.on_write is not None and pdu[0] not in READS:
+                self.on_write(now, unit, pdu, answer)
         elif unit == rtu.BROADCAST:
             broadcast(self._devices.values(), pdu, now)
             response = b""
+            if self.on_write is not None and pdu[0] in WRITES:
+                self.on_write(now, unit, pdu, b"")
         else:
             response = tcp_response(raw, exception_pdu(pdu[0], GATEWAY_TARGET_FAILED))
         self.requests += 1

@@ -17,7 +17,7 @@ from steptwin.state import Stateful
 from steptwin.wire import rtu
 from steptwin.wire.crc import with_crc
 from steptwin.wire.line import CharacterClock, SerialLine
-from steptwin.wire.pdu import REFUSED, WRITES
+from steptwin.wire.pdu import READS, REFUSED, WRITES
 from steptwin.wire.slave import FrameDirection, FrameObserver, PauseObserver, PauseReports, SlaveDevice, SlavePort, check_units
 
 # MIC-32: the highest rate the manual gives.
@@ -214,7 +214,10 @@ class TimedRtuSlavePort(SlavePort):
                 self._executing.append((self._units.take(unit, moment), unit, frame))
 
     def _execute(self, moment: Nanos, unit: int, frame: rtu.RtuFrame, now: Nanos) -> None:
-        response = with_crc(frame.raw[:1] + self._units.devices[unit].execute(frame.pdu, now))
+        answer = self._units.devices[unit].execute(frame.pdu, now)
+        if self.on_write is not None and frame.pdu[0] not in READS:
+            self.on_write(moment, unit, frame.pdu, b"" if frame.unit == rtu.BROADCAST else answer)
+        response = with_crc(frame.raw[:1] + answer)
         sent = moment
         if frame.unit != rtu.BROADCAST:
             sent = self._outgoing.send(len(response), moment + self._units.timing.turnaround_ns)

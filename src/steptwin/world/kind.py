@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from steptwin.world.faults import AxisLoad, Body, Faults
     from steptwin.world.heldjog import HeldJog
     from steptwin.world.lanes import AxisLane
-    from steptwin.world.lines import Line, LineWords
+    from steptwin.world.lines import Line, LineWords, LineWrite
     from steptwin.world.plant import Plant
     from steptwin.world.programs import Programs
     from steptwin.world.programtexts import Destination, Downloading, ProgramText, TextLanguage
@@ -309,6 +309,9 @@ class LineKind:
     """The line with its members, at least one. Raises `Misuse` if they do not fit together."""
     words: Callable[[Any, str, Callable[[FrameLine], None]], LineWords]
     """What goes over a line that was made, in words for a function; the text is put before the name of a place."""
+    writes: Callable[[Any, Callable[[LineWrite], None]], Callable[[], None]] | None = None
+    """Calls a function with what programs write over a line, until the returned function is called; None where that is not told
+    from reads."""
 
     @property
     def opened_by(self) -> Mapping[str, LinkKind]:

@@ -53,6 +53,19 @@ class LineTraffic(NamedTuple):
         return LineTraffic(self.requests + other.requests, self.errors + other.errors, self.unframed + other.unframed)
 
 
+class LineWrite(NamedTuple):
+    """What a program has sent that is no read. ``units``: the controllers that it addresses; empty where that is not known.
+
+    ``outcome``: ``done``, ``refusal``; empty where there is no answer.
+    """
+
+    time: Nanos
+    place: str
+    units: tuple[int, ...]
+    words: str
+    outcome: str
+
+
 class LineWords(FrameFollower, Protocol):
     """Decodes the traffic of a line into text."""
 

@@ -6,6 +6,7 @@ from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from steptwin.access.audit import CommandLog
 from steptwin.live.cell import Cell
 from steptwin.live.clients import Clients
 from steptwin.live.links import Link
@@ -33,6 +34,9 @@ class LinkArguments:
     tls: TlsFiles | None = None
     """Certificates, for those that encrypt; relative to ``folder``."""
     folder: Path = Path()
+    audit: CommandLog | None = None
+    """Records the writes of clients that prove who they are."""
+    line_name: str = ""
 
 
 @dataclass(frozen=True, slots=True)

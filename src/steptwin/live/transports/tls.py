@@ -5,8 +5,9 @@ from __future__ import annotations
 import asyncio
 import ssl
 from collections.abc import Callable
+from contextvars import ContextVar
 from pathlib import Path
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple, cast
 from weakref import WeakSet
 
 from steptwin.access.modbusroles import ROLE_OID, may_ask, role_of
@@ -17,10 +18,11 @@ from steptwin.live.clients import BACKLOG
 from steptwin.live.tcp import listening_at
 from steptwin.live.tcp_asyncio import AsyncioConnection, TurnedAway
 from steptwin.live.transports.contract import LinkArguments, OpenLink, Transport
-from steptwin.machine import Nanos, Port
+from steptwin.machine import Nanos, Port, SendingPort, SourcedPort
 from steptwin.system import reason
 from steptwin.wire.mbap import TcpFramer
-from steptwin.wire.pdu import ILLEGAL_FUNCTION, READS, WRITES, exception_pdu
+from steptwin.wire.pdu import ILLEGAL_FUNCTION, READS, REFUSED, WRITES, exception_pdu
+from steptwin.wire.rtu import BROADCAST
 from steptwin.wire.slave import tcp_response
 from steptwin.world.addresses import Address, parse_address
 from steptwin.world.links import TlsFiles
@@ -30,17 +32,19 @@ HANDSHAKE_S = 10.0
 
 
 class TlsClient(NamedTuple):
-    """Who a client is by its certificate: the common name, and its role; None without one that is known here."""
+    """Who a client is by its certificate: the common name, and its role; None without one that is known here. ``place``: where it
+    is."""
 
     name: str
     role: Role | None
+    place: str
 
     def __str__(self) -> str:
-        return f"{self.name} ({'no role' if self.role is None else self.role.title})"
+        return f"{self.name} ({'no role' if self.role is None else self.role.title}, {self.place})"
 
 
-def client_of(certificate: bytes) -> TlsClient:
-    """The owner of a certificate (DER) that has been verified."""
+def client_of(certificate: bytes, place: str) -> TlsClient:
+    """The owner, at ``place``, of a certificate (DER) that has been verified."""
     from cryptography import x509
     from cryptography.x509.oid import NameOID
 
@@ -49,14 +53,45 @@ def client_of(certificate: bytes) -> TlsClient:
         names = read.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
         values = [each.value for each in read.extensions if each.oid.dotted_string == ROLE_OID]
     except (ValueError, x509.DuplicateExtension):
-        return TlsClient("unnamed", None)
+        return TlsClient("unnamed", None, place)
     role = role_of(values[0].value) if values and isinstance(values[0], x509.UnrecognizedExtension) else None
-    return TlsClient(str(names[0].value) if names else "unnamed", role)
+    return TlsClient(str(names[0].value) if names else "unnamed", role, place)
+
+
+_unproved: ContextVar[asyncio.Transport | None] = ContextVar("_unproved", default=None)
+"""The connection on which a handshake is begun."""
+
+
+class _TellingObject(ssl.SSLObject):
+    """Sends the alert with which a handshake fails. asyncio closes the connection without it."""
+
+    outgoing: ssl.MemoryBIO
+    plain: asyncio.Transport | None = None
+
+    def do_handshake(self) -> None:
+        try:
+            super().do_handshake()
+        except (ssl.SSLWantReadError, ssl.SSLWantWriteError):
+            raise
+        except ssl.SSLError:
+            if self.plain is not None and (alert := self.outgoing.read()):
+                self.plain.write(alert)
+            raise
+
+
+class _TellingContext(ssl.SSLContext):
+    sslobject_class = _TellingObject
+
+    def wrap_bio(self, incoming: ssl.MemoryBIO, outgoing: ssl.MemoryBIO, *arguments: Any, **named: Any) -> ssl.SSLObject:
+        made = super().wrap_bio(incoming, outgoing, *arguments, **named)
+        if isinstance(made, _TellingObject):
+            made.outgoing, made.plain = outgoing, _unproved.get()
+        return made
 
 
 def server_context(files: TlsFiles, folder: Path) -> ssl.SSLContext:
     """TLS 1.2 or newer, with a certificate of the client that is trusted. Files are relative to ``folder``. Raises `Misuse`."""
-    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context = _TellingContext(ssl.PROTOCOL_TLS_SERVER)
     context.minimum_version = ssl.TLSVersion.TLSv1_2
     context.verify_mode = ssl.CERT_REQUIRED
     context.verify_flags |= ssl.VERIFY_X509_PARTIAL_CHAIN  # a certificate that is trusted needs no authority
@@ -77,37 +112,82 @@ def server_context(files: TlsFiles, folder: Path) -> ssl.SSLContext:
     return context
 
 
-class RestrictedPort:
-    """A port of a client that may not ask everything: what it may not is answered with exception 01."""
+class TlsPort:
+    """The port of a client whose certificate has been verified: what its role does not permit is answered with exception 01.
 
-    def __init__(self, port: Port, client: TlsClient, notice: Callable[[str], None]) -> None:
+    All but reads is recorded in the audit log, if there is one, when the answer is there.
+    """
+
+    def __init__(self, port: Port, client: TlsClient, opening: LinkArguments) -> None:
         self._port = port
         self._client = client
-        self._notice = notice
-        self._framer = TcpFramer()
+        self._notice = opening.clients.notice
+        self._audit = opening.audit
+        self._line = opening.line_name
+        self._requests = TcpFramer()
+        self._waiting: list[bytes] = []
+        """Recorded requests whose answers are still to come."""
 
     @property
     def broken(self) -> str | None:
-        return self._framer.broken or self._port.broken
+        return self._requests.broken or self._port.broken
 
     def exchange(self, data: bytes, now: Nanos) -> bytes:
-        return b"".join([self._answer(frame.raw, now) for frame in self._framer.feed(data)])
+        return b"".join([self._answer(frame.raw, now) for frame in self._requests.feed(data)])
 
     def _answer(self, request: bytes, now: Nanos) -> bytes:
         function = request[7]
-        if may_ask(self._client.role, function):
-            return self._port.exchange(request, now)
-        self._notice(f"client {self._client}: a request with function {function} is refused")
-        return tcp_response(request, exception_pdu(function, ILLEGAL_FUNCTION))
+        if not may_ask(self._client.role, function):
+            self._notice(f"client {self._client}: a request with function {function} is refused")
+            self._note(request, "refusal")
+            return tcp_response(request, exception_pdu(function, ILLEGAL_FUNCTION))
+        if self._audit is None or function in READS:
+            return self._seen(self._port.exchange(request, now))
+        self._waiting.append(request)
+        answer = self._seen(self._port.exchange(request, now))
+        if request[6] == BROADCAST and self._waiting[-1:] == [request]:
+            self._note(self._waiting.pop(), "sent")
+        return answer
+
+    def _seen(self, sent: bytes) -> bytes:
+        if self._waiting and sent:
+            for answer in TcpFramer().feed(sent):
+                asked = next((one for one in self._waiting if one[:2] == answer.raw[:2]), None)
+                if asked is not None:
+                    self._waiting.remove(asked)
+                    self._note(asked, "refusal" if answer.raw[7] >= REFUSED else "done")
+        return sent
+
+    def _note(self, request: bytes, outcome: str) -> None:
+        if self._audit is not None:
+            self._audit(self._client, "request", {"line": self._line, "unit": request[6], "pdu": request[7:].hex()}, outcome)
 
     def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
-        return self._port.to_send(now)
+        return [(at, self._seen(data)) for at, data in self._port.to_send(now)]
 
     def deadline(self) -> Nanos | None:
         return self._port.deadline()
 
     def close(self) -> None:
+        for request in self._waiting:
+            self._note(request, "failure")
         self._port.close()
+
+
+class SendingTlsPort(TlsPort):
+    """The same for a port with unsolicited output."""
+
+    def __init__(self, port: SendingPort, client: TlsClient, opening: LinkArguments) -> None:
+        super().__init__(port, client, opening)
+        self._sending = port
+
+    @property
+    def on_output(self) -> Callable[[], None] | None:
+        return self._sending.on_output
+
+    @on_output.setter
+    def on_output(self, call: Callable[[], None] | None) -> None:
+        self._sending.on_output = call
 
 
 class _Entrance(asyncio.Protocol):
@@ -132,6 +212,7 @@ class _Entrance(asyncio.Protocol):
 
     async def _prove(self, plain: asyncio.Transport) -> None:
         link = self._link
+        _unproved.set(plain)
         try:
             encrypted = await asyncio.get_running_loop().start_tls(
                 plain, self, link.context, server_side=True, ssl_handshake_timeout=HANDSHAKE_S
@@ -187,14 +268,18 @@ class TlsLink:
 
     def admit(self, transport: asyncio.Transport, received: bytes) -> None:
         """Serve a client whose certificate has been verified; ``received`` has come already."""
-        client = client_of(transport.get_extra_info("ssl_object").getpeercert(binary_form=True))
-        port = self._opening.make_port()
-        if not all(may_ask(client.role, function) for function in WRITES | READS):
-            port = RestrictedPort(port, client, self.clients.notice)
+        host, peer, *_ = transport.get_extra_info("peername") or ("unknown", 0)
+        client = client_of(transport.get_extra_info("ssl_object").getpeercert(binary_form=True), str(Address(host, peer)))
+        port = made = self._opening.make_port()
+        if self._opening.audit is not None or not all(may_ask(client.role, function) for function in WRITES | READS):
+            opening = self._opening
+            port = SendingTlsPort(made, client, opening) if isinstance(made, SendingPort) else TlsPort(made, client, opening)
         connection = AsyncioConnection(self._opening.cell, port, self.clients)
         self._connections.add(connection)
         transport.set_protocol(connection)
         connection.connection_made(transport)
+        if isinstance(made, SourcedPort):
+            made.used_by(str(client))
         if received:
             connection.data_received(received)
 

@@ -158,6 +158,25 @@ export type SubjectEvent = {
   /** Virtual time, as decimal text [ns] */
   time_ns: string;
   machine: string;
+  kind: "write";
+  /** Its place on the line. */
+  client: string;
+  /** Who is there: an address, the owner of a certificate, a path, or script. */
+  source: string;
+  /** What was written. */
+  words: string;
+  /** Empty where there is no answer. */
+  outcome: "done" | "refusal" | "";
+  /** The command or the event that led to it. */
+  cause: number | null;
+  /** As text; it adds nothing to the rest. */
+  text: string;
+} | {
+  /** Commands and events are numbered together; 0: a plan from before. */
+  number: number;
+  /** Virtual time, as decimal text [ns] */
+  time_ns: string;
+  machine: string;
   kind: "statement";
   program: string;
   line: number;
@@ -643,7 +662,7 @@ export type FollowRequest = {
   id?: string | number | null;
   version?: 1;
   /** Kinds of events; all but frames without. */
-  kinds?: ("plan" | "coordinate" | "sample" | "load" | "free" | "edge" | "frame" | "statement" | "status" | "note" | "report" | "button" | "input" | "fault" | "pace" | "restored" | "stopped" | "log" | "breakpoints")[] | null;
+  kinds?: ("plan" | "coordinate" | "sample" | "load" | "free" | "edge" | "frame" | "write" | "statement" | "status" | "note" | "report" | "button" | "input" | "fault" | "pace" | "restored" | "stopped" | "log" | "breakpoints")[] | null;
   /** Names of machines, lines, or 'world'; all without. */
   machines?: string[] | null;
   /** Numbers of axes as text; events of other axes are left out. */
@@ -1287,7 +1306,7 @@ export type PastEventsRequest = {
   /** The last moment. [ns] */
   to_ns: string | number;
   /** Kinds of events, as for follow. */
-  kinds?: ("plan" | "coordinate" | "sample" | "load" | "free" | "edge" | "frame" | "statement" | "status" | "note" | "report" | "button" | "input" | "fault" | "pace" | "restored" | "stopped" | "log" | "breakpoints")[] | null;
+  kinds?: ("plan" | "coordinate" | "sample" | "load" | "free" | "edge" | "frame" | "write" | "statement" | "status" | "note" | "report" | "button" | "input" | "fault" | "pace" | "restored" | "stopped" | "log" | "breakpoints")[] | null;
 };
 
 /** The world itself goes back to the moment that this viewer looks at; time stands there. What happened since is undone. */

@@ -15,7 +15,7 @@ from steptwin.world.kinds.m1486 import axes, build, control, faults, lanes, line
 from steptwin.world.kinds.m1486.heldjog import M1486HeldJog
 from steptwin.world.kinds.m1486.table import M1486Spec
 from steptwin.world.kinds.m1486.view import M1486View
-from steptwin.world.kinds.m1486.words import ChipLineWords
+from steptwin.world.kinds.m1486.words import ChipLineWords, follow_writes
 
 
 def _watch_events(chip: M1486Chip, call: Callable[[MachineEvent], None]) -> None:
@@ -33,6 +33,7 @@ CHARACTERS = LineKind(
     },
     make=line.make,
     words=ChipLineWords,
+    writes=follow_writes,
 )
 
 M1486: ControllerKind[M1486Spec, M1486Chip, M1486View] = ControllerKind(

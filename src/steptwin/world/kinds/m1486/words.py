@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
+from functools import partial
 
-from steptwin.m1486.characterlog import CharacterLog, LineSplitter
+from steptwin.m1486.characterlog import CharacterLog, LineSplitter, changes_nothing
 from steptwin.machine import Nanos
 from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection
 from steptwin.world.kinds.m1486.line import ChipLine
+from steptwin.world.lines import LineWrite
 from steptwin.world.trace import TraceRecord
 
 
@@ -43,3 +45,15 @@ class ChipLineWords:
         """A chip announces the byte that it sends."""
         if record.kind == "event" and record.subject == "upload":
             self._log.upload(**dict(record.facts))
+
+
+def follow_writes(line: ChipLine, take: Callable[[LineWrite], None]) -> Callable[[], None]:
+    """See `steptwin.world.kind.LineKind.writes`. Every chip receives what a host sends, and none answers."""
+
+    def sent(shown: FrameLine) -> None:
+        if shown.direction is FrameDirection.IN and not changes_nothing(shown.raw):
+            take(LineWrite(shown.time, shown.link, (), shown.meaning, ""))
+
+    words = ChipLineWords(line, "", sent)
+    line.follow_frames(words)
+    return partial(line.unfollow_frames, words)

@@ -19,7 +19,7 @@ from steptwin.world.kinds.mic488.heldjog import Mic488HeldJog
 from steptwin.world.kinds.mic488.program_watch import watch_program
 from steptwin.world.kinds.mic488.table import Mic488Spec
 from steptwin.world.kinds.mic488.view import Mic488View
-from steptwin.world.kinds.mic488.words import ModbusWords
+from steptwin.world.kinds.mic488.words import ModbusWords, follow_writes
 from steptwin.world.kinds.mic488.writes import encode_write
 
 
@@ -63,6 +63,7 @@ MODBUS = LineKind(
     keys=frozenset({"gap"}),
     make=line.make,
     words=ModbusWords,
+    writes=follow_writes,
 )
 
 MIC488: ControllerKind[Mic488Spec, Mic488Device, Mic488View] = ControllerKind(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import ClassVar
 
 from steptwin.errors import Misuse
@@ -31,8 +32,8 @@ SILENT_CHARACTERS = 4
 class ModbusBus(Line):
     """Controllers with different units on one line. With ``timing`` requests take the time of a wire and of the controllers."""
 
-    __slots__ = ("_baud", "_gap", "_master", "_seeing", "_served", "_timed", "devices")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_baud", "_gap", "_seeing", "_served", "devices"}) | Line.FIXED
+    __slots__ = ("_baud", "_gap", "_master", "_on_write", "_seeing", "_served", "_timed", "devices")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_baud", "_gap", "_on_write", "_seeing", "_served", "devices"}) | Line.FIXED
 
     kinds = ("rtu", "serial", "tcp")
     """``serial``: a real serial port, on which characters take their time whatever the line timing is."""
@@ -53,6 +54,7 @@ class ModbusBus(Line):
         super().__init__(kernel, name, record, faults)
         self.devices = devices
         self._served: Mapping[int, SlaveDevice] = devices
+        self._on_write: Callable[[str, Nanos, int, bytes, bytes], None] | None = None
         self._baud = baud
         self._gap = gap
         # WBC-15: a vision system belongs to one controller; without its registers in a program it costs nothing.
@@ -72,6 +74,20 @@ class ModbusBus(Line):
     def serve_by(self, served: Callable[[Mapping[int, SlaveDevice]], Mapping[int, SlaveDevice]]) -> None:
         """Without line timing; ports that are made from now on use it."""
         self._served = served(self.devices)
+
+    def watch_writes(self, observer: Callable[[str, Nanos, int, bytes, bytes], None] | None) -> None:
+        """Call ``observer`` with the place and what `steptwin.wire.slave.WriteObserver` says, from now on; None ends that."""
+        self._on_write = observer
+        for name, place in self.places.items():
+            if place.framed is not None:
+                place.framed.on_write = None if observer is None else partial(observer, name)
+
+    def connect(self, place: str, kind: str | None = None) -> LineEndPoint:
+        is_new = place not in self.places
+        found = super().connect(place, kind)
+        if is_new and self._on_write is not None and found.framed is not None:
+            found.framed.on_write = partial(self._on_write, place)
+        return found
 
     def is_idle_read(self, place: LineEndPoint, data: bytes) -> bool:
         # With timing a request takes the line and the controller; faults count requests.
