@@ -11,7 +11,7 @@ from steptwin.wire import mbap
 from steptwin.wire.crc import with_crc
 from steptwin.wire.gateway import ModbusGateway, ScriptPort, TcpGatewayPort
 from steptwin.wire.line import SerialLine
-from steptwin.wire.slave import RtuSlavePort, SlavePort, TcpSlavePort
+from steptwin.wire.slave import RtuSlavePort, TcpSlavePort
 from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
 
 READ = bytes.fromhex("03 00 05 00 01")
@@ -34,7 +34,7 @@ MAKERS: dict[str, tuple[Callable[[dict[int, Any]], Any], bool]] = {
 def test_writes_are_told_with_their_responses_and_reads_are_not(kind: str, is_logged: bool, new_bank: Callable[[], Any]) -> None:
     make, is_tcp = MAKERS[kind]
     banks = {1: new_bank(), 2: new_bank()}
-    port: SlavePort | Any = make(banks)
+    port: Any = make(banks)
     seen: list[tuple[int, bytes, bytes]] = []
     port.on_write = lambda now, unit, request, response: seen.append((unit, request, response))
     if is_logged:
