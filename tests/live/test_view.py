@@ -39,7 +39,7 @@ def screen(run: Run, world: World, width: int, height: int, *requests: bytes, ki
     async def scene() -> list[str]:
         live = LiveWorld(world)
         view = LiveView(live, Cell(live, Clock()), Output(None))
-        view.begin(banner(world, END_POINTS, REMARKS))
+        view.begin(banner(world, END_POINTS, REMARKS), {})
         port = PlacePort(live, LINE, "tcp-1", kind)
         for request in requests:
             port.exchange(request, 0)
@@ -123,7 +123,7 @@ def test_notices_are_among_the_events(run: Run) -> None:
     async def scene() -> list[str]:
         live = LiveWorld(demo())
         view = LiveView(live, Cell(live, Clock()), Output(None))
-        view.begin(banner(live.world, END_POINTS, REMARKS))
+        view.begin(banner(live.world, END_POINTS, REMARKS), {})
         for number in range(9):
             view.notice(f"notice {number}")
         return [text.plain for text in view.lines(80, 40)]

@@ -7,19 +7,22 @@ from typing import Annotated
 
 import typer
 
-from steptwin.cli.worldoptions import AuditInto, ListenAny, ReadyFile
+from steptwin.cli.optiongroups import grouped
+from steptwin.cli.worldoptions import AuditInto, ListenAny, LogOptions, ReadyFile
 
 
+@grouped
 def bridge(
     file: Annotated[Path, typer.Argument(metavar="FILE.toml", help="Devices and gateways: see docs/gateways.md.")],
     *,
     listen_any: ListenAny = False,
     ready_file: ReadyFile = None,
     audit: AuditInto = None,
+    log: LogOptions,
 ) -> None:
     """Serve real devices to programs of a plant, by the gateways of a file, until Ctrl-C.
 
     It owns the lines of the devices: commands are sent in order, stops first, and nothing is repeated."""
     from steptwin.commands.bridge import bridge as serve_devices
 
-    serve_devices(file, listen_any=listen_any, ready_file=ready_file, audit=audit)
+    serve_devices(file, listen_any=listen_any, ready_file=ready_file, audit=audit, telling=log.telling())

@@ -11,7 +11,7 @@ import typer
 
 from steptwin.cli import completion
 from steptwin.cli.optiongroups import GroupedCommand, OptionGroup, grouped
-from steptwin.cli.worldoptions import Control, Faults, LogTraffic, ReadyFile, Speed
+from steptwin.cli.worldoptions import Control, Faults, LogOptions, LogTraffic, ReadyFile, Speed
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
@@ -139,7 +139,7 @@ class TwinOptions(OptionGroup):
         typer.Option(metavar="FILE", help="Write that description to FILE, with the files it names beside it, and end."),
     ] = None
 
-    def on(self, line: LineOptions, kind: str, ports: Mapping[str, int]) -> ServeOptions:
+    def on(self, line: LineOptions, kind: str, ports: Mapping[str, int], log: LogOptions) -> ServeOptions:
         """The twin on a line; one that has no link gets those of ``ports`` and, where the system has them, a pseudo terminal."""
         from steptwin.commands.serve import ServeOptions
 
@@ -156,6 +156,7 @@ class TwinOptions(OptionGroup):
             line_timing=line.line_timing,
             ready_file=self.ready_file,
             log_frames=self.log_frames,
+            telling=log.telling(),
             listen_any=self.listen_any,
             faults=tuple(self.fault or ()),
             seed=self.seed,
@@ -203,6 +204,7 @@ def mic488(
     *,
     line: ModbusOptions,
     twin: TwinOptions,
+    log: LogOptions,
 ) -> None:
     """Serve virtual MIC488 controllers.
 
@@ -225,7 +227,8 @@ def mic488(
         gap_ms=line.gap,
         demo=demo,
     )
-    serve_mic488(twin.on(line, "mic488", {"tcp": MODBUS_TCP_PORT, "rtu_tcp": RTU_TCP_PORT}), controllers)
+    ports = {"tcp": MODBUS_TCP_PORT, "rtu_tcp": RTU_TCP_PORT}
+    serve_mic488(twin.on(line, "mic488", ports, log), controllers)
 
 
 @app.command(cls=GroupedCommand)
@@ -243,6 +246,7 @@ def m1486(
     *,
     line: ChipLineOptions,
     twin: TwinOptions,
+    log: LogOptions,
 ) -> None:
     """Serve virtual M1486 chips on one line; several clients may be connected to it.
 
@@ -251,4 +255,4 @@ def m1486(
     from steptwin.commands.serve_m1486 import ServeM1486, serve_m1486
 
     chips = ServeM1486(variant=variant, chain=chain, interface=interface, wires=tuple(wire or ()), program=program)
-    serve_m1486(twin.on(line, "m1486", {"tcp": M1486_TCP_PORT}), chips)
+    serve_m1486(twin.on(line, "m1486", {"tcp": M1486_TCP_PORT}, log), chips)

@@ -13,7 +13,7 @@ import typer
 
 from steptwin.cli import completion
 from steptwin.cli.optiongroups import OptionGroup, grouped
-from steptwin.cli.worldoptions import LiveOptions, ReadyFile, WorldRunOptions, up_options
+from steptwin.cli.worldoptions import LiveOptions, LogOptions, ReadyFile, WorldRunOptions, up_options
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,6 +66,7 @@ def studio(
     page: PageOptions,
     live: LiveOptions,
     options: WorldRunOptions,
+    log: LogOptions,
 ) -> None:
     """Show a world or devices in a browser, until Ctrl-C.
 
@@ -98,5 +99,5 @@ def studio(
         devices=tuple(page.device or ()),
         view=page.view,
     )
-    if not run_studio(own, up_options(world, ready_file, live, options)):
+    if not run_studio(own, up_options(world, ready_file, live, options, log)):
         raise typer.Exit(1)

@@ -13,7 +13,16 @@ import typer
 
 from steptwin.cli.optiongroups import grouped
 from steptwin.cli.pages import PageFormat, PageSection, show
-from steptwin.cli.worldoptions import AuditInto, Coverage, LiveOptions, ReadyFile, ShownOptions, WorldRunOptions, up_options
+from steptwin.cli.worldoptions import (
+    AuditInto,
+    Coverage,
+    LiveOptions,
+    LogOptions,
+    ReadyFile,
+    ShownOptions,
+    WorldRunOptions,
+    up_options,
+)
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND
 
@@ -37,6 +46,7 @@ def up(
     live: LiveOptions,
     options: WorldRunOptions,
     shown: ShownOptions,
+    log: LogOptions,
 ) -> None:
     """Run a world in real time until Ctrl-C or until one of its scripts stops it; other programs connect to its lines.
 
@@ -50,10 +60,10 @@ def up(
     from steptwin.commands.auditfile import audit_into
     from steptwin.commands.up_world import up as run_up
 
-    wanted = replace(up_options(world, ready_file, live, options), past=past, coverage=tuple(coverage or ()))
+    wanted = replace(up_options(world, ready_file, live, options, log), past=past, coverage=tuple(coverage or ()))
     wanted = replace(wanted, names=tuple(shown.of or ()), kinds=tuple(shown.show or ()))
-    with audit_into(audit) as log:
-        has_held = run_up(replace(wanted, audit=log))
+    with audit_into(audit) as commands:
+        has_held = run_up(replace(wanted, audit=commands))
     if not has_held:
         raise typer.Exit(1)
 

@@ -11,6 +11,7 @@ import typer
 from steptwin.cli.optiongroups import OptionGroup
 
 if TYPE_CHECKING:
+    from steptwin.commands.telling import Telling
     from steptwin.commands.up_world import UpOptions
     from steptwin.machine import Nanos
     from steptwin.world.overrides import Overrides
@@ -130,7 +131,29 @@ class LiveOptions(OptionGroup):
     log_frames: LogTraffic = False
 
 
-def up_options(world: Path | None, ready_file: Path | None, live: LiveOptions, options: WorldRunOptions) -> UpOptions:
+@dataclass(frozen=True, kw_only=True)
+class LogOptions(OptionGroup):
+    """Of commands that run until they are ended."""
+
+    heading = "Options of logs and traces"
+
+    log_format: Annotated[str, typer.Option(metavar="text|json", help="How output is written: as text, or as lines of JSON.")] = (
+        "text"
+    )
+    traces: Annotated[
+        str | None,
+        typer.Option(metavar="URL", help="Send traces of requests there, by OTLP over HTTP: http://127.0.0.1:4318/v1/traces."),
+    ] = None
+
+    def telling(self) -> Telling:
+        from steptwin.commands.telling import Telling
+
+        return Telling(self.log_format, self.traces)
+
+
+def up_options(
+    world: Path | None, ready_file: Path | None, live: LiveOptions, options: WorldRunOptions, log: LogOptions
+) -> UpOptions:
     """Raises `Misuse`."""
     from steptwin.commands.up_world import UpOptions
 
@@ -151,4 +174,5 @@ def up_options(world: Path | None, ready_file: Path | None, live: LiveOptions, o
         listen_any=live.listen_any,
         log_frames=live.log_frames,
         allow_outside=options.allow_outside,
+        telling=log.telling(),
     )

@@ -12,6 +12,7 @@ from steptwin.access.audit import Audit, CommandLog
 from steptwin.commands.auditfile import audit_into, wall_clock
 from steptwin.commands.gateways import open_gateways, recording
 from steptwin.commands.keptsettings import keep_settings
+from steptwin.commands.telling import Telling
 from steptwin.commands.without_world import serve_without_world
 from steptwin.devices.composite import CompositeSubject
 from steptwin.devices.connections import Computer, DeviceConnections
@@ -35,7 +36,7 @@ from steptwin.world.addresses import check_addresses
 from steptwin.world.lines import LineTraffic
 
 
-def bridge(file: Path, *, listen_any: bool, ready_file: Path | None, audit: Path | None = None) -> None:
+def bridge(file: Path, *, listen_any: bool, ready_file: Path | None, audit: Path | None, telling: Telling) -> None:
     """Serve the devices of ``file`` until SIGINT, SIGTERM or SIGHUP. Raises `SteptwinError` with a text for the user."""
     wanted = read_device_file(str(file), decode(read_bytes(file), str(file)).text)
     check_addresses([gateway.listen for gateway in wanted.gateways], listen_any=listen_any)
@@ -45,7 +46,7 @@ def bridge(file: Path, *, listen_any: bool, ready_file: Path | None, audit: Path
         async def open_all(server: Server) -> None:
             await _open(server, wanted, file, log, listen_any=listen_any)
 
-        asyncio.run(serve_without_world(ready_file, open_all))
+        asyncio.run(serve_without_world(ready_file, open_all, telling))
 
 
 async def _open(server: Server, wanted: DeviceFile, file: Path, audit: Audit | None, *, listen_any: bool) -> None:

@@ -14,11 +14,12 @@ from steptwin.live.server import EndPoint, Server
 from steptwin.live.world import LiveWorld
 from steptwin.live.world_control import WorldControl
 from steptwin.machine import Nanos
-from steptwin.subject.commands import Command, Jog
+from steptwin.subject.commands import Command, Jog, row_of
 from steptwin.subject.contract import Description, Reading, Result
 from steptwin.subject.events import Event
 from steptwin.subject.following import Filter, Following
 from steptwin.subject.jogs import Held, WorldJogs
+from steptwin.tracing import span
 from steptwin.world.gateways import GatewaySpec
 from steptwin.world.historytable import HISTORY, HistorySpec
 from steptwin.world.lines import LineTraffic
@@ -98,7 +99,12 @@ class LiveWorldSubject:
         return self._control.read(*points)
 
     async def do(self, wanted: Command, /) -> Result:
-        return self._control.do(wanted)
+        name = row_of(wanted).name
+        with span(f"twin {name}", {"command": name}, is_part=True) as noted:
+            result = self._control.do(wanted)
+            noted.note("time_ns", result.time)
+            noted.note("number", result.number)
+        return result
 
     async def begin_jog(self, wanted: Jog, /) -> Held:
         if not isinstance(self._live.companion, WorldJogs):

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from steptwin.commands.descriptions import DescribeNamed, print_world, save_world
+from steptwin.commands.telling import Telling
 from steptwin.commands.up_world import UpOptions, up_with
 from steptwin.files.world import World
 from steptwin.inputfiles import read_bytes
@@ -35,6 +36,7 @@ class ServeOptions:
     line_timing: str = "off"
     ready_file: Path | None = None
     log_frames: bool = False
+    telling: Telling = field(default_factory=Telling)
     listen_any: bool = False
     faults: tuple[str, ...] = ()
     seed: int = 0
@@ -82,6 +84,7 @@ def serve(options: ServeOptions, describe: DescribeNamed, text: str) -> None:
                 trace=options.trace,
                 ready_file=options.ready_file,
                 log_frames=options.log_frames,
+                telling=options.telling,
                 listen_any=options.listen_any,
             ),
         )

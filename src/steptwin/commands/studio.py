@@ -111,7 +111,7 @@ def studio(own: StudioOptions, options: UpOptions) -> bool:
         if options.world is not None:
             return up(replace(options, keeps_inputs=True, audit=audit), partial(page.open, beside=options))
         if own.devices:
-            asyncio.run(serve_without_world(options.ready_file, page.open_without_world))
+            asyncio.run(serve_without_world(options.ready_file, page.open_without_world, options.telling))
             return True
         options = replace(options, keeps_inputs=True)
         with demo_world(options) as world:

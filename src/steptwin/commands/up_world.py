@@ -16,6 +16,7 @@ from typing import TypeAlias
 from steptwin.access.audit import Audit
 from steptwin.commands.auditfile import wall_clock
 from steptwin.commands.gateways import LiveWorldSubject, open_gateways, recording
+from steptwin.commands.telling import Telling
 from steptwin.errors import Misuse
 from steptwin.files import session as sessions
 from steptwin.files.beginning import begin_world, check_session_target, is_session, set_faults
@@ -33,10 +34,12 @@ from steptwin.live.pace import Pace, read_speed
 from steptwin.live.rfc2217 import TwinLine
 from steptwin.live.server import Server, clear_ready_file
 from steptwin.live.serving import check_name, shows_live_view
+from steptwin.live.tracedport import TracedPort
 from steptwin.live.transports import TRANSPORTS, VISION
 from steptwin.live.world import LiveWorld, PlacePort, VisionPort, announced
 from steptwin.live.world_control import WorldControl
-from steptwin.machine import Nanos
+from steptwin.machine import Nanos, SendingPort
+from steptwin.tracing import is_traced
 from steptwin.world.actions import Leave
 from steptwin.world.addresses import check_addresses, parse_address
 from steptwin.world.kind import LinkKind
@@ -88,6 +91,7 @@ class UpOptions:
     """Where commands of gateways are recorded."""
     allow_outside: bool = False
     """Files of the description may lie anywhere."""
+    telling: Telling = field(default_factory=Telling)
     is_closed: bool = False
     """Whether nothing is open for other programs: neither lines nor the control endpoint."""
 
@@ -182,8 +186,9 @@ async def _serve(
     addition: Addition | None,
 ) -> None:
     with ExitStack() as stack:
-        output = Output(sys.stdout)
+        output = options.telling.output()
         stack.callback(output.close)
+        stack.enter_context(options.telling.tracing(world.spec.name, output.notice))
         live = LiveWorld(world)
         cell = Cell(live, Clock(begin=world.now))
         quiet = addition is not None
@@ -198,7 +203,8 @@ async def _serve(
             await _open(server, live, pace, options, addition)
             recorder = _recorder(live, kept)
             begun = True
-            display.begin(banner(world, server.end_points, remarks_on(world, listen_any=options.listen_any)), past)
+            head = banner(world, server.end_points, remarks_on(world, listen_any=options.listen_any))
+            display.begin(head, server.announcement(), past)
             pace.begin(read_speed(options.speed, least=0))
             await display.show(server)
             cell.enter()
@@ -318,8 +324,12 @@ async def _open_line(server: Server, live: LiveWorld, line: LineSpec, options: U
     number, there = count(1), live.world.lines[line.name]
     wire = TwinLine(lambda: there.baud, there.is_timed)
 
-    def maker(link: LinkKind, *, several: bool) -> Callable[[], PlacePort]:
-        return lambda: PlacePort(live, line.name, f"{link.place}-{next(number)}" if several else link.place, link.place_kind)
+    def maker(link: LinkKind, *, several: bool) -> Callable[[], SendingPort]:
+        def make() -> SendingPort:
+            port = PlacePort(live, line.name, f"{link.place}-{next(number)}" if several else link.place, link.place_kind)
+            return TracedPort(port, line.name) if is_traced() else port
+
+        return make
 
     on = "" if len(live.world.spec.lines) == 1 else f", {line.name}"
     links = line_kinds()[line.kind].opened_by

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Coroutine
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+from steptwin.commands.telling import Telling
 from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
-from steptwin.live.output import Output
 from steptwin.live.server import Server, clear_ready_file
 from steptwin.machine import Nanos
 
@@ -30,22 +29,24 @@ class _Nothing:
         return None
 
 
-async def serve_without_world(ready_file: Path | None, addition: Callable[[Server], Coroutine[Any, Any, None]]) -> None:
+async def serve_without_world(
+    ready_file: Path | None, addition: Callable[[Server], Coroutine[Any, Any, None]], telling: Telling
+) -> None:
     """Serve what ``addition`` opens until SIGINT, SIGTERM or SIGHUP."""
     with ExitStack() as stack:
-        output = Output(sys.stdout)
+        output = telling.output()
         stack.callback(output.close)
+        stack.enter_context(telling.tracing("devices", output.notice))
         if ready_file is not None:
             clear_ready_file(ready_file)
-        server = Server(Cell(_Nothing(), Clock()), output.line)
+        server = Server(Cell(_Nothing(), Clock()), output.notice)
         try:
             if not await server.unless_ended(addition(server)):
                 return
             if ready_file is not None:
                 server.write_ready_file(ready_file)
-            for end_point in server.end_points:
-                output.line(f"  {end_point.protocol}  {end_point.place}")
-            output.line("Ctrl-C ends")
+            places = [f"  {end_point.protocol}  {end_point.place}" for end_point in server.end_points]
+            output.begin([*places, "Ctrl-C ends"], server.announcement())
             await server.until_ended()
         finally:
             await server.close()

@@ -23,6 +23,7 @@ from steptwin.subject.events import Event
 from steptwin.subject.following import Filter, Followers
 from steptwin.subject.jogs import Held
 from steptwin.subject.payloads import StatusPayload
+from steptwin.tracing import span
 from steptwin.world import script as steps
 
 POLL_S = 0.1
@@ -160,6 +161,11 @@ class ConnectedDevice:
         return await later(self._do(wanted))
 
     async def _do(self, wanted: Command) -> Result:
+        name = row_of(wanted).name
+        with span(f"device {name}", {"command": name, "machine": self.name}, is_part=True):
+            return await self._done(wanted)
+
+    async def _done(self, wanted: Command) -> Result:
         try:
             if self._is_stop(wanted):
                 self._stops += 1

@@ -14,6 +14,7 @@ from steptwin.drivers.tcp import Endpoint
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.system import reason
+from steptwin.tracing import is_traced, span
 
 CLOSE_S = 1.0
 """Time for the other end to close a connection, s."""
@@ -91,6 +92,15 @@ class TaskLine(Generic[Q, A]):
     # ------------------------------------------------------------------ exchanges
 
     async def exchange(self, job: Job[Q, A]) -> A:
+        if not is_traced():
+            return await self._exchanged(job)
+        with span(f"line {self.place}", {"line": self.place, "request": str(job.request)}, is_part=True) as noted:
+            try:
+                return await self._exchanged(job)
+            finally:
+                noted.note("failed_attempts", job.attempts)
+
+    async def _exchanged(self, job: Job[Q, A]) -> A:
         if self._closed:
             raise Misuse(f"the line {self.place} is closed")
         done: asyncio.Future[None] = self._running().create_future()

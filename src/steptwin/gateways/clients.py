@@ -13,6 +13,7 @@ from steptwin.gateways.contract import GatewaySubject
 from steptwin.subject.commands import Command, StopAxes, plain_command, row_of
 from steptwin.subject.contract import Result
 from steptwin.subject.dispatch import code_of
+from steptwin.tracing import span
 
 
 def address_text(address: object) -> str:
@@ -45,9 +46,10 @@ class GatewayClient:
     @contextmanager
     def noted(self, subject: GatewaySubject, wanted: Command) -> Generator[None]:
         """Record a command in the audit log of ``subject``, with what becomes of it within. Who looks is not recorded."""
-        outcome = "internal"
+        outcome, name = "internal", row_of(wanted).name
         try:
-            yield
+            with span(f"gateway {name}", {"command": name, "client": str(self), "role": self.role.title}):
+                yield
             outcome = "done"
         except SteptwinError as error:
             outcome = code_of(error)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 from steptwin.files.world import World
@@ -10,7 +10,7 @@ from steptwin.live.output import Output
 from steptwin.live.server import EndPoint, Server
 from steptwin.live.world import LiveWorld
 from steptwin.live.world_frames import follow_frames
-from steptwin.world.records import ALL, Selection, describe
+from steptwin.world.records import ALL, Selection
 from steptwin.world.trace import TraceRecord
 
 
@@ -21,8 +21,8 @@ class Display(Protocol):
         """Show a notice."""
         ...
 
-    def begin(self, head: Sequence[str], past: Sequence[TraceRecord] = ()) -> None:
-        """Show ``head`` (`banner`), the records so far, and all further ones."""
+    def begin(self, head: Sequence[str], announcement: Mapping[str, object], past: Sequence[TraceRecord] = ()) -> None:
+        """Show what is served (`banner`, and `Server.announcement`), the records so far, and all further ones."""
         ...
 
     async def show(self, server: Server) -> None:
@@ -38,14 +38,15 @@ class Lines:
         self._output = output
         self._selection = selection
         if frames:
-            follow_frames(live, lambda frame: output.line(str(frame)))
+            follow_frames(live, output.frame)
 
     def notice(self, text: str) -> None:
-        self._output.line(text)
+        self._output.notice(text)
 
-    def begin(self, head: Sequence[str], past: Sequence[TraceRecord] = ()) -> None:
-        for text in (*head, *map(describe, filter(self._selection.shows, past))):
-            self._output.line(text)
+    def begin(self, head: Sequence[str], announcement: Mapping[str, object], past: Sequence[TraceRecord] = ()) -> None:
+        self._output.begin(head, announcement)
+        for record in filter(self._selection.shows, past):
+            self._output.record(record)
         self._live.world.trace.watchers.append(self._print)
 
     async def show(self, server: Server) -> None:
@@ -53,7 +54,7 @@ class Lines:
 
     def _print(self, record: TraceRecord) -> None:
         if self._selection.shows(record):
-            self._output.line(describe(record))
+            self._output.record(record)
 
 
 class Notices:
@@ -62,14 +63,13 @@ class Notices:
     def __init__(self, live: LiveWorld, output: Output, *, frames: bool) -> None:
         self._output = output
         if frames:
-            follow_frames(live, lambda frame: output.line(str(frame)))
+            follow_frames(live, output.frame)
 
     def notice(self, text: str) -> None:
-        self._output.line(text)
+        self._output.notice(text)
 
-    def begin(self, head: Sequence[str], past: Sequence[TraceRecord] = ()) -> None:
-        for text in head:
-            self._output.line(text)
+    def begin(self, head: Sequence[str], announcement: Mapping[str, object], past: Sequence[TraceRecord] = ()) -> None:
+        self._output.begin(head, announcement)
 
     async def show(self, server: Server) -> None:
         await server.until_ended()

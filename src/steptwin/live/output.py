@@ -12,7 +12,12 @@ import queue
 import select
 import sys
 import threading
+from collections.abc import Mapping, Sequence
 from typing import TextIO
+
+from steptwin.wire.frameline import FrameLine
+from steptwin.world.records import describe
+from steptwin.world.trace import TraceRecord
 
 MOST_WAITING = 10_000
 """Pieces of text kept for a reader that has stopped; later ones are dropped."""
@@ -39,6 +44,22 @@ class Output:
 
     def line(self, text: str) -> None:
         self.write(text + "\n")
+
+    def notice(self, text: str) -> None:
+        """What a user has to know."""
+        self.line(text)
+
+    def record(self, record: TraceRecord) -> None:
+        """What has happened in a world."""
+        self.line(describe(record))
+
+    def frame(self, frame: FrameLine) -> None:
+        self.line(str(frame))
+
+    def begin(self, head: Sequence[str], announcement: Mapping[str, object]) -> None:
+        """What is served: as text, and as the ready file has it (`steptwin.live.server.Server.announcement`)."""
+        for text in head:
+            self.line(text)
 
     def write(self, text: str) -> int:
         if self._thread is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from rich.console import Console
 from rich.live import Live
@@ -52,7 +52,7 @@ class LiveView:
         if self._selection.shows(record):
             self._events.append(describe(record))
 
-    def begin(self, head: Sequence[str], past: Sequence[TraceRecord] = ()) -> None:
+    def begin(self, head: Sequence[str], announcement: Mapping[str, object], past: Sequence[TraceRecord] = ()) -> None:
         for text in head:
             self._output.line(text)
         self._events.extend(map(describe, filter(self._selection.shows, past)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
@@ -13,8 +13,11 @@ from steptwin.files.export.tracefile import Ring
 from steptwin.files.world import World
 from steptwin.live.cell import Cell
 from steptwin.live.sharedreads import share_reads
+from steptwin.live.tracedport import traced
 from steptwin.machine import Nanos
 from steptwin.subject.world import WorldSubject
+from steptwin.tracing import is_traced
+from steptwin.wire.slave import SlaveDevice
 from steptwin.world.actions import Bytes, ExternalInput, Leave, See, size_of
 from steptwin.world.history import History
 from steptwin.world.kernel import Kernel
@@ -116,7 +119,12 @@ class LiveWorld:
     def share_reads(self, cell: Cell) -> None:
         """Let clients that ``cell`` serves at one moment share their reads."""
         for line in self.world.lines.values():
-            line.serve_by(lambda devices: share_reads(devices, cell))
+            names = {unit: name for name, (on, unit) in self.world.parts.line_of.items() if on is line}
+
+            def served(devices: Mapping[int, SlaveDevice], names: Mapping[int, str] = names) -> Mapping[int, SlaveDevice]:
+                return share_reads(traced(devices, names) if is_traced() else devices, cell)
+
+            line.serve_by(served)
 
     # ------------------------------------------------------------------ what comes from outside
 
