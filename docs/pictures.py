@@ -252,6 +252,34 @@ workpiece = 60.0
 at = 400.0
 hold = "table.OUT2"
 """
+TOOL = """
+[mic488.M2]
+unit = "mm"
+gear = 640.0
+acc = 400.0
+dec = 400.0
+vel = 100.0
+[[axis]]
+name = "a"
+drive = "table.M1"
+pitch = 5.0
+[[axis]]
+name = "b"
+drive = "table.M2"
+pitch = 5.0
+[[tool]]
+name = "head"
+axis = "a"
+other = "b"
+[[tool.x_switch]]
+above = 40.0
+to = "table.IN1"
+[[fault]]
+kind = "slipping-belt"
+element = "head"
+from_s = 0.6
+until_s = 0.7
+"""
 CUP = """
 [[button]]
 name = "part"
@@ -311,6 +339,8 @@ def main() -> None:
     draw("shaft", AXIS + SHAFT, way, 1.8, ("z.position", "cams.angle"), ("table.IN11", "table.IN12"))
     apart = ((0.0, "M1_EN=1"), (0.0, "M2_EN=1"), (0.2, "M1_POS_REL=80"), (0.2, "M2_POS_REL=80"), (0.7, "M2_EN=0"))
     draw("gantry", GANTRY, apart, 1.6, ("y1.position", "y2.position", "beam.skew"), ("table.M2_EN", "beam.skewed"))
+    turns = ((0.0, "M1_EN=1"), (0.0, "M2_EN=1"), (0.2, "M1_POS_REL=80"), (1.5, "M2_POS_REL=60"))
+    draw("tool", TOOL, turns, 2.8, ("a.position", "b.position", "head.x", "head.y"), ("table.IN1",))
     feeds = ((0.1, "OUT1=1"), (0.2, "OUT2=1"), (0.9, "OUT2=0"), (1.0, "OUT2=1"), (1.6, "OUT1=0"), (2.2, "OUT1=1"))
     fronts = "infeed.place1", "outfeed.place1"
     draw("conveyor", CONVEYOR, feeds, 3.4, fronts, ("table.OUT1", "table.OUT2", "table.IN5"))

@@ -89,6 +89,13 @@ axis = "left"
 other = "right"
 limit = 0.01
 mass = 5.0
+[[tool]]
+name = "head"
+axis = "x"
+other = "left"
+[[tool.x_switch]]
+above = 5.0
+to = "table.IN8"
 [[load]]
 name = "box"
 axis = "left"

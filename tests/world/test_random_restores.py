@@ -85,6 +85,11 @@ PARTS = (
     ),
     "[[carriage]]\nname = 't'\naxis = 'x'\nfrequency = 12\n[[carriage.switch]]\nabove = 50\nto = 'c.IN3'\n",
     "[[brake]]\nname = 'b'\naxis = 'x'\ntorque = 0.4\nrelease = 'c.OUT1'\n",
+    (
+        "[[tool]]\nname = 'tl'\naxis = 'x'\nother = 'y'\n[[tool.y_switch]]\nabove = 2\nto = 'c.IN12'\n"
+        "[[fault]]\nkind = 'slipping-belt'\nelement = 'tl'\nbelt = 'other'\nfrom_s = 0.7\nuntil_s = 1.1\n"
+        "[[event]]\nwhen = 'tl.x > 30'\nsteps = [{ note = 'far' }]\n"
+    ),
     "[[gantry]]\nname = 'g'\naxis = 'x'\nother = 'y'\nlimit = 3\nmass = 4\nfriction_force = 20\n",
     "[[collision]]\nname = 'k'\nwhen = 'abs(x.position - y.position) > 6'\neffect = 'jam'\nreset = 'c.OUT1'\n",
     "[[transducer]]\nname = 'v'\nof = 'x.position'\nto = 'c.AIN1'\npoints = [[0, 0], [80, 8]]\nresolution = 0.1\n",

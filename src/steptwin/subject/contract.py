@@ -111,7 +111,7 @@ class DrawingPart:
     shape: str
     """``rod``: the place is that of the end of a rod, which comes out of its body at 0. ``belt``: places are those of the fronts
     of workpieces on a belt that moves away from 0. ``slide``: the place is that of a slide on a rail. ``dial``: the place is the
-    angle of a hand, ``length`` is a turn."""
+    angle of a hand, ``length`` is a turn. ``plane``: the two places are those of a tool in a plane ``across`` high."""
     length: float
     places: tuple[str, ...]
     """Signals of the element, places on the track in their unit; unknown where there is nothing."""
@@ -119,6 +119,9 @@ class DrawingPart:
     """Length of a body: it ends so far before its place."""
     switches: tuple[SwitchPart, ...]
     low: float = 0.0
+    across: float = 0.0
+    across_low: float = 0.0
+    """As ``length`` and ``low``, of the other direction of a plane."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -253,7 +256,8 @@ def read_description(data: Mapping[str, Any]) -> Description:
 
 def _read_drawing(data: Mapping[str, Any]) -> DrawingPart:
     switches = tuple(SwitchPart(**switch) for switch in data["switches"])
-    return DrawingPart(data["shape"], data["length"], tuple(data["places"]), data["size"], switches, data.get("low", 0.0))
+    more = (data.get(name, 0.0) for name in ("low", "across", "across_low"))
+    return DrawingPart(data["shape"], data["length"], tuple(data["places"]), data["size"], switches, *more)
 
 
 def _read_control(data: Mapping[str, Any]) -> ControlDescription:

@@ -86,7 +86,8 @@ def _connections(world: Plant) -> Iterator[ConnectionPart]:
 
 def _drawing(drawing: Drawing) -> DrawingPart:
     switches = tuple(map(_switch, drawing.sensors))
-    return DrawingPart(drawing.shape, drawing.length, drawing.places, drawing.size, switches, drawing.low)
+    across = drawing.across, drawing.across_low
+    return DrawingPart(drawing.shape, drawing.length, drawing.places, drawing.size, switches, drawing.low, *across)
 
 
 def _switch(zone: SensorZone) -> SwitchPart:

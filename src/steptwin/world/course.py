@@ -173,6 +173,14 @@ class Course:
         load = piece.load + lead if piece.load_follows else piece.load
         return MechanicalState(rotor, load, piece.stalled, piece.behind)
 
+    def position(self, now: Nanos) -> float:
+        """Where the load is, between whole pulses as well."""
+        piece = self._piece(now)
+        if not piece.load_follows:
+            return float(piece.load)
+        lead = profile_of(self.plan) if self.free is None else self.free
+        return piece.load + (self.build.zero + self.build.sign * lead.position(now))
+
     def reaches(self, position: int, after: Nanos, direction: int, *, rotor: bool = False) -> Nanos | None:
         """First moment > ``after`` at which the load (or the rotor) has come to ``position`` in ``direction``, or beyond."""
         first = max(bisect_right(self.pieces, after, key=attrgetter("begin")) - 1, 0)

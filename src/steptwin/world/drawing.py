@@ -15,6 +15,8 @@ SLIDE = "slide"
 """The one place is that of a slide on a rail."""
 DIAL = "dial"
 """The one place is the angle of a hand, in the unit of which ``length`` is a turn."""
+PLANE = "plane"
+"""The two places are those of a tool in a plane, ``length`` wide and ``across`` high."""
 
 
 class SensorZone(NamedTuple):
@@ -31,7 +33,7 @@ class Drawing:
     """A track of ``length``, in the unit of its places."""
 
     shape: str
-    """`ROD`, `BELT`, `SLIDE` or `DIAL`."""
+    """`ROD`, `BELT`, `SLIDE`, `DIAL` or `PLANE`."""
     length: float
     places: tuple[str, ...]
     """Signals of the element, places on the track; NaN where there is nothing."""
@@ -40,6 +42,9 @@ class Drawing:
     sensors: tuple[SensorZone, ...] = ()
     low: float = 0.0
     """Where the track begins."""
+    across: float = 0.0
+    across_low: float = 0.0
+    """As ``length`` and ``low``, of the other direction of a plane."""
 
 
 def rail(travel: tuple[float, float] | None, sensors: tuple[SensorZone, ...] = (), beyond: float = 0.0) -> Drawing:

@@ -82,8 +82,8 @@ class Element(Generic[S, B]):
     """How it is drawn, where there is more to see than levels and numbers."""
     function: Callable[[B], str] | None = None
     """The word that says what it does among those of its kind, such as ``and``."""
-    moved: Callable[[B], tuple[BuiltAxis, MovedLane]] | None = None
-    """The lane of its motion, which follows from that of an axis."""
+    moved: Callable[[B], Iterable[tuple[BuiltAxis, MovedLane]]] | None = None
+    """The lanes of its motion, each of which follows from that of an axis."""
     faults: tuple[FaultKind, ...] = ()
     """Its faults (`Layer.ELEMENT`), which act on the built object."""
     is_named: bool = field(init=False)

@@ -41,7 +41,7 @@ class MovedLane(NamedTuple):
     """What an axis moves besides its load, as a function of the pulses P of the load (`Mechanics`).
 
     A shaft is at ``offset`` + ``per_pulse`` · P. A follower is lifted by that angle, as ``points`` say. A carriage swings about
-    it, with ``spring``. A gantry is in the middle between it and the load of ``other``.
+    it, with ``spring``. A gantry and a tool are moved by the load of ``other``, too.
     """
 
     name: str
@@ -51,7 +51,7 @@ class MovedLane(NamedTuple):
     per_pulse: float
     offset: float = 0.0
     coupling: str = ""
-    """The shaft whose coupling may slip."""
+    """The shaft whose coupling, or the belt of a tool that, may slip."""
     points: tuple[tuple[float, float], ...] = ()
     """Angle and lift, by angle."""
     turn: float = 360.0
@@ -59,7 +59,10 @@ class MovedLane(NamedTuple):
     spring: tuple[float, float] | None = None
     """Frequency (Hz) and damping ratio."""
     other: tuple[str, str] | None = None
-    """Machine and subject of the other axis of a gantry."""
+    """Machine and subject of the other axis of a gantry or a tool."""
+    other_per_pulse: float = 0.0
+    other_coupling: str = ""
+    """As ``per_pulse`` and ``coupling``, of the other axis."""
 
     @property
     def steepest(self) -> float:

@@ -242,6 +242,7 @@ export const DATASHEETS: Readonly<Record<string, string>> = {
   "The level it keeps.": "Poziom, który trzyma.",
   "Of its torque.": "Jaka część momentu.",
   "Of its lift.": "Jaka część skoku.",
+  "Whose belt.": "Czyj pasek.",
   "Of its frequency.": "Jaka część częstotliwości.",
   "Of its friction.": "Krotność tarcia.",
   "Of its mass, forces and torques; 0: it is missing.": "Krotność masy, sił i momentów; 0: obciążenia brak.",

@@ -59,6 +59,8 @@ export const MEANINGS: Readonly<Record<string, string>> = {
     "Pasek wózka jest luźny: wózek drga z niższą częstotliwością.",
   "The wire of an analog sensor is broken: 0 V.": "Przewód czujnika analogowego jest przerwany: 0 V.",
   "An analog sensor reads too high or too low.": "Czujnik analogowy zawyża lub zaniża.",
+  "A belt of a tool stands while its axis turns; afterwards it goes on from where it stands.":
+    "Pasek narzędzia stoi, choć oś się obraca; potem rusza dalej z tego miejsca.",
   "The guides of a gantry have a multiple of their friction.": "Prowadnice bramy mają wielokrotność swojego tarcia.",
   "A power supply has less voltage; its controllers are off while that is not enough.":
     "Zasilacz ma obniżone napięcie; gdy jest za niskie, jego sterowniki są wyłączone.",

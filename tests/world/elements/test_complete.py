@@ -92,4 +92,4 @@ def test_every_lane_is_in_every_export(tmp_path: Path) -> None:
         text = file.read_text("utf-8")
         lacking = {lane for lane in lanes if lane not in text and lane.replace(".", "_") not in text}
         assert not lacking, one
-        assert not {name for name in moved if not re.search(rf"{name}[ _]position|{name}[ _]angle|\"{name}\"", text)}, one
+        assert not {name for name in moved if not re.search(rf"{name}[ _](position|angle|x)|\"{name}\"", text)}, one

@@ -55,7 +55,7 @@ def test_shared_parameters_say_which_kinds_have_them() -> None:
     assert {parameter.name: of for parameter, of in found}["from_s"] == (
         "each byte, each delivery, each answer, each request, each change, each save, stuck, master-error, "
         "broken-wire, drift, stuck-output, stuck-input, welded-contact, open-coil, no-air, jam, belt-stop, empty-feeder, leak, "
-        "worn-jaws, worn-brake, stuck-brake, slipping-coupling, stuck-follower, worn-cam, slack-belt, "
+        "worn-jaws, worn-brake, stuck-brake, slipping-coupling, stuck-follower, worn-cam, slack-belt, slipping-belt, "
         "stiff-guides, brown-out, other-load"
     )
     assert len({parameter for parameter, _ in found}) == len(found)
@@ -125,6 +125,7 @@ def test_which_faults_elements_have() -> None:
         "gripper": {"stuck-input", "stuck-output", "worn-jaws"},
         "brake": {"stuck-input", "stuck-output", "worn-brake", "stuck-brake"},
         "carriage": {"slack-belt"},
+        "tool": {"slipping-belt"},
         "transducer": {"broken-wire", "drift"},
         "collision": {"stuck-input", "stuck-output"},
         "shaft": {"slipping-coupling"},

@@ -1,4 +1,4 @@
-"""Tracks of what axes move besides their loads: shafts, followers, carriages and gantries, from the true positions of the axes.
+"""Tracks of what axes move besides their loads, such as shafts and tools, from the true positions of the axes.
 
 A trace does not have their motion, because it follows from that of the loads, as `steptwin.world.lanes.MovedLane` says, and from
 the edges that faults record.
@@ -18,8 +18,8 @@ from steptwin.machine import SECOND, Nanos
 from steptwin.motion import Profile, Segment, at_rest
 from steptwin.motion.divisions import profile_of
 from steptwin.motion.elastic import DriveStretch, Response, ResponseStretch, Spring
-from steptwin.world.elements.carriage import polynomials
 from steptwin.world.lanes import LIFT_SHARE, SLIPS, SPRING_SHARE, STUCK, AxisLane, MovedLane
+from steptwin.world.loadmotion import polynomials
 
 SLACK_P = 0.02
 """Cubics are at most this far from the motion (pulses of its axis)."""
@@ -48,14 +48,16 @@ def moved_track(
     if lane.spring is not None:
         parts = _swinging(lane, load, pins.get(f"{lane.name}.{SPRING_SHARE}"), until)
     elif other is not None:
-        parts = _halfway(load, other, until)
+        one = _driven(load, lane.per_pulse, pins.get(f"{lane.coupling}.{SLIPS}"), until)
+        parts = _summed(one, _driven(other, lane.other_per_pulse, pins.get(f"{lane.other_coupling}.{SLIPS}"), until), lane.offset)
     else:
-        coupling = pins.get(f"{lane.coupling}.{SLIPS}")
-        parts = [_scaled(part, lane.per_pulse, lane.offset) for part in _slipping(_parts(load, until), coupling)]
+        parts = [
+            _scaled(part, 1.0, lane.offset) for part in _driven(load, lane.per_pulse, pins.get(f"{lane.coupling}.{SLIPS}"), until)
+        ]
         if lane.points:
             parts = _stuck([*_lifted(parts, lane.points, lane.turn)], lane.name, pins)
     track = AxisTrack(load.machine, AxisLane(f"{lane.name} {lane.signal}", lane.unit))
-    slack = SLACK_P * abs(lane.per_pulse) * lane.steepest
+    slack = SLACK_P * max(abs(lane.per_pulse), abs(lane.other_per_pulse)) * lane.steepest
     for part in parts:
         for begin, profile in _cubics(part, slack):
             track.times.append(begin)
@@ -64,6 +66,11 @@ def moved_track(
 
 
 # ---------------------------------------------------------------------- parts
+
+
+def _driven(load: AxisTrack, per_pulse: float, coupling: PinTrack | None, until: Nanos) -> Iterator[MovedPart]:
+    """What a load moves through a coupling that may slip."""
+    return (_scaled(part, per_pulse, 0.0) for part in _slipping(_parts(load, until), coupling))
 
 
 def _parts(load: AxisTrack, until: Nanos) -> Iterator[MovedPart]:
@@ -165,21 +172,17 @@ def _stuck(parts: list[MovedPart], name: str, pins: Mapping[str, PinTrack]) -> I
         yield part._replace(look=_standing(held))
 
 
-def _halfway(load: AxisTrack, other: AxisTrack, until: Nanos) -> Iterator[MovedPart]:
-    """The middle between two loads, in their unit."""
-    one, two = [*_parts(load, until)], [*_parts(other, until)]
-    rest = at_rest(two[0].begin, 0) if two else at_rest(until, 0)
-    begins = [part.begin for part in two]
-    for part in _cut(one, begins):
+def _summed(load: Iterable[MovedPart], other: Iterable[MovedPart], offset: float) -> Iterator[MovedPart]:
+    """What two loads move together; before the first part of ``other`` that stands where it begins."""
+    beside = [*other]
+    begins = [part.begin for part in beside]
+    for part in _cut(load, begins):
         i = bisect_right(begins, part.begin) - 1
-        beside = two[i].look if i >= 0 else partial(_on_profile, rest, rest.start, until)
+        its = beside[i].look if i >= 0 else _standing(beside[0].look(begins[0])[0] if beside else 0.0)
 
-        def look(now: Nanos, a: MotionLook = part.look, b: MotionLook = beside) -> tuple[float, float]:
+        def look(now: Nanos, a: MotionLook = part.look, b: MotionLook = its) -> tuple[float, float]:
             (p, v), (q, w) = a(now), b(now)
-            return (
-                (p / load.view.pulses_per_unit + q / other.view.pulses_per_unit) / 2.0,
-                (v / load.view.pulses_per_unit + w / other.view.pulses_per_unit) / 2.0,
-            )
+            return offset + p + q, v + w
 
         yield part._replace(look=look)
 

@@ -237,4 +237,4 @@ def _is_moved(lane: MovedLane) -> bool:
     angles = [angle for angle, _ in lane.points] if fields_fit(lane) else []
     rises = all(a < b for a, b in pairwise(angles)) and (not angles or angles[-1] - angles[0] < lane.turn)
     swings = lane.spring is None or (lane.spring[0] > 0.0 and 0.0 < lane.spring[1] < 1.0)
-    return fields_fit(lane) and lane.per_pulse != 0.0 and rises and swings
+    return fields_fit(lane) and (lane.per_pulse != 0.0 or lane.other_per_pulse != 0.0) and rises and swings

@@ -26,6 +26,7 @@ from steptwin.world.elements.shaft import SHAFT
 from steptwin.world.elements.source import SOURCE
 from steptwin.world.elements.supply import SUPPLY
 from steptwin.world.elements.timer import TIMER
+from steptwin.world.elements.tool import TOOL
 from steptwin.world.elements.transducer import TRANSDUCER
 from steptwin.world.elements.vacuum import VACUUM
 from steptwin.world.elements.wire import WIRE
@@ -80,6 +81,7 @@ for _one in (
     SHAFT,
     FOLLOWER,
     CARRIAGE,
+    TOOL,
     TRANSDUCER,
     COLLISION,
     GANTRY,

@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
-from math import floor, inf
-from typing import Any, ClassVar
+from math import floor
+from typing import ClassVar
 
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, Nanos
-from steptwin.motion import Profile, Segment
-from steptwin.motion.divisions import profile_of
+from steptwin.machine import Nanos
 from steptwin.motion.elastic import DriveStretch, Response, Spring
 from steptwin.state import Plain, Stateful
-from steptwin.world.course import Course
 from steptwin.world.drawing import rail
 from steptwin.world.element import Element, NamedSpec, Reference
 from steptwin.world.elements.axis import AXIS, BuiltAxis, find_axis
@@ -23,17 +20,13 @@ from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.table import ElementEffect
 from steptwin.world.faults.table import number as parameter
 from steptwin.world.lanes import SPRING_SHARE, MovedLane
+from steptwin.world.loadmotion import load_stretches
 from steptwin.world.reader import Key, Row, Table, TomlText, optional
 from steptwin.world.sense import TableRows
 from steptwin.world.signals import SignalOf
 from steptwin.world.site import Site
 from steptwin.world.spec import WorldSpec
 from steptwin.world.values import NameOf, name_value, number
-
-LOOK_NS: Nanos = 1_000_000
-"""Motions along arcs are no polynomials: their acceleration is taken as constant for so long."""
-MOST_LOOKS = 100_000
-"""Limit of the parts of an arc."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,13 +55,13 @@ class Carriage(Stateful):
         self._version: object = axis.mechanism.version()
 
     def _respond(self, now: Nanos, x: float, v: float) -> Response:
-        return Response(self._spring, _drives(self.axis.mechanism.course(now), now), x, v)
+        return Response(self._spring, load_stretches(self.axis.mechanism.course(now), now), x, v)
 
     def _renew(self, now: Nanos) -> None:
         """Go on from the present place after a change of the motion of the axis, or of the belt."""
         before = self._response
         x, v = before.at(now)
-        drives = tuple(_drives(self.axis.mechanism.course(now), now))
+        drives = tuple(load_stretches(self.axis.mechanism.course(now), now))
         v += 2.0 * self._spring.rate * (drives[0].p - before.stretch(now).drive.at(now)[0])
         self._response = Response(self._spring, drives, x, v)
         self._version = self.axis.mechanism.version()
@@ -142,50 +135,6 @@ class Carriage(Stateful):
         return (end for end in self._response.ends() if end > now)
 
 
-def _drives(course: Course, now: Nanos) -> Iterator[DriveStretch]:
-    """The motion of the load of an axis from a moment on."""
-    profile = profile_of(course.plan) if course.free is None else course.free
-    sign, zero = course.build.sign, course.build.zero
-    begun = [piece for piece in course.pieces if piece.begin <= now]
-    pieces = [*begun[-1:], *course.pieces[len(begun) :]]
-    for n, piece in enumerate(pieces):
-        begin = max(piece.begin, now)
-        end = pieces[n + 1].begin if n + 1 < len(pieces) else None
-        if not piece.load_follows:
-            yield DriveStretch(begin, float(piece.load), 0.0, 0.0, 0.0)
-            continue
-        offset = piece.load + zero
-        for at, p, v, a, j in polynomials(profile, begin, end):
-            yield DriveStretch(at, offset + sign * p, sign * v, sign * a, sign * j)
-
-
-def polynomials(profile: Profile, begin: Nanos, end: Nanos | None) -> Iterator[tuple[Nanos, float, float, float, float]]:
-    """Moment, position, velocity, acceleration and jerk at the beginning of each part of a profile between two moments."""
-    at = profile.start
-    for segment, segment_end in zip(profile.segments, profile.ends, strict=True):
-        until = None if segment_end == inf else profile.start + int(segment_end)
-        if (until is None or until > begin) and (end is None or at < end):
-            yield from _of_segment(profile, segment, max(at, begin), until if end is None or (until and until < end) else end)
-        at = at if until is None else until
-    if profile.end is not None and (end is None or profile.end < end):
-        yield max(profile.end, begin), profile.base + profile.final_p, 0.0, 0.0, 0.0
-
-
-def _of_segment(profile: Profile, s: Any, begin: Nanos, end: Nanos | None) -> Iterator[tuple[Nanos, float, float, float, float]]:
-    t = (begin - profile.start) / SECOND
-    if isinstance(s, Segment):
-        u = t - s.anchor_s
-        yield begin, profile.base + s.position(t), s.velocity(t), 2.0 * s.c2 + 6.0 * s.c3 * u, 6.0 * s.c3
-        return
-    for look in range(MOST_LOOKS):
-        now = begin + look * LOOK_NS
-        if end is not None and now >= end:
-            return
-        t, step = (now - profile.start) / SECOND, LOOK_NS / SECOND
-        v = s.velocity(t)
-        yield now, profile.base + s.position(t), v, (s.velocity(t + step) - v) / step, 0.0
-
-
 # ---------------------------------------------------------------------- the element
 
 
@@ -255,7 +204,7 @@ CARRIAGE: Element[CarriageSpec, Carriage] = Element(
     build=_build,
     signals=_signals,
     drawing=lambda carriage: rail(carriage.axis.spec.travel, tuple(one.zone for one in carriage.spec.switches)),
-    moved=lambda carriage: carriage.moved,
+    moved=lambda carriage: (carriage.moved,),
     faults=(
         FaultKind(
             "slack-belt",

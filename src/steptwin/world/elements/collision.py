@@ -16,6 +16,7 @@ from steptwin.world.elements.follower import FOLLOWER
 from steptwin.world.elements.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
 from steptwin.world.elements.quantity import TIME, check_condition, condition_of, owners_of
 from steptwin.world.elements.shaft import SHAFT
+from steptwin.world.elements.tool import TOOL
 from steptwin.world.kind import Terminals
 from steptwin.world.mechanics import Mechanism
 from steptwin.world.reader import Key, TomlText, optional
@@ -59,7 +60,7 @@ class Touch(BoardPart):
     """The output is on while parts touch. If that jams them, the axes stand from then on; they are free again when RESET is
     switched on, and jam again when they touch the next time."""
 
-    __slots__ = ("_axes", "_condition", "_due", "_is_jammed", "_jams", "_touches", "_was_reset", "count")
+    __slots__ = ("_axes", "_condition", "_due", "_is_jammed", "_is_short", "_jams", "_touches", "_was_reset", "count")
     FIXED: ClassVar[frozenset[str]] = frozenset({"_axes", "_condition", "_jams"}) | BoardPart.FIXED
 
     def __init__(self, board: Board, jams: bool, condition: SignalCondition, axes: Mapping[str, Mechanism]) -> None:
@@ -71,6 +72,8 @@ class Touch(BoardPart):
         """When parts may touch, or part, without an event."""
         self._touches = False
         self._is_jammed = False
+        self._is_short = False
+        """Whether they stand less than a pulse before where they touched: a jammed axis stands at a whole pulse."""
         self._was_reset = False
         self.count = 0
         """How often they touched."""
@@ -97,7 +100,7 @@ class Touch(BoardPart):
         return f"{self.board.name}: {' and '.join(self._axes) or 'parts'} touch"
 
     def update(self, now: Nanos) -> None:
-        touches = self._condition.holds(now)
+        touches = self._condition.holds(now) or self._is_short
         if touches is not self._touches:
             self._touches = touches
             if touches:
@@ -116,9 +119,10 @@ class Touch(BoardPart):
         self._report(self.touching(), touches=True)
         if self._jams and not self._is_jammed:
             self._block(True, now)
+            self._is_short = not self._condition.holds(now)
 
     def _block(self, blocked: bool, now: Nanos) -> None:
-        self._is_jammed = blocked
+        self._is_jammed, self._is_short = blocked, False
         for mechanism in self._axes.values():
             mechanism.block(blocked, now, by=self.board.name)
 
@@ -149,8 +153,10 @@ def _axes_of(spec: CollisionSpec, site: Site) -> Iterator[tuple[str, Mechanism]]
         **{name: shaft.axis for name, shaft in parts.built(SHAFT).items()},
         **{name: follower.shaft.axis for name, follower in parts.built(FOLLOWER).items()},
     }
-    for axis in (moved_by[owner] for owner in spec.owners if owner in moved_by):
-        yield axis.spec.name, axis.mechanism
+    for owner in spec.owners:
+        tool = parts.built(TOOL).get(owner)
+        axes = tool.axes if tool is not None else (moved_by[owner],) if owner in moved_by else ()
+        yield from ((axis.spec.name, axis.mechanism) for axis in axes)
 
 
 COLLISION = with_terminals(

@@ -246,7 +246,7 @@ FOLLOWER: Element[FollowerSpec, Follower] = Element(
     build=_build,
     signals=_signals,
     drawing=lambda follower: follower.drawing,
-    moved=lambda follower: follower.moved,
+    moved=lambda follower: (follower.moved,),
     faults=(
         FaultKind(
             "stuck-follower",

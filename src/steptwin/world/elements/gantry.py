@@ -115,10 +115,10 @@ class Gantry(Touch):
 
     @property
     def moved(self) -> tuple[BuiltAxis, MovedLane]:
-        one, other = (end.mechanism for end in self._ends)
-        per_pulse = one.build.sign / float(self._ends[0].scale.pulses_per_unit)
+        half, other_half = (end.mechanism.build.sign / (2.0 * float(end.scale.pulses_per_unit)) for end in self._ends)
+        other = self._ends[1].mechanism
         place = other.machine, str(other.number)
-        return self._ends[0], MovedLane(self.board.name, "position", self.unit, per_pulse, other=place)
+        return self._ends[0], MovedLane(self.board.name, "position", self.unit, half, other=place, other_per_pulse=other_half)
 
     @property
     def unit(self) -> str:
@@ -196,4 +196,4 @@ _GANTRY = with_terminals(
         ),
     ),
 )
-GANTRY = replace(_GANTRY, moved=lambda gantry: gantry.moved)
+GANTRY = replace(_GANTRY, moved=lambda gantry: (gantry.moved,))

@@ -229,7 +229,7 @@ SHAFT: Element[ShaftSpec, GearedShaft] = Element(
     build=_build,
     signals=_signals,
     drawing=lambda shaft: Drawing(DIAL, float(TURN), ("angle",), sensors=tuple(one.zone for one in shaft.spec.cams)),
-    moved=lambda shaft: shaft.moved,
+    moved=lambda shaft: (shaft.moved,),
     faults=(
         FaultKind(
             "slipping-coupling",

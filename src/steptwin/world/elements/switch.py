@@ -64,11 +64,11 @@ SWITCH = TableRows(
 )
 
 
-def read_switches(text: TomlText, axis: Path, table: Table) -> Iterator[SwitchSpec]:
+def read_switches(text: TomlText, axis: Path, table: Table, key: str = "switch") -> Iterator[SwitchSpec]:
     """The switches in the table of an axis that have all they need."""
-    given = table.get("switch", [])
+    given = table.get(key, [])
     for n, switch in enumerate(given if isinstance(given, list) else [given]):
-        path = (*axis, "switch", n)
+        path = (*axis, key, n)
         values = read_table(text, path, switch, SWITCH.keys)
         if "target" in values:
             check_sense(text, path, SWITCH, switch)

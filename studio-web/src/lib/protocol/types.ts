@@ -388,6 +388,8 @@ export type Description = {
         period: number | null;
       })[];
       low: number;
+      across: number;
+      across_low: number;
     } | null;
     function: string | null;
   })[];
