@@ -81,7 +81,7 @@ def test_completions() -> None:
 
 def test_signatures() -> None:
     analysis = of(session("I2H5\nC7\nR\n"))
-    assert [(s.label, s.active) if (s := analysis.signature(end)) else None for end in analysis.lines.ends[:3]] == [
+    assert [(s.label, s.active) if (s := analysis.signature(end)) else None for end in map(analysis.lines.end, range(3))] == [
         ("I line or flag H or L label", 2),
         ("C number or line or function or flag", 0),
         None,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from steptwin.lsp.positions import Encoding, LineIndex
@@ -28,7 +28,7 @@ def test_every_place_has_a_position_and_comes_back(text: str, encoding: Encoding
         line, found = lines.position(place, encoding)
         before = text[lines.starts[line] : place]
         assert found == column(before, encoding)
-        if place <= lines.ends[line]:
+        if place <= lines.end(line):
             assert lines.place(line, found, encoding) == place
 
 
@@ -37,7 +37,7 @@ def test_any_position_is_a_place_on_its_line(text: str, line: int, column: int, 
     lines = LineIndex(text)
     place = lines.place(line, column, encoding)
     if line < len(lines.starts):
-        assert lines.starts[line] <= place <= lines.ends[line]
+        assert lines.starts[line] <= place <= lines.end(line)
     else:
         assert place == len(text)
 
@@ -60,3 +60,19 @@ def test_columns_of_an_emoji(encoding: Encoding, column: int, place: int) -> Non
 def test_lines_end_as_the_protocol_says() -> None:
     lines = LineIndex("a\r\nb\rc\nd\u2028e\x0cf\n")
     assert [lines.line(number) for number in range(len(lines.starts))] == ["a", "b", "c", "d\u2028e\x0cf", ""]
+
+
+@given(texts, st.integers(0, 30), st.integers(0, 10), st.text(alphabet="ab\r\n😀", max_size=6))
+@example("a\r\nb", 2, 0, "x").via("between the halves of a line end")
+@example("a\rb", 2, 0, "\n").via("its other half")
+@example("a\r\n\nb", 1, 1, "").via("one half is left")
+def test_a_changed_text_is_that_text(text: str, start: int, length: int, typed: str) -> None:
+    start = min(start, len(text))
+    end = min(start + length, len(text))
+    changed = LineIndex(text).changed(start, end, typed)
+    whole = LineIndex(text[:start] + typed + text[end:])
+    assert (changed.text, changed.contents, changed.starts) == (whole.text, whole.contents, whole.starts)
+    places = range(len(whole.text) + 1)
+    assert [changed.position(place, Encoding.UTF16) for place in places] == [
+        whole.position(place, Encoding.UTF16) for place in places
+    ]

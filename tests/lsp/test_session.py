@@ -266,7 +266,7 @@ def test_signatures_know_the_operand() -> None:
     made = session("PABS M1 \nSET x = max(1, \nPULSE(OUT1, \nWAIT IN1 = \nEND ")
     analysis = made.analysis(PRG)
     assert analysis is not None
-    found = [analysis.signature(end) for end in analysis.lines.ends]
+    found = [analysis.signature(end) for end in map(analysis.lines.end, range(len(analysis.lines.starts)))]
     assert [(s.label, s.active) for s in found if s is not None] == [
         ("PABS Mx position", 1),
         ("max(Y, Z)", 1),

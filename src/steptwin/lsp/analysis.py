@@ -106,7 +106,7 @@ class Analysis:
         new = LineIndex(wanted)
         old = self.lines
         count = min(len(old.starts), len(new.starts))
-        edits = [Edit(Span(old.starts[n], old.ends[n]), new.line(n)) for n in range(count - 1) if old.line(n) != new.line(n)]
+        edits = [Edit(Span(old.starts[n], old.end(n)), new.line(n)) for n in range(count - 1) if old.line(n) != new.line(n)]
         rest_old, rest_new = Span(old.starts[count - 1], len(old.text)), new.text[new.starts[count - 1] :]
         if self.text[rest_old.start :] != rest_new:
             edits.append(Edit(rest_old, rest_new))

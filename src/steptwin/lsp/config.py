@@ -65,7 +65,7 @@ class ConfigAnalysis(Analysis):
         if before.startswith(_COMMENTS):
             return Completions(())
         if before.startswith("["):
-            span = Span(place - len(before), self.lines.ends[number])
+            span = Span(place - len(before), self.lines.end(number))
             names = [name for name in sections_of() if name.lower() not in self._present]
             return Completions([Completion(f"[{name}]", CompletionKind.KEY, span, "section") for name in names])
         header = self._header_at(place)
@@ -104,7 +104,7 @@ class ConfigAnalysis(Analysis):
         return [self._section(header, last) for header, last in self._sections()]
 
     def _section(self, header: Header, last: int) -> OutlineItem:
-        span = Span(header.span.start, max(header.span.end, self.lines.ends[last]))
+        span = Span(header.span.start, max(header.span.end, self.lines.end(last)))
         inside = [entry for entry in self._file.entries if span.start <= entry.key_span.start < span.end]
         children = tuple(
             OutlineItem(entry.key, SymbolKind.KEY, Span(entry.key_span.start, entry.value_span.end), entry.key_span, entry.value)

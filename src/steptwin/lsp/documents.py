@@ -42,5 +42,5 @@ class Document:
                 continue
             start = lines.place(*change.start, encoding)
             end = max(start, lines.place(*change.end, encoding))
-            lines = LineIndex(lines.text[:start] + change.text + lines.text[end:])
+            lines = lines.changed(start, end, change.text)
         return Document(self.uri, self.language, version, lines)

@@ -20,7 +20,7 @@ from steptwin.wbc.statements import COMPARISONS, SET, STATEMENTS, OperandKind
 
 
 class ForeignLine(NamedTuple):
-    """A refused line: its words, its text without comment and where that begins; ``jumps`` are the labels named by JUMPs.
+    """A refused line: its words, its text without comment and where that begins; ``jumps`` gives the labels named by JUMPs.
 
     ``reads`` returns whether a text would be accepted in place of the line.
     """
@@ -28,7 +28,7 @@ class ForeignLine(NamedTuple):
     words: Sequence[Lexeme]
     code: str
     start: int
-    jumps: frozenset[str]
+    jumps: Callable[[], frozenset[str]]
     reads: Callable[[str], bool]
 
     @property
@@ -162,7 +162,7 @@ def _label(line: ForeignLine) -> Advice | None:
     words = line.words
     name = words[-1]
     if (len(words) == 1 or (len(words) == 2 and line.key in ("LABEL", "SUB", "PROC", "FUNCTION"))) and (
-        name.text.upper() in line.jumps and line.reads(f"{name.text}:")
+        name.text.upper() in line.jumps() and line.reads(f"{name.text}:")
     ):
         return _of_all(line, f"{name.text} is a label", "a label is written with a ':'", f"{name.text}:", keyword=LABEL)
     return None

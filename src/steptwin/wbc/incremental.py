@@ -46,14 +46,12 @@ class Edited:
         self._memory = StepMemory()
         self._found: list[Diagnostic] = []
 
-    def update(self, text: str) -> None:
-        """Read the changed lines."""
-        pieces = _LINE_END.split(text)
-        contents, ends = pieces[::2], pieces[1::2]
-        starts = list(accumulate(map(add, map(len, contents), map(len, ends)), initial=0))
+    def update(self, text: str, lines: tuple[list[str], list[int]] | None = None) -> None:
+        """Read the changed lines. ``lines``: all of them without their ends, and where they begin, if that is known; those that
+        are the same objects as before are compared faster."""
+        contents, starts = split_lines(text) if lines is None else lines
         if contents and not contents[-1]:
-            contents.pop()
-            starts.pop()
+            contents, starts = contents[:-1], starts[:-1]
         same = _common(self.contents, contents)
         kept = _common(self.contents[same:][::-1], contents[same:][::-1])
         fresh = range(self._next_base, self._next_base + len(contents) - same - kept)
@@ -121,6 +119,13 @@ class Edited:
         fix = diagnostic.fix
         moved = None if fix is None else replace(fix, span=self.span(fix.span))
         return replace(diagnostic, span=self.span(diagnostic.span), fix=moved)
+
+
+def split_lines(text: str) -> tuple[list[str], list[int]]:
+    """The lines of a text without their ends, and where they begin; the last one is what follows the last line end."""
+    pieces = _LINE_END.split(text)
+    contents, ends = pieces[::2], pieces[1::2]
+    return contents, list(accumulate(map(add, map(len, contents), map(len, ends)), initial=0))
 
 
 _BLOCK = 256

@@ -38,7 +38,7 @@ class ProgramScope:
         self.remarked: set[str] = set()
         """Names of wrong definitions, already reported at their first use."""
         # A text is checked many times while it is edited: only new names are examined.
-        statements = [line.statement for line in program.lines]
+        statements = program.naming
         for statement in statements:
             if isinstance(statement, ConstantDefinition):
                 self._define(statement)

@@ -18,7 +18,7 @@ from steptwin.wbc.tree import Broken, Comment, Identifier, ImageRecord, Position
 RECORD_MARK = "//!record"
 POSITION_MARK = "//!position"
 _RECORD = re.compile(rf"{RECORD_MARK}\s+([0-9a-f]{{32}})$", re.IGNORECASE)
-_JUMP = re.compile(r"[ \t]*JUMP[ \t]+(\w+)", re.IGNORECASE)
+_JUMP = re.compile(r"^[ \t]*JUMP[ \t]+(\w+)", re.IGNORECASE | re.MULTILINE)
 _LONGEST_EXPLAINED = 500
 """Characters of a line up to which it is looked at for what other languages write: looking takes time."""
 _MOST_LOOK_ALIKES = 3
@@ -112,9 +112,7 @@ class Parser:
         if len(code) > _LONGEST_EXPLAINED:
             self.diagnostics.append(found)
             return None, None
-        if self._jumps is None:
-            self._jumps = frozenset(match[1].upper() for line in self._lines if (match := _JUMP.match(line)))
-        advice, keyword = explain(ForeignLine(words, code, start, self._jumps, self._reads), found)
+        advice, keyword = explain(ForeignLine(words, code, start, self._labels, self._reads), found)
         self.diagnostics.append(advice)
         opened = code.find("/*")
         if opened >= 0 and "*/" not in code[opened:] and "*/" not in self._lines[number][len(code) :]:
@@ -125,6 +123,12 @@ class Parser:
             name = words[-1]
             return None, Identifier(name.start, name.end, name.text, name.text.upper())
         return keyword, None
+
+    def _labels(self) -> frozenset[str]:
+        """Those that JUMPs name."""
+        if self._jumps is None:
+            self._jumps = frozenset(name.upper() for name in _JUMP.findall("\n".join(self._lines)))
+        return self._jumps
 
     def _reads(self, text: str) -> bool:
         words = tokens(text, 0)

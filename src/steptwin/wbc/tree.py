@@ -149,3 +149,11 @@ class SourceLine(TreeNode):
 @dataclass(frozen=True, slots=True)
 class ProgramTree:
     lines: tuple[SourceLine, ...]
+
+    @property
+    def naming(self) -> list[StatementNode]:
+        """The statements that may give names a meaning, in their order."""
+        return [statement for line in self.lines if type(statement := line.statement) in _NAMING]  # type: ignore[misc]
+
+
+_NAMING = frozenset({ConstantDefinition, Label, Assign, Broken})

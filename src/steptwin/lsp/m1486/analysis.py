@@ -120,7 +120,7 @@ class M1486Analysis(Analysis):
         """The chips, and the labels each with the commands up to the next."""
         marks = [command for _, command in self._commands if command.key in ("@", "X", "XG")]
         last = max((command.span.end for _, command in self._commands), default=0)
-        ends = [self.lines.ends[max(self.lines.line_of(command.span.start) - 1, 0)] for command in marks[1:]]
+        ends = [self.lines.end(max(self.lines.line_of(command.span.start) - 1, 0)) for command in marks[1:]]
         return [self._section(command, end) for command, end in zip(marks, [*ends, last], strict=False)]
 
     def _section(self, command: ChipCommand, end: int) -> OutlineItem:

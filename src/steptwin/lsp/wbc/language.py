@@ -104,7 +104,7 @@ def _around_program(session: OtherTexts, uri: str) -> tuple[object, ...]:
 
 def _analyse_program(session: OtherTexts, uri: str, lines: LineIndex) -> WbcAnalysis:
     edited = session.kept(uri, Edited)
-    edited.update(lines.text)
+    edited.update(lines.text, (lines.contents, lines.starts))
     return WbcAnalysis(uri, lines, edited, _context(session, uri))
 
 

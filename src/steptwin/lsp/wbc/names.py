@@ -33,8 +33,8 @@ class Names:
     def of(cls, program: ProgramTree, around: ProgramContext) -> Names:
         labels: dict[str, str] = {}
         values: dict[str, str] = {}
-        for line in program.lines:
-            statement = line.statement
+        naming = program.naming
+        for statement in naming:
             if isinstance(statement, Label):
                 labels.setdefault(statement.name.key, statement.name.text)
             elif isinstance(statement, ConstantDefinition):

@@ -89,13 +89,13 @@ class WorldAnalysis(Analysis):
         if line == table.first:
             keys = "\n".join(f"* `{key.name}`: {key.meaning}" for key in keys_of(table))
             return Hover(table.span, f"`{'.'.join(table.names)}`\n\n{keys}") if keys else None
-        found = _KEY.match(self.text, self.lines.starts[line], self.lines.ends[line])
+        found = _KEY.match(self.text, self.lines.starts[line], self.lines.end(line))
         key = None if found is None else next((key for key in keys_of(table) if key.name == found[1]), None)
         if found is None or key is None or key.name == "when":
             of_signal = self._signals.hover(self.lines.line(line), self.lines.starts[line], place)
             if of_signal is not None or found is None or key is None:
                 return of_signal
-        span = Span(found.start(1), max(self.lines.ends[line], found.end(1)))
+        span = Span(found.start(1), max(self.lines.end(line), found.end(1)))
         needed = " It is needed." if key.is_required else ""
         return Hover(span, f"`{key.name}` of `{'.'.join(table.names)}`\n\n{key.meaning[0].upper()}{key.meaning[1:]}.{needed}")
 
@@ -110,7 +110,7 @@ class WorldAnalysis(Analysis):
     def _present(self, table: TableOutline, without: int) -> Iterator[str]:
         """The keys of a table, except those of one line."""
         for number in range(table.first + 1, table.last + 1):
-            found = _KEY.match(self.text, self.lines.starts[number], self.lines.ends[number])
+            found = _KEY.match(self.text, self.lines.starts[number], self.lines.end(number))
             if found is not None and number != without:
                 yield found[1]
 
@@ -123,7 +123,7 @@ class WorldAnalysis(Analysis):
             name: kind
             for table, kind in tables
             for start, name in names.items()
-            if table.span.end <= start <= self.lines.ends[table.last]
+            if table.span.end <= start <= self.lines.end(table.last)
         }
 
     def new_name_problem(self, symbol: Symbol, text: str) -> str | None:
@@ -145,7 +145,7 @@ class WorldAnalysis(Analysis):
         return [self._section(table) for table in self._outline.tables]
 
     def _section(self, table: TableOutline) -> OutlineItem:
-        span = Span(table.span.start, max(table.span.end, self.lines.ends[table.last]))
+        span = Span(table.span.start, max(table.span.end, self.lines.end(table.last)))
         first = bisect_left(self._defined, span.start, key=_start)
         inside = [use for use in self._defined[first : first + 1] if use.span.start <= span.end]
         kind = _KINDS.get(table.kind, SymbolKind.SECTION)
@@ -170,9 +170,9 @@ class WorldAnalysis(Analysis):
         found: list[DocumentLink] = []
         for table in self._outline.tables:
             for number in range(table.first + 1, table.last + 1) if table.kind in _FILES else ():
-                key = _KEY.match(self.text, self.lines.starts[number], self.lines.ends[number])
+                key = _KEY.match(self.text, self.lines.starts[number], self.lines.end(number))
                 if key is not None and key[1] in _FILES[table.kind]:
-                    found += self._files(key.end(), self.lines.ends[number])
+                    found += self._files(key.end(), self.lines.end(number))
         return found
 
     def _files(self, start: int, end: int) -> Iterator[DocumentLink]:

@@ -51,7 +51,7 @@ class WorldOutline:
     def tables(self) -> Sequence[TableOutline]:
         headers: list[tuple[tuple[str, ...], Span, int]] = []
         for number, start in enumerate(self._lines.starts):
-            found = _HEADER.match(self._lines.text, start, self._lines.ends[number])
+            found = _HEADER.match(self._lines.text, start, self._lines.end(number))
             if found is not None and found[2].strip() and number not in self._inside:
                 names = tuple(part.strip() for part in found[2].split("."))
                 headers.append((names, Span(found.start(1), found.end()), number))
