@@ -78,7 +78,7 @@ def _by_server(name: str, language: str, text: str) -> list[list[str]]:
     for token in analysis.tokens():
         kinds[token.span.start : token.span.end] = [KINDS.get(token.kind, "")] * (token.span.end - token.span.start)
     lines = analysis.lines
-    return [kinds[start:end] for start, end in zip(lines.starts, lines.ends, strict=True)]
+    return [kinds[start : lines.end(number)] for number, start in enumerate(lines.starts)]
 
 
 def _kind(scopes: Sequence[str]) -> str:

@@ -64,6 +64,8 @@ FIXED = [
     ("W214", WBC, "SET $R0 = min(1,2)\n", "SET $R0 = min(1, 2)\n"),
     ("W220", WBC, "INPUT1 = 1\nOUT1 = INPUT1\n", "IN1 = 1\nOUT1 = INPUT1\n"),
     ("W222", WBC, "DELAY 500\n", "DELAY 0.5\n"),
+    ("W223", WBC, "M1 = ON\nVABS M1 -64.5\nWAIT IN1 = ON\n", "M1 = ON\nVABS M1 -20\nWAIT IN1 = ON\n"),
+    ("W223", WBC, "VmaxM1 = 20,01\n", "VmaxM1 = 20\n"),
     ("W250", CSV, "górna;1;2;3;4\n", "gorna;1;2;3;4\n"),
     ("M101", CHIP, "S200\n120\nE\n", "S200\nL20\nE\n"),
     ("M102", CHIP, "F-640\nR\n", "B640\nR\n"),
@@ -122,7 +124,7 @@ NOT_FIXED = {
     **dict.fromkeys(("W124", "W125", "W129", "W138", "W140", "W143", "M113", "M120", "M209", "M214"), _OTHER),
     **dict.fromkeys(("W145", "W160", "W161", "W216", "W260"), _IMAGE),
     **dict.fromkeys(("W146", "W209"), "the values of the row are the author's"),
-    **dict.fromkeys(("W201", "W202", "W203", "W205", "W210", "W218", "W219", "W221", "W223"), _WAY),
+    **dict.fromkeys(("W201", "W202", "W203", "W205", "W210", "W218", "W219", "W221"), _WAY),
     **dict.fromkeys(("W204", "M207"), "the code is needless, or the way to it is missing"),
     "W213": "what is read instead depends on what it is for",
     "W215": "the position table is a file",
@@ -157,7 +159,8 @@ def test_a_fix_mends_what_it_is_for(code: str, uri: str, text: str, mended: str)
     """All actions for a code, as an editor applies them."""
     old = "1.23" if code == "W139" else "1.70"
     world = f'[[mic488]]\nname = "m"\nfirmware = "{old}"\nprogram = "m.prg"\nconfig = "p.cfg"\n'
-    made = EditorSession(Shelf(w_toml=world, m_csv="ROW;1;x;x;x\n"))
+    gear = {"p_cfg": "[Axis0]\nGear=3200\n"} if code == "W223" else {}
+    made = EditorSession(Shelf(w_toml=world, m_csv="ROW;1;x;x;x\n", **gear))
     made.open(uri, "", 1, text)
     actions = [action for action in navigation.fixes(made, uri, Span(0, len(text))) if action.mends.code == code]
     assert actions

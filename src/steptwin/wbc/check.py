@@ -76,7 +76,7 @@ def check_program(
         if setup is not None:
             diagnostics += usage.unequal_axes(executable, setup)
             diagnostics += usage.homing_without_end(executable, setup)
-            diagnostics += usage.too_fast(executable, setup)
+            diagnostics += usage.too_fast(executable, program, setup)
     wrong_somewhere = any(d.severity is Severity.ERROR for d in diagnostics)
     runs = resolution.complete and not wrong_somewhere
     checked = CheckedProgram(text, program, executable if runs else None, len(executable.steps), in_order(diagnostics), positions)

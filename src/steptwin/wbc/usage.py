@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import inf
+from math import copysign, floor, inf, log10
 from typing import Any
 
-from steptwin.diagnostics import Diagnostic
+from steptwin.diagnostics import Diagnostic, Fix, Span
 from steptwin.tables import complete
 from steptwin.wbc import findings as f
 from steptwin.wbc import steps as s
 from steptwin.wbc.conditions import outcome
 from steptwin.wbc.events import BY_REGISTER, INPUTS, InterruptEvent
-from steptwin.wbc.positions import PositionTable
+from steptwin.wbc.positions import PositionTable, number_text
 from steptwin.wbc.real import real_text
 from steptwin.wbc.statements import CIRCLES, LINES
+from steptwin.wbc.tree import Assign, DecimalNumber, KeywordStatement, ProgramTree
 
 _RAMPS = frozenset({"ACCM", "DECM"})
 _PLANAR_AXES = (1, 2)
@@ -168,7 +169,7 @@ def homing_without_end(executable: s.Executable, setup: Setup) -> list[Diagnosti
     return found
 
 
-def too_fast(executable: s.Executable, setup: Setup) -> list[Diagnostic]:
+def too_fast(executable: s.Executable, program: ProgramTree, setup: Setup) -> list[Diagnostic]:
     """Velocities, known before, that are more than the pulse outputs give."""
     found: list[Diagnostic] = []
     for step in executable.steps:
@@ -184,9 +185,29 @@ def too_fast(executable: s.Executable, setup: Setup) -> list[Diagnostic]:
         speed_p = abs(value.value) * gear
         if speed_p > setup.most_speed_p:
             message = f"{real_text(value.value)} u/s at GEAR {gear:g} of M{axis} are {speed_p:.10g} pulses/s"
-            hint = f"the outputs give {setup.most_speed_p:g} pulses/s, {setup.most_speed_p / gear:.6g} u/s"
-            found.append(f.TOO_FAST.at(step, message, hint))
+            most = setup.most_speed_p / gear
+            hint = f"the outputs give {setup.most_speed_p:g} pulses/s, {most:.6g} u/s"
+            number = _number_of(program, step)
+            text = number_text(copysign(_six_digits_below(most), value.value))
+            found.append(
+                f.TOO_FAST.at(step, message, hint, None if number is None else Fix(Span(number.start, number.end), text))
+            )
     return found
+
+
+def _six_digits_below(value: float) -> float:
+    """The largest number with six digits that is no larger than a positive one."""
+    found = float(f"{value:.6g}")
+    return found if found <= value else float(f"{value - 10.0 ** (floor(log10(value)) - 5):.6g}")
+
+
+def _number_of(program: ProgramTree, step: s.ProgramStep) -> DecimalNumber | None:
+    """The last number written in the line of a step; None where a constant stands for it."""
+    statement = next((line.statement for line in program.lines if line.statement and line.statement.start == step.start), None)
+    match statement:
+        case Assign(value=DecimalNumber() as number) | KeywordStatement(operands=(*_, DecimalNumber() as number)):
+            return number
+    return None
 
 
 def interrupts(executable: s.Executable, setup: Setup | None) -> list[Diagnostic]:
