@@ -12,7 +12,7 @@ from typing import Protocol, TypeAlias
 Attribute: TypeAlias = str | int | float | bool
 
 
-class Span(Protocol):
+class TraceSpan(Protocol):
     def note(self, name: str, value: Attribute) -> None:
         """What is known after its begin."""
         ...
@@ -25,14 +25,14 @@ class NoSpan:
         """Nobody asks."""
 
 
-Tracer: TypeAlias = Callable[[str, Mapping[str, Attribute], bool], AbstractContextManager[Span]]
+Tracer: TypeAlias = Callable[[str, Mapping[str, Attribute], bool], AbstractContextManager[TraceSpan]]
 """Makes a span from its name, what is known of it, and whether it is only traced as a part of another one."""
 
-_NOTHING: AbstractContextManager[Span] = nullcontext(NoSpan())
+_NOTHING: AbstractContextManager[TraceSpan] = nullcontext(NoSpan())
 _tracers: list[Tracer] = []
 
 
-def span(name: str, attributes: Mapping[str, Attribute], *, is_part: bool = False) -> AbstractContextManager[Span]:
+def span(name: str, attributes: Mapping[str, Attribute], *, is_part: bool = False) -> AbstractContextManager[TraceSpan]:
     """A request, or a part of one, while it is entered. An exception marks it as failed, and passes.
 
     ``is_part``: it is traced within another span only, so that what a program does by itself, such as polling, is left out.

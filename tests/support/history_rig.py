@@ -9,7 +9,7 @@ from pathlib import Path
 from gateway_rig import GatewayWorld
 
 from steptwin.history.database import engine_of, read_url, upgrade
-from steptwin.history.recorder import Recorder
+from steptwin.history.recorder import Recorder, WallAndSteady
 from steptwin.history.rows import PointRow, RowBatch, RunHead
 from steptwin.history.writing import TableWriter
 from steptwin.subject import commands as command
@@ -35,13 +35,19 @@ class RecordedWorld:
         self.subject = _GoingWorld(text)
         self.world = self.subject.world
         self.late_us = 0
+        """By which both clocks are before the time of the world."""
+        self.set_us = 0
         """By which the wall clock has been set forward."""
-        self.recorder = Recorder(self.subject, registers or {}, wall_us=self.wall_us, dead_band=dead_band)
+        clock = WallAndSteady(self.wall_us, self.steady_us)
+        self.recorder = Recorder(self.subject, registers or {}, clock=clock, dead_band=dead_band)
         self.heads = [asyncio.run(self.recorder.begin())]
         self.batches: list[RowBatch] = []
 
     def wall_us(self) -> int:
-        return BEGAN_US + self.world.now // 1000 + self.late_us
+        return BEGAN_US + self.world.now // 1000 + self.late_us + self.set_us
+
+    def steady_us(self) -> int:
+        return self.world.now // 1000 + self.late_us
 
     def look(self) -> list[RowBatch]:
         found = asyncio.run(self.recorder.look())

@@ -16,7 +16,7 @@ from opentelemetry.trace import get_current_span
 
 from steptwin import __version__
 from steptwin.errors import Misuse
-from steptwin.tracing import Attribute, NoSpan, Span, traced_by
+from steptwin.tracing import Attribute, NoSpan, TraceSpan, traced_by
 
 TIMEOUT_S = 5
 
@@ -46,7 +46,7 @@ def traces_to(processor: SpanProcessor, subject: str) -> Generator[None]:
     tracer = provider.get_tracer("steptwin", __version__)
 
     @contextmanager
-    def span(name: str, attributes: Mapping[str, Attribute], is_part: bool) -> Generator[Span]:
+    def span(name: str, attributes: Mapping[str, Attribute], is_part: bool) -> Generator[TraceSpan]:
         if is_part and not get_current_span().get_span_context().is_valid:
             yield NoSpan()
             return

@@ -14,7 +14,7 @@ from steptwin.gateways.contract import GatewayState, GatewaySubject
 from steptwin.gateways.points import registers_by_machine
 from steptwin.history.database import read_url, shown
 from steptwin.history.past import KeptValues
-from steptwin.history.recorder import Recorder
+from steptwin.history.recorder import Recorder, WallAndSteady
 from steptwin.history.rows import RowBatch, RunHead
 from steptwin.history.spool import Spool
 from steptwin.history.writer import HistoryWriter
@@ -54,7 +54,7 @@ class HistoryKeeper:
 
         self._writer = HistoryWriter(self._url, self._spool, from_thread, keep_days=self._spec.keep_days)
         self._writer.start()
-        self._recorder = Recorder(self._subject, registers, wall_us=_wall_us, dead_band=self._spec.dead_band)
+        self._recorder = Recorder(self._subject, registers, clock=CLOCKS, dead_band=self._spec.dead_band)
         head = await self._recorder.begin()
         try:
             self._spool.begin(head)
@@ -128,5 +128,4 @@ class HistoryKeeper:
             self._spool.close()
 
 
-def _wall_us() -> int:
-    return time.time_ns() // 1000
+CLOCKS = WallAndSteady(lambda: time.time_ns() // 1000, lambda: time.monotonic_ns() // 1000)

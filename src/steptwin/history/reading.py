@@ -8,11 +8,12 @@ with HistoryDatabase("sqlite:///h.db") as past:
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from fnmatch import fnmatchcase
 from itertools import zip_longest
+from operator import attrgetter
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Self, TypeAlias
@@ -175,8 +176,8 @@ class HistoryDatabase:
     # ------------------------------------------------------------------ what there is
 
     def runs(self, subject: str | None = None) -> list[KeptRun]:
-        """In the order in which they began."""
-        wanted = select(RUN).order_by(RUN.c.began_us, RUN.c.id)
+        """In the order in which they began: that of their numbers, because the wall clock may be set back."""
+        wanted = select(RUN).order_by(RUN.c.id)
         if subject is not None:
             wanted = wanted.where(RUN.c.subject == subject)
         return [
@@ -264,10 +265,8 @@ class HistoryDatabase:
         wanted = select(s.run_id, s.t_ns, s.at_us, value.label("value")).where(s.point_id.in_(ids), s.run_id.in_(runs))
         if kind == TEXTS:
             wanted = wanted.select_from(SAMPLE).outerjoin(TEXT, TEXT.c.id == s.text_id)
-        rows = [
-            _Row(*row)
-            for row in (*self._before(wanted, SAMPLE, bounds), *self._rows(_ordered(wanted, SAMPLE, bounds).limit(most)))
-        ]
+        before, rest = self._before(wanted, SAMPLE, bounds), self._rows(_ordered(wanted, SAMPLE, bounds).limit(most))
+        rows = _in_order(_Row(*row) for row in (*before, *rest))
         is_whole = kind == TEXTS or not bounds.is_wall
         return rows if is_whole else [*self._summaries(ids, bounds, rows, runs), *rows]
 
@@ -306,7 +305,7 @@ class HistoryDatabase:
         wanted = select(*columns).where(p.point_id.in_(ids), p.run_id.in_(runs))
         limit = None if most is None else most + 1
         following = self._rows(_ordered(wanted, PLAN, bounds).limit(limit))
-        rows = [*self._before(wanted, PLAN, bounds), *following]
+        rows = sorted((*self._before(wanted, PLAN, bounds), *following), key=attrgetter("run_id", "t_ns"))
         found: list[KeptMotion] = []
         for row, after in zip_longest(rows, rows[1:]):
             if after is not None and after.run_id == row.run_id:
@@ -361,6 +360,11 @@ class HistoryDatabase:
 def _ordered(wanted: Query, table: Table, bounds: _Bounds) -> Query:
     """By the time of the subject: the wall clock may be set back."""
     return bounds.within(wanted, table).order_by(table.c.run_id, table.c.t_ns, table.c.id)
+
+
+def _in_order(rows: Iterable[_Row]) -> list[_Row]:
+    """Where the wall clock was set back, what held at a moment of it may be later than others after it."""
+    return sorted(rows, key=attrgetter("run", "time"))
 
 
 def _of_motions(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import uuid
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from operator import itemgetter
 from typing import NamedTuple
 
@@ -27,6 +28,8 @@ REST_NS: Nanos = SECOND
 """Twins whose events tell most of it are looked at so often without one."""
 ALIVE_US = 60_000_000
 """A run without changes says so often that it goes on."""
+SET_US = 1_000_000
+"""By how much the wall clock has to differ from the steady one to have been set; a clock that is corrected slowly has not."""
 FROM_PLANS = ("position", "velocity", "moving")
 PASSING = ("program.line", "program.statement", "virtual_time")
 """Too quick to be looked at now and then."""
@@ -55,19 +58,27 @@ class _Last(NamedTuple):
     seen: tuple[Nanos, int, KeptValue] | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class WallAndSteady:
+    """Two clocks, us: the wall clock in UTC, which may be set, and one that nobody sets."""
+
+    wall_us: Callable[[], int]
+    steady_us: Callable[[], int]
+
+
 class Recorder:
-    """Rows of ``subject``. ``wall_us``: the wall clock, UTC microseconds."""
+    """Rows of ``subject``."""
 
     def __init__(
         self,
         subject: GatewaySubject,
         registers: Mapping[str, Iterable[str]],
         *,
-        wall_us: Callable[[], int],
+        clock: WallAndSteady,
         dead_band: float = 0.0,
     ) -> None:
         self._subject = subject
-        self._wall_us = wall_us
+        self._clock = clock
         self._dead_band = dead_band
         self._sampler = Sampler(subject, registers)
         self._machines = {part.name: part for part in subject.description.machines}
@@ -88,6 +99,8 @@ class Recorder:
         self._batch = RowBatch(run="", number=0, time=0, at_us=0)
         self._speed = 1.0
         self._looked_at: tuple[Nanos, int] = 0, 0
+        self._steady = 0
+        """The steady clock at the last look."""
 
     def _add_machine(self, part: MachinePart, registers: Iterable[str]) -> None:
         points = [point for point in points_of(part, self._subject.description, registers) if point.name not in PASSING]
@@ -119,7 +132,8 @@ class Recorder:
     async def begin(self) -> RunHead:
         """Begin a run at the present moment, with all values. Raises as commands do."""
         clock = await self._sampler.take(CLOCK)
-        now, wall = _time(clock), self._wall_us()
+        now, wall = _time(clock), self._clock.wall_us()
+        self._steady = self._clock.steady_us()
         head = self._begin_run(now, wall)
         self._following.take()
         self._take_plans(wall)
@@ -164,7 +178,9 @@ class Recorder:
         """What has happened since the last look: a batch of the present run; the heads of others that have begun, because time
         has gone back, and their batches."""
         clock = await self._sampler.take(CLOCK)
-        now, wall = _time(clock), self._wall_us()
+        now, wall = _time(clock), self._clock.wall_us()
+        is_set, was = self._is_set(wall)
+        new, wall = wall, was if is_set else wall
         if clock.state is not None:
             speed = clock.state["speed"]
             self._speed = speed if isinstance(speed, int | float) and speed and not clock.state["paused"] else 0.0
@@ -186,8 +202,32 @@ class Recorder:
         if not 0 <= now - self._looked.get(LINES, -REST_NS) < REST_NS:
             self._take_traffic(now, wall)
         await self._take_changed(events, now, wall)
+        if is_set:
+            await self._go_on(now, wall, new)
+            wall = new
         self._looked_at = now, wall
         return [*found, *self._full(now, wall)]
+
+    def _is_set(self, wall: int) -> tuple[bool, int]:
+        """Whether the wall clock has been set since the last look, and what it would be otherwise."""
+        steady = self._clock.steady_us()
+        expected = self._looked_at[1] + steady - self._steady
+        self._steady = steady
+        return abs(wall - expected) > SET_US, expected
+
+    async def _go_on(self, now: Nanos, before: int, wall: int) -> None:
+        """The wall clock was set from ``before`` to ``wall``: keep everything again, so that nothing lasts over that moment."""
+        by = (wall - before) / 1e6
+        text = f"the wall clock went {'forward' if by > 0 else 'back'} by {abs(by):.3f} s: it was set, or this computer slept"
+        self._batch.events.append(EventRow(now, wall, 0, "", "clock", None, text, json.dumps({"by_s": by})))
+        for (machine, axis), (plan, origin) in self._plans.items():
+            there = self._axes[machine, axis]
+            self._batch.plans.append(PlanRow(there.point, now, before, plan, origin, there.scale, there.round_p))
+        self._plans.clear()
+        self._last.clear()
+        self._take_plans(wall)
+        self._take_sample(await self._sampler.take(CLOCK), now, wall)
+        await self._take_all(now, wall)
 
     async def _take_changed(self, events: Iterable[Event], now: Nanos, wall: int) -> None:
         if self._has_devices:
@@ -200,7 +240,7 @@ class Recorder:
         """Keep a command, with who gave it and what became of it."""
         content = json.dumps(entry.plain(), ensure_ascii=False, separators=(",", ":"))
         machine = str(entry.fields.get("machine") or "")
-        self._batch.events.append(EventRow(entry.time, self._wall_us(), 0, machine, COMMAND, None, str(entry), content))
+        self._batch.events.append(EventRow(entry.time, self._clock.wall_us(), 0, machine, COMMAND, None, str(entry), content))
 
     def lost(self, batches: Iterable[RowBatch]) -> None:
         """These could not be kept: say so in the next one."""
@@ -225,7 +265,7 @@ class Recorder:
 
     def _full(self, time: Nanos, wall: int) -> list[RowBatch]:
         full = self._batch
-        if not len(full) and wall - full.at_us < ALIVE_US:
+        if not len(full) and abs(wall - full.at_us) < ALIVE_US:
             return []
         full.time, full.at_us = time, wall
         self._batch = RowBatch(run=full.run, number=full.number + 1, time=time, at_us=wall)

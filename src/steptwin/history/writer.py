@@ -42,7 +42,8 @@ class HistoryWriter:
         self._writer = TableWriter()
         self._ending = threading.Event()
         self._removal: Iterator[None] | None = None
-        self._next_chores = self._next_removal = time.monotonic()
+        self._next_chores = self._next_removal = self._began = time.monotonic()
+        self._began_us = time.time_ns() // 1000
         self._thread = threading.Thread(target=self._work, name="history", daemon=True)
 
     def prepare(self) -> None:
@@ -155,10 +156,14 @@ class HistoryWriter:
                 return
             self._next_chores = now + CHORES_S
             if self._keep_days is not None and (self._removal is not None or now >= self._next_removal):
-                self._remove(now, time.time_ns() // 1000 - self._keep_days * DAY_US)
+                self._remove(now, self._safe_us(now) - self._keep_days * DAY_US)
         except DBAPIError as error:
             self._removal = None
             raise failure(self._url, error) from None
+
+    def _safe_us(self, now: float) -> int:
+        """The wall clock; one that has been set forward removes nothing before its time."""
+        return min(time.time_ns() // 1000, self._began_us + round((now - self._began) * 1e6))
 
     def _remove(self, now: float, limit_us: int) -> None:
         """A step of the removal; the next one follows at once."""

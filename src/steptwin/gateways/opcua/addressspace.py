@@ -6,8 +6,9 @@ Node ids are texts: ``table.M1.position``, as the control endpoint names points.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import cache, lru_cache
 from typing import Any
 
 from asyncua import ua
@@ -48,6 +49,7 @@ class BoundMethod:
     axis: int | None
 
 
+@lru_cache(maxsize=1 << 12)
 def node_id(path: Any) -> ua.NodeId:
     return ua.NodeId(path, NAMESPACE)
 
@@ -58,6 +60,7 @@ class AddressSpaceBuilder:
 
     def __init__(self, description: Description, registers: Mapping[str, Iterable[str]], *, is_kept: bool = False) -> None:
         self._is_kept = is_kept
+        self._shared: dict[object, Any] = {}
         self.items: list[ua.AddNodesItem] = []
         self.references: list[ua.AddReferencesItem] = []
         self.points: dict[str, tuple[PointNode, ...]] = {}
@@ -157,10 +160,12 @@ class AddressSpaceBuilder:
         if self._is_kept:
             access |= ua.AccessLevel.HistoryRead.mask
         self.items[-1].NodeClass = ua.NodeClass.Variable
-        begin = ua.Variant(ZEROS[point.type], VARIANTS[point.type])
-        self.items[-1].NodeAttributes = _variable(name, point.meaning, begin, access=access)
+        self.items[-1].NodeAttributes = self._alike(
+            (name, point.meaning, point.type, access),
+            lambda: _variable(name, point.meaning, ua.Variant(ZEROS[point.type], VARIANTS[point.type]), access=access),
+        )
         if has_unit:
-            unit = ua.Variant(engineering_unit(point.unit), ua.VariantType.ExtensionObject)
+            unit = _unit(point.unit)
             self._property(f"{path}.EngineeringUnits", node_id(path), "EngineeringUnits", unit, ua.ObjectIds.EUInformation)
             bounds = None if point.limits is None else value_range(point.limits)
             if bounds is not None:
@@ -174,24 +179,38 @@ class AddressSpaceBuilder:
         reference = ua.ObjectIds.Organizes if path == ROOT or parent == node_id(ROOT) else ua.ObjectIds.HasComponent
         self._item(path, parent, name, reference, node_id(kind) if isinstance(kind, str) else standard(kind))
         self.items[-1].NodeClass = ua.NodeClass.Object
-        self.items[-1].NodeAttributes = _attributes(ua.ObjectAttributes, name, meaning, EventNotifier=0)
+        self.items[-1].NodeAttributes = self._alike(
+            (name, meaning), lambda: _attributes(ua.ObjectAttributes, name, meaning, EventNotifier=0)
+        )
 
     def _property(self, path: str, parent: ua.NodeId, name: str, value: ua.Variant, kind: int, *, rank: int = -1) -> None:
         self._item(path, parent, name, ua.ObjectIds.HasProperty, standard(ua.ObjectIds.PropertyType))
         item = self.items[-1]
         if name in _STANDARD_NAMES:
-            item.BrowseName = ua.QualifiedName(name, 0)
+            item.BrowseName = _name(name, 0)
         item.NodeClass = ua.NodeClass.Variable
         item.NodeAttributes = _variable(name, "", value, data_type=kind, rank=rank)
+
+    def _alike(self, key: object, make: Callable[[], Any]) -> Any:
+        """The attributes of nodes that differ in nothing else: many controllers are of the same kind."""
+        found = self._shared.get(key)
+        if found is None:
+            found = self._shared[key] = make()
+        return found
 
     def _item(self, path: str, parent: ua.NodeId, name: str, reference: int, kind: ua.NodeId) -> None:
         item = ua.AddNodesItem()
         item.RequestedNewNodeId = node_id(path)
-        item.BrowseName = ua.QualifiedName(name, NAMESPACE)
+        item.BrowseName = _name(name, NAMESPACE)
         item.ParentNodeId = parent
         item.ReferenceTypeId = standard(reference)
         item.TypeDefinition = kind
         self.items.append(item)
+
+
+@cache
+def _unit(unit: str) -> ua.Variant:
+    return ua.Variant(engineering_unit(unit), ua.VariantType.ExtensionObject)
 
 
 _STANDARD_NAMES = frozenset({"InputArguments", "EngineeringUnits", "EURange"})
@@ -202,11 +221,21 @@ def _title(name: str) -> str:
     return "".join(word[:1].upper() + word[1:] for word in name.split("_"))
 
 
+@cache
+def _text(text: str) -> ua.LocalizedText:
+    return ua.LocalizedText(text)
+
+
+@cache
+def _name(name: str, namespace: int) -> ua.QualifiedName:
+    return ua.QualifiedName(name, namespace)
+
+
 def _attributes(kind: Any, name: str, meaning: str, **others: object) -> Any:
     """Those that are given; every one that a node has takes time and memory."""
-    given = {"DisplayName": ua.LocalizedText(name), **others}
+    given = {"DisplayName": _text(name), **others}
     if meaning:
-        given["Description"] = ua.LocalizedText(meaning)
+        given["Description"] = _text(meaning)
     return kind(**given, SpecifiedAttributes=sum(ua.NodeAttributesMask[attribute].value for attribute in given))
 
 

@@ -47,6 +47,8 @@ class NodeMaker:
         self._space = space
         self._to: dict[tuple[ua.NodeId, ua.NodeId, bool], Any] = {}
         """References to parents and types, which nodes share."""
+        self._alike: dict[tuple[int, int], tuple[ua.AddNodesItem, Mapping[ua.AttributeIds, AttributeValue]]] = {}
+        """By the objects of which they were made, which the item keeps."""
 
     def add(self, items: Iterable[ua.AddNodesItem]) -> None:
         """Each after its parent."""
@@ -59,13 +61,12 @@ class NodeMaker:
             raise AssertionError(f"{node} is there already")
         parent = space[item.ParentNodeId]
         made = NodeData(node)
+        given: Any = item.NodeAttributes
         attributes = made.attributes
         attributes[ua.AttributeIds.NodeId] = _value(node, ua.VariantType.NodeId)
-        attributes[ua.AttributeIds.BrowseName] = _value(item.BrowseName, ua.VariantType.QualifiedName)
-        attributes[ua.AttributeIds.NodeClass] = _value(item.NodeClass, ua.VariantType.Int32)
-        given: Any = item.NodeAttributes
-        for name, attribute, kind in _given(given.SpecifiedAttributes):
-            attributes[attribute] = _value(getattr(given, name), kind)
+        attributes.update(self._shared(item))
+        if isinstance(given, ua.VariableAttributes):
+            attributes[ua.AttributeIds.Value] = _value(given.Value, None)
         space[node] = made
         child = ua.ReferenceDescription()
         child.ReferenceTypeId = item.ReferenceTypeId
@@ -79,6 +80,22 @@ class NodeMaker:
         made.references.append(self._reference(item.ReferenceTypeId, item.ParentNodeId, is_forward=False))
         if not item.TypeDefinition.is_null():
             made.references.append(self._reference(_TYPE_DEFINITION, item.TypeDefinition, is_forward=True))
+
+    def _shared(self, item: ua.AddNodesItem) -> Mapping[ua.AttributeIds, AttributeValue]:
+        """The attributes of a node but its id and value: nobody writes them, so nodes that are alike have the same ones."""
+        given: Any = item.NodeAttributes
+        known = self._alike.get((id(given), id(item.BrowseName)))
+        if known is not None:
+            return known[1]
+        found = {
+            ua.AttributeIds.BrowseName: _value(item.BrowseName, ua.VariantType.QualifiedName),
+            ua.AttributeIds.NodeClass: _value(item.NodeClass, ua.VariantType.Int32),
+        }
+        for name, attribute, kind in _given(given.SpecifiedAttributes):
+            if attribute is not ua.AttributeIds.Value:
+                found[attribute] = _value(getattr(given, name), kind)
+        self._alike[id(given), id(item.BrowseName)] = item, found
+        return found
 
     def _reference(self, kind: ua.NodeId, target: ua.NodeId, *, is_forward: bool) -> Any:
         key = kind, target, is_forward

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from datetime import datetime
+from functools import cache
 from typing import Any
 
 from asyncua import ua
@@ -46,6 +47,7 @@ UNECE_URI = "http://www.opcfoundation.org/UA/units/un/cefact"
 OWN_URI = "urn:steptwin:units"
 
 
+@cache
 def standard(number: Any) -> ua.NodeId:
     """A node of OPC UA itself, such as ``ua.ObjectIds.Server``."""
     return ua.NodeId(number)
