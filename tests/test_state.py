@@ -40,8 +40,8 @@ class Piece(NamedTuple):
 class Ports(Stateful):
     """A controller and ports of every kind."""
 
-    __slots__ = ("device", "out", "ports", "shared")
-    FIXED = frozenset({"out"})
+    FIXED = ("out",)
+    __slots__ = (*FIXED, "device", "ports", "shared")
 
     def __init__(self) -> None:
         self.device = Mic488Device(ControllerConfig())

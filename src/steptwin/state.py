@@ -1,7 +1,8 @@
 """Plain state that can be copied out of a machine and put back: snapshots.
 
-A machine and its parts keep their state in slots. What is not a state - configuration, hooks, the machine a part belongs to -
-is named in ``FIXED``; everything else is copied, so that a new attribute cannot be forgotten.
+A machine and its parts keep their state in slots, so that a new attribute cannot be forgotten. What is not a state -
+configuration, hooks, the machine a part belongs to - is in ``FIXED``, which is a part of the slots:
+``__slots__ = (*FIXED, "position")``.
 """
 
 from __future__ import annotations
@@ -23,13 +24,15 @@ class Stateful:
 
     __slots__ = ()
 
-    FIXED: ClassVar[frozenset[str]] = frozenset()
+    FIXED: ClassVar[tuple[str, ...]] = ()
+    """Slots of a class that are not copied, besides those of its bases."""
     _STATE: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
-        slots = [name for base in reversed(cls.__mro__) for name in base.__dict__.get("__slots__", ())]
-        cls._STATE = tuple(name for name in slots if name not in cls.FIXED)
+        bases = [vars(base) for base in reversed(cls.__mro__)]
+        fixed = {name for base in bases for name in base.get("FIXED", ())}
+        cls._STATE = tuple(name for base in bases for name in base.get("__slots__", ()) if name not in fixed)
 
     def copy_state(self) -> Plain:
         """A copy of the state that shares nothing that changes."""

@@ -29,8 +29,8 @@ RUN_M1 = bytes.fromhex("10 2754 0002 04" + REAL_1000)
 class Relay(Bare):
     """Gives the inverse of its input A on its output B after a time, which may be 0. It has one axis."""
 
-    __slots__ = ("axis", "coming", "delay", "levels")
-    FIXED: ClassVar[frozenset[str]] = Bare.FIXED | {"delay"}
+    FIXED: ClassVar[tuple[str, ...]] = ("delay",)
+    __slots__ = (*FIXED, "axis", "coming", "levels")
 
     def __init__(self, delay: Nanos = 0) -> None:
         super().__init__()

@@ -61,8 +61,8 @@ class M1486Chip(ChipCore):
     output may have changed, ``on_event`` for every event, ``on_sent`` when characters have left.
     """
 
-    __slots__ = ("_due", "_rst_high_since", "_waveform", "changed", "now")
-    FIXED: ClassVar[frozenset[str]] = ChipCore.FIXED | {"changed"}
+    FIXED: ClassVar[tuple[str, ...]] = ("changed",)
+    __slots__ = (*FIXED, "_due", "_rst_high_since", "_waveform", "now")
 
     def __init__(
         self,

@@ -36,7 +36,9 @@ class ChipCore(Stateful):
     `steptwin.m1486.receiver.ReceiverHost`.
     """
 
+    FIXED: ClassVar[tuple[str, ...]] = ("is_timed", "on_event", "on_sent", "store", "variant")
     __slots__ = (
+        *FIXED,
         "_edges",
         "address",
         "events",
@@ -44,19 +46,13 @@ class ChipCore(Stateful):
         "interface",
         "io",
         "is_shut_down",
-        "is_timed",
         "memory",
         "motor",
-        "on_event",
-        "on_sent",
         "program",
         "receiver",
-        "store",
         "uart",
         "unit",
-        "variant",
     )
-    FIXED: ClassVar[frozenset[str]] = frozenset({"is_timed", "on_event", "on_sent", "store", "variant"})
 
     def __init__(
         self,

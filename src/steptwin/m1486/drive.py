@@ -67,8 +67,9 @@ class WrongMove(Exception):
 class ChipDrive(Stateful):
     """The axis of a chip: a `steptwin.machine.Drive`."""
 
+    FIXED: ClassVar[tuple[str, ...]] = ("_clock",)
     __slots__ = (
-        "_clock",
+        *FIXED,
         "_curve",
         "acceleration",
         "characteristic",
@@ -88,7 +89,6 @@ class ChipDrive(Stateful):
         "train",
         "velocity",
     )
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_clock"})
     offset_p = 0
     """0: traces show the count since power-on, because the position counter has its own scale and 24 bits (`counter_u`)."""
 

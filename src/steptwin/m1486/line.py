@@ -34,8 +34,8 @@ class SerialChain(Stateful):
     Raises `Misuse` for two chips with the same address, or with different baud rates or line timing.
     """
 
-    __slots__ = ("_ports", "_wire_free", "chips", "collisions")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_ports", "chips"})
+    FIXED: ClassVar[tuple[str, ...]] = ("_ports", "chips")
+    __slots__ = (*FIXED, "_wire_free", "collisions")
 
     def __init__(self, chips: Iterable[M1486Chip]) -> None:
         #: By the address each had when the line was made.

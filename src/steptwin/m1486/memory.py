@@ -46,21 +46,8 @@ class MemoryObserver(Protocol):
 class CommandMemory(Stateful):
     """The memory of one chip. On some variants its last bytes are the registers 1 to 8 too."""
 
-    __slots__ = (
-        "_bytes",
-        "_file_labels",
-        "_own",
-        "_reader",
-        "_shared",
-        "begin",
-        "end",
-        "file",
-        "labels",
-        "size",
-        "span",
-        "write",
-    )
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_reader", "_shared", "size", "span"})
+    FIXED: ClassVar[tuple[str, ...]] = ("_reader", "_shared", "size", "span")
+    __slots__ = (*FIXED, "_bytes", "_file_labels", "_own", "begin", "end", "file", "labels", "write")
 
     def __init__(self, variant: Variant, reader: MemoryObserver) -> None:
         self._reader = reader

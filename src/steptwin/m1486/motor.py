@@ -45,8 +45,8 @@ class MotorHost(Protocol):
 class MotorControl(Stateful):
     """Controls the drive of a chip from its program and pins."""
 
-    __slots__ = ("_chip", "_seek_line", "drive")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_chip"})
+    FIXED: ClassVar[tuple[str, ...]] = ("_chip",)
+    __slots__ = (*FIXED, "_seek_line", "drive")
 
     def __init__(self, chip: MotorHost, drive: ChipDrive) -> None:
         self._chip = chip

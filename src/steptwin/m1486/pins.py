@@ -36,8 +36,8 @@ _ADDRESS_LINES = (18, 19, 20, 21)
 class ChipPins(Stateful):
     """Levels of all pins. ``on_change`` is called with name, level and moment whenever a line or an output has changed."""
 
-    __slots__ = ("_on_change", "external", "latches", "levels", "others", "runsign", "tied_low")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_on_change"})
+    FIXED: ClassVar[tuple[str, ...]] = ("_on_change",)
+    __slots__ = (*FIXED, "external", "latches", "levels", "others", "runsign", "tied_low")
 
     def __init__(self, address: int, baud_code: int, interface: Interface, on_change: Callable[[str, int, Nanos], None]) -> None:
         self._on_change = on_change

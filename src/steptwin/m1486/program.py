@@ -61,14 +61,11 @@ class ProgramExecution(Stateful):
     outermost in; ``back`` is the place after the call in progress.
     """
 
+    FIXED: ClassVar[tuple[str, ...]] = ("_chip", "_code", "_compiled", "_hooks", "_linked", "statement_ns")
     __slots__ = (
+        *FIXED,
         "_burst",
         "_burst_at",
-        "_chip",
-        "_code",
-        "_compiled",
-        "_hooks",
-        "_linked",
         "back",
         "is_killed",
         "is_limited",
@@ -78,10 +75,8 @@ class ProgramExecution(Stateful):
         "loop_starts",
         "pc",
         "ready",
-        "statement_ns",
         "waiting",
     )
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_chip", "_code", "_compiled", "_hooks", "_linked", "statement_ns"})
 
     def __init__(self, chip: ProgramHost, places: int, statement_ns: Nanos) -> None:
         self._chip = chip

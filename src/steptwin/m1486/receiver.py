@@ -72,10 +72,10 @@ class ReceiverHost(Protocol):
 class Receiver(Stateful):
     """Input buffer, selection in a chain, and the way of commands into memory."""
 
+    FIXED: ClassVar[tuple[str, ...]] = ("_capacity", "_chip")
     __slots__ = (
+        *FIXED,
         "_buffer",
-        "_capacity",
-        "_chip",
         "_has_lost",
         "_in_comment",
         "_is_torn",
@@ -88,7 +88,6 @@ class Receiver(Stateful):
         "is_deaf",
         "is_listening",
     )
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_capacity", "_chip"})
 
     def __init__(self, chip: ReceiverHost) -> None:
         self._chip = chip

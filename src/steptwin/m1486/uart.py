@@ -19,8 +19,8 @@ class Uart(Stateful):
     """8N1 at the baud rate that was read from the pins. ``sent`` are the characters that have left and were not fetched; of more
     than `MOST_WAITING` the last ones."""
 
-    __slots__ = ("_arriving", "_incoming", "_is_timed", "_leaving", "_outgoing", "overrun", "sent")
-    FIXED = frozenset({"_is_timed"})
+    FIXED = ("_is_timed",)
+    __slots__ = (*FIXED, "_arriving", "_incoming", "_leaving", "_outgoing", "overrun", "sent")
 
     def __init__(self, baud: int, *, is_timed: bool) -> None:
         self._is_timed = is_timed

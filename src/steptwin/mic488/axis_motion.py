@@ -58,30 +58,27 @@ class AxisHost(Protocol):
 class AxisMotion(Stateful):
     """The motion of axis ``number`` (from 1) of a MIC488, after a command, and its state."""
 
+    FIXED = ("config", "gear", "host", "number", "revision")
     __slots__ = (
+        *FIXED,
         "_blocked_leg",
         "acc_p",
         "arrival",
-        "config",
         "control",
         "dec_p",
         "enabled",
         "encoder",
         "fall_p",
-        "gear",
         "homing",
-        "host",
         "jogging",
         "limit_l_p",
         "limit_r_p",
-        "number",
         "offset_p",
         "on_arc",
         "on_path",
         "pending",
         "profile",
         "ramp_p",
-        "revision",
         "rise_p",
         "speed_p",
         "status",
@@ -89,7 +86,6 @@ class AxisMotion(Stateful):
         "velocity_p",
         "vmax_p",
     )
-    FIXED = frozenset({"config", "gear", "host", "number", "revision"})
 
     def __init__(self, number: int, config: AxisConfig, host: AxisHost) -> None:
         self.number = number

@@ -94,34 +94,29 @@ class ControllerCore(Stateful):
     next deadline or an output may have changed, ``on_event`` for every event.
     """
 
+    FIXED = ("changed", "config", "firmware", "on_event", "registers", "store")
     __slots__ = (
+        *FIXED,
         "_due",
         "_edges",
         "_others",
         "analog_v",
         "axes",
-        "changed",
-        "config",
         "data_type",
         "error_led",
         "events",
-        "firmware",
         "inputs",
         "jog_speed_u",
         "master_error",
         "memory",
         "now",
-        "on_event",
         "outputs",
         "program",
-        "registers",
-        "store",
         "trigger_mode",
         "triggered",
         "user",
         "written",
     )
-    FIXED = frozenset({"changed", "config", "firmware", "on_event", "registers", "store"})
 
     def __init__(
         self,

@@ -54,8 +54,8 @@ class Mic488Device(ControllerCore):
     registers (MIC-3). The rest as in `ControllerCore`.
     """
 
-    __slots__ = ("lenient", "slave")
-    FIXED = ControllerCore.FIXED | {"lenient", "slave"}
+    FIXED = ("lenient", "slave")
+    __slots__ = (*FIXED,)
 
     def __init__(
         self,

@@ -38,8 +38,8 @@ class Encoder(Stateful):
     is how the encoder is built.
     """
 
-    __slots__ = ("_built", "_lost", "_motion", "_standing", "_turned", "_zero", "coupling", "enc_resol", "mot_resol")
-    FIXED = frozenset({"enc_resol", "mot_resol"})
+    FIXED = ("enc_resol", "mot_resol")
+    __slots__ = (*FIXED, "_built", "_lost", "_motion", "_standing", "_turned", "_zero", "coupling")
 
     def __init__(self, enc_resol: int, mot_resol: int, coupling: Coupling) -> None:
         self.enc_resol = enc_resol

@@ -34,8 +34,8 @@ class Inputs(Stateful):
     ``pins`` are the levels at the terminals, ``raw`` those after polarity, ``filtered`` those in registers.
     """
 
-    __slots__ = ("_due", "_pending", "_settings", "filtered", "pins", "raw")
-    FIXED = frozenset({"_settings"})
+    FIXED = ("_settings",)
+    __slots__ = (*FIXED, "_due", "_pending", "filtered", "pins", "raw")
 
     def __init__(self, settings: Sequence[InputSettings]) -> None:
         self._settings = settings

@@ -44,14 +44,13 @@ class ProgramControl(Stateful):
     To a program it is the controller (`steptwin.wbc.controller.ProgramController`).
     """
 
+    FIXED = ("banks", "device", "dialect")
     __slots__ = (
+        *FIXED,
         "_program",
         "_pulses",
         "_statuses",
         "_table",
-        "banks",
-        "device",
-        "dialect",
         "error",
         "fault",
         "interpreter",
@@ -61,7 +60,6 @@ class ProgramControl(Stateful):
         "state",
         "together",
     )
-    FIXED = frozenset({"banks", "device", "dialect"})
 
     def __init__(
         self,

@@ -66,8 +66,8 @@ class Com1Port(Stateful):
 
     broken = None
 
-    __slots__ = ("_device", "_frames", "_receiver", "modbus")
-    FIXED = frozenset({"_device", "_frames"})
+    FIXED = ("_device", "_frames")
+    __slots__ = (*FIXED, "_receiver", "modbus")
 
     def __init__(self, device: SeeingDevice, modbus: RtuSlavePort | TimedRtuSlavePort | None = None) -> None:
         self._device = device

@@ -52,20 +52,18 @@ class Interpreter(Stateful):
     All state is plain data: a snapshot in the middle of a program is complete but for the program itself.
     """
 
+    FIXED = ("_hooked", "_hooks", "_repeated", "controller", "rests", "rests_in_loops", "statement_time")
     __slots__ = (
-        "_hooked",
-        "_hooks",
+        *FIXED,
         "_mark",
         "_marks",
         "_moment",
-        "_repeated",
         "_resting",
         "_spent",
         "_trail",
         "_unmarked",
         "acted",
         "cells",
-        "controller",
         "due",
         "effects",
         "forgotten",
@@ -75,14 +73,10 @@ class Interpreter(Stateful):
         "paused_at",
         "pc",
         "pending",
-        "rests",
-        "rests_in_loops",
         "running",
         "stack",
-        "statement_time",
         "waiting",
     )
-    FIXED = frozenset({"_hooked", "_hooks", "_repeated", "controller", "rests", "rests_in_loops", "statement_time"})
 
     def __init__(self, controller: ProgramController, statement_time: Nanos = STATEMENT_TIME) -> None:
         if statement_time and not SHORTEST_STATEMENT_TIME <= statement_time <= LONGEST_STATEMENT_TIME:

@@ -41,8 +41,8 @@ class _Waiting(NamedTuple):
 class ModbusGateway(Stateful):
     """The line behind any number of ports, and the order of their requests."""
 
-    __slots__ = ("_count", "_free", "_waiting_ports", "units")
-    FIXED = frozenset({"_waiting_ports", "units"})
+    FIXED = ("_waiting_ports", "units")
+    __slots__ = (*FIXED, "_count", "_free")
 
     def __init__(self, units: TimedUnits) -> None:
         self.units = units
@@ -109,8 +109,8 @@ def _turn(port: GatewayPort) -> tuple[Nanos, int]:
 class GatewayPort(SlavePort, ABC):
     """Base of the ports of a `Gateway`; responses leave when they have come over the line. Call `to_send` at every `deadline`."""
 
-    __slots__ = ("__weakref__", "_gateway", "_responses", "waiting")
-    FIXED = frozenset({"__weakref__", "_gateway"}) | SlavePort.FIXED
+    FIXED = ("__weakref__", "_gateway")
+    __slots__ = (*FIXED, "_responses", "waiting")
 
     def __init__(self, gateway: ModbusGateway, *, on_frame: FrameObserver | None = None) -> None:
         super().__init__(on_frame)

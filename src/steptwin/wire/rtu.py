@@ -145,8 +145,8 @@ class RtuFramer(Stateful):
     ``pause_ns`` the longest silence inside a frame (the gap, when that is longer). Call `expire` when `deadline` has come.
     """
 
-    __slots__ = ("_asked", "_burst", "_fed", "_framed", "_last", "_own", "_pause_ns", "_pieces", "_scan", "gap_ns", "held")
-    FIXED = frozenset({"_own", "_pause_ns", "gap_ns"})
+    FIXED = ("_own", "_pause_ns", "gap_ns")
+    __slots__ = (*FIXED, "_asked", "_burst", "_fed", "_framed", "_last", "_pieces", "_scan", "held")
 
     def __init__(self, own: Collection[int] = (), gap_ns: Nanos = BURSTY_GAP_NS, pause_ns: Nanos = PAUSE_NS) -> None:
         if gap_ns < 1:

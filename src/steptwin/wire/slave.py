@@ -56,8 +56,8 @@ PAUSE_REPORT_NS: Nanos = SECOND
 class SlavePort(Stateful):
     """Base of the ports with devices behind them."""
 
-    __slots__ = ("exceptions", "on_frame", "on_write", "requests")
-    FIXED = frozenset({"exceptions", "on_frame", "on_write", "requests"})
+    FIXED = ("exceptions", "on_frame", "on_write", "requests")
+    __slots__ = (*FIXED,)
 
     def __init__(self, on_frame: FrameObserver | None) -> None:
         self.on_frame = on_frame
@@ -135,8 +135,8 @@ def tcp_response(request: bytes, pdu: bytes) -> bytes:
 class PauseReports(Stateful):
     """Reports requests that the device would have dropped because of a pause (MIC-15)."""
 
-    __slots__ = ("_next", "_observer")
-    FIXED = frozenset({"_observer"})
+    FIXED = ("_observer",)
+    __slots__ = (*FIXED, "_next")
 
     def __init__(self, observer: PauseObserver | None) -> None:
         self._observer = observer
@@ -158,8 +158,8 @@ class RtuSlavePort(SlavePort):
     broken = None
     """A serial line stays open whatever is received; only connections are closed."""
 
-    __slots__ = ("_devices", "_framer", "_held", "_line", "_pauses")
-    FIXED = frozenset({"_devices", "_held", "_line"}) | SlavePort.FIXED
+    FIXED = ("_devices", "_held", "_line")
+    __slots__ = (*FIXED, "_framer", "_pauses")
 
     def __init__(
         self,
@@ -242,8 +242,8 @@ class TcpSlavePort(SlavePort):
     and closes the connection.
     """
 
-    __slots__ = ("_devices", "_framer", "broken")
-    FIXED = frozenset({"_devices"}) | SlavePort.FIXED
+    FIXED = ("_devices",)
+    __slots__ = (*FIXED, "_framer", "broken")
 
     def __init__(self, devices: Mapping[int, SlaveDevice], *, on_frame: FrameObserver | None = None) -> None:
         super().__init__(on_frame)

@@ -50,8 +50,8 @@ class LineTiming:
 class TimedUnits(Stateful):
     """Controllers behind any number of ports, and the time until which each is busy. ``devices`` is read once."""
 
-    __slots__ = ("_busy", "_next", "devices", "timing")
-    FIXED = frozenset({"devices", "timing"})
+    FIXED = ("devices", "timing")
+    __slots__ = (*FIXED, "_busy", "_next")
 
     def __init__(self, devices: Mapping[int, SlaveDevice], timing: LineTiming) -> None:
         check_units(devices)
@@ -97,7 +97,9 @@ class TimedRtuSlavePort(SlavePort):
     broken = None
     """A serial line stays open whatever is received; only connections are closed."""
 
+    FIXED = ("_units",)
     __slots__ = (
+        *FIXED,
         "_arriving",
         "_executing",
         "_framer",
@@ -105,11 +107,9 @@ class TimedRtuSlavePort(SlavePort):
         "_outgoing",
         "_pauses",
         "_responses",
-        "_units",
         "dropped",
         "overrun",
     )
-    FIXED = frozenset({"_units"}) | SlavePort.FIXED
 
     def __init__(
         self,

@@ -22,8 +22,8 @@ class ConstantDrive(Stateful):
     """A drive with a constant forward speed while it is switched on, without ramps. A place is 1 pm, so that 1 mm/s is one place
     per nanosecond."""
 
-    __slots__ = ("_base", "_begin", "_changes", "_divisor", "_speed", "runs", "stride")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_divisor", "_speed", "stride"})
+    FIXED: ClassVar[tuple[str, ...]] = ("_divisor", "_speed", "stride")
+    __slots__ = (*FIXED, "_base", "_begin", "_changes", "runs")
 
     def __init__(self, speed: Fraction, now: Nanos) -> None:
         """``speed`` in mm/s."""

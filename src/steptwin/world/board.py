@@ -18,8 +18,8 @@ class Board(Stateful):
     Its element reads inputs in `KernelPart.update`, never earlier, so that a loop of elements is found by the kernel.
     """
 
-    __slots__ = ("_held", "_recorded", "_wanted", "inputs", "kernel", "levels", "name", "outputs")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"inputs", "kernel", "name", "outputs"})
+    FIXED: ClassVar[tuple[str, ...]] = ("inputs", "kernel", "name", "outputs")
+    __slots__ = (*FIXED, "_held", "_recorded", "_wanted", "levels")
 
     def __init__(self, kernel: Kernel, name: str, inputs: Iterable[str], outputs: Iterable[str]) -> None:
         self.kernel = kernel

@@ -166,19 +166,8 @@ class Contact(Stateful):
     as ``lane``.
     """
 
-    __slots__ = (
-        "_bouncing",
-        "_chance",
-        "_circuit",
-        "_due",
-        "bounce_ns",
-        "bounces",
-        "closed",
-        "lane",
-        "level",
-        "normally_closed",
-    )
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_circuit", "lane", "normally_closed"})
+    FIXED: ClassVar[tuple[str, ...]] = ("_circuit", "lane", "normally_closed")
+    __slots__ = (*FIXED, "_bouncing", "_chance", "_due", "bounce_ns", "bounces", "closed", "level")
 
     def __init__(
         self, circuit: Circuit, *, normally_closed: bool, bounce_ns: Nanos, bounces: int, chance: Chance, lane: str = ""
@@ -262,8 +251,8 @@ class Button(Contact):
 class Switch(Contact):
     """A switch that is on while a carriage is in its zone."""
 
-    __slots__ = ("_carriage", "_version", "on", "zone")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_carriage", "_version", "zone"}) | Contact.FIXED
+    FIXED: ClassVar[tuple[str, ...]] = ("_carriage", "_version", "zone")
+    __slots__ = (*FIXED, "on")
 
     def __init__(
         self,

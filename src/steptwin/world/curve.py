@@ -62,8 +62,8 @@ class Curve:
 class Stepped(Stateful):
     """The quantity. It is due whenever the signal comes to a value at which it is another one."""
 
-    __slots__ = ("_curve", "_level", "_signal", "_version", "due")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_curve", "_signal", "_version"})
+    FIXED: ClassVar[tuple[str, ...]] = ("_curve", "_signal", "_version")
+    __slots__ = (*FIXED, "_level", "due")
 
     def __init__(self, signal: Signal, points: Iterable[tuple[float, float]], step: float) -> None:
         self._signal = signal

@@ -81,10 +81,18 @@ class LineWords(FrameFollower, Protocol):
 class LineEndPoint(Stateful):
     """The connection of one program. ``received``: pieces not fetched yet, with their moments."""
 
-    __slots__ = ("at_once", "framed", "inner", "is_connected", "kind", "on_output", "port", "received", "talks", "unframed")
-    FIXED: ClassVar[frozenset[str]] = frozenset(
-        {"at_once", "framed", "inner", "is_connected", "kind", "on_output", "port", "unframed", "talks"}
+    FIXED: ClassVar[tuple[str, ...]] = (
+        "at_once",
+        "framed",
+        "inner",
+        "is_connected",
+        "kind",
+        "on_output",
+        "port",
+        "talks",
+        "unframed",
     )
+    __slots__ = (*FIXED, "received")
 
     def __init__(self, kind: str, port: FaultyPort, inner: Any, framed: SlavePort | None, *, talks: bool) -> None:
         self.kind = kind
@@ -115,10 +123,8 @@ class LineEndPoint(Stateful):
 class Line(Stateful, ABC):
     """Base class of lines; a part of its kernel."""
 
-    __slots__ = ("_before", "_busy", "_faults", "_followers", "_kernel", "_record", "name", "places")
-    FIXED: ClassVar[frozenset[str]] = frozenset(
-        {"_before", "_busy", "_faults", "_followers", "_kernel", "_record", "name", "places"}
-    )
+    FIXED: ClassVar[tuple[str, ...]] = ("_before", "_busy", "_faults", "_followers", "_kernel", "_record", "name", "places")
+    __slots__ = (*FIXED,)
 
     kinds: ClassVar[tuple[str, ...]]
     """Kinds of places; the first is that of scripts."""

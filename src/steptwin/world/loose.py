@@ -18,8 +18,8 @@ from steptwin.world.wells import Wells
 class Looseness(Stateful):
     """Whether a rotor is held by its field, from moment to moment."""
 
-    __slots__ = ("_build", "_motor", "_on_since", "_overruns", "due", "has_current", "is_free")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_build", "_motor"})
+    FIXED: ClassVar[tuple[str, ...]] = ("_build", "_motor")
+    __slots__ = (*FIXED, "_on_since", "_overruns", "due", "has_current", "is_free")
 
     def __init__(self, build: Build, motor: StepperMotor, now: Nanos) -> None:
         self._build = build

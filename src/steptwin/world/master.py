@@ -24,8 +24,8 @@ class Master(Stateful):
     and the next request, ns. A request is given up at its time-out.
     """
 
-    __slots__ = ("_free", "_pause", "_pending", "_queue", "_send", "answers", "asked", "finished", "unanswered", "wanted")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_pause", "_send"})
+    FIXED: ClassVar[tuple[str, ...]] = ("_pause", "_send")
+    __slots__ = (*FIXED, "_free", "_pending", "_queue", "answers", "asked", "finished", "unanswered", "wanted")
 
     def __init__(self, send: Callable[[bytes, Nanos], None], pause: Nanos) -> None:
         self._send = send

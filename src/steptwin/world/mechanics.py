@@ -73,7 +73,9 @@ class EncoderBuild:
 class Mechanism(Stateful):
     """The mechanics of axis ``number`` (from 1) of a machine in ``kernel``: a part of the kernel, and a carriage for switches."""
 
+    FIXED: ClassVar[tuple[str, ...]] = ("_encoders", "_kernel", "_name", "_revision", "build", "machine", "number")
     __slots__ = (
+        *FIXED,
         "_blockers",
         "_brake",
         "_burden",
@@ -83,24 +85,16 @@ class Mechanism(Stateful):
         "_coupled",
         "_course",
         "_due",
-        "_encoders",
         "_falls",
-        "_kernel",
         "_loose",
         "_lost",
-        "_name",
         "_reported",
         "_reported_course",
         "_rest_due",
-        "_revision",
         "_simple",
         "_stall_due",
         "_stalled",
-        "build",
-        "machine",
-        "number",
     )
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_encoders", "_kernel", "_name", "_revision", "build", "machine", "number"})
 
     def __init__(self, kernel: Kernel, machine: str, number: int, build: Build, name: str = "axis") -> None:
         self._kernel = kernel

@@ -103,8 +103,8 @@ class SineWaveform:
 class AnalogSource(Stateful):
     """Drives an analog input with the voltage of a waveform, updated every ``period``."""
 
-    __slots__ = ("_due", "_kernel", "_plain", "_waveform", "is_broken", "name", "offset", "period", "target")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_kernel", "_waveform", "name", "period", "target"})
+    FIXED: ClassVar[tuple[str, ...]] = ("_kernel", "_waveform", "name", "period", "target")
+    __slots__ = (*FIXED, "_due", "_plain", "is_broken", "offset")
 
     def __init__(self, kernel: Kernel, target: PinName, waveform: Waveform, period: Nanos, name: str = "") -> None:
         kernel.check(target)

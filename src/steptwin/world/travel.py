@@ -16,8 +16,8 @@ class Travel(Stateful):
     that both speeds are whole numbers of places per nanosecond.
     """
 
-    __slots__ = ("_back", "_begin", "_changes", "_direction", "_forth", "_place", "full")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_back", "_forth", "full"})
+    FIXED: ClassVar[tuple[str, ...]] = ("_back", "_forth", "full")
+    __slots__ = (*FIXED, "_begin", "_changes", "_direction", "_place")
 
     def __init__(self, forth: Nanos, back: Nanos, *, is_forth: bool, now: Nanos) -> None:
         self.full = forth * back

@@ -33,8 +33,8 @@ class LampSpec(NamedSpec):
 class Lamp(Stateful):
     """Lit when its output has been on for ``warms``, unless it has burnt out. Its edges are recorded under its name."""
 
-    __slots__ = ("_due", "_is_on", "_spec", "burnt", "kernel", "lit", "source")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_spec", "kernel", "source"})
+    FIXED: ClassVar[tuple[str, ...]] = ("_spec", "kernel", "source")
+    __slots__ = (*FIXED, "_due", "_is_on", "burnt", "lit")
 
     def __init__(self, spec: LampSpec, kernel: Kernel, source: PinName) -> None:
         self._spec = spec

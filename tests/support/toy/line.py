@@ -21,8 +21,8 @@ class ToyPort(Stateful):
 
     broken = None
 
-    __slots__ = ("_held", "_toy")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_toy"})
+    FIXED: ClassVar[tuple[str, ...]] = ("_toy",)
+    __slots__ = (*FIXED, "_held")
 
     def __init__(self, toy: Toy) -> None:
         self._toy = toy
@@ -47,8 +47,8 @@ class ToyPort(Stateful):
 class ToyLine(Line):
     """One toy; every program has a connection of its own."""
 
-    __slots__ = ("_toy",)
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_toy"}) | Line.FIXED
+    FIXED: ClassVar[tuple[str, ...]] = ("_toy",)
+    __slots__ = (*FIXED,)
 
     kinds = ("raw",)
     fault_kinds: ClassVar[Mapping[str, FaultLine]] = {"raw": FaultLine.CHARACTERS}

@@ -23,8 +23,8 @@ def _nothing() -> None:
 class Bare(Stateful):
     """A motion controller without axes, pins or anything to do: a base for small machines."""
 
-    __slots__ = ("changed", "edges", "now")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"changed"})
+    FIXED: ClassVar[tuple[str, ...]] = ("changed",)
+    __slots__ = (*FIXED, "edges", "now")
 
     def __init__(self) -> None:
         self.changed: Callable[[], None] = _nothing
@@ -77,8 +77,8 @@ class Bare(Stateful):
 
 
 class ToyAxis(Stateful):
-    __slots__ = ("is_energised", "plan", "revision")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"revision"})
+    FIXED: ClassVar[tuple[str, ...]] = ("revision",)
+    __slots__ = (*FIXED, "is_energised", "plan")
     offset_p = 0
 
     def __init__(self) -> None:

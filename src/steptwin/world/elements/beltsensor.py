@@ -78,8 +78,8 @@ class Carrying(Protocol):
 class Sensor(Contact):
     """On while a workpiece, or a mark on one, covers its place."""
 
-    __slots__ = ("_at", "_belt", "_of_marks", "_seen")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_at", "_belt", "_of_marks", "_seen"}) | Contact.FIXED
+    FIXED: ClassVar[tuple[str, ...]] = ("_at", "_belt", "_of_marks", "_seen")
+    __slots__ = (*FIXED,)
 
     def __init__(self, circuit: Circuit, belt: Carrying, spec: SensorSpec, chance: Chance, lane: str) -> None:
         super().__init__(

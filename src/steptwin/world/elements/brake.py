@@ -51,8 +51,8 @@ class Brake(BoardPart):
     """Lets go ``release_time`` after RELEASE is switched on, and acts ``apply_time`` after it is switched off. A shorter pulse
     does not move it."""
 
-    __slots__ = ("_due", "_is_released", "_mechanism", "_spec", "_was_on", "is_stuck", "share")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_mechanism", "_spec"}) | BoardPart.FIXED
+    FIXED: ClassVar[tuple[str, ...]] = ("_mechanism", "_spec")
+    __slots__ = (*FIXED, "_due", "_is_released", "_was_on", "is_stuck", "share")
 
     def __init__(self, board: Board, spec: BrakeSpec, mechanism: Mechanism) -> None:
         super().__init__(board)

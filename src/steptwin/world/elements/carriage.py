@@ -42,8 +42,8 @@ class CarriageSpec(NamedSpec):
 class Carriage(Stateful):
     """Follows the load of its axis through a spring and a damper. Its place is the whole pulse nearest to it."""
 
-    __slots__ = ("_response", "_spring", "_version", "axis", "spec")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_version", "axis", "spec"})
+    FIXED: ClassVar[tuple[str, ...]] = ("_version", "axis", "spec")
+    __slots__ = (*FIXED, "_response", "_spring")
 
     def __init__(self, spec: CarriageSpec, axis: BuiltAxis) -> None:
         self.spec = spec

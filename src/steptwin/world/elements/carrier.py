@@ -68,8 +68,8 @@ class CarrierSpec(BoardSpec):
 class Carrier(BoardPart):
     """It carries a workpiece while it holds it. Then it lies on the belt below, or has fallen."""
 
-    __slots__ = ("_pick_at", "_place_at", "carried", "dropped", "onto", "source")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_pick_at", "_place_at", "onto", "source"}) | BoardPart.FIXED
+    FIXED: ClassVar[tuple[str, ...]] = ("_pick_at", "_place_at", "onto", "source")
+    __slots__ = (*FIXED, "carried", "dropped")
 
     def __init__(self, board: Board, spec: CarrierSpec, site: Site) -> None:
         super().__init__(board)

@@ -60,8 +60,8 @@ class Touch(BoardPart):
     """The output is on while parts touch. If that jams them, the axes stand from then on; they are free again when RESET is
     switched on, and jam again when they touch the next time."""
 
-    __slots__ = ("_axes", "_condition", "_due", "_is_jammed", "_is_short", "_jams", "_touches", "_was_reset", "count")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_axes", "_condition", "_jams"}) | BoardPart.FIXED
+    FIXED: ClassVar[tuple[str, ...]] = ("_axes", "_condition", "_jams")
+    __slots__ = (*FIXED, "_due", "_is_jammed", "_is_short", "_touches", "_was_reset", "count")
 
     def __init__(self, board: Board, jams: bool, condition: SignalCondition, axes: Mapping[str, Mechanism]) -> None:
         super().__init__(board)

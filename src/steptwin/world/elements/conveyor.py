@@ -52,30 +52,30 @@ class Conveyor(BoardPart):
     backwards takes back what stands, and loses workpieces at its beginning.
     """
 
-    __slots__ = (
-        "_due",
-        "_is_fed",
+    FIXED: ClassVar[tuple[str, ...]] = (
         "_length",
         "_moved_by",
-        "_next_feed",
-        "_own",
         "_seen",
         "_stops",
-        "_then",
         "_turns",
-        "delivered",
         "drive",
-        "fed",
-        "feeder_stands",
         "following",
-        "is_stopped",
-        "load",
-        "missed",
         "per_mm",
         "spec",
     )
-    FIXED: ClassVar[frozenset[str]] = (
-        frozenset({"_length", "_moved_by", "_seen", "_stops", "_turns", "drive", "following", "per_mm", "spec"}) | BoardPart.FIXED
+    __slots__ = (
+        *FIXED,
+        "_due",
+        "_is_fed",
+        "_next_feed",
+        "_own",
+        "_then",
+        "delivered",
+        "fed",
+        "feeder_stands",
+        "is_stopped",
+        "load",
+        "missed",
     )
 
     def __init__(

@@ -40,8 +40,8 @@ class CounterSpec(BoardSpec):
 class Counter(BoardPart):
     """Counts edges from 0 to 1, from 0 to `MOST`, and begins anew at 0 while RESET is on. OUT is on from ``preset`` on."""
 
-    __slots__ = ("_levels", "_preset", "count")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_preset"}) | BoardPart.FIXED
+    FIXED: ClassVar[tuple[str, ...]] = ("_preset",)
+    __slots__ = (*FIXED, "_levels", "count")
 
     def __init__(self, board: Board, preset: int) -> None:
         super().__init__(board)

@@ -69,8 +69,8 @@ class Cylinder(BoardPart):
     both coils are on or off it keeps its place. The spool moves ``switching`` after its coil.
     """
 
-    __slots__ = ("_due", "_spec", "_spool", "_wanted", "has_air", "is_jammed", "travel")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_spec"}) | BoardPart.FIXED
+    FIXED: ClassVar[tuple[str, ...]] = ("_spec",)
+    __slots__ = (*FIXED, "_due", "_spool", "_wanted", "has_air", "is_jammed", "travel")
 
     def __init__(self, board: Board, spec: CylinderSpec) -> None:
         super().__init__(board)

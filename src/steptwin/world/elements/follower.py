@@ -49,8 +49,8 @@ class FollowerSpec(NamedSpec):
 class Follower(Stateful):
     """Is where the cam lifts it at the whole pulse of the axis that turns the shaft; it never leaves the cam."""
 
-    __slots__ = ("_cam", "_held", "_share", "shaft", "spec")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_cam", "shaft", "spec"})
+    FIXED: ClassVar[tuple[str, ...]] = ("_cam", "shaft", "spec")
+    __slots__ = (*FIXED, "_held", "_share")
 
     def __init__(self, spec: FollowerSpec, shaft: GearedShaft, cam: Cam) -> None:
         self.spec = spec

@@ -66,8 +66,8 @@ class Gantry(Touch):
     SKEWED is on while the ends are further apart than the limit; then the beam is stuck in its guides, with `JAM`.
     """
 
-    __slots__ = ("_ends", "_failed", "_loads", "_looked_at", "_pulling", "is_stiff")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_ends", "_loads"}) | Touch.FIXED
+    FIXED: ClassVar[tuple[str, ...]] = ("_ends", "_loads")
+    __slots__ = (*FIXED, "_failed", "_looked_at", "_pulling", "is_stiff")
 
     def __init__(self, board: Board, spec: GantrySpec, condition: SignalCondition, ends: tuple[BuiltAxis, BuiltAxis]) -> None:
         super().__init__(board, spec.effect == JAM, condition, {end.spec.name: end.mechanism for end in ends})

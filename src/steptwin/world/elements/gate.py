@@ -63,8 +63,8 @@ class GateSpec(BoardSpec):
 class Gate(BoardPart):
     """Gives its output the level that follows from its inputs, without delay."""
 
-    __slots__ = ("_function", "_inputs", "kind")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_function", "_inputs", "kind"}) | BoardPart.FIXED
+    FIXED: ClassVar[tuple[str, ...]] = ("_function", "_inputs", "kind")
+    __slots__ = (*FIXED,)
 
     def __init__(self, board: Board, kind: str, inputs: Iterable[str]) -> None:
         super().__init__(board)

@@ -52,8 +52,8 @@ class Gripper(Carrier):
     """The jaws move at constant speeds. They hold a workpiece that is between them when they come to its width, until they open.
     Without one they close."""
 
-    __slots__ = ("_at", "_is_narrow", "_spec", "is_held", "slips", "travel")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_at", "_spec"}) | Carrier.FIXED
+    FIXED: ClassVar[tuple[str, ...]] = ("_at", "_spec")
+    __slots__ = (*FIXED, "_is_narrow", "is_held", "slips", "travel")
 
     def __init__(self, board: Board, spec: GripperSpec, site: Site) -> None:
         super().__init__(board, spec, site)

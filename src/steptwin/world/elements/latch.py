@@ -38,8 +38,8 @@ class LatchSpec(BoardSpec):
 class Latch(BoardPart):
     """On once SET is on, off once RESET is on; while both are, ``priority`` decides."""
 
-    __slots__ = ("_is_on", "_reset_wins")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_reset_wins"}) | BoardPart.FIXED
+    FIXED: ClassVar[tuple[str, ...]] = ("_reset_wins",)
+    __slots__ = (*FIXED, "_is_on")
 
     def __init__(self, board: Board, priority: str) -> None:
         super().__init__(board)

@@ -82,8 +82,8 @@ class LoadSpec(BoardSpec):
 class FurtherLoad(BoardPart):
     """Loads the motor while its condition holds, with the share of its curve. ACTS is on while there is any."""
 
-    __slots__ = ("_axis", "_condition", "_curve", "_due", "_share", "_whole", "factor")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_axis", "_condition", "_whole"}) | BoardPart.FIXED
+    FIXED: ClassVar[tuple[str, ...]] = ("_axis", "_condition", "_whole")
+    __slots__ = (*FIXED, "_curve", "_due", "_share", "factor")
 
     def __init__(
         self, board: Board, axis: BuiltAxis, whole: Burden, condition: SignalCondition | None, curve: Stepped | None

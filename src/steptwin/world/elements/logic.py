@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
@@ -62,7 +62,6 @@ class BoardPart(Stateful, ABC):
     """The part of a kernel that gives the outputs of a board their levels."""
 
     __slots__ = ("board",)
-    FIXED: ClassVar[frozenset[str]] = frozenset()
 
     def __init__(self, board: Board) -> None:
         self.board = board
@@ -191,11 +190,7 @@ def with_terminals(
         return found
 
     def refers(found: S, world: WorldSpec) -> Iterator[Reference]:
-        yield Reference(found.name, found.name, found.path)
-        for joint in found.joints:
-            yield Reference(found.name, joint.source[0], (*found.path, joint.key))
-        for key, other in found.others(world):
-            yield Reference(found.name, other, (*found.path, key))
+        yield from _references(found, world)
         for one in inner:
             yield from one.refers(found)
 
@@ -208,12 +203,6 @@ def with_terminals(
             one.build(found, part, site)
         return part
 
-    def all_signals(part: P) -> Mapping[str, SignalOf]:
-        return {
-            **{terminal.lower(): level_signal(part.board, terminal) for terminal in part.board.levels},
-            **signals(part),
-        }
-
     return Element(
         name=name,
         spec=spec,
@@ -225,10 +214,23 @@ def with_terminals(
         build=build,
         connect=connect,
         terminals=lambda found: found.terminals,
-        signals=all_signals,
+        signals=lambda part: {**_terminal_signals(part.board), **signals(part)},
         drawing=drawing,
         faults=tuple(faults),
     )
+
+
+def _references(found: BoardSpec, world: WorldSpec) -> Iterator[Reference]:
+    """Of the terminals and keys of an element."""
+    yield Reference(found.name, found.name, found.path)
+    for joint in found.joints:
+        yield Reference(found.name, joint.source[0], (*found.path, joint.key))
+    for key, other in found.others(world):
+        yield Reference(found.name, other, (*found.path, key))
+
+
+def _terminal_signals(board: Board) -> Mapping[str, SignalOf]:
+    return {terminal.lower(): level_signal(board, terminal) for terminal in board.levels}
 
 
 def level_signal(board: Board, terminal: str) -> SignalOf:

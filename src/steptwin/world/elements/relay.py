@@ -39,8 +39,8 @@ class Relay(BoardPart):
     """NO is on and NC off from ``pull_in`` after its coil is energised until ``drop_out`` after it is not. A shorter pulse, or a
     shorter gap, does not move the contact."""
 
-    __slots__ = ("_drop_out", "_due", "_pull_in", "_was_on", "is_on", "is_open", "is_welded")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_drop_out", "_pull_in"}) | BoardPart.FIXED
+    FIXED: ClassVar[tuple[str, ...]] = ("_drop_out", "_pull_in")
+    __slots__ = (*FIXED, "_due", "_was_on", "is_on", "is_open", "is_welded")
 
     def __init__(self, board: Board, pull_in: Nanos, drop_out: Nanos) -> None:
         super().__init__(board)

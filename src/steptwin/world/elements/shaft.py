@@ -75,8 +75,8 @@ class ShaftSpec(NamedSpec):
 class GearedShaft(Stateful):
     """Turns with its axis, a moving part for cams: its place is in whole pulses of the axis."""
 
-    __slots__ = ("_behind", "_held", "axis", "spec")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"axis", "spec"})
+    FIXED: ClassVar[tuple[str, ...]] = ("axis", "spec")
+    __slots__ = (*FIXED, "_behind", "_held")
 
     def __init__(self, spec: ShaftSpec, axis: BuiltAxis) -> None:
         self.spec = spec

@@ -102,8 +102,8 @@ class Ramp(NamedTuple):
 class Supply(BoardPart):
     """GOOD is on, and so are the controllers, while its voltage is sufficient."""
 
-    __slots__ = ("_fed", "_is_on", "_is_wanted", "_ramp", "_spec", "_switch_due", "is_good", "sag")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_fed", "_spec"}) | BoardPart.FIXED
+    FIXED: ClassVar[tuple[str, ...]] = ("_fed", "_spec")
+    __slots__ = (*FIXED, "_is_on", "_is_wanted", "_ramp", "_switch_due", "is_good", "sag")
 
     def __init__(self, board: Board, spec: SupplySpec, fed: tuple[FaultyMachine, ...]) -> None:
         super().__init__(board)

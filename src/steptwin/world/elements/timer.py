@@ -38,8 +38,8 @@ class Timer(BoardPart):
     """On-delay (TON): on once the input has been on for ``time``. Off-delay (TOF): off once it has been off for ``time``.
     Pulse (TP): on for ``time`` from an edge of the input from 0 to 1; edges meanwhile do nothing."""
 
-    __slots__ = ("_due", "_time", "_was_on", "kind")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"kind", "_time"}) | BoardPart.FIXED
+    FIXED: ClassVar[tuple[str, ...]] = ("_time", "kind")
+    __slots__ = (*FIXED, "_due", "_was_on")
 
     def __init__(self, board: Board, kind: str, time: Nanos) -> None:
         super().__init__(board)

@@ -53,8 +53,8 @@ class ToolSpec(NamedSpec):
 class Tool(Stateful):
     """Is where its axes have it, also between their pulses. The belt of one that slips stands while its axis turns."""
 
-    __slots__ = ("_pulled", "axes", "coordinates", "spec")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"axes", "coordinates", "spec"})
+    FIXED: ClassVar[tuple[str, ...]] = ("axes", "coordinates", "spec")
+    __slots__ = (*FIXED, "_pulled")
 
     def __init__(self, spec: ToolSpec, axes: tuple[BuiltAxis, BuiltAxis]) -> None:
         self.spec = spec

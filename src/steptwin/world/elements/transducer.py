@@ -36,8 +36,8 @@ class TransducerSpec(NamedSpec):
 class Transducer(Stateful):
     """Drives an analog input. It is due whenever its signal comes to a value at which the voltage is another one."""
 
-    __slots__ = ("_kernel", "_level", "_spec", "is_broken", "offset")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_kernel", "_spec"})
+    FIXED: ClassVar[tuple[str, ...]] = ("_kernel", "_spec")
+    __slots__ = (*FIXED, "_level", "is_broken", "offset")
 
     def __init__(self, kernel: Kernel, spec: TransducerSpec, signal: Signal) -> None:
         self._kernel = kernel

@@ -54,8 +54,8 @@ class Vacuum(Carrier):
     from the threshold on.
     """
 
-    __slots__ = ("_begin", "_due", "_first", "_goal", "_is_held", "leaks", "spec")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"spec"}) | Carrier.FIXED
+    FIXED: ClassVar[tuple[str, ...]] = ("spec",)
+    __slots__ = (*FIXED, "_begin", "_due", "_first", "_goal", "_is_held", "leaks")
 
     def __init__(self, board: Board, spec: VacuumSpec, site: Site) -> None:
         super().__init__(board, spec, site)

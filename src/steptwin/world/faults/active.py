@@ -26,26 +26,8 @@ _LAST_ADDRESSED = 6
 class ActiveFault(Stateful):
     """An active fault, its counters and its random stream. Times count from ``since``."""
 
-    __slots__ = (
-        "_count",
-        "_every",
-        "_from",
-        "_nth",
-        "_probability",
-        "_until",
-        "chance",
-        "due",
-        "fault",
-        "left",
-        "name",
-        "seen",
-        "since",
-        "struck",
-        "worn",
-    )
-    FIXED: ClassVar[frozenset[str]] = frozenset(
-        {"_count", "_every", "_from", "_nth", "_probability", "_until", "fault", "name", "since"}
-    )
+    FIXED: ClassVar[tuple[str, ...]] = ("_count", "_every", "_from", "_nth", "_probability", "_until", "fault", "name", "since")
+    __slots__ = (*FIXED, "chance", "due", "left", "seen", "struck", "worn")
 
     def __init__(self, fault: Fault, name: str, seed: int, since: Nanos) -> None:
         self.fault = fault
@@ -143,8 +125,8 @@ class Faults(Stateful):
     faults is not part of its state: a state is restored into the same set.
     """
 
-    __slots__ = ("active", "elements", "has_supplies", "link", "machines", "ports", "seed", "sinks")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"elements", "has_supplies", "link", "machines", "ports", "seed", "sinks"})
+    FIXED: ClassVar[tuple[str, ...]] = ("elements", "has_supplies", "link", "machines", "ports", "seed", "sinks")
+    __slots__ = (*FIXED, "active")
 
     def __init__(self, seed: int = 0) -> None:
         self.seed = seed

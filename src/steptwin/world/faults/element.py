@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 class FaultyElement(Stateful):
     """A part of the kernel beside an element, which applies the effects of its faults to the built object."""
 
-    __slots__ = ("_faults", "_kernel", "_kinds", "_lasting", "_part", "name")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_faults", "_kernel", "_kinds", "_part", "name"})
+    FIXED: ClassVar[tuple[str, ...]] = ("_faults", "_kernel", "_kinds", "_part", "name")
+    __slots__ = (*FIXED, "_lasting")
 
     def __init__(self, kernel: Kernel, name: str, faults: Faults, kinds: Iterable[FaultKind], part: Any) -> None:
         self.name = name

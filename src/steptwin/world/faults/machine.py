@@ -74,24 +74,8 @@ class FaultyMachine(Stateful):
     Inputs are set through it, so that a stuck switch remains stuck.
     """
 
-    __slots__ = (
-        "_bounces",
-        "_cut",
-        "_faults",
-        "_fresh",
-        "_mute",
-        "_off_until",
-        "_on_edge",
-        "_outer",
-        "_released",
-        "_stuck",
-        "_unsupplied",
-        "body",
-        "changed",
-        "inner",
-        "name",
-    )
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_faults", "_fresh", "_on_edge", "body", "changed", "inner", "name"})
+    FIXED: ClassVar[tuple[str, ...]] = ("_faults", "_fresh", "_on_edge", "body", "changed", "inner", "name")
+    __slots__ = (*FIXED, "_bounces", "_cut", "_mute", "_off_until", "_outer", "_released", "_stuck", "_unsupplied")
 
     def __init__(
         self, inner: MotionController, name: str, faults: Faults, body: Body, on_edge: Callable[[str, Nanos, float], None]

@@ -27,17 +27,12 @@ class FaultyPort(Stateful):
     what goes wrong is recorded there, else at the link.
     """
 
-    __slots__ = (
+    FIXED: ClassVar[tuple[str, ...]] = (
         "__weakref__",
-        "_arriving",
-        "_asked",
         "_before",
         "_faults",
         "_framed",
-        "_fresh",
-        "_held",
         "_inner",
-        "_leaving",
         "_line",
         "_now",
         "_units",
@@ -48,24 +43,7 @@ class FaultyPort(Stateful):
         "link",
         "to_send",
     )
-    FIXED: ClassVar[frozenset[str]] = frozenset(
-        {
-            "__weakref__",
-            "_before",
-            "_faults",
-            "_framed",
-            "_inner",
-            "_line",
-            "_now",
-            "_units",
-            "deadline",
-            "exchange",
-            "is_transparent",
-            "line_name",
-            "link",
-            "to_send",
-        }
-    )
+    __slots__ = (*FIXED, "_arriving", "_asked", "_fresh", "_held", "_leaving")
 
     exchange: Callable[[bytes, Nanos], bytes]
     to_send: Callable[[Nanos], list[tuple[Nanos, bytes]]]
@@ -265,8 +243,8 @@ class FaultySendingPort(FaultyPort):
     """As `FaultyPort`, for a port that also sends without a request. ``is_read``: a program reads the output of the port;
     otherwise its output is no occasion for faults."""
 
-    __slots__ = ("_is_read", "_sending")
-    FIXED: ClassVar[frozenset[str]] = FaultyPort.FIXED | {"_is_read", "_sending"}
+    FIXED: ClassVar[tuple[str, ...]] = ("_is_read", "_sending")
+    __slots__ = (*FIXED,)
 
     def __init__(
         self, port: SendingPort, link: str, faults: Faults, line: LineProtocol, *, line_name: str = "", is_read: bool = True

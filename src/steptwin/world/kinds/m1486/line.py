@@ -23,8 +23,8 @@ from steptwin.world.trace import RecordSink
 class ChipLine(Line):
     """M1486 chips on one serial line. All chips receive all programs, and all programs receive all chips."""
 
-    __slots__ = ("_commands", "chain")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_commands"}) | Line.FIXED
+    FIXED: ClassVar[tuple[str, ...]] = ("_commands",)
+    __slots__ = (*FIXED, "chain")
 
     kinds = ("raw",)
     fault_kinds: ClassVar[Mapping[str, FaultLine]] = {"raw": FaultLine.CHARACTERS}

@@ -32,8 +32,8 @@ SILENT_CHARACTERS = 4
 class ModbusBus(Line):
     """Controllers with different units on one line. With ``timing`` requests take the time of a wire and of the controllers."""
 
-    __slots__ = ("_baud", "_gap", "_master", "_on_write", "_seeing", "_served", "_timed", "devices")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_baud", "_gap", "_on_write", "_seeing", "_served", "devices"}) | Line.FIXED
+    FIXED: ClassVar[tuple[str, ...]] = ("_baud", "_gap", "_on_write", "_seeing", "_served", "devices")
+    __slots__ = (*FIXED, "_master", "_timed")
 
     kinds = ("rtu", "serial", "tcp")
     """``serial``: a real serial port, on which characters take their time whatever the line timing is."""

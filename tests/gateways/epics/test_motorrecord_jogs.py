@@ -1,0 +1,145 @@
+"""Jogs of motor records, and motions that SPMG pauses."""
+
+from __future__ import annotations
+
+import pytest
+from motorrecord_rig import ME, OTHER, MotorRig, check
+
+from steptwin.errors import Misuse, Refusal
+
+
+@pytest.mark.parametrize(("button", "sign"), [("JOGF", 1), ("JOGR", -1)])
+def test_a_jog_ends_with_its_button(button: str, sign: int) -> None:
+    async def act(rig: MotorRig) -> None:
+        put = await rig.begin(button, 1)
+        await rig.until(lambda: sign * float(rig.get("RBV")[0]) > 60.0)
+        assert rig.get(button, "DMOV") == [1, 0]
+        await rig.put(button, 0)
+        await rig.over(put)
+        await rig.stands()
+        val, rbv, pressed = rig.get("VAL", "RBV", button)
+        assert (val, pressed) == (rbv, 0)
+
+    check(act)
+
+
+def test_a_jog_goes_as_the_user_sees_it() -> None:
+    async def act(rig: MotorRig) -> None:
+        await rig.put("DIR", 1)
+        await rig.begin("JOGF", 1)
+        await rig.until(lambda: float(rig.get("RBV")[0]) > 5.0)
+        assert float(rig.get("DRBV")[0]) < 0.0
+        await rig.put("STOP", 1)
+        await rig.stands()
+
+    check(act)
+
+
+def test_a_jog_ends_within_the_limits() -> None:
+    async def act(rig: MotorRig) -> None:
+        await rig.put("HLM", 100.0)
+        await rig.put("JOGF", 1)
+        rbv, limit, pressed = rig.get("RBV", "LVIO", "JOGF")
+        assert 50.0 < float(rbv) <= 100.0
+        assert (limit, pressed) == (1, 0)
+        await rig.put("HLM", float(rbv) + 1.0)
+        await rig.refused("JOGF", 1, Misuse, "a jog would leave 0 to")
+
+    check(act)
+
+
+def test_a_jog_ends_with_the_connection_of_its_client() -> None:
+    async def act(rig: MotorRig) -> None:
+        put = await rig.begin("JOGF", 1)
+        await rig.until(lambda: float(rig.get("RBV")[0]) > 5.0)
+        await rig.controller.leave(OTHER.circuit)
+        begin = float(rig.get("RBV")[0])
+        await rig.until(lambda: float(rig.get("RBV")[0]) > begin + 100.0)
+        await rig.controller.leave(ME.circuit)
+        await rig.over(put)
+        await rig.stands()
+        assert rig.get("JOGF", "DMOV") == [0, 1]
+
+    check(act)
+
+
+def test_a_move_instead_of_a_jog() -> None:
+    async def act(rig: MotorRig) -> None:
+        jog = await rig.begin("JOGF", 1)
+        await rig.until(lambda: float(rig.get("RBV")[0]) > 5.0)
+        await rig.put("VAL", 200.0)
+        await rig.over(jog)
+        assert rig.get("RBV", "JOGF", "MISS") == [200.0, 0, 0]
+
+    check(act)
+
+
+# ---------------------------------------------------------------------- SPMG
+
+
+def test_stop_of_spmg() -> None:
+    async def act(rig: MotorRig) -> None:
+        put = await rig.begin("VAL", 1000.0)
+        await rig.put("SPMG", 0)
+        await rig.over(put)
+        await rig.stands()
+        val, rbv = rig.get("VAL", "RBV")
+        assert val == rbv
+        for name in ("VAL", "JOGF", "HOMF", "TWF"):
+            await rig.refused(name, 1, Refusal, "SPMG is Stop")
+        await rig.put("SPMG", 3)
+        await rig.tick()
+        assert rig.get("DMOV", "MOVN") == [1, 0]
+        await rig.put("VAL", 5.0)
+        assert rig.get("RBV", "SPMG") == [5.0, 3]
+
+    check(act)
+
+
+def test_pause_and_go() -> None:
+    async def act(rig: MotorRig) -> None:
+        put = await rig.begin("VAL", 100.0)
+        await rig.put("SPMG", 1)
+        await rig.until(lambda: rig.get("MOVN") == [0])
+        assert rig.get("DMOV", "VAL") == [0, 100.0]
+        assert float(rig.get("RBV")[0]) < 100.0
+        assert not put.done()
+        await rig.refused("JOGF", 1, Refusal, "SPMG is Pause")
+        await rig.put("SPMG", 3)
+        await rig.over(put)
+        assert rig.get("RBV", "DMOV", "SPMG") == [100.0, 1, 3]
+
+    check(act)
+
+
+def test_a_target_that_is_given_in_a_pause() -> None:
+    async def act(rig: MotorRig) -> None:
+        await rig.put("SPMG", 1)
+        put = await rig.begin("VAL", 10.0)
+        later = await rig.begin("VAL", 12.0)
+        assert rig.get("VAL", "RBV", "DMOV", "MOVN") == [12.0, 0.0, 0, 0]
+        await rig.put("SPMG", 2)
+        await rig.over(put)
+        await rig.over(later)
+        assert rig.get("RBV", "SPMG") == [12.0, 1]
+        again = await rig.begin("VAL", 20.0)
+        await rig.put("STOP", 1)
+        await rig.over(again)
+        assert rig.get("VAL", "RBV", "DMOV") == [12.0, 12.0, 1]
+
+    check(act)
+
+
+def test_with_move_each_motion_ends_with_a_pause() -> None:
+    async def act(rig: MotorRig) -> None:
+        await rig.put("SPMG", 2)
+        jog = await rig.begin("JOGF", 1)
+        await rig.until(lambda: float(rig.get("RBV")[0]) > 5.0)
+        await rig.put("JOGF", 0)
+        await rig.over(jog)
+        assert rig.get("SPMG") == [1]
+
+    check(act)
+
+
+# ---------------------------------------------------------------------- SET, FOFF, DIR
