@@ -25,7 +25,7 @@ class DrivenAxis(Protocol):
 
 
 class AwaitedMotion:
-    """Moves ``axis``. Nothing is begun twice: what was refused or interrupted is told to who waits for it."""
+    """Moves ``axis``. Nothing is begun twice: what was refused or interrupted is reported to whoever waits for it."""
 
     def __init__(self, axis: DrivenAxis, show: Callable[[], Awaitable[None]]) -> None:
         self._axis = axis

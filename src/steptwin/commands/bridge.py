@@ -74,18 +74,18 @@ async def _open(server: Server, wanted: DeviceFile, file: Path, audit: Audit | N
 
 async def open_device(connections: DeviceConnections, device: DeviceSpec, notice: Callable[[str], None]) -> None:
     """Waits for a device that does not answer: what is served begins with its description."""
-    pause_s, is_told = RECONNECT_S[0], False
+    pause_s, is_reported = RECONNECT_S[0], False
     while True:
         try:
             await connections.open(device.address, device.name)
         except LineFailure as failure:
-            if not is_told:
+            if not is_reported:
                 notice(f"{device.name}: {failure}; nothing is served before it is there")
-            is_told = True
+            is_reported = True
             await asyncio.sleep(pause_s)
             pause_s = min(2.0 * pause_s, RECONNECT_S[1])
         else:
-            if is_told:
+            if is_reported:
                 notice(f"{device.name}: it is there")
             return
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from steptwin.campaign.campaign import RESULTS, SUFFIX, SUMMARY, Campaign, CampaignProgress
 from steptwin.campaign.report import comparison
-from steptwin.campaign.report.campaignpage import told
+from steptwin.campaign.report.campaignpage import cause_text
 from steptwin.campaign.report.write import write_report
 from steptwin.campaign.summary import percent
 from steptwin.errors import Misuse
@@ -63,7 +63,7 @@ def run(options: CampaignOptions, out: Print) -> bool:
     if options.as_json:
         out(_json(summary.plain()))
     else:
-        _print(summary.plain(), out, [f"cause, {len(one.numbers)} runs: {told(one)}" for one in report.found])
+        _print(summary.plain(), out, [f"cause, {len(one.numbers)} runs: {cause_text(one)}" for one in report.found])
         out(f"{time.monotonic() - began:.1f} s; results in {folder}, report.html shows them")
     reports.add(campaign.coverage, options.file.parent)
     tables: list[str] = []

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from steptwin.campaign.campaign import Campaign
-from steptwin.campaign.report.campaignpage import told
+from steptwin.campaign.report.campaignpage import cause_text
 from steptwin.campaign.report.write import write_report
 from steptwin.campaign.summary import CampaignSummary
 from steptwin.errors import Misuse
@@ -36,5 +36,5 @@ def run_campaign(options: CampaignMarker, folder: Path, temporary: Path) -> tupl
     if not summary.failed:
         return summary, ""
     report = write_report(campaign, summary, out, file)
-    causes = "\n".join(f"{len(cause.numbers)} runs: {told(cause)}" for cause in report.found)
+    causes = "\n".join(f"{len(cause.numbers)} runs: {cause_text(cause)}" for cause in report.found)
     return summary, f"{file.name}: {summary.failed} of {summary.runs} runs failed\n{causes}\n{out / 'report.html'}"

@@ -24,7 +24,7 @@ PointTurn: TypeAlias = tuple[Nanos, float]
 
 class PointTurns:
     """Notes the changes of all such points of ``world`` from now on: after each event of their controller, and after each
-    statement of which `executes` is told."""
+    statement of which `executes` is notified."""
 
     def __init__(self, world: Plant) -> None:
         self._world = world

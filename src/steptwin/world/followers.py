@@ -1,4 +1,4 @@
-"""Who follows the signals of one kernel, and is told of each of its events."""
+"""Followers of the signals of one kernel, which are notified of each of its events."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ class KernelFollowers:
         self.by_name: dict[str, dict[KernelFollower, None]] = {}
         """By the machines, lines and elements on which they depend."""
         self.leaving: list[KernelFollower] = []
-        """Who is told before each event."""
+        """Those that are notified before each event."""
         self.news: dict[KernelFollower, None] = {}
-        """Who will be told."""
+        """Those that will be notified."""
 
     def add(self, follower: KernelFollower, names: Iterable[str], *, leaves: bool) -> None:
         """Tell it of events at machines, lines and elements with these names; ``leaves``: and before each event."""

@@ -275,7 +275,9 @@ _KINDS: Mapping[str, _GatewayReader] = {
                 optional(text_value, "key", "file with its key, PEM"),
                 optional(text_value, "tokens", "file with lines ROLE NAME TOKEN; commands have a token"),
                 optional(word(*ROLES), "role", "role of commands without a token"),
-                optional(word("homeassistant"), "discovery", "what is told of the topics so that it shows them by itself"),
+                optional(
+                    word("homeassistant"), "discovery", "announces the topics to this program, which then shows them by itself"
+                ),
                 optional(_sparkplug, "sparkplug", "{ group, node, host }: Sparkplug B instead of JSON; host is the primary host"),
             ),
             need={

@@ -66,7 +66,7 @@ class Kernel:
         self.on_change: Callable[[Kernel], None] | None = None
         """Called with the kernel after each of its events and after each change from outside."""
         self.followers: KernelFollowers | None = None
-        """Who is told of each event; None: nobody ever was."""
+        """What is notified of each event; None: there has been nothing yet."""
         self._changed: set[str] = set()
         """The machines, lines and elements that were looked at since the last `take_changed`."""
         self._is_checked, self.is_blank = is_checked, is_blank

@@ -1,7 +1,7 @@
 """Observers of a running world: they see its signals at every moment at which these change, and change nothing.
 
-A `KernelFollower` is told by one kernel, event by event, however far that runs at once. A `WorldObserver` is for what depends on
-several kernels: the world brings them to each moment together.
+A `KernelFollower` is notified by one kernel, event by event, however far that runs at once. A `WorldObserver` is for what
+depends on several kernels: the world brings them to each moment together.
 """
 
 from __future__ import annotations

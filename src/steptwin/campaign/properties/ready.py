@@ -113,7 +113,7 @@ READY: Mapping[str, ReadyProperty] = {
         ReadyProperty(
             "no-lost-step-unnoticed",
             "[CONDITION] [within TIME]",
-            "when an axis has lost a step, CONDITION comes true within TIME, 1 s unless told; without it: its drive stops",
+            "when an axis has lost a step, CONDITION comes true within TIME, 1 s by default; without it: its drive stops",
             _no_lost_step,
         ),
         ReadyProperty("never-moves-while", "CONDITION", "no axis of a controller moves while CONDITION is true", _never_moves),

@@ -45,7 +45,7 @@ PROBES = (0.0625, *SHARES, 0.9375)
 class ComparisonRecord:
     """``is_fine``: between its turns its shape counts, too, because it meets others or a window.
 
-    It is told of events by `leave` and `look`, as a `KernelFollower`: by its ``kernel``, or, where that is None because its
+    It is notified of events by `leave` and `look`, as a `KernelFollower`: by its ``kernel``, or, where that is None because its
     signals have several, by who observes the world.
     """
 
@@ -95,7 +95,7 @@ class ComparisonRecord:
         return (kernels.pop(), tuple(sorted(source.name for source in sources))) if len(kernels) == 1 else (None, ())
 
     def follow(self, world: Plant) -> None:
-        """Be told by its kernel from now on."""
+        """From now on its kernel notifies it."""
         kernel = self.kernel
         if kernel is None:
             return

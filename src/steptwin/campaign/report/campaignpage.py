@@ -52,7 +52,7 @@ class CampaignReport:
         for name, found in by_property.items():
             case = ET.SubElement(suite, "testcase", classname=self.summary.name, name=name)
             if found:
-                texts = [f"{len(one.numbers)} of {self.summary.runs} runs: {told(one)}" for one in found]
+                texts = [f"{len(one.numbers)} of {self.summary.runs} runs: {cause_text(one)}" for one in found]
                 ET.SubElement(case, "failure", message=texts[0]).text = "\n".join(texts)
         return _NOT_XML.sub("\N{REPLACEMENT CHARACTER}", ET.tostring(suite, encoding="unicode", xml_declaration=True)).encode()
 
@@ -104,7 +104,7 @@ class CampaignReport:
         return f"<p>Spearman's rank correlation with {of}.</p>\n" + table(("value", "correlation", "p"), rows, (1, 2))
 
 
-def told(one: FoundFailure) -> str:
+def cause_text(one: FoundFailure) -> str:
     """A cause in a line."""
     return f"{summary(one.result)}. {_simplest(one)}"
 

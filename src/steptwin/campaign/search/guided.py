@@ -1,5 +1,5 @@
-"""Falsification: cases are chosen where those before came nearer to a violation. Asked in one place and told in order, so that a
-campaign has the same cases with any number of workers."""
+"""Falsification: cases are chosen where those before came nearer to a violation. They are chosen in one place, and
+results are given back in order, so that a campaign has the same cases with any number of workers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from steptwin.errors import Misuse
 from steptwin.extras import libraries_of, missing
 
 WAVE = 8
-"""Cases that are asked for before the results of any of them are told."""
+"""Cases that are chosen before the results of any of them are given back."""
 FIRST = 16
 """Cases that are drawn at random before estimators choose any."""
 SIGMA = 0.1
@@ -27,10 +27,10 @@ _BELOW_ONE = 1.0 - 2.0**-53
 
 
 class PointChooser(Protocol):
-    """Chooses points of a unit cube, whose distances from a violation it is told in the order in which it chose them."""
+    """Chooses points of a unit cube, whose distances from a violation it is given in the order in which it chose them."""
 
     def points(self, count: int) -> list[list[float]]:
-        """At most `WAVE`; those before have been told."""
+        """At most `WAVE`; the distances of those before have been given."""
         ...
 
     def tell(self, distances: Sequence[float]) -> None:
@@ -52,7 +52,7 @@ class GuidedSearch:
         self._next = 0
 
     def ask(self, count: int = WAVE) -> list[Case]:
-        """The next cases. Those before have been told."""
+        """The next cases. The distances of those before have been given."""
         found = [self._cases.at(self._next + n, point) for n, point in enumerate(self._chooser.points(count))]
         self._next += count
         return found
@@ -90,15 +90,15 @@ class _Evolution:
         return [[min(u, _BELOW_ONE) for u in point.tolist()] for point in self._asked]
 
     def tell(self, distances: Sequence[float]) -> None:
-        told = list(zip(self._asked, distances, strict=True))
+        results = list(zip(self._asked, distances, strict=True))
         self._asked = []
         if self._evolving is None:
-            self._drawn += [(distance, point) for point, distance in told]
+            self._drawn += [(distance, point) for point, distance in results]
             if len(self._drawn) >= WAVE:
                 self._begin()
             return
-        if len(told) == WAVE:  # fewer are the last ones
-            self._evolving.tell(told)
+        if len(results) == WAVE:  # fewer are the last ones
+            self._evolving.tell(results)
         least = min(distances)
         self._stale = 0 if least < self._least else self._stale + 1
         self._least = min(self._least, least)

@@ -1,4 +1,4 @@
-"""The server of PV Access: the library's, at addresses that are told and not taken from the environment."""
+"""The server of PV Access: the library's, at the given addresses rather than those of the environment."""
 
 from __future__ import annotations
 

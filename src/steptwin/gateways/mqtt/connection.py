@@ -124,15 +124,15 @@ class BrokerConnection:
     async def _run(self) -> None:
         loop = asyncio.get_running_loop()
         pause = FIRST_PAUSE_S
-        told = ""
+        reported = ""
         """Why there is no connection; the same reason is reported once."""
 
         def connected() -> None:
-            nonlocal told
+            nonlocal reported
             self.lost = None
-            if told:
+            if reported:
                 self._notice(f"{self._where}: connected again")
-            told = ""
+            reported = ""
 
         while not self._closing.is_set():
             began = loop.time()
@@ -140,9 +140,9 @@ class BrokerConnection:
                 await self._session(connected)
             except (MqttError, SessionOver, OSError, ssl.SSLError) as error:
                 self.lost = _words(error)
-                if self.lost != told:
-                    told = self.lost
-                    self._notice(f"{self._where}: {told}; it is tried again")
+                if self.lost != reported:
+                    reported = self.lost
+                    self._notice(f"{self._where}: {reported}; it is tried again")
             if loop.time() - began >= STEADY_S:
                 pause = FIRST_PAUSE_S
             with contextlib.suppress(TimeoutError):

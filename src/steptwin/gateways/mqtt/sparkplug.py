@@ -126,14 +126,14 @@ class SparkplugFace:
         device = self._devices[name]
         answers = sample.state is not None
         # Births and deaths tell what appears and disappears; without a session it is kept like other changes.
-        is_told = not device.is_seen or (answers != device.answers and self._is_born)
+        is_reported = not device.is_seen or (answers != device.answers and self._is_born)
         device.answers, device.is_seen = answers, True
         device.at = round(sample.at.timestamp() * 1000)
         for row in device.rows:
             if row.point is None:
                 continue
             value = row.value(sample)
-            if is_told:
+            if is_reported:
                 device.values[row.alias] = value
             elif value != device.values[row.alias]:
                 self._change(name, row, value, device.at)

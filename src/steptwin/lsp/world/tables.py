@@ -1,4 +1,4 @@
-"""Values of tables that may be wrong, because somebody is typing."""
+"""Values of tables that may be wrong, while a text is edited."""
 
 from __future__ import annotations
 
