@@ -12,7 +12,7 @@ from host_rig import Fault, Wire, thread_line
 from steptwin.drivers import Mic488, NoAnswer, NoMic488
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.mic488.failures import ModbusRefusal
-from steptwin.drivers.mic488.identify import SCAN_NS, Found, scan
+from steptwin.drivers.mic488.identify import SCAN_NS, FoundUnit, scan
 from steptwin.errors import LineFailure
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.wire import rtu
@@ -99,7 +99,7 @@ def test_scanning_finds_who_is_there() -> None:
     wire = Wire(units=(2, 5), firmware="1.23")
     asked: list[int] = []
     begin = wire.now
-    assert finish(scan(thread_line(wire), range(1, 9), progress=asked.append)) == [Found(2, "1.23"), Found(5, "1.23")]
+    assert finish(scan(thread_line(wire), range(1, 9), progress=asked.append)) == [FoundUnit(2, "1.23"), FoundUnit(5, "1.23")]
     assert asked == list(range(1, 9))
     assert wire.now - begin < 8 * (SCAN_NS + SECOND // 10)
 
@@ -107,7 +107,7 @@ def test_scanning_finds_who_is_there() -> None:
 def test_scanning_tells_who_is_no_mic488() -> None:
     wire = Wire()
     answering(wire, lambda request: bytes((request[0] | 0x80, 1)))
-    assert finish(scan(thread_line(wire), [7])) == [Found(7, None)]
+    assert finish(scan(thread_line(wire), [7])) == [FoundUnit(7, None)]
 
 
 def test_scanning_a_port_that_is_gone_ends() -> None:
@@ -139,7 +139,7 @@ def test_a_search_waits_once_for_each_unit_and_twice_as_long_for_what_one_that_i
         line = thread_line(wire)
         finish(line.open())
         begin = line.now()
-        assert finish(scan(line, units, timeout_ns=timeout_ns)) == ([Found(1, None)] if answers else [])
+        assert finish(scan(line, units, timeout_ns=timeout_ns)) == ([FoundUnit(1, None)] if answers else [])
         return line.now() - begin
 
     assert took(90 * MILLISECOND) - took(50 * MILLISECOND) == time_outs * 40 * MILLISECOND

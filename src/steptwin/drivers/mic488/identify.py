@@ -25,7 +25,7 @@ _NEW, _OLD = "1.70", "1.23"
 addresses of 1.70, and no read distinguishes them."""
 
 
-class Found(NamedTuple):
+class FoundUnit(NamedTuple):
     """A unit that responds. ``firmware`` is None if it is not a MIC488."""
 
     unit: int
@@ -91,7 +91,7 @@ async def scan(
     *,
     timeout_ns: Nanos = SCAN_NS,
     progress: Callable[[int], Any] | None = None,
-) -> list[Found]:
+) -> list[FoundUnit]:
     """The units that respond on a line. ``progress`` is called with every unit before it is tried. Raises `LineLost`."""
     found = []
     inputs = pdu.ReadRequest(pdu.READ_DISCRETE_INPUTS, 5000, 8)  # every firmware has them, and it is the manual's own example
@@ -113,5 +113,5 @@ async def scan(
             raise
         except (Refusal, LineFailure):
             firmware = None
-        found.append(Found(unit, firmware))
+        found.append(FoundUnit(unit, firmware))
     return found
