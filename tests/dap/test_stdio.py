@@ -231,7 +231,9 @@ def test_requests_that_make_no_sense_are_refused_and_the_session_goes_on(client:
     client.event("stopped")
     for command, arguments, problem in (
         ("stackTrace", {"threadId": 9}, "threadId = 9: permitted are 1 to 1"),
-        ("stackTrace", {}, "an argument is missing"),
+        ("stackTrace", {}, "stackTrace: the argument threadId is missing"),
+        ("scopes", {"frameId": 777}, "frameId = 777: nothing that is shown has this number"),
+        ("variables", {"variablesReference": 12345}, "variablesReference = 12345: nothing that is shown has this number"),
         ("variables", {"variablesReference": 1099}, "there is no such group"),
         ("evaluate", {"expression": "nothing"}, "'nothing' means nothing to mic488"),
         ("evaluate", {"expression": "go 9 h", "context": "repl"}, "the past is kept from"),
@@ -245,7 +247,7 @@ def test_requests_that_make_no_sense_are_refused_and_the_session_goes_on(client:
 def test_a_breakpoint_of_another_type_is_refused_and_the_next_is_set(client: DapClient, program: str) -> None:
     client.launch(program=program)
     for wrong in ({"line": 3, "condition": {"n": 3}}, {"line": 3, "logMessage": 5}, {"line": "3"}, {}):
-        with pytest.raises(Refused, match=r"expected a text|of another type"):
+        with pytest.raises(Refused, match=r"expected a text|of another type|line is missing"):
             client.ask("setBreakpoints", source={"path": program}, breakpoints=[wrong])
     (label,) = client.ask("setFunctionBreakpoints", breakpoints=[{"name": "COUNT"}])["breakpoints"]
     assert label["verified"]

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import AsyncIterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 import pytest_lsp
@@ -16,6 +17,9 @@ from lsprotocol import types as lsp
 from pygls.exceptions import JsonRpcInvalidParams
 from pytest_lsp import ClientServerConfig, LanguageClient, client_capabilities
 from tests.lsp.conftest import BROKEN, BROKEN_CHIP, CHIP, CONFIG, PROGRAM, TABLE, WORLD
+
+from steptwin.lsp.files import NoFiles
+from steptwin.lsp.server import server
 
 COMMAND = [sys.executable, "-m", "steptwin", "lsp"]
 
@@ -266,3 +270,49 @@ async def test_a_change_of_a_text_that_is_not_open_is_no_end(client: LanguageCli
     client.text_document_did_change(lsp.DidChangeTextDocumentParams(identifier, [change]))
     open_text(client, machine, PROGRAM)
     assert await diagnostics(client, machine) == []
+
+
+class Wire:
+    """What the server writes, without a process."""
+
+    def __init__(self) -> None:
+        self.sent: list[dict[str, Any]] = []
+        self._protocol = server(NoFiles()).protocol
+        self._protocol.set_writer(self, include_headers=False)
+
+    def write(self, data: bytes) -> None:
+        self.sent.append(json.loads(data))
+
+    def close(self) -> None:
+        pass
+
+    def ask(self, method: str, params: object) -> dict[str, Any]:
+        """The only answer."""
+        self.sent.clear()
+        message = {"jsonrpc": "2.0", "id": 7, "method": method, "params": params}
+        self._protocol.handle_message(json.loads(json.dumps(message), object_hook=self._protocol.structure_message))
+        (answer,) = self.sent
+        assert answer["id"] == 7
+        return answer
+
+
+def hover_at(line: int) -> dict[str, Any]:
+    return {"textDocument": {"uri": "file:///m/m.prg"}, "position": {"line": line, "character": 0}}
+
+
+def test_every_request_has_an_answer(caplog: pytest.LogCaptureFixture) -> None:
+    """Before initialize, after shutdown, and one with parameters that are none."""
+    wire = Wire()
+    assert wire.ask("textDocument/hover", hover_at(0))["error"]["code"] == -32002
+    assert "capabilities" in wire.ask("initialize", {"processId": None, "rootUri": None, "capabilities": {}})["result"]
+    assert wire.ask("textDocument/hover", hover_at(0))["result"] is None
+    for params in (hover_at(-1), {}, None, [], {"textDocument": 5, "position": "x"}):
+        refused = wire.ask("textDocument/hover", params)["error"]
+        assert (refused["code"], refused["message"]) == (
+            -32602,
+            "textDocument/hover: its parameters are not those of the protocol",
+        )
+    assert caplog.records == []
+    assert wire.ask("nothing/known", {})["error"]["code"] == -32601
+    assert wire.ask("shutdown", None)["result"] is None
+    assert wire.ask("textDocument/hover", hover_at(0))["error"]["code"] == -32600

@@ -94,8 +94,10 @@ class Adapter:
             return handler(self, arguments)
         except SteptwinError:
             raise
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
-            raise Misuse(f"{command}: an argument is missing or of another type ({type(error).__name__}: {error})") from error
+        except KeyError as error:
+            raise Misuse(f"{command}: the argument {error.args[0]} is missing") from error
+        except (TypeError, ValueError, AttributeError) as error:
+            raise Misuse(f"{command}: an argument is of another type: {error}") from error
 
     def after(self, command: str) -> None:
         """What comes after the response to a request that was answered."""
@@ -348,7 +350,14 @@ class Adapter:
 
     def _machine_of_frame(self, frame: object) -> str:
         """Of the first controller where no frame is named."""
-        return self._machine(1 if not isinstance(frame, int) else frame // FRAMES)
+        return self._machine(1) if frame is None else self._machine_of(frame, "frameId")
+
+    def _machine_of(self, reference: object, name: str) -> str:
+        """Of a frame or scope by its number."""
+        threads = self._started().threads
+        if not isinstance(reference, int) or not 1 <= reference // FRAMES <= len(threads):
+            raise Misuse(f"{name} = {reference!r}: nothing that is shown has this number")
+        return threads[reference // FRAMES - 1]
 
     def _stack(self, arguments: Arguments) -> _Body:
         thread = arguments["threadId"]
@@ -378,8 +387,9 @@ class Adapter:
         return {"content": self._sources.numbered(arguments["sourceReference"]).source.text}
 
     def _scopes(self, arguments: Arguments) -> _Body:
-        thread = arguments["frameId"] // FRAMES
-        self._machine(thread)
+        frame = arguments["frameId"]
+        self._machine_of(frame, "frameId")
+        thread = frame // FRAMES
         return {
             "scopes": [
                 {"name": name, "variablesReference": thread * FRAMES + number, "expensive": name == "Registers"}
@@ -388,7 +398,7 @@ class Adapter:
         }
 
     def _machine_of_scope(self, reference: int) -> str:
-        return self._machine(reference // FRAMES)
+        return self._machine_of(reference, "variablesReference")
 
     def _scope_of(self, reference: int) -> str:
         number = reference % FRAMES

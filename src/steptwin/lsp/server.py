@@ -18,7 +18,7 @@ from typing import Any, TypeAlias, TypeVar
 
 from lsprotocol import types as lsp
 from pygls.capabilities import ServerCapabilitiesBuilder, get_capability
-from pygls.exceptions import JsonRpcException, JsonRpcInvalidParams
+from pygls.exceptions import JsonRpcException, JsonRpcInvalidParams, JsonRpcInvalidRequest, JsonRpcServerNotInitialized
 from pygls.lsp.server import LanguageServer
 from pygls.protocol import LanguageServerProtocol, default_converter, json_rpc, lsp_method
 
@@ -56,7 +56,39 @@ class AtPlace(typing.Protocol):
 
 
 class Protocol(LanguageServerProtocol):
-    """Only the session stores texts: pygls' workspace would store each a second time, and reads files that are not open."""
+    """Only the session stores texts: pygls' workspace would store each a second time, and reads files that are not open.
+
+    Every request has an answer: pygls gives none to one whose parameters are wrong, and none after a shutdown.
+    """
+
+    _is_initialized = False
+
+    def structure_message(self, data: dict[str, Any]) -> Any:
+        try:
+            return super().structure_message(data)
+        except JsonRpcException as error:
+            if "id" in data and "method" in data:
+                text = f"{data['method']}: its parameters are not those of the protocol"
+                self._refuse(data["id"], JsonRpcInvalidParams(text) if isinstance(error, JsonRpcInvalidParams) else error)
+            return None
+
+    def handle_message(self, message: Any) -> None:
+        if not hasattr(message, "jsonrpc"):
+            return  # refused, or no message of the protocol
+        method, number = getattr(message, "method", None), getattr(message, "id", None)
+        if method == lsp.INITIALIZE:
+            self._is_initialized = True
+        if method is None or number is None:
+            super().handle_message(message)
+        elif not self._is_initialized:
+            self._refuse(number, JsonRpcServerNotInitialized("the first request is initialize"))
+        elif self._shutdown:
+            self._refuse(number, JsonRpcInvalidRequest("the server has been shut down"))
+        else:
+            super().handle_message(message)
+
+    def _refuse(self, number: int | str, error: JsonRpcException) -> None:
+        self._send_response(number, None, error.to_response_error())
 
     @lsp_method(lsp.TEXT_DOCUMENT_DID_OPEN)
     def lsp_text_document__did_open(self, params: lsp.DidOpenTextDocumentParams) -> Handling:
@@ -448,6 +480,8 @@ def server(files: Files | None = None) -> EditorServer:
 
 def _is_fault(record: logging.LogRecord) -> bool:
     """Refusals go to the client; pygls would log each with a traceback, too."""
+    if str(record.msg).startswith("Unable to deserialize message"):
+        return False
     return record.exc_info is None or not isinstance(record.exc_info[1], JsonRpcInvalidParams)
 
 
