@@ -156,7 +156,18 @@ def test_the_stack_has_what_is_executed_and_where_it_returns_to() -> None:
     world.machines["m"].set_pin("IN2", 1.0, world.now)
     while mic.depth() < 2:  # JUMP MAIN, JUMP COUNT
         world.run_to(world.now + MILLISECOND)
-    assert stack(mic, world.now) == [("COUNT", 10), ("MAIN", 6), ("COUNT", 10)]
+    assert stack(mic, world.now) == [("COUNT", 10), ("MAIN", 6)]  # JUMP MAIN is no call
+
+
+def test_what_is_interrupted_is_on_the_stack_wherever_it_was() -> None:
+    """Also behind a JUMP that never comes back."""
+    program = b"CFGINT_IN1 = RIS\nJUMP MAIN\nWORK:\nWAIT IN5 = ON\nMAIN:\nJUMP WORK\nINT_IN1:\nDELAY 1\nRETURN\n"
+    world = World.from_toml('[[mic488]]\nname = "m"\nprogram = "m.prg"\nstart = true\n', {"m.prg": program})
+    world.run_to(100 * MILLISECOND)
+    assert stack(world.programs["m"], world.now) == [("WORK", 4)]
+    world.machines["m"].set_pin("IN1", 1.0, world.now)
+    world.run_to(300 * MILLISECOND)
+    assert stack(world.programs["m"], world.now) == [("INT_IN1", 8), ("WORK", 4)]
 
 
 def test_variables_are_read_and_set() -> None:

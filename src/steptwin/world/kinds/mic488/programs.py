@@ -105,9 +105,13 @@ class WbcPrograms:
         control = self._device.program
         if control.running is None:
             return ()
-        text = bank_text(control.running_bank)
-        numbers = [control.interpreter.place(now), *(step for step, _ in reversed(control.interpreter.stack))]
-        return [Frame(self._bank(text).name(number), Place(text, number)) for number in numbers]
+        text, interpreter = bank_text(control.running_bank), control.interpreter
+        bank = self._bank(text)
+        back = [step for step, _ in reversed(interpreter.stack)]
+        interrupted, calls = (back[:1], back[1:]) if interpreter.handling else ([], back)
+        # A JUMP that never comes back, such as the last one of a main loop, is no call (WBC-1 keeps its step nevertheless).
+        numbers = [interpreter.place(now), *interrupted, *(step for step in calls if step == 0 or bank.comes_back(step - 1))]
+        return [Frame(bank.name(number), Place(text, number)) for number in numbers]
 
     def variables(self, now: Nanos) -> Mapping[str, float]:
         return self._device.program.variables(now)
