@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from time import process_time
+from unittest.mock import patch
 
 from steptwin.debug.debugger import Debugger
 from steptwin.debug.values import LabelPoint
 from steptwin.files.world import World
 from steptwin.machine import MICROSECOND, Nanos
+from steptwin.wbc.interpreter import Interpreter
 
 STATEMENTS = 1_000_000
 WBC = "n = 0\nMAIN:\n" + "    n = n + 1\n" * 20 + "JUMP MAIN\nNEVER:\n    OUT2 = ON\nEND\n"
@@ -22,6 +24,7 @@ ROUNDS = 3
 """Runs with and without a debugger take turns, so that both have the same machine; the best counts."""
 STEPS_BACK = 10
 BACK_GOAL_S = 0.2
+UNUSED_GOAL = 0.9
 RATE_GOAL = 3.0
 """Million statements per second, with a breakpoint elsewhere."""
 
@@ -65,7 +68,20 @@ def measure(name: str, text: str, label: str) -> None:
     print(f"{name}: a step back in {STATEMENTS} statements: at most {longest:.3f} s (goal {BACK_GOAL_S:g} s)")
 
 
+def measure_unused() -> None:
+    """What it costs that there can be hooks, where there are none."""
+    with_them: list[float] = []
+    without: list[float] = []
+    for _ in range(3 * ROUNDS):
+        with_them.append(seconds(world(WBC_WORLD).run_to))
+        with patch.object(Interpreter, "_steps", lambda _, code: code.steps):
+            without.append(seconds(world(WBC_WORLD).run_to))
+    share = min(without) / min(with_them)
+    print(f"MIC488, nothing listens: {share:.1%} of the speed without hooks (goal {UNUSED_GOAL:.0%})")
+
+
 def main() -> None:
+    measure_unused()
     measure("MIC488", WBC_WORLD, "NEVER")
     measure("M1486", CHIP_WORLD, "@2")
 
