@@ -11,8 +11,22 @@ from pathlib import Path
 
 CORE = ("motion", "wire", "mic488", "m1486", "wbc", "world", "drivers")
 """Packages that are mutated; tests/<package> mirrors each of them."""
-USERS = ("commands", "coverage", "debug", "explain", "files", "lsp", "subject", "why")
-"""Packages above them whose tests run in one process and do not wait for real time."""
+USERS = (
+    "calc",
+    "campaign",
+    "commands",
+    "coverage",
+    "debug",
+    "explain",
+    "files",
+    "gateways",
+    "history",
+    "lsp",
+    "subject",
+    "testing",
+    "why",
+)
+"""Packages above them whose tests run in one process."""
 WHOLE = ("test_branches.py", "test_state.py")
 """Tests of all state of a world with everything in it."""
 FOLDERS = tuple(f"tests/{name}" for name in (*CORE, *USERS, *WHOLE))

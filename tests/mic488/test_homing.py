@@ -88,6 +88,16 @@ def test_mic_30_at_the_sensor_the_drive_stops_without_ramp() -> None:
     assert rig.now == pytest.approx((0.8 + 180 / 800) * SECOND, abs=1)
 
 
+def test_mic_18_clearing_a_jog_bit_stops_no_homing() -> None:
+    rig = homer(HOME0)
+    rig.jog(1, +1, True)
+    rig.wait(0.1)
+    rig.set("HOME", -100.0)
+    rig.wait(0.01)
+    rig.jog(1, +1, False)
+    assert finished(rig) < 0
+
+
 @pytest.mark.parametrize(("mode", "home"), [(HOME0, -510), (HOME1, KL_TO + 1), (HOME2, KL_FROM - 1)])
 def test_homing_may_begin_on_the_sensor(mode: int, home: int) -> None:
     rig = homer(mode)

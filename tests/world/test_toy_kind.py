@@ -91,6 +91,10 @@ def test_mistakes_in_its_table_have_their_places() -> None:
         World.from_toml(TEXT.replace("tcp =", "gap = 1\ntcp ="))
     with pytest.raises(Misuse, match="'t' is a toy, which has no registers"):
         World.from_toml('[[toy]]\nname = "t"\n[[script]]\nname = "s"\nsteps = [{ write = { "t.POS_ABS" = 1 } }]\n')
+    with pytest.raises(
+        WorldError, match="'t' is a toy, which has no status of motions: send its commands, and wait for a condition"
+    ):
+        World.from_toml('[[toy]]\nname = "t"\n[[script]]\nname = "s"\nsteps = [{ wait_for = "t.M1" }]\n')
 
 
 def test_a_snapshot_goes_on_alike_and_can_be_pickled() -> None:

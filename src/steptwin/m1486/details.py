@@ -19,7 +19,7 @@ from steptwin.machine import Nanos
 
 def next_command(chip: M1486Chip) -> ChipCommand | None:
     """The next command of the program; None at the end of the memory in use."""
-    if chip.program.is_at_end or chip.program.pc == chip.memory.end:
+    if chip.program.pc == chip.memory.end:
         return None
     stored = decode(chip.memory.fetch(chip.program.pc))
     return None if stored is None else stored.command
