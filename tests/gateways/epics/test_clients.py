@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import os
 import subprocess
@@ -10,10 +11,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from gateway_rig import running, served
+from gateway_rig import GatewayWorld, running, served
 from tests.gateways.opcua.test_bridge import free_port
 
+from steptwin import World
+from steptwin.gateways.epics import gateway as epics
 from steptwin.world.description import read_world
+from steptwin.world.gateways import EpicsSpec
 from steptwin.world.reader import WorldError
 
 CLIENTS = Path(__file__).parents[1] / "clients"
@@ -123,6 +127,43 @@ def test_records_for_pvapy(tmp_path: Path) -> None:
         search = {"EPICS_PVA_ADDR_LIST": pva["host"], "EPICS_PVA_BROADCAST_PORT": str(pva["search_port"])}
         found = run_client("pvapy_records.py", "ST:table:", **search, EPICS_PVA_AUTO_ADDR_LIST="NO")
     assert found == PV_EXPECTED
+
+
+def test_clients_of_pv_access_are_listed() -> None:
+    """By their address, with the channels that they have."""
+    text = f'{TABLE}pva = "127.0.0.1:0"\n'
+    (spec,) = World.from_toml(text).spec.gateways
+    assert isinstance(spec, EpicsSpec)
+    gateway = epics.make(spec, GatewayWorld(text), Path())
+    program = (
+        "import pvaccess, sys\nc = pvaccess.Channel('ST:table:M1.VELO')\nc.setTimeout(30.0)\nc.put(5.0)\n"
+        "print('put', flush=True)\nsys.stdin.read()"
+    )
+
+    async def scene() -> None:
+        pva: Any = (await gateway.open(listen_any=False, notice=print))["pva"]
+        environment = {
+            **os.environ,
+            "EPICS_PVA_ADDR_LIST": pva["host"],
+            "EPICS_PVA_BROADCAST_PORT": str(pva["search_port"]),
+            "EPICS_PVA_AUTO_ADDR_LIST": "NO",
+        }
+        client = await asyncio.create_subprocess_exec(
+            sys.executable, "-c", program, env=environment, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE
+        )
+        assert client.stdout is not None
+        assert client.stdin is not None
+        assert await client.stdout.readline() == b"put\n"
+        (found,) = gateway.state().clients
+        assert (found.follows, found.role) == (("ST:table:M1.VELO",), "engineer")
+        assert found.place.startswith("127.0.0.1:")
+        assert found.name
+        client.stdin.close()
+        await client.wait()
+        await gateway.close()
+
+    asyncio.run(scene())
+    assert gateway.state().clients == ()
 
 
 @pytest.mark.parametrize(

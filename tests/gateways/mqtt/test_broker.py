@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -257,6 +258,70 @@ def test_tls_with_certificates_and_a_password(require_peer: Callable[[str], str]
         with served(text + good.replace('ca = "ca.pem"\n', ""), tmp_path, is_quiet=False):
             until(lambda: "certificate verify failed" in (tmp_path / "output").read_text(), "it is told")
         assert broker.retained(f"{BASE}/online") is False
+
+
+def test_commands_over_a_broker_are_in_the_audit_log(broker: Mosquitto, tmp_path: Path) -> None:
+    """Who, from where, what and its outcome; who looks is not recorded."""
+    (tmp_path / "tokens").write_text("operator anna letmein-0123456789\nviewer screen lookonly-0123456789\n")
+    keys = 'tokens = "tokens"\n'
+    with served(WORLD.format(port=broker.port) + keys, tmp_path, "--audit", "audit.jsonl"):
+        online(broker)
+        with broker.subscribe("me/answers") as answers:
+            ask = Requests(broker, answers)
+            assert "ok" in ask("enable", machine="table", axis=1, token="letmein-0123456789")
+            assert ask("move", machine="table", axis=9, to=1, token="letmein-0123456789")["error"]["code"] == "misuse"
+            assert ask("move", machine="table", axis=1, to=1, token="lookonly-0123456789")["error"]["code"] == "refusal"
+            assert "ok" in ask("read", points=["table.M1.position"], token="lookonly-0123456789")
+    entries = [json.loads(line) for line in (tmp_path / "audit.jsonl").read_text().splitlines()]
+    assert [(one["viewer"], one["role"], one["do"], one["outcome"]) for one in entries] == [
+        ("anna (MQTT)", "operator", "enable", "done"),
+        ("anna (MQTT)", "operator", "move", "misuse"),
+        ("screen (MQTT)", "viewer", "move", "refusal"),
+    ]
+    assert entries[0]["fields"] == {"machine": "table", "axis": 1}
+    assert "letmein" not in (tmp_path / "audit.jsonl").read_text()
+
+
+def test_two_worlds_without_names_do_not_meet(broker: Mosquitto, tmp_path: Path) -> None:
+    """Their topics have the names of their files."""
+    text = WORLD.format(port=broker.port).replace('name = "plant"', "seed = 1")
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / f"{name}.toml").write_text(text)
+    with running(tmp_path / "one", "up", "one.toml") as first, running(tmp_path / "two", "up", "two.toml") as second:
+        assert [points["mqtt"]["topic"] for points in (first, second)] == ["steptwin/one", "steptwin/two"]
+        for base in ("steptwin/one", "steptwin/two"):
+            online(broker, base)
+        with broker.subscribe("me/answers") as answers:
+            for base in ("steptwin/one", "steptwin/two"):
+                assert "ok" in Requests(broker, answers, base)("enable", machine="table", axis=1)
+            until(lambda: broker.retained("steptwin/one/table/M1")["enabled"], "it is on")
+    assert broker.retained("steptwin/two/online") is False
+
+
+def test_a_certificate_of_the_gateway_that_has_expired_is_told_and_a_new_one_is_taken(
+    require_peer: Callable[[str], str], tmp_path: Path
+) -> None:
+    authority = Authority(tmp_path)
+    authority.sign("broker")
+    authority.sign("client")
+    authority.sign("gateway", days=(-3, -1))
+    options = ("cafile ca.pem", "certfile broker.pem", "keyfile broker.key", "require_certificate true", "allow_anonymous true")
+    keys = 'tls = true\nca = "ca.pem"\ncertificate = "gateway.pem"\nkey = "gateway.key"\n'
+    with Mosquitto(require_peer, tmp_path, *options) as broker:
+        broker.client_options = (
+            "--cafile",
+            str(tmp_path / "ca.pem"),
+            "--cert",
+            str(tmp_path / "client.pem"),
+            "--key",
+            str(tmp_path / "client.key"),
+        )
+        with served(WORLD.format(port=broker.port) + keys, tmp_path, is_quiet=False):
+            until(lambda: "gateway.pem has expired on " in (tmp_path / "output").read_text(), "it is told")
+            authority.sign("gateway")
+            online(broker)
+        assert "connected again" in (tmp_path / "output").read_text()
 
 
 def test_home_assistant_finds_the_controllers(broker: Mosquitto, tmp_path: Path) -> None:

@@ -101,9 +101,9 @@ class EpicsGateway:
                 self._controllers[name].look()
 
     def state(self) -> GatewayState:
-        clients = () if self._server is None else tuple(self._server.clients(self._role.title))
-        unknown = "" if self._pv_server is None else "; clients of PV Access are not known"
-        return GatewayState(is_up=self._server is not None, text=f"listens{unknown}", shown=self._shown, clients=clients)
+        servers = (self._server, self._pv_server)
+        clients = tuple(one for server in servers if server is not None for one in server.clients(self._role.title))
+        return GatewayState(is_up=self._server is not None, text="listens", shown=self._shown, clients=clients)
 
     async def close(self) -> None:
         if self._task is not None:

@@ -60,7 +60,11 @@ class PvChannel:
     Made by a thread of the library. `begin` and `end` belong to the event loop.
     """
 
-    def __init__(self, provider: RecordProvider, record: Record, row: FieldRow, peer: str) -> None:
+    def __init__(self, provider: RecordProvider, name: str, found: tuple[Record, FieldRow], peer: str) -> None:
+        self.name = name
+        self.account = ""
+        """Of the client, as it says itself; known after its first put."""
+        record, row = found
         self._provider = provider
         self._record = record
         self._row = row
@@ -107,7 +111,8 @@ class PvChannel:
             operation.done()
         error: str | None = "internal error"
         try:
-            who = Putter(operation.account(), self._peer.rpartition(":")[0], self)
+            self.account = operation.account()
+            who = Putter(self.account, self._peer.rpartition(":")[0], self)
             await self._record.put(who, self._row.name, self._given(operation.value()))
             error = None
         except SteptwinError as refused:
@@ -212,6 +217,6 @@ class RecordProvider(DynamicProvider):
         return True
 
     def makeChannel(self, name: str, peer: str) -> SharedPV:  # noqa: N802  the library's name
-        channel = PvChannel(self, *found_field(self._records, name), peer)
+        channel = PvChannel(self, name, found_field(self._records, name), peer)
         self.call(channel.begin)
         return channel.pv

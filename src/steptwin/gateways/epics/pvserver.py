@@ -9,7 +9,8 @@ from collections.abc import Callable, Mapping
 from p4p.server import Server
 
 from steptwin.errors import LineFailure
-from steptwin.gateways.epics.pvchannels import RecordProvider
+from steptwin.gateways.contract import ClientState
+from steptwin.gateways.epics.pvchannels import PvChannel, RecordProvider
 from steptwin.gateways.epics.records import Record
 from steptwin.system import reason
 from steptwin.world.addresses import Address
@@ -54,6 +55,17 @@ class PvAccessServer:
             await self.close()
             raise LineFailure(f"cannot listen on {self._address}: it was taken meanwhile")
         return {"port": found, "search_port": int(chosen["EPICS_PVAS_BROADCAST_PORT"])}
+
+    def clients(self, role: str) -> list[ClientState]:
+        """By address, with the channels that they have. Their names are known after their first put."""
+        channels = () if self._provider is None else tuple(self._provider.channels)
+        found: dict[str, list[PvChannel]] = {}
+        for channel in sorted(channels, key=lambda one: one.name):
+            found.setdefault(str(channel), []).append(channel)
+        return [
+            ClientState(next((one.account for one in own if one.account), ""), place, role, tuple(one.name for one in own))
+            for place, own in found.items()
+        ]
 
     @property
     def has_clients(self) -> bool:

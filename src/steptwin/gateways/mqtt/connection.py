@@ -20,6 +20,7 @@ from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 from paho.mqtt.subscribeoptions import SubscribeOptions
 
+from steptwin.errors import Misuse
 from steptwin.system import reason
 from steptwin.world.addresses import Address
 
@@ -93,7 +94,8 @@ class Broker:
     keep_alive_s: int
     user: str | None = None
     password: str | None = None
-    tls: ssl.SSLContext | None = None
+    tls: Callable[[], ssl.SSLContext] | None = None
+    """Called for each session, because certificates are renewed. Raises `Misuse`; None: not encrypted."""
 
 
 class BrokerConnection:
@@ -138,7 +140,7 @@ class BrokerConnection:
             began = loop.time()
             try:
                 await self._session(connected)
-            except (MqttError, SessionOver, OSError, ssl.SSLError) as error:
+            except (MqttError, SessionOver, OSError, ssl.SSLError, Misuse) as error:
                 self.lost = _words(error)
                 if self.lost != reported:
                     reported = self.lost
@@ -162,7 +164,7 @@ class BrokerConnection:
             broker.address.port,
             username=broker.user,
             password=broker.password,
-            tls_context=broker.tls,
+            tls_context=None if broker.tls is None else broker.tls(),
             identifier=self._client_id,
             protocol=ProtocolVersion.V5,
             clean_start=True,

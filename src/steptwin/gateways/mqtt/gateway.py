@@ -7,6 +7,8 @@ import os
 import ssl
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 
 from steptwin.errors import Misuse
@@ -98,12 +100,14 @@ make = MqttGateway
 
 def broker_of(spec: MqttSpec, folder: Path) -> Broker:
     """Raises `Misuse` for files and variables that cannot be used."""
+    if spec.tls:
+        _tls(spec, folder)
     return Broker(
         address=parse_address(spec.broker, listen_any=True),
         keep_alive_s=spec.keep_alive // SECOND,
         user=spec.user,
         password=_password(spec, folder),
-        tls=_tls(spec, folder) if spec.tls else None,
+        tls=partial(_valid_tls, spec, folder) if spec.tls else None,
     )
 
 
@@ -131,4 +135,19 @@ def _tls(spec: MqttSpec, folder: Path) -> ssl.SSLContext:
             found.load_cert_chain(folder / spec.certificate, folder / spec.key, password="")
         except (OSError, ssl.SSLError, ValueError) as error:
             raise Misuse(f"[gateway.mqtt]: {spec.certificate}, {spec.key}: {reason(error)}") from None
+    return found
+
+
+def _valid_tls(spec: MqttSpec, folder: Path) -> ssl.SSLContext:
+    """For a session that begins. Raises `Misuse` for a certificate that has expired, of which a broker may say nothing."""
+    found = _tls(spec, folder)
+    if spec.certificate is None:
+        return found
+    try:
+        from cryptography.x509 import load_pem_x509_certificate
+    except ImportError:
+        return found
+    until = load_pem_x509_certificate((folder / spec.certificate).read_bytes()).not_valid_after_utc
+    if until <= datetime.now(UTC):
+        raise Misuse(f"{spec.certificate} has expired on {until:%Y-%m-%d %H:%M} UTC: renew it")
     return found

@@ -12,7 +12,7 @@ from pathlib import Path
 from asyncua.server.server import Server
 
 from steptwin import __version__
-from steptwin.errors import LineFailure
+from steptwin.errors import LineFailure, SteptwinError
 from steptwin.gateways.contract import GatewayState, GatewaySubject
 from steptwin.gateways.opcua.addressspace import NAMESPACE, NAMESPACE_URI, AddressSpaceBuilder
 from steptwin.gateways.opcua.nodes import NodeMaker
@@ -28,6 +28,8 @@ from steptwin.system import reason
 from steptwin.world.addresses import Address, is_loopback, parse_address
 from steptwin.world.gateways import APPLICATION_URI, OpcUaSpec
 
+LOOK_S = 60.0
+"""Between looks at its certificate."""
 PRODUCT_URI = "urn:steptwin"
 
 
@@ -47,9 +49,14 @@ class OpcUaGateway:
         self._notifications: Notifications | None = None
         self._service: NodeService | None = None
         self._task: asyncio.Task[None] | None = None
+        self._guard: asyncio.Task[None] | None = None
+        self._address: Address | None = None
+        """Where it listens, once it does."""
+        self._trouble: str | None = None
+        """Why its clients refuse it; None while they do not."""
 
     async def open(self, *, listen_any: bool, notice: Callable[[str], None]) -> Mapping[str, object]:
-        address = parse_address(self._spec.listen, listen_any=listen_any)
+        address = self._address or parse_address(self._spec.listen, listen_any=listen_any)
         security = Security(self._spec, self._folder, is_local=is_loopback(address.host))
         registers = self._registers()
         logging.getLogger("asyncua").addHandler(logging.NullHandler())
@@ -80,10 +87,30 @@ class OpcUaGateway:
             await server.start()
         except OSError as error:
             raise LineFailure(f"cannot listen on {address}: {reason(error)}") from error
+        self._security = security
         self._server, self._inside, self._shown = server, inside, sum(map(len, builder.points.values()))
         self._task = asyncio.create_task(self._publish(service, self._notifications))
         port = _port(server)
+        self._address = Address(address.host, port)
+        if security.valid_until is not None and self._guard is None:
+            self._guard = asyncio.create_task(self._watch(listen_any=listen_any, notice=notice))
         return {"host": address.host, "port": port, "url": f"opc.tcp://{Address(address.host, port)}/"}
+
+    async def _watch(self, *, listen_any: bool, notice: Callable[[str], None]) -> None:
+        """Look whether the certificate has expired, and begin anew with another one."""
+        while True:
+            before = self._trouble
+            try:
+                if self._server is None or self._security.is_renewed():
+                    await self._stop()
+                    await self.open(listen_any=listen_any, notice=notice)
+                    notice(f"[gateway.opcua]: {self._spec.certificate} has been renewed; clients have to connect again")
+                self._trouble = self._security.trouble()
+            except SteptwinError as error:
+                self._trouble = str(error).removeprefix("[gateway.opcua]: ")
+            if self._trouble is not None and self._trouble != before:
+                notice(f"[gateway.opcua]: {self._trouble}")
+            await asyncio.sleep(LOOK_S)
 
     def _registers(self) -> dict[str, list[str]]:
         return registers_by_machine("[gateway.opcua]", self._spec.registers, self._subject.description)
@@ -96,9 +123,16 @@ class OpcUaGateway:
 
     def state(self) -> GatewayState:
         clients = () if self._inside is None else tuple(self._inside.clients())
-        return GatewayState(is_up=self._server is not None, text="listens", shown=self._shown, clients=clients)
+        is_up = self._server is not None and self._trouble is None
+        return GatewayState(is_up=is_up, text=self._trouble or "listens", shown=self._shown, clients=clients)
 
     async def close(self) -> None:
+        if self._guard is not None:
+            self._guard.cancel()
+            await asyncio.wait((self._guard,))
+        await self._stop()
+
+    async def _stop(self) -> None:
         if self._task is not None:
             self._task.cancel()
             await asyncio.wait((self._task,))
@@ -107,6 +141,7 @@ class OpcUaGateway:
         for one in (self._service, self._sampler, self._notifications):
             if one is not None:
                 one.close()
+        self._task = self._server = self._inside = self._service = self._sampler = self._notifications = None
 
 
 make = OpcUaGateway

@@ -12,6 +12,8 @@ from asyncua.crypto.truststore import TrustStore
 from asyncua.crypto.validator import CertificateValidator, CertificateValidatorOptions
 from asyncua.server.server import Server
 from asyncua.server.user_managers import UserManager
+from cryptography.hazmat.primitives.serialization import load_pem_private_key
+from cryptography.x509 import load_pem_x509_certificate
 
 from steptwin.access.roles import Role
 from steptwin.access.tokens import AccessGate, read_tokens
@@ -34,6 +36,10 @@ _ENCRYPTED = (
 )
 
 
+def present() -> datetime:
+    return datetime.now(UTC)
+
+
 class Security(UserManager):
     """Users are admitted by tokens: the name of the user is free, the password is the token. Without tokens everybody on this
     computer is an engineer."""
@@ -43,6 +49,10 @@ class Security(UserManager):
         self._options = options
         self._folder = folder
         self.began = datetime.now(UTC)
+        self._loaded: tuple[bytes, ...] = ()
+        """Certificate and key, as they were read."""
+        self.valid_until: datetime | None = None
+        """The end of its certificate; None without one."""
         if not is_local and (options.security == "none" or options.tokens is None):
             raise Misuse("[gateway.opcua]: others can reach this address: give security = 'encrypt', certificate, key and tokens")
         if options.security != "none" and options.certificate is None:
@@ -62,6 +72,35 @@ class Security(UserManager):
         signed = _SIGNED if least != "encrypt" else ()
         return (*((ua.SecurityPolicyType.NoSecurity,) if least == "none" else ()), *_ENCRYPTED, *signed)
 
+    def _files(self) -> tuple[bytes, ...]:
+        """Raises `Misuse`."""
+        return tuple(
+            read_bytes(self._folder / name) for name in (self._options.certificate, self._options.key) if name is not None
+        )
+
+    def is_renewed(self) -> bool:
+        """Whether the files of certificate and key are others than those in use. Raises `Misuse` for what cannot be used, such as
+        a certificate whose key has not been written yet."""
+        found = self._files()
+        if found == self._loaded:
+            return False
+        names = f"[gateway.opcua]: {self._options.certificate}, {self._options.key}: "
+        try:
+            own = load_pem_private_key(found[1], None).public_key()
+            certified = load_pem_x509_certificate(found[0]).public_key()
+        except (ValueError, TypeError) as error:
+            raise Misuse(f"{names}{error}") from None
+        if own != certified:
+            raise Misuse(f"{names}they do not belong together")
+        return True
+
+    def trouble(self) -> str | None:
+        """Why clients refuse its certificate; None while they do not."""
+        until = self.valid_until
+        if until is None or present() < until:
+            return None
+        return f"{self._options.certificate} has expired on {until:%Y-%m-%d %H:%M} UTC: clients refuse it; renew it"
+
     async def apply(self, server: Server) -> None:
         """Raises `Misuse` for a certificate that cannot be used."""
         options = self._options
@@ -70,8 +109,10 @@ class Security(UserManager):
         server.set_identity_tokens([ua.UserNameIdentityToken] if asks else [ua.AnonymousIdentityToken, ua.UserNameIdentityToken])
         if options.certificate is not None and options.key is not None:
             try:
-                await server.load_certificate(read_bytes(self._folder / options.certificate), "PEM")
-                await server.load_private_key(read_bytes(self._folder / options.key), format="PEM")
+                self._loaded = self._files()
+                await server.load_certificate(self._loaded[0], "PEM")
+                await server.load_private_key(self._loaded[1], format="PEM")
+                self.valid_until = load_pem_x509_certificate(self._loaded[0]).not_valid_after_utc
             except ValueError as error:
                 raise Misuse(f"[gateway.opcua]: {options.certificate}, {options.key}: {error}") from None
         checks = CertificateValidatorOptions.BASIC_VALIDATION | CertificateValidatorOptions.PEER_CLIENT
