@@ -151,6 +151,18 @@ def test_points_are_written(client: NodeClient, points: Points) -> None:
         until(inputs, "it is through the filter of the inputs")
 
 
+def test_user_registers_are_an_array(client: NodeClient, points: Points) -> None:
+    path = "table.registers.USER_REGISTER"
+    words = lambda: list(read(client, path).values())  # noqa: E731  JSON of a typed array: by index
+    with ModbusTcpClient("127.0.0.1", port=points["tcp"]["port"]) as master:
+        assert not master.write_registers(1997, [65535, 1, 2], device_id=1).isError()
+        assert (len(words()), words()[1997:]) == (2000, [65535, 1, 2])
+        assert not master.write_register(1999, 3, device_id=1).isError()
+        assert words()[1999] == 3
+    assert client("read", node=f"ns=2;s={path}", attribute="ValueRank")["value"] == 1
+    assert client("write", node=f"ns=2;s={path}", value=double(1.0)) == "BadNotWritable"
+
+
 def test_nodes_have_units_ranges_and_what_robotics_clients_look_for(client: NodeClient) -> None:
     names = lambda node: [one[0] for one in client("browse", node=node)]  # noqa: E731
     assert names("ns=2;s=machines") == ["2:Time", "2:table", "2:feed"]

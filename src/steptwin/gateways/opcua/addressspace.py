@@ -22,6 +22,8 @@ NAMESPACE_URI = "urn:steptwin:machines"
 NAMESPACE: Any = 2
 """Its number: 0 is OPC UA, 1 the server."""
 ROOT = "machines"
+LEAST_LIST = 16
+"""Words of a point that is shown as an array."""
 
 _ROBOTICS: Mapping[str, tuple[str, str]] = {
     "position": ("ParameterSet", "ActualPosition"),
@@ -38,6 +40,19 @@ class PointNode:
 
     id: ua.NodeId
     point: GatewayPoint
+
+
+@dataclass(frozen=True, slots=True)
+class ArrayNode:
+    """A variable that shows all elements of a point that is a list, such as the user registers of a controller."""
+
+    machine: str
+    path: str
+    count: int
+
+    @property
+    def elements(self) -> tuple[str, ...]:
+        return tuple(f"{self.machine}.{self.path}[{number}]" for number in range(self.count))
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +80,7 @@ class AddressSpaceBuilder:
         self.references: list[ua.AddReferencesItem] = []
         self.points: dict[str, tuple[PointNode, ...]] = {}
         """By controller, and of the clock."""
+        self.arrays: dict[ua.NodeId, ArrayNode] = {}
         self.methods: dict[tuple[ua.NodeId, ua.NodeId], BoundMethod] = {}
         """By the ids of object and method."""
         self._description = description
@@ -112,7 +128,9 @@ class AddressSpaceBuilder:
         for what, text in (("Model", sheet.kind), ("SoftwareRevision", sheet.variant)):
             self._property(f"{name}.{what}", node_id(name), what, ua.Variant(text), ua.ObjectIds.String)
         points = points_of(part, self._description, registers)
+        lists = [point for point in sheet.points if len(point.addresses) == 1 and point.addresses[0].words >= LEAST_LIST]
         groups = dict.fromkeys(point.path[0] for point in points if len(point.path) > 1)
+        groups |= dict.fromkeys(("registers",) if lists else ())
         axes = {axis.name: axis for axis in sheet.axes}
         for group in groups:
             path = f"{name}.{group}"
@@ -126,7 +144,20 @@ class AddressSpaceBuilder:
                 self._bind(part, path, "Program", None)
             else:
                 self._object(path, node_id(name), _title(group), ua.ObjectIds.FolderType)
+        for one in lists:
+            self._array(ArrayNode(name, one.path, one.addresses[0].words), one.meaning)
         self.points[name] = tuple(self._point(name, point, is_of_axis=point.path[0] in axes) for point in points)
+
+    def _array(self, node: ArrayNode, meaning: str) -> None:
+        path = f"{node.machine}.registers.{node.path}"
+        kind = standard(ua.ObjectIds.BaseDataVariableType)
+        self._item(path, node_id(f"{node.machine}.registers"), node.path, ua.ObjectIds.HasComponent, kind)
+        self.items[-1].NodeClass = ua.NodeClass.Variable
+        nothing = ua.Variant([], ua.VariantType.UInt16, is_array=True)
+        self.items[-1].NodeAttributes = self._alike(
+            (node.path, meaning, "array"), lambda: _variable(node.path, meaning, nothing, rank=1)
+        )
+        self.arrays[node_id(path)] = node
 
     def _axis(self, path: str, kind: str | None) -> None:
         self._object(f"{path}.ParameterSet", node_id(path), "ParameterSet", ua.ObjectIds.BaseObjectType)

@@ -79,7 +79,7 @@ class OpcUaGateway:
             self._sampler = Sampler(self._subject, registers)
             if self._subject.past is not None:
                 inside.history_manager.set_storage(PastNodes(self._subject.past, builder.nodes()))
-            service = NodeService(inside.aspace, self._subject, self._sampler, builder.points, builder.methods)
+            service = NodeService(inside.aspace, self._subject, self._sampler, builder.points, builder.methods, builder.arrays)
             inside.service = self._service = service
             await service.refresh_all()
         self._notifications = await Notifications.open(server, self._subject)

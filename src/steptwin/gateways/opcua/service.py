@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from datetime import UTC, datetime
+from typing import Any
 
 from asyncua import ua
 from asyncua.server.address_space import AddressSpace
 
 from steptwin.datasheet import Argument, Limits
+from steptwin.errors import LineFailure, Refusal
 from steptwin.gateways.clients import GatewayClient
 from steptwin.gateways.contract import GatewaySubject
 from steptwin.gateways.leases import JogLeases
-from steptwin.gateways.opcua.addressspace import BoundMethod, PointNode
-from steptwin.gateways.opcua.nodetypes import data_value, number_of
+from steptwin.gateways.opcua.addressspace import ArrayNode, BoundMethod, PointNode
+from steptwin.gateways.opcua.nodetypes import data_value, number_of, status
 from steptwin.gateways.sampling import Sample, Sampler
-from steptwin.subject.commands import Jog, StopAxes
+from steptwin.subject.commands import Jog, ReadPoints, StopAxes
+
+ARRAY_PAUSE = 10
+"""Arrays take long to read: they are looked at once in so many publications."""
 
 
 class NodeService:
@@ -27,12 +33,16 @@ class NodeService:
         sampler: Sampler,
         points: Mapping[str, Sequence[PointNode]],
         methods: Mapping[tuple[ua.NodeId, ua.NodeId], BoundMethod],
+        arrays: Mapping[ua.NodeId, ArrayNode],
     ) -> None:
         self._space = space
         self._subject = subject
         self._sampler = sampler
         self._points = points
         self._methods = methods
+        self._arrays = arrays
+        self._watched_arrays: dict[ua.NodeId, int] = {}
+        """What has been subscribed to, and publications until it is read again."""
         self._of_node = {node.id: (machine, node) for machine, nodes in points.items() for node in nodes}
         self._leases = JogLeases(subject)
         self._watched: dict[str, list[PointNode]] = {}
@@ -43,6 +53,8 @@ class NodeService:
     async def refresh(self, nodes: Iterable[ua.NodeId]) -> None:
         wanted: dict[str, list[PointNode]] = {}
         for node in nodes:
+            if node in self._arrays:
+                await self._show_array(node)
             found = self._of_node.get(node)
             if found is not None:
                 wanted.setdefault(found[0], []).append(found[1])
@@ -55,6 +67,8 @@ class NodeService:
 
     def watch(self, nodes: Iterable[ua.NodeId]) -> None:
         for node in nodes:
+            if node in self._arrays:
+                self._watched_arrays.setdefault(node, 0)
             found = self._of_node.get(node)
             if found is not None:
                 machine, point = found
@@ -65,11 +79,18 @@ class NodeService:
     async def publish(self) -> None:
         """Notify the clients of what has changed."""
         self._forget()
+        for node, left in list(self._watched_arrays.items()):
+            self._watched_arrays[node] = left - 1 if left > 0 else ARRAY_PAUSE
+            if left <= 0:
+                await self._show_array(node)
         for sample in await self._sampler.changed(list(self._watched)):
             await self._show(sample, self._watched.get(sample.machine, ()))
 
     def _forget(self) -> None:
         """Nodes that have no subscription any more."""
+        for node in list(self._watched_arrays):
+            if not self._space[node].attributes[ua.AttributeIds.Value].datachange_callbacks:
+                del self._watched_arrays[node]
         for machine, nodes in list(self._watched.items()):
             kept = [node for node in nodes if self._space[node.id].attributes[ua.AttributeIds.Value].datachange_callbacks]
             if kept:
@@ -82,6 +103,18 @@ class NodeService:
             value = None if sample.state is None else node.point.read(sample.state)
             fresh = data_value(value, node.point.type, sample.at, is_answered=sample.state is not None)
             await self._space.write_attribute_value(node.id, ua.AttributeIds.Value, fresh)
+
+    async def _show_array(self, node: ua.NodeId) -> None:
+        array = self._arrays[node]
+        at: Any = datetime.now(UTC)
+        try:
+            found: Any = (await self._subject.do(ReadPoints(array.elements))).value
+        except (LineFailure, Refusal):
+            fresh = ua.DataValue(ua.Variant(), status(ua.StatusCodes.BadNoCommunication), at)
+        else:
+            words = [int(one["value"] or 0) & 0xFFFF for one in found]
+            fresh = ua.DataValue(ua.Variant(words, ua.VariantType.UInt16, is_array=True), SourceTimestamp=at)
+        await self._space.write_attribute_value(node, ua.AttributeIds.Value, fresh)
 
     # ------------------------------------------------------------------ commands
 
