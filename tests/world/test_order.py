@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import permutations
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from steptwin.files.world import World
@@ -110,3 +110,27 @@ def test_what_follows_what() -> None:
     assert update_order([set(), set(), set()], [0]) == [1, 2, 0]
     # 1 and 2 are a loop; 0 follows it, 3 is before it.
     assert update_order([set(), {0, 2}, {1}, {2}], ()) == [3, 1, 0, 2]
+
+
+def reached(number: int, after: list[set[int]]) -> set[int]:
+    found = {*after[number]}
+    for _ in after:
+        found |= {one for other in found for one in after[other]}
+    return found
+
+
+@st.composite
+def graphs(draw: st.DrawFn) -> list[set[int]]:
+    count = draw(st.integers(1, 9))
+    return [draw(st.sets(st.integers(0, count - 1), max_size=3)) - {number} for number in range(count)]
+
+
+@settings(max_examples=200, deadline=None)
+@given(graphs(), st.sets(st.integers(0, 8), max_size=2))
+@example([{2}, {3, 6}, {4, 6}, {0, 4}, {0, 1, 2, 3, 6}, {0, 7}, {3, 4}, {1, 5}], {3, 4})
+def test_only_within_a_loop_does_a_part_come_before_what_drives_it(after: list[set[int]], late: set[int]) -> None:
+    """In the example two parts that drive each other, 5 and 7, are before a loop with lower numbers."""
+    found = update_order(after, late)
+    assert sorted(found) == [*range(len(after))]
+    place = {number: n for n, number in enumerate(found)}
+    assert [(a, b) for a, those in enumerate(after) for b in those if place[a] > place[b] and a not in reached(b, after)] == []

@@ -197,7 +197,8 @@ class Contact(Stateful):
     def rest_at(self, closed: bool) -> None:
         """Set its initial state; `Circuit.close` sets the input."""
         self.closed = self.level = closed
-        self._report()
+        if not self._circuit.is_blank:
+            self._report()
 
     def change(self, closed: bool, now: Nanos) -> None:
         if closed == self.closed:

@@ -134,12 +134,14 @@ class Mechanism(Stateful):
         self._simple = build.ideal
         """Whether the load always was, and always will be, at the commanded position."""
         drive = self._drive
-        here = build.sign * drive.plan.count(kernel.now) + build.zero
-        if (build.low is not None and here < build.low) or (build.high is not None and here > build.high):
+        here = 0 if kernel.is_blank else build.sign * drive.plan.count(kernel.now) + build.zero
+        if kernel.is_blank:
+            pass  # it is restored, where another one has been
+        elif (build.low is not None and here < build.low) or (build.high is not None and here > build.high):
             raise Misuse(f"{machine} axis {number} stands at {here} imp, outside its hard stops {build.low} to {build.high} imp")
         self._revision = drive.revision
         self._course = Course(build, drive.plan, kernel.now, MechanicalState(here, here))
-        if self._loose is not None:
+        if self._loose is not None and not kernel.is_blank:
             self._renew(drive, kernel.now)
 
     @property

@@ -32,7 +32,7 @@ def successors(
 
 def update_order(after: Sequence[set[int]], late: Iterable[int]) -> list[int]:
     """Numbers of parts in the order in which they are updated: each before those that it concerns, ``late`` ones when no other is
-    ready, else as they are numbered. A loop begins with its lowest number."""
+    ready, else as they are numbered. A loop comes when all before it have come, and begins with its lowest number."""
     before: list[set[int]] = [set() for _ in after]
     for number, concerned in enumerate(after):
         for one in concerned:
@@ -43,9 +43,7 @@ def update_order(after: Sequence[set[int]], late: Iterable[int]) -> list[int]:
     left = dict.fromkeys(range(len(after)))
     found: list[int] = []
     while left:
-        number = heappop(ready)[1] if ready else _first_of_loop(next(iter(left)), before)
-        if number not in left:
-            continue
+        number = heappop(ready)[1] if ready else _first_of_loop(next(iter(left)), before, after)
         del left[number]
         found.append(number)
         for one in after[number]:
@@ -55,10 +53,21 @@ def update_order(after: Sequence[set[int]], late: Iterable[int]) -> list[int]:
     return found
 
 
-def _first_of_loop(number: int, before: Sequence[set[int]]) -> int:
-    """The lowest number of a loop that ``number`` waits for."""
-    way: list[int] = []
-    while number not in way:
-        way.append(number)
-        number = min(before[number])
-    return min(way[way.index(number) :])
+def _first_of_loop(number: int, before: Sequence[set[int]], after: Sequence[set[int]]) -> int:
+    """The lowest number of a loop that waits for nothing but itself; ``number`` is in it or waits for it."""
+    while True:
+        waits_for, waiting = _reached(number, before), _reached(number, after)
+        if waits_for <= waiting:
+            return min(waits_for)
+        number = min(waits_for - waiting)
+
+
+def _reached(number: int, next_ones: Sequence[set[int]]) -> set[int]:
+    """All that come after a number, itself only if it is in a loop."""
+    found: set[int] = set()
+    left = [number]
+    while left:
+        new = next_ones[left.pop()] - found
+        found |= new
+        left += new
+    return found

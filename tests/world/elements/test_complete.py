@@ -5,13 +5,21 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any, TypeAlias
 
 import pytest
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from pyarrow import parquet
 from toy import lamp
 from whole_world import everything
 
-from steptwin.files.export import axis_views, write_trace
+from steptwin.files.export import axis_views, plot, write_trace
+from steptwin.files.export.recording import sort_out
+from steptwin.motion.divisions import profile_of
 from steptwin.world.elements import ELEMENTS
+from steptwin.world.lanes import AxisViews
+from steptwin.world.plant import Plant
 
 ROOT = Path(__file__).parents[3]
 NAMES = sorted(ELEMENTS)
@@ -72,24 +80,63 @@ def test_it_has_tests_of_its_own(name: str) -> None:
     assert (Path(__file__).parent / TESTS.get(name, f"test_{name}.py")).is_file()
 
 
-def test_every_lane_is_in_every_export(tmp_path: Path) -> None:
-    """Those of terminals, contacts and faults; and what an axis moves besides."""
+Recorded: TypeAlias = "tuple[Plant, AxisViews, set[str], set[str]]"
+
+
+@pytest.fixture(scope="module")
+def recorded() -> Recorded:
+    """The world of all elements after 0.6 s, its views, lanes of terminals, contacts and faults, and what axes move besides."""
     with lamp.registered():
         world = everything()
         world.run(for_=0.6)
         pins = {pin for machine in world.machines.values() for pin in machine.pins()}
-        lanes = {record.subject for record in world.trace.edges()} - pins
         moved = {
             spec.name
             for element in ELEMENTS.values()
             if element.moved is not None
             for spec in element.named(world.spec.elements[element.name])
         }
-        formats = ("jsonl", "html", "vcd", "csv")
-        write_trace(world.trace, tmp_path, views=axis_views(world), ended=world.now, formats=formats)
-    for one in formats:
-        (file,) = tmp_path.glob(f"*.{one}")
-        text = file.read_text("utf-8")
-        lacking = {lane for lane in lanes if lane not in text and lane.replace(".", "_") not in text}
-        assert not lacking, one
-        assert not {name for name in moved if not re.search(rf"{name}[ _](position|angle|x)|\"{name}\"", text)}, one
+        return world, axis_views(world), {record.subject for record in world.trace.edges()} - pins, moved
+
+
+def lacking(text: str, lanes: set[str], moved: set[str]) -> set[str]:
+    """The lanes that a text does not have."""
+    return {lane for lane in lanes if lane not in text and lane.replace(".", "_") not in text} | {
+        name for name in moved if not re.search(rf"{name}[ _](position|angle|x)|\"{name}\"", text)
+    }
+
+
+@pytest.mark.parametrize("form", ["jsonl", "html", "vcd", "csv", "parquet"])
+def test_every_lane_is_in_every_export(recorded: Recorded, form: str, tmp_path: Path) -> None:
+    world, views, lanes, moved = recorded
+    (file,) = write_trace(world.trace, tmp_path / f"t.{form}", views=views, ended=world.now)
+    text = "\n".join(parquet.read_schema(file).names) if form == "parquet" else file.read_text("utf-8")
+    assert lacking(text, lanes, moved) == set()
+
+
+@pytest.mark.parametrize("form", ["svg", "png"])
+def test_every_lane_that_changes_is_in_the_pictures(
+    recorded: Recorded, form: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    world, views, lanes, moved = recorded
+    monkeypatch.setattr(plot, "MOST_ROWS", 1000)
+    drawn: list[str] = []
+    saved = Figure.savefig
+
+    def save(figure: Figure, *args: Any, **kwargs: Any) -> None:
+        drawn.extend(one.get_text() for one in figure.findobj(Text))
+        saved(figure, *args, **kwargs)
+
+    monkeypatch.setattr(Figure, "savefig", save)
+    (file,) = write_trace(world.trace, tmp_path / f"t.{form}", views=views, ended=world.now)
+    changed = {record.subject for record in world.trace.edges() if record.time > 0} & lanes
+    recording = sort_out(world.trace, views, until=world.now)
+    moving = {
+        track.view.name.split()[0]
+        for track in recording.moved
+        if any(profile_of(plan).moving(after) for plan, after, _ in track.stretches(0, world.now))
+    } & moved
+    assert len(changed) > 3
+    assert lacking("\n".join(drawn), changed, moving) == set()
+    if form == "svg":
+        assert lacking(file.read_text("utf-8"), changed, moving) == set()

@@ -66,7 +66,8 @@ class Brake(BoardPart):
         """Fault: it does not let go."""
         self.share = 1.0
         """Of its torque that it has; less while it is worn."""
-        mechanism.brake(spec.torque, board.kernel.now)
+        if not board.kernel.is_blank:
+            mechanism.brake(spec.torque, board.kernel.now)
 
     def acts_on(self, mechanism: Mechanism) -> bool:
         return self._mechanism is mechanism
