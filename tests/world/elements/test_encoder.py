@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from steptwin.files.world import World
+from steptwin.world.reader import WorldError
 
 TEXT = """
 [[mic488]]
@@ -55,3 +56,8 @@ def test_an_encoder_on_the_load_is_behind_the_play(mount: str, counts: int) -> N
         axis.move_to(position)
         world.run(until="idle")
     assert (axis.position, axis.encoder) == (5.0, counts)
+
+
+def test_an_encoder_does_not_follow_its_own_axis() -> None:
+    with pytest.raises(WorldError, match="follows = 'x' is its own axis: an encoder is on it anyway"):
+        World.from_toml(TEXT + 'follows = "x"\n')

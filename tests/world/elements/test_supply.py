@@ -182,6 +182,7 @@ def test_a_supply_that_drops_while_the_fault_of_a_machine_lasts() -> None:
         (('feeds = "b"', 'feeds = ["b", "b"]'), "a controller is named twice"),
         (('feeds = "b"', 'feeds = ["b", "a"]'), "'a' has the supply 'logic' already"),
         (('feeds = "b"', 'feeds = "logic"'), "'logic' is an element"),
+        (('on = "logic.good"', 'on = "power.good"'), "on: power waits for power, so that it never comes on"),
         (("enough = 18", "enough = 25"), "enough = 25 V is more than volts = 24"),
         (("enough = 18", "enogh = 18"), r"\[supply\] has no 'enogh' \(did you mean 'enough'\?\)"),
         (("switched = true\n", ""), "digital inputs of 'logic' are none"),

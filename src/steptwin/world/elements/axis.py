@@ -74,6 +74,10 @@ def _read(text: TomlText, row: Row, table: Table) -> AxisSpec:
         encoder=read_encoder(text, path, table),
         motor=read_motor(text, path, table),
     )
+    if spec.encoder is not None and spec.encoder.follows == spec.name:
+        text.wrong(
+            (*spec.encoder.path, "follows"), "D007", f"follows = {spec.name!r} is its own axis: an encoder is on it anyway"
+        )
     is_known = spec.travel is not None and not text.is_wrong((*path, "start"))
     if is_known and spec.travel is not None and not spec.travel[0] <= spec.start <= spec.travel[1]:
         text.wrong((*path, "start"), "D007", f"start = {spec.start:g} is outside travel = {list(spec.travel)}")

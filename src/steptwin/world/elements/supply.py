@@ -185,7 +185,18 @@ def _sag(active: ActiveFault, supply: Supply, begins: bool, now: Nanos) -> str:
     return f"{supply.board.name} has {'all of its voltage again' if supply.sag is None else f'{supply.sag:g} V at most'}"
 
 
+def _check_order(spec: SupplySpec, site: Site) -> None:
+    """Raises `Misuse` for supplies that wait for one another."""
+    waits_for = {one.name: one.on[0] for one in site.spec.elements_of(SUPPLY) if one.on is not None and one.on[1] == GOOD}
+    way = [spec.name]
+    while (before := waits_for.get(way[-1])) is not None and before not in way[1:]:
+        way.append(before)
+        if before == spec.name:
+            raise Misuse(f"on: {' waits for '.join(way)}, so that it never comes on")
+
+
 def _make(spec: SupplySpec, site: Site) -> Supply:
+    site.blueprint.once((*spec.path, "order"), lambda: _check_order(spec, site))
     rigging = Rigging(site.parts)
     site.parts.faults.expect_supplies()
     fed = []

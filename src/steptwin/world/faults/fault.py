@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from steptwin.errors import Misuse
+from steptwin.nearmiss import NearMiss
 from steptwin.world.faults.kinds import KINDS
 from steptwin.world.faults.table import FaultKind, FaultValue, Parameter, ParameterForm, RequestEffect, check
 
@@ -78,7 +79,8 @@ def parse(mapping: Mapping[str, object], place: str = "fault") -> Fault:
     word = mapping.get("kind")
     kind = KINDS.get(word) if isinstance(word, str) else None
     if kind is None:
-        raise FaultMistake(f"{place}: kind = {word!r}: permitted are {', '.join(KINDS)}", "kind")
+        near = NearMiss().hint(word, KINDS) if isinstance(word, str) else ""
+        raise FaultMistake(f"{place}: kind = {word!r}{near}: permitted are {', '.join(KINDS)}", "kind")
     name = mapping.get("name", "")
     if not isinstance(name, str) or " " in name or not name.isprintable():
         raise FaultMistake(f"{place}: name = {name!r}: permitted is text that can be printed, without blanks", "name")
