@@ -6,7 +6,7 @@ A machine never reads a clock, a file or a socket. Time is an argument, the next
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias, TypeGuard, runtime_checkable
 
 if TYPE_CHECKING:
     from steptwin.motion.divisions import Plan
@@ -166,7 +166,6 @@ class Port(Protocol):
         ...
 
 
-@runtime_checkable
 class SendingPort(Port, Protocol):
     """A port that also sends without a request: it calls ``on_output`` when there are bytes for `to_send`."""
 
@@ -174,6 +173,11 @@ class SendingPort(Port, Protocol):
     def on_output(self) -> Callable[[], None] | None: ...
     @on_output.setter
     def on_output(self, call: Callable[[], None] | None) -> None: ...
+
+
+def sends_by_itself(port: Port) -> TypeGuard[SendingPort]:
+    """Whether a port is a `SendingPort`. `isinstance` would look at every attribute, in each branch of a world."""
+    return hasattr(port, "on_output")
 
 
 @runtime_checkable

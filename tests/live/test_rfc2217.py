@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from steptwin.live.rfc2217 import MOST_HELD, Rfc2217Port, Telnet, TwinLine, escaped, over_network
-from steptwin.machine import SendingPort
+from steptwin.machine import sends_by_itself
 
 WILL_COM_PORT, DO_COM_PORT = bytes((255, 251, 44)), bytes((255, 253, 44))
 
@@ -124,8 +124,8 @@ def test_a_command_that_does_not_end_breaks_the_connection() -> None:
 def test_a_port_that_speaks_unasked_still_does() -> None:
     inner = Talker()
     port = over_network(inner, TwinLine())
-    assert isinstance(port, SendingPort)
-    assert not isinstance(over_network(Echo(), TwinLine()), SendingPort)
+    assert sends_by_itself(port)
+    assert not sends_by_itself(over_network(Echo(), TwinLine()))
     told: list[int] = []
     port.on_output = lambda: told.append(1)
     assert inner.on_output is port.on_output

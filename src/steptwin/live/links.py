@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Protocol
 
 from steptwin.live.cell import Cell
-from steptwin.machine import Nanos, Port, SendingPort
+from steptwin.machine import Nanos, Port, SendingPort, sends_by_itself
 
 SLICE_BYTES = 2048
 """Bytes of one client that are served at once, so that others do not wait."""
@@ -31,7 +31,7 @@ class Feed:
         self.is_read = True
         """Whether the other end reads. If not, unsolicited output is lost, as on a wire."""
         self._talks: SendingPort | None = None
-        if isinstance(port, SendingPort):
+        if sends_by_itself(port):
             self._talks = port  # announces its output: it is not asked when there will be some
             port.on_output = self._fetch_soon
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from steptwin.machine import Nanos, Port, SendingPort, SourcedPort
+from steptwin.machine import Nanos, Port, SendingPort, SourcedPort, sends_by_itself
 
 IAC, DONT, DO, WONT, WILL, SB, SE = 255, 254, 253, 252, 251, 250, 240
 BINARY, SUPPRESS_GO_AHEAD, COM_PORT = 0, 3, 44
@@ -247,4 +247,4 @@ class SendingRfc2217Port(Rfc2217Port):
 
 def over_network(port: Port, line: TwinLine) -> Port:
     """``port``, which is on ``line``, as a network serial port."""
-    return SendingRfc2217Port(port, line) if isinstance(port, SendingPort) else Rfc2217Port(port, line)
+    return SendingRfc2217Port(port, line) if sends_by_itself(port) else Rfc2217Port(port, line)

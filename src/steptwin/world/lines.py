@@ -12,7 +12,7 @@ from functools import partial
 from typing import Any, ClassVar, NamedTuple, Protocol
 
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos, Port, SendingPort
+from steptwin.machine import Nanos, Port, sends_by_itself
 from steptwin.state import Plain, Stateful
 from steptwin.wire.slave import FrameDirection, FrameObserver, SlaveDevice, SlavePort
 from steptwin.world.faults import Faults, FaultyPort, FaultySendingPort
@@ -193,7 +193,7 @@ class Line(Stateful, ABC):
             raise Misuse(f"line {self.name!r} takes no connection of kind {kind!r}: permitted are {', '.join(self.kinds)}")
         port = self._port(place, kind)
         framed = self._framed(port)
-        if isinstance(port, SendingPort):
+        if sends_by_itself(port):
             faulty: FaultyPort = FaultySendingPort(
                 port, place, self._faults, self.fault_kinds[kind], line_name=self.name, is_read=place != SCRIPTS
             )

@@ -18,7 +18,7 @@ from steptwin.live.clients import BACKLOG
 from steptwin.live.tcp import listening_at
 from steptwin.live.tcp_asyncio import AsyncioConnection, TurnedAway
 from steptwin.live.transports.contract import LinkArguments, OpenLink, Transport
-from steptwin.machine import Nanos, Port, SendingPort, SourcedPort
+from steptwin.machine import Nanos, Port, SendingPort, SourcedPort, sends_by_itself
 from steptwin.system import reason
 from steptwin.wire.mbap import TcpFramer
 from steptwin.wire.pdu import ILLEGAL_FUNCTION, READS, REFUSED, WRITES, exception_pdu
@@ -273,7 +273,7 @@ class TlsLink:
         port = made = self._opening.make_port()
         if self._opening.audit is not None or not all(may_ask(client.role, function) for function in WRITES | READS):
             opening = self._opening
-            port = SendingTlsPort(made, client, opening) if isinstance(made, SendingPort) else TlsPort(made, client, opening)
+            port = SendingTlsPort(made, client, opening) if sends_by_itself(made) else TlsPort(made, client, opening)
         connection = AsyncioConnection(self._opening.cell, port, self.clients)
         self._connections.add(connection)
         transport.set_protocol(connection)
