@@ -53,7 +53,7 @@ def traces_to(processor: SpanProcessor, subject: str) -> Generator[None]:
         with tracer.start_as_current_span(
             name, attributes={f"steptwin.{key}": value for key, value in attributes.items()}
         ) as made:
-            yield _Noted(made)
+            yield _NotedSpan(made)
 
     try:
         with traced_by(span):
@@ -62,7 +62,7 @@ def traces_to(processor: SpanProcessor, subject: str) -> Generator[None]:
         provider.shutdown()
 
 
-class _Noted:
+class _NotedSpan:
     def __init__(self, span: SdkSpan) -> None:
         self._span = span
 
