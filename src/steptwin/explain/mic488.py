@@ -21,7 +21,7 @@ from steptwin.wbc.dialect import DEFAULT, Dialect
 from steptwin.wbc.events import HARD_PREFIX, PREFIX
 from steptwin.wbc.flow import flow_of, reached
 from steptwin.wbc.positions import PositionTable
-from steptwin.wbc.usage import sources
+from steptwin.wbc.usage import acts_on, sources
 
 STATEMENT_BYTES = 16
 POSITION_BYTES = 18
@@ -166,13 +166,13 @@ def _usage(steps: Sequence[s.ProgramStep], statements: Sequence[ExplainedStateme
         for source in sources(step):
             if isinstance(source, s.RegisterOperand):
                 read[_group(source)].setdefault(source, set()).add(line)
-        match step:
-            case s.SetStep(target=s.RegisterOperand() as target):
-                written[_group(target)].setdefault(target, set()).add(line)
-            case s.PulseStep(output=output):
-                pulses.setdefault(f"OUT{output}", set()).add(line)
-            case s.MotionStep(axis=axis) | s.HaltStep(axis=axis):
-                drives.setdefault(axis, set()).add(line)
+        if isinstance(step, s.SetStep) and isinstance(step.target, s.RegisterOperand):
+            written[_group(step.target)].setdefault(step.target, set()).add(line)
+        output, drive = acts_on(step)
+        if output is not None:
+            pulses.setdefault(f"OUT{output}", set()).add(line)
+        if drive is not None:
+            drives.setdefault(drive, set()).add(line)
     found: dict[str, list[Usage]] = {}
     for group, lines_read in read.items():
         registers = sorted({*lines_read, *written[group]}, key=lambda register: (register.row.key, register.number))

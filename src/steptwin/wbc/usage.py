@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import copysign, floor, inf, log10
-from typing import Any
+from typing import Any, NamedTuple
 
 from steptwin.diagnostics import Diagnostic, Fix, Span
 from steptwin.tables import complete
@@ -71,6 +71,38 @@ _SOURCES: Mapping[type[s.ProgramStep], Callable[[Any], tuple[s.ValueSource, ...]
         **dict.fromkeys((s.HaltStep, s.WaitPosStep, s.InterruptStep, s.IllegalStep), lambda step: ()),
     },
 )
+
+
+class ActsOn(NamedTuple):
+    """What a step acts on besides the target of SET: an output or a drive, from 1."""
+
+    output: int | None = None
+    drive: int | None = None
+
+
+def _on_nothing(step: s.ProgramStep) -> ActsOn:
+    return ActsOn()
+
+
+_ACTS: Mapping[type[s.ProgramStep], Callable[[Any], ActsOn]] = complete(
+    "step",
+    s.STEPS,
+    "output or drive",
+    {
+        s.PulseStep: lambda step: ActsOn(output=step.output),
+        **dict.fromkeys((s.MotionStep, s.HaltStep), lambda step: ActsOn(drive=step.axis)),
+        **dict.fromkeys(
+            (s.SetStep, s.IfStep, s.ElseStep, s.EndIfStep, s.WhileStep, s.EndWhileStep, s.WaitStep, s.DelayStep), _on_nothing
+        ),
+        **dict.fromkeys((s.JumpStep, s.ReturnStep, s.EndStep, s.ProgResetStep, s.WaitPosStep), _on_nothing),
+        # The drives of a row are those of its values.
+        **dict.fromkeys((s.RowMotionStep, s.InterruptStep, s.IllegalStep), _on_nothing),
+    },
+)
+
+
+def acts_on(step: s.ProgramStep) -> ActsOn:
+    return _ACTS[type(step)](step)
 
 
 def endless_waits(executable: s.Executable) -> list[Diagnostic]:
