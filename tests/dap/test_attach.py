@@ -85,6 +85,16 @@ def test_who_detaches_leaves_the_twin_as_it_was_found(twin: Path, client: DapCli
     until(lambda: not paused(), "it goes on")
 
 
+def test_a_twin_that_stands_goes_on_when_it_is_told_to(twin: Path, client: DapClient) -> None:
+    ask("two", Pause())
+    attach(client, twin="two")
+    client.ask("configurationDone")
+    assert client.event("stopped")["reason"] == "pause"
+    assert paused()
+    client.ask("continue", threadId=1)
+    until(lambda: not paused(), "it goes on")
+
+
 @pytest.mark.parametrize("is_terminated", [False, True])
 def test_an_editor_that_ends_leaves_the_twin_as_it_was_found(twin: Path, is_terminated: bool) -> None:
     client = DapClient()

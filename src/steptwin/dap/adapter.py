@@ -144,7 +144,8 @@ class Adapter:
             raise Misuse(f"attach: twin = {twin!r}: expected the name, file or address of a running twin")
         attached = AttachedTwin(twin, self._log_of_twin)
         self._debugger = self._attached = attached
-        self._sources, self._stops_on_entry = Sources(texts_of(attached, attached.folder)), bool(stops)
+        self._sources = Sources(texts_of(attached, attached.folder))
+        self._stops_on_entry = bool(stops) or not attached.was_going
         return {}
 
     def _check_fresh(self, command: str) -> None:

@@ -64,7 +64,8 @@ class AttachedTwin:
             raise
         self.folder = Path(file).parent if file else Path()
         """Names of files in the world begin here."""
-        self._was_going = bool(self._found["going"])
+        self.was_going = bool(self._found["going"])
+        """Whether time went on when this began; a machine that stands does not start because a debugger has come."""
 
     def _ask(self, wanted: Command) -> Any:
         return self._subject.do(wanted).value
@@ -79,7 +80,7 @@ class AttachedTwin:
             self.set_breakpoints(())
             if self._has_set_events:
                 self._ask(command.StopOn(tuple(self._events_before)))
-            if self._was_going and self._ask(Time())["paused"]:
+            if self.was_going and self._ask(Time())["paused"]:
                 self._ask(Resume())
         finally:
             self._subject.close()
