@@ -48,7 +48,7 @@ run: $(RUN_STAMP)  ## Show a demo machine in the browser (ARGS="MACHINE.toml --s
 	@exec $(BIN)/steptwin studio $(ARGS)
 
 test: $(DEV_STAMP) $(WEB_STAMP) $(PAGE) $(EXTENSION_STAMP) $(CLIENTS_STAMP)  ## Run the tests (ARGS="-k mic_7 ..."); peers that are missing are skipped
-	$(BIN)/pytest -n auto $(ARGS)
+	$(BIN)/pytest -n auto --dist worksteal $(ARGS)
 
 golden: $(DEV_STAMP)  ## Make the golden files of tests anew (ARGS=tests/mic488/test_registers_golden.py): read the diff
 	@for test in $(ARGS); do PYTHONPATH=tests/support $(BIN)/python $$test || exit 1; done
