@@ -39,15 +39,23 @@ class Dispatcher:
 
     def do(self, command: Command) -> Result:
         """Execute a command. Raises `Misuse`, `Refusal`, `LineFailure`."""
-        action = self._actions.get(type(command))
-        if action is None:
-            raise Refusal(f"{row_of(command).name} is not supported here; supported are {', '.join(self.names)}")
+        action = self._action(command)
         number = self._begin()
         try:
             value = action(command)
         finally:
             time = self._end()
         return Result(value, time, number)
+
+    def look(self, command: Command) -> object:
+        """The answer to a command from which nothing follows. Raises as `do`."""
+        return self._action(command)(command)
+
+    def _action(self, command: Command) -> Action:
+        action = self._actions.get(type(command))
+        if action is None:
+            raise Refusal(f"{row_of(command).name} is not supported here; supported are {', '.join(self.names)}")
+        return action
 
 
 # ---------------------------------------------------------------------- messages

@@ -216,6 +216,10 @@ class Numbering:
         self._command = now, self._take()
         return self._command[1]
 
+    def look(self) -> int:
+        """The number of a command from which nothing follows."""
+        return self._take()
+
     def done(self) -> None:
         self._command = None
 

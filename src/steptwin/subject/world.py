@@ -41,6 +41,10 @@ STEPS = (
 """Commands that are steps themselves, without a result."""
 
 
+LOOKS = frozenset({command.ReadPoints, command.ReadState, command.Encoders, command.Describe})
+"""Commands that change nothing, and bring to the present what they look at."""
+
+
 class WorldSubject:
     """The world ``world``; ``apply_input`` applies an external input to it at its present moment."""
 
@@ -101,7 +105,14 @@ class WorldSubject:
         return Reading(point, value, signal.unit) if isfinite(value) else Reading(point, None, signal.unit, UNKNOWN)
 
     def do(self, wanted: command.Command) -> Result:
+        if type(wanted) in LOOKS:
+            return self._look(wanted)
         return self.dispatcher.do(wanted)
+
+    def _look(self, wanted: command.Command) -> Result:
+        """Nothing follows from looking at a controller, so the others need not be at the present: there may be a thousand."""
+        value = self.dispatcher.look(wanted)
+        return Result(value, self.world.now, self.numbering.look())
 
     async def answer(self, wanted: command.Command) -> Result:
         return self.do(wanted)
