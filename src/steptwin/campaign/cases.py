@@ -10,8 +10,8 @@ from math import prod
 from typing import Any, NamedTuple
 
 from steptwin.campaign.case import Case, FaultAt, StepAt, VariedValue
-from steptwin.campaign.description import CampaignDescription, step_text
-from steptwin.campaign.designs import Design, design_of
+from steptwin.campaign.description import SALTELLI, SEARCHES, CampaignDescription, step_text
+from steptwin.campaign.designs import Design, design_of, saltelli_block
 from steptwin.campaign.variation import Choice
 from steptwin.durations import duration
 from steptwin.errors import Misuse
@@ -88,8 +88,15 @@ class Cases:
         present = [True] * len(description.faults)
         for n, u in zip(self._doubtful, unit[len(description.vary) :], strict=True):
             present[n] = u >= 0.5 if is_grid else u < description.faults[n].chance
-        seed = Chance(description.seed, f"case {number}").draw() >> 1
+        seed = Chance(description.seed, f"case {self._seeded_as(number)}").draw() >> 1
         return self.made(number, seed, values, [n for n, one in enumerate(present) if one])
+
+    def _seeded_as(self, number: int) -> int:
+        """Chance is one more thing that differs between two points of Saltelli, and is that of the first in those between."""
+        if self.description.design != SALTELLI or self.description.search != SEARCHES[0]:
+            return number
+        place = number % saltelli_block(len(self.dimensions))
+        return number if place == 1 else number - place
 
     def made(
         self,

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from steptwin.campaign.cases import filled, filled_step, names_in
-from steptwin.campaign.description import Measure, NamedProperty, VariedFault, VariedStep
+from steptwin.campaign.description import SALTELLI, Measure, NamedProperty, VariedFault, VariedStep
 from steptwin.campaign.properties import read_property
 from steptwin.campaign.runner import read_step
 from steptwin.campaign.variation import Between, Choice, Normal, Varied, VariedValue
@@ -97,6 +97,8 @@ class CampaignChecks:
                     f"{one.name!r} is of the world, which is the same in all runs that have one beginning",
                     "leave out start, or vary names that faults and steps refer to",
                 )
+            if head.get("design") == SALTELLI and one.spread.is_grid:
+                toml.wrong((VARY, n, "grid"), "D007", f"design = {SALTELLI!r} draws all values", "give choose instead of grid")
             if head.get("design") == "grid" and not one.spread.levels:
                 toml.wrong((VARY, n), "D007", f"{one.name!r} has no few values, as a grid needs", "give choose, grid, or levels")
 

@@ -15,7 +15,8 @@ from steptwin.machine import Nanos
 from steptwin.world.blueprint import FileContents
 
 SEARCHES = ("random", "exhaustive", "guided")
-DESIGNS = ("random", "grid", "latin-hypercube", "sobol")
+SALTELLI = "saltelli"
+DESIGNS = ("random", "grid", "latin-hypercube", "sobol", SALTELLI)
 
 
 @dataclass(frozen=True, slots=True)

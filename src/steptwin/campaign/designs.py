@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, TypeAlias
 
+from steptwin.campaign.description import SALTELLI
 from steptwin.errors import Misuse
 from steptwin.extras import libraries_of, missing
 from steptwin.world.chance import Chance
@@ -26,6 +27,8 @@ def design_of(name: str, seed: int, dimensions: Sequence[str], count: int | None
         return lambda number: [_drawn(seed, number, one) for one in dimensions]
     if name == "sobol":
         return _Sobol(seed, len(dimensions)).point
+    if name == SALTELLI:
+        return _saltelli(_Sobol(seed, 2 * len(dimensions)).point, len(dimensions))
     if count is None:
         raise Misuse("a Latin hypercube needs the number of its points: give runs")
     if count * len(dimensions) > MOST_POINTS:
@@ -35,6 +38,25 @@ def design_of(name: str, seed: int, dimensions: Sequence[str], count: int | None
     hypercube = _qmc().LatinHypercube(len(dimensions), rng=seed)
     points = hypercube.random(count)
     return lambda number: points[number].tolist()
+
+
+def saltelli_block(dimensions: int) -> int:
+    """So many points belong together: one, another, and for each dimension the one with its number of the other."""
+    return dimensions + 2
+
+
+def _saltelli(pairs: Design, dimensions: int) -> Design:
+    """Points from which Sobol indices follow (A. Saltelli et al., 2010): ``pairs`` are two points each."""
+
+    def point(number: int) -> Sequence[float]:
+        block, place = divmod(number, saltelli_block(dimensions))
+        both = pairs(block)
+        one, other = both[:dimensions], both[dimensions:]
+        if place < 2:
+            return (one, other)[place]
+        return [*one[: place - 2], other[place - 2], *one[place - 1 :]]
+
+    return point
 
 
 def _drawn(seed: int, number: int, name: str) -> float:

@@ -12,11 +12,13 @@ from xml.etree import ElementTree as ET
 
 from steptwin.campaign.findings import FoundFailure
 from steptwin.campaign.report.html import link, page, table
+from steptwin.campaign.report.sobolindices import SobolIndex
 from steptwin.campaign.report.statistics import Histogram, Influence
 from steptwin.campaign.reproduce import summary, where
 from steptwin.campaign.summary import CampaignSummary, percent
 
 WIDTH, HEIGHT = 340, 130
+_OF = {"robustness": "the least robustness", "passed": "whether a run passes"}
 _NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """Characters that XML 1.0 cannot have, even escaped."""
 _STYLE = "rect { fill: var(--note); } .bad { color: var(--bad); } .good { color: var(--good); }"
@@ -27,6 +29,8 @@ class CampaignReport:
     summary: CampaignSummary
     found: Sequence[FoundFailure]
     influences: Sequence[Influence]
+    indices: Sequence[SobolIndex] = ()
+    """Of the design that gives them."""
     histograms: Sequence[Histogram]
     search: str
 
@@ -37,6 +41,7 @@ class CampaignReport:
             "search": self.search,
             "causes": [one.plain(folder) for one in self.found],
             "influences": [one._asdict() for one in self.influences],
+            "sobol_indices": [one._asdict() for one in self.indices],
             "measures": [one._asdict() for one in self.histograms],
         }
 
@@ -69,7 +74,9 @@ class CampaignReport:
         )
         if self.found:
             body += f"<h2>Failures by cause</h2>\n{self._causes(folder)}"
-        if self.influences:
+        if self.indices:
+            body += f"<h2>What matters most</h2>\n{self._indices()}"
+        elif self.influences:
             body += f"<h2>What matters most</h2>\n{self._influences()}"
         if self.histograms:
             body += f"<h2>Measures</h2>\n{''.join(_figure(one) for one in self.histograms)}\n"
@@ -100,8 +107,25 @@ class CampaignReport:
 
     def _influences(self) -> str:
         rows = [(escape(one.name), f"{one.correlation:+.3f}", f"{one.p_value:.2g}") for one in self.influences]
-        of = "the least robustness" if self.influences[0].of == "robustness" else "whether a run passes"
+        of = _OF[self.influences[0].of]
         return f"<p>Spearman's rank correlation with {of}.</p>\n" + table(("value", "correlation", "p"), rows, (1, 2))
+
+    def _indices(self) -> str:
+        rows = [
+            (
+                escape(one.name),
+                f"{one.total:.3f}",
+                f"{one.total_low:.3f} to {one.total_high:.3f}",
+                f"{one.first:.3f}",
+                f"{one.first_low:.3f} to {one.first_high:.3f}",
+            )
+            for one in self.indices
+        ]
+        text = (
+            f"<p>Sobol indices of {_OF[self.indices[0].of]}: the share of its variance that a value makes by itself (first), and "
+            "with all it does together with others (total).</p>\n"
+        )
+        return text + table(("value", "total", "95 %", "first", "95 %"), rows, (1, 2, 3, 4))
 
 
 def cause_text(one: FoundFailure) -> str:

@@ -42,6 +42,7 @@ class RunColumns:
 
     values: dict[str, array[float]] = field(default_factory=dict)
     measures: dict[str, array[float]] = field(default_factory=dict)
+    numbers: array[int] = field(default_factory=lambda: array("q"))
     robustness: array[float] = field(default_factory=lambda: array("d"))
     passed: array[float] = field(default_factory=lambda: array("d"))
 
@@ -54,6 +55,7 @@ class RunColumns:
                 found.values.setdefault(name, array("d", [float("nan")] * len(found.passed))).append(value)
             for name, measure in result.measures.items():
                 found.measures.setdefault(name, array("d")).append(measure)
+            found.numbers.append(case.number)
             found.robustness.append(distance(result))
             found.passed.append(0.0 if result.failed else 1.0)
             for column in found.values.values():

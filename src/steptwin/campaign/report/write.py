@@ -11,8 +11,10 @@ from pathlib import Path
 
 from steptwin.campaign.campaign import Campaign
 from steptwin.campaign.case import Case, CaseResult
+from steptwin.campaign.description import SALTELLI, SEARCHES
 from steptwin.campaign.findings import find
 from steptwin.campaign.report.campaignpage import CampaignReport
+from steptwin.campaign.report.sobolindices import SobolIndex, sobol_indices
 from steptwin.campaign.report.statistics import RunColumns, histogram, influences
 from steptwin.campaign.summary import CampaignSummary
 from steptwin.files.textfiles import write_bytes
@@ -50,6 +52,7 @@ def write_report(campaign: Campaign, summary: CampaignSummary, folder: Path, fil
         summary=summary,
         found=found,
         influences=influences(columns),
+        indices=_indices(campaign, columns),
         histograms=[one for one in shown if one is not None],
         search=campaign.description.search,
     )
@@ -61,6 +64,15 @@ def write_report(campaign: Campaign, summary: CampaignSummary, folder: Path, fil
     }.items():
         write_bytes(folder / name, content)
     return report
+
+
+def _indices(campaign: Campaign, columns: RunColumns) -> list[SobolIndex]:
+    description = campaign.description
+    if description.design != SALTELLI or description.search != SEARCHES[0]:
+        return []
+    faults = {f"fault {n}": f"fault {one.do}" for n, one in enumerate(description.faults, 1) if one.chance < 1.0}
+    names = [faults.get(one.name, one.name) for one in campaign.cases.dimensions]
+    return sobol_indices(names, columns.numbers, columns.robustness, columns.passed)
 
 
 def _unit(name: str, units: Mapping[str, str]) -> str:
