@@ -152,6 +152,10 @@ def test_the_labeller_by_hand(tmp_path: Path) -> None:
     assert set(effects(matrix, "stuck machine=cell pin=IN2 value=0")) == {"safe stop"}
     # Products that are not seen get no label.
     assert set(effects(matrix, "stuck machine=cell pin=IN1 value=0")) == {"wrong part"}
+    # A product that never goes away: the program waits for the next one, and the belt takes the products past it.
+    assert set(effects(matrix, "stuck machine=cell pin=IN1 value=1")) == {"wrong part"}
+    # A mark that never ends: the web runs on, for the program has no time limit there, and no further label is counted.
+    assert set(effects(matrix, "stuck machine=cell pin=IN2 value=1")) == {"wrong part"}
     # The belt stands: no tenth product within the minute of the script.
     assert set(effects(matrix, "belt-stop element=belt")) == {"safe stop"}
     # The web slips a little in one label; the next mark makes it good.

@@ -12,7 +12,7 @@ from typing import Any
 
 from steptwin.campaign.case import EXPECTATIONS, WAITS, Case, CaseResult, Verdict
 from steptwin.campaign.description import CampaignDescription, Measure
-from steptwin.campaign.properties import WatchState, read_property
+from steptwin.campaign.properties import WatchState, read_property, watch_together
 from steptwin.coverage.counts import Coverage
 from steptwin.coverage.watch import WorldCoverage
 from steptwin.errors import Misuse, SteptwinError
@@ -53,7 +53,7 @@ class CaseRunner:
             world = self._anew({}, description.seed)
             coverage = Coverage()
             watch = WorldCoverage(world, coverage)
-            watches = [one.watch(world) for one in self._properties]
+            watches = watch_together(self._properties, world)
             ended = world.run_to(description.start_ns)
             watch.close()
             if ended is not None:
@@ -145,7 +145,7 @@ class CaseRunner:
                 coverage.add(text)
             watch = WorldCoverage(world, coverage)
         measures = _Measures(world, self.description.measures)
-        watches = [one.watch(world, seen) for one, seen in zip(self._properties, self._seen, strict=True)]
+        watches = watch_together(self._properties, world, self._seen)
         world.run_to(case.end_ns, self.description.until)
         if watch is not None:
             watch.close()

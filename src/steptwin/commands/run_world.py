@@ -11,7 +11,7 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from steptwin.campaign.properties import Verdict, read_property
+from steptwin.campaign.properties import Verdict, read_property, watch_together
 from steptwin.commands.program_run import report_causes
 from steptwin.controllerstate import ControllerState
 from steptwin.datasheet import plain
@@ -118,7 +118,7 @@ def _run_and_report(world: World, options: WorldRun, reports: CoverageReports, o
     before = filter(is_shown, world.trace) if began else ()  # what happens at power-on is part of the run
     known = Counter(record.machine for record in before)
     _arrange(world, options)
-    properties = [read_property(text).watch(world) for text in options.properties]
+    properties = watch_together([read_property(text) for text in options.properties], world)
     selection = read_selection(options.names, options.kinds, named_in(world.parts))
     usual = USUAL_LIMIT_NS if options.until is None else LONGEST_RUN_NS
     limit = options.limit if options.limit is not None else usual

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple, Self, TypeAlias
 from steptwin.durations import duration
 from steptwin.errors import Misuse
 from steptwin.files.export.progress import TimeProgress, silent
+from steptwin.files.loading import Loading, keep_blueprint, known_blueprint
 from steptwin.files.memory import StateDirectory, StateFailure
 from steptwin.files.textfiles import read_text
 from steptwin.inputfiles import MOST_DESCRIPTION_BYTES, read_bytes, shown
@@ -141,7 +142,13 @@ class World(Plant):
             files[name] = read_beside(place.parent, name, allow_outside=allow_outside)
             return files[name]
 
-        spec = describe(str(path), read_text(place, MOST_DESCRIPTION_BYTES).source.text, seed, overrides, read)
+        text = read_text(place, MOST_DESCRIPTION_BYTES).source.text
+        loading = Loading(str(path), text, seed, repr(overrides))
+        known = known_blueprint(loading, read) if state is None else None
+        if known is not None:
+            return cls(known, keep_trace=keep_trace, keep_inputs=keep_inputs)
+        files.clear()
+        spec = describe(str(path), text, seed, overrides, read)
         for name, key in spec.files():
             try:
                 _ = files.get(name) or read(name)
@@ -153,7 +160,10 @@ class World(Plant):
                 where = _beside(place.parent, spec.state, allow_outside=allow_outside)
             except Misuse as error:
                 spec.text.wrong(("world", "state"), "D003", str(error))
-        return cls._with_memory(spec, files, where, keep_trace=keep_trace, keep_inputs=keep_inputs)
+        world = cls._with_memory(spec, files, where, keep_trace=keep_trace, keep_inputs=keep_inputs)
+        if where is None:
+            keep_blueprint(loading, world.blueprint)
+        return world
 
     def _save(self, machine: str, data: bytes, now: Nanos) -> None:
         """Raises `StateFailure` if it could not be stored."""

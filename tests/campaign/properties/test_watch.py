@@ -7,9 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from steptwin.campaign.properties import Verdict, read_property
+from steptwin.campaign.properties import Verdict, read_property, watch_together
+from steptwin.campaign.properties.recording import ComparisonRecord
+from steptwin.campaign.properties.text import parse_property
+from steptwin.campaign.properties.tree import Atom, nodes
 from steptwin.errors import Misuse
 from steptwin.files.world import World
+from steptwin.world.plant import Plant
 
 # 3200 pulses per turn and 4 mm: the axis goes 100 mm with 50 mm/s and ramps of 500 mm/s².
 WORLD = """
@@ -243,3 +247,42 @@ def test_a_moment_of_standstill_is_no_stop() -> None:
 )
 def test_a_violation_says_what_there_was(text: str, why: str) -> None:
     assert said(text).why == why
+
+
+TOGETHER = (
+    "after table.M1.moving within 2 s not table.M1.moving",
+    "never (x.position > 300 and table.M1.moving)",
+    "always x.position < 300",
+    "always x.position < 300 or table.OUT1",
+    "count(not table.M1.moving) <= 3",
+    "time between table.M1.moving and x.position > 5 <= 1 s",
+)
+
+
+def test_what_several_properties_compare_is_followed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    apart = world()
+    watches = [read_property(text).watch(apart) for text in TOGETHER]
+    apart.run(for_="3 s")
+    expected = [(one.verdict(), one.measures()) for one in watches]
+
+    made: list[Atom] = []
+    begin = ComparisonRecord.__init__
+
+    def noted(self: ComparisonRecord, world: Plant, atom: Atom, *, is_fine: bool) -> None:
+        made.append(atom)
+        begin(self, world, atom, is_fine=is_fine)
+
+    monkeypatch.setattr(ComparisonRecord, "__init__", noted)
+    joined = world()
+    several = watch_together([read_property(text) for text in TOGETHER], joined)
+    joined.run(for_="3 s")
+    assert [(one.verdict(), one.measures()) for one in several] == expected
+    comparisons = sum(len(set(_atoms(text))) for text in TOGETHER)
+    assert len(made) < comparisons
+    for one in several:
+        one.close()
+    assert all(kernel.followers is None or not any(kernel.followers.by_name.values()) for kernel in joined.kernels)
+
+
+def _atoms(text: str) -> list[Atom]:
+    return [node for node in nodes(parse_property(text)) if isinstance(node, Atom)]

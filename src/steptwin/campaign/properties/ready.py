@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 from steptwin.campaign.properties.text import parse_property
-from steptwin.campaign.properties.tree import PropertyFormula
 from steptwin.errors import Misuse
 from steptwin.nearmiss import NearMiss
 from steptwin.world.elements.collision import COLLISION
@@ -143,7 +142,7 @@ def check_ready(text: str) -> bool:
     return named is not None
 
 
-def formula_of(text: str, world: Plant) -> PropertyFormula:
-    """A property for a world. Raises `Misuse` as `check_ready`, and for what the world does not have."""
+def written_out(text: str, world: Plant) -> str:
+    """The text of a property for a world. Raises `Misuse` as `check_ready`, and for what the world does not have."""
     named = _named(text)
-    return parse_property(text if named is None else named[0].write(named[1], world))
+    return text if named is None else named[0].write(named[1], world)

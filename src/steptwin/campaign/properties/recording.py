@@ -357,8 +357,8 @@ def _scale(world: Plant, left: Quantity, right: Quantity) -> float:
 
 def _span(world: Plant, name: str) -> float | None:
     owner, _, rest = name.partition(".")
-    axis = world.axes.get(owner)
-    if axis is not None and rest == "position" and axis.spec.travel is not None:
+    axis = world.axes.get(owner) if rest == "position" else None
+    if axis is not None and axis.spec.travel is not None:
         return axis.spec.travel[1] - axis.spec.travel[0]
     signal = world.signal(name)
     bounds = signal.bounds if isinstance(signal, SignalOf) else None

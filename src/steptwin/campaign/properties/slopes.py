@@ -109,11 +109,11 @@ def within(course: Shape, length: Nanos) -> Shape:
     """At each moment the greatest value in the ``length`` ns after it, both ends included, as far as the course goes; what is
     true by no more than the share of the window that is left when it becomes true."""
     begin, end = course[0].begin, course[-1].end
-    values = _highest([_reached(slope, length, begin, end) for slope in course])
-    if length == 0:
+    is_all = length >= end - begin
+    values = from_on(course) if is_all else _highest([_reached(slope, length, begin, end) for slope in course])
+    if length == 0 or not any(slope.first > 0.0 for slope in course):
         return values
-    ramps = [_left(slope, length, begin, end) for slope in course if slope.first > 0.0]
-    return least(values, _highest(ramps)) if ramps else values
+    return least(values, _left(course, length))
 
 
 def _reached(slope: Slope, length: Nanos, begin: Nanos, end: Nanos) -> Shape:
@@ -127,10 +127,23 @@ def _reached(slope: Slope, length: Nanos, begin: Nanos, end: Nanos) -> Shape:
     return _filled(parts, begin, end, BOTTOM)
 
 
-def _left(slope: Slope, length: Nanos, begin: Nanos, end: Nanos) -> Shape:
-    """The share of a window that is left when what is true in one stretch comes."""
-    ramp = Slope(slope.begin - length, slope.begin, TINY, 1.0)
-    return _filled([ramp, Slope(slope.begin + 1, slope.end, 1.0, 1.0)], begin, end, TINY)
+def _left(course: Shape, length: Nanos) -> Shape:
+    """The share of the window from each moment on that is left when the next stretch that is true comes."""
+    begin = course[0].begin
+    found: Shape = []
+    for slope in course:
+        if slope.first <= 0.0:
+            continue
+        ramp = Slope(slope.begin - length, slope.begin, TINY, 1.0)
+        first = max(begin, ramp.begin)
+        if first > begin:
+            found += constant(begin, first - 1, TINY)
+        if first <= slope.begin:
+            found.append(ramp.cut(first, slope.begin))
+        if slope.end > slope.begin:
+            found += constant(slope.begin + 1, slope.end, 1.0)
+        begin = slope.end + 1
+    return found if begin > course[-1].end else [*found, *constant(begin, course[-1].end, TINY)]
 
 
 def _filled(parts: Iterable[Slope], begin: Nanos, end: Nanos, value: float) -> Shape:

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 from steptwin.campaign.case import Verdict
 from steptwin.campaign.properties.evaluate import Evaluation
-from steptwin.campaign.properties.ready import check_ready, formula_of
-from steptwin.campaign.properties.recording import ComparisonRecord
+from steptwin.campaign.properties.ready import check_ready, written_out
+from steptwin.campaign.properties.records import ComparisonRecords
 from steptwin.campaign.properties.slopes import TINY, Shape, Slope, shortest, value_at
 from steptwin.campaign.properties.text import parse_property
 from steptwin.campaign.properties.tree import Atom, CycleTime, Delayed, Holding, Lasting, PropertyFormula, Tally, measured, nodes
 from steptwin.campaign.properties.words import formula_text, found_text
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
-from steptwin.world.kernel import Source
 from steptwin.world.plant import Plant
 
 
@@ -38,7 +39,7 @@ class Property:
     def watch(self, world: Plant, earlier: WatchState | None = None) -> PropertyWatch:
         """Watch a world from its present moment on, or as if from the begin of ``earlier``, which another world with the same
         past has seen. Raises `Misuse` for what this world does not have."""
-        return PropertyWatch(self, world, earlier)
+        return watch_together([self], world, [earlier])[0]
 
 
 def read_property(text: str, name: str = "") -> Property:
@@ -48,31 +49,31 @@ def read_property(text: str, name: str = "") -> Property:
     return Property(text, name or text)
 
 
+def watch_together(
+    properties: Sequence[Property], world: Plant, earlier: Sequence[WatchState | None] | None = None
+) -> list[PropertyWatch]:
+    """As `Property.watch` of each; what several of them compare is followed once."""
+    records = ComparisonRecords(world)
+    seen = [None] * len(properties) if earlier is None else earlier
+    found = [PropertyWatch(one, world, state, records) for one, state in zip(properties, seen, strict=True)]
+    records.begin()
+    return found
+
+
 class PropertyWatch:
-    """An observer of a world (`steptwin.world.observing`). It ends with `close`."""
+    """A property on a world whose comparisons are followed by ``records``. It ends with `close`."""
 
-    number, entry = 0, 0
-    _begins = True
-    sources: tuple[Source, ...] = ()
-
-    def __init__(self, which: Property, world: Plant, earlier: WatchState | None) -> None:
+    def __init__(self, which: Property, world: Plant, earlier: WatchState | None, records: ComparisonRecords) -> None:
         self.which = which
         self._world = world
-        self._formula: PropertyFormula = formula_of(which.text, world)
-        fine = _shaped(self._formula)
-        atoms = dict.fromkeys(node for node in nodes(self._formula) if isinstance(node, Atom))
+        self._records = records
+        self._formula, atoms, shaped = _parsed(written_out(which.text, world))
         try:
-            self._recordings = {atom: ComparisonRecord(world, atom, is_fine=atom in fine) for atom in atoms}
+            self._recordings = records.use(atoms, shaped)
         except Misuse as error:
             raise Misuse(f"property {which.text!r}: {error}") from None
         if earlier is not None:
             self._go_on(earlier)
-        self._all = tuple(self._recordings.values())
-        self._spread = tuple(one for one in self._all if one.kernel is None)
-        """Those that no kernel follows alone."""
-        for recording in self._all:
-            recording.follow(world)
-        world.observe(self)
 
     def _go_on(self, earlier: WatchState) -> None:
         if earlier.text != self.which.text:
@@ -82,35 +83,11 @@ class PropertyWatch:
                 f"what was seen up to {earlier.now / SECOND:g} s does not serve a world at {self._world.now / SECOND:g} s"
             )
         for recording, course in zip(self._recordings.values(), earlier.courses, strict=True):
-            recording.begin_after([Slope(*one) for one in course])
+            recording.record.begin_after([Slope(*one) for one in course])
 
     def close(self) -> None:
         """The world is no longer watched."""
-        for recording in self._all:
-            recording.unfollow()
-        self._world.unobserve(self)
-
-    # ------------------------------------------------------------------ as an observer
-
-    def leave(self, moment: Nanos) -> None:
-        for recording in self._spread:
-            recording.leave(moment)
-
-    def look(self, now: Nanos) -> tuple[Source, ...]:
-        """All look where the watch begins; later only those that no kernel follows."""
-        found: dict[Source, None] = {}
-        for recording in self._all if self._begins else self._spread:
-            sources = recording.bring(now)
-            if recording.kernel is None:
-                found.update(dict.fromkeys(sources))
-            recording.look(now)
-        self._begins = False
-        return tuple(found)
-
-    def rewind(self, now: Nanos) -> None:
-        self._begins = True
-        for recording in self._all:
-            recording.rewind(now)
+        self._records.release()
 
     # ------------------------------------------------------------------ what it says
 
@@ -121,14 +98,13 @@ class PropertyWatch:
     def _at_present(self) -> Plant:
         """The world, all of which has come to its present moment."""
         self._world.advance(self._world.now)
-        for recording in self._all:
-            recording.bring(self._world.now)
+        self._records.bring(self._world.now)
         return self._world
 
     def state(self) -> WatchState:
         """For a branch from the present moment."""
         world = self._at_present()
-        courses: Any = tuple(tuple(map(tuple, one.state(world.now))) for one in self._all)
+        courses: Any = tuple(tuple(map(tuple, one.record.state(world.now))) for one in self._recordings.values())
         return WatchState(self.which.text, world.now, courses)
 
     def verdict(self) -> Verdict:
@@ -145,7 +121,8 @@ class PropertyWatch:
         if isinstance(by, Atom):
             recording = self._recordings[by]
             value = value_at(found.course(by), moment)
-            return f"{found_text(recording.node, value, recording.scale, recording.unit)} at {at}"
+            record = recording.record
+            return f"{found_text(recording.node, value, record.scale, record.unit)} at {at}"
         text = formula_text(by)
         if isinstance(by, Lasting | Holding | Delayed):
             return f"{text}: not come true by {at}"
@@ -153,9 +130,11 @@ class PropertyWatch:
 
     def measures(self) -> dict[str, float]:
         """Of each cycle time in the property: the least, greatest and mean, s, and how many cycles there were."""
+        several = list(dict.fromkeys(measured(self._formula)))
+        if not several:
+            return {}
         evaluation = Evaluation(self._courses())
         found: dict[str, float] = {}
-        several = list(dict.fromkeys(measured(self._formula)))
         for n, node in enumerate(several, 1):
             lengths = [(end - begin) / SECOND for begin, end in evaluation.cycles(node)[0]]
             name = f"{self.which.name} {n}" if len(several) > 1 else self.which.name
@@ -163,6 +142,13 @@ class PropertyWatch:
                 found |= {f"{name} min": min(lengths), f"{name} max": max(lengths), f"{name} mean": sum(lengths) / len(lengths)}
             found[f"{name} cycles"] = float(len(lengths))
         return found
+
+
+@lru_cache(maxsize=512)
+def _parsed(text: str) -> tuple[PropertyFormula, tuple[Atom, ...], frozenset[Atom]]:
+    """A property, its comparisons, and those whose shape counts: every run of a campaign asks for them."""
+    formula = parse_property(text)
+    return formula, tuple(dict.fromkeys(node for node in nodes(formula) if isinstance(node, Atom))), _shaped(formula)
 
 
 def _shaped(formula: PropertyFormula) -> frozenset[Atom]:
