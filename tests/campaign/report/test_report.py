@@ -13,10 +13,12 @@ import pytest
 
 from steptwin.campaign.campaign import Campaign
 from steptwin.campaign.case import Case, CaseResult, FaultAt, Verdict
+from steptwin.campaign.findings import FoundFailure
 from steptwin.campaign.report.campaignpage import CampaignReport
 from steptwin.campaign.report.comparison import compare, lines
 from steptwin.campaign.report.statistics import RunColumns, histogram, influences
 from steptwin.campaign.report.write import write_report
+from steptwin.campaign.shrink import failures_of
 from steptwin.campaign.store import StoredCase
 from steptwin.campaign.summary import CampaignSummary
 from steptwin.errors import Misuse
@@ -190,3 +192,14 @@ def test_a_report_of_what_ended_by_failure_has_nothing_after_it(tmp_path: Path) 
     report = write_report(campaign, summary, tmp_path / "out", None)
     assert [one.numbers for one in report.found] == [(0,)]
     assert report.histograms[0].count == 1
+
+
+def test_what_fails_only_after_something_else_fails_for_ci_too() -> None:
+    verdicts = (Verdict("first", False, -1.0, 3, "early"), Verdict("second", False, -1.0, 5, "late"))
+    result = CaseResult(0, verdicts, "", 100, {})
+    summary = CampaignSummary.of("n", "d", 1, [(Case(0, {}, (), (), 1, 100), result)])
+    found = FoundFailure(failures_of(result)[0], (0,), result, None, None)
+    suite = ET.fromstring(CampaignReport(summary=summary, found=[found], influences=(), histograms=(), search="random").junit())
+    assert suite.get("failures") == "2"
+    messages = {case.get("name"): case[0].get("message") for case in suite}
+    assert messages["second"] == "1 of 1 runs, in each of which another property failed before"

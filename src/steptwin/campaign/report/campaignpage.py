@@ -52,14 +52,21 @@ class CampaignReport:
             by_property.setdefault(one.failure.property, []).append(one)
         if not by_property:
             by_property["runs"] = []
-        failed = sum(1 for found in by_property.values() if found)
+        texts = {name: self._failures(name, found) for name, found in by_property.items()}
+        failed = sum(map(bool, texts.values()))
         suite = ET.Element("testsuite", name=self.summary.name, tests=str(len(by_property)), failures=str(failed), errors="0")
-        for name, found in by_property.items():
+        for name, why in texts.items():
             case = ET.SubElement(suite, "testcase", classname=self.summary.name, name=name)
-            if found:
-                texts = [f"{len(one.numbers)} of {self.summary.runs} runs: {cause_text(one)}" for one in found]
-                ET.SubElement(case, "failure", message=texts[0]).text = "\n".join(texts)
+            if why:
+                ET.SubElement(case, "failure", message=why[0]).text = "\n".join(why)
         return _NOT_XML.sub("\N{REPLACEMENT CHARACTER}", ET.tostring(suite, encoding="unicode", xml_declaration=True)).encode()
+
+    def _failures(self, name: str, found: Sequence[FoundFailure]) -> list[str]:
+        """Why a property failed; a run has the cause of what failed first in it."""
+        one = self.summary.properties.get(name)
+        if one is not None and one.failed and not found:
+            return [f"{one.failed} of {self.summary.runs} runs, in each of which another property failed before"]
+        return [f"{len(cause.numbers)} of {self.summary.runs} runs: {cause_text(cause)}" for cause in found]
 
     def html(self, folder: Path) -> str:
         one = self.summary
