@@ -33,6 +33,8 @@ from steptwin.world.quantities import (
 )
 from steptwin.world.signals import Idle, SignalOf
 
+_SIGNS = {"<": -1.0, "<=": -1.0, ">": 1.0, ">=": 1.0, "==": 0.0, "!=": 0.0}
+"""Whether more of the left side is nearer to the truth, or less; 0: neither."""
 FINEST_NS: Nanos = 1000
 """Stretches are not divided further."""
 DEVIATION = 0.001
@@ -55,10 +57,14 @@ class ComparisonRecord:
         self.node = atom.comparison.in_unit("", lambda name: self._signals[name].unit)
         self._reads: dict[str, Callable[[Nanos], float]] = {name: signal.value for name, signal in self._signals.items()}
         self._compare = COMPARE[self.node.sign]
+        self._sign = _SIGNS[self.node.sign]
+        self._is_simple = isinstance(self.node.left, SignalName) and isinstance(self.node.right, NumberLiteral)
+        """Whether it is a signal beside a number."""
         self._read()
         self.unit = unit_of_all(self.node, lambda name: self._signals[name].unit)
         self.scale = _scale(world, self.node.left, self.node.right)
         self._moving = {name: signal for name, signal in self._signals.items() if _moves(signal)}
+        self._standing = {name: signal for name, signal in self._signals.items() if name not in self._moving}
         self._only = next(iter(self._moving.values())).versions if len(self._signals) == len(self._moving) == 1 else None
         """The version of all, where that is one signal."""
         self._stays = all(signal.freeze is not None for signal in self._moving.values())
@@ -127,16 +133,12 @@ class ComparisonRecord:
         left, right = self._left_at(now), self._right_at(now)
         holds = bool(self._compare(left, right))
         difference = left - right
-        away = difference / self.scale
-        match self.node.sign:
-            case "==":
-                value = 1.0 if holds else -abs(away)
-            case "!=":
-                value = abs(away) if holds else -1.0
-            case "<" | "<=":
-                value = -away
-            case _:
-                value = away
+        if self._sign:
+            value = difference / self.scale * self._sign
+        elif holds is (self.node.sign == "=="):
+            value = 1.0 if holds else -1.0
+        else:
+            value = abs(difference) / self.scale * (1.0 if holds else -1.0)
         if isnan(value):
             return forced(0.0, holds=holds), NO_NUMBER
         return forced(value, holds=holds), (difference > 0.0) - (difference < 0.0)
@@ -179,17 +181,21 @@ class ComparisonRecord:
         versions = [one.version() for one in self._moving.values()]
         if None in versions:
             return None
-        return (*versions, *(one.value(now) for one in self._signals.values() if not _moves(one)))
+        return (*versions, *(one.value(now) for one in self._standing.values()))
 
     def _go_on(self, now: Nanos) -> None:
         """Begin another way."""
-        for name, signal in self._signals.items():
-            if not _moves(signal):
-                self._reads[name] = _constant(signal.value(now))
-            elif signal.freeze is not None:
+        for name, signal in self._standing.items():
+            self._reads[name] = _constant(signal.value(now))
+        for name, signal in self._moving.items():
+            if signal.freeze is not None:
                 self._reads[name] = signal.freeze(now)
-        self._read()
-        turns = merge(*(one.turns(now) for one in self._moving.values()))
+        if self._is_simple:
+            (self._left_at,) = self._reads.values()
+        else:
+            self._read()
+        several = [one.turns(now) for one in self._moving.values()]
+        turns = several[0] if len(several) == 1 else merge(*several)
         self._turns = iter(tuple(turns)) if self._stays else turns
         self._turn = next(self._turns, None)
         self._begin_at(now)
