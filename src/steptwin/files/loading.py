@@ -12,7 +12,7 @@ MOST_KNOWN = 8
 """The blueprints that were loaded last."""
 
 
-class Loading(NamedTuple):
+class DescriptionKey(NamedTuple):
     """What a description depends on, besides the files that it names. ``path``: its name in messages; ``overrides``: as text."""
 
     path: str
@@ -21,12 +21,12 @@ class Loading(NamedTuple):
     overrides: str
 
 
-_KNOWN: dict[Loading, Blueprint] = {}
+_KNOWN: dict[DescriptionKey, Blueprint] = {}
 
 
-def known_blueprint(loading: Loading, read: Callable[[str], bytes]) -> Blueprint | None:
+def known_blueprint(key: DescriptionKey, read: Callable[[str], bytes]) -> Blueprint | None:
     """One of the same description, if the files it names have the same contents still, which ``read`` gives."""
-    found = _KNOWN.get(loading)
+    found = _KNOWN.get(key)
     try:
         if found is None or any(read(name) != content for name, content in found.files.items()):
             return None
@@ -35,8 +35,8 @@ def known_blueprint(loading: Loading, read: Callable[[str], bytes]) -> Blueprint
     return found
 
 
-def keep_blueprint(loading: Loading, blueprint: Blueprint) -> None:
+def keep_blueprint(key: DescriptionKey, blueprint: Blueprint) -> None:
     """For the next who loads it."""
     while len(_KNOWN) >= MOST_KNOWN:
-        _KNOWN.pop(next(iter(_KNOWN), loading), None)
-    _KNOWN[loading] = blueprint
+        _KNOWN.pop(next(iter(_KNOWN), key), None)
+    _KNOWN[key] = blueprint

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, Self, TypeAlias
 from steptwin.durations import duration
 from steptwin.errors import Misuse
 from steptwin.files.export.progress import TimeProgress, silent
-from steptwin.files.loading import Loading, keep_blueprint, known_blueprint
+from steptwin.files.loading import DescriptionKey, keep_blueprint, known_blueprint
 from steptwin.files.memory import StateDirectory, StateFailure
 from steptwin.files.textfiles import read_text
 from steptwin.inputfiles import MOST_DESCRIPTION_BYTES, read_bytes, shown
@@ -143,8 +143,8 @@ class World(Plant):
             return files[name]
 
         text = read_text(place, MOST_DESCRIPTION_BYTES).source.text
-        loading = Loading(str(path), text, seed, repr(overrides))
-        known = known_blueprint(loading, read) if state is None else None
+        loaded = DescriptionKey(str(path), text, seed, repr(overrides))
+        known = known_blueprint(loaded, read) if state is None else None
         if known is not None:
             return cls(known, keep_trace=keep_trace, keep_inputs=keep_inputs)
         files.clear()
@@ -162,7 +162,7 @@ class World(Plant):
                 spec.text.wrong(("world", "state"), "D003", str(error))
         world = cls._with_memory(spec, files, where, keep_trace=keep_trace, keep_inputs=keep_inputs)
         if where is None:
-            keep_blueprint(loading, world.blueprint)
+            keep_blueprint(loaded, world.blueprint)
         return world
 
     def _save(self, machine: str, data: bytes, now: Nanos) -> None:
