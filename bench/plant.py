@@ -20,8 +20,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from tests.support.postgres import postgres_server, programs
-
 from steptwin.history.database import read_url
 from steptwin.history.rows import PointRow, RowBatch, RunHead, SampleRow
 from steptwin.history.spool import Spool
@@ -113,6 +111,10 @@ def write(url: str, rows: int) -> None:
 
 def history(rows: int) -> None:
     write("sqlite:///h.db", rows)
+    root = Path(__file__).parents[1]
+    sys.path[:0] = [str(root), str(root / "tests" / "support")]  # the server is that of the tests
+    from postgres import postgres_server, programs
+
     where = programs()
     if where is None:
         print("history, postgresql: it is not installed")

@@ -13,7 +13,7 @@ from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from alembic.util import CommandError
-from sqlalchemy import Connection, Engine, Table, create_engine, event, insert
+from sqlalchemy import Connection, Engine, Table, create_engine, event
 from sqlalchemy.engine import URL, make_url
 from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError
 
@@ -129,6 +129,7 @@ def insert_all(connection: Connection, table: Table, columns: Sequence[str], row
             for row in rows:
                 copy.write_row(row)
         return
-    found = [dict(zip(columns, row, strict=True)) for row in rows]
+    found = [tuple(row) for row in rows]
     if found:
-        connection.execute(insert(table), found)
+        names, places = ", ".join(columns), ", ".join("?" * len(columns))
+        connection.exec_driver_sql(f'INSERT INTO "{table.name}" ({names}) VALUES ({places})', found)
