@@ -177,6 +177,22 @@ def test_values_come_when_they_have_changed_and_not_more_often_than_asked() -> N
     assert "values" not in kinds(tab.read())
 
 
+def test_at_the_highest_rate_values_and_events_come_with_every_tick_although_they_are_taken_a_little_later() -> None:
+    studio = Studio()
+    tab = studio.open()
+    tab.ok("watch", points=["time"], rate=30)
+    tab.ok("follow", id="all")
+    tab.read()
+    found = []
+    for _ in range(30):
+        studio.run(1000 / 30)
+        tab.ok("note", text="tick")
+        if tab.session.has_news(studio.now):
+            found += [json.loads(text) for text in tab.session.take(studio.now + 2 * MILLISECOND)]
+    assert sum("values" in one for one in found) >= 29
+    assert sum("events" in one for one in found) >= 28
+
+
 def test_points_are_read_once_for_all_viewers(monkeypatch: pytest.MonkeyPatch) -> None:
     studio = Studio()
     tabs = [studio.open() for _ in range(20)]

@@ -18,7 +18,8 @@ class Viewer:
     role: Role
 
     def __str__(self) -> str:
-        return f"{self.name} (viewer {self.number})"
+        place = f"viewer {self.number}"
+        return place if self.name == place else f"{self.name} ({place})"
 
 
 class ControlChange(NamedTuple):

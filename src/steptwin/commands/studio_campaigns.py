@@ -14,7 +14,7 @@ from typing import Any
 
 from steptwin.campaign.campaign import RESULTS, SUFFIX
 from steptwin.campaign.report.comparison import REPORT
-from steptwin.commands.studio_processes import ChildProcesses, Process, last_line
+from steptwin.commands.studio_processes import ChildProcesses, Process, last_words
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.eventloop import later
 from steptwin.files.textfiles import read_text
@@ -101,7 +101,7 @@ class FolderCampaigns:
         self._running = None
         words = self._processes.end(process)
         if process.returncode not in (PASSED, FAILED):
-            self._errors[name] = last_line(words)
+            self._errors[name] = last_words(words)
         return None
 
     # ------------------------------------------------------------------ files, which are read in threads

@@ -55,7 +55,7 @@ class ChildProcesses:
         while not ready.exists() and process.poll() is None and time.monotonic() < until:
             time.sleep(POLL_S)
         if not ready.exists():
-            raise LineFailure(f"{what} has not started: {last_line(self.end(process))}")
+            raise LineFailure(f"{what} has not started: {last_words(self.end(process))}")
         points = json.loads(ready.read_text("utf-8"))["end_points"]
         return str(next(point["url"] for point in points if point["kind"] == "http"))
 
@@ -73,6 +73,11 @@ class ChildProcesses:
             self._folder.cleanup()
 
 
-def last_line(errors: bytes) -> str:
+def last_words(errors: bytes) -> str:
+    """The last error of a process; of a finding in a file its place, what is wrong and what is permitted."""
     lines = errors.decode("utf-8", "replace").strip().splitlines()
-    return lines[-1] if lines else "it ended without a word"
+    if not lines:
+        return "it ended without a word"
+    begin = max(number for number, line in enumerate(lines) if number == 0 or not line[:1].isspace())
+    hints = [line.strip().removeprefix("= ") for line in lines[begin + 1 :] if line.lstrip().startswith("= ")]
+    return f"{lines[begin]} ({hints[0]})" if hints else lines[begin]

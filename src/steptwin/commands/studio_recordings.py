@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 
-from steptwin.commands.studio_processes import ChildProcesses, Process, last_line
+from steptwin.commands.studio_processes import ChildProcesses, Process, last_words
 from steptwin.errors import Misuse, Refusal
 from steptwin.eventloop import later
 from steptwin.files import session as sessions
@@ -145,7 +145,7 @@ class _Processes(ChildProcesses):
             finally:
                 self.end(process)
         if not target.exists():
-            raise Refusal(f"{path.name} as {form}: {last_line(errors)}")
+            raise Refusal(f"{path.name} as {form}: {last_words(errors)}")
         return target
 
     def view(self, path: Path) -> str:

@@ -430,7 +430,7 @@ class ViewerSession:
         return json.dumps({"seq": next(self._seq), "past": self._looking.message(may)}, separators=(",", ":"))
 
     def _events(self, now: Nanos, time: Nanos) -> str:
-        self._events_due = now + EVENTS_NS
+        self._events_due = max(self._events_due + EVENTS_NS, now + EVENTS_NS // 2)
         batches, missed = self._left_over, self._missed
         self._left_over, self._missed = [], 0
         if self._place is not None:

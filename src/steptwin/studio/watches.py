@@ -68,7 +68,8 @@ class Watched:
         """The values changed since the last call."""
         text = self.values.since(self._sent)
         self._sent = self.values.version
-        self._due = now + self.interval_ns
+        # What is taken a little later than it was due is due again with the next tick, not with the one after it.
+        self._due = max(self._due + self.interval_ns, now + self.interval_ns // 2)
         return text
 
     def forget(self) -> None:

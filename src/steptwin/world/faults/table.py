@@ -94,9 +94,9 @@ class Parameter:
         """What it takes, in words."""
         if self.words:
             return ", ".join(self.words)
-        bounds = f"{self.least:g}" if self.least is not None else ""
+        bounds = _plain(self.least) if self.least is not None else ""
         if self.most is not None:
-            bounds += f" to {self.most:g}"
+            bounds += f" to {_plain(self.most)}"
         elif bounds:
             bounds += " and more"
         if self.form is ParameterForm.TEXT:
@@ -120,6 +120,13 @@ class Parameter:
             "words": list(self.words),
             "required": self.is_required,
         }
+
+
+def _plain(number: float) -> str:
+    """Without an exponent: 0.000001, 65535, 1 000 000 000."""
+    if abs(number) >= 1e6:
+        return f"{number:,.0f}".replace(",", " ")
+    return f"{number:.6f}".rstrip("0").rstrip(".")
 
 
 @dataclass(frozen=True, slots=True)

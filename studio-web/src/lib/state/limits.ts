@@ -1,14 +1,17 @@
 import { t } from "../../text";
 import type { Point } from "./model";
-import { readNumber, shortNumber } from "./numbers";
+import { readNumber, shortNumber, wholeNumber } from "./numbers";
 
 export type Limits = NonNullable<Point["limits"]>;
 
 export function rangeWords({ low, high, is_low_excluded }: Limits): string {
-  if (low !== null && high !== null) return t("rangeBetween", { low: shortNumber(low), high: shortNumber(high) });
-  if (low !== null) return t(is_low_excluded ? "rangeAbove" : "rangeFrom", { low: shortNumber(low) });
-  return high === null ? "" : t("rangeTo", { high: shortNumber(high) });
+  if (low !== null && high !== null) return t("rangeBetween", { low: limit(low), high: limit(high) });
+  if (low !== null) return t(is_low_excluded ? "rangeAbove" : "rangeFrom", { low: limit(low) });
+  return high === null ? "" : t("rangeTo", { high: limit(high) });
 }
+
+/** Whole numbers with all their digits: the last one is permitted, the next one is not. */
+const limit = (value: number): string => (Number.isSafeInteger(value) ? wholeNumber(value) : shortNumber(value));
 
 export function isWithin(value: number, { low, high, is_low_excluded }: Limits): boolean {
   if (low !== null && (is_low_excluded ? value <= low : value < low)) return false;

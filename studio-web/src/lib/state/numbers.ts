@@ -11,6 +11,12 @@ export function shortNumber(value: number | null | undefined): string {
   return String(Number(value.toPrecision(7))).replace("-", "−");
 }
 
+/** All digits, from a million on in groups of three: 65535, 2 147 483 647. */
+export function wholeNumber(value: number): string {
+  const digits = String(value).replace("-", "−");
+  return Math.abs(value) < 1e6 ? digits : digits.replace(/\B(?=(\d{3})+$)/g, "\u202f");
+}
+
 /** What somebody typed: point or comma, either minus. Null where it is no number. */
 export function readNumber(text: string): number | null {
   const plain = text.trim().replace(",", ".").replace("−", "-");

@@ -193,7 +193,7 @@ export class Studio {
       ({ failed }) => {
         const reasons = Object.entries(failed);
         if (reasons.length)
-          this.show({ text: reasons.map(([name, why]) => `${name}: ${why}`).join("; "), kind: "error" });
+          this.show({ text: reasons.map(([name, why]) => `${name}: ${why}`).join("\n"), kind: "error", lang: "en" });
       },
       (error: unknown) => this.report(error),
     );

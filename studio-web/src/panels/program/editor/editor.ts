@@ -18,6 +18,7 @@ import {
 import { highlightSelectionMatches, search, searchKeymap } from "@codemirror/search";
 import { EditorState, type Extension, type Text } from "@codemirror/state";
 import { EditorView, drawSelection, highlightActiveLine, keymap } from "@codemirror/view";
+import { sentence } from "../../../text";
 import { breakpoints, marksAre, type GutterEvents, type Mark } from "./breakpoints";
 import { Documents, OpenText, textOf, type Finding } from "./documents";
 import { runningLine, runsAt } from "./running";
@@ -308,8 +309,8 @@ export class ProgramEditor {
         to: Math.max(from, end),
         severity: finding.severity,
         source: finding.code,
-        message: finding.message,
-        actions: own.map((fix): Action => ({ name: fix.title, apply: () => this.apply(fix, at) })),
+        message: sentence(finding.message).text,
+        actions: own.map((fix): Action => ({ name: sentence(fix.title).text, apply: () => this.apply(fix, at) })),
       };
     });
     file.view.dispatch(setDiagnostics(file.view.state, found));
