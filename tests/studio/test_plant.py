@@ -139,6 +139,9 @@ def test_who_uses_the_gateways_and_what_has_been_kept(
     wrong = ask(studio, "history_values", points=["table.M1.place"])["error"]["message"]
     assert wrong == "no point 'table.M1.place' has been kept"
     assert "this is before" in ask(studio, "history_values", points=["table.M1.position"], from_s=5, to_s=1)["error"]["message"]
+    late = ask(studio, "history_values", points=["table.M1.position"], to_s=1e300)["error"]
+    assert late["code"] == "misuse"
+    assert "to_s: 1e+300: expected a number from 0 to" in late["message"]
 
 
 def test_a_campaign_is_run_and_its_report_reaches_nothing(start_studio: Callable[..., Process]) -> None:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import Protocol, TypeAlias
 
 from steptwin.access.roles import LOOK
+from steptwin.durations import LONGEST_NS
+from steptwin.machine import SECOND
 from steptwin.studio.requestrow import RequestRow
 from steptwin.subject.fields import NAMES, Field, Schema, number, whole
 from steptwin.subject.shapes import members
@@ -139,9 +141,10 @@ _DIFFERENCE = members(
 MOST_POINTS = 8
 """That are read at once."""
 _RUN_NUMBER = whole(-(2**31), 2**31)
+LONGEST_S = LONGEST_NS / SECOND
 _STRETCH = (
-    Field("from_s", number(0.0), "Begin of the stretch, since that of the run.", 0.0, "s"),
-    Field("to_s", number(0.0), "End of the stretch; that of the run without.", None, "s"),
+    Field("from_s", number(0.0, LONGEST_S), "Begin of the stretch, since that of the run.", 0.0, "s"),
+    Field("to_s", number(0.0, LONGEST_S), "End of the stretch; that of the run without.", None, "s"),
 )
 
 PLANT = (
