@@ -82,9 +82,9 @@ for _one in (
     FOLLOWER,
     CARRIAGE,
     TOOL,
+    GANTRY,
     TRANSDUCER,
     COLLISION,
-    GANTRY,
     SUPPLY,
     LOAD,
 ):

@@ -4,30 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import ClassVar
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.world.board import Board
 from steptwin.world.condition import SignalCondition
+from steptwin.world.coordinate import Coordinate, Pulled
 from steptwin.world.drawing import Drawing, rail
 from steptwin.world.elements.axis import BuiltAxis, find_axis
-from steptwin.world.elements.collision import JAM, REPORT, RESET, Touch
 from steptwin.world.elements.logic import STUCK, BoardSpec, Joint, with_terminals
+from steptwin.world.elements.touch import JAM, REPORT, RESET, Touch
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.table import ElementEffect, number
 from steptwin.world.kind import Terminals
 from steptwin.world.lanes import MovedLane
 from steptwin.world.reader import Key, TomlText, optional
 from steptwin.world.scale import Loading, burden_of
-from steptwin.world.signals import SignalOf, find_signal
+from steptwin.world.signals import SignalOf
 from steptwin.world.site import Site, Terminal
 from steptwin.world.spec import WorldSpec
 from steptwin.world.values import OUTPUT_PIN, NameOf, word
 from steptwin.world.values import number as number_value
 
 SKEWED = "SKEWED"
+SKEW = "skew"
+SHARES = {SKEW: (1.0, -1.0), "position": (0.5, 0.5)}
+"""Of the ends, in how far the one on its axis is ahead, and in where the middle is."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,12 +69,14 @@ class Gantry(Touch):
     SKEWED is on while the ends are further apart than the limit; then the beam is stuck in its guides, with `JAM`.
     """
 
-    FIXED: ClassVar[tuple[str, ...]] = ("_ends", "_loads")
+    FIXED: ClassVar[tuple[str, ...]] = ("_loads", "ends", "signals")
     __slots__ = (*FIXED, "_failed", "_looked_at", "_pulling", "is_stiff")
 
-    def __init__(self, board: Board, spec: GantrySpec, condition: SignalCondition, ends: tuple[BuiltAxis, BuiltAxis]) -> None:
-        super().__init__(board, spec.effect == JAM, condition, {end.spec.name: end.mechanism for end in ends})
-        self._ends = ends
+    def __init__(self, board: Board, spec: GantrySpec, ends: tuple[BuiltAxis, BuiltAxis]) -> None:
+        self.ends = ends
+        self.signals = dict(_moving(ends))
+        skewed = SignalCondition(f"abs({SKEW}) > {spec.limit!r}", self.signals.__getitem__)
+        super().__init__(board, spec.effect == JAM, skewed, {end.spec.name: end.mechanism for end in ends})
         beam = Loading(mass=spec.mass, friction_force=spec.friction_force)
         self._loads = tuple(burden_of(beam, end.scale, "gantry") for end in ends)
         """The whole beam, for each motor."""
@@ -87,10 +92,11 @@ class Gantry(Touch):
         return SKEWED
 
     def touching(self) -> str:
-        return f"the ends of {self.board.name} are skewed by {self.skew(self.board.kernel.now):g} {self.unit}"
+        skew = self.signals[SKEW].value(self.board.kernel.now)
+        return f"the ends of {self.board.name} are skewed by {skew:g} {self.unit}"
 
     def update(self, now: Nanos) -> None:
-        one, other = (end.mechanism for end in self._ends)
+        one, other = (end.mechanism for end in self.ends)
         pulls = one.pulls(now), other.pulls(now)
         if now != self._looked_at:
             self._looked_at, self._failed = now, (False, False)
@@ -99,40 +105,38 @@ class Gantry(Touch):
         self._failed = failed[0], failed[1]
         self._pulling = pulls[0] and not failed[0], pulls[1] and not failed[1]
         shares = (0.5, 0.5) if self._pulling[0] is self._pulling[1] else tuple(map(float, self._pulling))
-        for end, whole, share in zip(self._ends, self._loads, shares, strict=True):
+        for end, whole, share in zip(self.ends, self._loads, shares, strict=True):
             held = whole.times(share)
             end.mechanism.burden(self.board.name, held._replace(friction=held.friction * self.is_stiff), now)
         super().update(now)
 
     def deadline(self) -> Nanos | None:
         now = self.board.kernel.now
-        dues = (super().deadline(), *(end.mechanism.next_stall(now) for end in self._ends))
+        dues = (super().deadline(), *(end.mechanism.next_stall(now) for end in self.ends))
         return min((due for due in dues if due is not None), default=None)
 
     @property
     def drawing(self) -> Drawing:
-        return rail(self._ends[0].spec.travel)
+        return rail(self.ends[0].spec.travel)
 
     @property
     def moved(self) -> tuple[BuiltAxis, MovedLane]:
-        half, other_half = (end.mechanism.build.sign / (2.0 * float(end.scale.pulses_per_unit)) for end in self._ends)
-        other = self._ends[1].mechanism
+        half, other_half = (end.mechanism.build.sign / (2.0 * float(end.scale.pulses_per_unit)) for end in self.ends)
+        other = self.ends[1].mechanism
         place = other.machine, str(other.number)
-        return self._ends[0], MovedLane(self.board.name, "position", self.unit, half, other=place, other_per_pulse=other_half)
+        return self.ends[0], MovedLane(self.board.name, "position", self.unit, half, other=place, other_per_pulse=other_half)
 
     @property
     def unit(self) -> str:
-        return self._ends[0].scale.unit
+        return self.ends[0].scale.unit
 
-    def skew(self, now: Nanos) -> float:
-        """By how much the end on its axis is ahead of the other one."""
-        one, other = (end.units(end.mechanism.place(now)) for end in self._ends)
-        return one - other
 
-    def position(self, now: Nanos) -> float:
-        """Of the middle of the beam."""
-        one, other = (end.units(end.mechanism.place(now)) for end in self._ends)
-        return (one + other) / 2.0
+def _moving(ends: tuple[BuiltAxis, BuiltAxis]) -> Iterator[tuple[str, SignalOf]]:
+    """The signals that also change between events."""
+    sources, unit = tuple(end.source for end in ends), ends[0].scale.unit
+    for name, shares in SHARES.items():
+        its = Coordinate(ends, shares, (Pulled(), Pulled()))
+        yield name, SignalOf(sources, its.value, its.turns, its.version, unit)
 
 
 def _stiffen(active: ActiveFault, gantry: Gantry, begins: bool, now: Nanos) -> str:
@@ -151,22 +155,11 @@ def _make(spec: GantrySpec, site: Site) -> Gantry:
     for name, gantry in site.parts.built(GANTRY).items():
         if taken := [end.spec.name for end in (one, other) if gantry.is_moved_by(end.mechanism)]:
             raise Misuse(f"axis {taken[0]!r} moves the gantry {name!r} already")
-    text = f"abs({spec.axis}.position - {spec.other}.position) > {spec.limit!r}"
-    return Gantry(board, spec, SignalCondition(text, lambda name: find_signal(site.parts, name)), (one, other))
+    return Gantry(board, spec, (one, other))
 
 
 def _signals(gantry: Gantry) -> Mapping[str, SignalOf]:
-    def refuse(name: str, formula: str) -> None:
-        one, other = (f"{end}.position" for end in gantry.axes)
-        raise Misuse(f"{gantry.board.name}.{name} moves with two axes: write {formula.format(one, other)}")
-
-    source = (gantry.board.source,)
-    unit = gantry.unit
-    return {
-        "skew": SignalOf(source, gantry.skew, unit=unit, check=partial(refuse, "skew", "{} - {}")),
-        "position": SignalOf(source, gantry.position, unit=unit, check=partial(refuse, "position", "({} + {}) / 2")),
-        "count": SignalOf(source, lambda now: float(gantry.count)),
-    }
+    return {**gantry.signals, "count": SignalOf((gantry.board.source,), lambda now: float(gantry.count))}
 
 
 _GANTRY = with_terminals(
