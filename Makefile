@@ -29,9 +29,10 @@ EXTENSION_STAMP := $(EXTENSION)/node_modules/.steptwin
 CLIENTS := tests/gateways/clients
 CLIENTS_STAMP := $(CLIENTS)/node_modules/.steptwin
 
-# uv takes the interpreter it is given and what the lock files name, whatever project or environment surrounds it.
+# uv takes the interpreter it is given and what the lock files name, whatever project or environment surrounds it. Without compiled
+# modules every process would compile all that it imports.
 export UV_PYTHON_DOWNLOADS := never
-unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
+unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME PYTHONDONTWRITEBYTECODE
 INSTALL := $(UV) pip install --quiet --python $(BIN)/python
 
 PEER_PACKAGES := chromium curl mbpoll libmodbus-dev gcc libc6-dev pkg-config make mosquitto mosquitto-clients openssl postgresql \

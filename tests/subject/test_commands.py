@@ -149,7 +149,7 @@ def test_every_step_that_is_not_only_for_scripts_is_a_command() -> None:
         ("couple", {"machine": "a", "axis": 1, "to": "wheel"}, "couple: to: 'wheel': expected 'drive' or 'free' or 'blocked'"),
         ("request", {"line": "b", "unit": 1, "pdu": "0"}, "request: pdu: '0': expected bytes as hexadecimal digits"),
         ("send", {"line": "b", "text": "ż"}, "send: text: 'ż' is not an 8-bit character"),
-        ("fault", {"fault": "crk"}, "fault: fault: fault: kind = 'crk': permitted are"),
+        ("fault", {"fault": "crk"}, "fault: fault: fault: kind = 'crk' (did you mean 'crc'?): permitted are"),
         ("move", {"machine": "a", "axis": 1}, "move: give either to (a position) or by (a distance)"),
         ("move", {"machine": "a", "axis": 1, "to": 1, "by": 1}, "move: give either to (a position) or by (a distance)"),
         ("step", {"for_ns": 1, "to_ns": 2}, "step: for_ns and to_ns exclude each other"),
