@@ -47,7 +47,7 @@ class CollisionSpec(BoardSpec):
         yield from (("when", owner) for owner in self.owners if owner != TIME)
 
     def check(self, text: TomlText) -> None:
-        check_condition(text, self.path, self.when)
+        check_condition(text, self.path, self.name, self.when)
 
 
 def _make(spec: CollisionSpec, site: Site) -> Touch:

@@ -14,7 +14,7 @@ from steptwin.world.condition import SignalCondition
 from steptwin.world.curve import Stepped
 from steptwin.world.elements.axis import BuiltAxis, find_axis
 from steptwin.world.elements.logic import BoardPart, BoardSpec, Joint, with_terminals
-from steptwin.world.elements.quantity import TIME, check_condition, condition_of, owners_of, signal_of
+from steptwin.world.elements.quantity import TIME, check_condition, check_owners, condition_of, owner_of, owners_of, signal_of
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.table import ElementEffect, number
 from steptwin.world.kind import Terminals
@@ -61,13 +61,15 @@ class LoadSpec(BoardSpec):
 
     def others(self, world: WorldSpec) -> Iterator[tuple[str, str]]:
         yield "axis", self.axis
-        named = () if self.of is None else (self.of.partition(".")[0],)
+        named = () if self.of is None else (owner_of(self.of),)
         for key, owners in (("when", () if self.when is None else owners_of(self.when)), ("of", named)):
             yield from ((key, owner) for owner in owners if owner != TIME)
 
     def check(self, text: TomlText) -> None:
         if self.when is not None:
-            check_condition(text, self.path, self.when)
+            check_condition(text, self.path, self.name, self.when)
+        if self.of is not None:
+            check_owners(text, (*self.path, "of"), self.name, (owner_of(self.of),))
         if not any(self.loading):
             text.wrong(self.path, "D007", f"{self.name!r} weighs nothing: give it a mass, a force, a friction or an inertia")
         if (self.of is None) is not (self.points is None):

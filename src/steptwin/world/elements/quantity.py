@@ -20,17 +20,29 @@ TIME = "time"
 def owners_of(condition: str) -> tuple[str, ...]:
     """Machines and elements whose signals are in a condition; none for one that is wrong."""
     try:
-        return tuple(dict.fromkeys(name.partition(".")[0] for name in parse_condition(condition).names()))
+        return tuple(dict.fromkeys(owner_of(name) for name in parse_condition(condition).names()))
     except Misuse:
         return ()
 
 
-def check_condition(text: TomlText, path: Path, condition: str) -> None:
-    """Report a condition that cannot be read."""
+def check_condition(text: TomlText, path: Path, name: str, condition: str) -> None:
+    """Report a condition of the element ``name`` that cannot be read, or is over itself."""
     try:
         parse_condition(condition)
     except Misuse as error:
         text.wrong((*path, "when"), "D003", str(error))
+    check_owners(text, (*path, "when"), name, owners_of(condition))
+
+
+def check_owners(text: TomlText, path: Path, name: str, owners: tuple[str, ...]) -> None:
+    """Report a key of the element ``name`` that is over its own signals."""
+    if name in owners:
+        text.wrong(path, "D007", f"{name!r} depends on itself")
+
+
+def owner_of(signal: str) -> str:
+    """The machine or element that has a signal."""
+    return signal.partition(".")[0]
 
 
 def signal_of(key: str, board: Board, site: Site, name: str) -> SignalOf | Idle:

@@ -12,6 +12,7 @@ from steptwin.state import Stateful
 from steptwin.world.condition import Signal
 from steptwin.world.curve import Stepped
 from steptwin.world.element import Element, NamedSpec, Reference
+from steptwin.world.elements.quantity import check_owners, owner_of
 from steptwin.world.elements.voltage import BROKEN_WIRE, DRIFT
 from steptwin.world.kernel import Kernel, Source
 from steptwin.world.reader import Key, Row, Table, TomlText, optional
@@ -72,6 +73,7 @@ class Transducer(Stateful):
 
 def _read(text: TomlText, row: Row, table: Table) -> TransducerSpec:
     spec = TransducerSpec(**row)
+    check_owners(text, (*spec.path, "of"), spec.name, (owner_of(spec.of),))
     volts = [volts for _, volts in spec.points]
     if not all(LOWEST_V <= one <= HIGHEST_V for one in volts):
         there = f"{min(volts):g} to {max(volts):g} V"
@@ -82,7 +84,7 @@ def _read(text: TomlText, row: Row, table: Table) -> TransducerSpec:
 
 def _refers(spec: TransducerSpec, world: WorldSpec) -> Iterator[Reference]:
     yield Reference(spec.target[0], spec.target[0], (*spec.path, "to"))
-    yield Reference(spec.target[0], spec.of.partition(".")[0], (*spec.path, "of"))
+    yield Reference(spec.target[0], owner_of(spec.of), (*spec.path, "of"))
 
 
 def _build(spec: TransducerSpec, site: Site) -> Transducer:
