@@ -7,24 +7,11 @@ from pathlib import Path
 
 import pytest
 from shell import Shell
+from slides import slide
 
-# 800 pulses per mm. M1 goes 100 mm with 50 mm/s and ramps of 500 mm/s²: 2.1 s.
-WORLD = """
-[[mic488]]
-name = "table"
-[mic488.M1]
-unit = "mm"
-gear = 800.0
-acc = 500.0
-dec = 500.0
-vel = 50.0
-
-[[axis]]
-name = "x"
-drive = "table.M1"
-pitch = 4.0
-travel = [-50.0, 150.0]
-
+WORLD = (
+    slide()
+    + """
 [[script]]
 name = "move"
 steps = [
@@ -34,6 +21,7 @@ steps = [
   { set = { "table.IN1" = 1 } },
 ]
 """
+)
 
 
 @pytest.fixture

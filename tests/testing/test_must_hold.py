@@ -5,32 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
+from slides import GUARD, slide
 
 Run = Callable[..., pytest.RunResult]
-WORLD = """
-[[mic488]]
-name = "table"
-[mic488.M1]
-unit = "mm"
-gear = 800.0
-acc = 500.0
-dec = 500.0
-vel = 50.0
-
-[[axis]]
-name = "x"
-drive = "table.M1"
-pitch = 4.0
-travel = [-50.0, 150.0]
-
-[[button]]
-name = "guard"
-to = "table.IN1"
-
+WORLD = (
+    slide()
+    + GUARD
+    + """
 [[script]]
 name = "go"
 steps = [{ write = { "table.M1_EN" = 1, "table.M1_POS_ABS" = 100.0 } }]
 """
+)
 
 
 def test_a_world_that_violates_a_property_fails_its_test(run: Run, pytester: pytest.Pytester) -> None:

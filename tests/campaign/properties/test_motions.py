@@ -4,26 +4,12 @@ from __future__ import annotations
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from slides import slide
 
 from steptwin.campaign.properties import read_property
 from steptwin.files.world import World
 
-WORLD = """
-[[mic488]]
-name = "table"
-[mic488.M1]
-unit = "mm"
-gear = 800.0
-acc = 500.0
-dec = 500.0
-vel = 50.0
-
-[[axis]]
-name = "x"
-drive = "table.M1"
-pitch = 4.0
-travel = [-50.0, 50.0]
-"""
+WORLD = slide(travel=(-50.0, 50.0))
 TRAVEL = 100.0  # mm
 SPEED = 50.0  # mm/s
 STEP = 0.005  # s

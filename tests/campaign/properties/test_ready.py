@@ -3,27 +3,17 @@
 from __future__ import annotations
 
 import pytest
+from slides import GUARD, slide
 
 from steptwin.campaign.properties import Verdict, read_property
 from steptwin.files.world import World
 from steptwin.world.script import Send
 
-# 800 pulses per mm; 50 mm/s, ramps of 500 mm/s². M1 goes to 100 mm from 1 ms on; a ram comes across at 60 mm when OUT1 is on.
-SLIDE = """
-[[mic488]]
-name = "table"
-[mic488.M1]
-unit = "mm"
-gear = 800.0
-acc = 500.0
-dec = 500.0
-vel = 50.0
-
-[[axis]]
-name = "x"
-drive = "table.M1"
-pitch = 4.0
-
+# M1 goes to 100 mm from 1 ms on; a ram comes across at 60 mm when OUT1 is on.
+SLIDE = (
+    slide(travel=None)
+    + GUARD
+    + """
 [[cylinder]]
 name = "ram"
 extend = "valve.out"
@@ -40,10 +30,6 @@ inputs = 1
 name = "lower"
 to = "valve.in1"
 
-[[button]]
-name = "guard"
-to = "table.IN1"
-
 [[collision]]
 name = "crash"
 when = "ram.position > 40 and x.position > 60"
@@ -56,6 +42,7 @@ steps = [
   { write = { "table.M1_POS_ABS" = 100.0 } },
 ]
 """
+)
 # 64 microsteps for each of 200 full steps; F256000 are 20 turns with at most 800 full steps/s, 4 turns a second.
 DRUM = """
 [[line]]

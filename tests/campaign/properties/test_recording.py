@@ -5,28 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from slides import slide
 
 from steptwin.campaign.properties import Verdict, read_property
 from steptwin.files.world import World
 
-AXIS = """
-[[mic488]]
-name = "{name}"
-{more}
-[mic488.M1]
-unit = "mm"
-gear = 800.0
-acc = {acc}
-dec = {acc}
-vel = {vel}
-
-[[axis]]
-name = "{name}_x"
-drive = "{name}.M1"
-pitch = 4.0
-travel = [-50.0, 150.0]
-"""
-TWO = AXIS.format(name="left", more="", acc=500.0, vel=50.0) + AXIS.format(name="right", more="", acc=120.0, vel=80.0)
+TWO = slide("left", "left_x") + slide("right", "right_x", ramps=120.0, vel=80.0)
 JOINED = '\n[[wire]]\nfrom = "left.OUT8"\nto = "right.IN8"\n'
 CALCULATES = """$I0 = 0
 WHILE $I0 < 200
@@ -79,7 +63,7 @@ def test_the_extreme_over_two_motions_is_that_of_all_moments(joined: bool, text:
 def test_what_a_program_calculates_ahead_is_seen_where_it_happens(tmp_path: Path, condition: str) -> None:
     """A register changes inside of the program, an output outside of it: both have the moment that a run until then has."""
     (tmp_path / "counts.prg").write_text(CALCULATES)
-    axis = AXIS.format(name="left", more='program = "counts.prg"\nstart = true', acc=500.0, vel=50.0)
+    axis = slide("left", "left_x", more='program = "counts.prg"\nstart = true')
     (tmp_path / "world.toml").write_text(axis)
     run, watched = (World.load(tmp_path / "world.toml") for _ in range(2))
     run.run(until=condition)

@@ -6,6 +6,7 @@ import pickle
 from pathlib import Path
 
 import pytest
+from slides import GUARD, slide
 
 from steptwin.campaign.properties import Verdict, read_property, watch_together
 from steptwin.campaign.properties.recording import ComparisonRecord
@@ -15,27 +16,10 @@ from steptwin.errors import Misuse
 from steptwin.files.world import World
 from steptwin.world.plant import Plant
 
-# 3200 pulses per turn and 4 mm: the axis goes 100 mm with 50 mm/s and ramps of 500 mm/s².
-WORLD = """
-[[mic488]]
-name = "table"
-[mic488.M1]
-unit = "mm"
-gear = 800.0
-acc = 500.0
-dec = 500.0
-vel = 50.0
-
-[[axis]]
-name = "x"
-drive = "table.M1"
-pitch = 4.0
-travel = [-50.0, 150.0]
-
-[[button]]
-name = "guard"
-to = "table.IN1"
-
+WORLD = (
+    slide()
+    + GUARD
+    + """
 [[script]]
 name = "move"
 steps = [
@@ -43,6 +27,7 @@ steps = [
   { write = { "table.M1_POS_ABS" = 100.0 } },
 ]
 """
+)
 
 
 def world() -> World:
