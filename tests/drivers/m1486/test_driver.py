@@ -96,8 +96,8 @@ def test_a_move_takes_the_time_it_was_computed_to_take() -> None:
     assert wire.true() == 12.5 * 40 * 64
 
 
-def test_the_position_is_not_known_while_it_moves_nor_after_a_stop() -> None:
-    """M-28, M-16."""
+def test_m_28_the_position_is_not_known_while_it_moves_nor_after_a_stop() -> None:
+    """And M-16."""
     wire = ChipWire("B")
     chip = chip_driver(wire)
     chip.move_by(5000.0)
