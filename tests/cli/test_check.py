@@ -155,12 +155,18 @@ def test_files_in_other_encodings(run: Run, tmp_path: Path) -> None:
 
 def test_a_world_is_checked_with_its_files(run: Run, program: Callable[..., Path]) -> None:
     file = program('[[mic488]]\nname = "a"\nprogram = "a.prg"\n[[axis]]\nname = "x"\ndrive = "b.M1"\n', "w.toml")
-    program("M1 = ON\nMOVE M1\n", "a.prg")
+    used = program("M1 = ON\nMOVE M1\nMOVE M2\nHOME M1 10\n", "a.prg")
     code, out, _ = run(file)
     assert code == 1
-    assert f"{file}:1:1: error D010: a file has errors: {file.parent / 'a.prg'}:2:1: error W137: WBC has no MOVE" in out
+    assert f"{file}:3:1: error D010: a file has errors: {used}:2:1: error W137: WBC has no MOVE" in out
+    assert f"{used}:3:1: error W137: WBC has no MOVE" in out
     assert f"{file}:6:1: error D009: nothing is called 'b'" in out
-    assert out.endswith(f"{file}: 2 errors, 0 warnings\n")
+    assert out.endswith(f"{file}: 4 errors, 0 warnings\n")
+    used.write_text("M1 = ON\nHOME M1 10\n")
+    file.write_text('[[mic488]]\nname = "a"\nprogram = "a.prg"\n')
+    code, out, _ = run(file)
+    assert (code, out.splitlines()[-1]) == (0, f"{file}: 0 errors, 1 warning")
+    assert f"{used}:2:1: warning W219" in out
     sound = program('[[mic488]]\nname = "a"\n', "sound.toml")
     assert run(sound) == (0, f"{sound}: 0 errors, 0 warnings\n", "")
     outside = program('[[mic488]]\nname = "a"\nprogram = "../a.prg"\n', "outside.toml")

@@ -29,12 +29,13 @@ def found(text: str) -> str:
             raise Misuse(f"{name}: no such file")
         return files[name].encode()
 
-    findings = diagnose("w.toml", description, read)
+    diagnosis = diagnose("w.toml", description, read)
     lines = []
-    for finding in findings:
+    for finding in diagnosis.findings:
         lines.append(render(SourceText("w.toml", description), [finding]))
         if finding.fix is not None:
             lines.append(f"  fix: {description[finding.fix.span.start : finding.fix.span.end]!r} → {finding.fix.text!r}")
+    lines += [render(source, of) for source, of in diagnosis.files if of]
     return "\n".join(lines)
 
 

@@ -275,10 +275,10 @@ def test_files_from_outside_the_folder_are_refused(tmp_path: Path) -> None:
 
 def test_editors_see_errors_at_the_use_and_none_in_the_file_itself() -> None:
     broken = {"parts/station.toml": STATION.replace("above", "abov").encode()}
-    found = diagnose("m.toml", MAIN, given_files(broken))
+    found = diagnose("m.toml", MAIN, given_files(broken)).findings
     assert {finding.span.start for finding in found} == {MAIN.index("[[use]]"), MAIN.rindex("[[use]]")}
     assert all(finding.message.startswith("a file has errors: parts/station.toml:") for finding in found)
-    assert diagnose("station.toml", STATION, given_files({})) == ()
+    assert diagnose("station.toml", STATION, given_files({})).findings == ()
     with pytest.raises(WorldError, match=r"a file with \[parameters\] is for \[\[use\]\] of a description"):
         World.from_toml(STATION)
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, TypeAlias, TypeVar, cast
 
-from steptwin.diagnostics import Diagnostic, Severity, SourceText, render
+from steptwin.diagnostics import Diagnostic, Severity, SourceText, in_order, render
 from steptwin.errors import Misuse, SourceErrors
 from steptwin.world.pieces import beside
 from steptwin.world.spec import ControllerSpec, WorldSpec
@@ -26,14 +26,22 @@ def memory_file(name: str) -> str:
     return f"state:{name}"
 
 
+class _FileErrors(SourceErrors):
+    """The file of this name has errors."""
+
+    def __init__(self, file: str, text: str) -> None:
+        super().__init__(text)
+        self.file = file
+
+
 class Blueprint:
     """A description with its files, from which worlds are built. Errors in files are reported in the text of the description."""
 
     def __init__(self, spec: WorldSpec, files: FileContents) -> None:
         self.spec = spec
         self.files = files
-        self.warnings: list[str] = []
-        """About the files that the description names."""
+        self._findings: dict[str, tuple[SourceText, list[Diagnostic]]] = {}
+        """About the files that the description names, by name."""
         self.makers: dict[str, Callable[[bytes | None], Any]] = {}
         """Make the machine of each controller whose files have no errors, as `ControllerKind.build`."""
         self.joined: Sequence[Sequence[str]] | None = None
@@ -60,8 +68,24 @@ class Blueprint:
             found = self._known[path] = make()
         return cast("T", found)
 
+    @property
+    def findings(self) -> Sequence[tuple[SourceText, Sequence[Diagnostic]]]:
+        """What was found in each file that controllers name, in the order of its text; of a controller, up to the first file with
+        errors."""
+        return [(source, in_order(found)) for source, found in self._findings.values()]
+
+    @property
+    def warnings(self) -> Sequence[str]:
+        """About the files that the description names."""
+        found = [(source, [one for one in of if one.severity is Severity.WARNING]) for source, of in self.findings]
+        return [render(source, warnings) for source, warnings in found if warnings]
+
     def _prepare(self, controller: ControllerSpec) -> None:
-        self.makers[controller.name] = controller.kind.build(controller, self)
+        try:
+            self.makers[controller.name] = controller.kind.build(controller, self)
+        except _FileErrors as error:
+            keys = [key for name, key in controller.kind.files(controller) if name == error.file]
+            self.spec.text.wrong_file((*controller.path, *keys[:1]), error)
 
     def data(self, name: str) -> bytes:
         """As `BuildContext.data`."""
@@ -74,8 +98,7 @@ class Blueprint:
         """As `BuildContext.accept`."""
         shown = SourceText(beside(self.spec.text.source.name, source.name), source.text)
         found = tuple(findings)
+        _, known = self._findings.setdefault(source.name, (shown, []))
+        known += [one for one in found if one not in known]
         if errors := [one for one in found if one.severity is Severity.ERROR]:
-            raise SourceErrors(render(shown, errors))
-        warnings = [one for one in found if one.severity is Severity.WARNING]
-        if warnings and (text := render(shown, warnings)) not in self.warnings:
-            self.warnings.append(text)
+            raise _FileErrors(source.name, render(shown, errors))

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
-from steptwin.diagnostics import Diagnostic, in_order
+from steptwin.diagnostics import Diagnostic, SourceText, in_order
 from steptwin.errors import Misuse
 from steptwin.world.blueprint import Blueprint
 from steptwin.world.description import describe
@@ -17,7 +18,14 @@ LONGEST_MESSAGE = 500
 """Limit of a message, in characters: the errors in a program that a description names are many, and shown in the program too."""
 
 
-def diagnose(name: str, text: str, read: Callable[[str], bytes]) -> Sequence[Diagnostic]:
+class Diagnosis(NamedTuple):
+    """What was found in a description, and in each file of programs, positions and configurations that it names."""
+
+    findings: Sequence[Diagnostic]
+    files: Sequence[tuple[SourceText, Sequence[Diagnostic]]] = ()
+
+
+def diagnose(name: str, text: str, read: Callable[[str], bytes]) -> Diagnosis:
     """``read`` gives the content of a file by the name it has in the text. Never raises."""
     files: dict[str, bytes] = {}
 
@@ -27,20 +35,23 @@ def diagnose(name: str, text: str, read: Callable[[str], bytes]) -> Sequence[Dia
 
     try:
         if is_piece(TomlText(name, text)):
-            return ()  # what it is depends on what uses it
+            return Diagnosis(())  # what it is depends on what uses it
         spec = describe(name, text, read=keep)
     except WorldError as error:
-        return error.findings
+        return Diagnosis(error.findings)
+    blueprint: Blueprint | None = None
     try:
         for file, key in spec.files():
             try:
                 _ = files.get(file) or keep(file)
             except Misuse as error:
                 spec.text.wrong(key, "D009", str(error))
-        Plant(Blueprint(spec, files), keep_trace=False, keep_inputs=False)
+        blueprint = Blueprint(spec, files)
+        Plant(blueprint, keep_trace=False, keep_inputs=False)
+        found: Sequence[Diagnostic] = in_order(spec.text.findings)
     except WorldError as error:
-        return [_short(finding) for finding in error.findings]
-    return [_short(finding) for finding in in_order(spec.text.findings)]
+        found = error.findings
+    return Diagnosis([_short(finding) for finding in found], () if blueprint is None else blueprint.findings)
 
 
 def _short(finding: Diagnostic) -> Diagnostic:

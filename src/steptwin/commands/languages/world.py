@@ -12,7 +12,8 @@ from steptwin.world.check import diagnose
 
 def _check(source: SourceText, options: GivenOptions) -> CheckReport:
     folder = Path(source.name).parent
-    return CheckReport(list(diagnose(source.name, source.text, lambda name: read_beside(folder, name))))
+    found = diagnose(source.name, source.text, lambda name: read_beside(folder, name))
+    return CheckReport(list(found.findings), companions=[(file, list(of)) for file, of in found.files])
 
 
 WORLDS = FileLanguage(name="world", title="worlds", suffixes=(".toml",), check=_check)

@@ -61,7 +61,7 @@ class WorldAnalysis(Analysis):
 
     @cached_property
     def _found(self) -> Sequence[Diagnostic]:
-        return diagnose(name_of(self.uri), self.text, self._read)
+        return diagnose(name_of(self.uri), self.text, self._read).findings
 
     def _read(self, name: str) -> bytes:
         """As worlds do it, only from their own folder and those below."""
