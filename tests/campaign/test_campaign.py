@@ -40,7 +40,7 @@ def test_half_of_the_runs_fail(doors: Campaign) -> None:
     early = [n for n in range(40) if float(doors.cases[n].values["t"]) <= 1.0]
     assert (summary.runs, summary.failed) == (40, len(early))
     assert [one.number for one in summary.failures] == early
-    assert summary.failures[0].why == "expectations of the scripts: table.IN1 == 0"
+    assert summary.failures[0].why == "expectations of the scripts: table.IN1 == 0; table.IN1 is 1"
 
 
 @pytest.mark.parametrize(("jobs", "dask"), [(2, None), (2, LOCAL)])

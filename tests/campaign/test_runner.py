@@ -35,7 +35,7 @@ def test_a_run_has_its_steps_measures_and_end(doors: Campaign) -> None:
 def test_an_expectation_in_vain_is_a_verdict(doors: Campaign) -> None:
     case = doors.cases.made(0, 1, {"t": 0.75}, [])
     (verdict,) = doors.run_case(case).verdicts
-    assert (verdict.holds, verdict.at_ns, verdict.why) == (False, SECOND, "table.IN1 == 0")
+    assert (verdict.holds, verdict.at_ns, verdict.why) == (False, SECOND, "table.IN1 == 0; table.IN1 is 1")
 
 
 def test_the_same_case_has_the_same_result_and_others_have_others(doors: Campaign) -> None:

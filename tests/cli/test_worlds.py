@@ -53,7 +53,9 @@ def test_run_ends_on_a_condition_and_tells_it_as_json() -> None:
 def test_a_condition_that_never_comes_true_is_waited_for_an_hour_and_told(tmp_path: Path) -> None:
     world = tmp_path / "w.toml"
     world.write_text('[[mic488]]\nname = "a"\n')
-    assert "warning: a.M1.position > 3 did not come true in 3600 s\n" in invoke("run", str(world), "--until", "a.M1.position > 3")
+    assert "warning: waited 3600 s in vain for a.M1.position > 3; a.M1.position is 0 imp\n" in invoke(
+        "run", str(world), "--until", "a.M1.position > 3"
+    )
     with pytest.raises(Misuse, match="--for 2s ends the run then"):
         invoke("run", str(world), "--until", "2s")
     told = json.loads(invoke("run", str(world), "--until", "a.M1.position > 3", "--for", "2s", "--json"))
@@ -143,19 +145,25 @@ def test_another_seed_is_another_chance_and_stays_with_the_session(tmp_path: Pat
 def test_an_expectation_that_fails_is_exit_code_1(tmp_path: Path) -> None:
     world = tmp_path / "w.toml"
     world.write_text('[[mic488]]\nname = "a"\n[[event]]\nat = 1\nsteps = [{ expect = "a.M1.position > 3" }]\n')
-    assert "expectation failed at 1 s: a.M1.position > 3" in invoke("run", str(world), "--for", "2s", code=1)
+    told = "a.M1.position > 3; a.M1.position is 0 imp"
+    assert f"expectation failed at 1 s: {told}\n" in invoke("run", str(world), "--for", "2s", code=1)
+    (failure,) = json.loads(invoke("run", str(world), "--for", "2s", "--json", code=1))["failures"]
+    assert failure == {"time_s": 1.0, "condition": "a.M1.position > 3", "what": told}
 
 
 def test_what_was_waited_for_in_vain_is_a_warning(tmp_path: Path) -> None:
     world = tmp_path / "w.toml"
     steps = '[{ until = "a.M1.position > 3", within = "500 ms" }]'
     world.write_text(f'[[mic488]]\nname = "a"\n[[script]]\nname = "hand"\nsteps = {steps}\n')
-    assert "warning: at 0.5 s hand waited in vain for a.M1.position > 3\n" in invoke("run", str(world), "--for", "2s")
+    assert "warning: at 0.5 s hand waited in vain for a.M1.position > 3; a.M1.position is 0 imp\n" in invoke(
+        "run", str(world), "--for", "2s"
+    )
     assert "hand waited in vain" in invoke("run", str(world), "--for", "2s", "--strict", code=1)
-    assert "did not come true" in invoke("run", str(world), "--for", "400ms", "--until", "a.M1.position > 3", "--strict", code=1)
+    said = invoke("run", str(world), "--for", "400ms", "--until", "a.M1.position > 3", "--strict", code=1)
+    assert "waited 0.4 s in vain for a.M1.position > 3; a.M1.position is 0 imp\n" in said
     invoke("run", str(world), "--for", "400ms", "--strict")
     told = json.loads(invoke("run", str(world), "--for", "2s", "--json"))
-    assert told["overdue"] == [{"time_s": 0.5, "what": "hand waited in vain for a.M1.position > 3"}]
+    assert told["overdue"] == [{"time_s": 0.5, "what": "hand waited in vain for a.M1.position > 3; a.M1.position is 0 imp"}]
 
 
 def test_what_is_doubtful_in_files_of_a_world_is_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -35,6 +35,13 @@ class Level:
         return None
 
 
+def test_what_signals_are_is_told_of_the_first_of_many() -> None:
+    levels = {f"x{n}": Level(n / 3) for n in range(8)}
+    levels["x1"].unit = "mm"
+    told = SignalCondition(" or ".join(f"{name} > 9" for name in levels), levels.__getitem__).told(0).partition("; ")[2]
+    assert told == "x0 is 0, x1 is 0.333333333 mm, x2 is 0.666666667, x3 is 1, x4 is 1.33333333, x5 is 1.66666667 and 2 more"
+
+
 class Moving:
     """The count or velocity of a profile that goes there and back."""
 

@@ -92,11 +92,11 @@ def test_on_a_slow_line_the_request_is_waited_for() -> None:
 def test_a_motion_that_fails_is_a_failure() -> None:
     found = world('{ move = "a.M1", to = 190.0 }', '{ note = "end" }')
     found.run(for_=10)
-    assert [str(record.value) for record in found.failures] == ["a.M1.status == 4"]
+    assert [str(record.value) for record in found.failures] == ["a.M1.status == 4; a.M1.status is 10"]
     assert found.axis["x"].position == pytest.approx(200.0, abs=0.01)
     off = World.from_toml(TEXT.format(line="", steps='{ write = { "a.M1_EN" = 0 } }, { move = "a.M1", to = 10.0 }'))
     off.run(for_=1)
-    assert [str(record.value) for record in off.failures] == ["a.M1.status == 4"]
+    assert [str(record.value) for record in off.failures] == ["a.M1.status == 4; a.M1.status is 0"]
 
 
 def test_wait_for_waits_for_what_is_in_progress() -> None:
@@ -108,7 +108,7 @@ def test_wait_for_waits_for_what_is_in_progress() -> None:
     )
     found.run(for_=10)
     assert [str(record.value) for record in found.overdue] == [
-        "s waited in vain for a.M1.status != 3 and a.M1.status != 6 and a.M1.status != 8"
+        "s waited in vain for a.M1.status != 3 and a.M1.status != 6 and a.M1.status != 8; a.M1.status is 3"
     ]
     assert notes(found)[0][0] == pytest.approx(2.5, abs=1e-3)
 
@@ -205,7 +205,7 @@ def test_a_move_of_a_chip_that_is_stopped_is_a_failure() -> None:
     found = chip('{ move = "c.M1", by = 640000 }', '{ note = "end" }')
     found.at(2.0, Send("chips", b"k\r"))
     found.run(for_=10)
-    assert [str(record.value) for record in found.failures] == ["c.valid"]
+    assert [str(record.value) for record in found.failures] == ["c.valid; c.valid is 0"]
     ((end, _),) = notes(found)
     assert 2.0 < end < 2.5
 
@@ -259,10 +259,14 @@ def test_a_seek_that_is_stopped_or_finds_nothing_is_a_failure() -> None:
     found = homing('{ home = "c.M1", seek = "-B8" }', '{ note = "end" }')
     found.at(0.2, Send("chips", b"k\r"))
     found.run(for_=5)
-    assert [str(record.value) for record in found.failures] == ["c.valid and c.counter == 0 and c.B8 == 0"]
+    assert [str(record.value) for record in found.failures] == [
+        "c.valid and c.counter == 0 and c.B8 == 0; c.valid is 1, c.counter is 0 min. microsteps, c.B8 is 1"
+    ]
     away = homing('{ home = "c.M1", seek = "+B8", within = "2 s" }', '{ note = "end" }')
     away.run(for_=5)
-    assert [str(record.value) for record in away.overdue] == ["s waited in vain for not c.busy and chips.idle"]
+    assert [str(record.value) for record in away.overdue] == [
+        "s waited in vain for not c.busy and chips.idle; c.busy is 1, chips.idle is 1"
+    ]
     assert len(away.failures) == 1
     busy = homing('{ send = "chips", text = "g+\\rr\\r" }', '{ home = "c.M1", seek = "-B8", within = "1 s" }')
     busy.run(for_=5)

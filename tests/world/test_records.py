@@ -78,7 +78,7 @@ def test_all_without_a_selection(ran: World) -> None:
 
 
 def test_by_kind(ran: World) -> None:
-    assert shown(ran, kinds="note, report") == ["world      note: pressed", "world      expectation: a.OUT2"]
+    assert shown(ran, kinds="note, report") == ["world      note: pressed", "world      expectation: a.OUT2; a.OUT2 is 0"]
     assert shown(ran, kinds="button") == ["a          start: pressed"]
     assert shown(ran, kinds="fault") == ["clamp      no-air: clamp has no air"]
 

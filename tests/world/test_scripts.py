@@ -52,7 +52,7 @@ def test_expectations_that_do_not_hold_are_told() -> None:
         '[[script]]\nname = "s"\nsteps = [{ expect = "x.position > 49" }, { wait = "1 s" }, { expect = "x.position < 49" }]\n'
     )
     world.run(for_=2)
-    assert [(f.time, f.value) for f in world.failures] == [(SECOND, "x.position < 49")]
+    assert [(f.time, f.value) for f in world.failures] == [(SECOND, "x.position < 49; x.position is 50 mm")]
 
 
 def test_what_a_script_waits_for_in_vain_is_told_and_goes_on() -> None:
@@ -71,7 +71,7 @@ def test_what_a_script_waits_for_in_vain_is_told_and_goes_on() -> None:
     snapshot = world.snapshot()
     world.run(for_=4)
     told = [(r.time // SECOND, r.subject, r.value) for r in world.trace.events("world")]
-    assert told == [(2, "overdue", "s waited in vain for x.position > 60"), (3, "note", "on")]
+    assert told == [(2, "overdue", "s waited in vain for x.position > 60; x.position is 50 mm"), (3, "note", "on")]
     assert [record.time for record in world.overdue] == [2 * SECOND]
     assert not world.failures
     digest = world.trace.digest()

@@ -27,6 +27,7 @@ from steptwin.files.world import LONGEST_RUN_NS, World
 from steptwin.live.interrupts import FirstInterrupt
 from steptwin.machine import SECOND, Nanos
 from steptwin.world import script as do
+from steptwin.world.condition import INSTEAD
 from steptwin.world.kind import ProgramAct, ProgramReport
 from steptwin.world.overrides import Overrides
 from steptwin.world.records import PROGRAM, Selection, describe, is_shown, named_in, read_selection
@@ -287,7 +288,8 @@ def _print_end(world: World, outcome: WorldRunResult, selection: Selection, out:
     if world.overdue.more:
         out(f"warning: {world.overdue.more} more of these")
     if outcome.in_vain is not None:
-        out(f"warning: {outcome.in_vain} did not come true in {(world.now - outcome.began) / SECOND:g} s")
+        time = f"{(world.now - outcome.began) / SECOND:g} s"
+        out(f"warning: waited {time} in vain for {world.told(outcome.in_vain)}")
     if outcome.reason is None or world.failures or world.overdue:
         _print_unfinished(world, outcome.began, selection, out)
     for path in outcome.written:
@@ -329,7 +331,9 @@ def _json(world: World, outcome: WorldRunResult, out: Print) -> None:
         "wall_s": round(outcome.wall_s, 3),
         "ended_by": outcome.reason,
         "in_vain": outcome.in_vain,
-        "failures": [{"time_s": f.time / SECOND, "condition": f.value} for f in world.failures],
+        "failures": [
+            {"time_s": f.time / SECOND, "condition": str(f.value).partition(INSTEAD)[0], "what": f.value} for f in world.failures
+        ],
         "properties": [
             {
                 "property": one.name,

@@ -19,6 +19,11 @@ from steptwin.points import FARTHEST_NS
 from steptwin.world.expression import REMEMBERED, Comparison, Truth, comparisons, parse_condition, truth_of
 from steptwin.world.quantities import Quantity, SignalName, Sum, next_change
 
+INSTEAD = "; "
+"""Between a condition that does not hold and what its signals are."""
+MOST_TOLD = 6
+"""Number of signals whose values a message gives."""
+
 
 class Signal(Protocol):
     """A quantity of a world. ``continuous``: it also changes between events."""
@@ -98,6 +103,13 @@ class SignalCondition:
 
     def holds(self, now: Nanos) -> bool:
         return self._test(now)
+
+    def told(self, now: Nanos) -> str:
+        """Its text and what its signals are, after `bring`: ``lift.count == 3; lift.count is 0``. At most `MOST_TOLD` of them."""
+        texts = [f"{name} is {one.value(now):.9g} {one.unit}".rstrip() for name, one in self._signals.items()]
+        more = len(texts) - MOST_TOLD
+        told = ", ".join(texts) if more <= 0 else f"{', '.join(texts[:MOST_TOLD])} and {more} more"
+        return f"{self.text}{INSTEAD}{told}" if told else self.text
 
     def due(self, now: Nanos) -> Nanos | None:
         """The next moment at which the condition may become true without an event; ``now`` if it is true; None if never."""

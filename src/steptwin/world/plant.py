@@ -209,14 +209,20 @@ class Plant:
         return self._scripts.start(name, make, is_external=is_external)
 
     def expect(self, text: str) -> None:
-        """Report a condition that does not hold."""
+        """Report a condition that does not hold, with the values that it has instead."""
         if not self.holds(self.condition(text)):
-            self._report(self.failures, "expectation", text)
+            self._report(self.failures, "expectation", self.told(text))
 
     def holds(self, condition: SignalCondition) -> bool:
         """Whether a condition is true now."""
         condition.bring(self.now)
         return condition.holds(self.now)
+
+    def told(self, text: str) -> str:
+        """A condition with what its signals are now: ``lift.count == 3; lift.count is 0``."""
+        condition = self.condition(text)
+        condition.bring(self.now)
+        return condition.told(self.now)
 
     def report_refused(self, text: str) -> None:
         """Report a command of a script that cannot be done."""

@@ -227,7 +227,7 @@ class Scripts:
             return
         if waiting.condition is not None:
             if not has_come:
-                self._plant.report_overdue(f"{script.name} waited in vain for {waiting.condition}")
+                self._plant.report_overdue(f"{script.name} waited in vain for {self._plant.told(waiting.condition)}")
             return
         for asked in waiting.asked:
             if asked.first <= self._master(asked.line).unanswered <= asked.last:
