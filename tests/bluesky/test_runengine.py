@@ -15,13 +15,14 @@ from bluesky.preprocessors import run_decorator, stage_decorator
 from bluesky.run_engine import call_in_bluesky_event_loop
 from bluesky.utils import FailedStatus, MsgGenerator
 from gateway_rig import served
-from ophyd_async.core import FlyMotorInfo, NotConnectedError, init_devices
+from ophyd_async.core import FlyMotorInfo, NotConnectedError, init_devices, observe_value
 from tests.conftest import Served
 from tests.gateways.epics.test_clients import client
 
-from steptwin.bluesky import M1486Controller, Mic488Controller
+from steptwin.bluesky import AnalogInput, M1486Controller, Mic488Controller
 from steptwin.drivers import AsyncMic488, ProgramState
 from steptwin.drivers.m1486 import AsyncM1486
+from steptwin.errors import Misuse
 
 
 class Documents:
@@ -252,6 +253,104 @@ def test_an_m1486(serve_m1486: Callable[..., Served], engine: RunEngine, told: D
         engine(bps.mv(drum.motor, 0.0))
     assert "PositionUnknown" in failure(unknown)
     of_driver(drum.close())
+
+
+def test_the_program_of_an_m1486(serve_m1486: Callable[..., Served], engine: RunEngine) -> None:
+    """It runs from a label that a plan sets until it is completed or stopped, and is not begun while it runs."""
+    twin = serve_m1486("--variant", "B")
+    with init_devices():
+        drum = M1486Controller(AsyncM1486(f"tcp://127.0.0.1:{twin.tcp_port}"), label=1)
+    of_driver(drum.driver.download("[\nj3\n@1\n:11\nw20\nj1\n@2\n:22\nw20\nj2\n@3\n]\n"))
+    of_driver(drum.driver.wait())
+    program = drum.program
+
+    @run_decorator()
+    def run(label: int) -> MsgGenerator:
+        yield from bps.mv(program.label, label)
+        yield from bps.kickoff(program, wait=True)
+        yield from bps.sleep(0.1)
+        yield from bps.complete(program, wait=True)
+
+    for label in (1, 2):
+        engine(run(label))
+        assert of_driver(drum.driver.variable()) == 11 * label
+    assert of_driver(program.read_configuration())["drum-program-label"]["value"] == 2
+    with pytest.raises(FailedStatus) as wrong:
+        engine(run(81))
+    assert "the label = 81" in failure(wrong)
+    with pytest.raises(FailedStatus) as ended:
+        engine(bps.complete(program, wait=True))
+    assert "the program was not started here" in failure(ended)
+
+    @run_decorator()
+    def stopped(*, success: bool) -> MsgGenerator:
+        yield from bps.mv(program.label, 1)
+        yield from bps.kickoff(program, wait=True)
+        yield from bps.wait_for([lambda: program.stop(success=success)])
+        yield from bps.complete(program, wait=True)
+
+    with pytest.raises(FailedStatus) as failed:
+        engine(stopped(success=False))
+    assert "drum-program was stopped" in failure(failed)
+
+    @run_decorator()
+    def twice() -> MsgGenerator:
+        yield from bps.kickoff(program, wait=True)
+        yield from bps.kickoff(program, wait=True)
+
+    with pytest.raises(FailedStatus) as again:
+        engine(twice())
+    assert "Busy" in failure(again)
+    assert of_driver(drum.driver.is_busy())
+    of_driver(program.stop())
+    assert not of_driver(drum.driver.is_busy())
+    of_driver(drum.close())
+
+
+def test_analog_inputs(tmp_path: Path, serve: Callable[..., Served], engine: RunEngine, told: Documents) -> None:
+    """Each is a signal with the unit of its scale, by the register into which the program copies it."""
+    (tmp_path / "copy.prg").write_text("AGAIN:\n$R100 = AIN1\n$I102 = AIN2\nDELAY 0.01\nJUMP AGAIN\n")
+    (tmp_path / "table.cfg").write_text("[AIN0]\nLoVal=-1\nHiVal=9\n[AIN1]\nLoVal=0\nHiVal=200\n")
+    twin = serve("--config", str(tmp_path / "table.cfg"), "--program", str(tmp_path / "copy.prg"))
+    driver = AsyncMic488(f"tcp://127.0.0.1:{twin.tcp_port}")
+    inputs = {"pressure": AnalogInput("USER_REGISTER[100]:real", "bar"), "level": AnalogInput("USER_REGISTER[102]:int", "%")}
+    with init_devices():
+        press = Mic488Controller(driver, analog=inputs)
+    of_driver(driver.program.start())
+    assert twin.command("pin", "AIN1=2.5", "AIN2=5").returncode == 0
+    engine(bps.sleep(0.1))
+    engine(bp.count([press.analog]))
+    engine(bp.count([press.analog.pressure]))
+    assert told.column("press-analog-pressure") == [1.5, 1.5]
+    assert told.column("press-analog-level") == [100.0]
+    both, single = told.of("descriptor")
+    assert both["data_keys"]["press-analog-pressure"]["units"] == "bar"
+    assert both["data_keys"]["press-analog-level"]["units"] == "%"
+    assert set(both["hints"]["press-analog"]["fields"]) == {"press-analog-pressure", "press-analog-level"}
+    assert single["data_keys"]["press-analog-pressure"]["source"].endswith("/1/USER_REGISTER[100]:real")
+    changes = observe_value(press.analog.pressure, done_timeout=30.0)
+    assert of_driver(anext(changes)) == 1.5
+    assert twin.command("pin", "AIN1=10").returncode == 0
+
+    async def until_full() -> None:
+        async for value in changes:
+            if value == 9.0:
+                return
+
+    of_driver(until_full())
+    of_driver(changes.aclose())
+    of_driver(press.close())
+
+
+@pytest.mark.parametrize("name", ["name", "two words", "class", "_hidden"])
+def test_names_that_an_analog_input_cannot_have(name: str) -> None:
+    with pytest.raises(Misuse, match=f"analog input '{name}'"):
+        Mic488Controller(AsyncMic488("tcp://127.0.0.1:1"), analog={name: AnalogInput("USER_REGISTER[0]", "V")})
+
+
+def test_a_point_that_no_register_shows() -> None:
+    with pytest.raises(Misuse, match=r"no register shows AIN1; a program that has \$R100 = AIN1 copies it"):
+        Mic488Controller(AsyncMic488("tcp://127.0.0.1:1"), points=["IN3", "AIN1"])
 
 
 def test_the_motor_record_of_a_twin(tmp_path: Path) -> None:

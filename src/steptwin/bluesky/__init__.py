@@ -1,7 +1,7 @@
-"""Controllers as devices of Bluesky, by ophyd-async, on the drivers: motors, flyers, readings and programs (docs/bluesky.md).
+"""Controllers as devices of Bluesky, by ophyd-async, on the drivers (docs/bluesky.md).
 
 with init_devices():
-    table = Mic488Controller(AsyncMic488("tcp://127.0.0.1:5020"), points=["AIN1", "IN3"])
+    table = Mic488Controller(AsyncMic488("tcp://127.0.0.1:5020"), points=["M1_STATUS", "IN3"])
 RE(scan([table.readings], table.m1, 0.0, 20.0, 5))
 """
 
@@ -10,7 +10,9 @@ from __future__ import annotations
 from steptwin.extras import libraries_of, missing
 
 try:
+    from steptwin.bluesky.analoginputs import AnalogInput, AnalogReadings
     from steptwin.bluesky.controllers import M1486Controller, Mic488Controller
+    from steptwin.bluesky.labelledprograms import LabelledProgram
     from steptwin.bluesky.motors import FlyingMotor, MovingMotor
     from steptwin.bluesky.programs import RunnableProgram
     from steptwin.bluesky.readings import PointReadings
@@ -19,4 +21,14 @@ except ModuleNotFoundError as error:
         raise
     raise missing("steptwin.bluesky", libraries_of("bluesky")) from error
 
-__all__ = ["FlyingMotor", "M1486Controller", "Mic488Controller", "MovingMotor", "PointReadings", "RunnableProgram"]
+__all__ = [
+    "AnalogInput",
+    "AnalogReadings",
+    "FlyingMotor",
+    "LabelledProgram",
+    "M1486Controller",
+    "Mic488Controller",
+    "MovingMotor",
+    "PointReadings",
+    "RunnableProgram",
+]

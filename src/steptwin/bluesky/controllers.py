@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Protocol
 
 from ophyd_async.core import Device, DeviceConnector, NotConnectedError
 
+from steptwin.bluesky.analoginputs import AnalogInput, AnalogReadings
+from steptwin.bluesky.labelledprograms import LabelledProgram
 from steptwin.bluesky.motors import FlyingMotor, MotorPlace, MovingMotor, RampSettings
 from steptwin.bluesky.programs import RunnableProgram
 from steptwin.bluesky.readings import PointReadings
@@ -18,6 +21,7 @@ from steptwin.drivers.m1486.subject import M1486Part
 from steptwin.drivers.mic488.subject import Mic488Part
 from steptwin.drivers.subject import DevicePart
 from steptwin.errors import Misuse, SteptwinError
+from steptwin.mic488.core import ANALOG_PINS
 
 
 class OpenableDriver(Protocol):
@@ -68,14 +72,30 @@ class DriverConnector(DeviceConnector):
 
 
 class Mic488Controller(Device):
-    """The MIC488 of ``driver``: motors ``m1`` to ``m4`` in its units, ``readings`` of ``points``, and its ``program``."""
+    """The MIC488 of ``driver``: motors ``m1`` to ``m4`` in its units, ``readings`` of ``points``, a signal of each of the inputs
+    ``analog``, and its ``program``."""
 
-    def __init__(self, driver: AsyncMic488, points: Sequence[str] = (), name: str = "") -> None:
+    def __init__(
+        self,
+        driver: AsyncMic488,
+        points: Sequence[str] = (),
+        name: str = "",
+        *,
+        analog: Mapping[str, AnalogInput] = MappingProxyType({}),
+    ) -> None:
+        """Raises `Misuse` for an analog input among ``points``: no register shows it."""
+        for point in points:
+            if point.upper() in ANALOG_PINS:
+                raise Misuse(
+                    f"points: no register shows {point}; a program that has $R100 = {point.upper()} copies it, and "
+                    'analog={"NAME": AnalogInput("USER_REGISTER[100]:real", "UNIT")} reads it'
+                )
         self.driver = driver
         place = f"{driver.line.place}/{driver.unit}"
         self._connection = connector = DriverConnector(driver, place, lambda: Mic488Part(driver))
         self.m1, self.m2, self.m3, self.m4 = (self._motor(number) for number in range(1, 5))
         self.readings = PointReadings(connector.part, points)
+        self.analog = AnalogReadings(driver, lambda: place, analog)
         self.program = RunnableProgram(driver, lambda: place)
         super().__init__(name, connector)
 
@@ -94,15 +114,16 @@ class Mic488Controller(Device):
 
 
 class M1486Controller(Device):
-    """The M1486 of ``driver``: ``motor`` in its unit, and ``readings`` of ``points`` at rest. It does not fly, because a chip
-    does not tell its position in motion."""
+    """The M1486 of ``driver``: ``motor`` in its unit, ``readings`` of ``points`` at rest, and the ``program`` in its command
+    memory from ``label`` on. Its motor does not fly, because a chip does not tell its position in motion."""
 
-    def __init__(self, driver: AsyncM1486, points: Sequence[str] = ("COUNTER",), name: str = "") -> None:
+    def __init__(self, driver: AsyncM1486, points: Sequence[str] = ("COUNTER",), name: str = "", *, label: int = 1) -> None:
         self.driver = driver
         place = driver.line.place if driver.address is None else f"{driver.line.place}/{driver.address}"
         self._connection = connector = DriverConnector(driver, place, lambda: M1486Part(driver))
         self.motor = MovingMotor(driver, connector.motor_place(1), poll_s=None)
         self.readings = PointReadings(connector.part, points)
+        self.program = LabelledProgram(driver, lambda: place, label)
         super().__init__(name, connector)
 
     async def close(self) -> None:

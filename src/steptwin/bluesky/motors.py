@@ -27,12 +27,10 @@ from ophyd_async.core import (
 )
 
 from steptwin.bluesky.motions import AwaitedMotion, DrivenAxis
-from steptwin.bluesky.signals import DriverBackend, metadata_of
+from steptwin.bluesky.signals import POLL_S, DriverBackend, metadata_of
 from steptwin.datasheet import Limits
 from steptwin.errors import Misuse
 
-POLL_S = 0.1
-"""How often the position of a motor that is monitored is read, s."""
 SAMPLE_S = 0.02
 """How long a flying motor waits between two samples, s."""
 

@@ -14,7 +14,7 @@ from steptwin.errors import Refusal
 
 
 class PointReadings(Device, AsyncReadable, Triggerable, HasHints):
-    """The points ``points`` (``AIN1``, ``M1_STATUS``, ``USER_REGISTER[5]``) of the controller ``part``, which is there once it is
+    """The points ``points`` (``IN3``, ``M1_STATUS``, ``USER_REGISTER[5]``) of the controller ``part``, which is there once it is
     connected. A reading is that of the last trigger; without one since the last reading it is new."""
 
     def __init__(self, part: Callable[[], DevicePart], points: Sequence[str], name: str = "") -> None:

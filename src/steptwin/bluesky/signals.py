@@ -15,6 +15,8 @@ from steptwin.datasheet import Limits
 from steptwin.errors import Misuse, SteptwinError
 
 ValueT = TypeVar("ValueT", float, str)
+POLL_S = 0.1
+"""How often a value that is monitored is read, s."""
 INVALID = 3
 """Severity of a value that could not be read."""
 
