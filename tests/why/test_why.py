@@ -179,6 +179,63 @@ def test_a_wait_for_all_axes_is_for_the_one_that_ends_last() -> None:
     assert "the motion of table.M1 ended, which began at" in ended[4]
 
 
+def moves() -> World:
+    """Motions from 0.001 s and from 3 s on: 500 pulses take less than 1 s."""
+    program = "M1 = ON\nPABS M1 500\nWAITPOS\nDELAY 2\nPABS M1 0\nWAITPOS\nWAIT IN1 = ON\n"
+    return World.from_toml('[[mic488]]\nname = "table"\nprogram = "a.prg"\nstart = true\n', {"a.prg": program.encode()})
+
+
+@pytest.mark.parametrize("point", ["M1.moving", "M1.velocity", "M1.position", "M1_POS_ACT", "M1.status"])
+def test_what_changes_by_the_end_of_a_motion_is_so_since_that_end(point: str) -> None:
+    world = moves()
+    world.run(20.0)
+    end = world.why("M1.moving == 0").since
+    assert end is not None
+    began = world.why("M1.moving", at=end / 1e9 - 0.01)
+    assert (began.state, began.links[0].text) == ("table.M1.moving is 1", "line 5 `PABS M1 0` was executed")
+    assert began.since == began.links[0].time < end
+    answer = world.why(point)
+    assert answer.since == end
+    assert [link.text for link in answer.links[:2]] == [
+        f"the motion of table.M1 ended, which began at {began.links[0].time / 1e9:.6f} s",
+        "line 5 `PABS M1 0` was executed",
+    ]
+
+
+def test_a_running_twin_knows_the_end_of_a_motion_that_is_long_past() -> None:
+    world = moves()
+    history = History(world)
+    for second in range(1, 21):
+        world.run(float(second))
+        history.take()
+    questions = PastQuestions(history)
+    for point in ("M1.moving", "M1.position"):
+        answer = finish(questions.asking(point))
+        assert answer.since == world.why(point).since
+        assert answer.links[1].text == "line 5 `PABS M1 0` was executed"
+
+
+@pytest.mark.parametrize("point", ["moving", "position"])
+def test_the_end_of_a_motion_of_an_m1486(point: str) -> None:
+    """At the same moment the next command is executed, which has nothing to do with it."""
+    world = World.from_toml(CHIP, {"p.m1486": CHIP_PROGRAM.replace("Z2\n", "").encode()})
+    world.run(2.0)
+    answer = world.why(point)
+    assert answer.since == world.why("B1").since
+    assert [link.text for link in answer.links[:2]] == ["stands at 6400", "line 5 `R` was executed"]
+
+
+def test_what_never_moved_and_what_was_set_since() -> None:
+    world = moves()
+    world.run(10.0)
+    for point in ("M2.moving", "M2.position"):
+        assert world.why(point).since is None
+    world.mic488["table"].write("M1_POS_ACT", 77.0)
+    world.run(11.0)
+    answer = world.why("M1.position")
+    assert (answer.since, answer.links[0].text) == (10_000_000_000, "from outside: writes table.M1_POS_ACT = 77")
+
+
 def test_a_fault_is_a_cause_of_what_it_names_only() -> None:
     world = line()
     world.run(1.0)

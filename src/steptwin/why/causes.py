@@ -252,7 +252,14 @@ class Causes:
                 event = record
         if event is not None:
             return Cause(ChainLink(change.time, machine, str(event.value)), after)
-        return self._fault(machine, change.time) or after()
+        return self._fault(machine, change.time) or self._ended(machine, change.time, wanted) or after()
+
+    def _ended(self, machine: str, time: Nanos, wanted: Resource | None) -> FoundCause:
+        """The motion of an axis that ended at a moment."""
+        if wanted is None or wanted.kind is not ResourceKind.AXIS:
+            return None
+        ended = (self._end(plan)[0] == time for plan in self._log.plans_in_force(machine, wanted.name, time) if plan.time < time)
+        return self.motion(machine, wanted.name, time) if any(ended) else None
 
     def _asked_before(self, machine: str, change: Change) -> FoundCause:
         """A request on a line with timing, which is answered later than it came."""

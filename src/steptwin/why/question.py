@@ -10,6 +10,7 @@ from typing import TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
+from steptwin.points import LivePoint
 from steptwin.why import points
 from steptwin.why.answer import MOST_LINKS, Answer, ChainLink, since_before
 from steptwin.why.causes import Cause, Causes, nothing
@@ -17,18 +18,22 @@ from steptwin.why.courses import Courses, CourseTurns, watch_truth, watch_value
 from steptwin.why.log import MOST_NOTED, CauseLog, in_parts
 from steptwin.why.search import Asked
 from steptwin.why.sentences import statement
-from steptwin.why.states import Interval, StatesOnTheWay
+from steptwin.why.states import Interval, StatesOnTheWay, rest_of
 from steptwin.world.condition import Signal, SignalCondition
 from steptwin.world.expression import parse_condition
 from steptwin.world.history import outside_past
 from steptwin.world.plant import Plant
 from steptwin.world.plantsnapshot import RecordedInput
 from steptwin.world.programs import Resource, ResourceKind
+from steptwin.world.signals import SignalOf
 
 MOST_STATES = 5
 """Limit of the signals whose present levels are shown of what a program waits for."""
 
-_AXIS = re.compile(r"M(\d+)[._]", re.IGNORECASE)
+SWITCH = "switch"
+"""The type of a point that is 0 or 1."""
+_AXIS = re.compile(r"(?:M|ENC)(\d+)[._]|moving$", re.IGNORECASE)
+"""A point that a motion changes; the group is the number of its axis, none where the controller has one only."""
 
 Asking: TypeAlias = Generator[None, None, Answer]
 """In parts: after each of them something else can be done, or the question be given up by `close`."""
@@ -135,7 +140,7 @@ class Why:
         names = tuple(dict.fromkeys(parse_condition(text).names()))
         is_bare = len(names) == 1 and text == names[0]
         moving = {name for name in names if not self.log.has(name) and self.log.world.signal(name).continuous}
-        if (is_bare and moving) or "idle" in names:
+        if (is_bare and self._takes_values_between(text)) or "idle" in names:
             return None
         canonical = {name: self._canonical(name) for name in names}
         edges = frozenset(full for full in canonical.values() if self._has_edges(full))
@@ -161,8 +166,8 @@ class Why:
         asked = self._named(text)
         found = tuple(dict.fromkeys(parse_condition(asked).names()))
         is_bare = asked == found[0] if len(found) == 1 else False
-        if is_bare and not self.log.has(found[0]) and self.log.world.signal(found[0]).continuous:
-            return (yield from self._moving(found[0], at))
+        if is_bare and self._takes_values_between(asked):
+            return (yield from self._moving(asked, at))
         canonical = {name: self._canonical(name) for name in found}
         if all(self.log.is_recorded(name) for name in canonical.values()):
             value, since = self._from_log(asked, canonical, at, is_bare=is_bare)
@@ -171,6 +176,19 @@ class Why:
         state = f"{asked} is {value:g}" if is_bare else f"{asked} is {'true' if value else 'false'}"
         first = None if since is None else self._changed(tuple(canonical.values()), since)
         return (yield from self._answer(text, at, state, since, first))
+
+    def _takes_values_between(self, name: str) -> bool:
+        """Whether a quantity changes between events, but not from one level to the other as ``moving`` at the end of a motion."""
+        if self.log.has(name) or not self.log.world.signal(name).continuous:
+            return False
+        point = self._point(name)
+        return point is None or point.point.type != SWITCH
+
+    def _point(self, name: str) -> LivePoint | None:
+        """The point of a controller with this name; None for what is none."""
+        owner, _, rest = name.partition(".")
+        world = self.log.world
+        return world.kind(owner).point(world.machine(owner), rest) if owner in world.machines else None
 
     def _named(self, text: str) -> str:
         """The condition with names that leave out their controller in full, where there is only one that has it."""
@@ -312,18 +330,25 @@ class Why:
             lanes = [name for name in self.log.changes if name == owner or name.startswith(f"{owner}.")]
             return causes.last(lanes, time)
         axis = _AXIS.match(rest)
-        wanted = None if axis is None else Resource(ResourceKind.AXIS, axis[1])
+        is_of_axis = axis is not None or (self._is_signal(signal) and world.signal(signal).continuous)
+        wanted = Resource(ResourceKind.AXIS, (axis and axis[1]) or "") if is_of_axis else None
         return causes.at_moment(owner, time, wanted)
 
     def _moving(self, signal: str, at: Nanos) -> Asking:
-        """Of a quantity that changes all the time."""
+        """Of a quantity that changes all the time: the motion, or since when a point of a controller stands."""
         world = self.log.world
         other, state = self._make(), next(self._on_the_way.until(at))
         other.restore(state.snapshot)
         for _ in in_parts(other, self._inputs[state.inputs :], at):
             yield
-        state = f"{signal} is {other.read(signal):.6g} {world.signal(signal).unit}".rstrip()
-        first = self._of_unrecorded(self._canonical(signal), at)
+        value, full = other.read(signal), self._canonical(signal)
+        state = f"{signal} is {value:.6g} {world.signal(signal).unit}".rstrip()
+        standing = other.signal(signal)
+        if self._point(signal) is not None and isinstance(standing, SignalOf) and rest_of(standing, at) is not None:
+            _, since = yield from self._from_run(f"{signal} == {value!r}", {signal: full}, at, is_bare=False)
+            changed = None if since is None else self._changed((full,), since)
+            return (yield from self._answer(signal, at, state, since, changed))
+        first = self._of_unrecorded(full, at)
         return (yield from self._answer(signal, at, state, None if first is None else first.link.time, first))
 
     # ------------------------------------------------------------------ programs
