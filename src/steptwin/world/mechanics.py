@@ -166,7 +166,7 @@ class Mechanism(Stateful):
         return self.course(now).at(now)
 
     def lost(self, now: Nanos) -> int:
-        """The number of pulses by which the rotor is behind the field."""
+        """The number of pulses by which the rotor is below the field; negative: above it."""
         course = self.course(now)
         return course.field(now) - course.at(now).rotor
 
