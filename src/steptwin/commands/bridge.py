@@ -60,8 +60,7 @@ async def _open(server: Server, wanted: DeviceFile, file: Path, audit: Audit | N
 
     server.introduce(wanted.name, file=file)
     subject = CompositeSubject(None, now, Numbering({}))
-    around = DeviceSurroundings(clock=now, keep=keep_settings, on_internal=report)
-    connections = DeviceConnections(subject, around, Computer(ports=_no_ports, find=find_device))
+    connections = connections_of(subject, report)
     server.join(connections)
     for device in wanted.devices:
         await open_device(connections, device.beside(file.parent), server.notice)
@@ -70,6 +69,12 @@ async def _open(server: Server, wanted: DeviceFile, file: Path, audit: Audit | N
         audit = Audit(wall_clock)
     devices.audit = recording(audit, now)
     await open_gateways(server, wanted.gateways, wanted.history, file.parent, devices, audit, listen_any=listen_any)
+
+
+def connections_of(subject: CompositeSubject, on_internal: Callable[[Exception], object]) -> DeviceConnections:
+    """Connections to devices that become parts of ``subject``."""
+    around = DeviceSurroundings(clock=subject.now, keep=keep_settings, on_internal=on_internal)
+    return DeviceConnections(subject, around, Computer(ports=_no_ports, find=find_device))
 
 
 async def open_device(connections: DeviceConnections, device: DeviceSpec, notice: Callable[[str], None]) -> None:
