@@ -371,7 +371,10 @@ def test_a_motor_without_torque_is_told_when_it_loses_the_field_and_when_it_is_c
     behind = 200 - mechanism.place(kernel.now)
     assert behind == 192, "the multiple of 64 nearest to 190"
     events = [(record.time, record.subject, record.value) for record in told if record.kind == "event"]
-    assert [event[1:] for event in events] == [("stall", "x loses the field"), ("stall", "x is caught, 192 pulses behind")]
+    assert [event[1:] for event in events] == [
+        ("stall", "x stalls: it no longer follows its field"),
+        ("stall", "x is caught, 192 pulses behind"),
+    ]
     assert [event[0] for event in events] == pytest.approx([0.2 * SECOND, end], abs=1000)
     assert mechanism.lost(kernel.now) == 192
 

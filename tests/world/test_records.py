@@ -97,7 +97,7 @@ def test_names_are_no_words_of_a_text() -> None:
     """A note may begin with the name of an element, and an axis that stalls has its name among the facts."""
     world = World.from_toml(STALLING)
     world.run(for_=3)
-    assert shown(world, "slide")[0] == "a          slide loses the field"
+    assert shown(world, "slide")[0] == "a          slide stalls: the motion needs 1.26 N·m, the motor has 0.01 N·m"
     assert shown(world, "world") == ["world      note: slide has no load"]
 
 

@@ -28,6 +28,8 @@ from steptwin.motion.divisions import Plan, profile_of
 from steptwin.world.motor import StepperMotor
 from steptwin.world.resonance import Spell, spells
 
+UNFOLLOWED = "it no longer follows its field"
+
 
 @dataclass(frozen=True, slots=True)
 class Build:
@@ -212,9 +214,16 @@ class Course:
         before = max(bisect_right(self._spells, now_s, key=attrgetter("begin_s")) - 1, 0)
         return self._spells[before].at(max(now_s, self._spells[before].begin_s), motor.resonance.least)
 
-    def is_shaken(self, now: Nanos) -> bool:
-        """Whether the rotor loses the field by resonance in this moment."""
-        return now in self._shaken
+    def why_stalled(self, now: Nanos) -> str:
+        """Why the rotor loses the field in this moment, for a sentence."""
+        motor, profile = self.build.motor, profile_of(self.plan)
+        if now in self._shaken:
+            return " by resonance"
+        part = bisect_right(profile.ends, now - profile.start)
+        if motor is None or part >= len(profile.segments):
+            return f": {UNFOLLOWED}"
+        lack = motor.lack(profile.segments[part], (now - profile.start) / SECOND, self.build.sign)
+        return f": {lack or UNFOLLOWED}"
 
     def load_pieces(self) -> tuple[LoadPiece, ...]:
         """Where the load is, with as few entries as possible; for a drive at rest the distance of the load from it."""

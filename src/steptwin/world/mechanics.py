@@ -223,8 +223,8 @@ class Mechanism(Stateful):
         stalled = self._course.at(now).stalled
         if stalled is not self._stalled:
             self._stalled = stalled
-            why = " by resonance" if self._course.is_shaken(now) else ""
-            text = f"{self._name} loses the field{why}" if stalled else f"{self._name} is caught, {self.lost(now)} pulses behind"
+            caught = f"{self._name} is caught, {self.lost(now)} pulses behind"
+            text = f"{self._name} stalls{self._course.why_stalled(now)}" if stalled else caught
             facts = (
                 ("axis", self.number),
                 ("element", self._name),

@@ -30,6 +30,8 @@ LOOK_S = 0.001
 _NEAR_S = 1e-5
 Quadratic: TypeAlias = tuple[float, float, float]
 """q0 + q1·u + q2·u²."""
+_SAME = 0.005
+"""Relative difference of torques that three digits do not show."""
 _SLACK = 1e-12
 """Relative tolerance for rounding when required and available torque are equal."""
 
@@ -142,6 +144,19 @@ class StepperMotor:
     def needs(self, acceleration: float, direction: int) -> float:
         """Torque required for an acceleration (pulses/s²) while moving in ``direction``."""
         return self.inertia * acceleration + self.friction * direction + self.load
+
+    def lack(self, s: Any, t_s: float, sign: int) -> str:
+        """In words, what the motion needs at a moment of a segment and the motor does not have; empty if it has it."""
+        if not isinstance(s, Segment):
+            return ""
+        speed = abs(s.velocity(t_s))
+        acceleration = 2.0 * s.c2 + 6.0 * s.c3 * (t_s - s.anchor_s)
+        need, has = abs(self.needs(sign * acceleration, sign * s.direction)), max(self.torque(speed), 0.0)
+        if need < has * (1.0 - _SAME):
+            return ""
+        if need <= has * (1.0 + _SAME):
+            return f"the motion needs more than the {has:.3g} N·m that the motor has at this speed"
+        return f"the motion needs {need:.3g} N·m, the motor has {has:.3g} N·m"
 
     def loses(self, s: Any, begin_s: float, end_s: float, sign: int) -> float | None:
         """First moment from ``begin_s`` on and before ``end_s`` at which the torque is insufficient; seconds of segment ``s``.

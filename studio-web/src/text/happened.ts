@@ -63,8 +63,12 @@ export const HAPPENED: Readonly<Record<string, string>> = {
   "shutdown is over: the program begins again": "koniec shutdown: program zaczyna od nowa",
   "the EEPROM could not be kept: {why}": "EEPROM nie dał się zapisać: {why}",
   // Of mechanics and elements.
-  "{axis} loses the field by resonance": "{axis} gubi pole przez rezonans",
-  "{axis} loses the field": "{axis} gubi pole",
+  "{axis} stalls by resonance": "{axis} utyka przez rezonans",
+  "{axis} stalls: {why}": "{axis} utyka: {why}",
+  "the motion needs {need} N·m, the motor has {has} N·m": "ruch wymaga {need} N·m, silnik ma {has} N·m",
+  "the motion needs more than the {has} N·m that the motor has at this speed":
+    "ruch wymaga więcej niż {has} N·m, które silnik ma przy tej prędkości",
+  "it no longer follows its field": "nie nadąża już za polem",
   "{axis} is caught, {pulses} pulses behind": "{axis} znów w polu, {pulses} impulsów w tyle",
   "{axis} moves without current": "{axis} rusza się bez prądu",
   "{axis} stands, {pulses} pulses behind": "{axis} stoi, {pulses} impulsów w tyle",

@@ -181,7 +181,7 @@ def test_a_brake_that_does_not_let_go_stalls_the_motor() -> None:
     device.write("M1_POS_ABS", 10.0)
     world.run(until="idle")
     assert (world.axis["z"].position, world.read("hold.released")) == (200.0, 0)
-    assert events(world, "stall")[0][1] == "z loses the field"
+    assert events(world, "stall")[0][1] == "z stalls: the motion needs 4.26 N·m, the motor has 3 N·m"
 
 
 def test_a_supply_that_fails_lets_it_fall() -> None:

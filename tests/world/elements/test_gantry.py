@@ -88,7 +88,10 @@ def test_a_motor_whose_partner_has_no_current_moves_all_of_it() -> None:
     world = World.from_toml(text(), overrides={"beam.limit": 50.0})
     start(world, "b")
     world.run(until="idle")
-    assert events(world, "stall")[0] == (pytest.approx(expected, abs=2e-6), "yb loses the field")
+    assert events(world, "stall")[0] == (
+        pytest.approx(expected, abs=2e-6),
+        "yb stalls: the motion needs more than the 0.398 N·m that the motor has at this speed",
+    )
     loaded = World.from_toml(text(), overrides={"beam.limit": 50.0, "beam.friction_force": 200.0})
     start(loaded, "b")
     loaded.run(until="yb.position > 40")
@@ -101,7 +104,7 @@ def test_what_one_loses_the_other_has_to_move() -> None:
     world.run(for_=0.5)
     world.fault("stall machine=a axis=1 for_s=0.3")
     world.run(until="idle")
-    assert events(world, "stall")[0] == (0.5, "yb loses the field")
+    assert events(world, "stall")[0] == (0.5, "yb stalls: the motion needs 0.382 N·m, the motor has 0.34 N·m")
     assert events(world, "collision") == []
 
 
@@ -176,7 +179,8 @@ def test_stiff_guides_stall_both() -> None:
     world.run(for_=0.5)
     world.fault("stiff-guides element=beam factor=3")
     world.run(for_=0.1)
-    assert [words for _, words in events(world, "stall")] == ["ya loses the field", "yb loses the field"]
+    lack = "the motion needs 0.573 N·m, the motor has 0.34 N·m"
+    assert [words for _, words in events(world, "stall")] == [f"ya stalls: {lack}", f"yb stalls: {lack}"]
 
 
 @pytest.mark.parametrize(
