@@ -261,6 +261,53 @@ def test_a_stuck_output_of_an_element() -> None:
     ]
 
 
+def test_a_fault_that_holds_the_level_that_is_there() -> None:
+    """There is no change that it causes, but it is why there is none."""
+    world = waits()
+    world.fault("stuck machine=cell pin=IN2 value=0 name=cut")
+    world.run(6.0)
+    by_fault = ["5.000000 s cell cell.IN2 is held at 0 by fault cut", "5.000000 s outside from outside: sets the fault cut"]
+    assert shown(world, "cell.IN2 == 0") == ["cell.IN2 == 0 is true, from the beginning (at 6 s)", *by_fault]
+    assert shown(world, "cell")[1:] == ["6.000000 s cell cell.IN2 is held at 0 by fault cut since 5.000000 s", *by_fault]
+    assert shown(world, "IN2", 4.0) == ["cell.IN2 is 0, from the beginning (at 4 s)"]
+    world.clear_fault("cut")
+    world.run(7.0)
+    assert len(shown(world, "IN2")) == 1
+    assert shown(world, "IN2", 5.5)[1:] == by_fault
+
+
+def test_a_level_that_changed_before_a_fault_held_it() -> None:
+    world = waits()
+    world.fault("stuck machine=cell pin=IN1 value=1")
+    world.run(6.0)
+    assert [link.text for link in world.why("IN1").links[:3]] == [
+        "cell.IN1 is held at 1 by fault stuck",
+        "from outside: sets the fault stuck",
+        "cell.IN1 became 1",
+    ]
+
+
+def test_terminals_that_are_held() -> None:
+    world = waits()
+    world.fault("stuck-input element=both input=in2 level=0 name=open")
+    world.run(6.0)
+    assert "6.000000 s both both.in2 is held at 0 by fault open since 5.000000 s" in shown(world, "cell")
+    world.fault("stuck-output element=both output=out level=0")
+    world.run(7.0)
+    for question in ("both.out", "cell.IN2"):
+        assert world.why(question).links[0].text == "both.out is held at 0 by fault stuck-output"
+
+
+def test_a_running_twin_knows_a_fault_that_was_set_long_ago() -> None:
+    world = waits()
+    world.fault("stuck machine=cell pin=IN2 value=0")
+    history = History(world)
+    for second in range(5, 20):
+        world.run(float(second))
+        history.take()
+    assert finish(PastQuestions(history).asking("IN2")).links[0].text == "cell.IN2 is held at 0 by fault stuck"
+
+
 def test_commands_of_an_m1486() -> None:
     world = World.from_toml(CHIP, {"p.m1486": CHIP_PROGRAM.encode()})
     world.run(1.0)

@@ -50,6 +50,36 @@ def test_waits_of_programs_and_scripts() -> None:
     assert next(iter(waiting(world))) == ("a", "a.prg:4 WAIT OUT2 = ON: a.OUT2 is 0")
 
 
+def test_a_fault_that_holds_an_input_or_what_drives_it() -> None:
+    world = World.from_toml(
+        """
+        [[mic488]]
+        name = "a"
+        program = "a.prg"
+        start = true
+        [[gate]]
+        name = "both"
+        kind = "and"
+        inputs = ["a.OUT1", "a.OUT2"]
+        [[wire]]
+        from = "both.out"
+        to = "a.IN5"
+        """,
+        FILES,
+    )
+    world.fault("stuck-output element=both output=out level=0 name=weld")
+    world.run(for_=1)
+    (one,) = waiting(world)
+    assert one.what == "a.prg:2 WAIT IN5 = ON: a.IN5 is 0, driven by both.out (held at 0 by fault weld)"
+    world.fault("stuck pin=IN5 value=0")
+    world.run(for_=1)
+    assert [one.what for one in waiting(world)] == ["a.prg:2 WAIT IN5 = ON: a.IN5 is held at 0 by fault stuck"]
+    world.clear_fault("stuck")
+    world.clear_fault("weld")
+    world.run(for_=1)
+    assert [one.what for one in waiting(world)] == ["a.prg:2 WAIT IN5 = ON: a.IN5 is 0, driven by both.out"]
+
+
 def test_inputs_that_never_changed() -> None:
     world = World.from_toml(TEXT, FILES)
     world.run(for_=1)

@@ -112,6 +112,28 @@ class Causes:
                     return _acted(act)
         return None
 
+    def lasting(self, signals: Sequence[str], at: Nanos, first: FoundCause) -> FoundCause:
+        """The fault that holds one of these signals at a moment, or the output to which a pin is wired, if it began to after the
+        change ``first``, which is the next cause then."""
+        pins = [signal for signal in signals if signal.partition(".")[0] in self._world.machines]
+        wired = [source for pin in pins for source in self.drivers(pin, at)]
+        named = dict.fromkeys((*signals, *wired))
+        holds = [(hold.time, signal, hold.held) for signal in named if (hold := self._log.hold(signal, at)) and hold.held]
+        time, signal, held = max(holds, default=(-1, "", None))
+        if held is None or (first is not None and time <= first.link.time):
+            return first
+
+        link = ChainLink(time, signal.partition(".")[0], f"{signal} is {held.words()}")
+
+        def before() -> FoundCause:
+            return first or self._at_begin()
+
+        for act in self._log.acts_before(time, MOST_LOOKED_BACK):
+            match act.what:
+                case do.SetFault(fault) if held.fault.startswith(fault.name or fault.kind.name):
+                    return Cause(link, partial(Cause, _acted(act).link, before))
+        return Cause(link, nothing if first is None and self._log.is_whole else before)
+
     def _of_element(self, name: str, change: Change) -> FoundCause:
         """What changed an output of an element: an input at the same moment, or one before, as much earlier as it delays."""
         part = self._parts[name]
@@ -182,13 +204,23 @@ class Causes:
             return self.change(name, earlier, ", and the contact bounced")
         return None
 
-    def drivers(self, signal: str) -> list[str]:
-        """The signals that a signal follows: those that drive an input, or the inputs of an element."""
+    def drivers(self, signal: str, at: Nanos) -> list[str]:
+        """The signals that a signal follows at a moment: those that drive an input, or the inputs of an element; an input of an
+        element that a fault holds stands for what drives it."""
+        if self._log.hold(signal, at) is not None:
+            return []
         owner, _, terminal = signal.partition(".")
         part = self._parts.get(owner)
         if part is not None:
-            return [source for name in _inputs(part) for source in self._sources(PinName(owner, name))]
+            return [source for name in _inputs(part) for source in self._held_or_sources(owner, name, at)]
         return list(self._sources(PinName(owner, terminal))) if owner in self._world.machines else []
+
+    def _held_or_sources(self, owner: str, terminal: str, at: Nanos) -> Iterator[str]:
+        signal = f"{owner}.{terminal.lower()}"
+        if self._log.hold(signal, at) is None:
+            yield from self._sources(PinName(owner, terminal))
+        else:
+            yield signal
 
     # ------------------------------------------------------------------ controllers
 
@@ -392,7 +424,8 @@ class Causes:
         match resource.kind:
             case ResourceKind.PIN:
                 every = [name for name in self._log.changes if name.startswith(f"{machine}.")]
-                return self.last([f"{machine}.{resource.name}"] if resource.name else every, time)
+                read = [f"{machine}.{resource.name}"] if resource.name else every
+                return self.lasting(read, time, self.last(read, time))
             case ResourceKind.AXIS:
                 return self.motion(machine, resource.name, time)
             case ResourceKind.VALUE:

@@ -16,8 +16,10 @@ from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.statements import StatementHook
 from steptwin.why import points
+from steptwin.world import script as do
 from steptwin.world.actions import Download, ExternalInput
 from steptwin.world.elements import ELEMENTS
+from steptwin.world.faults.active import Held
 from steptwin.world.history import SLICE_NS, replay
 from steptwin.world.plant import Plant
 from steptwin.world.plantsnapshot import RecordedInput
@@ -77,6 +79,13 @@ class Change(NamedTuple):
     position: int
 
 
+class Hold(NamedTuple):
+    """From a moment on a fault holds a signal; nothing does, if ``held`` is None."""
+
+    time: Nanos
+    held: Held | None
+
+
 class CauseLog:
     """Notes what happens in ``world`` from now on while that runs.
 
@@ -99,6 +108,7 @@ class CauseLog:
         self.plans: dict[tuple[str, str], list[Change]] = defaultdict(list)
         """Moments and positions of the plans of an axis, by controller and number."""
         self.acts: list[Act] = []
+        self._holds: dict[str, list[Hold]] = defaultdict(list)
         self._replaced: dict[str, Nanos] = {}
         """When the program of a controller was last replaced by a download."""
         self._keeping: dict[str, dict[Place, bool]] = defaultdict(dict)
@@ -109,6 +119,8 @@ class CauseLog:
         for record in world.trace if self.is_whole else _plans(world):
             self._take(record)
         world.trace.stop()  # it is noted here
+        for owner in (*parts.faults.machines, *parts.faults.elements):
+            self._note_holds(owner, self.begin)
         self._built = {group: len(records) for group, records in self.records.items()}
         self.points = points.PointTurns(world)
         world.trace.watchers.append(self._take)
@@ -149,7 +161,16 @@ class CauseLog:
                 self.changes[self.signal_of(record)].append(change)
             case "plan":
                 self.plans[record.machine, record.subject].append(Change(record.time, 0.0, group, len(records)))
+            case "fault":
+                self._note_holds(record.machine, record.time)
         records.append(record)
+
+    def _note_holds(self, owner: str, now: Nanos) -> None:
+        held = self.world.parts.faults.held(owner)
+        for signal in (*held, *(name for name in self._holds if name.startswith(f"{owner}.") and name not in held)):
+            holds = self._holds[signal]
+            if (holds[-1].held if holds else None) != held.get(signal):
+                holds.append(Hold(now, held.get(signal)))
 
     def _act(self, script: str, what: ExternalInput) -> None:
         self._count()
@@ -159,6 +180,10 @@ class CauseLog:
             case Download(machine=machine):
                 self._replaced[machine] = self.world.now
                 self._keeping[machine].clear()
+            case do.ClearFault(name):
+                for holds in self._holds.values():
+                    if (held := holds[-1].held) is not None and held.fault == name:
+                        holds.append(Hold(self.world.now, None))
 
     def _hook(self, name: str, programs: Programs) -> StatementHook:
         add, records, executes = self.executed[name].add, self.records[self._group_of[name]], self.points.executes
@@ -209,6 +234,11 @@ class CauseLog:
         while index and before is not None and changes[index - 1].time == until and changes[index - 1].position >= before:
             index -= 1
         return changes[index - 1] if index else None
+
+    def hold(self, signal: str, at: Nanos) -> Hold | None:
+        """What holds a signal at a moment, since when."""
+        last = next((hold for hold in reversed(self._holds.get(signal, ())) if hold.time <= at), None)
+        return None if last is None or last.held is None else last
 
     def changes_in(self, signal: str, after: Nanos, until: Nanos) -> Iterator[Nanos]:
         """The moments at which a signal took another value, after one until another."""

@@ -174,7 +174,8 @@ class Why:
         else:
             value, since = yield from self._from_run(asked, canonical, at, is_bare=is_bare)
         state = f"{asked} is {value:g}" if is_bare else f"{asked} is {'true' if value else 'false'}"
-        first = None if since is None else self._changed(tuple(canonical.values()), since)
+        signals = tuple(canonical.values())
+        first = self._causes.lasting(signals, at, None if since is None else self._changed(signals, since))
         return (yield from self._answer(text, at, state, since, first))
 
     def _takes_values_between(self, name: str) -> bool:
@@ -394,11 +395,16 @@ class Why:
                 continue
             seen.add(name)
             since = self.log.since(name, at)
-            drivers = self._causes.drivers(name)
+            drivers = self._causes.drivers(name, at)
             waiting += drivers
             when = since_before(self.log.begin) if since is None else f"since {since / SECOND:.6f} s"
             driven = f", driven by {' and '.join(drivers)}" if drivers else ""
-            yield ChainLink(at, name.partition(".")[0], f"{name} is {self.log.level(name, at):g} {when}{driven}")
+            hold = self.log.hold(name, at)
+            if hold is not None and hold.held is not None:
+                level = f"{hold.held.words()} since {hold.time / SECOND:.6f} s"
+            else:
+                level = f"{self.log.level(name, at):g} {when}{driven}"
+            yield ChainLink(at, name.partition(".")[0], f"{name} is {level}")
 
     # ------------------------------------------------------------------ the chain
 

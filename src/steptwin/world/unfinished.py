@@ -8,6 +8,7 @@ from typing import NamedTuple
 from steptwin.diagnostics import visible
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.world.faults.active import Held
 from steptwin.world.plant import Plant
 from steptwin.world.programs import Place, Resource, ResourceKind
 from steptwin.world.wiring import Connection, connections
@@ -22,14 +23,14 @@ class Waiting(NamedTuple):
 
 def waiting(plant: Plant) -> Iterator[Waiting]:
     """The programs that wait for something other than time, then the scripts, but for events, which wait for the next time."""
-    drivers = _drivers(plant)
+    drivers, held = _drivers(plant), _held(plant)
     for name, programs in plant.programs.items():
         stack = programs.stack(plant.now)
         if not stack:
             continue
         use = programs.use(stack[0].place)
         if use.waits and use.reads:
-            states = ", ".join(state for resource in use.reads for state in _states(plant, name, resource, drivers))
+            states = ", ".join(state for resource in use.reads for state in _states(plant, name, resource, drivers, held))
             where = _statement(plant, name, stack[0].place)
             yield Waiting(name, f"{where}: {states}" if states else where)
     events = {script.name for script in plant.spec.scripts if script.when is not None or script.every is not None}
@@ -46,7 +47,9 @@ def _statement(plant: Plant, machine: str, place: Place) -> str:
     return f"{source.name}:{found.line} {visible(source.text[found.start : found.end].strip())}"
 
 
-def _states(plant: Plant, machine: str, resource: Resource, drivers: dict[str, list[Connection]]) -> Iterator[str]:
+def _states(
+    plant: Plant, machine: str, resource: Resource, drivers: dict[str, list[Connection]], held: dict[str, Held]
+) -> Iterator[str]:
     """The present level of a pin that a statement reads, and what drives it; where the axes are that it waits for."""
     if resource.kind is ResourceKind.AXIS:
         for axis in plant.kind(machine).state(plant.machine(machine), plant.now).axes:
@@ -54,21 +57,29 @@ def _states(plant: Plant, machine: str, resource: Resource, drivers: dict[str, l
                 place = "" if axis.position is None else f" at {axis.position:g} {axis.unit}"
                 yield f"{machine}.{axis.name} moves{place}"
     elif resource.kind is ResourceKind.PIN and resource.name:
-        yield from _level(plant, machine, resource.name, drivers)
+        yield from _level(plant, machine, resource.name, drivers, held)
 
 
-def _level(plant: Plant, machine: str, name: str, drivers: dict[str, list[Connection]]) -> Iterator[str]:
+def _level(plant: Plant, machine: str, name: str, drivers: dict[str, list[Connection]], held: dict[str, Held]) -> Iterator[str]:
     pin = f"{machine}.{name}"
     try:
         level = plant.read(pin)
     except Misuse:
         return
     terminals = plant.kind(machine).terminals
-    if name not in (*terminals.digital_inputs, *terminals.analog_inputs):
+    if pin in held:
+        yield f"{pin} is {held[pin].words()}"
+    elif name not in (*terminals.digital_inputs, *terminals.analog_inputs):
         yield f"{pin} is {level:g}"
     else:
-        by = " and ".join(one.source for one in drivers.get(pin, ())) or "nothing"
+        sources = (one.source for one in drivers.get(pin, ()))
+        by = " and ".join(f"{one} ({held[one].words()})" if one in held else one for one in sources) or "nothing"
         yield f"{pin} is {level:g}, driven by {by}"
+
+
+def _held(plant: Plant) -> dict[str, Held]:
+    faults = plant.parts.faults
+    return {signal: held for owner in (*faults.machines, *faults.elements) for signal, held in faults.held(owner).items()}
 
 
 def _drivers(plant: Plant) -> dict[str, list[Connection]]:

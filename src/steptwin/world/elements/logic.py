@@ -142,7 +142,7 @@ STUCK_OUTPUT = FaultKind(
         Parameter("output", ParameterForm.TEXT, "Which output.", default="out"),
         whole("level", "The level it keeps.", 0, 1, default=0),
     ),
-    effect=ElementEffect(_stick),
+    effect=ElementEffect(_stick, holds="output"),
     check=_check_output,
 )
 """Of elements with outputs."""
@@ -155,7 +155,7 @@ STUCK_INPUT = FaultKind(
         Parameter("input", ParameterForm.TEXT, "Which input.", is_required=True),
         whole("level", "The level it keeps.", 0, 1, default=0),
     ),
-    effect=ElementEffect(_stick),
+    effect=ElementEffect(_stick, holds="input"),
     check=_check_input,
 )
 """Of elements with inputs."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 from weakref import WeakSet
 
 from steptwin.errors import Misuse
@@ -116,6 +116,17 @@ def addresses(pdu: bytes) -> range | None:
     first = pdu[1] << 8 | pdu[2]
     single = _LAST_WITH_COUNT < pdu[0] <= _LAST_ADDRESSED
     return range(first, first + (1 if single else pdu[3] << 8 | pdu[4]))
+
+
+class Held(NamedTuple):
+    """What keeps a pin or terminal at a level; ``fault``: its name."""
+
+    fault: str
+    level: float
+
+    def words(self) -> str:
+        """As "held at 0 by fault stuck"."""
+        return f"held at {self.level:g} by fault {self.fault}"
 
 
 class Faults(Stateful):
@@ -240,6 +251,11 @@ class Faults(Stateful):
             if active.fault.kind.layer is Layer.PHYSICS
             and (active.fault.get("machine") == machine or (only and not active.fault.get("machine")))
         ]
+
+    def held(self, owner: str) -> dict[str, Held]:
+        """The pins of a machine, or terminals of an element, that faults hold at present, as conditions name them."""
+        failing = self.machines.get(owner) or self.elements.get(owner)
+        return {} if failing is None else {f"{owner}.{terminal}": held for terminal, held in failing.held()}
 
     def refusing(self) -> list[ActiveFault]:
         """The faults that refuse a request."""

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.state import Stateful
+from steptwin.world.faults.active import Held
 from steptwin.world.faults.table import FaultKind
 
 if TYPE_CHECKING:
@@ -48,6 +49,13 @@ class FaultyElement(Stateful):
         if active.name in self._lasting:
             self._turn(active, now, begins=False)
         self._kernel.mark()
+
+    def held(self) -> Iterator[tuple[str, Held]]:
+        """The terminals that faults hold, in small letters."""
+        for active in self._faults.of_element(self.name):
+            holds = active.fault.kind.effect.holds
+            if holds and active.name in self._lasting:
+                yield str(active.fault.get(holds)).lower(), Held(active.name, active.fault.number("level"))
 
     def update(self, now: Nanos) -> None:
         for active in self._faults.of_element(self.name):

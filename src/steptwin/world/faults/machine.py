@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple, Protocol
 
 from steptwin.errors import Misuse
 from steptwin.machine import Drive, MotionController, Nanos, PinEdge
 from steptwin.state import Plain, Stateful
 from steptwin.wire.pdu import exception_pdu
-from steptwin.world.faults.active import ActiveFault, Faults
+from steptwin.world.faults.active import ActiveFault, Faults, Held
 from steptwin.world.faults.fault import Fault
 from steptwin.world.faults.kinds_frames import NEVER_SENT
 from steptwin.world.faults.table import ChangeEffect, FaultKind, Occasion, SaveEffect
@@ -286,6 +286,11 @@ class FaultyMachine(Stateful):
         self.changed()
 
     # ------------------------------------------------------------------ inputs
+
+    def held(self) -> Iterator[tuple[str, Held]]:
+        """The inputs that faults hold."""
+        for pin, fault in self._stuck.items():
+            yield pin, Held(fault, self.inner.pin(pin))
 
     def pin_of(self, fault: Fault) -> str:
         """The pin that a fault names, under its one name."""

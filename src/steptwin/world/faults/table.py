@@ -199,6 +199,8 @@ class ElementEffect:
     """``act`` takes what was built of the element, and whether the fault begins or ends; gives what it did, in words."""
 
     act: Callable[[ActiveFault, Any, bool, Nanos], str]
+    holds: str = ""
+    """The parameter with the terminal that it holds at its ``level``; empty: none."""
 
 
 _FITTING: dict[Occasion, tuple[tuple[Layer, ...], tuple[type, ...]]] = {
