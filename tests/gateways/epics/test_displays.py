@@ -65,7 +65,8 @@ _LISTS = {
 PROPERTIES = {kind: set(listed.split()) for kind, listed in _LISTS.items()}
 """By the type of a widget: those that `defineProperties` of its class has in ControlSystemStudio/phoebus,
 app/display/model/src/main/java/org/csstudio/display/builder/model/widgets."""
-VERSIONS = dict.fromkeys(PROPERTIES, "2.0.0") | {"action_button": "3.0.0", "group": "3.0.0"}
+VERSIONS = dict.fromkeys(PROPERTIES, "2.0.0") | dict.fromkeys(("action_button", "group", "textentry"), "3.0.0")
+"""Those of `getVersion` of the same classes; what is older is read as a file of the display builder before Phoebus."""
 ACTIONS = {"write_pv": {"description", "pv_name", "value"}, "open_display": {"description", "file", "target"}}
 MOST = {"mode": 2, "vertical_alignment": 2, "style": 3}
 """The last of the values that a property has, which are numbers in a file."""

@@ -12,7 +12,7 @@ VERSIONS = {
     "group": "3.0.0",
     "label": "2.0.0",
     "led": "2.0.0",
-    "textentry": "2.0.0",
+    "textentry": "3.0.0",
     "textupdate": "2.0.0",
 }
 """The types of widgets that are used, with the version that their properties have."""
