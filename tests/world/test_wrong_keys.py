@@ -19,6 +19,7 @@ AROUND = {
     "axis": "name = 'x'\ndrive = 'a.M1'\n",
     "shaft": "name = 's'\naxis = 'x'\nratio = 1\n",
     "conveyor": "name = 'b'\nlength = 100\nspeed = 10\n",
+    "tool": "name = 't'\naxis = 'x'\nother = 'y'\n",
 }
 """Tables with tables in them, which are read when nothing is missing."""
 STEP_VALUES = (("'1 s'", "1 s"), ("'start'", "start"), ("'a.M1'", "a.M1"), ("{ 'a.OUT1' = 1 }", {"a.OUT1": 1}))
