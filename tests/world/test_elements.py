@@ -88,7 +88,7 @@ def test_it_is_described_built_recorded_and_asked_for() -> None:
     notes = [(record.value, record.time) for record in world.trace if record.subject == "note"]
     assert notes == [("lit", 50 * MILLISECOND), ("dark", 200 * MILLISECOND)]
     # At the end of the move the lamp is dark in the same moment.
-    assert [record.value for record in world.failures] == ["busy.lit == 1"]
+    assert [record.value for record in world.failures] == ["busy.lit == 1; busy.lit is 0"]
     assert world.parts.built(LAMP)["busy"].lit is False
 
 
