@@ -5,6 +5,7 @@ Regenerate with ``python tests/world/test_signal_table.py`` and read the diff.
 
 from __future__ import annotations
 
+import re
 from itertools import islice
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from whole_world import everything
 
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, Nanos
+from steptwin.world.elements import ELEMENTS
 from steptwin.world.signals import SignalOf
 
 GOLDEN = Path(__file__).parent / "golden" / "signals.txt"
@@ -53,6 +55,23 @@ def table() -> list[str]:
 
 def test_signals_are_the_reviewed_ones() -> None:
     assert table() == GOLDEN.read_text("utf-8").splitlines()
+
+
+def test_the_documentation_lists_them() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "elements.md").read_text("utf-8")
+    section = page.partition("\n## Signals\n")[2].partition("\n## ")[0]
+    rows = re.findall(r"^\| `\[\[(\w+)\]\]` \| (.*?) \|", section, re.MULTILINE)
+    listed = {kind: set(re.findall(r"`(\w+)`", names)) for kind, names in rows}
+    known: dict[str, set[str]] = {}
+    with lamp.registered():
+        world = everything()
+        for kind in listed:
+            for spec in world.spec.elements[kind]:
+                names = world.parts.element_signals(spec.name) or {}
+                known.setdefault(kind, set()).update(re.sub(r"\d+$", "1", name) for name in names)
+        named = {kind for kind, element in ELEMENTS.items() if element.is_named}
+    assert set(listed) == named - {"lamp"}
+    assert listed == known
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, MotionController, Nanos
-from steptwin.nearmiss import NearMiss
+from steptwin.nearmiss import NearMiss, alike
 from steptwin.world.kernel import Source
 from steptwin.world.names import Unknown, UnknownSignal
 
@@ -23,6 +23,8 @@ T = TypeVar("T")
 
 MOST_NAMED = 8
 """Number of points listed in a message."""
+MOST_COMPARED = 40
+"""Characters of an unknown name that are compared with others."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,10 +184,12 @@ def _chosen(known: Mapping[str, T], rest: str, name: str) -> T:
 
 
 def _unknown(known: Sequence[str], rest: str, name: str, others: str = "") -> Misuse:
-    """The error for an unknown name, with the names of the same axis if it names one."""
+    """The error for an unknown name, with the names of the same axis if it names one; otherwise similar ones come first, and
+    numbered ones last."""
     axis, dot, _ = rest.rpartition(".")
     of_axis = [path for path in known if dot and path.upper().startswith(f"{axis.upper()}.")]
-    shown = of_axis or known[:MOST_NAMED]
+    in_order = dict.fromkeys([*alike(rest[:MOST_COMPARED], known), *sorted(known, key=_is_numbered)])
+    shown = of_axis or list(in_order)[:MOST_NAMED]
     more = "" if of_axis or len(shown) == len(known) else f" and more, {len(known)} in all"
     near = NearMiss()
     meant = near.of(rest, known)
@@ -194,3 +198,7 @@ def _unknown(known: Sequence[str], rest: str, name: str, others: str = "") -> Mi
         f"no signal {name!r}{near.hint(rest, known)}; there are {', '.join(shown)}{more}{'' if of_axis else others}",
         None if meant is None else f"{name.removesuffix(rest)}{meant}",
     )
+
+
+def _is_numbered(name: str) -> bool:
+    return name[-1].isdigit()
