@@ -12,6 +12,9 @@ from steptwin.campaign.reading import ROWS, load_campaign, read_campaign
 from steptwin.campaign.variation import Between, Choice, Normal
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND
+from steptwin.world.check import diagnose
+from steptwin.world.pieces import no_files
+from steptwin.world.reader import WorldError
 
 HEAD = '[campaign]\nworld = "world.toml"\nend = "2 s"\nruns = 5\n'
 
@@ -223,3 +226,11 @@ def test_the_digest_is_that_of_what_results_depend_on(tmp_path: Path) -> None:
 def test_a_text_needs_no_file_of_its_own(tmp_path: Path) -> None:
     campaign_file(tmp_path)
     assert read_campaign("a.toml", CAMPAIGN, tmp_path).name == "a"
+
+
+def test_a_world_is_no_campaign_and_a_campaign_no_world(tmp_path: Path) -> None:
+    with pytest.raises(WorldError, match=r"^a.toml:1:1: error D004: this is a world, not a campaign\n") as refused:
+        read_campaign("a.toml", '[[mic488]]\nname = "a"\n[[axis]]\nname = "x"\n', tmp_path)
+    assert len(refused.value.findings) == 1
+    found = diagnose("a.toml", CAMPAIGN, no_files).findings
+    assert [one.message for one in found] == ["this is a campaign, not a world"]

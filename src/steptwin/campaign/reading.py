@@ -31,7 +31,7 @@ from steptwin.machine import SECOND, Nanos
 from steptwin.world.expression import parse_condition
 from steptwin.world.reader import Key, TomlText, optional, read_table
 from steptwin.world.sense import TableRows, check_sense
-from steptwin.world.tables import SEED
+from steptwin.world.tables import SEED, tables
 from steptwin.world.tomlplaces import Path as TomlPath
 from steptwin.world.values import flag, name_value, number, positive_time, text_value, whole, word
 
@@ -199,6 +199,10 @@ def read_campaign(name: str, text: str, folder: Path) -> CampaignDescription:
     """As `load_campaign`, of a text whose world lies in a folder."""
     toml = TomlText(name, text, (), (VARY,))
     known = list(ROWS)
+    of_world = next((key for key in toml.data if key in tables() and key not in ROWS), None)
+    if CAMPAIGN not in toml.data and of_world is not None:
+        toml.wrong((of_world,), "D004", "this is a world, not a campaign", 'a campaign names it: [campaign] with world = "FILE"')
+        raise toml.error()
     for key in toml.data:
         if key not in known:
             fix = toml.key_replacement((key,) if isinstance(toml.data[key], dict) else (key, 0), key, known)

@@ -25,6 +25,10 @@ from steptwin.world.steptable import STEPS, read_steps
 from steptwin.world.tables import KEYS, SEED, tables
 
 
+CAMPAIGN = "campaign"
+"""The table that only a campaign has (`steptwin.campaign`)."""
+
+
 def read_world(
     name: str, text: str, seed: int | None = None, overrides: Overrides = NO_OVERRIDES, read: ReadFile = no_files
 ) -> WorldSpec:
@@ -48,6 +52,9 @@ def describe(
     data = toml.data
     if is_piece(toml):
         toml.wrong((PARAMETERS,), "D004", "a file with [parameters] is for [[use]] of a description")
+        raise toml.error()
+    if CAMPAIGN in data:
+        toml.wrong((CAMPAIGN,), "D004", "this is a campaign, not a world", "steptwin campaign run checks it and runs its world")
         raise toml.error()
     late = override(data, overrides, USE)
     pieces = Pieces(read, tables(), toml.controllers, named)
