@@ -24,7 +24,6 @@ from steptwin.world.spec import LineSpec, ScriptSpec, WorldSpec
 from steptwin.world.steptable import STEPS, read_steps
 from steptwin.world.tables import KEYS, SEED, tables
 
-
 CAMPAIGN = "campaign"
 """The table that only a campaign has (`steptwin.campaign`)."""
 

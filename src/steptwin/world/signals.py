@@ -184,11 +184,12 @@ def _chosen(known: Mapping[str, T], rest: str, name: str) -> T:
 
 
 def _unknown(known: Sequence[str], rest: str, name: str, others: str = "") -> Misuse:
-    """The error for an unknown name, with the names of the same axis if it names one; otherwise similar ones come first, and
-    numbered ones last."""
+    """The error for an unknown name, with the names of the same axis if it names one; otherwise similar ones of an element come
+    first, and numbered ones last."""
     axis, dot, _ = rest.rpartition(".")
     of_axis = [path for path in known if dot and path.upper().startswith(f"{axis.upper()}.")]
-    in_order = dict.fromkeys([*alike(rest[:MOST_COMPARED], known), *sorted(known, key=_is_numbered)])
+    similar = [] if others else alike(rest[:MOST_COMPARED], known)
+    in_order = dict.fromkeys([*similar, *sorted(known, key=_is_numbered)])
     shown = of_axis or list(in_order)[:MOST_NAMED]
     more = "" if of_axis or len(shown) == len(known) else f" and more, {len(known)} in all"
     near = NearMiss()
