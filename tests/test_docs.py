@@ -71,7 +71,7 @@ def test_elements_have_pictures() -> None:
     text = (Path(__file__).parents[1] / "docs" / "elements.md").read_text(encoding="utf-8")
     chapters = {part.partition("\n")[0]: part for part in text.split("\n## ")[1:]}
     without = {name for name, part in chapters.items() if "](images/" not in part}
-    assert without == {"Connections", "Faults"}
+    assert without == {"Connections", "Faults", "Guard doors and light barriers", "Signals"}
     assert all(
         (Path(__file__).parents[1] / "docs" / "images" / one).is_file() for one in re.findall(r"\]\(images/([^)]+)\)", text)
     )

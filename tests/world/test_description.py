@@ -214,7 +214,7 @@ def wrong(text: str) -> str:
             "w.toml:8:1: error D007: mass means nothing for kind =",
         ),
         (TABLE + "[[event]]\nat = 1\nonce = true\nsteps = []\n", "w.toml:5:1: error D007: once means nothing without when"),
-        ("[[fault]]\nkind = 'crcc'\n", "kind = 'crcc': permitted are"),
+        ("[[fault]]\nkind = 'crcc'\n", "kind = 'crcc' (did you mean 'crc'?): permitted are"),
     ],
 )
 def test_what_is_wrong_is_told_with_its_place(text: str, message: str) -> None:

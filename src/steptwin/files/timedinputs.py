@@ -10,6 +10,7 @@ from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 
 _INPUT = re.compile(r"([\w.&]+) *= *(-?\d+(?:\.\d+)?) *@ *(.+)\Z", re.ASCII)
+_NUMBER = re.compile(r"\d+(\.\d+)?", re.ASCII)
 
 
 class TimedInput(NamedTuple):
@@ -21,9 +22,12 @@ class TimedInput(NamedTuple):
 
 
 def parse_duration(text: str, option: str) -> Nanos:
-    """``10s``, ``1.5 s``, ``500ms``, ``2min``, ``1h``. Raises `Misuse` in the name of ``option``."""
+    """``10s``, ``1.5 s``, ``500ms``, ``2min``, ``1h``; a bare number is in seconds, as numbers in descriptions are.
+
+    Raises `Misuse` in the name of ``option``.
+    """
     try:
-        return duration(text)
+        return duration(f"{text.strip()}s" if _NUMBER.fullmatch(text.strip()) else text)
     except Misuse as error:
         raise Misuse(f"{option}: {error}") from None
 
