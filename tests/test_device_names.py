@@ -11,6 +11,7 @@ BELOW = (*DEVICES, "calc", "explain", "drivers", "verify", "world/kinds")
 """Packages of devices, and those with a folder or a module for each device and a table of them."""
 TOOLS = {
     "bluesky/controllers.py": "the devices of Bluesky, a class for each controller",
+    "bluesky/labelledprograms.py": "programs of the M1486 in Bluesky",
     "bluesky/programs.py": "programs of the MIC488 in Bluesky",
     "cli/build.py": "compiled images of WBC programs",
     "cli/calc.py": "options of each model of the calculator",

@@ -11,9 +11,9 @@ from functools import partial
 from typing import TypeAlias
 
 from steptwin.dap.attach import AttachedTwin
-from steptwin.dap.breakpoints import Breakpoints
+from steptwin.dap.breakpoints import EditorBreakpoints
 from steptwin.dap.capabilities import CAPABILITIES
-from steptwin.dap.debugged import Arguments, Body, Debugged
+from steptwin.dap.debugged import Arguments, Debugged, ResponseBody
 from steptwin.dap.inspection import Inspection
 from steptwin.dap.launch import Launch, open_world, read_launch
 from steptwin.dap.sources import Sources, texts_of
@@ -27,7 +27,7 @@ from steptwin.machine import SECOND
 from steptwin.subject.debugcommands import SCOPES
 from steptwin.why.answer import Answer
 
-_SendEvent: TypeAlias = Callable[[str, Body], None]
+_SendEvent: TypeAlias = Callable[[str, ResponseBody], None]
 """An event and its body."""
 
 LOOK_S = 0.1
@@ -55,14 +55,14 @@ class Adapter:
     def __init__(self, send: _SendEvent) -> None:
         self._send = send
         self._debugged = Debugged()
-        self._breakpoints = Breakpoints(self._debugged)
+        self._breakpoints = EditorBreakpoints(self._debugged)
         self._world: World | None = None
         self._launch: Launch | None = None
         self._attached: AttachedTwin | None = None
         self._stops_on_entry = False
         self.has_ended = False
         """The session is over."""
-        self._handlers: Mapping[str, Callable[[Arguments], Body]] = {
+        self._handlers: Mapping[str, Callable[[Arguments], ResponseBody]] = {
             "initialize": self._initialize,
             "launch": self._launch_world,
             "attach": self._attach,
@@ -90,7 +90,7 @@ class Adapter:
 
     # ------------------------------------------------------------------ requests
 
-    def answer(self, command: str, arguments: Arguments) -> Body:
+    def answer(self, command: str, arguments: Arguments) -> ResponseBody:
         """The body of the response. Raises `SteptwinError` for what cannot be done."""
         handler = self._handlers.get(command)
         if handler is None:
@@ -109,12 +109,12 @@ class Adapter:
         if command in ("launch", "attach"):
             self._send("initialized", {})
 
-    def _initialize(self, arguments: Arguments) -> Body:
+    def _initialize(self, arguments: Arguments) -> ResponseBody:
         self._debugged.first_line = 1 if arguments.get("linesStartAt1", True) else 0
         self._debugged.first_column = 1 if arguments.get("columnsStartAt1", True) else 0
         return CAPABILITIES
 
-    def _launch_world(self, arguments: Arguments) -> Body:
+    def _launch_world(self, arguments: Arguments) -> ResponseBody:
         self._check_fresh("launch")
         asked = read_launch(arguments)
         world = open_world(asked, self._tell)
@@ -131,7 +131,7 @@ class Adapter:
         self._stops_on_entry, self._breakpoints.is_off = asked.stop_on_entry, asked.no_debug
         return {}
 
-    def _attach(self, arguments: Arguments) -> Body:
+    def _attach(self, arguments: Arguments) -> ResponseBody:
         self._check_fresh("attach")
         twin, stops = arguments.get("twin"), arguments.get("stopOnEntry", False)
         if twin is not None and not isinstance(twin, str):
@@ -146,12 +146,12 @@ class Adapter:
         if self._debugged.target is not None:
             raise Misuse(f"{command}: this session has something to debug already")
 
-    def _configuration_done(self, arguments: Arguments) -> Body:
+    def _configuration_done(self, arguments: Arguments) -> ResponseBody:
         debugger = self._debugged.stopped()
         self._run(debugger.running_to_entry() if self._stops_on_entry else debugger.running())
         return {}
 
-    def _restart(self, arguments: Arguments) -> Body:
+    def _restart(self, arguments: Arguments) -> ResponseBody:
         if self._world is None:
             raise Misuse("restart: a twin that runs has no beginning to go to; disconnect and attach again")
         if self.is_running:
@@ -161,7 +161,7 @@ class Adapter:
         debugger.branch()
         return self._configuration_done(arguments)
 
-    def _end(self, arguments: Arguments) -> Body:
+    def _end(self, arguments: Arguments) -> ResponseBody:
         self._end_travel()
         if not self.has_ended:
             self.has_ended = True
@@ -179,7 +179,7 @@ class Adapter:
     def _run(self, travel: DebugTravel) -> None:
         self._debugged.travel = travel
 
-    def _starting(self, arguments: Arguments, *, name: str) -> Body:
+    def _starting(self, arguments: Arguments, *, name: str) -> ResponseBody:
         debugger = self._debugged.stopped()
         machine = self._debugged.machine(arguments["threadId"])
         travels: Mapping[str, Callable[[], DebugTravel]] = {
@@ -222,7 +222,7 @@ class Adapter:
             self._debugged.travel.close()
             self._debugged.travel = None
 
-    def _pause(self, arguments: Arguments) -> Body:
+    def _pause(self, arguments: Arguments) -> ResponseBody:
         if self.is_running:
             self._end_travel()
             self._report(self._debugged.started().pause())
@@ -252,7 +252,7 @@ class Adapter:
 
     # ------------------------------------------------------------------ expressions
 
-    def _evaluate(self, arguments: Arguments) -> Body:
+    def _evaluate(self, arguments: Arguments) -> ResponseBody:
         debugger, text = self._debugged.stopped(), arguments["expression"].strip()
         if arguments.get("context") == "repl":
             word, _, rest = text.partition(" ")
@@ -270,11 +270,11 @@ class Adapter:
         value = debugger.evaluate(self._debugged.machine_of_frame(arguments.get("frameId")), text)
         return {"result": value.text, "variablesReference": 0}
 
-    def _set_variable(self, arguments: Arguments) -> Body:
+    def _set_variable(self, arguments: Arguments) -> ResponseBody:
         machine = self._debugged.machine_of_scope(arguments["variablesReference"])
         return {"value": self._debugged.stopped().set_value(machine, arguments["name"], arguments["value"]).text}
 
-    def _set_expression(self, arguments: Arguments) -> Body:
+    def _set_expression(self, arguments: Arguments) -> ResponseBody:
         machine = self._debugged.machine_of_frame(arguments.get("frameId"))
         return {"value": self._debugged.stopped().set_value(machine, arguments["expression"].strip(), arguments["value"]).text}
 

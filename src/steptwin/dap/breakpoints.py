@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from steptwin.dap.arguments import data_point, label_point, line_points
-from steptwin.dap.debugged import Arguments, Body, Debugged
+from steptwin.dap.debugged import Arguments, Debugged, ResponseBody
 from steptwin.debug.breakpoints import AnyPoint
 from steptwin.debug.values import Events, SetPoint
 from steptwin.errors import Misuse
@@ -15,7 +15,7 @@ DATA_ACCESS = "write"
 """Reading a value changes nothing, and is not noticed."""
 
 
-class Breakpoints:
+class EditorBreakpoints:
     """The protocol sets those of one file or of one kind at a time; what is debugged is given all of them."""
 
     def __init__(self, debugged: Debugged) -> None:
@@ -28,7 +28,7 @@ class Breakpoints:
         """Nothing stops: the editor launched without debugging."""
 
     @property
-    def handlers(self) -> Mapping[str, Callable[[Arguments], Body]]:
+    def handlers(self) -> Mapping[str, Callable[[Arguments], ResponseBody]]:
         return {
             "setBreakpoints": self._set_lines,
             "setFunctionBreakpoints": self._set_labels,
@@ -38,7 +38,7 @@ class Breakpoints:
             "breakpointLocations": self._locations,
         }
 
-    def _set_lines(self, arguments: Arguments) -> Body:
+    def _set_lines(self, arguments: Arguments) -> ResponseBody:
         path = self._debugged.sources.path(arguments["source"])
         texts = self._debugged.sources.of(path)
         wanted: Sequence[Arguments] = arguments.get("breakpoints") or ()
@@ -51,11 +51,11 @@ class Breakpoints:
         found = self._set_all(points)[:: len(texts)]
         return {"breakpoints": [self._point(one, arguments["source"]) for one in found]}
 
-    def _set_labels(self, arguments: Arguments) -> Body:
+    def _set_labels(self, arguments: Arguments) -> ResponseBody:
         self._labels = [label_point(one) for one in arguments["breakpoints"]]
         return {"breakpoints": [self._point(one) for one in self._set_all(self._labels)]}
 
-    def _data_info(self, arguments: Arguments) -> Body:
+    def _data_info(self, arguments: Arguments) -> ResponseBody:
         debugger = self._debugged.stopped()
         reference = arguments.get("variablesReference") or 0
         machine = (
@@ -68,7 +68,7 @@ class Breakpoints:
             return {"dataId": None, "description": str(error)}
         return {"dataId": f"{machine}/{name}", "description": f"{name} of {machine}", "accessTypes": [DATA_ACCESS]}
 
-    def _set_data(self, arguments: Arguments) -> Body:
+    def _set_data(self, arguments: Arguments) -> ResponseBody:
         wanted = [(data_point(one), one.get("accessType") or DATA_ACCESS) for one in arguments["breakpoints"]]
         self._data = [point for point, access in wanted if access == DATA_ACCESS]
         found = iter(self._set_all(self._data))
@@ -94,7 +94,7 @@ class Breakpoints:
         by_point = dict(zip(everything, found, strict=True))
         return [by_point[point] for point in wanted]
 
-    def _point(self, found: SetPoint, source: object = None) -> Body:
+    def _point(self, found: SetPoint, source: object = None) -> ResponseBody:
         body: dict[str, object] = {"id": found.number, "verified": found.is_set and not found.note}
         if message := found.problem or found.note:
             body["message"] = message
@@ -102,7 +102,7 @@ class Breakpoints:
             body |= {"line": found.line - 1 + self._debugged.first_line, "source": source}
         return body
 
-    def _set_events(self, arguments: Arguments) -> Body:
+    def _set_events(self, arguments: Arguments) -> ResponseBody:
         known = {event.code: event for event in Events}
         unknown = [name for name in arguments["filters"] if name not in known]
         if unknown:
@@ -111,7 +111,7 @@ class Breakpoints:
             self._debugged.started().set_events([known[name] for name in arguments["filters"]])
         return {}
 
-    def _locations(self, arguments: Arguments) -> Body:
+    def _locations(self, arguments: Arguments) -> ResponseBody:
         texts = self._debugged.sources.of(self._debugged.sources.path(arguments["source"]))
         first = arguments["line"] - self._debugged.first_line + 1
         last = arguments.get("endLine", arguments["line"]) - self._debugged.first_line + 1

@@ -11,7 +11,7 @@ from steptwin.debug.debugger import DebugTravel
 from steptwin.debug.values import Location
 from steptwin.errors import Misuse
 
-Body: TypeAlias = Mapping[str, object]
+ResponseBody: TypeAlias = Mapping[str, object]
 """Of a response or an event."""
 Arguments: TypeAlias = Mapping[str, Any]
 
@@ -63,7 +63,7 @@ class Debugged:
     def machine_of_scope(self, reference: int) -> str:
         return self.machine_of(reference, "variablesReference")
 
-    def placed(self, location: Location) -> Body:
+    def placed(self, location: Location) -> ResponseBody:
         """A location as the protocol has it."""
         line, column = self.first_line - 1, self.first_column - 1
         return {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from steptwin.dap.debugged import FRAMES, Arguments, Body, Debugged
+from steptwin.dap.debugged import FRAMES, Arguments, Debugged, ResponseBody
 from steptwin.debug.values import ShownValue
 from steptwin.errors import Misuse
 from steptwin.subject.debugcommands import SCOPES
@@ -17,7 +17,7 @@ class Inspection:
         self._debugged = debugged
 
     @property
-    def handlers(self) -> Mapping[str, Callable[[Arguments], Body]]:
+    def handlers(self) -> Mapping[str, Callable[[Arguments], ResponseBody]]:
         return {
             "threads": self._threads,
             "stackTrace": self._stack,
@@ -27,12 +27,12 @@ class Inspection:
             "variables": self._variables,
         }
 
-    def _threads(self, arguments: Arguments) -> Body:
+    def _threads(self, arguments: Arguments) -> ResponseBody:
         return {
             "threads": [{"id": number, "name": name} for number, name in enumerate(self._debugged.started().threads, start=1)]
         }
 
-    def _stack(self, arguments: Arguments) -> Body:
+    def _stack(self, arguments: Arguments) -> ResponseBody:
         thread = arguments["threadId"]
         frames = self._debugged.stopped().stack(self._debugged.machine(thread))
         first = arguments.get("startFrame") or 0
@@ -43,13 +43,13 @@ class Inspection:
         ]
         return {"stackFrames": shown, "totalFrames": len(frames)}
 
-    def _loaded(self, arguments: Arguments) -> Body:
+    def _loaded(self, arguments: Arguments) -> ResponseBody:
         return {"sources": self._debugged.sources.all()}
 
-    def _source(self, arguments: Arguments) -> Body:
+    def _source(self, arguments: Arguments) -> ResponseBody:
         return {"content": self._debugged.sources.numbered(arguments["sourceReference"]).source.text}
 
-    def _scopes(self, arguments: Arguments) -> Body:
+    def _scopes(self, arguments: Arguments) -> ResponseBody:
         frame = arguments["frameId"]
         self._debugged.machine_of(frame, "frameId")
         thread = frame // FRAMES
@@ -60,7 +60,7 @@ class Inspection:
             ]
         }
 
-    def _variables(self, arguments: Arguments) -> Body:
+    def _variables(self, arguments: Arguments) -> ResponseBody:
         reference = arguments["variablesReference"]
         found = self._debugged.stopped().scope(self._debugged.machine_of_scope(reference), _scope_of(reference)).values
         first = arguments.get("start") or 0
@@ -68,7 +68,7 @@ class Inspection:
         return {"variables": [_variable(value) for value in found[first : first + count]]}
 
 
-def _variable(value: ShownValue) -> Body:
+def _variable(value: ShownValue) -> ResponseBody:
     hint = {} if value.is_settable else {"presentationHint": {"attributes": ["readOnly"]}}
     evaluated = {"evaluateName": value.expression} if value.expression else {}
     return {"name": value.name, "value": value.text, "variablesReference": 0, **evaluated, **hint}

@@ -19,7 +19,7 @@ from steptwin.why import points
 from steptwin.world import script as do
 from steptwin.world.actions import Download, ExternalInput
 from steptwin.world.elements import ELEMENTS
-from steptwin.world.faults.active import Held
+from steptwin.world.faults.active import HeldLevel
 from steptwin.world.history import SLICE_NS, replay
 from steptwin.world.plant import Plant
 from steptwin.world.plantsnapshot import RecordedInput
@@ -83,7 +83,7 @@ class Hold(NamedTuple):
     """From a moment on a fault holds a signal; nothing does, if ``held`` is None."""
 
     time: Nanos
-    held: Held | None
+    held: HeldLevel | None
 
 
 class CauseLog:

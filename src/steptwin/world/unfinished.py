@@ -8,7 +8,7 @@ from typing import NamedTuple
 from steptwin.diagnostics import visible
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
-from steptwin.world.faults.active import Held
+from steptwin.world.faults.active import HeldLevel
 from steptwin.world.plant import Plant
 from steptwin.world.programs import Place, Resource, ResourceKind
 from steptwin.world.wiring import Connection, connections
@@ -48,7 +48,7 @@ def _statement(plant: Plant, machine: str, place: Place) -> str:
 
 
 def _states(
-    plant: Plant, machine: str, resource: Resource, drivers: dict[str, list[Connection]], held: dict[str, Held]
+    plant: Plant, machine: str, resource: Resource, drivers: dict[str, list[Connection]], held: dict[str, HeldLevel]
 ) -> Iterator[str]:
     """The present level of a pin that a statement reads, and what drives it; where the axes are that it waits for."""
     if resource.kind is ResourceKind.AXIS:
@@ -60,7 +60,9 @@ def _states(
         yield from _level(plant, machine, resource.name, drivers, held)
 
 
-def _level(plant: Plant, machine: str, name: str, drivers: dict[str, list[Connection]], held: dict[str, Held]) -> Iterator[str]:
+def _level(
+    plant: Plant, machine: str, name: str, drivers: dict[str, list[Connection]], held: dict[str, HeldLevel]
+) -> Iterator[str]:
     pin = f"{machine}.{name}"
     try:
         level = plant.read(pin)
@@ -77,7 +79,7 @@ def _level(plant: Plant, machine: str, name: str, drivers: dict[str, list[Connec
         yield f"{pin} is {level:g}, driven by {by}"
 
 
-def _held(plant: Plant) -> dict[str, Held]:
+def _held(plant: Plant) -> dict[str, HeldLevel]:
     faults = plant.parts.faults
     return {signal: held for owner in (*faults.machines, *faults.elements) for signal, held in faults.held(owner).items()}
 

@@ -118,7 +118,7 @@ def addresses(pdu: bytes) -> range | None:
     return range(first, first + (1 if single else pdu[3] << 8 | pdu[4]))
 
 
-class Held(NamedTuple):
+class HeldLevel(NamedTuple):
     """What keeps a pin or terminal at a level; ``fault``: its name."""
 
     fault: str
@@ -252,7 +252,7 @@ class Faults(Stateful):
             and (active.fault.get("machine") == machine or (only and not active.fault.get("machine")))
         ]
 
-    def held(self, owner: str) -> dict[str, Held]:
+    def held(self, owner: str) -> dict[str, HeldLevel]:
         """The pins of a machine, or terminals of an element, that faults hold at present, as conditions name them."""
         failing = self.machines.get(owner) or self.elements.get(owner)
         return {} if failing is None else {f"{owner}.{terminal}": held for terminal, held in failing.held()}

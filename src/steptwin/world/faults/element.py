@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.state import Stateful
-from steptwin.world.faults.active import Held
+from steptwin.world.faults.active import HeldLevel
 from steptwin.world.faults.table import FaultKind
 
 if TYPE_CHECKING:
@@ -50,12 +50,12 @@ class FaultyElement(Stateful):
             self._turn(active, now, begins=False)
         self._kernel.mark()
 
-    def held(self) -> Iterator[tuple[str, Held]]:
+    def held(self) -> Iterator[tuple[str, HeldLevel]]:
         """The terminals that faults hold, in small letters."""
         for active in self._faults.of_element(self.name):
             holds = active.fault.kind.effect.holds
             if holds and active.name in self._lasting:
-                yield str(active.fault.get(holds)).lower(), Held(active.name, active.fault.number("level"))
+                yield str(active.fault.get(holds)).lower(), HeldLevel(active.name, active.fault.number("level"))
 
     def update(self, now: Nanos) -> None:
         for active in self._faults.of_element(self.name):

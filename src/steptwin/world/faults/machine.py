@@ -9,7 +9,7 @@ from steptwin.errors import Misuse
 from steptwin.machine import Drive, MotionController, Nanos, PinEdge
 from steptwin.state import Plain, Stateful
 from steptwin.wire.pdu import exception_pdu
-from steptwin.world.faults.active import ActiveFault, Faults, Held
+from steptwin.world.faults.active import ActiveFault, Faults, HeldLevel
 from steptwin.world.faults.fault import Fault
 from steptwin.world.faults.kinds_frames import NEVER_SENT
 from steptwin.world.faults.table import ChangeEffect, FaultKind, Occasion, SaveEffect
@@ -287,10 +287,10 @@ class FaultyMachine(Stateful):
 
     # ------------------------------------------------------------------ inputs
 
-    def held(self) -> Iterator[tuple[str, Held]]:
+    def held(self) -> Iterator[tuple[str, HeldLevel]]:
         """The inputs that faults hold."""
         for pin, fault in self._stuck.items():
-            yield pin, Held(fault, self.inner.pin(pin))
+            yield pin, HeldLevel(fault, self.inner.pin(pin))
 
     def pin_of(self, fault: Fault) -> str:
         """The pin that a fault names, under its one name."""
