@@ -406,7 +406,7 @@ def test_every_element_is_drawn(start_studio: Callable[..., Process], browser: B
     page = studio.page(panel="Machine")
     expect(page.get_by_role("region", name="box, load")).to_be_visible()
     drawn = {node.get_attribute("data-symbol") for node in page.locator("[data-symbol]").all()}
-    tracks = {"cylinder", "gripper", "conveyor", "carriage", "gantry", "shaft", "follower"}
+    tracks = {"cylinder", "gripper", "conveyor", "carriage", "gantry", "shaft", "follower", "tool"}
     elsewhere = {"axis", "button", "wire", "source"}
     assert drawn | tracks | elsewhere == set(ELEMENTS)
     studio.close()

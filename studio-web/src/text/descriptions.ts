@@ -17,6 +17,8 @@ export const DESCRIPTIONS: Readonly<Record<string, string>> = {
   "unit {#unit} is not served here": "adres {#unit} nie jest tu obsługiwany",
   "unit {#unit}: {text}": "adres {#unit}: {text}",
   "broadcast: {text}": "rozgłoszenie: {text}",
+  // Configurations.
+  "channel {letter} of encoder {#number}": "kanał {letter} enkodera {#number}",
   "1 byte that belongs to no frame": "1 bajt spoza ramek",
   "{#count} bytes that belong to no frame": "bajtów spoza ramek: {#count}",
   // Characters of M1486.
