@@ -22,6 +22,14 @@ acc = 400.0
 dec = 400.0
 vel = 100.0
 """
+SECOND_MOTOR = """
+[mic488.M2]
+unit = "mm"
+gear = 640.0
+acc = 400.0
+dec = 400.0
+vel = 100.0
+"""
 AXIS = """
 [[axis]]
 name = "z"
@@ -190,14 +198,7 @@ element = "cams"
 from_s = 0.9
 until_s = 1.0
 """
-GANTRY = """
-[mic488.M2]
-unit = "mm"
-gear = 640.0
-acc = 400.0
-dec = 400.0
-vel = 100.0
-[[axis]]
+GANTRY = f"""{SECOND_MOTOR}[[axis]]
 name = "y1"
 drive = "table.M1"
 pitch = 5.0
@@ -252,14 +253,7 @@ workpiece = 60.0
 at = 400.0
 hold = "table.OUT2"
 """
-TOOL = """
-[mic488.M2]
-unit = "mm"
-gear = 640.0
-acc = 400.0
-dec = 400.0
-vel = 100.0
-[[axis]]
+TOOL = f"""{SECOND_MOTOR}[[axis]]
 name = "a"
 drive = "table.M1"
 pitch = 5.0

@@ -12,6 +12,7 @@ import bluesky.plans as bp
 import pytest
 from bluesky import RunEngine
 from bluesky.preprocessors import run_decorator, stage_decorator
+from bluesky.protocols import Flyable
 from bluesky.run_engine import call_in_bluesky_event_loop
 from bluesky.utils import FailedStatus, MsgGenerator
 from gateway_rig import served
@@ -202,19 +203,20 @@ def test_a_pass_that_is_stopped(table: Mic488Controller, engine: RunEngine) -> N
     assert of_driver(table.driver.get("M1_VMAX")) == {"M1_VMAX": before}
 
 
+@run_decorator()
+def kicked_off_twice(program: Flyable) -> MsgGenerator:
+    yield from bps.kickoff(program, wait=True)
+    yield from bps.kickoff(program, wait=True)
+
+
 def test_a_program(table: Mic488Controller, engine: RunEngine) -> None:
     """It is awaited to its end; one that runs is not begun again; who stops it says whether that is an error."""
     program = table.program
     engine(bps.trigger(program, wait=True))
     assert of_driver(table.driver.program.state()) is ProgramState.STOPPED
 
-    @run_decorator()
-    def twice() -> MsgGenerator:
-        yield from bps.kickoff(program, wait=True)
-        yield from bps.kickoff(program, wait=True)
-
     with pytest.raises(FailedStatus) as again:
-        engine(twice())
+        engine(kicked_off_twice(program))
     assert "the program is running" in failure(again)
 
     def stopped() -> MsgGenerator:
@@ -293,13 +295,8 @@ def test_the_program_of_an_m1486(serve_m1486: Callable[..., Served], engine: Run
         engine(stopped(success=False))
     assert "drum-program was stopped" in failure(failed)
 
-    @run_decorator()
-    def twice() -> MsgGenerator:
-        yield from bps.kickoff(program, wait=True)
-        yield from bps.kickoff(program, wait=True)
-
     with pytest.raises(FailedStatus) as again:
-        engine(twice())
+        engine(kicked_off_twice(program))
     assert "Busy" in failure(again)
     assert of_driver(drum.driver.is_busy())
     of_driver(program.stop())

@@ -14,8 +14,8 @@ from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.why.answer import Answer
 from steptwin.why.question import Asking, Why
-from steptwin.why.search import Asked, LastChanges
-from steptwin.world.history import PastState, outside_past
+from steptwin.why.search import Asked, LastChanges, PastStates
+from steptwin.world.history import outside_past
 from steptwin.world.plant import Plant
 from steptwin.world.plantsnapshot import PlantSnapshot, RecordedInput
 
@@ -28,16 +28,9 @@ MOST_NOTED = 500_000
 """Limit of the records and statements that are noted: some 100 MB."""
 
 
-class StatesAndInputs(Protocol):
+class StatesAndInputs(PastStates, Protocol):
     """What `steptwin.world.history.History` has of the past of a world."""
 
-    @property
-    def world(self) -> Plant: ...
-    @property
-    def begin(self) -> Nanos: ...
-    @property
-    def branch(self) -> int: ...
-    def state_at(self, moment: Nanos) -> PastState: ...
     def keeps_inputs_from(self, number: int) -> bool: ...
     def inputs_from(self, number: int) -> Sequence[RecordedInput]: ...
 

@@ -47,7 +47,7 @@ class Found(NamedTuple):
 
 
 class PastStates(Protocol):
-    """As `steptwin.why.kept.StatesAndInputs`."""
+    """What a search needs of a world's past; see `steptwin.world.history.History`."""
 
     @property
     def world(self) -> Plant: ...
