@@ -126,6 +126,16 @@ def test_what_is_no_message_ends_the_connection(start_studio: Start, message: st
         editor.socket.recv(60)
 
 
+def test_a_request_with_wrong_parameters_is_answered_and_the_connection_goes_on(start_studio: Start) -> None:
+    editor = Editor(start_studio())
+    editor.socket.send('{"jsonrpc": "2.0", "id": "odd", "method": "textDocument/hover", "params": 5}')
+    answer = json.loads(editor.socket.recv(60))
+    assert answer["id"] == "odd"
+    assert answer["error"]["message"] == "textDocument/hover: its parameters are not those of the protocol"
+    editor.open(PROGRAM, "wbc", "ED\n")
+    assert editor.diagnostics(PROGRAM, 1)
+
+
 def test_a_client_that_says_exit_does_not_end_the_studio(start_studio: Start) -> None:
     studio = start_studio()
     editor = Editor(studio)
