@@ -22,16 +22,17 @@ class RecordedPlans:
 
     def report(self, record: RecordSink, now: Nanos) -> None:
         """Record new plans and changes of coordinates. A plan that only continues the rest at the same position is not new."""
+        revisions = self._revisions
         for i, number, drive in self._drives:
-            origin = drive.offset_p
-            if origin != self._origins[i]:
-                self._origins[i] = origin
+            if drive.offset_p != self._origins[i]:
+                origin = self._origins[i] = drive.offset_p
                 record(TraceRecord(now, self._name, "coordinate", number, origin))
-            if self._revisions[i] == drive.revision:
+            revision = drive.revision
+            if revisions[i] == revision:
                 continue
             plan = drive.plan
             before, profile = self._profiles[i], profile_of(plan)
-            self._revisions[i], self._profiles[i] = drive.revision, profile
+            revisions[i], self._profiles[i] = revision, profile
             if before is None or not _only_rests(before, profile):
                 record(TraceRecord(now, self._name, "plan", number, plan))
 
