@@ -498,3 +498,8 @@ def test_words_that_are_near_nothing_have_no_fix(wrong: str) -> None:
     with pytest.raises(WorldError) as caught:
         World.from_toml(f'[[timer]]\nname = "t"\ntime = "1 s"\n{wrong}\n')
     assert [(finding.code, finding.fix) for finding in caught.value.findings] == [("D003", None)]
+
+
+def test_addresses_for_records_of_vision_systems() -> None:
+    text = '[[mic488]]\nname = "a"\nvision = "127.0.0.1:7001"\n[[m1486]]\nname = "c"\n[[mic488]]\nname = "b"\n'
+    assert list(read_world("w", text).vision_addresses()) == [("a", "127.0.0.1:7001")]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from steptwin.machine import MILLISECOND
+from steptwin.machine import MILLISECOND, SECOND
 from steptwin.world.description import describe, read_world
-from steptwin.world.gateways import OpcUaSpec
+from steptwin.world.gateways import EpicsSpec, GatewaySpec, ListeningSpec, ModbusSpec, MqttSpec, OpcUaSpec, SparkplugSpec
 from steptwin.world.reader import WorldError
 
 HALL = '[[mic488]]\nname = "table"\n'
@@ -17,9 +17,123 @@ def test_a_gateway_is_described() -> None:
     assert (gateway.kind, gateway.listen) == ("prometheus", "127.0.0.1:9100")
 
 
-def test_without_keys_it_listens_on_its_usual_port() -> None:
-    (gateway,) = read_world("hall.toml", HALL + "[gateway.prometheus]\n").gateways
-    assert gateway.listen == "127.0.0.1:9488"
+PLAIN = (
+    ListeningSpec(kind="prometheus", listen="127.0.0.1:9488", file="hall.toml"),
+    OpcUaSpec(
+        kind="opcua",
+        listen="127.0.0.1:4840",
+        file="hall.toml",
+        interval=100 * MILLISECOND,
+        registers=(),
+        security="none",
+        certificate=None,
+        key=None,
+        trusted=None,
+        tokens=None,
+    ),
+    EpicsSpec(
+        kind="epics",
+        listen="127.0.0.1:5064",
+        file="hall.toml",
+        prefix="",
+        beacons="127.0.0.1:5065",
+        pva=None,
+        pva_beacons="127.0.0.1:5076",
+        interval=100 * MILLISECOND,
+        registers=(),
+        role=None,
+    ),
+    ModbusSpec(kind="modbus", listen="127.0.0.1:5020", file="hall.toml", units={}, role=None),
+    MqttSpec(
+        kind="mqtt",
+        listen=None,
+        file="hall.toml",
+        broker="127.0.0.1:1883",
+        topic="steptwin",
+        interval=100 * MILLISECOND,
+        registers=(),
+        keep_alive=15 * SECOND,
+        store=4096,
+        user=None,
+        password_file=None,
+        password_variable=None,
+        tls=False,
+        ca=None,
+        certificate=None,
+        key=None,
+        tokens=None,
+        role=None,
+        discovery=None,
+        sparkplug=None,
+    ),
+)
+
+
+@pytest.mark.parametrize("plain", PLAIN, ids=[plain.kind for plain in PLAIN])
+def test_without_keys_it_is_as_documented(plain: GatewaySpec) -> None:
+    (gateway,) = read_world("hall.toml", HALL + f"[gateway.{plain.kind}]\n").gateways
+    assert gateway == plain
+
+
+@pytest.mark.parametrize(
+    ("table", "told"),
+    [
+        ('mqtt]\nbroker = "a:0"', "broker: 'a:0': the port of a broker is 1 to 65535, usually 1883"),
+        ('mqtt]\ntopic = "/a"', "topic: '/a': a topic has no + and #, and begins and ends without /"),
+        ('mqtt]\ntopic = "$a"', "topic: '$a': a topic has no + and #, and begins and ends without /"),
+        ('mqtt]\ntopic = "a/"', "topic: 'a/': a topic has no + and #, and begins and ends without /"),
+        ('mqtt]\ntopic = "a+b"', "topic: 'a+b': a topic has no + and #, and begins and ends without /"),
+        ("mqtt]\nstore = 0", "store: 0: permitted are whole numbers from 1 to 1000000"),
+        ("mqtt]\nstore = 1_000_001", "store: 1000001: permitted are whole numbers from 1 to 1000000"),
+        ("mqtt]\nsparkplug = 1", "sparkplug: 1: expected { group = ..., node = ... }"),
+        ("mqtt]\nsparkplug = { node = 'n' }", "sparkplug: group is missing: expected { group = ..., node = ... }"),
+        ("mqtt]\nsparkplug = { group = 'g' }", "sparkplug: node is missing: expected { group = ..., node = ... }"),
+        (
+            "mqtt]\nsparkplug = { group = 'g', node = 'n', hots = 'h' }",
+            "sparkplug: there is no 'hots'; permitted are group, node, host",
+        ),
+        (
+            "mqtt]\nsparkplug = { group = 'g', node = 'n', host = 'h#' }",
+            "sparkplug: 'h#': an id of Sparkplug has no +, / and #",
+        ),
+        ("mqtt]\nsparkplug = { group = 1, node = 'n' }", "sparkplug: 1: expected a text"),
+        ('epics]\nbeacons = "a:0"', "beacons: 'a:0': the port for beacons is 1 to 65535, usually 5065, of PV Access 5076"),
+        ('epics]\npva = "a:65535"', "pva: 'a:65535': the port is at most 65534, because the next one is for searches"),
+        ('epics]\nprefix = "a b"', "prefix: 'a b': names of records have letters from A to Z, digits and _-:;<>[]"),
+        ("epics]\nprefix = 1", "prefix: 1: names of records have letters from A to Z, digits and _-:;<>[]"),
+        ("modbus]\nunits = 1", "units: 1: expected { CONTROLLER = UNIT, ... }"),
+        ("modbus]\nunits = { table = 0 }", "units: table = 0: units are 1 to 247"),
+        ("modbus]\nunits = { table = 248 }", "units: table = 248: units are 1 to 247"),
+        ("modbus]\nunits = { table = true }", "units: table = True: units are 1 to 247"),
+    ],
+)
+def test_what_a_key_does_not_take(table: str, told: str) -> None:
+    with pytest.raises(WorldError) as error:
+        read_world("hall.toml", f"{HALL}[gateway.{table}\n")
+    kind = table.partition("]")[0]
+    assert f"hall.toml:4:1: error D003: [gateway.{kind}]: {told}\n" in str(error.value)
+
+
+def test_what_keys_just_take() -> None:
+    text = """
+    [gateway.mqtt]
+    broker = "a:1"
+    store = 1_000_000
+    sparkplug = { group = "g", node = "n", host = "h" }
+    [gateway.epics]
+    beacons = "127.0.0.1:1"
+    pva = "127.0.0.1:65534"
+    prefix = ""
+    [gateway.modbus]
+    units = { table = 1, other = 247 }
+    """
+    mqtt, epics, modbus = read_world("hall.toml", HALL + text).gateways
+    assert isinstance(mqtt, MqttSpec)
+    assert isinstance(epics, EpicsSpec)
+    assert isinstance(modbus, ModbusSpec)
+    assert (mqtt.broker, mqtt.store, mqtt.sparkplug) == ("a:1", 1_000_000, SparkplugSpec(group="g", node="n", host="h"))
+    assert (epics.beacons, epics.pva, epics.prefix) == ("127.0.0.1:1", "127.0.0.1:65534", "")
+    assert modbus.units == {"table": 1, "other": 247}
 
 
 @pytest.mark.parametrize(
@@ -43,11 +157,7 @@ def test_a_world_without_gateways_has_none() -> None:
     assert describe("hall.toml", HALL).gateways == ()
 
 
-def test_what_an_opc_ua_gateway_is_without_keys_and_with_all_of_them() -> None:
-    (plain,) = read_world("hall.toml", HALL + "[gateway.opcua]\n").gateways
-    assert isinstance(plain, OpcUaSpec)
-    assert (plain.listen, plain.interval, plain.registers, plain.security) == ("127.0.0.1:4840", 100 * MILLISECOND, (), "none")
-    assert (plain.certificate, plain.key, plain.trusted, plain.tokens) == (None, None, None, None)
+def test_an_opc_ua_gateway_with_all_keys() -> None:
     text = (
         '[gateway.opcua]\nlisten = "127.0.0.1:0"\ninterval = "250 ms"\nregisters = ["table.USER_REGISTER[5]"]\n'
         'security = "sign"\ncertificate = "c.pem"\nkey = "k.pem"\ntrusted = "clients"\ntokens = "t.txt"\n'

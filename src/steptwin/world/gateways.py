@@ -14,7 +14,6 @@ from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.world.reader import Key, TomlText, optional, read_table
 from steptwin.world.sense import TableRows, check_sense
-from steptwin.world.tomlplaces import Path
 from steptwin.world.values import address_value, flag, permitting, positive_time, text_value, texts, whole, whole_seconds, word
 
 GATEWAY = "gateway"
@@ -33,7 +32,6 @@ class GatewaySpec:
     kind: str
     listen: str | None = None
     """HOST:PORT where it is reached; None for one that only connects to others."""
-    path: Path = ()
     file: str = ""
     """The name of the file with the description."""
 
@@ -314,7 +312,7 @@ def read_gateways(text: TomlText) -> Iterator[GatewaySpec]:
             rows = GATEWAYS[kind]
             values = read_table(text, path, table, rows.keys)
             check_sense(text, path, rows, table)
-            yield _KINDS[kind].make(kind=kind, path=path, file=text.source.name, **values)
+            yield _KINDS[kind].make(kind=kind, file=text.source.name, **values)
         else:
             fix = text.key_replacement(path, kind, list(GATEWAYS))
             near = text.near(kind, list(GATEWAYS))

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from steptwin.diagnostics import visible
-from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.world.faults.active import HeldLevel
 from steptwin.world.plant import Plant
@@ -64,10 +63,7 @@ def _level(
     plant: Plant, machine: str, name: str, drivers: dict[str, list[Connection]], held: dict[str, HeldLevel]
 ) -> Iterator[str]:
     pin = f"{machine}.{name}"
-    try:
-        level = plant.read(pin)
-    except Misuse:
-        return
+    level = plant.read(pin)
     terminals = plant.kind(machine).terminals
     if pin in held:
         yield f"{pin} is {held[pin].words()}"
