@@ -109,6 +109,26 @@ def test_after_a_stop_without_ramp_it_runs_on_by_as_many_periods_as_its_energy_t
     assert 0.4 * time < end - begin < time, "faster, on the mean, to the middle of the last period"
 
 
+@pytest.mark.parametrize("speed", [700, 1200, 1900])
+def test_a_move_of_an_m1486_ends_without_ramp(speed: int) -> None:
+    """At start/stop speed, full steps/s. A rotor that its energy keeps in its period stays there."""
+
+    def acceleration(x: float, v: float) -> float:
+        return (-TORQUE * sin(POLES * x) - 0.2 * sign(v)) / INERTIA
+
+    lag = asin(0.2 / TORQUE) / POLES
+    _, x, _ = integrated(acceleration, -lag, speed / 200 * 2 * pi, lambda t, x, v: v <= 0)
+    periods = round((x - lag) * POLES / (2 * pi))
+    motor = TEXT[TEXT.index("[axis.motor]") :].format(friction=0.2, motor="overruns = true")
+    text = f'[[m1486]]\nname = "c"\nprogram = "p"\n[[axis]]\nname = "x"\ndrive = "c.M1"\n{motor}'
+    found = World.from_toml(text, {"p": f"[\rs{speed}\rv1950\rf12800\rr\rw500\r]\r".encode()})
+    found.run(for_=2.0)
+    assert found.read("c.position") == 12800
+    assert found.read("x.lost") == -periods * 4 * 64
+    ends = [record.time / SECOND for record in found.trace.of("event") if record.value == "stands at 12800"]
+    assert [moment for moment, _ in events(found, "fall")[:1]] == (ends if periods else [])
+
+
 def test_a_ramp_is_no_stop() -> None:
     found = world("overruns = true", rpm=1000)
     start(found, 40_000)

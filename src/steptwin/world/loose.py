@@ -78,7 +78,7 @@ class Looseness(Stateful):
         if not is_weak and (not self.is_free or self._motor.follows(speed)):
             self.is_free = False
             found = None
-            if motor.overruns and moves and not state.stalled:
+            if motor.overruns and before.leads(now - 1) and not stands and not state.stalled:
                 found = self._overrun(plan, led, motion, state, now)
             if found is None:
                 self._watch(plan, motion, now)
