@@ -379,6 +379,51 @@ def test_a_motor_without_torque_is_told_when_it_loses_the_field_and_when_it_is_c
     assert mechanism.lost(kernel.now) == 192
 
 
+@pytest.mark.parametrize(("sign", "side"), [(1, "upper"), (-1, "lower")])
+def test_an_axis_that_pushes_against_a_hard_stop_is_reported_until_it_no_longer_does(sign: int, side: str) -> None:
+    """It stands at the stop and does not push; 60 pulses further, each of them is lost: a multiple of the period."""
+    build = Build(low=-40, high=40, period_p=4)
+    kernel, drive, mechanism, told = rigged(build)
+
+    def reported() -> list[tuple[Nanos, str]]:
+        return [(record.time, str(record.value)) for record in told if record.subject == "hard-stop"]
+
+    drive.go(sign * 40, 0)
+    kernel.advance(2 * SECOND)
+    assert (reported(), mechanism.deadline()) == ([], None)
+    drive.go(sign * 100, kernel.now)
+    begin = kernel.now
+    kernel.advance(10 * SECOND)
+    end = drive.axis.plan.end
+    assert end is not None
+    (first, begins), (last, ends) = reported()
+    assert begins == f"x pushes against its {side} hard stop"
+    assert ends == f"x no longer pushes against its {side} hard stop, {sign * 60} pulses behind"
+    assert first == pytest.approx(begin + (2 / 500) ** 0.5 * SECOND, abs=1), "the first pulse of the way, at 250 t²"
+    assert last == end
+    drive.go(sign * 70, kernel.now)
+    kernel.advance(20 * SECOND)
+    assert (len(reported()), mechanism.place(kernel.now)) == (2, sign * 10)
+    facts = [dict(record.facts) for record in told if record.subject == "hard-stop"]
+    assert facts == [
+        {"axis": 1, "element": "x", "stop": side, "pushes": True, "lost": sign},
+        {"axis": 1, "element": "x", "stop": side, "pushes": False, "lost": sign * 60},
+    ]
+
+
+def test_an_axis_that_turns_round_at_a_hard_stop_pushes_until_its_field_comes_back_to_it() -> None:
+    """The field is 3 pulses beyond the stop, less than half a period of 8: nothing is lost."""
+    kernel, drive, mechanism, told = rigged(Build(high=40, period_p=8))
+    drive.go(43, 0)
+    kernel.advance(SECOND)
+    drive.go(0, kernel.now)
+    kernel.advance(5 * SECOND)
+    texts = [str(record.value) for record in told if record.subject == "hard-stop"]
+    assert texts[0] == "x pushes against its upper hard stop"
+    assert texts[-1] == "x no longer pushes against its upper hard stop, 0 pulses behind"
+    assert mechanism.place(kernel.now) == 0
+
+
 def test_a_blocked_rotor_of_a_motor_is_let_go_to_the_nearest_period() -> None:
     build = Build(period_p=64, motor=StepperMotor(((0.0, 1.0), (1000.0, 1.0)), 0.0, 0.0, 0.0, None))
     kernel, drive, mechanism, _ = rigged(build)

@@ -82,6 +82,8 @@ class CoursePiece(NamedTuple):
     load: int
     stalled: bool
     behind: int
+    stop: int = 0
+    """The hard stop against which the field draws the rotor: 1 upper, -1 lower, 0 neither."""
 
 
 class LoadPiece(NamedTuple):
@@ -204,6 +206,15 @@ class Course:
         """First moment > ``after`` at which the rotor loses the field or is caught again."""
         stalled = self._piece(after).stalled
         return next((piece.begin for piece in self.pieces if piece.begin > after and piece.stalled is not stalled), None)
+
+    def stop(self, now: Nanos) -> int:
+        """The hard stop against which the field draws the rotor, as in `CoursePiece`."""
+        return self._piece(now).stop
+
+    def next_stop(self, after: Nanos) -> Nanos | None:
+        """First moment > ``after`` at which that changes."""
+        stop = self._piece(after).stop
+        return next((piece.begin for piece in self.pieces if piece.begin > after and piece.stop != stop), None)
 
     def vibration(self, now: Nanos) -> float:
         """The amplitude of the rotor about the field, full steps; 0 where no resonance is described."""
@@ -342,23 +353,21 @@ class Course:
         """The rotor goes with the field until a stop holds it, the load when its play is used up."""
         build = self.build
         if self._is_pushed(begin, direction):
-            self._stand(begin, direction)
+            self._stand(begin, direction, stop=direction)
             return
         self._catch(begin)
         rotor, load, _, behind = self._now
         if self.field(begin) - behind != rotor:
             # Drawn against a stop from which the field comes back.
             left = self._time(rotor + behind, begin)
-            self._stand(begin, direction)
+            self._stand(begin, direction, stop=-direction)
             if left is None or (end is not None and left >= end):
                 return
             begin, rotor = left, self.field(left) - behind
         offset = -behind
         slack = 0 if direction > 0 else build.play
         stop = build.high if direction > 0 else None if build.low is None else build.low - build.play
-        held = (
-            None if stop is None else begin if (stop - rotor) * direction <= 0 else self._time(stop + direction - offset, begin)
-        )
+        held = None if stop is None else self._time(stop + direction - offset, begin)
         if held is not None and end is not None and held >= end:
             held = None
         touches = (rotor + slack - load) * direction >= 0
@@ -371,7 +380,7 @@ class Course:
             if met is not None:
                 self._laid.append(CoursePiece(met, direction, True, offset, True, offset + slack, False, behind))
         if held is not None and stop is not None:
-            self._laid.append(CoursePiece(held, direction, False, stop, False, stop + slack, False, behind))
+            self._laid.append(CoursePiece(held, direction, False, stop, False, stop + slack, False, behind, direction))
         if end is not None:
             rotor = offset + self.field(end)
             if stop is not None and (rotor - stop) * direction > 0:
@@ -387,9 +396,9 @@ class Course:
             return build.high is not None and rotor >= build.high and drawn > 0
         return build.low is not None and rotor <= build.low - build.play and drawn < 0
 
-    def _stand(self, now: Nanos, direction: int) -> None:
+    def _stand(self, now: Nanos, direction: int, *, stop: int = 0) -> None:
         rotor, load, stalled, behind = self._now
-        self._laid.append(CoursePiece(now, direction, False, rotor, False, load, stalled, behind))
+        self._laid.append(CoursePiece(now, direction, False, rotor, False, load, stalled, behind, stop))
 
     def _catch(self, now: Nanos) -> None:
         """The rotor goes to the nearest place that has the electrical angle of the field, or towards it as far as a stop."""

@@ -94,6 +94,8 @@ class Mechanism(Stateful):
         "_simple",
         "_stall_due",
         "_stalled",
+        "_stop",
+        "_stop_due",
     )
 
     def __init__(self, kernel: Kernel, machine: str, number: int, build: Build, name: str = "axis") -> None:
@@ -110,6 +112,10 @@ class Mechanism(Stateful):
         self._stalled = False
         self._stall_due: Nanos | None = None
         """The next moment at which the motor stalls or synchronises again."""
+        self._stop = 0
+        """The hard stop against which the motor pushes, as reported: 1 upper, -1 lower, 0 neither."""
+        self._stop_due: Nanos | None = None
+        """When that changes next."""
         self._lost = 0
         self._blockers: tuple[str, ...] = ()
         """What blocks the rotor."""
@@ -191,6 +197,8 @@ class Mechanism(Stateful):
                 self._turn_encoders(now)
             if self._stall_due is not None and self._stall_due <= now:
                 self._watch_motor(now)
+            if self._stop_due is not None and self._stop_due <= now:
+                self._watch_stops(now)
             if self._rest_due is not None and self._rest_due <= now:
                 self._watch_fall(now, None)
             self._report_load(now)
@@ -215,7 +223,7 @@ class Mechanism(Stateful):
 
     def deadline(self) -> Nanos | None:
         """Courses are computed in advance: what is due is to be reported, or concerns followers and the current of the axis."""
-        dues = (self._due, self._stall_due, self._rest_due, None if self._loose is None else self._loose.due)
+        dues = (self._due, self._stall_due, self._stop_due, self._rest_due, None if self._loose is None else self._loose.due)
         return min((due for due in dues if due is not None), default=None)
 
     def _watch_motor(self, now: Nanos) -> None:
@@ -233,6 +241,19 @@ class Mechanism(Stateful):
             )
             self._kernel.report(self.machine, "event", "stall", text, *facts)
         self._stall_due = self._course.next_stall(now)
+
+    def _watch_stops(self, now: Nanos) -> None:
+        """Report that the motor begins to push against a hard stop, and that it no longer does."""
+        stop = self._course.stop(now)
+        if stop != self._stop:
+            pushes, side = stop != 0, "upper" if (stop or self._stop) > 0 else "lower"
+            lost = self.lost(now)
+            ended = f"{self._name} no longer pushes against its {side} hard stop, {lost} pulses behind"
+            text = f"{self._name} pushes against its {side} hard stop" if pushes else ended
+            facts = ("axis", self.number), ("element", self._name), ("stop", side), ("pushes", pushes), ("lost", lost)
+            self._kernel.report(self.machine, "event", "hard-stop", text, *facts)
+            self._stop = stop
+        self._stop_due = self._course.next_stop(now)
 
     def _renew(self, drive: Drive, now: Nanos, state: MechanicalState | None = None, *, rests: bool = False) -> None:
         """Compute a new course after a change of the drive's plan or of the mechanics. ``rests``: a free rotor stands now."""
@@ -262,6 +283,8 @@ class Mechanism(Stateful):
             self._turn_encoders(now)
         if self.build.motor is not None:
             self._watch_motor(now)
+        if self.build.low is not None or self.build.high is not None:
+            self._watch_stops(now)
         if self._loose is not None:
             self._watch_fall(now, free)
 

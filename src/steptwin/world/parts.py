@@ -58,6 +58,13 @@ class WorldParts:
     def element_names(self) -> list[str]:
         return [name for built in self.elements.values() for name in built]
 
+    def unbuilt(self, name: str) -> str | None:
+        """The kind of an element that the description has and that is not built yet."""
+        for kind, specs in self.spec.elements.items():
+            if name not in self.elements.get(kind, {}) and any(one.name == name for one in ELEMENTS[kind].named(specs)):
+                return kind
+        return None
+
     def element_signals(self, name: str) -> Mapping[str, SignalOf] | None:
         """The signals of an element; None if no element has the name."""
         for kind, built in self.elements.items():

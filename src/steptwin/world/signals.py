@@ -126,6 +126,11 @@ class Idle:
         return None
 
 
+BUILT_BEFORE = (
+    "; an element may depend on those of its kind above it in the file, and on kinds that 'up --keys' has before its own"
+)
+
+
 def find_signal(plan: WorldParts, name: str) -> SignalOf | Idle:
     """The signal called ``name``. Raises `Misuse` with the existing names."""
     if name == "time":
@@ -141,6 +146,9 @@ def find_signal(plan: WorldParts, name: str) -> SignalOf | Idle:
         return _chosen({"idle": _quiet(line, plan.kernel_of[owner].source(owner))}, rest, name)
     machine = plan.machines.get(owner)
     if machine is None:
+        later = plan.unbuilt(owner)
+        if later is not None:
+            raise Unknown(owner, f"no signal {name!r} yet: [[{later}]] {owner!r} is built later{BUILT_BEFORE}")
         known = [*plan.machines, *plan.element_names, "time", "idle"]
         near = NearMiss()
         text = f"no signal {name!r}: nothing is called {owner!r}{near.hint(owner, known)}; there are {', '.join(known)}"

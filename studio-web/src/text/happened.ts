@@ -70,6 +70,12 @@ export const HAPPENED: Readonly<Record<string, string>> = {
     "ruch wymaga więcej niż {has} N·m, które silnik ma przy tej prędkości",
   "it no longer follows its field": "nie nadąża już za polem",
   "{axis} is caught, {pulses} pulses behind": "{axis} znów w polu, {pulses} impulsów w tyle",
+  "{axis} pushes against its upper hard stop": "{axis} napiera na górny twardy ogranicznik",
+  "{axis} pushes against its lower hard stop": "{axis} napiera na dolny twardy ogranicznik",
+  "{axis} no longer pushes against its upper hard stop, {pulses} pulses behind":
+    "{axis} już nie napiera na górny twardy ogranicznik, {pulses} impulsów w tyle",
+  "{axis} no longer pushes against its lower hard stop, {pulses} pulses behind":
+    "{axis} już nie napiera na dolny twardy ogranicznik, {pulses} impulsów w tyle",
   "{axis} moves without current": "{axis} rusza się bez prądu",
   "{axis} stands, {pulses} pulses behind": "{axis} stoi, {pulses} impulsów w tyle",
   "{zone}: {axes} touch": "{zone}: dotykają się {axes}",

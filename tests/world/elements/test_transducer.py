@@ -164,3 +164,17 @@ def test_snapshots_and_sessions_have_it(moment_s: float, tmp_path: object) -> No
 def test_mistakes_have_their_places(old: str, new: str, text: str) -> None:
     with pytest.raises(WorldError, match=f"(?s){text}"):
         World.from_toml(TEXT.replace(old, new, 1), name="t.toml")
+
+
+def test_what_is_built_later_is_named_as_that() -> None:
+    """Two sensors that depend on each other, and a kind that is built after this one."""
+    second = TEXT.replace('of = "x.position"', 'of = "next.volts"') + TEXT[TEXT.index("[[transducer]]") :].replace(
+        "gap", "next"
+    ).replace("x.position", "gap.volts").replace("AIN1", "AIN2")
+    with pytest.raises(
+        WorldError, match=r"no signal 'next\.volts' yet: \[\[transducer\]\] 'next' is built later; an element may depend on"
+    ):
+        World.from_toml(second)
+    load = TEXT.replace('of = "x.position"', 'of = "part.kg"') + '[[load]]\nname = "part"\naxis = "x"\nkg = 1.0\n'
+    with pytest.raises(WorldError, match=r"\[\[load\]\] 'part' is built later"):
+        World.from_toml(load)
