@@ -175,6 +175,6 @@ def test_what_is_built_later_is_named_as_that() -> None:
         WorldError, match=r"no signal 'next\.volts' yet: \[\[transducer\]\] 'next' is built later; an element may depend on"
     ):
         World.from_toml(second)
-    load = TEXT.replace('of = "x.position"', 'of = "part.kg"') + '[[load]]\nname = "part"\naxis = "x"\nkg = 1.0\n'
+    load = TEXT.replace('of = "x.position"', 'of = "part.kg"') + '[[load]]\nname = "part"\naxis = "x"\nmass = 1.0\n'
     with pytest.raises(WorldError, match=r"\[\[load\]\] 'part' is built later"):
         World.from_toml(load)
