@@ -15,9 +15,10 @@ from hypothesis import strategies as st
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
-from steptwin.machine import SECOND
+from steptwin.machine import MILLISECOND, SECOND
 from steptwin.world import script as do
 from steptwin.world.actions import Bytes, ExternalInput
+from steptwin.world.control import Move
 from steptwin.world.faults import read
 from steptwin.world.script import Steps
 
@@ -89,6 +90,29 @@ def test_requests_of_python_are_in_the_session() -> None:
     world.run(for_=2)
     session = session_of(world)
     assert [type(given.what).__name__ for given in session.inputs] == ["Request"]
+    assert session.replay().trace.digest() == session.digest
+
+
+def test_what_commands_of_python_did_not_reach_is_in_the_session(tmp_path: Path) -> None:
+    def operator() -> Steps:
+        yield do.Order(Move("drum", 1, by=6400.0))
+        yield do.Wait(MILLISECOND)
+        yield do.Order(Move("drum", 1, by=640.0))
+        yield do.ExpectReached("table", 2)
+
+    world = World.from_toml(
+        "[[mic488]]\nname = 'table'\n[[line]]\nname = 'chips'\nkind = 'm1486'\n"
+        "[[m1486]]\nname = 'drum'\nline = 'chips'\naddress = 3\n"
+    )
+    world.script(operator)
+    world.run(for_=2)
+    assert [failure.value for failure in world.failures] == [
+        "drum is not at rest (waits for the end of the move): wait, or stop it",
+        "table.M2.status == 4; table.M2.status is 0",
+    ]
+    save(session_of(world), tmp_path / "s.json")
+    session = load(tmp_path / "s.json")
+    assert [type(given.what).__name__ for given in session.inputs] == ["Send", "Refused", "Expect"]
     assert session.replay().trace.digest() == session.digest
 
 

@@ -66,7 +66,13 @@ class Leave(NamedTuple):
     place: str
 
 
-ExternalInput: TypeAlias = do.Step | Bytes | See | SetVariable | Download | Leave
+class Refused(NamedTuple):
+    """A controller could not do what a script from outside commanded; a replay has the command no more."""
+
+    text: str
+
+
+ExternalInput: TypeAlias = do.Step | Bytes | See | SetVariable | Download | Leave | Refused
 """An input from outside a world. Recorded with its moment, it can be replayed."""
 
 
@@ -204,6 +210,10 @@ def _leave(plant: Plant, given: Leave) -> None:
     line.leave(given.place)
 
 
+def _refused(plant: Plant, given: Refused) -> None:
+    plant.report_refused(given.text)
+
+
 def _power_cycle(plant: Plant, step: do.PowerCycle) -> None:
     machine = plant.machine(step.machine)
     with _now(plant, step.machine):
@@ -270,5 +280,6 @@ ACTIONS: Mapping[type, Callable[[Plant, Any], None]] = complete(
         Download: _download,
         SetVariable: _set_variable,
         Leave: _leave,
+        Refused: _refused,
     },
 )

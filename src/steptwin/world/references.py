@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, get_args
 from steptwin.errors import Misuse, Refusal
 from steptwin.tables import complete
 from steptwin.world import script as do
-from steptwin.world.actions import Bytes, Download, ExternalInput, Leave, See, SetVariable
+from steptwin.world.actions import Bytes, Download, ExternalInput, Leave, Refused, See, SetVariable
 from steptwin.world.control import Seek
 from steptwin.world.faults import Fault
 from steptwin.world.motions import motion_ends, ordered
@@ -204,6 +204,7 @@ _CHECKS: Mapping[type, Callable[[Plant, Any], None]] = complete(
         SetVariable: _set_variable,
         do.SetFault: _fault,
         do.ClearFault: _clear_fault,
-        **dict.fromkeys((do.Wait, do.At, do.Note, do.Stop, do.Read, do.Call, do.Repeat, Bytes, Download, Leave), _nothing),
+        **dict.fromkeys((do.Wait, do.At, do.Note, do.Stop, do.Read, do.Call, do.Repeat), _nothing),
+        **dict.fromkeys((Bytes, Download, Leave, Refused), _nothing),
     },
 )

@@ -10,7 +10,7 @@ from steptwin.errors import Refusal, Runaway
 from steptwin.machine import Nanos
 from steptwin.tables import complete
 from steptwin.world import script as do
-from steptwin.world.actions import FOR_SCRIPTS, ExternalInput
+from steptwin.world.actions import FOR_SCRIPTS, ExternalInput, Refused
 from steptwin.world.agenda import Agenda, Watchers
 from steptwin.world.kernel import Kernel
 from steptwin.world.master import Master
@@ -269,7 +269,7 @@ class Scripts:
         try:
             found = ordered(self._plant, step.command)
         except Refusal as error:
-            self._plant.report_refused(str(error))
+            self._do(script, Refused(str(error)))
             return None, None
         return self._take(found, script)
 
@@ -278,7 +278,7 @@ class Scripts:
         return ScriptWait(None if step.within is None else self._plant.now + step.within, over), None
 
     def _expect_reached(self, step: do.ExpectReached, script: Script) -> StepResult:
-        self._plant.expect(motion_ends(self._plant, step.machine, step.axis, step.seek).reached)
+        self._do(script, do.Expect(motion_ends(self._plant, step.machine, step.axis, step.seek).reached))
         return None, None
 
     def _stop(self, step: do.Stop, script: Script) -> StepResult:

@@ -1,0 +1,447 @@
+"""Further scenes: of supplies, voltages, lines, controllers, programs, conditions and tables from other files."""
+
+from __future__ import annotations
+
+from scenes import DRIVES, MOVES, Scene
+
+PROGRAM = """
+COUNT = 0
+IF IN1 = 1
+  COUNT = 5
+ENDIF
+M1 = ON
+M2 = ON
+CFGINT_IN3 = RIS
+MAIN:
+COUNT = COUNT + 1
+OUT⟨#1..3⟩ = ON
+PABS M1 ⟨5..30⟩
+WAITPOS
+OUT1 = OFF
+WAIT IN2 = ⟨ON|OFF⟩
+DELAY ⟨0.01..0.09⟩
+PABS M2 ⟨5..30⟩
+PABS M1 0
+WAITPOS
+OUT⟨#1..3⟩ = OFF
+JUMP MAIN
+INT_IN3:
+OUT4 = ON
+DELAY 0.02
+OUT4 = OFF
+RETURN
+"""
+CHIP = "[\n@1\nF⟨640|1280|6400⟩\nR\nW⟨#1..90⟩\nB⟨128|640|3200⟩\nR\n+2\nJ1\n.\n]\n"
+
+PROGRAMMED = DRIVES.replace('name = "c"', 'name = "c"\nprogram = "p.prg"\nstart = true\n?statement_time = "⟨1..3⟩ ms"')
+
+MORE: dict[str, Scene] = {
+    "supplies": Scene(
+        """
+[[mic488]]
+name = "c"
+program = "p.prg"
+start = true
+[[mic488]]
+name = "d"
+[[mic488]]
+name = "e"
+
+[[supply]]
+name = "s"
+feeds = ["c", "e"]
+?on = "d.OUT1"; switched = true
+?volts = ⟨20..40⟩; enough = ⟨5..19⟩
+?delay = "⟨10..60⟩ ms"
+?rise = "⟨0..90⟩ ms"
+?hold_up = "⟨0..60⟩ ms"
+?fall = "⟨0..90⟩ ms"
+
+[[supply]]
+name = "t"
+feeds = "d"
+rise = "⟨5..60⟩ ms"
+fall = "⟨5..60⟩ ms"
+
+[[wire]]
+from = "s.good"
+to = "d.IN1"
+
+[[wire]]
+from = "c.OUT1"
+to = "d.IN2"
+?delay = "⟨1..20⟩ ms"
+?inverted = true
+
+[[transducer]]
+name = "v"
+of = "d.M1.position"
+to = "d.AIN1"
+points = [[0, 0], [⟨10..30⟩, ⟨5..9⟩]]
+?resolution = ⟨0.1..0.8⟩
+
+! kind = "brown-out", element = "⟨s|t⟩", volts = ⟨2..22⟩
+! kind = "brown-out", element = "s"
+! kind = "stuck-output", element = "s", output = "good", level = ⟨#0..1⟩
+* s.volts ⟨>|<|>=⟩ ⟨4..20⟩ V
+* s.good and t.good or d.AIN1 > ⟨2..5⟩
+""",
+        """
+{ write = { "d.OUT1" = ⟨#0..1⟩ } }
+{ write = { "d.OUT1" = 1 } }
+{ set = { "d.IN3" = ⟨#0..1⟩, "d.AIN2" = ⟨1..9⟩ } }
+{ until = "s.volts ⟨>|<⟩ ⟨4..20⟩", within = "⟨20..200⟩ ms" }
+""",
+        {"p.prg": "A:\nOUT1 = ON\nDELAY ⟨0.02..0.09⟩\nOUT1 = OFF\nDELAY ⟨0.02..0.09⟩\nJUMP A\n"},
+    ),
+    "voltages": Scene(
+        """
+[[mic488]]
+name = "c"
+[mic488.M1]
+acc = ⟨3000..9000⟩
+dec = ⟨3000..9000⟩
+vel = ⟨600..1200⟩
+[[mic488]]
+name = "d"
+
+[[source]]
+?name = "one"
+to = "c.AIN1"
+kind = "sine"
+value = ⟨4..6⟩
+amplitude = ⟨1..4⟩
+?frequency = ⟨0.5..9.0⟩
+?phase = ⟨-90..200⟩
+?period = "⟨5..30⟩ ms"
+
+[[source]]
+name = "two"
+to = "c.AIN2"
+kind = "ramp"
+begin = ⟨0..9⟩
+end = ⟨0..9⟩
+over = "⟨90..600⟩ ms"
+?repeat = "⟨100..700⟩ ms"
+?period = "⟨5..30⟩ ms"
+
+[[source]]
+name = "three"
+to = "d.AIN1"
+kind = "table"
+points = [[0, ⟨0..9⟩], [⟨0.1..0.3⟩, ⟨0..9⟩], [⟨0.4..0.7⟩, ⟨0..9⟩]]
+?repeat = "⟨700..900⟩ ms"
+?period = "⟨5..30⟩ ms"
+
+[[source]]
+to = "d.AIN2"
+value = ⟨0..10⟩
+
+! kind = "⟨broken-wire|drift⟩", element = "two"
+! kind = "drift", element = "three", volts = ⟨-6..6⟩
+! kind = "stuck", pin = "AIN1", machine = "c", value = ⟨1..9⟩, from_s = ⟨0.1..0.6⟩, until_s = ⟨0.7..1.2⟩
+* two.volts ⟨>|<|>=⟩ ⟨1..8⟩
+* d.AIN1 > three.volts + ⟨0..2⟩ or c.AIN1 < ⟨3..6⟩ and not c.AIN2 == d.AIN2
+* (time - ⟨0.2..0.9⟩) * 2 > abs(⟨0..1⟩ - time) / 3
+""",
+        """
++ { write = { "c.M1_EN" = 1, "c.M1_POS_ABS" = 900 } }
+{ set = { "c.IN1" = ⟨#0..1⟩ } }
+{ until = "c.AIN1 ⟨>|<⟩ ⟨4000..6000⟩ mV", within = "⟨20..200⟩ ms" }
+{ until = "c.M1.position + c.AIN2 > ⟨100..700⟩", within = "⟨20..200⟩ ms" }
+{ expect = "two.volts < ⟨1..8⟩ and c.AIN1 - 1 > d.AIN2 * 0.5" }
+""",
+    ),
+    "lines": Scene(
+        """
+[[line]]
+name = "bus"
+?baud = ⟨9600|19200|115200⟩
+?timing = "⟨real|strict⟩"
+?gap = "⟨2..9⟩ ms"
+[[line]]
+name = "two"
+timing = "⟨real|strict⟩"
+[[mic488]]
+name = "c"
+line = "bus"
+unit = ⟨#2..9⟩
+?firmware = "⟨1.40|1.23⟩"
+[mic488.M1]
+acc = ⟨3000..9000⟩
+dec = ⟨3000..9000⟩
+vel = ⟨600..1200⟩
+[[mic488]]
+name = "d"
+line = "⟨bus|two⟩"
+unit = ⟨#10..19⟩
+[[mic488]]
+name = "e"
+line = "two"
+unit = ⟨#20..29⟩
+
+[[wire]]
+from = "c.OUT1"
+to = "d.IN1"
+
+! kind = "⟨crc|late|wrong-unit|echo⟩", line = "bus", link = "script", every = ⟨#2..4⟩
+! kind = "⟨delay|no-answer⟩", line = "two", link = "script", nth = ⟨#1..6⟩
+! kind = "no-answer", line = "bus", lost = "request", link = "script", nth = ⟨#1..6⟩
+! kind = "⟨flip|drop|insert|gap⟩", line = "bus", link = "script", direction = "⟨in|out⟩", probability = 0.02
+! kind = "⟨split|noise⟩", line = "two", link = "script", length = ⟨#1..3⟩, every = ⟨#2..3⟩
+! kind = "exception", link = "script", line = "bus", function = ⟨3|5|6|16⟩, code = ⟨#1..9⟩, count = ⟨#1..3⟩
+! kind = "busy", link = "script", line = "two", address = "⟨6000|100-12000⟩", probability = 0.4
+* c.M1_ACC > ⟨3000..9000⟩ or c.USER_REGISTER[6]:real ⟨>|!=⟩ ⟨1..9⟩
+* bus.idle and two.idle
+""",
+        """
+{ write = { "⟨c|d|e⟩.OUT⟨#1..3⟩" = ⟨#0..1⟩ } }
+{ write = { "⟨c|d|e⟩.OUT⟨#1..3⟩" = ⟨#0..1⟩, "⟨c|d|e⟩.M1_EN" = 1 } }
+{ write = { "c.M1_ACC" = ⟨3000..9000⟩, "c.USER_REGISTER[5]" = ⟨#1..99⟩ } }
+{ write = { "c.M1_EN" = 1, "c.M1_POS_ABS" = ⟨100..900⟩ } }
+{ move = "⟨c|d⟩.M1", to = ⟨100..900⟩, within = "⟨100..300⟩ ms" }
+{ until = "idle", within = "⟨20..200⟩ ms" }
+{ power_cycle = "⟨d|e⟩" }
+@ bus 0⟨#2..9⟩03272400⟨#10..40⟩
+@ two ⟨14|15|16⟩0300640002
+@ ⟨bus|two⟩ ff000102
+@ ⟨bus|two⟩ leave
+""",
+    ),
+    "chips": Scene(
+        """
+[[line]]
+name = "chips"
+kind = "m1486"
+?baud = ⟨1200|4800⟩
+?timing = "real"
+[[m1486]]
+name = "c"
+line = "chips"
+address = 3
+?variant = "⟨A|C|E1⟩"
+?interface = "⟨dual|two⟩"
+?statement_time = "⟨0.5..3.0⟩ ms"
+[[m1486]]
+name = "d"
+line = "chips"
+address = "A"
+?program = "p.m1486"
+
+[[axis]]
+name = "x"
+drive = "c.M1"
+?pitch = ⟨4.0..6.0⟩
+?pulses_per_rev = 12800
+?inverted = true
+[[axis.switch]]
+above = ⟨1..5⟩
+to = "d.B2"
+?bounce = "⟨1..5⟩ ms"
+[[axis.switch]]
+below = ⟨-9..-1⟩
+to = "c.B4"
+
+[[axis]]
+name = "y"
+drive = "d.M1"
+kind = "rotary"
+[[axis.switch]]
+position = ⟨20..90⟩
+width = ⟨5..20⟩
+to = "d.B5"
+
+[[wire]]
+from = "d.B3"
+to = "c.B3"
+?delay = "⟨1..9⟩ ms"
+
+! kind = "stall", machine = "c", at_s = ⟨0.1..0.9⟩, for_s = ⟨0.02..0.3⟩
+! kind = "⟨flip|drop|insert⟩", line = "chips", link = "script", direction = "⟨in|out⟩", probability = 0.02
+! kind = "stuck", machine = "d", pin = "B2", value = ⟨#0..1⟩, from_s = ⟨0.1..0.6⟩, until_s = ⟨0.7..1.2⟩
+! kind = "bounce", machine = "d", pin = "B5", bounces = ⟨#1..4⟩, for_ms = ⟨2.0..9.0⟩
+! kind = "supply-drop", machine = "⟨c|d⟩", at_s = ⟨0.3..0.9⟩, for_s = ⟨0.02..0.3⟩
+* c.position ⟨>|<⟩ ⟨#-3000..9000⟩ and not d.busy
+* x.position > ⟨0..9⟩ or c.counter > ⟨#0..300⟩
+""",
+        """
++ { send = "chips", text = "x3\\\\ra⟨#2000..9000⟩\\\\rv⟨#2000..9000⟩\\\\rf⟨#3000..12800⟩\\\\rr\\\\r" }
+{ send = "chips", text = "x3\\\\r⟨f|b⟩⟨#300..12800⟩\\\\rr\\\\r" }
+{ send = "chips", text = "x⟨3|a|g⟩\\\\ru⟨#14..21⟩\\\\r" }
+{ send = "chips", text = "xa\\\\rf⟨#300..9000⟩\\\\rr\\\\r" }
+{ send = "chips", text = "xa\\\\r⟨+|-⟩3\\\\r" }
+{ move = "⟨c|d⟩.M1", by = ⟨#-3000..3000⟩, within = "⟨100..300⟩ ms" }
+{ home = "c.M1", seek = "⟨-|+⟩B4", within = "⟨100..300⟩ ms" }
+{ wait_for = "⟨c|d⟩.M1", within = "⟨100..300⟩ ms" }
+{ set = { "c.B1" = ⟨#0..1⟩ } }
+{ until = "not c.moving", within = "⟨20..200⟩ ms" }
+{ power_cycle = "d" }
+""",
+        {"p.m1486": CHIP},
+    ),
+    "machines": Scene(
+        f"""
+{DRIVES}
+pos_ctrl_mode = "⟨ENCODER|OFF⟩"
+enc_resol = 400
+home_mode = "⟨HOME1|HOME2⟩"
+limit_mode = "⟨KL|KR|KL+KR⟩"
+in_kl = "IN1"
+in_kr = "IN2"
+[mic488.IN5]
+?filter = ⟨#1..2⟩
+?level = 1
+[[mic488]]
+name = "e"
+
+[[axis]]
+name = "x"
+drive = "c.M2"
+start = ⟨5..20⟩
+[[axis.switch]]
+below = ⟨0..4⟩
+to = "c.IN1"
+[[axis.switch]]
+above = ⟨30..50⟩
+to = "c.IN2"
+?join = "parallel"
+[[axis.switch]]
+position = ⟨22..29⟩
+width = ⟨0.2..1.0⟩
+to = "c.IN5"
+
+! kind = "stall", machine = "c", axis = ⟨#1..2⟩, at_s = ⟨0.1..0.9⟩, for_s = ⟨0.02..0.3⟩, period_s = ⟨0.3..0.5⟩, count = 2
+! kind = "slip", machine = "c", axis = ⟨#1..2⟩, counts = ⟨#-40..40⟩, at_s = ⟨0.1..0.9⟩, probability = 0.8
+! kind = "bounce", machine = "c", pin = "IN⟨#4..5⟩", bounces = ⟨#1..4⟩, for_ms = ⟨2.0..9.0⟩, nth = ⟨#1..2⟩
+! kind = "stuck", machine = "c", pin = "IN⟨#4..5⟩", from_s = ⟨0.1..0.6⟩, until_s = ⟨0.7..1.2⟩
+! kind = "supply-drop", machine = "⟨c|e⟩", at_s = ⟨0.2..0.9⟩, for_s = ⟨0.02..0.3⟩, period_s = ⟨0.3..0.5⟩, until_s = 1.3
+! kind = "power-cut", machine = "e", for_s = ⟨0.02..0.3⟩, written = ⟨#20..3000⟩, nth = ⟨#1..2⟩
+! kind = "wear", machine = "e", writes = ⟨#0..2⟩
+! kind = "master-error", machine = "c", from_s = ⟨0.1..0.6⟩, until_s = ⟨0.7..1.2⟩
+* x.position ⟨>|<⟩ ⟨5..40⟩ or c.M2.status == ⟨#1..5⟩
+""",
+        MOVES
+        + """
+{ home = "c.M2", velocity = ⟨-50|50⟩, within = "⟨100..400⟩ ms" }
+{ write = { "c.M2_HOME" = ⟨-50..-20⟩ } }
+{ write = { "e.USER_REGISTER[1500]" = ⟨#1..99⟩, "e.USER_REG_SAVE" = 1 } }
+{ set = { "c.IN⟨#4..5⟩" = ⟨#0..1⟩ } }
+{ turn = "c.M⟨#3..4⟩", counts = ⟨#-90..90⟩ }
+{ couple = "c.M3", to = "⟨drive|free|blocked⟩" }
+{ write = { "c.M3_EN" = 1, "c.M3_POS_REL" = ⟨#-300..900⟩ } }
+""",
+    ),
+    "programs": Scene(
+        f"""
+{PROGRAMMED}
+[[line]]
+name = "chips"
+kind = "m1486"
+[[m1486]]
+name = "k"
+line = "chips"
+program = "p.m1486"
+
+[[wire]]
+from = "c.OUT1"
+to = "c.IN2"
+delay = "⟨1..90⟩ ms"
+?inverted = true
+
+[[button]]
+name = "b"
+to = "c.IN3"
+?bounce = "⟨1..6⟩ ms"
+
+[[wire]]
+from = "c.OUT2"
+to = "k.B1"
+
+* c.M1.position > ⟨3..20⟩ and c.OUT4
+* k.position > ⟨#500..3000⟩ or c.program == 1
+""",
+        """
+{ press = "b", for = "⟨5..60⟩ ms" }
+{ set = { "c.IN1" = ⟨#0..1⟩ } }
+{ until = "c.OUT⟨#1..3⟩ == ⟨#0..1⟩", within = "⟨20..200⟩ ms" }
+{ power_cycle = "⟨c|k⟩" }
+{ repeat = ⟨#2..3⟩, steps = [{ press = "b" }, { wait = "⟨2..20⟩ ms" }, { release = "b" }, { wait = "⟨2..20⟩ ms" }] }
+{ until = "idle", within = "⟨20..200⟩ ms" }
+""",
+        {"p.prg": PROGRAM, "p.m1486": CHIP},
+    ),
+    "scripts": Scene(
+        f"""
+{DRIVES}
+[[use]]
+name = "left"
+file = "part.toml"
+[use.with]
+drive = "c.M1"
+?length = ⟨20..40⟩
+
+[[use]]
+name = "right"
+file = "part.toml"
+[use.with]
+drive = "c.M2"
+input = "IN5"
+
+[[event]]
+every = "⟨40..300⟩ ms"
+steps = [{{ note = "tick" }}, {{ wait = "⟨0..30⟩ ms" }}, {{ set = {{ "c.IN1" = ⟨#0..1⟩ }} }}]
+
+[[event]]
+at = "⟨40..900⟩ ms"
+steps = [{{ expect = "left_x.position < ⟨5..20⟩ and abs(right_x.position - left_x.position) <= ⟨1..9⟩" }}]
+
+[[event]]
+?name = "far"
+when = "left_x.position - right_x.position ⟨>|<|>=⟩ ⟨-9..9⟩"
+steps = [{{ repeat = ⟨#1..3⟩, steps = [{{ note = "far" }}, {{ press = "left_b", for = "⟨5..60⟩ ms" }}, {{ wait = "9 ms" }}] }}]
+
+[[script]]
+name = "more"
+?at = "⟨30..200⟩ ms"
+?repeat = ⟨#2..4⟩
+steps = [{{ at = "⟨100..400⟩ ms" }}, {{ until = "c.IN5 or time > ⟨0.3..0.9⟩" }}, {{ set = {{ "c.IN2" = 1 }} }}]
+
+[[script]]
+name = "end"
+at = "⟨700..1400⟩ ms"
+steps = [{{ stop = "it is enough" }}, {{ note = "after the end" }}]
+""",
+        MOVES
+        + """
+{ press = "⟨left|right⟩_b", for = "⟨5..120⟩ ms" }
+{ press = "⟨left|right⟩_b" }
+{ release = "⟨left|right⟩_b" }
+{ move = "c.M⟨#1..2⟩", ⟨to|by⟩ = ⟨-20..20⟩, within = "⟨50..400⟩ ms" }
+{ wait_for = "c.M⟨#1..2⟩" }
+{ until = "left_x.position % ⟨3..9⟩ < ⟨1..3⟩", within = "⟨50..300⟩ ms" }
+{ expect = "left_x.position == right_x.position" }
+""",
+        {
+            "part.toml": """
+[parameters]
+drive = {}
+length = 30.0
+input = "IN4"
+
+[[axis]]
+name = "x"
+drive = "{drive}"
+travel = [-10, "{length}"]
+[[axis.switch]]
+above = 5
+to = "c.{input}"
+join = "parallel"
+
+[[button]]
+name = "b"
+to = "c.{input}"
+join = "parallel"
+"""
+        },
+    ),
+}

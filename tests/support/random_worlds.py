@@ -1,0 +1,195 @@
+"""Small worlds with values by chance, and all that can be seen of them.
+
+A world is made of a `Scene`, a description with gaps: ``⟨2..9⟩`` becomes a number, ``⟨#2..9⟩`` a whole one, ``⟨a|b⟩`` one
+of these. What begins with ``?``, a line or a whole table, is left out by chance. ``! kind = ...`` is a fault, of the description
+or of a step. ``* condition`` is an event. In one half of the worlds numbers are on a coarse grid, so that moments and places
+coincide; in the other one they have decimals. All comes from `random.Random.random`, which is the same in every Python.
+"""
+
+from __future__ import annotations
+
+import re
+from hashlib import blake2b
+from random import Random
+
+from more_scenes import MORE
+from scenes import SCENES as FIRST
+from scenes import Scene
+
+from steptwin.files.export import axis_views
+from steptwin.files.session import session_of
+from steptwin.files.world import World
+from steptwin.machine import SECOND
+from steptwin.subject.describe import describe
+from steptwin.wire.crc import with_crc
+from steptwin.world.actions import ACTIONS, Leave
+from steptwin.world.reader import TomlText
+from steptwin.world.steptable import read_steps
+from steptwin.world.trace import encode
+from steptwin.world.unfinished import unchanged_inputs, waiting
+
+GAP = re.compile(r"⟨([^⟩]*)⟩")
+STEPS = 16
+MOMENTS = 7
+END_S = 1.5
+SCENES = FIRST | MORE
+
+
+class Chance:
+    """Where all that is by chance comes from."""
+
+    def __init__(self, name: str, seed: int) -> None:
+        self._random = Random(f"{name} {seed}")
+        self.is_even = seed % 2 == 0
+
+    def below(self, end: int) -> int:
+        return int(self._random.random() * end)
+
+    def is_so(self) -> bool:
+        """Two times of three."""
+        return self.below(3) > 0
+
+    def number(self, low: str, high: str) -> str:
+        places = max(len(end.partition(".")[2]) for end in (low, high))
+        begin, end = float(low), float(high)
+        if self.is_even:
+            return f"{begin + (end - begin) * self.below(9) / 8:.{places}f}"
+        return f"{begin + (end - begin) * self._random.random():.{places + 3}f}"
+
+    def whole(self, low: str, high: str) -> str:
+        return str(int(low) + self.below(int(high) - int(low) + 1))
+
+    def gap(self, inside: str) -> str:
+        chosen = inside.split("|")
+        one = chosen[self.below(len(chosen))]
+        low, dots, high = one.partition("..")
+        if not dots:
+            return one
+        return self.whole(low[1:], high) if low.startswith("#") else self.number(low, high)
+
+    def filled(self, text: str) -> str:
+        return GAP.sub(lambda found: self.gap(found[1]), text)
+
+
+def described(chance: Chance, scene: Scene) -> tuple[str, list[str]]:
+    """The description of a world, and a step from outside for each of the moments."""
+    tables: list[str] = [f"[world]\nseed = {chance.below(99)}"]
+    steps = scene.steps.split("\n")
+    is_left_out = False
+    for number, line in enumerate(scene.tables.split("\n")):
+        if not line:
+            is_left_out = False
+        elif line.startswith("?") and not chance.is_so():
+            is_left_out = is_left_out or line.startswith("?[")
+        elif line.startswith("! "):
+            table, step = fault(chance, line[2:], f"fault-{number}")
+            tables.append(table)
+            steps.append(step)
+        elif line.startswith("* "):
+            once = "true" if chance.below(2) else "false"
+            note = f"steps = [{{ note = 'event {number}' }}]"
+            tables.append(f'[[event]]\nwhen = "{chance.filled(line[2:])}"\nonce = {once}\n{note}')
+        elif not is_left_out:
+            tables += chance.filled(line.removeprefix("?")).split("; ")
+    others = [step for step in steps if step.startswith("{ ")]
+
+    def drawn(number: int, among: list[str]) -> list[str]:
+        return [chance.filled(among[chance.below(len(among))]) for _ in range(number)]
+
+    first = [chance.filled(step[2:]) for step in steps if step.startswith("+ ")]
+    hand = [f"  {step}, {{ wait = '{chance.number('0', '120')} ms' }},\n" for step in (*first, *drawn(STEPS, others))]
+    text = "\n".join([*tables, f"[[script]]\nname = 'hand'\nsteps = [\n{''.join(hand)}]\n"])
+    return text, drawn(MOMENTS, [step for step in steps if step[:2] in ("{ ", "@ ") and "fault" not in step])
+
+
+def fault(chance: Chance, line: str, name: str) -> tuple[str, str]:
+    """A fault as a table of the description, or as steps that set and clear it; or neither."""
+    given = chance.filled(line)
+    if not chance.is_so():
+        return "", ""
+    if chance.below(3) == 0:
+        wait = f"{{ wait = '{chance.number('5', '90')} ms' }}"
+        return "", f"{{ fault = {{ {given}, name = '{name}' }} }}, {wait}, {{ clear_fault = '{name}' }}"
+    if "_s = " not in given and "for_ms" not in given:
+        given = f"{given}, from_s = {chance.number('0.1', '0.6')}, until_s = {chance.number('0.8', '1.4')}"
+    return "[[fault]]\n" + given.replace(", ", "\n"), ""
+
+
+def seen(name: str, seed: int) -> dict[str, list[str]]:
+    """What a world is made of, what it shows at some moments, and what has happened in it.
+
+    It is brought back to one of the moments, or another world goes on from there, and its session is replayed: if anything is
+    different then, that is said, too.
+    """
+    chance, scene = Chance(name, seed), SCENES[name]
+    text, from_outside = described(chance, scene)
+    world = World.from_toml(text, {file: chance.filled(content).encode() for file, content in scene.files.items()})
+    moments = sorted(chance.below(round(END_S * SECOND)) for _ in range(MOMENTS))
+    steps = list(zip(moments, from_outside, strict=True))
+    cut = chance.below(MOMENTS)
+    values = go_on(world, steps[:cut], moments[cut])
+    snapshot = world.snapshot()
+    values += go_on(world, steps[cut:], round(END_S * SECOND))
+    happened = [repr((*record[:4], encode(record).hex(), record.facts)) for record in world.trace]
+    end, digest_there = shown(world), world.trace.digest()
+    replayed = session_of(world).replay()
+    other = world if chance.below(2) else world.branch(snapshot)
+    other.restore(snapshot)
+    go_on(other, steps[cut:], round(END_S * SECOND))
+    if shown(other) != end:
+        values.append("it goes on differently from a snapshot")
+    if not replayed.trace.digest() == other.trace.digest() == digest_there:
+        values.append("something else happens when it is replayed, or from a snapshot")
+    return {"parts": parts(world), "values": values, "trace": happened}
+
+
+def go_on(world: World, steps: list[tuple[int, str]], end: int) -> list[str]:
+    """Do steps at their moments, and run on to the end; what the world shows then."""
+    found: list[str] = []
+    for moment, step in steps:
+        world.run(until=moment / SECOND)
+        found += shown(world)
+        do_from_outside(world, step)
+    world.run(until=end / SECOND)
+    return found + shown(world)
+
+
+def do_from_outside(world: World, text: str) -> None:
+    """Do a step of a description now, as somebody outside of the world; or send a frame on a line, or leave it."""
+    if text.startswith("@ "):
+        line, _, data = text[2:].partition(" ")
+        there = world.line[line]
+        world.apply_input(Leave(line, "python")) if data == "leave" else there.send(with_crc(bytes.fromhex(data)))
+        return
+    toml = TomlText("steps", f"steps = [{text}]")
+    for step in read_steps(toml, ("steps",), toml.data["steps"]):
+        if type(step) in ACTIONS:
+            world.apply_input(step)
+        else:
+            world.at(world.time, step)
+
+
+def shown(world: World) -> list[str]:
+    """Signals of elements, and what a viewer sees of controllers and axes."""
+    found = [f"{world.now} {world.stopped} due {world.due()}"]
+    for name in world.parts.element_names:
+        signals = world.parts.element_signals(name) or {}
+        found += [f"{name}.{signal} {world.read(f'{name}.{signal}'):.9g}" for signal in signals]
+    for name, axis in world.axis.items():
+        found.append(f"{name} {axis.position:.9g} {axis.rotor:.9g} {axis.lost} {axis.stalled}")
+    for name in world.machines:
+        world.touch(name)
+        found.append(repr(world.kind(name).state(world.machines[name], world.now)))
+    found += [repr(one) for one in waiting(world)]
+    return found
+
+
+def parts(world: World) -> list[str]:
+    """As viewers and exports get them."""
+    there = describe(world)
+    found: list[object] = [*there.axes, there.buttons, *there.elements, *there.connections, *there.lines]
+    return [repr(one) for one in (*found, *dict(axis_views(world)).items(), *unchanged_inputs(world, 0))]
+
+
+def digest(lines: list[str]) -> str:
+    return blake2b("\n".join(lines).encode(), digest_size=6).hexdigest()
