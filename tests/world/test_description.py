@@ -249,6 +249,14 @@ def test_only_what_is_wrong_is_reported_not_what_follows_from_it() -> None:
     assert places(AXIS.replace("[[axis]]", "unit = 300\n[[axis]]") + event) == ["w.toml:3:1"]
 
 
+def test_what_is_in_a_misspelt_table_is_not_unknown_elsewhere() -> None:
+    """The axis is in no table that there is; the event names it and another one, which is unknown."""
+    event = '[[event]]\nwhen = "{}.position > 1"\nsteps = []\n'
+    misspelt = AXIS.replace("[[axis]]", "[[axiss]]")
+    assert places(misspelt + event.format("x")) == ["w.toml:3:1"]
+    assert len(places(misspelt + event.format("y"))) == 2
+
+
 def test_a_fault_that_is_no_table_leaves_the_others_their_places() -> None:
     assert places('fault = [\n3,\n{ kind = "stall", machine = "b" },\n]\n' + TABLE) == ["w.toml:2:1", "w.toml:3:1"]
 

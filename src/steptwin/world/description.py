@@ -66,6 +66,7 @@ def describe(
             near = toml.near(key, known)
             fix = toml.key_replacement((key,) if isinstance(data[key], dict) else (key, 0), key, known)
             toml.wrong((key,), "D004", f"the file has no [{key}]{near}", f"permitted: {', '.join(known)}", fix)
+            toml.leave_out_all(key)
     placed = _rows(toml, DRAWING)
     world = read_table(toml, ("world",), data.get("world", {}), KEYS["world"])
     spec = WorldSpec(

@@ -213,6 +213,13 @@ class TomlText:
         """What has this name is not built because of what is wrong elsewhere."""
         self._left_out.add(name)
 
+    def leave_out_all(self, kind: str) -> None:
+        """Nothing in the tables called ``kind`` is built, because there is no such kind."""
+        tables = self.data[kind]
+        for number in range(len(tables) if isinstance(tables, list) else 0):
+            if (name := self._name_of(kind, number)) is not None:
+                self.leave_out(name)
+
     def may_be_broken(self, name: str) -> bool:
         """Whether this is the name of a table with something wrong in it, or may be, because such a table has none."""
         if name in self._left_out or name.startswith(self._left_out_uses):
