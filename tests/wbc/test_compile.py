@@ -84,3 +84,31 @@ def test_code_that_writes_a_read_only_register_is_not_made() -> None:
     wrong = s.Executable((s.SetStep(0, 0, s.RegisterOperand(row, 0), s.Literal(1.0)),), (), {}, {}, {})
     with pytest.raises(ValueError, match="INPUTS cannot be written"):
         compile_program(wrong, ACCESS)
+
+
+def test_calculations_are_executed_at_once_from_where_they_are_entered_to_where_they_branch_or_can_fail() -> None:
+    text = """
+    n = 0
+    a = 1
+    MAIN:
+        n = n + 1
+        b = n * a
+        IF n > 3
+            a = b
+            JUMP SUB
+        ENDIF
+        a = b / n
+        b = PosM1
+        b = a
+        b = b - 2
+    JUMP MAIN
+    SUB:
+        WHILE a < 2
+            a = a + 1
+        ENDWHILE
+    RETURN
+    """
+    executable = check(text).executable
+    assert executable is not None
+    lengths = {first: found.further + 1 for first, found in enumerate(compile_program(executable, ACCESS).straight) if found}
+    assert lengths == {0: 2, 2: 3, 10: 2, 14: 2}

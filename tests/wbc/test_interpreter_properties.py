@@ -6,6 +6,7 @@ import pickle
 from dataclasses import replace
 from functools import partial
 from typing import Any
+from unittest.mock import patch
 
 import pytest
 from hypothesis import HealthCheck, example, given, settings
@@ -16,6 +17,7 @@ from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.mic488.config import AxisConfig, ControllerConfig, InputConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.program_banks import LoadedProgram, load
+from steptwin.wbc import code
 from steptwin.wbc.check import check
 from steptwin.wbc.positions import PositionTable, parse_positions
 
@@ -201,6 +203,57 @@ def test_wbc_18_a_loop_that_acts_never_rests(body: list[str], closed: str, happe
     resting.advance(END)
     looking.advance(END)
     assert seen(resting) == seen(looking)
+
+
+LARGE = f"3{'0' * 38}"
+"""Near the end of what a variable holds."""
+
+
+@st.composite
+def calculating(draw: st.DrawFn, depth: int = 2) -> list[str]:
+    """Lines that depend on variables and constants; now and then another one is between them."""
+    operand = st.sampled_from(("a", "b", "n", "1", "-3,5", LARGE))
+    condition = st.builds(" ".join, st.tuples(st.sampled_from("abn"), st.sampled_from(("=", "<", ">", "<=", ">=")), operand))
+    operation = st.builds(" ".join, st.tuples(operand, st.sampled_from("+-*"), operand))
+    line = st.builds("{} = {}".format, st.sampled_from("ab"), st.one_of(operand, operation))
+    lines: list[str] = []
+    for _ in range(draw(st.integers(1, 3))):
+        lines += draw(st.lists(line, max_size=4))
+        kind = draw(st.sampled_from(("other", "IF", "ELSE", "WHILE") if depth else ("other", "call")))
+        if kind == "IF":
+            lines += [f"IF {draw(condition)}", *draw(calculating(depth - 1)), "ENDIF"]
+        elif kind == "ELSE":
+            lines += [f"IF {draw(condition)}", *draw(calculating(depth - 1)), "ELSE", *draw(calculating(depth - 1)), "ENDIF"]
+        elif kind == "WHILE":
+            lines += ["WHILE n < 9", "n = n + 1", *draw(calculating(depth - 1)), "ENDWHILE"]
+        else:
+            lines += draw(st.lists(st.sampled_from(("a = b / 7", "$I3 = n", "a = PosM1", "JUMP SUB")), max_size=1))
+    return lines
+
+
+@settings(few, max_examples=30)
+@given(lines=calculating(), looks=st.lists(st.integers(0, 200), max_size=20), hooked=st.sets(st.integers(0, 60), max_size=2))
+@example(lines=[f"b = {LARGE} + {LARGE}", "b = n - b", "a = b"], looks=[], hooked=set())
+@example(lines=["a = n + 1", "n = a * 1", "b = b + n"], looks=[7, 8], hooked={5})
+def test_calculations_at_once_are_calculations_one_by_one(lines: list[str], looks: list[int], hooked: set[int]) -> None:
+    ends = ("JUMP L", "SUB:", "n = n + 1", "a = n", "RETURN", "INT_TICK100:", "a = b", "RETURN")
+    text = "\n".join(("CFGINT_TICK100 = HIGH", "a = 1", "b = 2", "L:", "n = 0", *lines, *ends))
+    with patch.object(code, "COMPILED_AFTER", 3):
+        loaded = ready(text, "")
+        at_once, one_by_one = started(loaded), started(loaded)
+        for device in (at_once, one_by_one):
+            device.program.interpreter.rests_in_loops = False
+        told: list[tuple[Nanos, int]] = []
+        every: list[tuple[Nanos, int]] = []
+        at_once.program.interpreter.hook(lambda now, number: told.append((now, number)), hooked)
+        one_by_one.program.interpreter.hook(lambda now, number: every.append((now, number)))
+        for moment in sorted({*looks, 300}):
+            at_once.advance(moment * MILLISECOND)
+            one_by_one.advance(moment * MILLISECOND)
+            assert at_once.program.interpreter.copy_state() == one_by_one.program.interpreter.copy_state()
+    assert seen(at_once) == seen(one_by_one)
+    assert [now for now, _ in every] == [moment * MILLISECOND for moment in range(1, 301)]
+    assert told == [(now, number) for now, number in every if number in hooked]
 
 
 @few

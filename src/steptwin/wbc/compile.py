@@ -15,6 +15,7 @@ from steptwin.wbc.events import EVENTS
 from steptwin.wbc.real import COMPARISONS, FUNCTIONS, OPERATIONS, ProgramFault, real, real_text
 from steptwin.wbc.registers import REAL, REAL_MAX, RegisterRow
 from steptwin.wbc.statements import COMPARISONS as SIGNS
+from steptwin.wbc.straight import straight_of
 from steptwin.wbc.usage import sources
 
 ValueCode: TypeAlias = Callable[[Execution, Cells], float]
@@ -33,15 +34,16 @@ class _Compiler:
         self._constants: dict[float, int] = {}
 
     def code(self) -> Code:
-        made = [_CODES[type(step)](self, step, number) for number, step in enumerate(self._executable.steps)]
-        made.append(_end(len(made)))
-        watches = [tuple(self._watches(step)) for step in self._executable.steps]
+        steps = self._executable.steps
+        made = [_CODES[type(step)](self, step, number) for number, step in enumerate(steps)]
+        straight = straight_of(made, steps, self._cell)
+        watches = [tuple(self._watches(step)) for step in steps]
         entries = {
             EVENTS.index(step.event): InterruptEntry(number, step.hard)
-            for number, step in enumerate(self._executable.steps)
+            for number, step in enumerate(steps)
             if isinstance(step, s.InterruptStep)
         }
-        return Code(tuple(made), (*watches, ()), self._cells, entries)
+        return Code((*made, _end(len(made))), (*straight, None), (*watches, ()), self._cells, entries)
 
     # -- values
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 from array import array
 from collections import deque
 from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
 
 from steptwin.errors import Misuse
 from steptwin.machine import MICROSECOND, MILLISECOND, SECOND, Nanos
@@ -88,8 +89,8 @@ class Interpreter(Stateful):
         self.rests_in_loops = True
         """If off, every statement of a loop is executed; only WAIT rests."""
         self._hooks: StatementHooks = ()
-        self._hooked: tuple[Code, tuple[StepCode, ...]] | None = None
-        """Code, and its steps with hooks."""
+        self._hooked: tuple[Code, Code] | None = None
+        """Code, and the same with hooks."""
         self._repeated = -1
         """The step that is in progress already: it is evaluated again without a call of its hooks."""
         self.statement_time = statement_time
@@ -276,13 +277,19 @@ class Interpreter(Stateful):
         self._hooks = without(self._hooks, hook)
         self._hooked = None
 
-    def _steps(self, code: Code) -> tuple[StepCode, ...]:
-        """The functions that are executed for the steps."""
+    def _with_hooks(self, code: Code) -> Code:
+        """What is executed for it."""
         if not self._hooks:
-            return code.steps
+            return code
         self._repeated = self.pc if self.waiting else -1
         if self._hooked is None or self._hooked[0] is not code:
-            self._hooked = code, tuple(self._with_hook(number, step) for number, step in enumerate(code.steps))
+            steps = tuple(self._with_hook(number, step) for number, step in enumerate(code.steps))
+            without_hook = [step is own for step, own in zip(steps, code.steps, strict=True)]
+            straight = (
+                found if found is not None and all(without_hook[first : first + found.further + 1]) else None
+                for first, found in enumerate(code.straight)
+            )
+            self._hooked = code, replace(code, steps=steps, straight=tuple(straight))
         return self._hooked[1]
 
     def _with_hook(self, number: int, code: StepCode) -> StepCode:
@@ -303,19 +310,27 @@ class Interpreter(Stateful):
 
     def _execute(self, code: Code, until: Nanos) -> bool:
         """Execute until an event has to be checked. True: continue, with recording."""
-        steps, cells, pause = self._steps(code), self.cells, self.statement_time
+        executed, cells, pause = self._with_hooks(code), self.cells, self.statement_time
+        steps, straight = executed.steps, executed.straight
         pc, now, unmarked = self.pc, self.now, self._unmarked
         marks = self.rests and self.rests_in_loops
         self.waiting = False
         self.not_before = 0
         try:
             while True:
-                following = steps[pc](self, cells)
-                if following < 0:
-                    pc = ~following
-                    self.pc = pc
-                    self._check_events(code)
-                    return False
+                several = straight[pc]
+                if several is None or now + several.further * pause > until:
+                    following = steps[pc](self, cells)
+                    if following < 0:
+                        pc = ~following
+                        self.pc = pc
+                        self._check_events(code)
+                        return False
+                else:
+                    following = several.run(self, cells)
+                    pc += several.further
+                    now += several.further * pause
+                    self.now = now
                 if following <= pc and marks:
                     if unmarked == 0:
                         unmarked = self._set_mark(now + pause)
@@ -338,7 +353,7 @@ class Interpreter(Stateful):
 
     def _execute_untimed(self, code: Code) -> None:
         """`_execute` without time: up to `STATEMENTS_AT_ONCE` statements at this moment, then `UNTIMED_INTERVAL` passes."""
-        steps, cells = self._steps(code), self.cells
+        steps, cells = self._with_hooks(code).steps, self.cells
         pc, executed, acted = self.pc, self._spent, 0
         self.waiting = False
         self.not_before = 0
@@ -393,7 +408,7 @@ class Interpreter(Stateful):
 
     def _record(self, code: Code, trail: list[Visit], until: Nanos) -> bool:
         """As `_execute`, noting every visit, until the loop is closed or turns out to be none. True: go on, not recording."""
-        steps, cells, pause = self._steps(code), self.cells, self.statement_time
+        steps, cells, pause = self._with_hooks(code).steps, self.cells, self.statement_time
         while len(trail) < LONGEST_LOOP:
             now = self.now
             visit = self._visit(now - self._mark)
