@@ -9,30 +9,39 @@ coincide; in the other one they have decimals. All comes from `random.Random.ran
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from hashlib import blake2b
 from random import Random
 
-from more_scenes import MORE
-from scenes import SCENES as FIRST
-from scenes import Scene
+from axis_scenes import AXIS_SCENES
+from machine_scenes import MACHINE_SCENES
+from scenes import BELT_SCENES, Scene
 
+from steptwin.diagnostics import render
+from steptwin.errors import Misuse
 from steptwin.files.export import axis_views
 from steptwin.files.session import session_of
 from steptwin.files.world import World
 from steptwin.machine import SECOND
+from steptwin.motion.divisions import StepTrain
+from steptwin.motion.profile import Profile
 from steptwin.subject.describe import describe
 from steptwin.wire.crc import with_crc
 from steptwin.world.actions import ACTIONS, Leave
+from steptwin.world.check import diagnose
+from steptwin.world.overrides import read_overrides
+from steptwin.world.pieces import given_files
 from steptwin.world.reader import TomlText
 from steptwin.world.steptable import read_steps
-from steptwin.world.trace import encode
+from steptwin.world.trace import TraceRecord, encode
 from steptwin.world.unfinished import unchanged_inputs, waiting
 
 GAP = re.compile(r"⟨([^⟩]*)⟩")
 STEPS = 16
 MOMENTS = 7
+WRONG = 16
 END_S = 1.5
-SCENES = FIRST | MORE
+SCENES = BELT_SCENES | AXIS_SCENES | MACHINE_SCENES
 
 
 class Chance:
@@ -130,7 +139,7 @@ def seen(name: str, seed: int) -> dict[str, list[str]]:
     values = go_on(world, steps[:cut], moments[cut])
     snapshot = world.snapshot()
     values += go_on(world, steps[cut:], round(END_S * SECOND))
-    happened = [repr((*record[:4], encode(record).hex(), record.facts)) for record in world.trace]
+    happened = [repr((*record[:4], shown_value(record), record.facts)) for record in world.trace]
     end, digest_there = shown(world), world.trace.digest()
     replayed = session_of(world).replay()
     other = world if chance.below(2) else world.branch(snapshot)
@@ -169,6 +178,11 @@ def do_from_outside(world: World, text: str) -> None:
             world.at(world.time, step)
 
 
+def shown_value(record: TraceRecord) -> object:
+    """Of a motion all that it has, as in the digest of a trace."""
+    return encode(record).hex() if isinstance(record.value, Profile | StepTrain) else record.value
+
+
 def shown(world: World) -> list[str]:
     """Signals of elements, and what a viewer sees of controllers and axes."""
     found = [f"{world.now} {world.stopped} due {world.due()}"]
@@ -193,3 +207,71 @@ def parts(world: World) -> list[str]:
 
 def digest(lines: list[str]) -> str:
     return blake2b("\n".join(lines).encode(), digest_size=6).hexdigest()
+
+
+VALUES = ("0", "-1", "1e300", "''", "'x'", "'c.IN1'", "'c.OUT1'", "'c.M1'", "[]", "[[0, 1]]", "true", "'10 ms'", "{}")
+
+
+def wrong(name: str, seed: int) -> list[str]:
+    """Descriptions with one or two mistakes by chance, or with a value in the place of another; and what is told of each."""
+    chance, scene = Chance(name, seed), SCENES[name]
+    text, _ = described(chance, scene)
+    files = {file: chance.filled(content).encode() for file, content in scene.files.items()}
+    found = []
+    for _ in range(WRONG):
+        lines = text.split("\n")
+        found += replaced(chance, text, files)
+        for _ in range(1 + chance.below(2)):
+            damage(chance, lines)
+        found += told("\n".join(lines), files)
+    return found
+
+
+def told(text: str, files: Mapping[str, bytes]) -> list[str]:
+    """What is wrong with a description. What is said of a text that is not TOML is Python's."""
+    diagnosis = diagnose("w.toml", text, given_files(files))
+    if any(one.code == "D001" for one in diagnosis.findings):
+        return []
+    shown = [f"{one.code} {one.span} {one.message} ({one.hint}) {one.fix}" for one in diagnosis.findings]
+    return [text, *shown, *(render(source, of) for source, of in diagnosis.files)]
+
+
+def replaced(chance: Chance, text: str, files: Mapping[str, bytes]) -> list[str]:
+    """What comes of an override of a key of a table by the value of another one."""
+    keys = re.findall(r"^([a-z_]+) = (.*)$", text, re.MULTILINE)
+    names = re.findall(r"^name = .(\w+).$", text, re.MULTILINE)
+    tables = re.findall(r"^\[+(.*?)\]+$", text, re.MULTILINE)
+    owner = (names if chance.below(4) else tables)[chance.below(min(len(names), len(tables)))]
+    key, value = keys[chance.below(len(keys))][0], keys[chance.below(len(keys))][1]
+    given = read_overrides([f"{owner}.{key}={value}"])
+    try:
+        return [repr(given), *parts(World.from_toml(text, files, overrides=given))]
+    except Misuse as error:
+        return [repr(given), str(error)]
+
+
+def damage(chance: Chance, lines: list[str]) -> None:
+    """A mistake in a description."""
+    there = [number for number, line in enumerate(lines) if line.strip()]
+    at, other = there[chance.below(len(there))], there[chance.below(len(there))]
+    line = lines[at]
+    key, sign, value = line.partition(" = ")
+    words = re.findall(r"[A-Za-z_][A-Za-z_0-9]+", value)
+    match chance.below(8):
+        case 0:
+            lines[at] = ""
+        case 1:
+            lines.insert(other, line)
+        case 2:
+            lines[at] = f"{key}{sign}{VALUES[chance.below(len(VALUES))]}" if sign else f"[{line}]"
+        case 3:
+            lines[at] = f"{key}{sign}{lines[other].partition(' = ')[2] or '7'}"
+        case 4 if sign:
+            lines[at] = f"{key}{key[-1]}{sign}{value}"
+        case 5 if sign:
+            lines[at] = re.sub(r"\d+\.?\d*", ("0", "1000000", "-3")[chance.below(3)], line, count=1)
+        case 6:
+            lines[at], lines[other] = lines[other], lines[at]
+        case _ if words:
+            word = words[chance.below(len(words))]
+            lines[at] = line.replace(word, word + word[-1] if chance.below(2) else word[:-1])

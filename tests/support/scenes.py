@@ -1,4 +1,7 @@
-"""What `random_worlds` makes small worlds of: descriptions with gaps, and steps of an operator. See there for the notation."""
+"""What `random_worlds` makes small worlds of: descriptions with gaps, and steps of an operator. See there for the notation.
+
+Here are logic, pneumatics and belts.
+"""
 
 from __future__ import annotations
 
@@ -63,7 +66,7 @@ SWITCH = """
 ?bounce = "⟨1..5⟩ ms"; bounces = ⟨#1..4⟩
 """
 
-SCENES: dict[str, Scene] = {
+BELT_SCENES: dict[str, Scene] = {
     "logic": Scene(
         """
 [[mic488]]
@@ -287,6 +290,71 @@ at = ⟨20..110⟩
 { expect = "p.count == ⟨#0..3⟩" }
 """,
     ),
+    "driven": Scene(
+        f"""
+{DRIVES}
+[[axis]]
+name = "x"
+drive = "c.M1"
+?pitch = ⟨4.0..6.0⟩
+?inverted = true
+?start = ⟨0..20⟩
+
+[[conveyor]]
+name = "p"
+length = ⟨60..120⟩
+axis = "x"
+?mm_per_unit = ⟨0.5..3.0⟩
+feed = "c.OUT1"
+?feed_every = "⟨90..300⟩ ms"
+workpiece = ⟨10..25⟩
+marks = [⟨1..2⟩, ⟨3..4⟩]
+next = "q"
+[[conveyor.sensor]]
+at = ⟨10..40⟩
+to = "c.IN1"
+sees = "⟨mark|workpiece⟩"
+?bounce = "⟨1..5⟩ ms"
+[[conveyor.sensor]]
+at = ⟨15..60⟩
+to = "c.IN2"
+[[conveyor.stop]]
+at = ⟨20..60⟩
+hold = "c.OUT2"
+
+[[conveyor]]
+name = "q"
+length = ⟨30..90⟩
+?mass = ⟨0.1..2.0⟩
+axis = "x"
+mm_per_unit = ⟨0.5..3.0⟩
+[[conveyor.sensor]]
+at = ⟨5..20⟩
+to = "c.IN3"
+?contact = "NC"
+
+[[gripper]]
+name = "jaws"
+close = "c.OUT3"
+pick = "c.OUT2"
+from = "⟨p|q⟩"
+pick_at = ⟨10..30⟩
+onto = "⟨p|q⟩"
+place = "c.OUT4"
+
+! kind = "empty-feeder", element = "p"
+* p.count > ⟨#0..2⟩ and q.count >= ⟨#0..2⟩
+* c.IN1 != c.IN2 or jaws.held
+""",
+        OUTPUTS
+        + """
++ { write = { "c.M1_EN" = 1, "c.OUT1" = 1 } }
+{ write = { "c.M1_VEL_ABS" = ⟨20..90⟩ } }
+{ write = { "c.M1_VEL_ABS" = ⟨-50..90⟩, "c.OUT1" = ⟨#0..1⟩ } }
+{ write = { "c.M1_POS_REL" = ⟨5..60⟩, "c.OUT1" = ⟨#0..1⟩ } }
+{ write = { "c.M1_STOP" = 1 } }
+""",
+    ),
     "hands": Scene(
         """
 [[mic488]]
@@ -360,403 +428,6 @@ resolution = ⟨0.2..0.8⟩
 { write = { "c.OUT2" = ⟨#0..1⟩, "c.OUT3" = ⟨#0..1⟩ } }
 { write = { "c.OUT1" = ⟨#0..1⟩, "c.OUT4" = ⟨#0..1⟩ } }
 { until = "⟨cup|jaws⟩.held == ⟨#0..1⟩", within = "⟨20..200⟩ ms" }
-""",
-    ),
-    "axes": Scene(
-        f"""
-{DRIVES}
-[[axis]]
-name = "x"
-drive = "c.M1"
-?pitch = ⟨4.0..6.0⟩
-?inverted = true
-travel = [⟨-12..-2⟩, ⟨35..58⟩]
-?start = ⟨0..20⟩
-?backlash = ⟨0.02..0.4⟩
-[[axis.switch]]
-above = ⟨20..40⟩
-to = "c.IN1"
-{SWITCH}
-[[axis.switch]]
-below = ⟨0..10⟩
-to = "c.IN2"
-{SWITCH}
-[[axis.switch]]
-position = ⟨1..9⟩
-width = ⟨0.5..3.0⟩
-period = ⟨7.0..11.0⟩
-to = "c.IN3"
-
-[[axis]]
-name = "y"
-drive = "c.M2"
-kind = "rotary"
-pulses_per_rev = ⟨#2000..4000⟩
-?unit = "⟨rev|degree⟩"
-?inverted = true
-[[axis.switch]]
-position = ⟨0.1..0.9⟩
-width = ⟨0.1..0.2⟩
-to = "c.IN4"
-{SWITCH}
-
-! kind = "stall", axis = ⟨#1..2⟩, at_s = ⟨0.1..0.9⟩, for_s = ⟨0.02..0.3⟩
-! kind = "lost-steps", axis = ⟨#1..2⟩, at_s = ⟨0.1..0.9⟩, pulses = ⟨#-60..60⟩, period_s = ⟨0.1..0.3⟩
-! kind = "stuck", pin = "IN1", value = ⟨#0..1⟩, from_s = ⟨0.1..0.6⟩, until_s = ⟨0.7..1.2⟩
-! kind = "bounce", pin = "IN2", bounces = ⟨#1..4⟩, for_ms = ⟨2.0..9.0⟩, every = ⟨#1..2⟩
-* x.position ⟨>|<|>=⟩ ⟨5..40⟩
-* abs(x.lost) > ⟨0..400⟩ or y.position % ⟨1000..3000⟩ > ⟨500..900⟩
-""",
-        MOVES
-        + """
-{ until = "x.position ⟨>|<⟩ ⟨5..40⟩", within = "⟨50..300⟩ ms" }
-{ until = "not c.M1.moving", within = "⟨50..300⟩ ms" }
-{ move = "c.M⟨#1..2⟩", ⟨to|by⟩ = ⟨5..20⟩, within = "⟨100..400⟩ ms" }
-{ wait_for = "c.M⟨#1..2⟩", within = "⟨100..400⟩ ms" }
-{ expect = "x.position ⟨>|<⟩ ⟨5..40⟩ and y.lost == 0" }
-""",
-    ),
-    "motors": Scene(
-        f"""
-{DRIVES}
-[[axis]]
-name = "x"
-drive = "c.M1"
-pitch = 5.0
-?travel = [⟨-12..-2⟩, ⟨35..58⟩]
-?backlash = ⟨0.02..0.4⟩
-?inverted = true
-[axis.motor]
-{MOTOR}
-?resonance = [⟨100..300⟩, ⟨400..700⟩]
-
-[[axis]]
-name = "y"
-drive = "c.M2"
-pitch = 5.0
-[axis.motor]
-{MOTOR}
-resonance = [⟨100..300⟩, ⟨400..700⟩]
-resonance_growth = ⟨20.0..60.0⟩
-?resonance_fading = ⟨5.0..60.0⟩
-?vibration = ⟨0.02..0.2⟩
-?full_steps = ⟨200|400⟩
-
-[[load]]
-name = "m"
-axis = "⟨x|y⟩"
-mass = ⟨0.5..4.0⟩
-?force = ⟨-60..60⟩
-?when = "x.position > ⟨5..30⟩"
-
-[[load]]
-name = "n"
-axis = "x"
-friction_force = ⟨30..300⟩
-?load = ⟨-0.1..0.1⟩
-of = "⟨x.position|y.position|time⟩"
-points = [[0, ⟨0.0..0.3⟩], [⟨5..30⟩, 1], [⟨40..60⟩, ⟨0.5..2.0⟩]]
-?resolution = ⟨0.05..0.2⟩
-
-! kind = "other-load", element = "⟨m|n⟩", factor = ⟨0..5⟩
-! kind = "stall", axis = ⟨#1..2⟩, at_s = ⟨0.1..0.9⟩, for_s = ⟨0.02..0.3⟩
-* n.share > ⟨0.2..0.8⟩ or m.acts
-* ⟨x|y⟩.stalled
-""",
-        MOVES
-        + """
-{ write = { "c.M1_VMAX" = ⟨60..200⟩, "c.M1_ACC" = ⟨300..3000⟩ } }
-{ write = { "c.M2_POS_ABS" = ⟨-60..60⟩ } }
-{ until = "abs(y.lost) > ⟨0..100⟩", within = "⟨50..300⟩ ms" }
-""",
-    ),
-    "falls": Scene(
-        f"""
-{DRIVES}
-[[axis]]
-name = "x"
-drive = "c.M1"
-pitch = 5.0
-?travel = [⟨-12..-2⟩, ⟨35..58⟩]
-?backlash = ⟨0.02..0.4⟩
-[axis.motor]
-{MOTOR}
-when_off = "free"
-?overruns = true
-?detent = ⟨0.01..0.06⟩
-?hold_current = ⟨0.0..0.6⟩
-?full_steps = 200
-
-[[axis]]
-name = "y"
-drive = "c.M2"
-pitch = 5.0
-?inverted = true
-[axis.motor]
-{MOTOR}
-overruns = true
-
-[[brake]]
-name = "b"
-axis = "x"
-torque = ⟨0.1..0.8⟩
-?release = "c.OUT1"
-?release_time = "⟨5..60⟩ ms"
-?apply_time = "⟨5..60⟩ ms"
-
-[[load]]
-name = "m"
-axis = "x"
-mass = ⟨0.5..4.0⟩
-force = ⟨-60..60⟩
-when = "c.OUT2"
-
-[[collision]]
-name = "k"
-when = "x.position ⟨>|<⟩ ⟨5..30⟩ and y.position > ⟨2..9⟩"
-?effect = "jam"
-?reset = "c.OUT3"
-
-! kind = "worn-brake", element = "b", share = ⟨0.0..0.5⟩
-! kind = "stuck-brake", element = "b"
-! kind = "other-load", element = "m", factor = ⟨0..5⟩
-! kind = "supply-drop", at_s = ⟨0.3..0.9⟩, for_s = ⟨0.02..0.3⟩
-* x.position ⟨>|<⟩ ⟨-10..20⟩ and b.released
-* k.hit
-""",
-        MOVES
-        + OUTPUTS
-        + """
-+ { write = { "c.OUT1" = 1 } }
-{ write = { "c.M1_EN" = ⟨#0..1⟩ } }
-{ write = { "c.M1_EN" = 1 } }
-{ write = { "c.M2_VEL_ABS" = ⟨-90..90⟩ } }
-{ write = { "c.M2_STOP" = 1 } }
-""",
-    ),
-    "encoders": Scene(
-        f"""
-{DRIVES}
-enc_resol = ⟨#400..4000⟩
-?enc_tolerance = ⟨#1..4⟩
-?pos_ctrl_mode = "ENCODER"
-?err_ctrl_mode = "⟨ERRMODE0|ERRMODE1⟩"
-[mic488.M3]
-enc_resol = 400
-mot_resol = 3200
-acc = 900.0
-dec = 900.0
-vel = 300.0
-pos_ctrl_mode = "ENCFOLLOW"
-
-[[axis]]
-name = "x"
-drive = "c.M1"
-pitch = 5.0
-?backlash = ⟨0.02..0.4⟩
-?travel = [⟨-12..-2⟩, ⟨35..58⟩]
-[axis.encoder]
-⟨counts_per_rev|counts_per_unit⟩ = ⟨#300..2000⟩
-?mount = "load"
-
-[[axis]]
-name = "y"
-drive = "c.M2"
-pitch = 5.0
-?backlash = ⟨0.02..0.4⟩
-[axis.encoder]
-counts_per_rev = ⟨#-2000..-300⟩
-?index = true; offset = ⟨0.0..5.0⟩
-?mount = "load"
-
-[[axis]]
-name = "z"
-drive = "c.M3"
-kind = "rotary"
-[axis.encoder]
-follows = "⟨x|y⟩"
-?slip = ⟨0.01..0.2⟩
-
-! kind = "slip", axis = ⟨#1..2⟩, counts = ⟨#-40..40⟩, at_s = ⟨0.1..0.9⟩, period_s = ⟨0.1..0.3⟩, count = ⟨#1..3⟩
-! kind = "lost-steps", axis = 1, at_s = ⟨0.1..0.9⟩, pulses = ⟨#-60..60⟩
-! kind = "stall", axis = 2, at_s = ⟨0.1..0.9⟩, for_s = ⟨0.02..0.3⟩
-* c.M⟨#1..3⟩.encoder ⟨>|<⟩ ⟨5..40⟩
-* z.position > ⟨5..40⟩
-""",
-        MOVES
-        + """
-+ { write = { "c.M3_EN" = 1 } }
-{ turn = "c.M4", counts = ⟨#-90..90⟩ }
-{ couple = "c.M4", to = "⟨drive|free|blocked⟩" }
-{ write = { "c.M4_EN" = 1, "c.M4_POS_REL" = ⟨-300..300⟩ } }
-{ until = "c.M1.encoder > ⟨5..30⟩", within = "⟨50..300⟩ ms" }
-""",
-    ),
-    "cams": Scene(
-        f"""
-{DRIVES}
-[[axis]]
-name = "x"
-drive = "c.M1"
-?backlash = ⟨0.02..0.4⟩
-?inverted = true
-
-[[shaft]]
-name = "s"
-axis = "x"
-ratio = ⟨-0.09..-0.03|0.03..0.09⟩
-?offset = ⟨-50..400⟩
-[[shaft.cam]]
-from = ⟨0..180⟩
-until = ⟨190..350⟩
-to = "c.IN1"
-?contact = "NC"
-?bounce = "⟨1..5⟩ ms"
-[[shaft.cam]]
-from = ⟨270..350⟩
-until = ⟨5..90⟩
-to = "c.IN2"
-
-[[follower]]
-name = "f"
-shaft = "s"
-points = [[⟨0..40⟩, ⟨0..3⟩], [⟨90..120⟩, ⟨5..12⟩], [⟨150..180⟩, ⟨5..12⟩], [⟨200..350⟩, 0]]
-?unit = "⟨cm|degree⟩"
-[[follower.switch]]
-above = ⟨3..8⟩
-to = "c.IN3"
-{SWITCH}
-[[follower.switch]]
-position = ⟨2..4⟩
-width = ⟨0.2..1.0⟩
-to = "c.IN4"
-{SWITCH}
-
-[[transducer]]
-name = "v"
-of = "⟨f.position|s.angle|x.position|c.M1.velocity⟩"
-to = "c.AIN2"
-points = [[0, ⟨0..2⟩], [⟨3..6⟩, ⟨5..9⟩], [⟨10..90⟩, ⟨0..9⟩]]
-resolution = ⟨0.1..0.8⟩
-
-! kind = "slipping-coupling", element = "s"
-! kind = "stuck-follower", element = "f"
-! kind = "worn-cam", element = "f", share = ⟨0.0..0.9⟩
-! kind = "broken-wire", element = "v"
-* f.position ⟨>|<|>=⟩ ⟨1..8⟩
-* s.angle % 360 > ⟨10..300⟩ or v.volts == ⟨0..3⟩
-""",
-        MOVES
-        + """
-{ until = "f.position ⟨>|<⟩ ⟨1..8⟩", within = "⟨50..300⟩ ms" }
-{ until = "s.angle ⟨>|<⟩ ⟨-90..90⟩ degree", within = "⟨50..300⟩ ms" }
-""",
-    ),
-    "carriages": Scene(
-        f"""
-{DRIVES}
-[[axis]]
-name = "x"
-drive = "c.M1"
-?backlash = ⟨0.02..0.4⟩
-travel = [⟨-12..-2⟩, ⟨35..58⟩]
-
-[[axis]]
-name = "y"
-drive = "c.M2"
-?inverted = true
-
-[[carriage]]
-name = "t"
-axis = "x"
-frequency = ⟨8..30⟩
-?damping = ⟨0.02..0.3⟩
-[[carriage.switch]]
-above = ⟨10..30⟩
-to = "c.IN1"
-{SWITCH}
-[[carriage.switch]]
-position = ⟨10..30⟩
-width = ⟨1..5⟩
-to = "c.IN2"
-
-[[carriage]]
-name = "u"
-axis = "y"
-frequency = ⟨8..30⟩
-
-[[tool]]
-name = "h"
-axis = "x"
-other = "y"
-?x = [⟨0.3..0.7⟩, ⟨0.3..0.7⟩]
-?y = [⟨0.3..0.7⟩, ⟨-0.7..-0.3⟩]
-?x_travel = [⟨-9..-1⟩, ⟨30..60⟩]
-?y_travel = [⟨-9..-1⟩, ⟨30..60⟩]
-[[tool.x_switch]]
-above = ⟨3..20⟩
-to = "c.IN3"
-{SWITCH}
-[[tool.y_switch]]
-below = ⟨-3..9⟩
-to = "c.IN4"
-{SWITCH}
-
-! kind = "slack-belt", element = "t", share = ⟨0.2..0.9⟩
-! kind = "slipping-belt", element = "h", belt = "⟨axis|other⟩"
-* t.position ⟨>|<⟩ ⟨5..30⟩
-* h.x > ⟨3..20⟩ and h.y < ⟨3..20⟩
-""",
-        MOVES
-        + """
-{ until = "⟨t|u⟩.position ⟨>|<⟩ ⟨1..40⟩", within = "⟨50..300⟩ ms" }
-{ until = "h.⟨x|y⟩ ⟨>|<⟩ ⟨1..20⟩", within = "⟨50..300⟩ ms" }
-""",
-    ),
-    "gantries": Scene(
-        f"""
-{DRIVES}
-[[axis]]
-name = "x"
-drive = "c.M1"
-pitch = 5.0
-?inverted = true
-[axis.motor]
-{MOTOR}
-
-[[axis]]
-name = "y"
-drive = "c.M2"
-pitch = 5.0
-?start = ⟨0.5..2.0⟩
-[axis.motor]
-{MOTOR}
-
-[[gantry]]
-name = "g"
-axis = "x"
-other = "y"
-limit = ⟨2..9⟩
-?mass = ⟨0.5..9.0⟩
-?friction_force = ⟨5..60⟩
-?effect = "⟨report|jam⟩"
-?reset = "c.OUT1"
-
-[[wire]]
-from = "g.skewed"
-to = "c.IN1"
-
-! kind = "stiff-guides", element = "g", factor = ⟨1..9⟩
-! kind = "lost-steps", axis = 1, at_s = ⟨0.1..0.9⟩, pulses = ⟨#-600..600⟩
-! kind = "stuck-output", element = "g", output = "skewed", level = ⟨#0..1⟩
-* g.skew ⟨>|<⟩ ⟨-3..3⟩
-* abs(g.position) > ⟨2..30⟩
-""",
-        MOVES
-        + """
-{ write = { "c.M1_POS_ABS" = ⟨10..30⟩, "c.M2_POS_ABS" = ⟨10..30⟩ } }
-{ write = { "c.M1_POS_ABS" = ⟨10..30⟩, "c.M2_POS_ABS" = ⟨10..30⟩ } }
-{ write = { "c.OUT1" = ⟨#0..1⟩ } }
 """,
     ),
 }

@@ -1,4 +1,4 @@
-"""Further scenes: of supplies, voltages, lines, controllers, programs, conditions and tables from other files."""
+"""Scenes of supplies, voltages, lines, controllers, programs, conditions and tables from other files."""
 
 from __future__ import annotations
 
@@ -34,8 +34,13 @@ RETURN
 CHIP = "[\n@1\nF⟨640|1280|6400⟩\nR\nW⟨#1..90⟩\nB⟨128|640|3200⟩\nR\n+2\nJ1\n.\n]\n"
 
 PROGRAMMED = DRIVES.replace('name = "c"', 'name = "c"\nprogram = "p.prg"\nstart = true\n?statement_time = "⟨1..3⟩ ms"')
+HELD = "\n" + "\n".join(
+    f'{{ fault = {{ {fault}, machine = "c", pin = "IN4", name = "held" }} }}, '
+    '{ set = { "c.IN4" = ⟨#0..1⟩ } }, { wait = "⟨1..30⟩ ms" }, { clear_fault = "held" }'
+    for fault in ('kind = "bounce", for_ms = ⟨20..90⟩, bounces = 3', 'kind = "stuck", value = ⟨#0..1⟩', 'kind = "stuck"')
+)
 
-MORE: dict[str, Scene] = {
+MACHINE_SCENES: dict[str, Scene] = {
     "supplies": Scene(
         """
 [[mic488]]
@@ -321,11 +326,13 @@ to = "c.IN5"
 * x.position ⟨>|<⟩ ⟨5..40⟩ or c.M2.status == ⟨#1..5⟩
 """,
         MOVES
+        + HELD
         + """
 { home = "c.M2", velocity = ⟨-50|50⟩, within = "⟨100..400⟩ ms" }
 { write = { "c.M2_HOME" = ⟨-50..-20⟩ } }
 { write = { "e.USER_REGISTER[1500]" = ⟨#1..99⟩, "e.USER_REG_SAVE" = 1 } }
-{ set = { "c.IN⟨#4..5⟩" = ⟨#0..1⟩ } }
+{ set = { "c.IN⟨#4..6⟩" = ⟨#0..1⟩ } }
+{ set = { "c.IN4" = 1, "c.IN6" = 1 } }
 { turn = "c.M⟨#3..4⟩", counts = ⟨#-90..90⟩ }
 { couple = "c.M3", to = "⟨drive|free|blocked⟩" }
 { write = { "c.M3_EN" = 1, "c.M3_POS_REL" = ⟨#-300..900⟩ } }
