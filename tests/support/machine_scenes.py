@@ -1,7 +1,8 @@
-"""Scenes of supplies, voltages, lines, controllers, programs, conditions and tables from other files."""
+"""Scenes of supplies, voltages, controllers, programs, conditions and tables from other files."""
 
 from __future__ import annotations
 
+from plant_scenes import CHIP
 from scenes import DRIVES, MOVES, Scene
 
 PROGRAM = """
@@ -31,7 +32,6 @@ DELAY 0.02
 OUT4 = OFF
 RETURN
 """
-CHIP = "[\n@1\nF⟨640|1280|6400⟩\nR\nW⟨#1..90⟩\nB⟨128|640|3200⟩\nR\n+2\nJ1\n.\n]\n"
 
 PROGRAMMED = DRIVES.replace('name = "c"', 'name = "c"\nprogram = "p.prg"\nstart = true\n?statement_time = "⟨1..3⟩ ms"')
 HELD = "\n" + "\n".join(
@@ -157,133 +157,6 @@ value = ⟨0..10⟩
 { expect = "two.volts < ⟨1..8⟩ and c.AIN1 - 1 > d.AIN2 * 0.5" }
 """,
     ),
-    "lines": Scene(
-        """
-[[line]]
-name = "bus"
-?baud = ⟨9600|19200|115200⟩
-?timing = "⟨real|strict⟩"
-?gap = "⟨2..9⟩ ms"
-[[line]]
-name = "two"
-timing = "⟨real|strict⟩"
-[[mic488]]
-name = "c"
-line = "bus"
-unit = ⟨#2..9⟩
-?firmware = "⟨1.40|1.23⟩"
-[mic488.M1]
-acc = ⟨3000..9000⟩
-dec = ⟨3000..9000⟩
-vel = ⟨600..1200⟩
-[[mic488]]
-name = "d"
-line = "⟨bus|two⟩"
-unit = ⟨#10..19⟩
-[[mic488]]
-name = "e"
-line = "two"
-unit = ⟨#20..29⟩
-
-[[wire]]
-from = "c.OUT1"
-to = "d.IN1"
-
-! kind = "⟨crc|late|wrong-unit|echo⟩", line = "bus", link = "script", every = ⟨#2..4⟩
-! kind = "⟨delay|no-answer⟩", line = "two", link = "script", nth = ⟨#1..6⟩
-! kind = "no-answer", line = "bus", lost = "request", link = "script", nth = ⟨#1..6⟩
-! kind = "⟨flip|drop|insert|gap⟩", line = "bus", link = "script", direction = "⟨in|out⟩", probability = 0.02
-! kind = "⟨split|noise⟩", line = "two", link = "script", length = ⟨#1..3⟩, every = ⟨#2..3⟩
-! kind = "exception", link = "script", line = "bus", function = ⟨3|5|6|16⟩, code = ⟨#1..9⟩, count = ⟨#1..3⟩
-! kind = "busy", link = "script", line = "two", address = "⟨6000|100-12000⟩", probability = 0.4
-* c.M1_ACC > ⟨3000..9000⟩ or c.USER_REGISTER[6]:real ⟨>|!=⟩ ⟨1..9⟩
-* bus.idle and two.idle
-""",
-        """
-{ write = { "⟨c|d|e⟩.OUT⟨#1..3⟩" = ⟨#0..1⟩ } }
-{ write = { "⟨c|d|e⟩.OUT⟨#1..3⟩" = ⟨#0..1⟩, "⟨c|d|e⟩.M1_EN" = 1 } }
-{ write = { "c.M1_ACC" = ⟨3000..9000⟩, "c.USER_REGISTER[5]" = ⟨#1..99⟩ } }
-{ write = { "c.M1_EN" = 1, "c.M1_POS_ABS" = ⟨100..900⟩ } }
-{ move = "⟨c|d⟩.M1", to = ⟨100..900⟩, within = "⟨100..300⟩ ms" }
-{ until = "idle", within = "⟨20..200⟩ ms" }
-{ power_cycle = "⟨d|e⟩" }
-@ bus 0⟨#2..9⟩03272400⟨#10..40⟩
-@ two ⟨14|15|16⟩0300640002
-@ ⟨bus|two⟩ ff000102
-@ ⟨bus|two⟩ leave
-""",
-    ),
-    "chips": Scene(
-        """
-[[line]]
-name = "chips"
-kind = "m1486"
-?baud = ⟨1200|4800⟩
-?timing = "real"
-[[m1486]]
-name = "c"
-line = "chips"
-address = 3
-?variant = "⟨A|C|E1⟩"
-?interface = "⟨dual|two⟩"
-?statement_time = "⟨0.5..3.0⟩ ms"
-[[m1486]]
-name = "d"
-line = "chips"
-address = "A"
-?program = "p.m1486"
-
-[[axis]]
-name = "x"
-drive = "c.M1"
-?pitch = ⟨4.0..6.0⟩
-?pulses_per_rev = 12800
-?inverted = true
-[[axis.switch]]
-above = ⟨1..5⟩
-to = "d.B2"
-?bounce = "⟨1..5⟩ ms"
-[[axis.switch]]
-below = ⟨-9..-1⟩
-to = "c.B4"
-
-[[axis]]
-name = "y"
-drive = "d.M1"
-kind = "rotary"
-[[axis.switch]]
-position = ⟨20..90⟩
-width = ⟨5..20⟩
-to = "d.B5"
-
-[[wire]]
-from = "d.B3"
-to = "c.B3"
-?delay = "⟨1..9⟩ ms"
-
-! kind = "stall", machine = "c", at_s = ⟨0.1..0.9⟩, for_s = ⟨0.02..0.3⟩
-! kind = "⟨flip|drop|insert⟩", line = "chips", link = "script", direction = "⟨in|out⟩", probability = 0.02
-! kind = "stuck", machine = "d", pin = "B2", value = ⟨#0..1⟩, from_s = ⟨0.1..0.6⟩, until_s = ⟨0.7..1.2⟩
-! kind = "bounce", machine = "d", pin = "B5", bounces = ⟨#1..4⟩, for_ms = ⟨2.0..9.0⟩
-! kind = "supply-drop", machine = "⟨c|d⟩", at_s = ⟨0.3..0.9⟩, for_s = ⟨0.02..0.3⟩
-* c.position ⟨>|<⟩ ⟨#-3000..9000⟩ and not d.busy
-* x.position > ⟨0..9⟩ or c.counter > ⟨#0..300⟩
-""",
-        """
-+ { send = "chips", text = "x3\\\\ra⟨#2000..9000⟩\\\\rv⟨#2000..9000⟩\\\\rf⟨#3000..12800⟩\\\\rr\\\\r" }
-{ send = "chips", text = "x3\\\\r⟨f|b⟩⟨#300..12800⟩\\\\rr\\\\r" }
-{ send = "chips", text = "x⟨3|a|g⟩\\\\ru⟨#14..21⟩\\\\r" }
-{ send = "chips", text = "xa\\\\rf⟨#300..9000⟩\\\\rr\\\\r" }
-{ send = "chips", text = "xa\\\\r⟨+|-⟩3\\\\r" }
-{ move = "⟨c|d⟩.M1", by = ⟨#-3000..3000⟩, within = "⟨100..300⟩ ms" }
-{ home = "c.M1", seek = "⟨-|+⟩B4", within = "⟨100..300⟩ ms" }
-{ wait_for = "⟨c|d⟩.M1", within = "⟨100..300⟩ ms" }
-{ set = { "c.B1" = ⟨#0..1⟩ } }
-{ until = "not c.moving", within = "⟨20..200⟩ ms" }
-{ power_cycle = "d" }
-""",
-        {"p.m1486": CHIP},
-    ),
     "machines": Scene(
         f"""
 {DRIVES}
@@ -372,10 +245,13 @@ to = "k.B1"
 { set = { "c.IN1" = ⟨#0..1⟩ } }
 { until = "c.OUT⟨#1..3⟩ == ⟨#0..1⟩", within = "⟨20..200⟩ ms" }
 { power_cycle = "⟨c|k⟩" }
+@ variable c COUNT ⟨#1..9⟩
+@ download c program_0 q.prg
+@ download k program p.m1486
 { repeat = ⟨#2..3⟩, steps = [{ press = "b" }, { wait = "⟨2..20⟩ ms" }, { release = "b" }, { wait = "⟨2..20⟩ ms" }] }
 { until = "idle", within = "⟨20..200⟩ ms" }
 """,
-        {"p.prg": PROGRAM, "p.m1486": CHIP},
+        {"p.prg": PROGRAM, "p.m1486": CHIP, "q.prg": "OUT5 = ON\nDELAY 0.1\nOUT5 = OFF\n"},
     ),
     "scripts": Scene(
         f"""

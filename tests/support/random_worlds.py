@@ -15,10 +15,11 @@ from random import Random
 
 from axis_scenes import AXIS_SCENES
 from machine_scenes import MACHINE_SCENES
+from plant_scenes import PLANT_SCENES
 from scenes import BELT_SCENES, Scene
 
 from steptwin.diagnostics import render
-from steptwin.errors import Misuse
+from steptwin.errors import Misuse, Refusal
 from steptwin.files.export import axis_views
 from steptwin.files.session import session_of
 from steptwin.files.world import World
@@ -27,10 +28,11 @@ from steptwin.motion.divisions import StepTrain
 from steptwin.motion.profile import Profile
 from steptwin.subject.describe import describe
 from steptwin.wire.crc import with_crc
-from steptwin.world.actions import ACTIONS, Leave
+from steptwin.world.actions import ACTIONS, Download, Leave, See, SetVariable
 from steptwin.world.check import diagnose
 from steptwin.world.overrides import read_overrides
 from steptwin.world.pieces import given_files
+from steptwin.world.programs import StatementFollower
 from steptwin.world.reader import TomlText
 from steptwin.world.steptable import read_steps
 from steptwin.world.trace import TraceRecord, encode
@@ -41,7 +43,7 @@ STEPS = 16
 MOMENTS = 7
 WRONG = 16
 END_S = 1.5
-SCENES = BELT_SCENES | AXIS_SCENES | MACHINE_SCENES
+SCENES = BELT_SCENES | AXIS_SCENES | MACHINE_SCENES | PLANT_SCENES
 
 
 class Chance:
@@ -132,19 +134,24 @@ def seen(name: str, seed: int) -> dict[str, list[str]]:
     """
     chance, scene = Chance(name, seed), SCENES[name]
     text, from_outside = described(chance, scene)
-    world = World.from_toml(text, {file: chance.filled(content).encode() for file, content in scene.files.items()})
+    files = {file: chance.filled(content).encode() for file, content in scene.files.items()}
+    world = World.from_toml(text, files)
+    statements: list[TraceRecord] = []
+    follower = StatementFollower(world, statements.append)
     moments = sorted(chance.below(round(END_S * SECOND)) for _ in range(MOMENTS))
     steps = list(zip(moments, from_outside, strict=True))
     cut = chance.below(MOMENTS)
-    values = go_on(world, steps[:cut], moments[cut])
+    values = go_on(world, steps[:cut], moments[cut], files)
+    values += do_from_outside(world, steps[cut][1], files)
     snapshot = world.snapshot()
-    values += go_on(world, steps[cut:], round(END_S * SECOND))
-    happened = [repr((*record[:4], shown_value(record), record.facts)) for record in world.trace]
+    values += go_on(world, steps[cut + 1 :], round(END_S * SECOND), files)
+    happened = [repr((*one[:4], shown_value(one), one.facts)) for one in (*world.trace, *statements)]
+    follower.close()
     end, digest_there = shown(world), world.trace.digest()
     replayed = session_of(world).replay()
     other = world if chance.below(2) else world.branch(snapshot)
     other.restore(snapshot)
-    go_on(other, steps[cut:], round(END_S * SECOND))
+    go_on(other, steps[cut + 1 :], round(END_S * SECOND), files)
     if shown(other) != end:
         values.append("it goes on differently from a snapshot")
     if not replayed.trace.digest() == other.trace.digest() == digest_there:
@@ -152,30 +159,42 @@ def seen(name: str, seed: int) -> dict[str, list[str]]:
     return {"parts": parts(world), "values": values, "trace": happened}
 
 
-def go_on(world: World, steps: list[tuple[int, str]], end: int) -> list[str]:
+def go_on(world: World, steps: list[tuple[int, str]], end: int, files: Mapping[str, bytes]) -> list[str]:
     """Do steps at their moments, and run on to the end; what the world shows then."""
     found: list[str] = []
     for moment, step in steps:
         world.run(until=moment / SECOND)
         found += shown(world)
-        do_from_outside(world, step)
+        found += do_from_outside(world, step, files)
     world.run(until=end / SECOND)
     return found + shown(world)
 
 
-def do_from_outside(world: World, text: str) -> None:
-    """Do a step of a description now, as somebody outside of the world; or send a frame on a line, or leave it."""
-    if text.startswith("@ "):
-        line, _, data = text[2:].partition(" ")
-        there = world.line[line]
-        world.apply_input(Leave(line, "python")) if data == "leave" else there.send(with_crc(bytes.fromhex(data)))
-        return
-    toml = TomlText("steps", f"steps = [{text}]")
-    for step in read_steps(toml, ("steps",), toml.data["steps"]):
-        if type(step) in ACTIONS:
-            world.apply_input(step)
-        else:
-            world.at(world.time, step)
+def do_from_outside(world: World, text: str, files: Mapping[str, bytes]) -> list[str]:
+    """Do now, as somebody outside of the world, a step of a description, or what no description has; why it cannot be done."""
+    if not text.startswith("@ "):
+        toml = TomlText("steps", f"steps = [{text}]")
+        for step in read_steps(toml, ("steps",), toml.data["steps"]):
+            if type(step) in ACTIONS:
+                world.apply_input(step)
+            else:
+                world.at(world.time, step)
+        return []
+    try:
+        match text[2:].split():
+            case ["see", machine, *numbers]:
+                world.apply_input(See(machine, *map(float, numbers)))
+            case ["variable", machine, variable, value]:
+                world.apply_input(SetVariable(machine, variable, float(value)))
+            case ["download", machine, place, file]:
+                world.apply_input(Download(machine, place.replace("_", " "), files[file].decode()))
+            case [line, "leave"]:
+                world.apply_input(Leave(line, "python"))
+            case [line, data]:
+                world.line[line].send(with_crc(bytes.fromhex(data)))
+    except (Misuse, Refusal) as error:
+        return [str(error)]
+    return []
 
 
 def shown_value(record: TraceRecord) -> object:
@@ -194,6 +213,7 @@ def shown(world: World) -> list[str]:
     for name in world.machines:
         world.touch(name)
         found.append(repr(world.kind(name).state(world.machines[name], world.now)))
+    found += [repr(programs.stack(world.now)) for programs in world.programs.values()]
     found += [repr(one) for one in waiting(world)]
     return found
 
@@ -202,7 +222,9 @@ def parts(world: World) -> list[str]:
     """As viewers and exports get them."""
     there = describe(world)
     found: list[object] = [*there.axes, there.buttons, *there.elements, *there.connections, *there.lines]
-    return [repr(one) for one in (*found, *dict(axis_views(world)).items(), *unchanged_inputs(world, 0))]
+    spec = world.spec
+    found += [spec.lines, spec.gateways, spec.history, spec.drawing, dict(axis_views(world)), unchanged_inputs(world, 0)]
+    return [repr(one) for one in found]
 
 
 def digest(lines: list[str]) -> str:
