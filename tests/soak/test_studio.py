@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import gc
 import json
+import os
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -22,6 +24,8 @@ FEW_OBJECTS = 300
 """Caches fill up a little."""
 MOST_HEAP = 60_000_000
 """Of the page, after a collection, bytes."""
+MOST_GROWTH = 30_000_000
+"""Of the resident memory of the service after the first eighth, bytes."""
 BUSY = (
     TABLE
     + """
@@ -44,6 +48,11 @@ def objects() -> int:
     for _ in range(3):
         gc.collect()
     return len(gc.get_objects())
+
+
+def resident(pid: int) -> int:
+    pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE")
 
 
 def look(tab: Tab) -> None:
@@ -80,6 +89,39 @@ def test_viewers_of_a_busy_world_leave_nothing_behind() -> None:
     assert studio.errors == []
 
 
+def test_a_long_session_takes_no_more_memory_than_a_short_one() -> None:
+    """10^5 messages of a viewer that watches, follows, jogs and reads, and one that never reads."""
+    studio = Studio()
+    tab, silent = studio.open(), studio.open()
+    for one in (tab, silent):
+        one.ok("follow", id=1, bound=100)
+        one.ok("watch", points=["table.M1.position", "time"], rate=30)
+    tab.ok("enable", machine="table", axis=1)
+
+    def busy(times: int) -> None:
+        for n in range(times):
+            tab.ok("move", machine="table", axis=1, to=n % 50)
+            watch = tab.ok("watch", points=[f"table.M{n % 4 + 1}.position"])["watch"]
+            tab.ok("follow", id="x", kinds=["edge"])
+            studio.run(40)  # fewer requests than are permitted
+            tab.read()
+            tab.messages.clear()
+            tab.ok("unfollow", follow="x")
+            tab.ok("unwatch", watch=watch)
+            visitor = studio.open()
+            visitor.ok("follow", id=n, kinds=["plan"])
+            visitor.close()
+
+    studio.world.stop_recording()
+    busy(20)
+    before = objects()
+    busy(scaled(100_000) // 8)
+    # The audit log has room for 10 000 entries; the rest is as it was.
+    entries = len(studio.hub.around.audit.last(10**6))
+    assert objects() - before < 6 * entries + 2000
+    assert studio.errors == []
+
+
 @pytest.fixture
 def studio_world() -> StudioWorld:
     return StudioWorld(BUSY)
@@ -94,17 +136,19 @@ def test_a_page_of_a_busy_world_stays_as_large_as_it_is(
     button(page, "Open beside").click()
     page.get_by_label("Panel", exact=True).last.select_option(label="Axes")
     session = page.context.new_cdp_session(page)
-    found = []
+    found, service = [], []
     part_s = HOURS * 3600 / SPEED * factor() / 8
     for _ in range(8):
         page.wait_for_timeout(max(500.0, part_s * 1000))
         session.send("HeapProfiler.collectGarbage")
         found.append(int(session.send("Runtime.getHeapUsage")["usedSize"]))
         counted = session.send("Memory.getDOMCounters")
+        service.append(resident(process.process.pid))
     show(page, "Overview")
     with capsys.disabled():
-        print(json.dumps({"heap": found, "dom": counted}))
+        print(json.dumps({"heap": found, "dom": counted, "service": service}))
     assert max(found) < MOST_HEAP
     assert counted["nodes"] < 20_000
+    assert max(service) - service[0] < MOST_GROWTH
     studio.close()
     assert studio.complaints == []

@@ -247,6 +247,11 @@ def test_a_chip_is_given_a_program_and_typed_to(studio: Studio) -> None:
     typed.press("ArrowUp")
     typed.press("ArrowUp")
     expect(typed).to_have_value("b640")
+    typed.press("Enter")
+    typed.fill("b600")
+    typed.press("Enter")
+    refused = "drum: wrong data: 600 is not a multiple of 64 minimum microsteps (M1); the program stops"
+    expect(page.get_by_role("log", name="What went over chips")).to_contain_text(refused)
 
 
 def test_the_keyboard_is_enough(studio: Studio) -> None:

@@ -69,6 +69,8 @@ def test_the_settings_of_a_chip_are_sent_as_commands(studio: Studio) -> None:
 
 def test_a_configuration_is_edited_written_and_saved(studio: Studio, tmp_path: Path) -> None:
     page = studio.page(panel="Configuration")
+    expect(page.get_by_label("M1 Unit").locator("option:checked")).to_have_text("mm")
+    expect(page.get_by_label("M1 EnWired").locator("option:checked")).to_have_text("wired")
     page.get_by_text("GEAR from mechanics").click()
     page.get_by_label("Travel in one revolution").fill("5")
     button(page, "GEAR M1 = 640 imp/mm").click()
@@ -87,6 +89,19 @@ def test_a_configuration_is_edited_written_and_saved(studio: Studio, tmp_path: P
         button(page, "Save file").click()
     download.value.save_as(tmp_path / "table.cfg")
     assert "Acc=300,5" in (tmp_path / "table.cfg").read_text()
+
+
+def test_edits_that_overlap_are_all_kept(studio: Studio) -> None:
+    page = studio.page(panel="Configuration")
+    for label, value in (("M1 Acc", "200"), ("M1 Dec", "100"), ("M1 HomeMode", "2")):
+        page.get_by_label(label).evaluate("(field, value) => { field.value = value }", value)
+    page.evaluate(
+        """() => document.querySelectorAll(":is([aria-label='M1 Acc'], [aria-label='M1 Dec'], [aria-label='M1 HomeMode'])")
+        .forEach((field) => field.dispatchEvent(new Event("change", { bubbles: true })))"""
+    )
+    expect(page.get_by_role("row", name="M1_DEC 400 100 mm/s²")).to_be_visible()
+    expect(page.get_by_role("row", name="M1_ACC 400 200 mm/s²")).to_be_visible()
+    expect(page.get_by_text("• changed")).to_have_count(3)
 
 
 def test_a_file_is_opened_with_what_is_wrong_in_it(studio: Studio, tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ Pure: moments of the wall clock are arguments; sessions (`steptwin.studio.sessio
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import count
 
@@ -68,23 +68,31 @@ class Lease:
         return {**head, "velocity": self.jog.velocity}
 
 
-class Shared:
-    """A part of the state that is sent to all viewers after a change. ``version`` counts the changes."""
+class SharedParts:
+    """Parts of the state that are sent to all viewers after a change. ``changes`` counts the changes of all of them."""
 
-    __slots__ = ("text", "version")
+    __slots__ = ("_changed", "_texts", "_values", "changes")
 
-    def __init__(self, value: object) -> None:
-        self.version = 0
-        self.text = json.dumps(value)
+    def __init__(self, **values: object) -> None:
+        self.changes = 0
+        self._values = values
+        self._texts = {name: json.dumps(value) for name, value in values.items()}
+        self._changed = dict.fromkeys(values, 0)
 
-    def put(self, value: object) -> None:
-        if json.dumps(value) != self.text:
-            self.repeat(value)
+    def put(self, name: str, value: object) -> None:
+        if value != self._values[name]:
+            self.repeat(name, value)
 
-    def repeat(self, value: object) -> None:
+    def repeat(self, name: str, value: object) -> None:
         """Send it, also if it has not changed."""
-        self.text = json.dumps(value)
-        self.version += 1
+        self.changes += 1
+        self._values[name] = value
+        self._texts[name] = json.dumps(value)
+        self._changed[name] = self.changes
+
+    def since(self, change: int) -> list[tuple[str, str]]:
+        """Names of what has changed after the change with that number, and what there is now, as JSON."""
+        return [(name, self._texts[name]) for name, number in self._changed.items() if number > change]
 
 
 class Hub:
@@ -113,13 +121,8 @@ class Hub:
         """When those over REST asked last."""
         self._clock_due: Nanos = 0
         self._running: tuple[bool, float] | None = None
-        self.shared: Mapping[str, Shared] = {
-            "lost": Shared(None),
-            "control": Shared(None),
-            "viewers": Shared(0),
-            "leases": Shared([]),
-            "clock": Shared(None),
-        }
+        self._moment: tuple[Nanos, str] = (-1, "")
+        self.shared = SharedParts(lost=None, control=None, viewers=0, leases=[], clock=None)
 
     def _describe(self) -> None:
         if self.subject.description is not self._described:
@@ -182,13 +185,13 @@ class Hub:
         if len(self.viewers) >= MOST_VIEWERS:
             raise Refusal(f"there are {MOST_VIEWERS} viewers already, the most possible")
         self.viewers[viewer.number] = viewer
-        self.shared["viewers"].put(len(self.viewers))
+        self.shared.put("viewers", len(self.viewers))
 
     def leave(self, viewer: Viewer) -> None:
         """Jogs end, control passes."""
         if self.viewers.pop(viewer.number, None) is None:
             return
-        self.shared["viewers"].put(len(self.viewers))
+        self.shared.put("viewers", len(self.viewers))
         self._drop([lease for lease in self._leases.values() if lease.viewer.number == viewer.number])
         self.control.release(viewer)
         self._say_control()
@@ -224,7 +227,7 @@ class Hub:
         self._say_control()
 
     def _say_control(self) -> None:
-        self.shared["control"].put(self.holder())
+        self.shared.put("control", self.holder())
 
     def holder(self) -> object:
         found = self.control.holder
@@ -295,7 +298,7 @@ class Hub:
             self.around.on_internal(error)
 
     def _say_leases(self) -> None:
-        self.shared["leases"].put(self.leases())
+        self.shared.put("leases", self.leases())
 
     def leases(self) -> list[dict[str, object]]:
         return [lease.plain() for lease in self._leases.values()]
@@ -347,13 +350,19 @@ class Hub:
 
     # ------------------------------------------------------------------ time
 
+    def time(self, now: Nanos) -> str:
+        """The present moment as text, the same for all viewers that are sent something at ``now``."""
+        if self._moment[0] != now:
+            self._moment = now, str(self.around.moment().time)
+        return self._moment[1]
+
     def tick(self, now: Nanos) -> None:
         """Called about 30 times a second while there are viewers: reads what is watched, spreads events, looks at the clock."""
         self._describe()
         points = self.watches.due(now)
         if points:
             self.watches.put(self.subject.read(*points))
-        self.shared["lost"].put(self.subject.lost)
+        self.shared.put("lost", self.subject.lost)
         self.streams.flush()
         over = [lease for lease in self._leases.values() if lease.held.over is not None]
         for lease in over:
@@ -371,4 +380,4 @@ class Hub:
         goes = moment.running, moment.speed
         if goes != self._running or now >= self._clock_due:
             self._running, self._clock_due = goes, now + CLOCK_NS
-            self.shared["clock"].repeat(moment.plain())  # where time stands, too: pages see that the studio is there
+            self.shared.repeat("clock", moment.plain())  # where time stands, too: pages see that the studio is there

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
 import socket
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from fastapi import FastAPI
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from websockets.protocol import State
+from websockets.server import ServerProtocol
 
 from steptwin import __version__
 from steptwin.access.origin import Origins
@@ -24,11 +27,34 @@ from steptwin.subject.dispatch import LONGEST_REQUEST
 
 
 class _Protocol(WebSocketsSansIOProtocol):
-    """Permits closing a connection whose other end does not read."""
+    """A connection whose application may write without waiting, and ends it where its other end does not read."""
 
     def connection_made(self, transport: Any) -> None:
-        self.app_state = {**self.app_state, "abort": transport.abort}
+        self.app_state = {**self.app_state, "wire": _Wire(self.conn, transport)}
         super().connection_made(transport)
+
+
+class _Wire:
+    """What one viewer or editor is sent."""
+
+    def __init__(self, protocol: ServerProtocol, transport: asyncio.Transport) -> None:
+        self._protocol = protocol
+        self._transport = transport
+
+    @property
+    def unread(self) -> int:
+        return self._transport.get_write_buffer_size()
+
+    def write(self, texts: Iterable[str]) -> None:
+        protocol = self._protocol
+        if protocol.state is not State.OPEN or self._transport.is_closing():
+            return
+        for text in texts:
+            protocol.send_text(text.encode())
+        self._transport.write(b"".join(protocol.data_to_send()))
+
+    def abort(self) -> None:
+        self._transport.abort()
 
 
 class StudioService:

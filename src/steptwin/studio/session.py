@@ -82,7 +82,8 @@ class ViewerSession:
         self._seq = count()
         self._needs_hello = False
         self._descriptions = hub.descriptions
-        self._seen: dict[str, int] = {}
+        self._seen = 0
+        """The last change of shared parts that it was sent."""
         self._watches: dict[int, Watched] = {}
         self._watch_numbers = count(1)
         self._follows: dict[object, tuple[Filter, int]] = {}
@@ -369,67 +370,48 @@ class ViewerSession:
             filters = [what for what, _ in self._follows.values()]
             self._place = streams.enter(filters, max(bound for _, bound in self._follows.values()))
         if before is not None:
-            self._left_over.append(before.take())
+            batch = before.take()
+            if batch.count or batch.missed:
+                self._left_over.append(batch)
             streams.leave(before)
         if len(self._left_over) > MOST_LEFT_OVER:
             dropped = self._left_over.pop(0)
             self._missed += dropped.count + dropped.missed
 
-    def has_news(self, now: Nanos) -> bool:
-        """Whether `take` returns a message."""
-        if not self.has_entered or self.is_rest:
-            return False
-        if self._is_to_greet() or self._looking.is_changed:
-            return True
-        return self._has_changes() or self._has_events(now) or self._has_values(now)
-
-    def _is_to_greet(self) -> bool:
-        """Whether the whole state is to be sent: it was asked for, or there are other machines than before."""
-        return self._needs_hello or self._descriptions != self._hub.descriptions
-
-    def _has_changes(self) -> bool:
-        return any(shared.version != self._seen.get(name) for name, shared in self._hub.shared.items())
-
-    def _has_events(self, now: Nanos) -> bool:
-        waiting = any(map(any, self._left_over)) or self._missed > 0 or (self._place is not None and self._place.has_news)
-        return waiting and now >= self._events_due
-
-    def _has_values(self, now: Nanos) -> bool:
-        if self._looking.is_back:
-            return bool(self._looking.unsent)
-        return any(watched.is_due(now) for watched in self._watches.values())
-
     def take(self, now: Nanos) -> list[str]:
-        """The messages to send now. Must be called only after the previous ones were sent."""
+        """The messages to send now, often none. Must be called only after the previous ones were sent."""
         if not self.has_entered or self.is_rest:
             return []
+        hub = self._hub
         found: list[str] = []
-        if self._is_to_greet():
+        if self._needs_hello or self._descriptions != hub.descriptions:  # it was asked for, or there are other machines
             found.append(self._whole())
-        for name, shared in self._hub.shared.items():
-            if shared.version != self._seen.get(name):
-                self._seen[name] = shared.version
-                found.append(f'{{"seq":{next(self._seq)},"{name}":{shared.text}}}')
+        if self._seen != hub.shared.changes:
+            parts = hub.shared.since(self._seen)
+            self._seen = hub.shared.changes
+            found += [f'{{"seq":{next(self._seq)},"{name}":{text}}}' for name, text in parts]
         if self._looking.is_changed:
             found.append(self._past())
-        time = self._hub.around.moment().time if self._watches or self._place or self._left_over else 0
-        if self._has_values(now):
-            parts = [f'"{number}":{values}' for number, values in self._take_values(now).items()]
-            found.append(f'{{"seq":{next(self._seq)},"time_ns":"{time}","values":{{{",".join(parts)}}}}}')
-        if self._has_events(now):
-            found.append(self._events(now, time))
+        values = ",".join([f'"{number}":{text}' for number, text in self._take_values(now)])
+        if values:
+            found.append(f'{{"seq":{next(self._seq)},"time_ns":"{hub.time(now)}","values":{{{values}}}}}')
+        if now >= self._events_due and self._has_events():
+            found.append(self._events(now))
         return found
 
-    def _take_values(self, now: Nanos) -> Mapping[int, str]:
+    def _has_events(self) -> bool:
+        return bool(self._left_over) or self._missed > 0 or (self._place is not None and self._place.has_news)
+
+    def _take_values(self, now: Nanos) -> list[tuple[int, str]]:
         if self._looking.is_back:
-            return self._looking.take(self._watches)
-        return {one.number: one.take(now) for one in self._watches.values() if one.is_due(now)}
+            return list(self._looking.take(self._watches).items())
+        return [(one.number, one.take(now)) for one in self._watches.values() if one.is_due(now)]
 
     def _past(self) -> str:
         may = [name for name in self._hub.may(self.viewer.role) if name in IN_THE_PAST or not permit_of(name).control]
         return json.dumps({"seq": next(self._seq), "past": self._looking.message(may)}, separators=(",", ":"))
 
-    def _events(self, now: Nanos, time: Nanos) -> str:
+    def _events(self, now: Nanos) -> str:
         self._events_due = max(self._events_due + EVENTS_NS, now + EVENTS_NS // 2)
         batches, missed = self._left_over, self._missed
         self._left_over, self._missed = [], 0
@@ -437,7 +419,7 @@ class ViewerSession:
             batches.append(self._place.take())
         text = ",".join(batch.text for batch in batches if batch.text)
         missed += sum(batch.missed for batch in batches)
-        return f'{{"seq":{next(self._seq)},"time_ns":"{time}","events":[{text}],"missed":{missed}}}'
+        return f'{{"seq":{next(self._seq)},"time_ns":"{self._hub.time(now)}","events":[{text}],"missed":{missed}}}'
 
     def _whole(self) -> str:
         """The message hello; whatever was to be sent before is in it."""
@@ -445,7 +427,7 @@ class ViewerSession:
         self._needs_hello = False
         self._descriptions = hub.descriptions
         self._seq = count(1)
-        self._seen = {name: shared.version for name, shared in hub.shared.items()}
+        self._seen = hub.shared.changes
         self._forget_values()
         if self._looking.is_back:
             self._looking.is_changed, self._looking.unsent = True, set(self._watches)

@@ -1,6 +1,7 @@
 """Viewers over WebSockets: each request is answered, and messages of a session are sent as fast as its viewer reads.
 
 Everything runs in the event loop of the world, so commands are done between the requests of its other clients, without locks.
+Nothing that is sent waits or has a task of its own: all messages of a viewer that are there at a tick are one write.
 """
 
 from __future__ import annotations
@@ -8,12 +9,11 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-from collections import deque
-from collections.abc import Awaitable, Callable, MutableMapping
-from typing import Any, TypeAlias
+from collections.abc import Awaitable, Callable, Iterable, MutableMapping
+from typing import Any, Protocol, TypeAlias
 
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
+from steptwin.machine import SECOND, Nanos
 from steptwin.studio.hub import Hub
 from steptwin.studio.session import ViewerSession
 from steptwin.subject.dispatch import Message, failure
@@ -26,10 +26,29 @@ PATH = "/ws"
 TICK_S = 1 / 30
 PATIENCE_S = 10.0
 """Time-out for a viewer that does not read."""
+MOST_UNREAD = 65_536
+"""A viewer with more unread bytes than this is sent nothing more, and its requests wait."""
 HELLO_S = 10.0
 """Time-out for the hello of a connection."""
-REFUSED, SLOW, SILENT = 4401, 4408, 4400
-"""Close codes: wrong token, does not read, no hello."""
+REFUSED, SILENT = 4401, 4400
+"""Close codes: wrong token, no hello."""
+
+
+class Wire(Protocol):
+    """The sending half of a connection; ``scope["state"]["wire"]``."""
+
+    @property
+    def unread(self) -> int:
+        """Number of bytes that the operating system has not accepted yet."""
+        ...
+
+    def write(self, texts: Iterable[str]) -> None:
+        """Send messages, at once. Nothing on a connection that ends."""
+        ...
+
+    def abort(self) -> None:
+        """End the connection; unread bytes are dropped."""
+        ...
 
 
 class Viewers:
@@ -38,7 +57,7 @@ class Viewers:
     def __init__(self, hub: Hub, clock: Callable[[], Nanos]) -> None:
         self._hub = hub
         self._clock = clock
-        self._connections: set[_Connection] = set()
+        self._connections: set[Connection] = set()
         self._ticking: asyncio.Task[None] | None = None
 
     async def serve(self, scope: AsgiScope, receive: AsgiReceive, send: AsgiSend) -> None:
@@ -46,16 +65,15 @@ class Viewers:
         await receive()  # that it wants to connect
         await send({"type": "websocket.accept"})
         session = ViewerSession(self._hub, _peer(scope))
-        connection = _Connection(session, send, self._clock, scope["state"]["abort"])
+        connection = Connection(session, scope["state"]["wire"], self._clock, self._hub.around.on_internal)
         self._connections.add(connection)
         if self._ticking is None:
             self._ticking = asyncio.create_task(self._tick())
         try:
-            await connection.serve(receive)
+            await connection.serve(receive, send)
         finally:
             self._connections.discard(connection)
             session.close()
-            await connection.close()
 
     async def _tick(self) -> None:
         """Runs while there are connections. An error in one connection does not affect the others."""
@@ -77,83 +95,67 @@ class Viewers:
                 await self._ticking
 
 
-class _Connection:
-    """A connection. Answers are sent in order; a separate task sends messages, so that only that task waits for a slow reader."""
+class Connection:
+    """A connection. Answers are sent in order."""
 
-    def __init__(self, session: ViewerSession, send: AsgiSend, clock: Callable[[], Nanos], abort: Callable[[], None]) -> None:
+    def __init__(
+        self, session: ViewerSession, wire: Wire, clock: Callable[[], Nanos], on_internal: Callable[[Exception], object]
+    ) -> None:
         self._session = session
-        self._send = send
+        self._wire = wire
         self._clock = clock
-        self._abort = abort
-        self._news = asyncio.Event()
-        self._answers: deque[str] = deque()
-        """Later answers that are not sent yet."""
-        self._writing: asyncio.Task[None] | None = None
+        self._on_internal = on_internal
+        self._has_room = asyncio.Event()
+        self._has_room.set()
+        self._unread = 0
+        """What there was when the viewer read something last, while there is too much."""
+        self._read_at: Nanos = 0
 
-    async def serve(self, receive: AsgiReceive) -> None:
-        loop = asyncio.get_running_loop()
-        silent = loop.call_later(HELLO_S, self._abort)
-        self._writing = asyncio.create_task(self._write())
+    async def serve(self, receive: AsgiReceive, send: AsgiSend) -> None:
+        silent = asyncio.get_running_loop().call_later(HELLO_S, self._wire.abort)
         try:
             while (message := await receive())["type"] == "websocket.receive":
-                await self._answer(message.get("text"))
+                self._answer(message.get("text"))
                 if self._session.is_refused:
-                    await self._send({"type": "websocket.close", "code": REFUSED})
+                    await send({"type": "websocket.close", "code": REFUSED})
                     return
                 if self._session.has_entered:
                     silent.cancel()
                 self.look(self._clock())
-        except (TimeoutError, OSError):
-            self._abort()
+                await self._has_room.wait()
         finally:
             silent.cancel()
 
-    async def _answer(self, text: str | None) -> None:
+    def _answer(self, text: str | None) -> None:
         """Send an answer when it is available; other requests are served meanwhile."""
         if text is None:
-            await self._written(_text(failure(Misuse("a message is a text of JSON; this one is binary"))))
-            return
-        answer = self._session.receive(text, self._clock())
-        if answer.is_done:
-            await self._written(_text(answer.result()))
+            self._write(failure(Misuse("a message is a text of JSON; this one is binary")))
         else:
-            answer.then(lambda: self._answered(answer.result()))
+            answer = self._session.receive(text, self._clock())
+            answer.then(lambda: self._write(answer.result()))
 
-    def _answered(self, answer: Message) -> None:
-        self._answers.append(_text(answer))
-        self._news.set()
-
-    async def _write(self) -> None:
-        try:
-            while True:
-                await self._news.wait()
-                self._news.clear()
-                while self._answers:
-                    await self._written(self._answers.popleft())
-                for text in self._session.take(self._clock()):
-                    await self._written(text)
-        except (TimeoutError, OSError):
-            self._abort()
-
-    async def _written(self, text: str) -> None:
-        """Raises `TimeoutError` if the viewer does not read, `OSError` if it has disconnected."""
-        async with asyncio.timeout(PATIENCE_S):
-            await self._send({"type": "websocket.send", "text": text})
+    def _write(self, answer: Message) -> None:
+        self._wire.write((json.dumps(answer, separators=(",", ":")),))
 
     def look(self, now: Nanos) -> None:
-        """Send the available messages."""
-        if not self._news.is_set() and self._session.has_news(now):
-            self._news.set()
-
-    async def close(self) -> None:
-        if self._writing is not None:
-            self._writing.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await self._writing
-
-
-def _text(message: Message) -> str:
-    return json.dumps(message, separators=(",", ":"))
+        """Send the available messages, if the viewer reads them; end the connection of one that has not for long."""
+        unread = self._wire.unread
+        if unread > MOST_UNREAD:
+            if self._has_room.is_set() or unread < self._unread:
+                self._has_room.clear()
+                self._unread, self._read_at = unread, now
+            elif now - self._read_at > PATIENCE_S * SECOND:
+                self._wire.abort()
+            return
+        self._has_room.set()
+        try:
+            texts = self._session.take(now)
+        except Exception as error:  # noqa: BLE001  it is reported here only
+            self._on_internal(error)
+            self._wire.abort()
+            return
+        if texts:
+            self._wire.write(texts)
 
 
 def _peer(scope: AsgiScope) -> str:

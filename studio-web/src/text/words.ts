@@ -30,7 +30,6 @@ export const POLISH: Readonly<Record<string, string>> = {
   counts: "zliczenia",
   "counts/rev": "zliczenia/obr.",
   "imp/rev": "imp/obr.",
-  degree: "°",
   rev: "obr.",
   "min. microsteps": "min. mikrokroki",
   "min. microsteps/s": "min. mikrokroki/s",
@@ -43,6 +42,11 @@ export const POLISH: Readonly<Record<string, string>> = {
   "M1486 line": "linia M1486",
 };
 
+/** Units with a sign of their own, in every language. */
+const SIGNS: Readonly<Record<string, string>> = { degree: "°" };
+
 export function inWords(words: string): string {
+  const sign = SIGNS[words];
+  if (sign !== undefined) return sign;
   return language() === "pl" ? (POLISH[words] ?? MEANINGS[words] ?? words) : words;
 }

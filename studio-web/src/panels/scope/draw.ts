@@ -18,6 +18,7 @@ const MARKS = 12;
 const LANE = 20;
 const GAP = 14;
 const LEAST_TRACK = 60;
+const UNIT_GAP = 6;
 
 /** Lines that are told apart without colour. */
 const DASHES: readonly (readonly number[])[] = [[], [7, 3], [2, 2], [9, 3, 2, 3]];
@@ -124,16 +125,18 @@ export class Picture {
     const digits = digitsOf(marks);
     ctx.lineWidth = 1;
     ctx.textAlign = "center";
+    const right = LEFT + this.inner - 4;
     for (const mark of marks) {
       if (mark < 0) continue;
       const x = LEFT + ((mark - from_s) / span_s) * this.inner;
       ctx.strokeStyle = colours.rule;
       this.line(x, MARKS, x, bottom);
       ctx.fillStyle = colours.dim;
-      ctx.fillText(shownNumber(mark, digits), x, bottom + 10);
+      const text = shownNumber(mark, digits);
+      if (x + ctx.measureText(text).width / 2 + UNIT_GAP <= right) ctx.fillText(text, x, bottom + 10);
     }
     ctx.textAlign = "left";
-    ctx.fillText("s", LEFT + this.inner - 4, bottom + 10);
+    ctx.fillText("s", right, bottom + 10);
   }
 
   private marks(scene: Scene, colours: Colours): void {
