@@ -11,12 +11,12 @@ import pytest
 from tests.support.studio_rig import Studio, check_message
 
 from steptwin.machine import SECOND
-from steptwin.studio.viewers import MOST_UNREAD, PATIENCE_S, Connection
+from steptwin.studio.viewers import MOST_UNREAD, PATIENCE_S, ViewerConnection
 
 PATIENCE_NS = int(PATIENCE_S * SECOND)
 
 
-class Wire:
+class Writer:
     """A connection whose other end reads when it is told to."""
 
     def __init__(self) -> None:
@@ -35,13 +35,13 @@ class Wire:
 
 
 class Viewer:
-    """A viewer of the studio behind a wire, which watches the time and follows events."""
+    """A viewer of the studio behind a writer, which watches the time and follows events."""
 
     def __init__(self, studio: Studio) -> None:
         self.studio = studio
-        self.wire = Wire()
+        self.writer = Writer()
         self.tab = studio.open()
-        self.connection = Connection(self.tab.session, self.wire, lambda: studio.now, studio.errors.append)
+        self.connection = ViewerConnection(self.tab.session, self.writer, lambda: studio.now, studio.errors.append)
         self.tab.ok("watch", points=["time"], rate=30)
         self.tab.ok("follow", id=1)
         self.look()
@@ -49,9 +49,9 @@ class Viewer:
     def look(self, after_ms: float = 100) -> list[dict[str, Any]]:
         """What is written at the next tick."""
         self.studio.run(after_ms)
-        self.wire.writes.clear()
+        self.writer.writes.clear()
         self.connection.look(self.studio.now)
-        return [message for messages in self.wire.writes for message in messages]
+        return [message for messages in self.writer.writes for message in messages]
 
 
 @pytest.fixture
@@ -66,40 +66,40 @@ def kinds(messages: list[dict[str, Any]]) -> set[str]:
 def test_all_messages_of_a_tick_are_one_write_and_none_is_none(viewer: Viewer) -> None:
     viewer.tab.ok("note", text="here")
     assert kinds(viewer.look(2000)) == {"values", "events", "clock", "control"}
-    assert len(viewer.wire.writes) == 1
+    assert len(viewer.writer.writes) == 1
     assert viewer.look(0) == []
-    assert viewer.wire.writes == []
+    assert viewer.writer.writes == []
 
 
 def test_a_viewer_that_does_not_read_is_sent_nothing_more_and_the_present_when_it_reads_again(viewer: Viewer) -> None:
-    viewer.wire.unread = MOST_UNREAD + 1
+    viewer.writer.unread = MOST_UNREAD + 1
     for _ in range(20):
         viewer.tab.ok("note", text="missed by nobody")
         assert viewer.look() == []
-    viewer.wire.unread = MOST_UNREAD
+    viewer.writer.unread = MOST_UNREAD
     written = viewer.look()
     (values,) = [message["values"] for message in written if "values" in message]
     assert values == {"1": [[0, pytest.approx(viewer.studio.value("time"), abs=1e-6)]]}
     (events,) = [message["events"] for message in written if "events" in message]
     assert len(events) == 20
-    assert not viewer.wire.is_aborted
+    assert not viewer.writer.is_aborted
 
 
 def test_the_connection_of_a_viewer_that_reads_nothing_for_long_ends(viewer: Viewer) -> None:
-    viewer.wire.unread = MOST_UNREAD + 3
+    viewer.writer.unread = MOST_UNREAD + 3
     viewer.look()
     began = viewer.studio.now
-    while not viewer.wire.is_aborted:
+    while not viewer.writer.is_aborted:
         viewer.look()
     assert PATIENCE_NS < viewer.studio.now - began < PATIENCE_NS + SECOND
 
 
 def test_one_that_reads_slowly_has_time(viewer: Viewer) -> None:
     for unread in range(MOST_UNREAD + 5, MOST_UNREAD, -1):
-        viewer.wire.unread = unread
+        viewer.writer.unread = unread
         viewer.look()
         viewer.look(PATIENCE_S * 900)
-    assert not viewer.wire.is_aborted
+    assert not viewer.writer.is_aborted
 
 
 def test_requests_of_one_that_does_not_read_its_answers_wait(viewer: Viewer) -> None:
@@ -115,12 +115,12 @@ def test_requests_of_one_that_does_not_read_its_answers_wait(viewer: Viewer) -> 
         pytest.fail(f"sent {message}")
 
     async def serve() -> None:
-        viewer.wire.unread = MOST_UNREAD + 1
+        viewer.writer.unread = MOST_UNREAD + 1
         serving = asyncio.create_task(viewer.connection.serve(receive, send))
         for _ in range(5):
             await asyncio.sleep(0)
         assert len(asked) == 1
-        viewer.wire.unread = 0
+        viewer.writer.unread = 0
         viewer.look()
         await serving
 
@@ -136,7 +136,7 @@ def test_an_error_in_one_connection_ends_that_connection_only(viewer: Viewer, mo
 
     monkeypatch.setattr(viewer.tab.session, "take", fail)
     assert viewer.look() == []
-    assert viewer.wire.is_aborted
+    assert viewer.writer.is_aborted
     assert [type(error) for error in viewer.studio.errors] == [ValueError]
     assert kinds(other.look())
-    assert not other.wire.is_aborted
+    assert not other.writer.is_aborted

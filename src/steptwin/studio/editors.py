@@ -68,7 +68,7 @@ class Editors:
         else:
             self._count += 1
             try:
-                await self._converse(receive, send, scope["state"]["wire"].abort)
+                await self._converse(receive, send, scope["state"]["writer"].abort)
             finally:
                 self._count -= 1
 

@@ -30,11 +30,11 @@ class _Protocol(WebSocketsSansIOProtocol):
     """A connection whose application may write without waiting, and ends it where its other end does not read."""
 
     def connection_made(self, transport: Any) -> None:
-        self.app_state = {**self.app_state, "wire": _Wire(self.conn, transport)}
+        self.app_state = {**self.app_state, "writer": _SocketWriter(self.conn, transport)}
         super().connection_made(transport)
 
 
-class _Wire:
+class _SocketWriter:
     """What one viewer or editor is sent."""
 
     def __init__(self, protocol: ServerProtocol, transport: asyncio.Transport) -> None:

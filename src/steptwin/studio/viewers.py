@@ -34,8 +34,8 @@ REFUSED, SILENT = 4401, 4400
 """Close codes: wrong token, no hello."""
 
 
-class Wire(Protocol):
-    """The sending half of a connection; ``scope["state"]["wire"]``."""
+class MessageWriter(Protocol):
+    """The sending half of a connection; ``scope["state"]["writer"]``."""
 
     @property
     def unread(self) -> int:
@@ -57,7 +57,7 @@ class Viewers:
     def __init__(self, hub: Hub, clock: Callable[[], Nanos]) -> None:
         self._hub = hub
         self._clock = clock
-        self._connections: set[Connection] = set()
+        self._connections: set[ViewerConnection] = set()
         self._ticking: asyncio.Task[None] | None = None
 
     async def serve(self, scope: AsgiScope, receive: AsgiReceive, send: AsgiSend) -> None:
@@ -65,7 +65,7 @@ class Viewers:
         await receive()  # that it wants to connect
         await send({"type": "websocket.accept"})
         session = ViewerSession(self._hub, _peer(scope))
-        connection = Connection(session, scope["state"]["wire"], self._clock, self._hub.around.on_internal)
+        connection = ViewerConnection(session, scope["state"]["writer"], self._clock, self._hub.around.on_internal)
         self._connections.add(connection)
         if self._ticking is None:
             self._ticking = asyncio.create_task(self._tick())
@@ -95,14 +95,18 @@ class Viewers:
                 await self._ticking
 
 
-class Connection:
+class ViewerConnection:
     """A connection. Answers are sent in order."""
 
     def __init__(
-        self, session: ViewerSession, wire: Wire, clock: Callable[[], Nanos], on_internal: Callable[[Exception], object]
+        self,
+        session: ViewerSession,
+        writer: MessageWriter,
+        clock: Callable[[], Nanos],
+        on_internal: Callable[[Exception], object],
     ) -> None:
         self._session = session
-        self._wire = wire
+        self._writer = writer
         self._clock = clock
         self._on_internal = on_internal
         self._has_room = asyncio.Event()
@@ -112,7 +116,7 @@ class Connection:
         self._read_at: Nanos = 0
 
     async def serve(self, receive: AsgiReceive, send: AsgiSend) -> None:
-        silent = asyncio.get_running_loop().call_later(HELLO_S, self._wire.abort)
+        silent = asyncio.get_running_loop().call_later(HELLO_S, self._writer.abort)
         try:
             while (message := await receive())["type"] == "websocket.receive":
                 self._answer(message.get("text"))
@@ -135,27 +139,27 @@ class Connection:
             answer.then(lambda: self._write(answer.result()))
 
     def _write(self, answer: Message) -> None:
-        self._wire.write((json.dumps(answer, separators=(",", ":")),))
+        self._writer.write((json.dumps(answer, separators=(",", ":")),))
 
     def look(self, now: Nanos) -> None:
         """Send the available messages, if the viewer reads them; end the connection of one that has not for long."""
-        unread = self._wire.unread
+        unread = self._writer.unread
         if unread > MOST_UNREAD:
             if self._has_room.is_set() or unread < self._unread:
                 self._has_room.clear()
                 self._unread, self._read_at = unread, now
             elif now - self._read_at > PATIENCE_S * SECOND:
-                self._wire.abort()
+                self._writer.abort()
             return
         self._has_room.set()
         try:
             texts = self._session.take(now)
         except Exception as error:  # noqa: BLE001  it is reported here only
             self._on_internal(error)
-            self._wire.abort()
+            self._writer.abort()
             return
         if texts:
-            self._wire.write(texts)
+            self._writer.write(texts)
 
 
 def _peer(scope: AsgiScope) -> str:
