@@ -18,7 +18,8 @@ const MARKS = 12;
 const LANE = 20;
 const GAP = 14;
 const LEAST_TRACK = 60;
-const UNIT_GAP = 6;
+/** Of a character of the numbers, with their font of one width. */
+const CHARACTER = 6.6;
 
 /** Lines that are told apart without colour. */
 const DASHES: readonly (readonly number[])[] = [[], [7, 3], [2, 2], [9, 3, 2, 3]];
@@ -133,7 +134,7 @@ export class Picture {
       this.line(x, MARKS, x, bottom);
       ctx.fillStyle = colours.dim;
       const text = shownNumber(mark, digits);
-      if (x + ctx.measureText(text).width / 2 + UNIT_GAP <= right) ctx.fillText(text, x, bottom + 10);
+      if (x + (text.length / 2 + 1) * CHARACTER <= right) ctx.fillText(text, x, bottom + 10);
     }
     ctx.textAlign = "left";
     ctx.fillText("s", right, bottom + 10);
