@@ -16,7 +16,7 @@ GUEST = Viewer(3, "guest", Role.VIEWER)
 def test_one_holds_control_and_another_takes_it_only_by_saying_so() -> None:
     control = Control()
     assert control.take(ANNA, over=False) == (None, ANNA)
-    with pytest.raises(Refusal, match=r"Anna \(viewer 1\) holds control: take_control with over = true takes it"):
+    with pytest.raises(Refusal, match=r"Anna \(viewer 1\) holds control: take it over first"):
         control.take(PIOTR, over=False)
     assert control.take(PIOTR, over=True) == (ANNA, PIOTR)
     assert control.release(ANNA) == (PIOTR, PIOTR)

@@ -154,6 +154,7 @@ def test_the_time_panel_branches_from_the_moment_that_is_shown(studio: Studio) -
     expect(branch.get_by_role("heading", level=1)).to_have_text("steptwin cell")
     expect(branch.get_by_role("banner")).to_contain_text("Branch 1 from 1.000 s")
     expect(branch.get_by_role("group", name="Virtual time")).to_contain_text("paused")
+    expect(branch.get_by_role("region", name="First minute")).to_have_count(0)
     show(branch, "I/O")
     button(branch, "Set IN3").click()
     expect(button(branch, "Set IN3")).to_have_attribute("aria-pressed", "true")
@@ -171,5 +172,9 @@ def test_the_branches_in_polish(studio: Studio) -> None:
     with page.context.expect_page() as opened:
         page.get_by_role("link", name="Otwórz odgałęzienie 1").click()
     branch = opened.value
+    branch.emulate_media(color_scheme="light")
+    expect(branch.locator("html")).to_have_attribute("data-theme", "light")
+    branch.emulate_media(color_scheme="dark")
+    expect(branch.locator("html")).to_have_attribute("data-theme", "dark")
     expect(branch.get_by_role("banner")).to_contain_text(re.compile(r"Odgałęzienie 1 od \d+\.\d{3} s"))
     assert [*serious(page), *serious(branch)] == []

@@ -110,7 +110,7 @@ def test_two_viewers_see_the_same_and_hand_control_over() -> None:
     code, message = piotr.error("move", machine="table", axis=1, to=5)
     assert (code, message) == (
         "refusal",
-        "move needs control, which Anna (viewer 1) holds: take_control with over = true takes it",
+        "move needs control, which Anna (viewer 1) holds: take it over first",
     )
     assert piotr.error("take_control")[0] == "refusal"
     piotr.ok("take_control", over=True)

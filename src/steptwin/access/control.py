@@ -39,7 +39,7 @@ class Control:
         """Give control to ``viewer``. Raises `Refusal` if another viewer holds it, unless ``over``."""
         before = self.holder
         if before is not None and before.number != viewer.number and not over:
-            raise Refusal(f"{before} holds control: take_control with over = true takes it")
+            raise Refusal(f"{before} holds control: take it over first")
         self.holder = viewer
         return ControlChange(before, viewer)
 
@@ -62,5 +62,5 @@ def check(name: str, permit: Permit, viewer: Viewer, control: Control) -> bool:
     if not permit.control or (holder is not None and holder.number == viewer.number):
         return False
     if holder is not None:
-        raise Refusal(f"{name} needs control, which {holder} holds: take_control with over = true takes it")
+        raise Refusal(f"{name} needs control, which {holder} holds: take it over first")
     return True

@@ -13,9 +13,9 @@ export const REFUSALS: Readonly<Record<string, string>> = {
   // Who may do what.
   "{name} is for the role {role}; {viewer} has the role {other}":
     "{name} jest dla roli {role}; {viewer} ma rolę {other}",
-  "{name} needs control, which {holder} holds: take_control with over = true takes it":
+  "{name} needs control, which {holder} holds: take it over first":
     "{name} wymaga sterowania, które ma {holder}: najpierw przejmij sterowanie",
-  "{holder} holds control: take_control with over = true takes it": "sterowanie ma {holder}: można je przejąć",
+  "{holder} holds control: take it over first": "sterowanie ma {holder}: można je przejąć",
   "Host {host} is no name of this studio; it is reached as {names}":
     "{host} nie jest nazwą tego studia; osiąga się je jako {names}",
   "Origin {origin} is another site; only pages of this studio may ask it":

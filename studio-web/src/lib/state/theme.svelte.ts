@@ -16,10 +16,14 @@ export function chooseTheme(next: Theme): void {
   localStorage.setItem(KEY, next);
 }
 
-/** That of last time, else that of the system. */
+/** That of last time, else that of the system, also when it changes. */
 export function restoreTheme(): void {
-  const kept = localStorage.getItem(KEY);
-  const isDark = kept === null ? matchMedia("(prefers-color-scheme: dark)").matches : kept === "dark";
-  chosen.theme = isDark ? "dark" : "light";
-  document.documentElement.dataset.theme = chosen.theme;
+  const system = matchMedia("(prefers-color-scheme: dark)");
+  const show = (): void => {
+    const kept = localStorage.getItem(KEY);
+    chosen.theme = (kept === null ? system.matches : kept === "dark") ? "dark" : "light";
+    document.documentElement.dataset.theme = chosen.theme;
+  };
+  system.addEventListener("change", show);
+  show();
 }
