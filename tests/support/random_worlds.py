@@ -9,7 +9,7 @@ coincide; in the other one they have decimals. All comes from `random.Random.ran
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from hashlib import blake2b
 from random import Random
 
@@ -18,7 +18,7 @@ from machine_scenes import MACHINE_SCENES
 from plant_scenes import PLANT_SCENES
 from scenes import BELT_SCENES, Scene
 
-from steptwin.diagnostics import render
+from steptwin.diagnostics import render, to_json
 from steptwin.errors import Misuse, Refusal
 from steptwin.files.export import axis_views
 from steptwin.files.session import session_of
@@ -32,7 +32,8 @@ from steptwin.world.actions import ACTIONS, Download, Leave, See, SetVariable
 from steptwin.world.check import diagnose
 from steptwin.world.overrides import read_overrides
 from steptwin.world.pieces import given_files
-from steptwin.world.programs import StatementFollower
+from steptwin.world.programs import Place, StatementFollower
+from steptwin.world.programtexts import WorldPrograms, program_texts
 from steptwin.world.reader import TomlText
 from steptwin.world.steptable import read_steps
 from steptwin.world.trace import TraceRecord, encode
@@ -213,7 +214,9 @@ def shown(world: World) -> list[str]:
     for name in world.machines:
         world.touch(name)
         found.append(repr(world.kind(name).state(world.machines[name], world.now)))
-    found += [repr(programs.stack(world.now)) for programs in world.programs.values()]
+    for programs in world.programs.values():
+        found.append(repr((programs.stack(world.now), dict(programs.variables(world.now)), programs.depth())))
+    found.append(repr(WorldPrograms(world).list()))
     found += [repr(one) for one in waiting(world)]
     return found
 
@@ -224,7 +227,21 @@ def parts(world: World) -> list[str]:
     found: list[object] = [*there.axes, there.buttons, *there.elements, *there.connections, *there.lines]
     spec = world.spec
     found += [spec.lines, spec.gateways, spec.history, spec.drawing, dict(axis_views(world)), unchanged_inputs(world, 0)]
-    return [repr(one) for one in found]
+    return [*(repr(one) for one in found), *programs_of(world)]
+
+
+def programs_of(world: World) -> Iterator[str]:
+    """What is in the program memories of its controllers, as editors and debuggers get it."""
+    yield repr(WorldPrograms(world).files())
+    for machine, programs in world.programs.items():
+        for place, source in programs.texts.items():
+            numbers = range(len(programs.statements(place)))
+            yield repr((machine, source.name, programs.statements(place), programs.labels(place), dict(programs.after(place))))
+            for number in numbers:
+                at = Place(place, number)
+                yield repr((programs.use(at), programs.comes_back(at), sorted(programs.reached(place, [number]))))
+        for text in program_texts(world, machine):
+            yield repr((text.place, to_json(text.source, text.check()), text.memory(text.source.text)))
 
 
 def digest(lines: list[str]) -> str:
