@@ -46,7 +46,8 @@ class LivePoint:
     freeze: Callable[[Nanos], Callable[[Nanos], float]] | None = None
     """Gives the course at a moment as a function that stays as it is; None where there is none."""
     is_kept: bool = False
-    """Whether a write, by a request or a statement, only keeps the value, which is not an event of the controller."""
+    """Whether a write, by a request or a statement, only keeps the value, which is not an event of the controller. Besides, it
+    becomes what it is after power-on."""
     memory: MemoryCells | None = None
     """Where it is, if it is part of a memory."""
 

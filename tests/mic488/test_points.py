@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import pytest
 from mic488_rig import Rig, controller, programmed
 
@@ -9,7 +12,7 @@ from steptwin.datasheet import Access
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND
 from steptwin.mic488.config import AxisConfig
-from steptwin.mic488.points import live_point
+from steptwin.mic488.points import live_point, marks, points
 from steptwin.points import LivePoint
 
 CONFIG = controller(AxisConfig(), AxisConfig(unit=3, gear=100.0, acc=200.0, dec=400.0, vel=50.0))
@@ -153,3 +156,27 @@ def test_a_value_goes_one_way_between_its_turns() -> None:
 def test_mic_40_a_write_that_acts_on_the_next_command_is_no_event(name: str, is_kept: bool) -> None:
     """ACC, DEC and VMAX act on the next command, soft limits at once."""
     assert point(Rig(CONFIG), name).is_kept is is_kept
+
+
+def test_marks_change_with_each_point_that_neither_moves_nor_is_only_kept() -> None:
+    rig = programmed("WAIT IN20 = ON\n", "", CONFIG)
+    device = rig.device
+    named = {one.path: live_point(device, one.path) for one in points(device.registers, [""] * 4) if "USER_REG" not in one.path}
+    others = {
+        path: one for path, one in named.items() if one and one.turns is None and not one.is_kept and path not in device.pins()
+    }
+    watched = {path: one.read for path, one in others.items() if one.read is not None}
+    changed: set[str] = set()
+    acts: list[Callable[[], object]] = [lambda: rig.enable(1, 2, 3, 4), rig.start, lambda: device.set_master_error(True, rig.now)]
+    acts += [
+        partial(rig.set, f"POSLIM_{side}", value, axis) for side, value in (("L", -9.0), ("R", 9.0)) for axis in (1, 2, 3, 4)
+    ]
+    acts += [partial(rig.word, f"AXIS_{key}_TRIG", 1) for key in ("VEL_ABS", "VEL_REL", "POS_ABS", "POS_REL")]
+    for act in acts:
+        values, before = {path: read(rig.now) for path, read in watched.items()}, marks(device)
+        act()
+        rig.wait(0.02)
+        found = {path for path, read in watched.items() if read(rig.now) != values[path]}
+        assert not found or marks(device) != before, found
+        changed |= found
+    assert changed == {*watched}

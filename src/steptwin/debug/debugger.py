@@ -33,7 +33,7 @@ T = TypeVar("T")
 
 LONGEST_SLICE_NS: Nanos = 10 * SECOND
 STATEMENTS_AT_ONCE = 256
-MOST_STATEMENTS_AT_ONCE = 1 << 15
+MOST_STATEMENTS_AT_ONCE = 1 << 14
 MOST_OBSERVED_AT_ONCE = 1 << 12
 """A slice, which is executed without interruption, has so many statements of one program at first. It becomes twice as long where
 nothing is found, up to the second number, or to the third while every statement is observed."""

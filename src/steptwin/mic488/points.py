@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from operator import attrgetter
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -188,6 +189,16 @@ def live_point(device: Mic488Device, text: str) -> LivePoint | None:
         return LivePoint(point=point, read=_bit(device, behaviour.read((register.index or 1) - 1)))
     owner = device if register.axis is None else device.axes[register.axis - 1]
     return _live(point, owner, register.key, behaviour.read, is_kept=behaviour.quiet)
+
+
+_axis_marks = attrgetter("status", "enabled", "limit_l_p", "limit_r_p")
+
+
+def marks(device: Mic488Device) -> object:
+    """See `steptwin.world.kind.ControllerKind.marks`."""
+    program = device.program
+    flags = program.state, program.error, device.master_error
+    return *flags, *device.triggered.values(), *map(_axis_marks, device.axes)
 
 
 def _short_name(text: str) -> tuple[ShortName, int | None] | None:

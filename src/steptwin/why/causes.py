@@ -22,6 +22,8 @@ from steptwin.world.trace import TraceRecord
 from steptwin.world.wires import PinName
 
 MOST_LOOKED_BACK = 20_000
+"""Limit of what is looked at for one cause."""
+MOST_UNDECIDED = 5000
 """Limit of the statements among which the one that decided is looked for."""
 
 
@@ -56,7 +58,7 @@ class Causes:
         built = log.world.parts.elements
         self._at_begin = nothing if log.is_whole else unknown
         self.is_far = False
-        """Whether the chain that was followed last ends because nothing older was looked at (`MOST_LOOKED_BACK`)."""
+        """Whether the chain that was followed last ends because nothing older was looked at (`MOST_UNDECIDED`)."""
         self._parts: dict[str, BoardPart] = {
             name: part for kind, parts in built.items() if ELEMENTS[kind].terminals is not None for name, part in parts.items()
         }
@@ -396,7 +398,7 @@ class Causes:
         """The wait or condition that let a statement be executed."""
         executed = self._log.executed[machine]
         number = executed[index].place.number
-        for earlier in range(index - 1, max(-1, index - MOST_LOOKED_BACK), -1):
+        for earlier in range(index - 1, max(-1, index - MOST_UNDECIDED), -1):
             use = self.use(machine, earlier)
             if use.jumps is not None and executed[earlier + 1].place.number == use.jumps <= number:
                 number = executed[earlier].place.number
@@ -405,7 +407,7 @@ class Causes:
                 return self._decided(machine, earlier, ended, "ended")
             if number in use.governs or (use.is_loop and executed[earlier + 1].place.number >= use.governs.stop):
                 return self._decided(machine, earlier, executed[earlier].time, "decided")
-        self.is_far = index >= MOST_LOOKED_BACK
+        self.is_far = index >= MOST_UNDECIDED
         return None if self.is_far else self._started(machine)
 
     def _decided(self, machine: str, index: int, time: Nanos, how: str) -> Cause:

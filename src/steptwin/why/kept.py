@@ -21,8 +21,8 @@ from steptwin.world.plantsnapshot import PlantSnapshot, RecordedInput
 
 FIRST_SPAN_NS: Nanos = 5 * SECOND
 """So much of the past is looked at first, and `FURTHER` times as much where the causes are older."""
-FIRST_STATEMENTS = 5000
-"""Of a program, at most as many at first."""
+FIRST_STATEMENTS = 5500
+"""Of a program, at most as many at first: some more than the last ones, among which the one that decided is looked for."""
 FURTHER = 8
 MOST_NOTED = 500_000
 """Limit of the records and statements that are noted: some 100 MB."""

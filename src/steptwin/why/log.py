@@ -10,7 +10,7 @@ from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from itertools import takewhile
-from typing import NamedTuple, NoReturn
+from typing import NamedTuple
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
@@ -46,20 +46,18 @@ class ExecutedStatements:
 
     def __init__(self, machine: str) -> None:
         self._machine = machine
-        self._times, self._positions = array("q"), array("q")
-        self._places: list[Place] = []
+        self.times, self.positions = array("q"), array("q")
+        self.places: list[Place] = []
 
-    def add(self, time: Nanos, place: Place, position: int) -> None:
-        self._times.append(time)
-        self._places.append(place)
-        self._positions.append(position)
+    def __len__(self) -> int:
+        return len(self.times)
 
     def __getitem__(self, index: int) -> Executed:
-        return Executed(self._times[index], self._machine, self._places[index], self._positions[index])
+        return Executed(self.times[index], self._machine, self.places[index], self.positions[index])
 
     def last(self, until: Nanos) -> int:
         """The number of the last one by a moment; -1 if there is none."""
-        return bisect_right(self._times, until) - 1
+        return bisect_right(self.times, until) - 1
 
 
 class Act(NamedTuple):
@@ -113,7 +111,7 @@ class CauseLog:
         """When the program of a controller was last replaced by a download."""
         self._keeping: dict[str, dict[Place, bool]] = defaultdict(dict)
         """Whether statements may change points without an event, by controller."""
-        self.noted = 0
+        self._events = 0
         self.inputs = 0
         """Number of inputs that were applied."""
         for record in world.trace if self.is_whole else _plans(world):
@@ -128,7 +126,7 @@ class CauseLog:
         for name, programs in world.programs.items():
             if not self.is_whole:
                 for frame in programs.stack(self.begin)[:1]:
-                    self.executed[name].add(self.begin, frame.place, 0)
+                    self._executes(name, self.begin, frame.place)
             programs.hook(self._hook(name, programs))
 
     @property
@@ -141,15 +139,22 @@ class CauseLog:
         do not fit."""
         for is_input in in_parts(self.world, inputs[self.inputs :], end):
             self.inputs += is_input
+            self._check_size()
             yield
 
-    def _count(self) -> None:
-        self.noted += 1
-        if self.noted > self._most:
-            self._refuse()
+    @property
+    def noted(self) -> int:
+        """The number of records, actions and statements."""
+        return self._events + sum(map(len, self.executed.values()))
 
-    def _refuse(self) -> NoReturn:
-        raise Misuse(f"more than {self._most} records and statements since {self.begin / SECOND:g} s: too many to look at")
+    def _count(self) -> None:
+        self._events += 1
+        if self._events > self._most:
+            self._check_size()
+
+    def _check_size(self) -> None:
+        if self.noted > self._most:
+            raise Misuse(f"more than {self._most} records and statements since {self.begin / SECOND:g} s: too many to look at")
 
     def _take(self, record: TraceRecord) -> None:
         self._count()
@@ -185,21 +190,33 @@ class CauseLog:
                     if (held := holds[-1].held) is not None and held.fault == name:
                         holds.append(Hold(self.world.now, None))
 
+    def _executes(self, name: str, now: Nanos, place: Place) -> None:
+        executed = self.executed[name]
+        executed.times.append(now)
+        executed.places.append(place)
+        executed.positions.append(len(self.records[self._group_of[name]]))
+
     def _hook(self, name: str, programs: Programs) -> StatementHook:
-        add, records, executes = self.executed[name].add, self.records[self._group_of[name]], self.points.executes
-        keeping = self._keeping[name]
+        executed, records = self.executed[name], self.records[self._group_of[name]]
+        add_time, add_place, add_position = executed.times.append, executed.places.append, executed.positions.append
+        place_of, keeping, points = programs.place, self._keeping[name], self.points
+        before = False
+        """Whether the last statement may have changed points."""
 
         def hook(now: Nanos, number: int) -> None:
-            place = programs.place(number)
-            if place is not None:
-                self.noted += 1
-                if self.noted > self._most:
-                    self._refuse()
-                add(now, place, len(records))
-                keeps = keeping.get(place)
-                if keeps is None:
-                    keeps = keeping[place] = programs.use(place).keeps
-                executes(name, now, keeps=keeps)
+            nonlocal before
+            place = place_of(number)
+            if place is None:
+                return
+            add_time(now)
+            add_place(place)
+            add_position(len(records))
+            keeps = keeping.get(place)
+            if keeps is None:
+                keeps = keeping[place] = programs.use(place).keeps
+            if keeps or before:
+                points.executes(name, now, keeps=keeps)
+                before = keeps
 
         return hook
 

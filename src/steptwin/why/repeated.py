@@ -15,7 +15,7 @@ from steptwin.world.history import ChangedSince, PastState, outside_past
 from steptwin.world.plant import Plant
 from steptwin.world.plantsnapshot import RecordedInput
 
-STATES = 64
+STATES = 32
 """Number of states at equal distances; further ones are near the end, about which most questions are."""
 
 

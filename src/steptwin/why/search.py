@@ -9,16 +9,17 @@ from functools import partial
 from typing import NamedTuple, Protocol, TypeAlias
 
 from steptwin.machine import Nanos
+from steptwin.points import MemoryCells
 from steptwin.statements import StatementHook
 from steptwin.why import points
 from steptwin.why.courses import CourseTurns, watch_truth
 from steptwin.why.log import in_parts, levels_of
 from steptwin.why.states import rest_of
 from steptwin.world.actions import Bytes, Download
-from steptwin.world.history import MOVED, PastState
+from steptwin.world.history import ACTED, MOVED, PastState
 from steptwin.world.plant import Plant
 from steptwin.world.plantsnapshot import PlantSnapshot, RecordedInput
-from steptwin.world.programs import Place, Programs, ResourceKind
+from steptwin.world.programs import Place, Programs, Resource, ResourceKind
 from steptwin.world.signals import SignalOf
 from steptwin.world.trace import TraceRecord
 
@@ -73,6 +74,10 @@ class LastChanges:
         self._known: dict[str, tuple[Nanos, Found]] = {}
         """What was found before a moment, by question."""
         self._world: Plant | None = None
+        self._values: dict[tuple[str, Nanos], float] = {}
+        """At states, while a search goes on."""
+        self._written: dict[tuple[str, str, tuple[str, ...]], bool] = {}
+        """Whether statements may write a point, by controller, point and the texts of its programs."""
 
     def before(self, asked: Asked, moment: Nanos) -> Searching:
         """The last change before ``moment``, that of a state, in parts."""
@@ -88,6 +93,7 @@ class LastChanges:
                 found = yield from self._search(asked, until, moment, found)
             finally:
                 self._world = None
+                self._values.clear()
             self._known[asked.text] = moment, found
         return found
 
@@ -128,11 +134,60 @@ class LastChanges:
 
     def _may_change(self, asked: Asked, state: PastState, after: PastState) -> bool:
         """Whether something that is asked about may change between two states, one after the other."""
-        if asked.signals != asked.edges | asked.moving:
-            return True
         if any(name in asked.edges for machine, subject in after.changed for name in (subject, f"{machine}.{subject}")):
             return True
+        if any(self._may_take_another(name, state, after) for name in asked.signals - asked.edges - asked.moving):
+            return True
         return bool(asked.moving) and not self._stands(asked, state, after)
+
+    def _may_take_another(self, name: str, state: PastState, after: PastState) -> bool:
+        """The same for a signal without edges, which does not move."""
+        owner, _, path = name.partition(".")
+        if (owner, path) in after.changed:
+            return True
+        present = self._history.world
+        point = present.kind(owner).point(present.machine(owner), path) if owner in present.machines else None
+        if point is None or point.read is None or point.turns is not None:
+            return True
+        if not point.is_kept:
+            return all(one.path != path for one in present.kind(owner).datasheet(present.machine(owner)).points)
+        on = present.parts.line_of.get(owner)
+        if on is not None and on[0].is_timed:
+            return True  # a request is executed later than it was made
+        if ACTED in after.changed or self._value_at(after, name) != self._value_at(state, name):
+            return True
+        return self._writes(self._at(state), owner, path, point.memory)
+
+    def _value_at(self, state: PastState, name: str) -> float:
+        key = name, state.snapshot.now
+        if key not in self._values:
+            world = self._at(state)
+            self._values[key] = world.signal(name).value(world.now)
+        return self._values[key]
+
+    def _writes(self, world: Plant, owner: str, path: str, memory: MemoryCells | None) -> bool:
+        """Whether a statement of a controller may write a point that is kept."""
+        programs = world.programs.get(owner)
+        if programs is None:
+            return False
+        key = owner, path, tuple(source.text for source in programs.texts.values())
+        if key not in self._written:
+            written = {programs.use(place).writes for place, keeps in _acting(programs) if keeps}
+            self._written[key] = any(self._are_in(world, owner, path, memory, resources) for resources in written)
+        return self._written[key]
+
+    @staticmethod
+    def _are_in(world: Plant, owner: str, path: str, memory: MemoryCells | None, written: Collection[Resource]) -> bool:
+        """Whether a point may have another value after a statement that keeps what it writes."""
+        values = [one.name for one in written if one.kind is ResourceKind.VALUE]
+        for name in filter(None, map(world.programs[owner].point, values)):
+            other = world.kind(owner).point(world.machine(owner), name)
+            if other is None or other.point.path == path:
+                return True
+            cells = None if other.memory is None else other.memory.cells
+            if memory is not None and cells is not None and cells.start < memory.cells.stop and memory.cells.start < cells.stop:
+                return True
+        return not values
 
     def _stands(self, asked: Asked, state: PastState, after: PastState) -> bool:
         """Whether all that may move stands at the moment of a state, and nothing begins to move until the next one."""

@@ -9,14 +9,16 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+from functools import partial
 from itertools import islice
 from typing import NamedTuple, TypeAlias
 
 from steptwin.durations import duration_text
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
-from steptwin.world.actions import size_of
+from steptwin.world.actions import ExternalInput, size_of
 from steptwin.world.plant import Plant
 from steptwin.world.plantsnapshot import PlantSnapshot, RecordedInput
 from steptwin.world.trace import TraceRecord
@@ -72,7 +74,10 @@ MOVED = ""
 _MOTIONS = frozenset({"plan", "load", "free", "coordinate", "fault", "input"})
 
 Changed: TypeAlias = tuple[str, str]
-"""Machine and subject of the records of what has edges, or machine and `MOVED`."""
+"""Machine and subject of the records of what has edges, machine and path of a point, or machine and `MOVED`."""
+
+ACTED: Changed = ("", "")
+"""A script acted, or something came from outside."""
 
 
 class PastState(NamedTuple):
@@ -90,9 +95,14 @@ class ChangedSince:
         self._world = world
         self._names: set[Changed] = set()
         world.trace.watchers.append(self._take)
+        world.act_watchers.append(self._act)
+        self._points = [_ChangedPoints(world, owner, self._names.add) for owner in world.machines]
 
     def close(self) -> None:
         self._world.trace.watchers.remove(self._take)
+        self._world.act_watchers.remove(self._act)
+        for points in self._points:
+            points.close()
 
     def _take(self, record: TraceRecord) -> None:
         if record.kind == "edge":
@@ -100,13 +110,66 @@ class ChangedSince:
         elif record.kind in _MOTIONS:
             self._names.add((record.machine, MOVED))
 
-    def add(self, names: Iterable[Changed]) -> None:
+    def _act(self, script: str, what: ExternalInput) -> None:
+        self._names.add(ACTED)
+
+    def gone_back(self, names: Iterable[Changed]) -> None:
+        """The world has another state; ``names``: what had changed since the last one that is kept."""
         self._names.update(names)
+        for points in self._points:
+            points.read()
 
     def take(self) -> frozenset[Changed]:
         """The names since the last call."""
-        names, self._names = frozenset(self._names), set()
+        names = frozenset(self._names)
+        self._names.clear()
         return names
+
+
+class _ChangedPoints:
+    """Those of one controller that have the same value between events, and are not only kept (`LivePoint.is_kept`). As
+    `steptwin.world.followers.KernelFollower`."""
+
+    def __init__(self, world: Plant, owner: str, note: Callable[[Changed], None]) -> None:
+        machine, kind = world.machine(owner), world.kind(owner)
+        self._world, self._owner, self._note = world, owner, note
+        self._reads: list[Callable[[Nanos], float]] = []
+        self._paths: list[str] = []
+        pins = machine.pins()
+        for point in (one for one in kind.datasheet(machine).points if one.path not in pins):
+            with suppress(Misuse):  # of a row of registers one must be chosen
+                live = kind.point(machine, point.path)
+                if live is not None and live.read is not None and live.turns is None and not live.is_kept:
+                    self._reads.append(live.read)
+                    self._paths.append(point.path)
+        self._marks_of = (lambda: None) if kind.marks is None else partial(kind.marks, machine)
+        self._marks: object = None
+        self._values: list[float] = []
+        self.read()
+        world.parts.kernel_of[owner].follow(self, (owner,))
+
+    def close(self) -> None:
+        self._world.parts.kernel_of[self._owner].unfollow(self)
+
+    def read(self) -> None:
+        """The present values, whatever they were before."""
+        self._marks = self._marks_of()
+        self._values = [read(self._world.now) for read in self._reads]
+
+    def leave(self, moment: Nanos) -> None:
+        """It need not know."""
+
+    def look(self, now: Nanos) -> None:
+        marks = self._marks_of()
+        if marks == self._marks and marks is not None:
+            return
+        self._marks = marks
+        values = [read(now) for read in self._reads]
+        if values != self._values:
+            for path, value, before in zip(self._paths, values, self._values, strict=True):
+                if value != before:
+                    self._note((self._owner, path))
+            self._values = values
 
 
 class History:
@@ -182,8 +245,10 @@ class History:
     def gone_back(self) -> None:
         """Must be called after the world has gone back: snapshots and inputs of its present moment and later are removed."""
         now = self.world.now
+        changed: set[Changed] = set()
         while self._states and self._states[-1].snapshot.now >= now:
-            self._changed.add(self._states.pop().changed)
+            changed |= self._states.pop().changed
+        self._changed.gone_back(changed)
         while self._inputs and self._inputs[-1].time >= now:
             self._bytes -= size_of(self._inputs.pop().what)
         self.branch += 1

@@ -210,6 +210,9 @@ class ControllerKind(Generic[S, M, V]):
     point: Callable[[M, str], LivePoint | None]
     """The point of its data sheet that a name or an address means: what conditions, scripts and programs outside read of it. None
     where there is none; raises `Misuse` for what is half a value."""
+    marks: Callable[[M], object] | None = None
+    """A value that is another one after an event that has changed points which neither move nor are only kept
+    (`steptwin.points.LivePoint`); faster than to compare these, which is done where there is none."""
     motion_ends: Callable[[str, str | None, Seek | None], MotionEnds] | None = None
     """Conditions on an axis, which has that name in conditions, of a controller on a line with that name, or at the end of a
     seek; None where its state does not show how a motion ended."""

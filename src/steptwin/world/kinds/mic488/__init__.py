@@ -90,6 +90,7 @@ MIC488: ControllerKind[Mic488Spec, Mic488Device, Mic488View] = ControllerKind(
     datasheet=datasheet.datasheet,
     datasheet_of=lambda variant: datasheet.datasheet_of(variant or DEFAULT_FIRMWARE),
     point=points.live_point,
+    marks=points.marks,
     motion_ends=control.motion_ends,
     control=control.CONTROL,
     held_jog=Mic488HeldJog,

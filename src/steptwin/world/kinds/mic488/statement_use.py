@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
+from steptwin.mic488.program_registers import ACCESS
 from steptwin.tables import complete
 from steptwin.wbc import steps as s
 from steptwin.wbc.usage import sources
@@ -46,8 +47,10 @@ def _end_of_while(step: s.EndWhileStep, number: int) -> StatementUse:
 
 def _sets(step: s.SetStep, number: int) -> StatementUse:
     (target,) = _operands((step.target,))
-    is_register = isinstance(step.target, s.RegisterOperand)
-    return StatementUse(writes=(target,), keeps=is_register and target.kind is not ResourceKind.PIN)
+    if isinstance(step.target, s.Variable) or not ACCESS[step.target.row.key].quiet:
+        return StatementUse(writes=(target,))
+    register = Resource(ResourceKind.VALUE, step.target.name)
+    return StatementUse(writes=(target,) if target == register else (target, register), keeps=True)
 
 
 def _of_axis(step: s.MotionStep | s.HaltStep, number: int) -> StatementUse:
