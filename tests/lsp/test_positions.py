@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from time import process_time
+
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
@@ -76,3 +78,12 @@ def test_a_changed_text_is_that_text(text: str, start: int, length: int, typed: 
     assert [changed.position(place, Encoding.UTF16) for place in places] == [
         whole.position(place, Encoding.UTF16) for place in places
     ]
+
+
+def test_a_long_line_with_letters_beyond_ascii_takes_no_time_for_each_character() -> None:
+    lines = LineIndex("ą " * 200_000)
+    begin = process_time()
+    for place in range(399_000, 399_100):
+        line, column = lines.position(place, Encoding.UTF16)
+        assert lines.place(line, column, Encoding.UTF16) == place
+    assert process_time() - begin < 4.0, "6 s, character by character"

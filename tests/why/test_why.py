@@ -8,7 +8,7 @@ from why_worlds import CHIP, CHIP_PROGRAM, LINE, PROGRAM, WAITS
 from steptwin.errors import Misuse
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND
-from steptwin.why import kept
+from steptwin.why import causes, kept
 from steptwin.why.kept import PastQuestions
 from steptwin.why.question import finish
 from steptwin.wire.rtu import encode_frame
@@ -403,6 +403,7 @@ def test_a_past_of_many_statements_is_known_near_its_end(monkeypatch: pytest.Mon
         keep_trace=False,
     )
     monkeypatch.setattr(kept, "MOST_NOTED", 20_000)
+    monkeypatch.setattr(causes, "MOST_UNDECIDED", 20_000)
     history = History(world)
     for moment in range(1, 11):
         world.run_to(moment * 5 * MILLISECOND)

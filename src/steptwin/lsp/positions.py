@@ -56,12 +56,8 @@ class LineIndex:
         start, end = self.starts[line], self.end(line)
         if self._ascii or encoding is Encoding.UTF32:
             return min(start + column, end)
-        units = 0
-        for place in range(start, end):
-            units += _units(self.text[place], encoding)
-            if units > column:
-                return place
-        return end
+        content = self.contents[line]
+        return start + bisect_right(range(1, len(content) + 1), column, key=lambda count: _units(content[:count], encoding))
 
     def position(self, place: int, encoding: Encoding) -> tuple[int, int]:
         """Line and column of a character."""
@@ -69,7 +65,7 @@ class LineIndex:
         start = self.starts[line]
         if self._ascii or encoding is Encoding.UTF32:
             return line, place - start
-        return line, sum(_units(character, encoding) for character in self.text[start:place])
+        return line, _units(self.text[start:place], encoding)
 
     def line_of(self, place: int) -> int:
         """The line of a character, from 0."""
@@ -99,8 +95,8 @@ def _after_line_feed(start: int, length: int) -> int:
     return start + length + 1
 
 
-def _units(character: str, encoding: Encoding) -> int:
-    code = ord(character)
+def _units(text: str, encoding: Encoding) -> int:
+    """Also of halves of pairs that stand alone."""
     if encoding is Encoding.UTF16:
-        return 2 if code > 0xFFFF else 1
-    return 1 if code < 0x80 else 2 if code < 0x800 else 3 if code < 0x10000 else 4
+        return len(text.encode("utf-16-le", "surrogatepass")) // 2
+    return len(text.encode("utf-8", "surrogatepass"))
