@@ -1,6 +1,6 @@
 """The present state of one controller: one shape for all kinds. What is not known is None.
 
-`steptwin.datasheet.plain` makes JSON of it, `read_state` reads that. The data sheet has what does not change: title, units, pins,
+`ControllerState.plain` makes JSON of it, `read_state` reads that. The data sheet has what does not change: title, units, pins,
 and what each of the ``details`` means.
 """
 
@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, TypeAlias, TypeVar
 
-from steptwin.datasheet import Detail
+from steptwin.datasheet import Detail, plain
 from steptwin.machine import Nanos
 
 M = TypeVar("M")
@@ -44,6 +44,9 @@ class StateStatus:
     text: str
     level: StatusLevel = StatusLevel.OK
 
+    def plain(self) -> dict[str, object]:
+        return {"code": self.code, "text": self.text, "level": self.level.value}
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StateProgram:
@@ -59,6 +62,16 @@ class StateProgram:
     statement: str | None = None
     """The one that is executed or comes next."""
     variables: Mapping[str, float]
+
+    def plain(self) -> dict[str, object]:
+        return {
+            "state": None if self.state is None else self.state.value,
+            "text": self.text,
+            "file": self.file,
+            "line": self.line,
+            "statement": self.statement,
+            "variables": dict(self.variables),
+        }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,6 +92,19 @@ class StateAxis:
     """Counts; None without an encoder."""
     status: StateStatus
 
+    def plain(self) -> dict[str, object]:
+        return {
+            "number": self.number,
+            "name": self.name,
+            "unit": self.unit,
+            "position": self.position,
+            "velocity": self.velocity,
+            "moving": self.moving,
+            "enabled": self.enabled,
+            "encoder": self.encoder,
+            "status": self.status.plain(),
+        }
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ControllerState:
@@ -94,6 +120,19 @@ class ControllerState:
     """Levels: 0, 1, volts."""
     details: Mapping[str, DetailValue]
     """What only this kind has, by the names of ``details`` in its data sheet."""
+
+    def plain(self) -> dict[str, object]:
+        """As JSON has values. It is made for every sample of a gateway, so nothing is looked for in it."""
+        return {
+            "kind": self.kind,
+            "variant": self.variant,
+            "time_s": self.time_s,
+            "status": self.status.plain(),
+            "program": self.program.plain(),
+            "axes": [axis.plain() for axis in self.axes],
+            "pins": dict(self.pins),
+            "details": plain(self.details),
+        }
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 from mic488_rig import EN, MM, Rig, controller, loaded, programmed, started
 
-from steptwin.controllerstate import ControllerState, ProgramActivity, StateProgram, StatusLevel
+from steptwin.controllerstate import ControllerState, ProgramActivity, StateProgram, StatusLevel, read_state
+from steptwin.datasheet import plain
 from steptwin.mic488.config import AxisConfig, ProgramConfig
 from steptwin.mic488.present import axis_status, controller_status, empty_banks, place_of, state_of, statement_of
 
@@ -162,3 +163,20 @@ def test_an_enable_coil_shows_at_once() -> None:
     rig = Rig()
     rig.coil(EN + 2, True)
     assert [axis.enabled for axis in state(rig).axes] == [False, False, True, False]
+
+
+def test_json_has_every_member() -> None:
+    rig = Rig(controller(MM))
+    rig.enable(1)
+    found = state(rig)
+    assert found.plain() == plain(found)
+    assert list(found.plain()) == list(plain(found))
+    assert read_state(found.plain()) == found
+
+
+@pytest.mark.parametrize("used", [(), (0,), (1999,), (5, 249, 250, 251, 1000)])
+def test_user_registers_that_are_not_0(used: tuple[int, ...]) -> None:
+    rig = Rig(controller(MM))
+    for number in used:
+        rig.device.user[number] = number + 1
+    assert state(rig).details["user_registers"] == {str(number): number + 1 for number in used}

@@ -26,7 +26,6 @@ from steptwin.commands.program_run import (
     write,
 )
 from steptwin.commands.travels import PlacedSwitches, SwitchTravel, place_switches
-from steptwin.datasheet import plain
 from steptwin.diagnostics import Severity, render, visible
 from steptwin.durations import duration_text
 from steptwin.errors import Misuse
@@ -313,7 +312,7 @@ def _data(ran: WbcRunResult, *, wrong: bool) -> dict[str, object]:
         "ratio": outcome.ratio,
         "assumed": list(ran.given.placed.assumed),
         "missing_switches": ran.missing,
-        "state": plain(state_of(watch.device, outcome.ending.at)),
+        "state": state_of(watch.device, outcome.ending.at).plain(),
         "events": [_event_data(watch, happening) for happening in watch.happened],
     }
 

@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 from steptwin.campaign.properties import Verdict, read_property, watch_together
 from steptwin.commands.program_run import report_causes
 from steptwin.controllerstate import ControllerState
-from steptwin.datasheet import plain
 from steptwin.durations import duration
 from steptwin.errors import Misuse
 from steptwin.files import session as sessions
@@ -351,7 +350,7 @@ def _json(world: World, outcome: WorldRunResult, out: Print) -> None:
             name: {"position": axis.position, "unit": axis.unit, "lost_pulses": axis.lost, "stalled": axis.stalled}
             for name, axis in world.axis.items()
         },
-        "controllers": {name: plain(state) for name, state in _states(world).items()},
+        "controllers": {name: state.plain() for name, state in _states(world).items()},
         "files": [str(path) for path in outcome.written],
         "digest": outcome.digest,
     }

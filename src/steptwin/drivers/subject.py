@@ -17,7 +17,7 @@ from types import TracebackType
 from typing import Any, Protocol, TypeAlias
 
 from steptwin.controllerstate import ControllerState
-from steptwin.datasheet import Datasheet, plain
+from steptwin.datasheet import Datasheet
 from steptwin.drivers.blocking import Blocking, blocking, finish
 from steptwin.drivers.line import DriverLine
 from steptwin.errors import Misuse, Refusal
@@ -281,7 +281,7 @@ class AsyncDeviceSubject:
         return {one.point: one.value for one in await self.read(*pins)}
 
     async def _state(self, _: command.ReadState) -> object:
-        return plain(await self._device.state())
+        return (await self._device.state()).plain()
 
     async def _time(self, _: command.Time) -> object:
         now = self.now()

@@ -337,7 +337,9 @@ class ControllerCore(Stateful):
                 axis.input_changed(number, active, now)
 
     def pins(self) -> Mapping[str, float]:
-        return {name: float(read(self, number)) for name, (read, number) in _PIN_READERS.items()}
+        enabled = (axis.enabled for axis in self.axes)
+        levels = (*self.inputs.pins, *self.analog_v, *self.outputs, *enabled, self.error_led)
+        return dict(zip(_PIN_READERS, map(float, levels), strict=True))
 
     def pin(self, name: str) -> float:
         read, number = _PIN_READERS[name]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import NamedTuple
 
 from steptwin.controllerstate import (
@@ -34,6 +35,10 @@ _LEVELS: Mapping[int, StatusLevel] = {
     AxisStatus.LIMIT_L: StatusLevel.WARNING,
     AxisStatus.LIMIT_R: StatusLevel.WARNING,
 }
+
+
+MOST_KEPT = 64
+"""Statuses whose meaning is kept."""
 
 
 class StatementPlace(NamedTuple):
@@ -123,12 +128,14 @@ def _axis(axis: Axis, described: AxisDescription, now: Nanos) -> StateAxis:
     )
 
 
+@lru_cache(MOST_KEPT)
 def controller_status(code: int) -> StateStatus:
     """The meaning of register M_STATUS."""
     level = StatusLevel.OK if code == ControllerStatus.OK else StatusLevel.ERROR
     return StateStatus(code=int(code), text=CONTROLLER_STATUS_TEXTS.get(code, f"unknown status {code}"), level=level)
 
 
+@lru_cache(MOST_KEPT)
 def axis_status(code: int) -> StateStatus:
     """The meaning of a register Mx_STATUS."""
     text = AXIS_STATUS_TEXTS.get(code, f"unknown status {code}")

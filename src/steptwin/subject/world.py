@@ -7,7 +7,6 @@ from functools import partial
 from math import isfinite
 from typing import Any, get_args
 
-from steptwin.datasheet import plain
 from steptwin.errors import Refusal
 from steptwin.machine import Nanos
 from steptwin.subject import commands as command
@@ -190,7 +189,7 @@ class WorldSubject:
     def _state(self, wanted: command.ReadState) -> object:
         machine = self.world.machine(wanted.machine)
         self.world.touch(wanted.machine)
-        return plain(self.world.kind(wanted.machine).state(machine, self.world.now))
+        return self.world.kind(wanted.machine).state(machine, self.world.now).plain()
 
     def _encoders(self, wanted: command.Encoders) -> object:
         encoders = self.world.encoders(wanted.machine)
