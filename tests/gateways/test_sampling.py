@@ -1,98 +1,252 @@
-"""When samples of controllers are taken."""
+"""When samples of controllers are taken, in virtual time."""
 
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Awaitable, Callable, Iterable
 
 import pytest
 from gateway_rig import GatewayWorld
+from virtual_loop import run_virtually
 
 from steptwin.errors import LineFailure, Refusal, SteptwinError
-from steptwin.gateways.points import CLOCK, CLOCK_POINTS
-from steptwin.gateways.sampling import MOST_EVENTS, RESTING_SAMPLES, Sampler
-from steptwin.machine import SECOND
+from steptwin.gateways.points import CLOCK, CLOCK_POINTS, State
+from steptwin.gateways.sampling import AT_ONCE, MOST_EVENTS, RESTING_INTERVALS, TICK_S, Sampler
+from steptwin.machine import MILLISECOND, SECOND
 from steptwin.subject import commands as command
 from steptwin.world.script import Note, Set
 
 TEXT = '[[mic488]]\nname = "table"\n[[mic488]]\nname = "other"\n'
 MACHINES = ("table", "other")
+INTERVAL_S = 0.1
 
 
-@pytest.fixture
-def world() -> GatewayWorld:
-    return GatewayWorld(TEXT)
+class Gateway:
+    """Follows controllers of a world as gateways do."""
+
+    def __init__(self, world: GatewayWorld, *, interval_s: float = INTERVAL_S, registers: Iterable[str] = ()) -> None:
+        self.world = world
+        interval = round(interval_s * 1000) * MILLISECOND
+        self.sampler = Sampler(world, {"other": registers}, interval)
+        self.seen: list[tuple[float, str]] = []
+        """When samples have come, s."""
+        self.states: dict[str, State | None] = {}
+        self.sampler.watch(MACHINES)
+        self.task = asyncio.create_task(self._run())
+
+    async def _run(self) -> None:
+        loop = asyncio.get_running_loop()
+        while True:
+            for sample in await self.sampler.changed(INTERVAL_S):
+                self.seen.append((round(loop.time(), 3), sample.machine))
+                self.states[sample.machine] = sample.state
+
+    async def after(self, seconds: float) -> list[str]:
+        """Whose samples come meanwhile."""
+        self.seen.clear()
+        await asyncio.sleep(seconds)
+        return [machine for _, machine in self.seen]
+
+    async def rest(self) -> None:
+        """What happens at the beginning has been seen, and both have just been looked at."""
+        await self.after(2.0)
+        while not await self.after(TICK_S):
+            pass
+
+    async def close(self) -> None:
+        self.task.cancel()
+        await asyncio.wait((self.task,))
+        self.sampler.close()
+
+    @property
+    def reads(self) -> int:
+        return self.world.done.count(command.ReadState("table"))
 
 
-def changed(sampler: Sampler) -> list[str]:
-    return [sample.machine for sample in asyncio.run(sampler.changed(MACHINES))]
+def story(act: Callable[[Gateway], Awaitable[None]], *, registers: Iterable[str] = (), text: str = TEXT) -> None:
+    async def play() -> None:
+        gateway = Gateway(GatewayWorld(text), registers=registers)
+        await act(gateway)
+        await gateway.close()
+
+    run_virtually(play())
 
 
-def settle(sampler: Sampler) -> None:
-    """Until what happens at the beginning has been seen."""
-    while changed(sampler):
-        pass
+def set_pin(gateway: Gateway, level: float = 1.0) -> None:
+    gateway.world.inner.do(Set((("table", "IN3", level),)))
 
 
-def test_controllers_at_rest_are_looked_at_now_and_then(world: GatewayWorld) -> None:
-    sampler = Sampler(world, {})
-    assert changed(sampler) == ["table", "other"]
-    settle(sampler)
-    assert [changed(sampler) for _ in range(RESTING_SAMPLES - 1)] == [[]] * (RESTING_SAMPLES - 1)
-    assert changed(sampler) == ["table", "other"]
+def test_controllers_at_rest_are_looked_at_now_and_then() -> None:
+    async def act(gateway: Gateway) -> None:
+        await gateway.rest()
+        assert await gateway.after(RESTING_INTERVALS * INTERVAL_S * 0.9) == []
+        assert sorted(await gateway.after(RESTING_INTERVALS * INTERVAL_S * 0.2)) == ["other", "table"]
+
+    story(act)
 
 
-def test_an_event_is_a_reason(world: GatewayWorld) -> None:
-    sampler = Sampler(world, {})
-    settle(sampler)
-    world.inner.do(Set((("table", "IN3", 1.0),)))
-    assert changed(sampler) == ["table"]
-    assert changed(sampler) == []
+def test_an_event_is_a_reason_at_once_but_not_twice_in_an_interval() -> None:
+    async def act(gateway: Gateway) -> None:
+        await gateway.rest()
+        await gateway.after(2 * INTERVAL_S)
+        set_pin(gateway)
+        assert await gateway.after(2 * TICK_S) == ["table"]
+        assert gateway.states["table"] is not None
+        assert gateway.states["table"]["pins"]["IN3"] == 1.0
+        for level in (0.0, 1.0, 0.0):
+            set_pin(gateway, level)
+        assert await gateway.after(INTERVAL_S - 4 * TICK_S) == []
+        assert await gateway.after(5 * TICK_S) == ["table"]
+        assert gateway.states["table"]["pins"]["IN3"] == 0.0
+
+    story(act)
 
 
-def test_a_controller_in_motion_is_always_looked_at(world: GatewayWorld) -> None:
-    sampler = Sampler(world, {})
-    settle(sampler)
-    world.inner.do(command.Enable("other", 1))
-    world.inner.do(command.Move("other", 1, by=1000.0))
-    assert [changed(sampler) for _ in range(3)] == [["other"]] * 3
-    world.inner.do(command.Advance(duration=600 * SECOND))
-    assert changed(sampler) == ["other"]
-    assert changed(sampler) == []
+def test_a_controller_in_motion_is_always_looked_at() -> None:
+    async def act(gateway: Gateway) -> None:
+        world = gateway.world.inner
+        await gateway.rest()
+        world.do(command.Enable("other", 1))
+        world.do(command.Move("other", 1, by=1000.0))
+        await gateway.after(INTERVAL_S)
+        assert await gateway.after(3 * INTERVAL_S) == ["other"] * 3
+        world.do(command.Advance(duration=600 * SECOND))
+        assert "other" in await gateway.after(2 * INTERVAL_S)
+        assert "other" not in await gateway.after(3 * INTERVAL_S)
+
+    story(act)
 
 
-def test_named_registers_are_a_reason_too(world: GatewayWorld) -> None:
-    sampler = Sampler(world, {"other": ["M1_VMAX"]})
-    assert changed(sampler) == ["table", "other"]
-    assert [changed(sampler)[-1:] for _ in range(3)] == [["other"]] * 3
+def test_named_registers_are_a_reason_too() -> None:
+    async def act(gateway: Gateway) -> None:
+        await gateway.rest()
+        assert (await gateway.after(3.5 * INTERVAL_S)).count("other") in (3, 4)
+
+    story(act, registers=["M1_VMAX"])
 
 
-def test_after_lost_events_everything_is_looked_at(world: GatewayWorld) -> None:
-    sampler = Sampler(world, {})
-    settle(sampler)
-    for number in range(MOST_EVENTS + 1):
-        world.inner.do(Note(str(number)))
-    assert changed(sampler) == ["table", "other"]
+def test_after_lost_events_and_another_past_everything_is_looked_at() -> None:
+    async def act(gateway: Gateway) -> None:
+        world = gateway.world.inner
+        await gateway.rest()
+        await gateway.after(2 * INTERVAL_S)
+        for number in range(MOST_EVENTS + 1):
+            world.do(Note(str(number)))
+        assert sorted(await gateway.after(2 * TICK_S)) == ["other", "table"]
+        world.do(command.TakeSnapshot("before"))
+        await gateway.after(2 * INTERVAL_S)
+        world.do(command.RestoreSnapshot("before"))
+        assert sorted(await gateway.after(2 * TICK_S)) == ["other", "table"]
+
+    story(act)
 
 
 @pytest.mark.parametrize("silence", [LineFailure("no answer"), Refusal("illegal data address")])
-def test_a_silent_controller_has_no_state(world: GatewayWorld, silence: SteptwinError) -> None:
+def test_a_silent_controller_has_no_state(silence: SteptwinError) -> None:
     """Or one that refuses what it is asked: who asks goes on."""
-    sampler = Sampler(world, {})
-    world.silence = silence
-    world.silent.add("table")
-    assert [asyncio.run(sampler.take(name)).state is None for name in MACHINES] == [True, False]
-    world.silent.clear()
-    assert asyncio.run(sampler.take("table")).state is not None
+
+    async def act(gateway: Gateway) -> None:
+        gateway.world.silence = silence
+        gateway.world.silent.add("table")
+        await gateway.rest()
+        assert [gateway.states[name] is None for name in MACHINES] == [True, False]
+        gateway.world.silent.clear()
+        await gateway.after(2 * INTERVAL_S)
+        assert gateway.states["table"] is not None
+
+    story(act)
 
 
-def test_the_clock(world: GatewayWorld) -> None:
-    world.inner.do(command.Advance(duration=3 * SECOND))
-    sample = asyncio.run(Sampler(world, {}).take(CLOCK))
-    assert sample.state is not None
-    assert [point.read(sample.state) for point in CLOCK_POINTS] == [3.0, True, None]
+def test_gateways_share_samples() -> None:
+    async def act(gateway: Gateway) -> None:
+        second, third = Gateway(gateway.world), Gateway(gateway.world, interval_s=0.25)
+        await gateway.rest()
+        await gateway.after(0.3)
+        before = gateway.reads
+        for level in (1.0, 0.0, 1.0):
+            set_pin(gateway, level)
+            await asyncio.sleep(0.3)
+        seen = [len([name for _, name in one.seen if name == "table"]) for one in (gateway, second, third)]
+        assert min(seen) >= 3
+        assert gateway.reads - before == 3
+        assert gateway.states["table"] is second.states["table"]
+        await second.close()
+        await third.close()
+
+    story(act)
 
 
-def test_nothing_is_followed_after_the_end(world: GatewayWorld) -> None:
-    sampler = Sampler(world, {})
-    sampler.close()
+def test_what_has_not_changed_is_the_same_object() -> None:
+    async def act(gateway: Gateway) -> None:
+        await gateway.rest()
+        before = gateway.states["table"]
+        set_pin(gateway)
+        await gateway.after(2 * INTERVAL_S)
+        now = gateway.states["table"]
+        assert before is not None
+        assert now is not None
+        same = [name for name in ("status", "program", "pins", "details", "registers") if before[name] is now[name]]
+        assert same == ["status", "program", "details", "registers"]
+        assert all(old is new for old, new in zip(before["axes"], now["axes"], strict=True))
+
+    story(act)
+
+
+def test_a_gateway_that_is_late_gets_the_latest_values() -> None:
+    """Nothing waits for it but the names of controllers, each once."""
+
+    async def act(gateway: Gateway) -> None:
+        sampler = Sampler(gateway.world, {})
+        sampler.watch(MACHINES)
+        for number in range(50):
+            set_pin(gateway, number % 2)
+            await asyncio.sleep(INTERVAL_S)
+        found = await sampler.changed(INTERVAL_S)
+        assert sorted(sample.machine for sample in found) == ["other", "table"]
+        (table,) = [sample.state for sample in found if sample.machine == "table"]
+        assert table is not None
+        assert table["pins"]["IN3"] == 1.0
+        sampler.close()
+
+    story(act)
+
+
+def test_many_controllers_come_in_parts() -> None:
+    async def act() -> None:
+        world = GatewayWorld("".join(f'[[mic488]]\nname = "t{number}"\n' for number in range(AT_ONCE + 6)))
+        sampler = Sampler(world, {})
+        sampler.watch(part.name for part in world.description.machines)
+        assert [len(await sampler.changed(INTERVAL_S)) for _ in range(2)] == [AT_ONCE, 6]
+        sampler.close()
+
+    run_virtually(act())
+
+
+def test_what_is_not_watched_any_more_does_not_come() -> None:
+    async def act(gateway: Gateway) -> None:
+        gateway.sampler.watch(["other"])
+        await gateway.after(INTERVAL_S)
+        set_pin(gateway)
+        assert "table" not in await gateway.after(2.0)
+
+    story(act)
+
+
+def test_the_clock() -> None:
+    async def act() -> None:
+        world = GatewayWorld(TEXT)
+        world.inner.do(command.Advance(duration=3 * SECOND))
+        sample = await Sampler(world, {}).take(CLOCK)
+        assert sample.state is not None
+        assert [point.read(sample.state) for point in CLOCK_POINTS] == [3.0, True, None]
+
+    run_virtually(act())
+
+
+def test_nothing_is_followed_after_the_end() -> None:
+    world = GatewayWorld(TEXT)
+    samplers = [Sampler(world, {}) for _ in range(2)]
+    samplers[0].close()
+    assert world.inner.followers
+    samplers[1].close()
     assert not world.inner.followers

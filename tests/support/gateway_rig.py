@@ -17,6 +17,7 @@ from steptwin import World
 from steptwin.access.audit import CommandLog
 from steptwin.errors import LineFailure, SteptwinError
 from steptwin.gateways.contract import PastValues
+from steptwin.gateways.sampling import SharedSamples
 from steptwin.subject import commands as command
 from steptwin.subject.contract import Description, Reading, Result
 from steptwin.subject.events import Event
@@ -35,6 +36,7 @@ class GatewayWorld:
         self.jogs = WorldJogs(self.inner)
         self.past: PastValues | None = None
         self.audit: CommandLog | None = None
+        self.samples = SharedSamples(self)
         self.silent: set[str] = set()
         self.silence: SteptwinError = LineFailure("no answer")
         self.done: list[command.Command] = []

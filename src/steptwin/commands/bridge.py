@@ -21,6 +21,7 @@ from steptwin.errors import LineFailure
 from steptwin.eventloop import result_of
 from steptwin.gateways.contract import PastValues
 from steptwin.gateways.devicefile import DeviceFile, DeviceSpec, read_device_file
+from steptwin.gateways.sampling import SharedSamples
 from steptwin.inputfiles import read_bytes
 from steptwin.later import start
 from steptwin.live.server import Server
@@ -108,6 +109,7 @@ class _Devices:
         self._name = name
         self._subject = subject
         self._connections = connections
+        self.samples = SharedSamples(self)
 
     @property
     def description(self) -> Description:

@@ -10,6 +10,7 @@ from steptwin.access.audit import Audit, CommandLog
 from steptwin.extras import libraries_of, missing
 from steptwin.gateways import make_gateway
 from steptwin.gateways.contract import GatewaySubject, OpenGateway, PastValues
+from steptwin.gateways.sampling import SharedSamples
 from steptwin.live.server import EndPoint, Server
 from steptwin.live.world import LiveWorld
 from steptwin.live.world_control import WorldControl
@@ -90,6 +91,7 @@ class LiveWorldSubject:
         self.audit: CommandLog | None = None
         self._control = control
         self._live = live
+        self.samples = SharedSamples(self)
 
     @property
     def description(self) -> Description:

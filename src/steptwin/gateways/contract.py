@@ -7,6 +7,7 @@ from datetime import datetime
 from typing import NamedTuple, Protocol
 
 from steptwin.access.audit import CommandLog
+from steptwin.gateways.sampling import SharedSamples
 from steptwin.subject.commands import Command, Jog
 from steptwin.subject.contract import Description, Reading, Result
 from steptwin.subject.events import Event
@@ -58,6 +59,11 @@ class GatewaySubject(Protocol):
 
     @property
     def description(self) -> Description: ...
+
+    @property
+    def samples(self) -> SharedSamples:
+        """What the samplers of its gateways share."""
+        ...
 
     def read(self, *points: str) -> tuple[Reading, ...]:
         """Values known at present. `Misuse` for points that are not there."""

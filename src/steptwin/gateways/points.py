@@ -10,7 +10,7 @@ import enum
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from operator import itemgetter
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 from steptwin.controllerstate import StatusLevel
 from steptwin.datasheet import Access, AxisDescription, Detail, FactType, Limits, Pin, PinDirection
@@ -43,7 +43,10 @@ class GatewayPoint:
     unit: str = ""
     limits: Limits | None = None
     """Of its values; None where they are not known."""
-    read: Callable[[State], PointValue]
+    part: Callable[[State], Any]
+    """The part of a state in which it is, which it shares with the others of its `group`."""
+    of: Callable[[Any], PointValue]
+    """Its value in that part."""
     write: Callable[[float], Command] | None = None
     """The command that gives it another value; None where it cannot be written."""
 
@@ -51,9 +54,20 @@ class GatewayPoint:
     def name(self) -> str:
         return ".".join(self.path)
 
+    @property
+    def group(self) -> str:
+        """What it belongs to below its controller: an axis, ``pins`` …; empty for the controller itself."""
+        return self.path[0] if len(self.path) > 1 else ""
+
+    def read(self, state: State) -> PointValue:
+        return self.of(self.part(state))
+
     def shown(self, state: State) -> PointValue:
         """Its value, of its type."""
-        value = self.read(state)
+        return self.shown_in(self.part(state))
+
+    def shown_in(self, part: Any) -> PointValue:
+        value = self.of(part)
         if value is None:
             return None
         return bool(value) if self.type is PointType.TRUTH else float(value) if self.type is PointType.NUMBER else value
@@ -83,23 +97,32 @@ def _points(part: MachinePart, description: Description, registers: Iterable[str
 # ---------------------------------------------------------------------- the state
 
 
-def _at(*path: str | int) -> Callable[[State], Any]:
-    def read(state: State) -> Any:
-        found: Any = state
-        for step in path:
-            found = found[step]
-        return found
+def whole_state(state: State) -> State:
+    """The `GatewayPoint.part` of a value that is in no part."""
+    return state
 
-    return read
+
+_STATUS, _PROGRAM_PART, _PINS, _DETAILS, _REGISTERS = map(itemgetter, ("status", "program", "pins", "details", "registers"))
+
+
+def _of_status(key: str) -> Callable[[Any], PointValue]:
+    """Of an axis."""
+    return lambda axis: cast("PointValue", axis["status"][key])
 
 
 _LEVELS = ", ".join(level.value for level in StatusLevel)
 
 _CONTROLLER = (
-    GatewayPoint(path=("status",), meaning="Its status in words.", type=PointType.TEXT, read=_at("status", "text")),
-    GatewayPoint(path=("status_code",), meaning="The number of its status.", type=PointType.WHOLE, read=_at("status", "code")),
+    GatewayPoint(path=("status",), meaning="Its status in words.", type=PointType.TEXT, part=_STATUS, of=itemgetter("text")),
     GatewayPoint(
-        path=("status_level",), meaning=f"How serious that is: {_LEVELS}.", type=PointType.TEXT, read=_at("status", "level")
+        path=("status_code",), meaning="The number of its status.", type=PointType.WHOLE, part=_STATUS, of=itemgetter("code")
+    ),
+    GatewayPoint(
+        path=("status_level",),
+        meaning=f"How serious that is: {_LEVELS}.",
+        type=PointType.TEXT,
+        part=_STATUS,
+        of=itemgetter("level"),
     ),
 )
 _PROGRAM = (
@@ -107,42 +130,61 @@ _PROGRAM = (
         path=("program", "state"),
         meaning="stopped, running, waiting or paused.",
         type=PointType.TEXT,
-        read=_at("program", "state"),
+        part=_PROGRAM_PART,
+        of=itemgetter("state"),
     ),
     GatewayPoint(
         path=("program", "text"),
         meaning="The same in words, with what it waits for.",
         type=PointType.TEXT,
-        read=_at("program", "text"),
+        part=_PROGRAM_PART,
+        of=itemgetter("text"),
     ),
     GatewayPoint(
-        path=("program", "line"), meaning="The line that is executed.", type=PointType.WHOLE, read=_at("program", "line")
+        path=("program", "line"),
+        meaning="The line that is executed.",
+        type=PointType.WHOLE,
+        part=_PROGRAM_PART,
+        of=itemgetter("line"),
     ),
     GatewayPoint(
-        path=("program", "statement"), meaning="The statement there.", type=PointType.TEXT, read=_at("program", "statement")
+        path=("program", "statement"),
+        meaning="The statement there.",
+        type=PointType.TEXT,
+        part=_PROGRAM_PART,
+        of=itemgetter("statement"),
     ),
 )
 
 
 def _axis(index: int, axis: AxisDescription) -> Iterator[GatewayPoint]:
-    def point(name: str, meaning: str, kind: PointType, *path: str, unit: str = "", limits: Limits | None = None) -> GatewayPoint:
-        read = _at("axes", index, *path)
-        return GatewayPoint(path=(axis.name, name), meaning=meaning, type=kind, unit=unit, limits=limits, read=read)
+    def point(
+        name: str,
+        meaning: str,
+        kind: PointType,
+        of: Callable[[Any], PointValue] | None = None,
+        unit: str = "",
+        limits: Limits | None = None,
+    ) -> GatewayPoint:
+        of = itemgetter(name) if of is None else of
+        return GatewayPoint(path=(axis.name, name), meaning=meaning, type=kind, unit=unit, limits=limits, part=part, of=of)
+
+    def part(state: State) -> Any:
+        return state["axes"][index]
 
     number, whole, truth, text = PointType.NUMBER, PointType.WHOLE, PointType.TRUTH, PointType.TEXT
-    yield point("position", "Counted position.", number, "position", unit=axis.unit, limits=axis.positions)
-    yield point("velocity", "Velocity with its sign.", number, "velocity", unit=f"{axis.unit}/s", limits=axis.velocities)
-    yield point("moving", "Whether it moves.", truth, "moving")
-    yield point("enabled", "Whether its drive is on.", truth, "enabled")
-    yield point("encoder", "Counts of its encoder.", whole, "encoder")
-    yield point("status", "Its status in words.", text, "status", "text")
-    yield point("status_code", "The number of its status.", whole, "status", "code")
-    yield point("status_level", f"How serious that is: {_LEVELS}.", text, "status", "level")
+    yield point("position", "Counted position.", number, unit=axis.unit, limits=axis.positions)
+    yield point("velocity", "Velocity with its sign.", number, unit=f"{axis.unit}/s", limits=axis.velocities)
+    yield point("moving", "Whether it moves.", truth)
+    yield point("enabled", "Whether its drive is on.", truth)
+    yield point("encoder", "Counts of its encoder.", whole)
+    yield point("status", "Its status in words.", text, _of_status("text"))
+    yield point("status_code", "The number of its status.", whole, _of_status("code"))
+    yield point("status_level", f"How serious that is: {_LEVELS}.", text, _of_status("level"))
 
 
 def _pin(machine: str, pin: Pin, *, can_set: bool, is_writable: bool) -> GatewayPoint:
     """Inputs of a twin take levels; outputs are written where the controller has a register for them."""
-    read = itemgetter(pin.name)
     write: Callable[[float], Command] | None = None
     if is_writable:
         write = lambda level: Write(((machine, pin.name, level),))  # noqa: E731
@@ -154,7 +196,8 @@ def _pin(machine: str, pin: Pin, *, can_set: bool, is_writable: bool) -> Gateway
         type=PointType.NUMBER if pin.is_analog else PointType.TRUTH,
         unit=pin.unit,
         limits=pin.limits,
-        read=lambda state: read(state["pins"]),
+        part=_PINS,
+        of=itemgetter(pin.name),
         write=write,
     )
 
@@ -173,7 +216,8 @@ def _detail(detail: Detail) -> GatewayPoint:
         meaning=f"{detail.meaning}.",
         type=_DETAIL_TYPES[detail.type],
         unit=detail.unit,
-        read=_at("details", detail.name),
+        part=_DETAILS,
+        of=itemgetter(detail.name),
     )
 
 
@@ -187,14 +231,16 @@ CLOCK_POINTS = (
         meaning="Time of the twins since they began.",
         type=PointType.NUMBER,
         unit="s",
-        read=_at("time_s"),
+        part=whole_state,
+        of=itemgetter("time_s"),
     ),
-    GatewayPoint(path=("paused",), meaning="Whether it stands.", type=PointType.TRUTH, read=_at("paused")),
+    GatewayPoint(path=("paused",), meaning="Whether it stands.", type=PointType.TRUTH, part=whole_state, of=itemgetter("paused")),
     GatewayPoint(
         path=("speed",),
         meaning="Virtual seconds in a second; unknown where it is as fast as it can be.",
         type=PointType.NUMBER,
-        read=lambda state: state["speed"] if isinstance(state["speed"], int | float) else None,
+        part=whole_state,
+        of=lambda state: state["speed"] if isinstance(state["speed"], int | float) else None,
     ),
 )
 """Read from the answer to the command ``time``."""
@@ -213,7 +259,8 @@ def _register(part: MachinePart, name: str) -> GatewayPoint:
         type=PointType.TRUTH if point.type == "switch" else PointType.NUMBER,
         unit=point.unit,
         limits=point.limits,
-        read=lambda state: state["registers"][name],
+        part=_REGISTERS,
+        of=itemgetter(name),
         write=None if point.access is Access.READ else lambda value: Write(((machine, name, value),)),
     )
 

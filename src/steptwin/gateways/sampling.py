@@ -1,30 +1,47 @@
-"""Present values of controllers for gateways, taken when they may have changed."""
+"""Present values of controllers for gateways, taken when they may have changed.
+
+An event of a controller makes it due at once, but at most once in an interval; what changes without events (a motion, a running
+program, named registers) is due once in an interval. Nothing waits in queues: a gateway that is late gets the latest values.
+"""
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
+from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from steptwin.errors import LineFailure, Refusal
-from steptwin.gateways.contract import GatewaySubject
 from steptwin.gateways.points import CLOCK, State
-from steptwin.machine import Nanos
+from steptwin.machine import SECOND, Nanos
 from steptwin.subject import commands as command
-from steptwin.subject.following import USUAL, Filter
+from steptwin.subject.following import USUAL, Filter, Following
+from steptwin.subject.payloads import RestoredPayload
+
+if TYPE_CHECKING:
+    from steptwin.gateways.contract import GatewaySubject
 
 ACTIVE = ("running", "waiting")
 """Programs in these states change what they show without an event."""
 MOST_EVENTS = 4096
-RESTING_SAMPLES = 10
-"""Of a controller at rest, one in so many samples is taken: for what changes without an event, such as a register."""
+RESTING_INTERVALS = 10
+"""A controller at rest is sampled once in so many intervals: for what changes without an event, such as a register."""
+TICK_S = 0.01
+"""Controllers become due at multiples of this, so that what happens at almost the same time is looked at together."""
+AT_ONCE = 64
+"""Controllers that are sampled before others in this event loop have their turn."""
+INTERVAL = SECOND // 10
 
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """``state`` at the moment ``at``; None for a controller that does not answer, or refuses what it is asked."""
+    """``state`` at the moment ``at``; None for a controller that does not answer, or refuses what it is asked.
+
+    A part of a state in which nothing has changed is the same object as in the sample before (`GatewayPoint.part`).
+    """
 
     machine: str
     state: State | None
@@ -33,34 +50,81 @@ class Sample:
     """The same moment by the clock of the subject, which may stand; 0 without an answer."""
 
 
-class Sampler:
-    """Samples of the controllers of ``subject``, with the registers that are named by controller."""
+class SharedSamples:
+    """What the samplers of ``subject`` share: events, and samples that one of them has just taken."""
 
-    def __init__(self, subject: GatewaySubject, registers: Mapping[str, Iterable[str]]) -> None:
+    def __init__(self, subject: GatewaySubject) -> None:
         self._subject = subject
-        self._registers = {name: tuple(of) for name, of in registers.items()}
-        self._following = subject.follow(Filter(USUAL), MOST_EVENTS)
-        self._resting: dict[str, int] = {}
-        """Controllers that rest, and how many samples have been left out."""
+        self._samplers: list[Sampler] = []
+        self._following: Following | None = None
+        self._latest: dict[str, tuple[float, Sample]] = {}
+        """The last sample of each controller, and when it was taken by the clock of the event loop."""
+        self._past: set[str] = set()
+        """Controllers to which something has happened since."""
+        self._registers: dict[str, tuple[str, ...]] = {}
 
-    def close(self) -> None:
-        self._following.close()
+    def join(self, sampler: Sampler) -> None:
+        if self._following is None:
+            self._following = self._subject.follow(Filter(USUAL), MOST_EVENTS)
+            self._following.on_event = self._wake
+        self._samplers.append(sampler)
+        self._collect_registers()
+
+    def leave(self, sampler: Sampler) -> None:
+        if sampler in self._samplers:
+            self._samplers.remove(sampler)
+            self._collect_registers()
+        if self._following is not None and not self._samplers:
+            self._following.close()
+            self._following = None
+            self._latest.clear()
+
+    def _collect_registers(self) -> None:
+        found: dict[str, dict[str, None]] = {}
+        for sampler in self._samplers:
+            for machine, names in sampler.registers.items():
+                found.setdefault(machine, {}).update(dict.fromkeys(names))
+        self._registers = {machine: tuple(names) for machine, names in found.items()}
+
+    def _wake(self) -> None:
+        for sampler in self._samplers:
+            sampler.wake()
+
+    def see_events(self) -> None:
+        """Tell all samplers what has happened."""
+        if self._following is None:
+            return
+        missed, events = self._following.take()
+        if missed or any(isinstance(event.payload, RestoredPayload) for event in events):
+            self._past.update(self._latest)
+            for sampler in self._samplers:
+                sampler.everything_changed()
+            return
+        for name in {event.machine for event in events}:
+            self._past.add(name)
+            for sampler in self._samplers:
+                sampler.changed_by_event(name)
+
+    async def recent(self, machine: str, since: float) -> Sample:
+        """One that was taken after ``since`` and everything that has happened, or a new one."""
+        known = self._latest.get(machine)
+        if known is not None and known[0] >= since and machine not in self._past:
+            return known[1]
+        return await self.take(machine)
 
     async def take(self, machine: str) -> Sample:
         """The present values of a controller, or of the `CLOCK`."""
         if machine == CLOCK:
             return Sample(CLOCK, cast("State", (await self._subject.do(command.Time())).value), datetime.now(UTC))
+        self._past.discard(machine)
         try:
             answer = await self._subject.do(command.ReadState(machine))
-            state = cast("Mapping[str, Any]", answer.value)
-            registers = await self._read(machine)
+            state = {**cast("State", answer.value), "registers": await self._read(machine)}
+            found = Sample(machine, self._merged(machine, state), datetime.now(UTC), answer.time)
         except (LineFailure, Refusal):  # a device may refuse a register
-            return Sample(machine, None, datetime.now(UTC))
-        if _is_resting(state):
-            self._resting[machine] = 0
-        else:
-            self._resting.pop(machine, None)
-        return Sample(machine, {**state, "registers": registers}, datetime.now(UTC), answer.time)
+            found = Sample(machine, None, datetime.now(UTC))
+        self._latest[machine] = asyncio.get_running_loop().time(), found
+        return found
 
     async def _read(self, machine: str) -> Mapping[str, float | None]:
         names = self._registers.get(machine, ())
@@ -70,25 +134,147 @@ class Sampler:
         readings = cast("list[Mapping[str, Any]]", (await self._subject.do(command.ReadPoints(points))).value)
         return {name: reading["value"] for name, reading in zip(names, readings, strict=True)}
 
-    async def changed(self, machines: Iterable[str]) -> list[Sample]:
-        """Samples of those ``machines`` that may have changed since their last one."""
-        return await asyncio.gather(*map(self.take, self.due(machines)))
+    def _merged(self, machine: str, state: dict[str, Any]) -> State:
+        """``state`` with those parts of the last one in which nothing has changed."""
+        known = self._latest.get(machine)
+        before = None if known is None else known[1].state
+        if before is None:
+            return state
+        state["axes"] = [old if old == new else new for old, new in zip(before["axes"], state["axes"], strict=True)]
+        for name in ("status", "program", "pins", "details", "registers"):
+            if state[name] == before[name]:
+                state[name] = before[name]
+        return state
 
-    def due(self, machines: Iterable[str]) -> list[str]:
-        """Those ``machines`` that may have changed since their last sample."""
-        missed, events = self._following.take()
-        if missed:
-            self._resting.clear()
-        for event in events:
-            self._resting.pop(event.machine, None)
-        return [name for name in machines if self._is_due(name)]
 
-    def _is_due(self, machine: str) -> bool:
-        left_out = self._resting.get(machine)
-        if left_out is None or left_out >= RESTING_SAMPLES or self._registers.get(machine):
-            return True
-        self._resting[machine] = left_out + 1
-        return False
+class Sampler:
+    """Samples of the controllers of ``subject`` for one gateway, with the registers that are named by controller."""
+
+    def __init__(self, subject: GatewaySubject, registers: Mapping[str, Iterable[str]], interval: Nanos = INTERVAL) -> None:
+        self.registers = {name: tuple(of) for name, of in registers.items()}
+        self._shared = subject.samples
+        self._slots = max(round(interval / SECOND / TICK_S), 1)
+        """Of an interval, as long as `TICK_S` each; moments are numbers of slots of the event loop's time."""
+        self._last: dict[str, int] = {}
+        """Controllers that are looked at, and when each of them was due the last time."""
+        self._at: dict[str, int] = {}
+        """When each of them is due."""
+        self._calendar: dict[int, list[str]] = {}
+        """The same by moment; entries that `_at` does not confirm are of the past."""
+        self._ready: deque[str] = deque()
+        self._woken = asyncio.Event()
+        self._reading: dict[str, asyncio.Task[None]] = {}
+        self._read: list[Sample] = []
+        """Samples of devices, whose answers come later."""
+        self._real = frozenset(part.name for part in subject.description.machines if part.is_real)
+        self._shared.join(self)
+
+    def close(self) -> None:
+        self._shared.leave(self)
+        for task in self._reading.values():
+            task.cancel()
+
+    # ------------------------------------------------------------------ what is looked at
+
+    def watch(self, machines: Iterable[str]) -> None:
+        """Look at these from now on, and at no others."""
+        wanted = set(machines)
+        for name in self._last.keys() - wanted:
+            del self._last[name]
+            self._at.pop(name, None)
+        for name in wanted - self._last.keys():
+            self._last[name] = -RESTING_INTERVALS * self._slots
+            self._plan(name, self._now())
+
+    def hasten(self, machine: str) -> None:
+        """It may have changed, or will: look at it when the interval is over."""
+        if machine in self._last:
+            self._plan(machine, max(self._last[machine] + self._slots, self._now()))
+
+    changed_by_event = hasten
+
+    def everything_changed(self) -> None:
+        for name in self._last:
+            self.hasten(name)
+
+    def wake(self) -> None:
+        self._woken.set()
+
+    def _now(self) -> int:
+        return int(asyncio.get_running_loop().time() / TICK_S + 1e-6)
+
+    def _plan(self, machine: str, slot: int) -> None:
+        planned = self._at.get(machine)
+        if planned is None or planned > slot:
+            self._at[machine] = slot
+            self._calendar.setdefault(slot, []).append(machine)
+
+    # ------------------------------------------------------------------ samples
+
+    async def due(self, within_s: float) -> list[str]:
+        """Controllers that may have changed, some of them if there are many; none if there are none ``within_s``.
+        Whoever asks takes samples of them and reports it by `taken`."""
+        loop = asyncio.get_running_loop()
+        end = loop.time() + within_s
+        await asyncio.sleep(0)
+        while True:
+            self._woken.clear()
+            self._shared.see_events()
+            self._come(self._now())
+            if self._ready or self._read or loop.time() >= end:
+                return [self._ready.popleft() for _ in range(min(len(self._ready), AT_ONCE))]
+            await self._wait(end)
+
+    def _come(self, now: int) -> None:
+        for slot in sorted(slot for slot in self._calendar if slot <= now):
+            for name in self._calendar.pop(slot):
+                if self._at.get(name) == slot:
+                    del self._at[name]
+                    self._last[name] = slot
+                    self._ready.append(name)
+
+    async def _wait(self, end: float) -> None:
+        """Until the next moment at which something is due, or the end of the slot in which something happens."""
+        loop = asyncio.get_running_loop()
+        planned = min(self._calendar, default=None)
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout_at(end if planned is None else min(end, planned * TICK_S)):
+                await self._woken.wait()
+                await asyncio.sleep((self._now() + 1) * TICK_S - loop.time())
+
+    def taken(self, sample: Sample) -> None:
+        """This sample of a controller that was due has been taken."""
+        name = sample.machine
+        if name in self._last:
+            rests = name != CLOCK and sample.state is not None and not self.registers.get(name) and _is_resting(sample.state)
+            self._plan(name, max(self._last[name] + self._slots * (RESTING_INTERVALS if rests else 1), self._now()))
+
+    async def changed(self, within_s: float) -> list[Sample]:
+        """Samples of controllers that may have changed, as `due`. A device that does not answer holds up no other controller."""
+        found: list[Sample] = []
+        for name in await self.due(within_s):
+            if name in self._real:
+                if name not in self._reading:
+                    self._reading[name] = asyncio.create_task(self._read_device(name))
+            elif name in self._last:
+                found.append(await self._shared.recent(name, self._last[name] * TICK_S))
+                self.taken(found[-1])
+        found += self._read
+        self._read.clear()
+        return found
+
+    async def _read_device(self, name: str) -> None:
+        try:
+            sample = await self.take(name)
+        finally:
+            del self._reading[name]
+        self._read.append(sample)
+        self.taken(sample)
+        self.wake()
+
+    async def take(self, machine: str) -> Sample:
+        """The present values of a controller, or of the `CLOCK`."""
+        return await self._shared.take(machine)
 
 
 def _is_resting(state: State) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import uuid
 from collections.abc import Callable, Iterable, Mapping
@@ -11,7 +12,7 @@ from typing import NamedTuple
 
 from steptwin.access.audit import Entry
 from steptwin.gateways.contract import GatewaySubject
-from steptwin.gateways.points import CLOCK, CLOCK_POINTS, GatewayPoint, PointType, PointValue, points_of
+from steptwin.gateways.points import CLOCK, CLOCK_POINTS, GatewayPoint, PointType, PointValue, points_of, whole_state
 from steptwin.gateways.sampling import Sample, Sampler
 from steptwin.history.rows import EventRow, KeptValue, PlanRow, PointRow, RowBatch, RunHead, SampleRow
 from steptwin.machine import SECOND, Nanos
@@ -35,7 +36,7 @@ PASSING = ("program.line", "program.statement", "virtual_time")
 """Too quick to be looked at now and then."""
 LINES, COMMAND = "lines", "command"
 TRAFFIC_POINTS = tuple(
-    GatewayPoint(path=(name,), meaning=meaning, type=PointType.WHOLE, read=itemgetter(name))
+    GatewayPoint(path=(name,), meaning=meaning, type=PointType.WHOLE, part=whole_state, of=itemgetter(name))
     for name, meaning in (
         ("requests", "Requests of programs, or lines of characters, since the line was opened."),
         ("errors", "Those that were answered with an exception, lost, or not answered."),
@@ -131,6 +132,8 @@ class Recorder:
 
     async def begin(self) -> RunHead:
         """Begin a run at the present moment, with all values. Raises as commands do."""
+        if self._has_devices:
+            self._sampler.watch(self._machines)
         clock = await self._sampler.take(CLOCK)
         now, wall = _time(clock), self._clock.wall_us()
         self._steady = self._clock.steady_us()
@@ -231,7 +234,8 @@ class Recorder:
 
     async def _take_changed(self, events: Iterable[Event], now: Nanos, wall: int) -> None:
         if self._has_devices:
-            for sample in await self._sampler.changed(self._machines):
+            for sample in await asyncio.gather(*map(self._sampler.take, await self._sampler.due(0.0))):
+                self._sampler.taken(sample)
                 self._take_sample(sample, now, wall)
         for name in self._due(events, now):
             self._take_sample(await self._sampler.take(name), now, wall)

@@ -20,7 +20,7 @@ from steptwin.gateways.epics.records import Record, found_field
 from steptwin.gateways.epics.recordset import make_records
 from steptwin.gateways.leases import JogLeases
 from steptwin.gateways.points import CLOCK, registers_by_machine
-from steptwin.gateways.sampling import Sampler
+from steptwin.gateways.sampling import Sampler, SharedSamples
 from steptwin.subject.contract import Description
 
 HALL = """
@@ -195,7 +195,8 @@ def records(plant: Plant) -> dict[str, Record]:
     """Those that the gateway has for the same description."""
     description = plant.description
     registers = registers_by_machine("[gateway.epics]", ["table.USER_REGISTER[5]", "table.M1_VMAX"], description)
-    subject: Any = SimpleNamespace(description=description, follow=lambda what, bound: None)
+    subject: Any = SimpleNamespace(description=description, follow=lambda what, bound: SimpleNamespace())
+    subject.samples = SharedSamples(subject)
     leases, sampler = JogLeases(subject), Sampler(subject, registers)
     names = [*(part.name for part in description.machines), CLOCK]
     controllers = {name: EpicsController(name, subject, sampler, leases, Role.ENGINEER) for name in names}

@@ -84,6 +84,7 @@ class EpicsController:
         try:
             before = self._commands
             sample = await self._sampler.take(self.name)
+            self._sampler.taken(sample)
             is_sure = before == self._commands and not self._on_their_way
         finally:
             self._sampling = None

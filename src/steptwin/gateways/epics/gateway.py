@@ -57,7 +57,7 @@ class EpicsGateway:
         open_to = Role.ENGINEER if all(map(is_loopback, hosts)) else Role.VIEWER
         role = self._role = open_to if spec.role is None else ROLES[spec.role]
         registers = registers_by_machine("[gateway.epics]", spec.registers, self._subject.description)
-        self._sampler = Sampler(self._subject, registers)
+        self._sampler = Sampler(self._subject, registers, spec.interval)
         for name in (*(part.name for part in self._subject.description.machines), CLOCK):
             self._controllers[name] = EpicsController(name, self._subject, self._sampler, self._leases, role)
         records = make_records(spec.prefix, self._subject, self._controllers, registers)
@@ -93,11 +93,13 @@ class EpicsGateway:
 
     async def _publish(self, server: ChannelAccessServer, sampler: Sampler) -> None:
         while True:
-            await asyncio.sleep(self._spec.interval / SECOND)
             busy = [name for name, controller in self._controllers.items() if controller.is_busy]
             has_clients = server.has_clients or (self._pv_server is not None and self._pv_server.has_clients)
             wanted = [name for name, one in self._controllers.items() if one.is_wanted] if has_clients else []
-            for name in dict.fromkeys((*busy, *sampler.due(wanted))):
+            sampler.watch((*wanted, *busy))
+            for name in busy:
+                sampler.hasten(name)
+            for name in await sampler.due(self._spec.interval / SECOND):
                 self._controllers[name].look()
 
     def state(self) -> GatewayState:

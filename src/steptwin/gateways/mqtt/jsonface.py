@@ -54,6 +54,8 @@ class JsonFace:
         self._instance = secrets.token_hex(8)
         self._shown: dict[str, Mapping[str, PointValue]] = {}
         """What has been published in this session, by topic."""
+        self._parts: dict[str, object] = {}
+        """Where they were taken from."""
         self._doing: set[asyncio.Task[None]] = set()
         self._others: dict[str, bytes] = {}
         """What is known of whoever uses these topics, until this gateway does."""
@@ -77,17 +79,19 @@ class JsonFace:
             await link.publish_all(discovery(self._topics, self._subject.description))
         machines = [name for name in self._topics.groups if name != CLOCK]
         await self._publish(link, await asyncio.gather(*(self._sampler.take(name) for name in machines)))
+        self._sampler.watch(machines)
         await link.publish(Publication(self._topics(ONLINE), b"true", qos=1, retain=True))
         await link.subscribe(self._topics(DO), retained=False)
-        clock_at = 0.0
+        loop, interval_s = asyncio.get_running_loop(), self._spec.interval / SECOND
+        at, clock_at = loop.time(), loop.time()
         while True:
-            now = asyncio.get_running_loop().time()
-            if CLOCK in self._topics.groups and now - clock_at >= CLOCK_S:
-                clock_at = now
+            await self._publish(link, await self._sampler.changed(max(at - loop.time(), 0.0)))
+            if loop.time() >= at:
+                at = loop.time() + interval_s
+                await self._publish_events(link)
+            if CLOCK in self._topics.groups and loop.time() >= clock_at:
+                clock_at = loop.time() + CLOCK_S
                 await self._publish(link, [await self._sampler.take(CLOCK)])
-            await self._publish(link, await self._sampler.changed(machines))
-            await self._publish_events(link)
-            await asyncio.sleep(self._spec.interval / SECOND)
 
     async def _claim(self, link: BrokerLink) -> None:
         """Make sure that nobody else uses these topics: both would do every command. Raises `SessionOver`."""
@@ -110,6 +114,7 @@ class JsonFace:
     def lost(self) -> None:
         self._is_online = False
         self._shown.clear()
+        self._parts.clear()
         self._commands.lost()
 
     # ------------------------------------------------------------------ values and events
@@ -118,6 +123,10 @@ class JsonFace:
         found: list[Publication] = []
         for sample in samples:
             for group in self._topics.groups[sample.machine]:
+                part = group.part(sample)
+                if part is not None and self._parts.get(group.topic) is part:
+                    continue
+                self._parts[group.topic] = part
                 values = group.values(sample)
                 if self._shown.get(group.topic) != values:
                     self._shown[group.topic] = values

@@ -40,9 +40,14 @@ class Group:
     name: str
     points: tuple[GatewayPoint, ...]
 
+    def part(self, sample: Sample) -> object:
+        """What its values are taken from: the same object in two samples between which nothing has changed in it."""
+        return None if sample.state is None else self.points[0].part(sample.state)
+
     def values(self, sample: Sample) -> dict[str, PointValue]:
         """By name; all unknown where the controller does not answer."""
-        found = {point.path[-1]: None if sample.state is None else point.shown(sample.state) for point in self.points}
+        part = self.part(sample)
+        found = {point.path[-1]: None if part is None else point.shown_in(part) for point in self.points}
         return found if self.name or sample.machine == CLOCK else {ANSWERS: sample.state is not None, **found}
 
 
@@ -93,7 +98,7 @@ class Topics:
 def _groups(topic: str, points: Iterable[GatewayPoint]) -> Iterable[Group]:
     found: dict[str, list[GatewayPoint]] = {}
     for point in points:
-        found.setdefault(point.path[0] if len(point.path) > 1 else "", []).append(point)
+        found.setdefault(point.group, []).append(point)
     for name, members in found.items():
         yield Group(f"{topic}/{name}" if name else topic, name, tuple(members))
 
@@ -112,8 +117,11 @@ def _described(group: Group) -> dict[str, object]:
     return {"meaning": GROUP_MEANINGS.get(group.name, "an axis"), "values": values}
 
 
+_ENCODER = json.JSONEncoder(ensure_ascii=False, separators=(",", ":"))
+
+
 def encode(value: Any) -> bytes:
-    return json.dumps(value, ensure_ascii=False, separators=(",", ":")).encode()
+    return _ENCODER.encode(value).encode()
 
 
 def encode_sample(values: Mapping[str, PointValue], sample: Sample) -> bytes:

@@ -10,7 +10,7 @@ import asyncio
 import contextlib
 import json
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from datetime import UTC, datetime
 from typing import NamedTuple
 
@@ -29,7 +29,7 @@ from steptwin.gateways.mqtt.sparkplugcodec import (
     encode_payload,
 )
 from steptwin.gateways.mqtt.sparkplugmetrics import BDSEQ, DROPPED, REBIRTH, RESULT, MetricRow, Namespace
-from steptwin.gateways.points import CLOCK
+from steptwin.gateways.points import CLOCK, GatewayPoint, State
 from steptwin.gateways.sampling import Sample, Sampler
 from steptwin.machine import SECOND, Nanos
 
@@ -63,6 +63,22 @@ class _Device:
         self.is_seen = False
         self.is_born = False
         """In this session."""
+        self.state: State | None = None
+        """Of the last sample."""
+        self.groups: dict[str, list[tuple[MetricRow, GatewayPoint]]] = {}
+        """Metrics that show points, by the part of a state in which these are."""
+        for row in rows:
+            if row.point is not None:
+                self.groups.setdefault(row.point.group, []).append((row, row.point))
+
+    def shown(self, sample: Sample) -> Iterator[tuple[MetricRow, SparkplugValue]]:
+        """The values of a sample that may be others than those of the last one."""
+        before, self.state = self.state, sample.state
+        for rows in self.groups.values():
+            first = rows[0][1]
+            part = None if sample.state is None else first.part(sample.state)
+            if part is None or before is None or first.part(before) is not part:
+                yield from ((row, None if part is None else point.shown_in(part)) for row, point in rows)
 
 
 class SparkplugFace:
@@ -96,6 +112,8 @@ class SparkplugFace:
         self._host_at = -1
         """Timestamp of its last state."""
         self._wants_rebirth = False
+        self._news = asyncio.Event()
+        """There is something to be published."""
         self._watching: asyncio.Task[None] | None = None
         self._doing: set[asyncio.Task[None]] = set()
 
@@ -110,16 +128,15 @@ class SparkplugFace:
     # ------------------------------------------------------------------ values, with or without a broker
 
     async def _watch(self) -> None:
-        machines = [name for name in self._devices if name is not None]
+        loop = asyncio.get_running_loop()
+        self._sampler.watch(name for name in self._devices if name is not None)
         while True:
-            loop = asyncio.get_running_loop()
-            samples = await self._sampler.changed(machines)
+            samples = await self._sampler.changed(self._interval_s)
             if "time" in self._subject.description.commands and loop.time() - self._clock_at >= CLOCK_S:
                 self._clock_at = loop.time()
                 samples.append(await self._sampler.take(CLOCK))
             for sample in samples:
                 self._look(sample)
-            await asyncio.sleep(self._interval_s)
 
     def _look(self, sample: Sample) -> None:
         name = None if sample.machine == CLOCK else sample.machine
@@ -127,12 +144,11 @@ class SparkplugFace:
         answers = sample.state is not None
         # Births and deaths tell what appears and disappears; without a session it is kept like other changes.
         is_reported = not device.is_seen or (answers != device.answers and self._is_born)
+        if answers != device.answers:
+            self._news.set()
         device.answers, device.is_seen = answers, True
         device.at = round(sample.at.timestamp() * 1000)
-        for row in device.rows:
-            if row.point is None:
-                continue
-            value = row.value(sample)
+        for row, value in device.shown(sample):
             if is_reported:
                 device.values[row.alias] = value
             elif value != device.values[row.alias]:
@@ -143,6 +159,7 @@ class SparkplugFace:
         device.values[row.alias] = value
         if len(self._changes) == self._changes.maxlen:
             self._dropped += 1
+        self._news.set()
         self._changes.append(_Change(name, row, value, at, is_historical=not device.is_born))
 
     # ------------------------------------------------------------------ the session
@@ -171,12 +188,13 @@ class SparkplugFace:
         await self._host.wait()
         await self._bear(link)
         while True:
+            self._news.clear()
             if self._wants_rebirth:
                 self._wants_rebirth = False
                 await self._bear(link)
             await self._follow_devices(link)
             await self._publish_changes(link)
-            await asyncio.sleep(self._interval_s)
+            await self._news.wait()
 
     async def leave(self, link: BrokerLink) -> None:
         await link.publish(self._death())
@@ -224,15 +242,19 @@ class SparkplugFace:
         if not ready:
             return
         self._keep([one for one in self._changes if not self._devices[one.device].is_born])
+        found: list[Publication] = []
+        first = 0
+        while first < len(ready):
+            together = _together(ready, first)
+            device = together[0].device
+            metrics = [one.row.data(one.value, one.at, is_historical=one.is_historical) for one in together]
+            found.append(self._publication("NDATA" if device is None else "DDATA", device, metrics))
+            first += len(together)
         try:
-            while ready:
-                together = _together(ready)
-                device = together[0].device
-                metrics = [one.row.data(one.value, one.at, is_historical=one.is_historical) for one in together]
-                await self._send(link, "NDATA" if device is None else "DDATA", device, metrics)
-                del ready[: len(together)]
-        finally:
-            self._keep([*ready, *self._changes])
+            await link.publish_all(found)
+        except BaseException:
+            self._keep([*ready, *self._changes])  # some may come twice, with the same moments; none is lost
+            raise
 
     def _keep(self, changes: list[_Change]) -> None:
         """The newest of them, as many as are kept."""
@@ -241,9 +263,12 @@ class SparkplugFace:
         self._changes = deque(changes, maxlen=most)
 
     async def _send(self, link: BrokerLink, kind: str, device: str | None, metrics: Iterable[SparkplugMetric]) -> None:
+        await link.publish(self._publication(kind, device, metrics))
+
+    def _publication(self, kind: str, device: str | None, metrics: Iterable[SparkplugMetric]) -> Publication:
         payload = SparkplugPayload(timestamp=_now(), metrics=tuple(metrics), seq=self._seq)
         self._seq = (self._seq + 1) % COUNTED
-        await link.publish(Publication(self._topic(kind, device), encode_payload(payload)))
+        return Publication(self._topic(kind, device), encode_payload(payload))
 
     # ------------------------------------------------------------------ from the host
 
@@ -291,6 +316,7 @@ class SparkplugFace:
             )
             if name is None and row is not None and row.name == REBIRTH:
                 self._wants_rebirth |= metric.value is True
+                self._news.set()
             elif name is not None and row is not None and row.command is not None:
                 await self._do(name, row, metric)
 
@@ -310,12 +336,12 @@ class SparkplugFace:
                 self._change(name, one, result, _now())
 
 
-def _together(changes: list[_Change]) -> list[_Change]:
-    """The first of them that can be in one message: each metric once, so that all of its values have their moments."""
-    first = changes[0]
+def _together(changes: list[_Change], begin: int) -> list[_Change]:
+    """Those from ``begin`` on that can be in one message: each metric once, so that all of its values have their moments."""
+    first = changes[begin]
     aliases: set[int] = set()
     found: list[_Change] = []
-    for one in changes[:AT_MOST]:
+    for one in changes[begin : begin + AT_MOST]:
         if (one.device, one.is_historical) != (first.device, first.is_historical):
             break
         if one.row.alias in aliases and not one.is_historical:

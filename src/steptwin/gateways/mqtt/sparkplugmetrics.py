@@ -12,7 +12,6 @@ from steptwin.errors import Misuse
 from steptwin.gateways.methods import METHODS, MethodRow, methods_of
 from steptwin.gateways.mqtt.sparkplugcodec import SparkplugMetric, SparkplugProperty, SparkplugType, SparkplugValue
 from steptwin.gateways.points import CLOCK_POINTS, GatewayPoint, PointType, points_of
-from steptwin.gateways.sampling import Sample
 from steptwin.subject.commands import Command
 from steptwin.subject.contract import Description, MachinePart
 
@@ -39,11 +38,6 @@ class MetricRow:
     """The value of one without a point."""
     command: Callable[[SparkplugValue], Command] | None = None
     """What a command to it does; raises `Misuse`. None where there is none."""
-
-    def value(self, sample: Sample) -> SparkplugValue:
-        if self.point is None:
-            return self.start
-        return None if sample.state is None else self.point.shown(sample.state)
 
     def birth(self, value: SparkplugValue, at: int) -> SparkplugMetric:
         return SparkplugMetric(

@@ -76,7 +76,7 @@ class OpcUaGateway:
             NodeMaker(inside.aspace).add(builder.items)
             for code in await inside.isession.add_references(builder.references):
                 code.check()
-            self._sampler = Sampler(self._subject, registers)
+            self._sampler = Sampler(self._subject, registers, self._spec.interval)
             if self._subject.past is not None:
                 inside.history_manager.set_storage(PastNodes(self._subject.past, builder.nodes()))
             service = NodeService(inside.aspace, self._subject, self._sampler, builder.points, builder.methods, builder.arrays)
@@ -116,10 +116,14 @@ class OpcUaGateway:
         return registers_by_machine("[gateway.opcua]", self._spec.registers, self._subject.description)
 
     async def _publish(self, service: NodeService, notifications: Notifications) -> None:
+        loop, interval_s = asyncio.get_running_loop(), self._spec.interval / SECOND
+        at = loop.time() + interval_s
         while True:
-            await asyncio.sleep(self._spec.interval / SECOND)
-            await service.publish()
-            await notifications.publish()
+            await service.publish(max(at - loop.time(), 0.0))
+            if loop.time() >= at:
+                at = loop.time() + interval_s
+                await service.publish_arrays()
+                await notifications.publish()
 
     def state(self) -> GatewayState:
         clients = () if self._inside is None else tuple(self._inside.clients())

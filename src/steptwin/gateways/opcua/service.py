@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any
 
@@ -16,11 +16,54 @@ from steptwin.gateways.contract import GatewaySubject
 from steptwin.gateways.leases import JogLeases
 from steptwin.gateways.opcua.addressspace import ArrayNode, BoundMethod, PointNode
 from steptwin.gateways.opcua.nodetypes import data_value, number_of, status
+from steptwin.gateways.points import PointValue, State
 from steptwin.gateways.sampling import Sample, Sampler
 from steptwin.subject.commands import Jog, ReadPoints, StopAxes
 
 ARRAY_PAUSE = 10
 """Arrays take long to read: they are looked at once in so many publications."""
+
+
+class WatchedNodes:
+    """Variables of one controller that clients follow."""
+
+    def __init__(self) -> None:
+        self._groups: dict[str, dict[ua.NodeId, PointNode]] = {}
+        self._shown: dict[ua.NodeId, PointValue] = {}
+        self._state: State | None = None
+        """Of the last sample; None: everything has to be looked at."""
+
+    def add(self, node: PointNode) -> None:
+        self._groups.setdefault(node.point.group, {})[node.id] = node
+        self._state = None
+
+    def keep(self, is_followed: Callable[[ua.NodeId], bool]) -> bool:
+        """Only those; whether there are any."""
+        groups = {name: {one: nodes[one] for one in nodes if is_followed(one)} for name, nodes in self._groups.items()}
+        self._groups = {name: nodes for name, nodes in groups.items() if nodes}
+        self._shown = {node: value for node, value in self._shown.items() if is_followed(node)}
+        return bool(self._groups)
+
+    def changes(self, sample: Sample) -> Iterator[tuple[PointNode, PointValue]]:
+        """Those with another value than before, and this value."""
+        before, self._state = self._state, sample.state
+        if sample.state is None:
+            self._shown.clear()
+            yield from ((node, None) for nodes in self._groups.values() for node in nodes.values())
+            return
+        for nodes in self._groups.values():
+            point = next(iter(nodes.values())).point
+            part = point.part(sample.state)
+            if before is not None and point.part(before) is part:
+                continue
+            for node in nodes.values():
+                value = node.point.of(part)
+                if self._shown.get(node.id, _NOTHING) != value:
+                    self._shown[node.id] = value
+                    yield node, value
+
+
+_NOTHING = object()
 
 
 class NodeService:
@@ -45,8 +88,10 @@ class NodeService:
         """What has been subscribed to, and publications until it is read again."""
         self._of_node = {node.id: (machine, node) for machine, nodes in points.items() for node in nodes}
         self._leases = JogLeases(subject)
-        self._watched: dict[str, list[PointNode]] = {}
+        self._watched: dict[str, WatchedNodes] = {}
         """What has been subscribed to, by controller."""
+        self._has_gone = False
+        """Whether a subscription has ended since the last publication."""
 
     # ------------------------------------------------------------------ values
 
@@ -72,37 +117,50 @@ class NodeService:
             found = self._of_node.get(node)
             if found is not None:
                 machine, point = found
-                watched = self._watched.setdefault(machine, [])
-                if point not in watched:
-                    watched.append(point)
+                self._watched.setdefault(machine, WatchedNodes()).add(point)
+                self._sampler.hasten(machine)
+        self._sampler.watch(self._watched)
 
-    async def publish(self) -> None:
-        """Notify the clients of what has changed."""
-        self._forget()
+    def unwatched(self) -> None:
+        self._has_gone = True
+
+    async def publish(self, within_s: float) -> None:
+        """Notify the clients of what has changed, or of nothing ``within_s``."""
+        if self._has_gone:
+            self._has_gone = False
+            self._forget()
+        for sample in await self._sampler.changed(within_s):
+            watched = self._watched.get(sample.machine)
+            if watched is not None:
+                for node, value in watched.changes(sample):
+                    await self._write(sample, node, value)
+
+    async def publish_arrays(self) -> None:
         for node, left in list(self._watched_arrays.items()):
             self._watched_arrays[node] = left - 1 if left > 0 else ARRAY_PAUSE
             if left <= 0:
                 await self._show_array(node)
-        for sample in await self._sampler.changed(list(self._watched)):
-            await self._show(sample, self._watched.get(sample.machine, ()))
 
     def _forget(self) -> None:
         """Nodes that have no subscription any more."""
         for node in list(self._watched_arrays):
-            if not self._space[node].attributes[ua.AttributeIds.Value].datachange_callbacks:
+            if not self._is_followed(node):
                 del self._watched_arrays[node]
         for machine, nodes in list(self._watched.items()):
-            kept = [node for node in nodes if self._space[node.id].attributes[ua.AttributeIds.Value].datachange_callbacks]
-            if kept:
-                self._watched[machine] = kept
-            else:
+            if not nodes.keep(self._is_followed):
                 del self._watched[machine]
+        self._sampler.watch(self._watched)
+
+    def _is_followed(self, node: ua.NodeId) -> bool:
+        return bool(self._space[node].attributes[ua.AttributeIds.Value].datachange_callbacks)
 
     async def _show(self, sample: Sample, points: Iterable[PointNode]) -> None:
         for node in points:
-            value = None if sample.state is None else node.point.read(sample.state)
-            fresh = data_value(value, node.point.type, sample.at, is_answered=sample.state is not None)
-            await self._space.write_attribute_value(node.id, ua.AttributeIds.Value, fresh)
+            await self._write(sample, node, None if sample.state is None else node.point.read(sample.state))
+
+    async def _write(self, sample: Sample, node: PointNode, value: PointValue) -> None:
+        fresh = data_value(value, node.point.type, sample.at, is_answered=sample.state is not None)
+        await self._space.write_attribute_value(node.id, ua.AttributeIds.Value, fresh)
 
     async def _show_array(self, node: ua.NodeId) -> None:
         array = self._arrays[node]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Iterable, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -16,6 +16,7 @@ from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
 from steptwin.gateways.clients import GatewayClient, NotPermitted, address_text
 from steptwin.gateways.contract import ClientState
 from steptwin.gateways.opcua.nodetypes import status
+from steptwin.gateways.opcua.subscriptions import MonitoredItems, Publish, packing
 
 CODES: tuple[tuple[type[SteptwinError], int], ...] = (
     (NotPermitted, ua.StatusCodes.BadUserAccessDenied),
@@ -67,6 +68,10 @@ class SessionRequests(Protocol):
 
     def watch(self, nodes: Iterable[ua.NodeId]) -> None:
         """Clients subscribe to these."""
+        ...
+
+    def unwatched(self) -> None:
+        """Some of them have no subscription any more."""
         ...
 
 
@@ -149,6 +154,22 @@ class GatewaySession(InternalSession):
     async def close_session(self, delete_subs: bool = True) -> None:
         self._service.leave(self)
         await super().close_session(delete_subs)
+
+    async def create_subscription(
+        self,
+        params: ua.CreateSubscriptionParameters,
+        callback: Publish,
+        request_callback: Callable[..., Any] | None = None,
+    ) -> ua.CreateSubscriptionResult:
+        result = await super().create_subscription(params, packing(callback), request_callback)
+        subscription = self.subscription_service.subscriptions[result.SubscriptionId]
+        subscription.monitored_item_srv = MonitoredItems(subscription, self.aspace, self._service.unwatched)
+        return result
+
+    async def transfer_subscriptions(
+        self, params: ua.TransferSubscriptionsParameters, callback: Publish
+    ) -> list[ua.TransferResult]:
+        return await super().transfer_subscriptions(params, packing(callback))
 
     async def create_monitored_items(self, params: ua.CreateMonitoredItemsParameters) -> list[ua.MonitoredItemCreateResult]:
         wanted = [one.ItemToMonitor.NodeId for one in params.ItemsToCreate]

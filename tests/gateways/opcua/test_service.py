@@ -1,0 +1,60 @@
+"""Which variables get another value from a sample."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterator
+
+from gateway_rig import GatewayWorld
+
+from steptwin.gateways.opcua.addressspace import PointNode, node_id
+from steptwin.gateways.opcua.service import WatchedNodes
+from steptwin.gateways.points import PointValue, points_of
+from steptwin.gateways.sampling import Sample, Sampler
+from steptwin.world.script import Set
+
+WATCHED = ("pins.IN3", "pins.IN4", "M1.position", "program.state")
+
+
+class Rig:
+    def __init__(self) -> None:
+        self.world = GatewayWorld('[[mic488]]\nname = "table"\n')
+        self.sampler = Sampler(self.world, {})
+        self.nodes = WatchedNodes()
+        points = {point.name: point for point in points_of(self.world.description.machines[0], self.world.description)}
+        self.all_of = {name: PointNode(node_id(f"table.{name}"), points[name]) for name in WATCHED}
+        for node in self.all_of.values():
+            self.nodes.add(node)
+
+    def sample(self) -> Sample:
+        return asyncio.run(self.sampler.take("table"))
+
+    def changes(self) -> dict[str, PointValue]:
+        found: Iterator[tuple[PointNode, PointValue]] = self.nodes.changes(self.sample())
+        return {node.point.name: value for node, value in found}
+
+
+def test_only_what_has_changed() -> None:
+    rig = Rig()
+    assert rig.changes() == {"pins.IN3": 0.0, "pins.IN4": 0.0, "M1.position": 0.0, "program.state": "stopped"}
+    assert rig.changes() == {}
+    rig.world.inner.do(Set((("table", "IN3", 1.0),)))
+    assert rig.changes() == {"pins.IN3": 1.0}
+    rig.nodes.add(rig.all_of["pins.IN4"])
+    assert rig.changes() == {}
+
+
+def test_what_is_not_known_and_is_known_again() -> None:
+    rig = Rig()
+    rig.changes()
+    rig.world.silent.add("table")
+    assert rig.changes() == dict.fromkeys(WATCHED)
+    rig.world.silent.clear()
+    assert set(rig.changes()) == set(WATCHED)
+
+
+def test_what_nobody_follows_is_left_out() -> None:
+    rig = Rig()
+    assert rig.nodes.keep(lambda node: node == node_id("table.pins.IN3"))
+    assert rig.changes() == {"pins.IN3": 0.0}
+    assert not rig.nodes.keep(lambda node: False)
