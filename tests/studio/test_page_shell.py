@@ -72,6 +72,7 @@ def test_keys_are_told(studio: Studio) -> None:
     dialog = page.get_by_role("dialog", name="Keys")
     expect(dialog).to_contain_text("Stop all, from everywhere")
     expect(dialog).to_contain_text("not an emergency stop")
+    expect(dialog).to_contain_text("1 … 9")
     page.keyboard.press("Escape")
     expect(dialog).to_have_count(0)
 

@@ -11,6 +11,9 @@ export const isInText = (target: EventTarget | null): boolean =>
 /** Where a key was pressed, inside of editors too. */
 const originOf = (event: KeyboardEvent): EventTarget | null => event.composedPath()[0] ?? event.target;
 
+/** So many panels have a key, a digit. */
+export const NUMBERED = 9;
+
 /** What a key means outside of controls: null for nothing. Escape is heard everywhere. */
 export type Meaning = "stop" | "live" | "pause" | "back" | "on" | "find" | "help" | { panel: number };
 

@@ -27,7 +27,7 @@ export const t = texts(
     writeHelp:
       "Registers have these values until power-off. The rest of the file takes effect when the controller starts with it: save it, and name it in the description (config = …), or put it into the controller with the vendor's program.",
     nothing: "The registers have the values of the file.",
-    written: "{count} registers of {machine} have the values of the file",
+    written: "Registers of {machine} with the values of the file: {count}",
     undo: "Undo writing",
     register: "Register",
     now: "now",
