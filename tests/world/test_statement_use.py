@@ -65,7 +65,7 @@ WBC_USES = [
     StatementUse((pin("IN1"),), governs=range(7, 10)),  # IF: up to its ENDIF
     StatementUse((ANY_PIN,), (ANY_PIN,)),
     StatementUse(),
-    StatementUse((), (axis(3),), keeps=True),
+    StatementUse((), (axis(3), value("AccM3")), keeps=True),
     StatementUse(),
     StatementUse((axis(1), value("x")), governs=range(12, 13), is_loop=True),
     StatementUse((value("x"),), waits=True),
