@@ -12,16 +12,19 @@ from mic488_rig import loaded
 from steptwin.errors import Misuse, Refusal
 from steptwin.files.world import World
 from steptwin.later import start
-from steptwin.machine import MILLISECOND, Nanos
+from steptwin.m1486.drive import speed_curve
+from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.mic488.registers import AXIS_STATUS_TEXTS
 from steptwin.mic488.status import AxisStatus
 from steptwin.motion.divisions import profile_of
+from steptwin.motion.ramps import plan_distance
 from steptwin.subject.commands import Enable, Home, Jog, StopAxes
 from steptwin.subject.following import filter_of
 from steptwin.subject.jogs import Held, WorldJogs
 from steptwin.subject.payloads import FramePayload, PlanPayload
 from steptwin.subject.world import WorldSubject
 from steptwin.world import script as do
-from steptwin.world.heldjog import STANDS_NS
+from steptwin.world.heldjog import STANDS_NS, STOP_NS
 from steptwin.world.kinds.m1486.heldjog import M1486HeldJog
 from steptwin.world.kinds.mic488.heldjog import Mic488HeldJog
 
@@ -413,3 +416,140 @@ def test_a_jog_that_is_cut_says_so_and_asks_for_nothing_more() -> None:
         ended.release(rig.world.now)
         ended.cut()
         assert ended.over == "let go"
+
+
+def asked(held: Mic488HeldJog, world: World) -> tuple[tuple[tuple[str, float], ...], ...]:
+    """What it asks for with its first extension; the requests are carried out."""
+    given = held.extend(world.now)
+    return tuple(values(one) for one in given)
+
+
+def values(one: object) -> tuple[tuple[str, float], ...]:
+    assert isinstance(one, do.Write)
+    return tuple((name, value) for _, name, value in one.values)
+
+
+@pytest.mark.parametrize(
+    ("acc", "velocity", "going", "way"),
+    [
+        # 5 pulses on the ramp, 240 at 10 mm/s, 5 to brake
+        (1000.0, 10.0, 0.0, 2.5),
+        (1000.0, -10.0, 0.0, -2.5),
+        # 160 ms on the ramp up to 3.2 mm/s, and 160 ms to brake
+        (20.0, 40.0, 0.0, 0.5 * 3.2 * 0.16 + 0.5 * 3.2 * 0.16),
+        # It goes on from 10 mm/s, or turns first and is taken to begin at rest.
+        (100.0, 40.0, 10.0, 0.5 * (10 + 26) * 0.16 + 0.5 * 26 * 0.26),
+        (100.0, -40.0, 10.0, -(0.5 * 16 * 0.16 + 0.5 * 16 * 0.16)),
+        (100.0, 10.0, 30.0, 10 * 0.17 + 0.5 * 10 * 0.1),
+        # A pulse at least
+        (5000.0, 0.001, 0.0, 0.01),
+    ],
+)
+def test_how_far_a_move_of_a_held_jog_goes(acc: float, velocity: float, going: float, way: float) -> None:
+    rig = mic(acc)
+    rig.world.mic488["a"].write("M1_VEL_ABS", going)
+    rig.run(1000)
+    held = Mic488HeldJog(rig.world.mic488["a"].device, "bus", Jog("a", 1, velocity))
+    assert (held.deadline(), held.advance(rig.world.now)) == (None, ())
+    ((*first, (name, distance)),) = asked(held, rig.world)
+    assert first == ([] if abs(velocity) == 40.0 else [("M1_VMAX", abs(velocity))])
+    assert name == "M1_POS_REL"
+    assert distance == pytest.approx(way, rel=1e-6)
+    assert held.deadline() == rig.world.now + STOP_NS
+
+
+def test_a_jog_of_a_mic488_that_is_let_go_before_it_moves_puts_vmax_back() -> None:
+    rig = mic()
+    held = Mic488HeldJog(rig.world.mic488["a"].device, "bus", Jog("a", 1, 10.0))
+    held.extend(rig.world.now)
+    assert held.release(rig.world.now) == (do.Write((("a", "M1_VMAX", 40.0),)),)
+    assert (held.over, held.deadline(), held.release(rig.world.now)) == ("let go", None, ())
+
+
+@pytest.mark.parametrize("ends", ["release", "drop"])
+def test_what_a_moving_axis_is_told_at_the_end_of_a_jog(ends: str) -> None:
+    rig = mic(20.0)
+    rig.world.mic488["a"].write("M1_VEL_ABS", 10.0)
+    rig.run(1000)
+    held = Mic488HeldJog(rig.world.mic488["a"].device, "bus", Jog("a", 1, 10.0))
+    begun = rig.world.now
+    for given in held.extend(begun):
+        rig.world.apply_input(given)
+    rig.run(50)
+    now = rig.world.now
+    assert rig.world.mic488["a"].device.axes[0].profile.moving(now)
+    given = held.release(now) if ends == "release" else held.drop(now)
+    assert given == (do.Write((("a", "M1_VEL_ABS", 0.0), ("a", "M1_VMAX", 40.0))),)
+    # Who has let go may brake as long as it takes; who has gone has to stand in time.
+    due = (now if ends == "release" else begun) + STOP_NS
+    assert held.deadline() == due
+    for one in given:
+        rig.world.apply_input(one)
+    assert held.advance(due - 1) == ()
+    stop = (do.Write((("a", "M1_STOP", 1.0),)),) if ends == "drop" else ()
+    assert held.advance(due) == stop
+    assert (held.over, held.deadline()) == ("let go" if ends == "release" else "lapsed", None)
+
+
+def test_a_jog_of_a_mic488_that_another_has_stopped_is_over() -> None:
+    rig = mic()
+    device = rig.world.mic488["a"].device
+    held = Mic488HeldJog(device, "bus", Jog("a", 1, 40.0))
+    held.extend(rig.world.now)
+    begun = rig.world.now
+    # Its request has not arrived within 200 ms.
+    rig.run(200)
+    assert held.extend(begun + 200 * MILLISECOND) != ()
+    assert held.extend(begun + 200 * MILLISECOND + 1) == ()
+    assert held.over == f"a M1: {AXIS_STATUS_TEXTS[device.axes[0].status]}"
+    assert (held.deadline(), held.extend(rig.world.now)) == (None, ())
+
+
+@pytest.mark.parametrize("variant", ["A", "A2x"])
+@pytest.mark.parametrize("velocity", [33, 100, 640, 1999, 5000])
+def test_a_move_of_a_held_jog_of_an_m1486_is_the_longest_that_ends_in_time(variant: str, velocity: int) -> None:
+    """100 ms: with one microstep more it would take longer."""
+    rig = chip(variant)
+    unit = 64 * rig.world.m1486["drum"].chip.variant.clock
+    held = M1486HeldJog(rig.world.m1486["drum"].chip, "chips", Jog("drum", 1, float(unit * velocity)))
+    (given,) = held.extend(rig.world.now)
+    assert isinstance(given, do.Send)
+    _, _, text, _, _ = given.data.decode().split("\r")
+    drive = rig.world.m1486["drum"].chip.drive
+    curve = speed_curve(
+        (drive.start_stop, drive.acceleration, drive.profile_speed, velocity),
+        drive.qualification,
+        rig.world.m1486["drum"].chip.variant.clock,
+    )
+    longest, longer = (plan_distance(0, 0, int(text[1:]) + more, curve).end or 0 for more in (0, drive.grid_u))
+    assert longest <= 100 * MILLISECOND < longer
+
+
+def test_a_jog_of_an_m1486_lapses_in_its_last_nanosecond() -> None:
+    rig = chip()
+    held = M1486HeldJog(rig.world.m1486["drum"].chip, "chips", Jog("drum", 1, -6400.0))
+    begun = rig.world.now
+    held.extend(begun)
+    assert held.deadline() == begun + MILLISECOND
+    drive = rig.world.m1486["drum"].chip.drive
+    held._target_u = drive.true_u(begun)  # as if it had moved
+    assert held.advance(begun + held.lasts_ns) != ()
+    assert held.over is None
+    held._target_u = drive.true_u(begun)
+    assert held.advance(begun + held.lasts_ns + 1) == (do.Send("chips", b"x7\rv1000\r"),)
+    assert (held.over, held.deadline()) == ("lapsed", None)
+
+
+def test_a_chip_that_does_something_else_for_two_seconds_ends_its_jog() -> None:
+    rig = chip()
+    held = M1486HeldJog(rig.world.m1486["drum"].chip, "chips", Jog("drum", 1, 6400.0))
+    begun = rig.world.now
+    held.extend(begun)
+    rig.subject.do(Jog("drum", 1, 64.0 * 640))
+    rig.run(100)
+    assert held.advance(begun + 2 * SECOND) == ()
+    assert (held.over, held.deadline()) == (None, begun + 2 * SECOND + MILLISECOND)
+    assert held.advance(begun + 2 * SECOND + 1) == ()
+    assert held.over is not None
+    assert held.over.startswith("the chip ")
+    assert held.deadline() is None
