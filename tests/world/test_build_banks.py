@@ -7,6 +7,9 @@ import pytest
 from steptwin.errors import Misuse
 from steptwin.files.session import session_of
 from steptwin.files.world import World
+from steptwin.wbc.check import check
+from steptwin.wbc.image import build
+from steptwin.wbc.positions import parse_positions
 
 FILES = {
     "one.prg": b"OUT1 = ON\n",
@@ -68,3 +71,24 @@ def test_names_of_positions_are_those_of_the_own_bank_or_of_the_only_table() -> 
     assert alone.program.banks.programs[3].steps == device.program.banks.programs[0].steps
     with pytest.raises(Misuse, match="positions"):
         world('programs = { 3 = "go.prg" }\npositions = { 0 = "a.csv", 2 = "b.csv" }', **files)
+
+
+def test_an_image_brings_its_own_positions_unless_the_bank_has_others() -> None:
+    go, positions = b"M1 = ON\nMOVEPTP @top\n", b"low;0;x;x;x\ntop;1;x;x;x\n"
+    table, _ = parse_positions(positions.decode())
+    executable = check(go.decode(), table).executable
+    assert executable is not None
+    image, _ = build(executable, table)
+    assert image is not None
+    for keys, row in (("", 1.0), ('\npositions = { 2 = "b.csv" }', 7.0)):
+        made = world('programs = { 2 = "go.wbc" }' + keys, **{"go.wbc": image, "b.csv": b"P0;0;x;x;x\nP1;7;x;x;x\n"})
+        banks = made.mic488["a"].device.program.banks
+        assert set(banks.positions) == {2}
+        assert banks.positions[2].rows[1].values[0] == row
+
+
+def test_what_is_doubtful_in_a_program_is_a_warning_with_its_place() -> None:
+    program = b"MAIN:\nWAIT IN2 = ON\nJUMP MAIN\nINT_IN1:\nJUMP MAIN\n"
+    (warning,) = world('program = "p.prg"', **{"p.prg": program}).blueprint.warnings
+    assert warning.splitlines()[0] == "p.prg:4:1: warning W201: every path from the interrupt label of IN1 leaves without RETURN"
+    assert world('program = "one.prg"').blueprint.warnings == []

@@ -139,11 +139,11 @@ def test_what_a_chip_does_not_take(command: ControllerCommand, kind: type[Except
         m1486.CONTROL[StopAxes](chip, None, StopAxes("c"))
 
 
-@pytest.mark.parametrize(("to", "is_taken"), [(96.0, True), (64.0, False)])
+@pytest.mark.parametrize(("to", "is_taken"), [(80.0, True), (112.0, False), (64.0, False)])
 def test_positions_lie_on_the_grid_from_where_the_chip_is(to: float, is_taken: bool) -> None:
-    """Microsteps of 32, one of them made, then whole steps of 64."""
-    chip = chips("m2\rq2", "f32", "r", "m1\rq1").m1486["c"].chip
-    assert (chip.drive.counter_u(chip.now), chip.drive.grid_u) == (32, 64)
+    """A microstep of 16 was made, then come whole steps of 64."""
+    chip = chips("m4\rq4", "f16", "r", "m1\rq1").m1486["c"].chip
+    assert (chip.drive.counter_u(chip.now), chip.drive.grid_u) == (16, 64)
     if is_taken:
         assert m1486.CONTROL[Move](chip, "chips", Move("c", 1, to=to))
         return

@@ -511,3 +511,16 @@ def test_words_that_are_near_nothing_have_no_fix(wrong: str) -> None:
 def test_addresses_for_records_of_vision_systems() -> None:
     text = '[[mic488]]\nname = "a"\nvision = "127.0.0.1:7001"\n[[m1486]]\nname = "c"\n[[mic488]]\nname = "b"\n'
     assert list(read_world("w", text).vision_addresses()) == [("a", "127.0.0.1:7001")]
+
+
+@pytest.mark.parametrize(
+    ("top", "message"),
+    [
+        ("[campaign]\n", "w.toml:1:1: error D004: this is a campaign, not a world"),
+        ("[parameters]\n", "w.toml:1:1: error D004: a file with [parameters] is for [[use]] of a description"),
+    ],
+)
+def test_of_a_file_that_is_something_else_nothing_more_is_told(top: str, message: str) -> None:
+    found = wrong(f"{top}[[mic488]]\nnme = 1\n")
+    assert found.count("error") == 1
+    assert message in found

@@ -57,3 +57,35 @@ def test_each_calculated_number_is_checked() -> None:
 def test_an_expression_ends_with_its_text() -> None:
     with pytest.raises(Misuse, match="column 3"):
         parse_expression("a b")
+
+
+RANGES = {"a": (1.0, 4.0), "b": (-3.0, -1.0), "c": (0.0, 0.0), "d": (-1.0, 1.0)}
+
+
+@pytest.mark.parametrize(
+    ("text", "least", "most"),
+    [
+        ("a > 0", 1.0, 1.0),
+        ("a > 4", 0.0, 0.0),
+        ("a >= 4", 0.0, 1.0),
+        ("a < 1", 0.0, 0.0),
+        ("a <= 1", 0.0, 1.0),
+        ("c == 0", 1.0, 1.0),
+        ("c != 0", 0.0, 0.0),
+        ("b == -2", 0.0, 1.0),
+        ("a == b", 0.0, 0.0),
+        ("a != b", 1.0, 1.0),
+        ("a > 0 and b > 0", 0.0, 0.0),
+        ("a > 0 and d > 0", 0.0, 1.0),
+        ("a > 0 and b < 0", 1.0, 1.0),
+        ("a > 4 or b > 0", 0.0, 0.0),
+        ("a > 4 or d > 0", 0.0, 1.0),
+        ("a > 0 or d > 0", 1.0, 1.0),
+        ("not a > 0", 0.0, 0.0),
+        ("not d > 0", 0.0, 1.0),
+        ("not (a > 4 or b > 0)", 1.0, 1.0),
+        ("a / d > 0", 0.0, 1.0),
+    ],
+)
+def test_what_a_condition_can_be_within_ranges(text: str, least: float, most: float) -> None:
+    assert parse_condition(text).range(RANGES.__getitem__) == (least, most)

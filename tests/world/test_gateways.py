@@ -131,9 +131,13 @@ def test_what_keys_just_take() -> None:
     assert isinstance(mqtt, MqttSpec)
     assert isinstance(epics, EpicsSpec)
     assert isinstance(modbus, ModbusSpec)
-    assert (mqtt.broker, mqtt.store, mqtt.sparkplug) == ("a:1", 1_000_000, SparkplugSpec(group="g", node="n", host="h"))
+    assert (mqtt.broker, mqtt.store) == ("a:1", 1_000_000)
+    assert mqtt.sparkplug == SparkplugSpec(group="g", node="n", host="h")
     assert (epics.beacons, epics.pva, epics.prefix) == ("127.0.0.1:1", "127.0.0.1:65534", "")
     assert modbus.units == {"table": 1, "other": 247}
+    (mqtt,) = read_world("hall.toml", HALL + '[gateway.mqtt]\ntopic = "a/b$"\n').gateways
+    assert isinstance(mqtt, MqttSpec)
+    assert mqtt.topic == "a/b$"
 
 
 @pytest.mark.parametrize(

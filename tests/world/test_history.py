@@ -12,6 +12,7 @@ from steptwin.errors import Misuse
 from steptwin.files.world import World
 from steptwin.machine import SECOND, Nanos
 from steptwin.world import history as module
+from steptwin.world.actions import Bytes, size_of
 from steptwin.world.history import History, Past
 from steptwin.world.plant import Plant
 from steptwin.world.script import Set, Write
@@ -238,3 +239,48 @@ def test_a_branch_begins_whenever_the_world_goes_back() -> None:
     assert history.branch == 0
     history.gone_back()
     assert history.branch == 1
+
+
+def test_what_a_snapshot_that_goes_had_seen_changed_stays_with_the_next(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "MOST_CONTROLLER_STATES", 16)
+    world = World.from_toml(TEXT)
+    history = History(world)
+    for count in range(20):
+        world.run(for_=0.01)
+        world.apply_input(Set((("m", f"IN{count + 1}", 1.0),)))
+        world.settle_all()
+        history.take()
+    assert len(history) == 16
+    changed = [name for state in history._states for machine, name in state.changed if name.startswith("IN")]
+    assert sorted(changed) == sorted(f"IN{count + 1}" for count in range(20))
+
+
+def test_inputs_are_bounded_by_their_bytes_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = '[[line]]\nname = "bus"\nkind = "modbus"\n' + TEXT.replace('name = "m"', 'name = "m"\nline = "bus"')
+    world = World.from_toml(text, keep_trace=False, keep_inputs=False)
+    given = Bytes("bus", "here", "rtu", b"nothing")
+    monkeypatch.setattr(module, "MOST_INPUT_BYTES", 3 * size_of(given))
+    history = History(world)
+    for count, kept in enumerate((1, 2, 3, 0, 1), start=1):
+        world.run(for_=0.1)
+        world.apply_input(given)
+        assert (history.kept_inputs, history.inputs_so_far) == (kept, count)
+    # Those that are undone no longer count.
+    world.run(for_=0.1)
+    snapshot = world.snapshot()
+    for _ in range(4):
+        world.run(for_=0.1)
+        world.apply_input(given)
+        assert history.kept_inputs == 2
+        world.restore(snapshot)
+        history.gone_back()
+        assert history.kept_inputs == 1
+
+
+def test_nothing_watches_the_trace_after_the_end() -> None:
+    world = make()
+    watchers = list(world.trace.watchers)
+    history = History(world)
+    assert world.trace.watchers != watchers
+    history.close()
+    assert world.trace.watchers == watchers

@@ -12,7 +12,7 @@ from steptwin.machine import MILLISECOND
 from steptwin.wire.crc import with_crc
 from steptwin.world.actions import Download, SetVariable
 from steptwin.world.kinds import line_kinds
-from steptwin.world.lines import LineTraffic
+from steptwin.world.lines import SCRIPTS, LineTraffic, LineWrite
 
 READ_STATUS = bytes.fromhex("03 27 1A 00 01")
 """M1_STATUS with firmware 1.70."""
@@ -244,3 +244,46 @@ def test_faults_name_the_links_of_a_line_and_know_their_frames(lines: str, key: 
             described("crc", link)
     else:
         described("crc" if lines == "bus" else "flip", link)
+
+
+@pytest.mark.parametrize("kind", ["rtu", "tcp"])
+def test_writes_are_told_of_places_that_are_there_and_of_those_that_come(kind: str) -> None:
+    there = world()
+    line, framed = there.lines["bus"], rtu if kind == "rtu" else tcp
+    line.connect("early", kind)
+    told: list[LineWrite] = []
+    writes = line_kinds()["modbus"].writes
+    assert writes is not None
+    end = writes(line, told.append)
+    line.connect("late", kind)
+    for place, pdu, unit in (("early", ON, 1), ("late", ON, 2), ("late", READ_STATUS, 1), ("early", b"\x06\xff\x00\0\7", 1)):
+        line.receive(place, framed(pdu, unit), there.now)
+        there.run(for_="50 ms")
+    assert [(one.place, one.units, one.outcome) for one in told] == [
+        ("early", (1,), "done"),
+        ("late", (2,), "done"),
+        ("early", (1,), "refusal"),
+    ]
+    assert [one.words for one in told[:2]] == [f"unit {unit}: write USER_REGISTER 5 = 7" for unit in (1, 2)]
+    end()
+    line.receive("early", framed(ON), there.now)
+    line.receive("late", framed(ON), there.now)
+    assert len(told) == 3
+
+
+def test_ports_are_served_by_what_is_put_around_the_controllers_but_not_those_of_scripts() -> None:
+    there = world()
+    line = there.lines["bus"]
+    before = line.connect("before", "tcp")
+    line.serve_by(lambda devices: {9: devices[1]})
+    after, scripts = line.connect("after", "tcp"), line.connect(SCRIPTS, "rtu")
+    rtu_after = line.connect("rtu", "rtu")
+    for place, unit in (("before", 1), ("after", 9)):
+        line.receive(place, tcp(READ_STATUS, unit), there.now)
+    line.receive(SCRIPTS, rtu(READ_STATUS), there.now)
+    line.receive("rtu", rtu(READ_STATUS, 9), there.now)
+    there.run(for_="50 ms")
+    assert [data for _, data in before.take(there.now)] == [tcp(OFF)]
+    assert [data for _, data in after.take(there.now)] == [tcp(OFF, 9)]
+    assert [data for _, data in rtu_after.take(there.now)] == [rtu(OFF, 9)]
+    assert scripts.take(there.now) == []  # its master has it

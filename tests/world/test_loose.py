@@ -245,3 +245,34 @@ def test_the_end_of_a_plan_at_speed_is_due() -> None:
     loose = Looseness(HELD, OVERRUNS, 0)
     assert moved(loose, Field(gentle), Course(HELD, gentle, 0, MechanicalState(0, 0)), MILLISECOND) is None
     assert loose.due is None
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize(("load", "away", "ends"), [(2.0, 0, -30), (-2.0, 0, 50), (2.0, 4, -34), (-2.0, 4, 46)])
+def test_it_falls_until_the_load_is_at_its_stop(sign: int, load: float, away: int, ends: int) -> None:
+    build = replace(FREE, sign=sign, zero=10, low=-30, high=50)
+    before = standing(build, 20, away)
+    found = moved(Looseness(build, MOTOR, 0), Field(at_rest(0, 0), is_energised=False), before, SECOND, load)
+    assert found is not None
+    assert found.end is not None
+    assert found.count(found.end) == (ends - 10) * sign
+
+
+@pytest.mark.parametrize(("inertia", "friction", "rate"), [(0.0, 0.0, 24.0), (1 / 32, 0.0, 12.0), (0.0, 0.25, 16.0)])
+def test_what_a_free_rotor_moves_besides_its_own(inertia: float, friction: float, rate: float) -> None:
+    before, field = standing(FREE), Field(at_rest(0, 0), is_energised=False)
+    burden = Burden(inertia, friction, 1.0)
+    found, _ = Looseness(FREE, MOTOR, 0).motion(field, before, before.at(0), 0, is_new=False, burden=burden, stands=False)
+    assert found is not None
+    assert found.velocity(SECOND) == -rate
+
+
+def test_a_stop_of_the_current_moment_is_not_due_again() -> None:
+    loose = Looseness(FREE, MOTOR, 0)
+    field, here = Field(at_rest(SECOND, 0)), standing(FREE)
+    assert moved(loose, field, here, SECOND, 0.76) is None
+    assert loose.due == SECOND + 300 * MILLISECOND
+    stiff = Looseness(replace(FREE, is_free=False), MOTOR, 0)
+    assert moved(stiff, field, here, SECOND, 5.0) is None
+    assert (stiff.due, stiff.is_free) == (None, False)
+    assert [build.is_loose for build in (FREE, HELD, Build(motor=MOTOR), Build())] == [True, True, False, False]

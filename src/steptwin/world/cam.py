@@ -60,12 +60,9 @@ class Cam:
         above, below = level.numerator * self._lifts, level.denominator
         for (x0, y0), (x1, y1) in pairwise(zip(self._x[1:], self._y[1:], strict=True)):
             over0, over1 = y0 * below - above, y1 * below - above
-            if over0 * direction >= 0 or over1 * direction >= 0:
-                rise = over1 - over0
-                at = _Ratio(x0, 1)
-                if rise:
-                    sign = 1 if rise > 0 else -1
-                    at = _Ratio((x0 * rise - over0 * (x1 - x0)) * sign, rise * sign)
+            if max(over0 * direction, over1 * direction) >= 0:
+                rise = abs(over1 - over0)
+                at = _Ratio(x0 * rise + abs(over0) * (x1 - x0), rise)  # used only where one of them is on the other side
                 yield _Ratio(x0, 1) if over0 * direction >= 0 else at, _Ratio(x1, 1) if over1 * direction >= 0 else at
 
     def next(self, level: Fraction, place: int, direction: int, way: int) -> int | None:

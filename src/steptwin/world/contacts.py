@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 from fractions import Fraction
-from math import floor
+from math import ceil, floor
 from typing import ClassVar, Protocol
 
 from steptwin.errors import Misuse
@@ -87,12 +87,9 @@ class Zone:
 
     def _turn(self, place: int) -> int:
         """The last turn whose zone, with hysteresis, begins at or below ``place``."""
-        if self.period is None or self.low is None:
+        if self.period is None:
             return 0
-        turn = floor((place - self.low + self.hysteresis) / Fraction(self.period)) + 1
-        while self._ends(turn)[0] - self.hysteresis > place:
-            turn -= 1
-        return turn
+        return ceil((place - (self.low or 0) + self.hysteresis + Fraction(1, 2)) / self.period) - 1
 
     def _ends(self, turn: int) -> tuple[int, int]:
         shift = 0 if self.period is None else floor(turn * self.period + Fraction(1, 2))

@@ -6,6 +6,7 @@ that has not the energy to leave the full step that it is at.
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import ceil, inf, sqrt
@@ -112,7 +113,7 @@ class FreeMotion:
             return []
         way: list[Segment] = []
         if abs(v) > slow:
-            if rate * direction >= 0.0 or (s.end_s < inf and abs(s.velocity(s.end_s)) > slow):
+            if rate * direction >= 0.0 or abs(s.velocity(s.end_s)) > slow:
                 return []
             way.append(ramp(begin_s, p, v, direction * slow, abs(rate)))
         at = way[0].position(way[0].end_s) if way else p
@@ -154,12 +155,10 @@ def slow_from(profile: Profile, now: Nanos, speed: float) -> Nanos | None:
     """First moment from ``now`` on at which a free motion is not faster than ``speed`` pulses/s; None if it never is."""
     if abs(profile.velocity(now)) <= speed:
         return now
-    for s, end in zip(profile.segments, profile.ends, strict=True):
-        if end == inf:
-            return None
-        until = profile.start + int(end)
-        if until > now:
-            # At the end of each segment it stands. It is faster than ``speed`` now, so what ends slower brakes.
-            brakes = abs(s.velocity(s.end_s)) < speed
-            return max(now, profile.start + ceil(s.when_speed(speed) * SECOND)) if brakes else until
-    return now
+    part = bisect_right(profile.ends, now - profile.start)
+    s, end = profile.segments[part], profile.ends[part]
+    if end == inf:
+        return None
+    # At the end of each segment it stands. It is faster than ``speed`` now, so what ends slower brakes.
+    brakes = abs(s.velocity(s.end_s)) < speed
+    return max(now, profile.start + ceil(s.when_speed(speed) * SECOND)) if brakes else profile.start + int(end)

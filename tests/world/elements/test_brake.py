@@ -337,3 +337,11 @@ def test_the_trace_has_the_fall() -> None:
 def test_mistakes_have_their_places(old: str, new: str, text: str) -> None:
     with pytest.raises(WorldError, match=f"(?s){text}"):
         World.from_toml((TEXT + BRAKE).replace(old, new, 1), name="t.toml")
+
+
+def test_a_brake_that_is_released_from_the_beginning_lets_go_in_its_time() -> None:
+    text = TEXT + BRAKE.replace('release = "a.OUT1"\n', "") + '[[wire]]\nfrom = "a.OUT1"\nto = "hold.release"\ninverted = true\n'
+    world = World.from_toml(text)
+    world.run(until=0.1)
+    released = [(record.time / SECOND, record.value) for record in world.trace.edges() if record.subject == "hold.released"]
+    assert released == [(0.0, 0.0), (0.04, 1.0)]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -9,6 +11,7 @@ from hypothesis import strategies as st
 from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND
+from steptwin.world.elements.cylinder import CYLINDER
 from steptwin.world.reader import WorldError
 
 TEXT = """
@@ -186,3 +189,13 @@ def test_snapshots_and_sessions_have_it(moment_s: float, tmp_path: object) -> No
 def test_mistakes_have_their_places(old: str, new: str, text: str) -> None:
     with pytest.raises(WorldError, match=text):
         World.from_toml(TEXT.replace(old, new, 1))
+
+
+@pytest.mark.parametrize("stroke", [3.0, 7.0, 50.0])
+def test_places_are_the_nearest(stroke: float) -> None:
+    world = World.from_toml(TEXT.replace("stroke = 50.0", f"stroke = {stroke}").replace("above = 45.0", "above = 2.5"))
+    cylinder = world.parts.built(CYLINDER)["clamp"]
+    for n in range(1, 40):
+        units = stroke * n / 41
+        assert abs(cylinder.places(units) - Fraction(str(units)) / Fraction(str(stroke)) * cylinder.travel.full) <= Fraction(1, 2)
+    assert cylinder.places(stroke) == cylinder.travel.full == 200 * 300 * MILLISECOND**2

@@ -9,6 +9,8 @@ import pytest
 from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
 from steptwin.machine import SECOND
+from steptwin.world.elements.gantry import GANTRY as ELEMENT
+from steptwin.world.lanes import MovedLane
 from steptwin.world.reader import WorldError
 
 CONTROLLER = """
@@ -233,3 +235,14 @@ def test_a_beam_that_is_too_heavy_for_both_stands(old: str, new: str) -> None:
     world.run(until=0.1)
     assert (world.read("ya.stalled"), world.read("yb.stalled")) == (1, 1)
     assert abs(world.read("beam.position")) < 1.0
+
+
+def test_its_beam_is_drawn_from_both_ends() -> None:
+    """640 pulses are a mm; the second end goes the other way."""
+    found = World.from_toml(text().replace('drive = "b.M1"', 'drive = "b.M1"\ninverted = true'))
+    (gantry,) = found.parts.built(ELEMENT).values()
+    assert ELEMENT.moved is not None
+    ((end, lane),) = ELEMENT.moved(gantry)
+    assert end.spec.name == "ya"
+    half = 1 / 1280
+    assert lane == MovedLane("beam", "position", "mm", half, other=("b", "1"), other_per_pulse=-half)

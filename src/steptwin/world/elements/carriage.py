@@ -70,9 +70,7 @@ class Carriage(Stateful):
         """Let the belt have a share of its frequency."""
         self._spring = Spring(self.spec.frequency * share, self.spec.damping)
         self._renew(now)
-        kernel, machine = self.axis.kernel, self.axis.mechanism.machine
-        kernel.report(machine, "edge", f"{self.spec.name}.{SPRING_SHARE}", share)
-        kernel.mark(self.spec.name)
+        self.axis.kernel.report(self.axis.mechanism.machine, "edge", f"{self.spec.name}.{SPRING_SHARE}", share)
 
     # ------------------------------------------------------------------ part of a kernel
 

@@ -313,7 +313,6 @@ def _stop_feeder(active: ActiveFault, conveyor: Conveyor, begins: bool, now: Nan
     conveyor.feeder_stands = begins
     kernel, name = conveyor.board.kernel, conveyor.spec.name
     kernel.report(kernel.owner(name), "edge", f"{name}.{FEEDER_STANDS}", float(begins))
-    kernel.mark(name)
     return f"the feeder of {name} {'stands' if begins else 'works again'}"
 
 

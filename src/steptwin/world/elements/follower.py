@@ -126,12 +126,10 @@ class Follower(Stateful):
     def hold(self, holds: bool, now: Nanos) -> None:
         self._held = self.lift(now) if holds else None
         self._report(STUCK, float(holds))
-        self.shaft.axis.kernel.mark(self.spec.name)
 
     def wear(self, share: float) -> None:
         self._share = exact_fraction(share)
         self._report(LIFT_SHARE, share)
-        self.shaft.axis.kernel.mark(self.spec.name)
 
     def _report(self, what: str, level: float) -> None:
         axis = self.shaft.axis
