@@ -89,3 +89,13 @@ RANGES = {"a": (1.0, 4.0), "b": (-3.0, -1.0), "c": (0.0, 0.0), "d": (-1.0, 1.0)}
 )
 def test_what_a_condition_can_be_within_ranges(text: str, least: float, most: float) -> None:
     assert parse_condition(text).range(RANGES.__getitem__) == (least, most)
+
+
+@pytest.mark.parametrize("before", ["(a > 0) and ", "not a > 0 and ", "- a > 0 and ", "abs(a) > 0 and "])
+def test_nesting_before_does_not_count(before: str) -> None:
+    """64 deep is permitted, 65 is not, whatever is closed before."""
+    deep = "(" * 63 + "{}" + ")" * 63
+    for inner in ("(a > 0)", "not a > 0", "- a > 0", "abs(a) > 0"):
+        assert parse_condition(before * 3 + deep.format(inner))
+        with pytest.raises(Misuse, match="nested more than 64 deep"):
+            parse_condition(before * 3 + f"({deep.format(inner)})")

@@ -284,3 +284,58 @@ def test_nothing_watches_the_trace_after_the_end() -> None:
     assert world.trace.watchers != watchers
     history.close()
     assert world.trace.watchers == watchers
+
+
+@pytest.mark.parametrize(("machines", "most"), [(1, 60), (2, 30), (3, 20), (5, 16)])
+def test_a_world_of_more_controllers_keeps_fewer_snapshots(monkeypatch: pytest.MonkeyPatch, machines: int, most: int) -> None:
+    monkeypatch.setattr(module, "MOST_CONTROLLER_STATES", 60)
+    world = World.from_toml("".join(f'[[mic488]]\nname = "m{n}"\n' for n in range(machines)), keep_inputs=False)
+    history = History(world)
+    for _ in range(most + 2):
+        world.run(for_=0.001)
+        history.take()
+    assert len(history) == most
+
+
+def test_what_a_past_knows_of_its_place() -> None:
+    world = make()
+    history = History(world)
+    past = Past(history)
+    assert not past.is_in_step
+    world.run(for_=1)
+    go(past, SECOND)
+    assert (past.is_in_step, past.lacks_inputs, past.can_go_on) == (True, False, True)
+    world.apply_input(Set((("m", "IN3", 1.0),)))
+    assert (past.is_in_step, past.lacks_inputs) == (True, True)
+    world.run(for_=1)
+    assert not past.is_in_step
+    for _ in past.go_on(world.now):
+        pass
+    assert (past.is_in_step, past.lacks_inputs, past.world.machine("m").pins()["IN3"]) == (True, False, 1.0)
+    past.forget()
+    assert not past.is_in_step
+    assert not past.world.notes_inputs  # its own inputs are kept by nobody
+
+
+def test_a_past_goes_on_from_where_it_is_and_back_to_the_nearest_state(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = make()
+    history = History(world)
+    world.run(for_=3)
+    past, restored = Past(history), []
+    restore = past.world.restore
+    monkeypatch.setattr(past.world, "restore", lambda snapshot: (restored.append(snapshot.now), restore(snapshot)))
+    for moment in (0.9, 1.0, 1.0, 2.1, 0.6, 0.55, 0.5, 2.0):
+        go(past, round(moment * SECOND))
+    # A state every 250 ms on the way; from one of them on where time goes back, and where there is a newer one.
+    assert restored == [0, 500_000_000, 500_000_000, 500_000_000, 2_000_000_000]
+
+
+def test_what_is_undone_in_its_own_moment_is_gone_too() -> None:
+    world = make()
+    history = History(world)
+    world.run(for_=1)
+    snapshot = world.snapshot()
+    world.apply_input(Set((("m", "IN3", 1.0),)))
+    world.restore(snapshot)
+    history.gone_back()
+    assert (history.kept_inputs, history.inputs_so_far, len(history)) == (0, 0, 2)

@@ -390,3 +390,51 @@ def test_a_kernel_in_which_nothing_has_changed_is_settled() -> None:
         kernel.replace("x", Relay())
     with pytest.raises(Misuse, match=r"wire to a\.A: a delay of -1 ns is negative"):
         Wire(PinName("a", "B"), PinName("a", "A"), delay=-1)
+
+
+def test_each_event_is_told_with_its_kernel() -> None:
+    """Of a machine alone, of joined ones, and changes from outside."""
+    told: list[tuple[Kernel, Nanos]] = []
+    alone, joined = Kernel(), Kernel()
+    alone.add("a", Relay(10))
+    for name in ("a", "b"):
+        joined.add(name, Relay(10))
+    joined.connect(wire("a.B", "b.A"))
+    for kernel in (alone, joined):
+        kernel.settle()
+        kernel.on_change = lambda one: told.append((one, one.now))
+        kernel.machines["a"].set_pin("A", 1.0, kernel.now)
+        assert told == [(kernel, kernel.now)]
+        told.clear()
+        kernel.settle()
+        assert told == [(kernel, 0)]
+        told.clear()
+        kernel.advance(15)
+        assert (kernel, 10) in told
+        told.clear()
+        kernel.advance(16)
+        assert told == []
+        kernel.advance(40)
+        assert bool(told) is (kernel is joined)
+        told.clear()
+
+
+def test_a_machine_that_says_nothing_of_its_edges_is_looked_at() -> None:
+    class Silent(Relay):
+        """Its hook is not called by itself."""
+
+        __slots__ = ()
+
+        def advance(self, now: Nanos) -> None:
+            hook, self.changed = self.changed, lambda: None
+            super().advance(now)
+            self.changed = hook
+
+    kernel = Kernel()
+    kernel.add("a", Silent(10))
+    kernel.add("b", Relay(5))
+    kernel.connect(wire("a.B", "b.A"))
+    kernel.settle()
+    kernel.machines["a"].set_pin("A", 1.0, 0)
+    kernel.advance(30)
+    assert [kernel.machines[name].pin("B") for name in ("a", "b")] == [0.0, 1.0]

@@ -77,6 +77,13 @@ COURSES: dict[str, tuple[Build, Plan, MechanicalState, dict[str, object]]] = {
     "behind": (Build(period_p=16), OUT, MechanicalState(-16, -16, behind=16), {}),
     "no place for it": (Build(period_p=16), OUT, MechanicalState(5, 5), {}),
     "half a period": (Build(period_p=16), STANDS, MechanicalState(4, 4), {}),
+    "a pulse before a stop": (Build(high=1), OUT, HERE, {}),
+    "a pulse before a stop below": (Build(low=-3, play=2), BACK, MechanicalState(-4, -3), {}),
+    "a pulse beyond a stop": (Build(high=89, period_p=16), OUT, HERE, {}),
+    "two pulses beyond a stop": (Build(high=88, period_p=16), OUT, HERE, {}),
+    "pushed at a stop below": (Build(low=0, play=5, period_p=64), BACK, MechanicalState(-5, 0, behind=5), {}),
+    "at a stop below without play": (Build(low=0, period_p=64), BACK, HERE, {}),
+    "the load meets a stop with its rotor": (Build(high=30, play=40), OUT, MechanicalState(0, 30), {}),
     "endless": (Build(high=50, play=3), ENDLESS, HERE, {}),
     "a stop of the field": (Build(play=3, zero=-20), STOPS, MechanicalState(0, 0), {}),
     "microsteps": (Build(low=-10, high=250), DIVIDED, HERE, {}),
@@ -101,6 +108,18 @@ COURSES: dict[str, tuple[Build, Plan, MechanicalState, dict[str, object]]] = {
     "a jump": (Build(motor=MOTOR, period_p=16), STOPS, MechanicalState(20, 20), {"jump": -60.5}),
     "a jump to rest": (Build(motor=MOTOR, period_p=16), STANDS, MechanicalState(12, 12), {"jump": 100.0}),
     "resonance": (Build(motor=RINGS, period_p=16), OUT, HERE, {"vibration": 0.3}),
+    "caught and lost at once": (
+        Build(motor=replace(RINGS, load=0.68, start_p=100.0, resonance=Resonance(60.0, 130.0, 14.0, 4.0, 0.9)), period_p=16),
+        plan_velocity(MotionState(BEGIN, 0, 0.0, 80.0), 80.0, 300.0, 300.0),
+        MechanicalState(0, 0, stalled=True),
+        {"vibration": 0.9},
+    ),
+    "resonance and a weak motor": (
+        Build(motor=replace(RINGS, load=0.3), period_p=16),
+        plan_position(MotionState(BEGIN, 0, 0.0, 0.0), 150, 100.0, 100.0, 190.0),
+        HERE,
+        {"vibration": 0.4},
+    ),
     "resonance, slower": (Build(motor=RINGS, period_p=16), BACK, HERE, {"vibration": 0.01}),
     "free": (Build(sign=-1, zero=5, motor=MOTOR, is_free=True), STANDS, MechanicalState(5, 8, behind=2), {"free": FALLS}),
     "free, at rest": (Build(motor=MOTOR, is_free=True), STANDS, MechanicalState(3, 3), {"free": at_rest(BEGIN, 3)}),
@@ -215,6 +234,44 @@ backlash = 0.5
 """
 
 
+CHIP_AND_TWO = """
+[[m1486]]
+name = "c"
+program = "p"
+[[mic488]]
+name = "a"
+[mic488.M1]
+acc = 500.0
+dec = 300.0
+vel = 700.0
+[[axis]]
+name = "x"
+drive = "c.M1"
+pulses_per_unit = 640.0
+[[axis]]
+name = "y"
+drive = "a.M1"
+pulses_per_unit = 20.0
+[[wire]]
+from = "a.OUT1"
+to = "c.B3"
+"""
+"""The acceleration of the chip falls from 300 steps/s on."""
+
+
+def with_a_chip() -> Iterator[tuple[str, list[str]]]:
+    world = World.from_toml(CHIP_AND_TWO, {"p": b"[\rs100\ra900\rp300\rv700\rf64000\rr\rw9000\r]\r"})
+    world.mic488["a"].write("M1_EN", 1)
+    world.mic488["a"].write("M1_POS_ABS", 1100.0)
+    one, other = (world.parts.built(AXIS)[name] for name in ("x", "y"))
+    for moment in (0.0, 0.05, 0.4, 0.9, 1.6):
+        world.run(until=moment)
+        for shares in ((0.5, 0.5), (0.5, -0.5), (0.25, -0.5)):
+            its = Coordinate((one, other), shares, (Pulled(), Pulled()))
+            turns = " ".join(str(turn - world.now) for turn in its.turns(world.now))
+            yield f"{shares} at {moment}", [f"  {its.place(world.now)} {turns}"]
+
+
 def coordinates() -> Iterator[tuple[str, list[str]]]:
     world = World.from_toml(TWO)
     for name, value in (("M1_EN", 1), ("M2_EN", 1), ("M1_POS_ABS", 900.0), ("M2_POS_ABS", -1500.0)):
@@ -257,7 +314,7 @@ def cams() -> Iterator[tuple[str, list[str]]]:
         yield f"a turn of {turn}", lines
 
 
-SOURCES: tuple[Callable[[], Iterator[tuple[str, list[str]]]], ...] = (courses, free_motions, coordinates, cams)
+SOURCES: tuple[Callable[[], Iterator[tuple[str, list[str]]]], ...] = (courses, free_motions, coordinates, with_a_chip, cams)
 
 
 def ways(source: Callable[[], Iterator[tuple[str, list[str]]]]) -> dict[str, list[str]]:

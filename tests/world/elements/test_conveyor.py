@@ -303,3 +303,45 @@ def test_a_belt_is_longer_than_a_step_of_its_drive() -> None:
 def test_mistakes_have_their_places(old: str, new: str, text: str) -> None:
     with pytest.raises(WorldError, match=text):
         World.from_toml(TEXT.replace(old, new, 1))
+
+
+HELD = ON_AN_AXIS.replace('next = "second"', '[[conveyor.stop]]\nat = 150.0\n')
+
+
+def test_a_belt_that_goes_back_takes_what_stands_with_its_first_pulse() -> None:
+    text = HELD.replace("[[conveyor.stop]]\nat = 150.0\n", "") + '[[wire]]\nfrom = "a.OUT2"\nto = "belt.stop1"\n'
+    text = text.replace('[[conveyor.sensor]]\nat = 100.0', "[[conveyor.stop]]\nat = 150.0\n[[conveyor.sensor]]\nat = 100.0")
+    world = World.from_toml(text)
+    device = world.mic488["a"]
+    device.axis[1].enable()
+    device.write("OUT2", 1)
+    world.press("feeder", "10 ms")
+    world.run(for_=0.1)
+    device.axis[1].move_to(40.0)
+    world.run(until="idle")
+    assert happened(world)[-1][1] == "belt.1 stands at 150 mm of belt"
+    began = world.now
+    device.axis[1].move_to(30.0)
+    world.run(until="idle")
+    # 100 pulses/mm and 1000 mm/s²: the first pulse after √(2 / 100 000) s.
+    ((back, what),) = happened(world)[-1:]
+    assert (back - began / MILLISECOND, what) == (pytest.approx(4.4722, abs=1e-3), "belt.1 goes back on belt")
+
+
+def test_a_workpiece_waits_until_the_next_belt_has_room() -> None:
+    second = '[[conveyor]]\nname = "second"\nlength = 100.0\nspeed = 50.0\nrun = "a.OUT2"\nworkpiece = 30.0\nfeed = "a.OUT3"\n'
+    world = World.from_toml(TEXT.replace("workpiece = 40.0", 'workpiece = 40.0\nnext = "second"') + second)
+    device = world.mic488["a"]
+    device.write("OUT3", 1)
+    device.write("OUT1", 1)
+    world.press("feeder", "10 ms")
+    world.run(until=5.0)
+    assert happened(world)[-1] == (3200, "belt.1 stands at 400 mm of belt")
+    device.write("OUT2", 1)
+    world.run(until=6.0)
+    # 30 mm at 50 mm/s, and the first place beyond
+    assert [one for one in happened(world) if one[0] > 5000] == [
+        (5600 + 1e-6, "belt.1 goes on on belt"),
+        (5600 + 1e-6, "belt.1 leaves belt"),
+        (5600 + 1e-6, "belt.1 is on second"),
+    ]
