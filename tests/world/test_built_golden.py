@@ -17,11 +17,106 @@ from steptwin.world.elements.axis import AXIS
 
 FOLDER = Path(__file__).parent / "golden"
 GOLDEN, WORLDS = FOLDER / "built.txt", FOLDER / "elements.txt"
+ACROSS = """
+[[line]]
+name = "bus"
+kind = "modbus"
+[[mic488]]
+name = "a"
+line = "bus"
+[[mic488]]
+name = "b"
+line = "bus"
+unit = 2
+[mic488.M1]
+enc_resol = 4000
+[[m1486]]
+name = "c"
+[[axis]]
+name = "x"
+drive = "a.M1"
+unit = "mm"
+pulses_per_unit = 100
+inverted = true
+travel = [-10, 90]
+start = 1.5
+backlash = 0.25
+[[axis.switch]]
+above = 80
+to = "b.IN1"
+[axis.motor]
+torque = [[0, 1.0], [1500, 0.3]]
+inertia = 0.00003
+friction = 0.05
+when_off = "free"
+[[axis]]
+name = "y"
+kind = "rotary"
+drive = "b.M1"
+[axis.encoder]
+follows = "x"
+[[axis.switch]]
+position = 90
+width = 4
+to = "a.IN2"
+[[axis]]
+name = "z"
+drive = "c.M1"
+[[shaft]]
+name = "main"
+axis = "y"
+ratio = 2
+[[shaft.cam]]
+from = 90
+until = 180
+to = "c.B3"
+[[follower]]
+name = "lever"
+shaft = "main"
+points = [[0, 0], [180, 5]]
+[[follower.switch]]
+above = 3
+to = "a.IN3"
+[[carriage]]
+name = "head"
+axis = "x"
+frequency = 12
+damping = 0.1
+[[carriage.switch]]
+above = 50
+to = "c.B4"
+[[cylinder]]
+name = "clamp"
+extend = "c.B5"
+[[cylinder.switch]]
+above = 45
+to = "b.IN4"
+[[conveyor]]
+name = "belt"
+length = 200
+speed = 50
+run = "a.OUT2"
+next = "second"
+[[conveyor.sensor]]
+at = 100
+to = "b.IN5"
+[[conveyor]]
+name = "second"
+length = 200
+axis = "z"
+[[collision]]
+name = "crash"
+when = "x.position > y.position + clamp.position"
+[[wire]]
+from = "crash.hit"
+to = "a.IN6"
+"""
+"""References to other controllers at every key that can have them."""
 FILE = re.compile(r"^@ (.+)\n", re.MULTILINE)
 
 
 def worlds() -> dict[str, World]:
-    found = {}
+    found = {"across": World.from_toml(ACROSS)}
     for case in WORLDS.read_text(encoding="utf-8").split("=== ")[1:]:
         name, _, body = case.partition("\n")
         text, *named = FILE.split(body.partition("---\n")[0])

@@ -355,3 +355,21 @@ def test_a_number_is_on_the_side_of_the_exact_level(level: Fraction, value: floa
         for _ in range(abs(steps)):
             value = nextafter(value, inf if steps > 0 else -inf)
     assert Border.of(level).side(value) == (value > level) - (value < level)
+
+
+@pytest.mark.parametrize(
+    ("level", "border"),
+    [
+        (Fraction(1, 2), (0.5, 0.5)),
+        (Fraction(1, 3), (1 / 3, nextafter(1 / 3, inf))),
+        (Fraction(-1, 3), (nextafter(-1 / 3, -inf), -1 / 3)),
+        (Fraction(2, 3), (2 / 3, nextafter(2 / 3, inf))),
+        (Fraction(1, 10), (nextafter(0.1, -inf), 0.1)),
+        (Fraction(10**400), (1.7976931348623157e308, inf)),
+        (Fraction(-(10**400)), (-inf, -1.7976931348623157e308)),
+    ],
+)
+def test_borders_lie_beside_numbers_that_floats_do_not_have(level: Fraction, border: tuple[float, float]) -> None:
+    assert Border.of(level) == border
+    below, above = border
+    assert (Border.of(level).side(below), Border.of(level).side(above)) == ((0, 0) if below == above else (-1, 1))

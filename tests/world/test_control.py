@@ -174,3 +174,9 @@ def test_a_chip_that_moves_or_was_stopped_in_a_move_takes_no_move() -> None:
 def test_lines_that_cannot_be_sought(pin: str) -> None:
     with pytest.raises(Misuse, match="permitted are B1 to B21, such as '-B8'"):
         m1486.seek(chips().m1486["c"].chip, "chips", Seek("c", 1, 1, pin))
+
+
+def test_a_distance_of_0_is_no_position_that_is_ignored() -> None:
+    world = World.from_toml('[[mic488]]\nname = "a"\n[mic488.M1]\ngear = 1e10\n')
+    command = Move("a", 1, by=0.0)
+    assert mic488.CONTROL[Move](world.mic488["a"].device, None, command) == do.Write((("a", "M1_POS_REL", 0.0),))

@@ -67,7 +67,7 @@ COURSES: dict[str, tuple[Build, Plan, MechanicalState, dict[str, object]]] = {
     "a stop below": (Build(low=-30, period_p=16, play=4), TURNS, MechanicalState(0, 2), {}),
     "a stop above": (Build(high=20, period_p=16), OUT, HERE, {}),
     "at a stop": (Build(high=0, period_p=16), OUT, HERE, {}),
-    "at a stop, drawn": (Build(high=0, period_p=64), BACK, MechanicalState(0, 0, behind=-9), {}),
+    "at a stop, drawn": (Build(low=-40, high=0, period_p=64), BACK, MechanicalState(0, 0, behind=-9), {}),
     "drawn beyond the end": (Build(high=0, period_p=640), BACK, MechanicalState(0, 0, behind=-200), {}),
     "away from a stop": (Build(low=0, play=5), OUT, MechanicalState(-5, 0), {}),
     "play": (Build(play=9), TURNS, HERE, {}),
@@ -76,6 +76,7 @@ COURSES: dict[str, tuple[Build, Plan, MechanicalState, dict[str, object]]] = {
     "play that is not used up": (Build(play=200), TURNS, MechanicalState(0, 100), {}),
     "behind": (Build(period_p=16), OUT, MechanicalState(-16, -16, behind=16), {}),
     "no place for it": (Build(period_p=16), OUT, MechanicalState(5, 5), {}),
+    "no place for it, downwards": (Build(period_p=64), BACK, MechanicalState(5, 5), {}),
     "half a period": (Build(period_p=16), STANDS, MechanicalState(4, 4), {}),
     "a pulse before a stop": (Build(high=1), OUT, HERE, {}),
     "a pulse before a stop below": (Build(low=-3, play=2), BACK, MechanicalState(-4, -3), {}),
@@ -119,6 +120,12 @@ COURSES: dict[str, tuple[Build, Plan, MechanicalState, dict[str, object]]] = {
         plan_position(MotionState(BEGIN, 0, 0.0, 0.0), 150, 100.0, 100.0, 190.0),
         HERE,
         {"vibration": 0.4},
+    ),
+    "resonance, but a weak motor before": (
+        Build(motor=replace(RINGS, curve=((0.0, 1.0), (80.0, 0.9), (90.0, 0.3), (400.0, 0.3))), period_p=16),
+        plan_position(MotionState(BEGIN, 0, 0.0, 0.0), 400, 300.0, 100.0, 190.0),
+        HERE,
+        {"vibration": 0.2},
     ),
     "resonance, slower": (Build(motor=RINGS, period_p=16), BACK, HERE, {"vibration": 0.01}),
     "free": (Build(sign=-1, zero=5, motor=MOTOR, is_free=True), STANDS, MechanicalState(5, 8, behind=2), {"free": FALLS}),
@@ -199,9 +206,10 @@ def profile_text(found: Profile) -> str:
 
 def free_motions() -> Iterator[tuple[str, list[str]]]:
     for name, body in BODIES.items():
+        begins = [(500, 0.0, 0.0), (500, 0.25, 25.0), (500, 0.25, -25.0), (500, 0.0, 150.0), (500, -0.5, -150.0)]
+        begins += [(500, 0.0, 400.0), (500, 0.0, -400.0), (510, 0.0, -30.0), (498, 0.0, 30.0), (505, 0.0, 60.0)]
         yield f"from there: {name}", [
-            f"  {velocity:g} {phase:g}: {profile_text(body.profile(7, 500, phase, velocity))}"
-            for velocity, phase in ((0.0, 0.0), (25.0, 0.25), (-25.0, 0.25), (150.0, 0.0), (-150.0, -0.5), (400.0, 0.0), (-400.0, 0.0))
+            f"  {velocity:g}: {profile_text(body.profile(7, base, phase, velocity))}" for base, phase, velocity in begins
         ]
         field = Wells(1.0, 64.0)
         runs = ((velocity, body.overrun(field, 7, 500, velocity)) for velocity in (100.0, -250.0, 300.0, 600.0, -600.0))

@@ -191,3 +191,32 @@ def test_it_can_be_restored_anywhere(moment_s: float, tmp_path: object) -> None:
     place = f"{tmp_path}/s.json"
     save(session_of(found), place)
     assert load(place).replay().trace.digest() == found.trace.digest()
+
+
+def test_switches_of_a_stuck_follower_stay_as_they_are() -> None:
+    """Also where its axis gets another plan."""
+    world = start(World.from_toml(TEXT))
+    world.run(until="knife.position > 11.5")
+    world.fault("stuck-follower element=knife name=stuck")
+    switched = edges(world, "knife.switch1")
+    assert switched[-1][1] == 1
+    world.run(for_=0.05)
+    world.mic488["a"].write("M1_POS_ABS", 30.0)
+    world.run(for_=3.0)
+    assert lift(round(world.axis["x"].position * 160)) < 11.0
+    assert edges(world, "knife.switch1") == switched
+    now = world.now / SECOND
+    world.clear_fault("stuck")
+    assert edges(world, "knife.switch1")[len(switched) :] == [(now, 0)]
+
+
+def test_a_cam_that_wears_at_rest_changes_switches_at_once() -> None:
+    world = start(World.from_toml(TEXT))
+    world.run(until="knife.position > 11.5")
+    world.mic488["a"].write("M1_STOP", 1)
+    world.run(for_=0.1)
+    now = world.now / SECOND
+    world.fault("worn-cam element=knife share=0.5 name=worn")
+    assert edges(world, "knife.switch1")[-1] == (now, 0)
+    world.clear_fault("worn")
+    assert edges(world, "knife.switch1")[-1] == (now, 1)

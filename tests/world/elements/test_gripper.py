@@ -153,3 +153,14 @@ def test_snapshots_have_it(moment_s: float) -> None:
     other.run(until=2.0)
     assert other.trace.digest() == world.trace.digest()
     assert other.read("jaws.held") == 1
+
+
+def test_closed_jaws_take_nothing_whatever_else_happens() -> None:
+    world = World.from_toml(TEXT)
+    world.press("at_pick")
+    for output in ("OUT4", "OUT1", "OUT2"):
+        world.mic488["a"].write(output, 1)
+    world.run(until=1.3)
+    world.press("at_place")
+    world.run(until=1.4)
+    assert world.read("jaws.held") == 0

@@ -90,8 +90,7 @@ class Gripper(Carrier):
     def deadline(self) -> Nanos | None:
         now = self.board.kernel.now
         touches = self.travel.reaches(self._at, now, 1)
-        opens = self.travel.reaches(self._at - 1, now, -1)
-        moments = (*self.travel.turns(now), *(one for one in (touches, opens) if one is not None))
+        moments = (*self.travel.turns(now), *(() if touches is None else (touches,)))
         return min(moments, default=None)
 
     @property
