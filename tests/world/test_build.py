@@ -331,3 +331,10 @@ def test_characters_of_a_chip_take_the_time_of_its_own_line(own: str, other: str
     assert (early == b"B") is at_once
     world.run(for_=1)
     assert early + world.line["one"].received() == b"B"
+
+
+def test_another_seed_is_of_the_same_description() -> None:
+    world = World.from_toml('[world]\nseed = 3\n[[mic488]]\nname = "a"\n')
+    other = world.blueprint.with_seed(5)
+    assert (world.blueprint.spec.seed, other.spec.seed) == (3, 5)
+    assert other.makers is world.blueprint.makers

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from steptwin.files.export import axis_views
 from steptwin.files.world import World
 from steptwin.world.elements import ELEMENTS
 from steptwin.world.elements.axis import AXIS
@@ -129,6 +130,7 @@ def described(world: World) -> Iterator[str]:
     yield f"kernels: {'; '.join(' '.join(names) for names in world.blueprint.joined or ())}"
     for name, axis in world.parts.built(AXIS).items():
         yield f"axis {name}: {axis.mechanism.build}, {float(axis.scale.pulses_per_unit):.12g} imp/{axis.scale.unit}"
+    yield from (f"view {'.'.join(name)}: {view}" for name, view in axis_views(world).items())
     for element in ELEMENTS.values():
         for spec in world.spec.elements_of(element):
             refers = (f"{one.one}–{one.other} {'.'.join(map(str, one.path))}" for one in element.refers(spec, world.spec))
@@ -136,6 +138,9 @@ def described(world: World) -> Iterator[str]:
         for name, built in world.parts.built(element).items():
             if element.drawing is not None:
                 yield f"  {name} is drawn: {element.drawing(built)}"
+            for signal, of in ({} if element.signals is None else element.signals(built)).items():
+                sources = " ".join(source.name for source in of.sources)
+                yield f"  {name}.{signal}: {of.unit} {of.bounds} of {sources}"
             if element.moved is not None:
                 yield from (f"  {name} is moved by {axis.spec.name}: {lane}" for axis, lane in element.moved(built))
     for kernel in world.kernels:

@@ -373,3 +373,14 @@ def test_borders_lie_beside_numbers_that_floats_do_not_have(level: Fraction, bor
     assert Border.of(level) == border
     below, above = border
     assert (Border.of(level).side(below), Border.of(level).side(above)) == ((0, 0) if below == above else (-1, 1))
+
+
+@pytest.mark.parametrize("text", ["x.position < x.position * 2 - 10", "x.position * 2 - 10 > x.position", "x.position > 10"])
+def test_a_signal_on_both_sides(text: str) -> None:
+    condition = SignalCondition(text, SIGNALS.__getitem__)
+    profile = Moving().profile
+    moment = condition.change(profile.start)
+    assert moment == profile.pulse_time(10, profile.start)
+    assert moment is not None
+    assert condition.holds(moment - 1)
+    assert not condition.holds(moment)

@@ -256,3 +256,40 @@ def test_a_place_where_a_way_begins_is_reached_when_it_is_come_to_again() -> Non
     assert CountedPosition(axis).reaches(0, 0, 1) == pytest.approx(4 * SECOND, abs=2)
     assert CountedPosition(axis).reaches(0, 0, -1) == pytest.approx(2 * SECOND, abs=2)
     assert CountedPosition(axis).reaches(10, SECOND, 1) == pytest.approx(5 * SECOND, abs=2)
+
+
+def test_a_switch_whose_carriage_does_as_before_asks_it_nothing() -> None:
+    class Counted:
+        """Stands; counts how often it is asked."""
+
+        def __init__(self) -> None:
+            self.asked = 0
+            self.plan = 1
+
+        def version(self) -> object:
+            return self.plan
+
+        def place(self, now: int) -> int:
+            self.asked += 1
+            return 0
+
+        def reaches(self, position: int, after: int, direction: int) -> None:
+            return None
+
+    kernel, carriage = Kernel(), Counted()
+    kernel.add("m", Mic488Device(controller()))
+    switch = Switch(Circuit(kernel, PinName("m", "IN3")), carriage, Zone(5, 9), 0)
+    switch.update(0)
+    asked = carriage.asked
+    for now in (1, 2, 3):
+        switch.update(now)
+    assert carriage.asked == asked
+    carriage.plan = 2
+    switch.update(4)
+    assert carriage.asked == asked + 1
+    switch.set_state(switch.copy_state())
+    switch.update(5)
+    assert carriage.asked == asked + 1
+    carriage.plan = 3
+    switch.update(6)
+    assert carriage.asked == asked + 2

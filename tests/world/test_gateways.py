@@ -114,6 +114,14 @@ def test_what_a_key_does_not_take(table: str, told: str) -> None:
     assert f"hall.toml:4:1: error D003: [gateway.{kind}]: {told}\n" in str(error.value)
 
 
+def test_what_is_no_table_of_gateways() -> None:
+    with pytest.raises(WorldError) as error:
+        read_world("hall.toml", "gateway = 1\n" + HALL)
+    kinds = ", ".join(f"[gateway.{plain.kind}]" for plain in PLAIN)
+    lines = str(error.value).splitlines()
+    assert (lines[0], lines[-1].strip()) == ("hall.toml:1:1: error D002: [gateway] is 1", f"= expected tables: {kinds}")
+
+
 def test_what_keys_just_take() -> None:
     text = """
     [gateway.mqtt]

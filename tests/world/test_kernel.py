@@ -431,10 +431,12 @@ def test_a_machine_that_says_nothing_of_its_edges_is_looked_at() -> None:
             self.changed = hook
 
     kernel = Kernel()
+    kernel.add("loud", Relay(10))
     kernel.add("a", Silent(10))
     kernel.add("b", Relay(5))
     kernel.connect(wire("a.B", "b.A"))
     kernel.settle()
-    kernel.machines["a"].set_pin("A", 1.0, 0)
+    for name in ("loud", "a"):
+        kernel.machines[name].set_pin("A", 1.0, 0)
     kernel.advance(30)
     assert [kernel.machines[name].pin("B") for name in ("a", "b")] == [0.0, 1.0]

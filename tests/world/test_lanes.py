@@ -8,7 +8,7 @@ from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.lines import interface
 from steptwin.m1486.variants import variant
 from steptwin.world.kinds.m1486.lanes import AXIS, lanes
-from steptwin.world.lanes import AxisLane, Mechanics, PhaseOutputs, StepOutputs, plain_view
+from steptwin.world.lanes import AxisLane, Mechanics, MovedLane, PhaseOutputs, StepOutputs, plain_view
 
 
 def test_a_chip_is_shown_in_full_steps_with_pulses_of_1800_ns() -> None:
@@ -37,3 +37,11 @@ def test_names_of_columns() -> None:
 
 def test_an_axis_of_which_nothing_is_known() -> None:
     assert plain_view("3") == AxisLane("M3", "imp", 1.0, StepOutputs("M3_STEP", "M3_DIR", False, 5000))
+
+
+def test_how_steep_a_moved_lane_is() -> None:
+    """Also from its last point through the end of a turn to the first one."""
+    assert MovedLane("s", "angle", "degree", 2.0).steepest == 1.0
+    points = ((30.0, 1.0), (90.0, 4.0), (300.0, 7.0))
+    assert MovedLane("f", "position", "mm", 2.0, points=points).steepest == 6 / 90
+    assert MovedLane("f", "position", "mm", 2.0, points=points, turn=390.0).steepest == 3 / 60

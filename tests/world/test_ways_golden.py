@@ -93,6 +93,7 @@ COURSES: dict[str, tuple[Build, Plan, MechanicalState, dict[str, object]]] = {
     "blocked": (Build(), TURNS, HERE, {"blocked": True}),
     "blocked and stalled": (Build(period_p=16, motor=MOTOR), OUT, MechanicalState(0, 0, stalled=True), {"blocked": True}),
     "a motor": (Build(motor=MOTOR, period_p=16), OUT, HERE, {}),
+    "a stalled motor, caught at once": (Build(motor=MOTOR, period_p=16), BACK, MechanicalState(3, 3, stalled=True), {}),
     "a motor that stalls": (Build(motor=WEAK, period_p=16), TURNS, HERE, {}),
     "a motor that stalls, inverted": (Build(sign=-1, motor=WEAK, period_p=16), TURNS, HERE, {}),
     "a motor that stalls where it is fast": (Build(motor=MOTOR, period_p=16, play=2), JUMPS, HERE, {}),
@@ -208,9 +209,10 @@ def free_motions() -> Iterator[tuple[str, list[str]]]:
     for name, body in BODIES.items():
         begins = [(500, 0.0, 0.0), (500, 0.25, 25.0), (500, 0.25, -25.0), (500, 0.0, 150.0), (500, -0.5, -150.0)]
         begins += [(500, 0.0, 400.0), (500, 0.0, -400.0), (510, 0.0, -30.0), (498, 0.0, 30.0), (505, 0.0, 60.0)]
-        yield f"from there: {name}", [
-            f"  {velocity:g}: {profile_text(body.profile(7, base, phase, velocity))}" for base, phase, velocity in begins
-        ]
+        yield (
+            f"from there: {name}",
+            [f"  {velocity:g}: {profile_text(body.profile(7, base, phase, velocity))}" for base, phase, velocity in begins],
+        )
         field = Wells(1.0, 64.0)
         runs = ((velocity, body.overrun(field, 7, 500, velocity)) for velocity in (100.0, -250.0, 300.0, 600.0, -600.0))
         yield f"runs on: {name}", [f"  {velocity:g}: {'-' if found is None else profile_text(found)}" for velocity, found in runs]

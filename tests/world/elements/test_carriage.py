@@ -254,3 +254,11 @@ def test_a_stiff_belt_is_settled_while_its_axis_stands() -> None:
 
     assert [at(t) for t in (0.0, 0.04, 0.08, 0.1, 0.25, 0.3, 0.34)] == [0.0] * 6 + [1.0]
     assert found.read("tool.position") == 20.0
+
+
+@pytest.mark.parametrize("place", [0.0, 12.5])
+def test_it_stands_where_its_axis_does_at_the_beginning(place: float) -> None:
+    found = world(axis=f"start = {place}")
+    assert [found.read(f"tool.{name}") for name in ("position", "deflection", "settled")] == [place, 0.0, 1.0]
+    found.run(for_=1.0)
+    assert found.read("tool.position") == place

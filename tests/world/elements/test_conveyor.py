@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from math import isnan
 
 import pytest
@@ -305,12 +306,12 @@ def test_mistakes_have_their_places(old: str, new: str, text: str) -> None:
         World.from_toml(TEXT.replace(old, new, 1))
 
 
-HELD = ON_AN_AXIS.replace('next = "second"', '[[conveyor.stop]]\nat = 150.0\n')
+HELD = ON_AN_AXIS.replace('next = "second"', "[[conveyor.stop]]\nat = 150.0\n")
 
 
 def test_a_belt_that_goes_back_takes_what_stands_with_its_first_pulse() -> None:
     text = HELD.replace("[[conveyor.stop]]\nat = 150.0\n", "") + '[[wire]]\nfrom = "a.OUT2"\nto = "belt.stop1"\n'
-    text = text.replace('[[conveyor.sensor]]\nat = 100.0', "[[conveyor.stop]]\nat = 150.0\n[[conveyor.sensor]]\nat = 100.0")
+    text = text.replace("[[conveyor.sensor]]\nat = 100.0", "[[conveyor.stop]]\nat = 150.0\n[[conveyor.sensor]]\nat = 100.0")
     world = World.from_toml(text)
     device = world.mic488["a"]
     device.axis[1].enable()
@@ -345,3 +346,12 @@ def test_a_workpiece_waits_until_the_next_belt_has_room() -> None:
         (5600 + 1e-6, "belt.1 leaves belt"),
         (5600 + 1e-6, "belt.1 is on second"),
     ]
+
+
+@pytest.mark.parametrize("mm_per_unit", [160.0, 7.0, 333.0])
+def test_places_are_the_nearest_pulses(mm_per_unit: float) -> None:
+    world = World.from_toml(ON_AN_AXIS.replace("mm_per_unit = 160.0", f"mm_per_unit = {mm_per_unit}"))
+    belt = world.parts.built(CONVEYOR)["belt"]
+    assert belt.per_mm == Fraction(3200) / Fraction(mm_per_unit)
+    for n in range(1, 30):
+        assert abs(belt.places(n * 0.37) - Fraction(str(round(n * 0.37, 2))) * belt.per_mm) <= Fraction(1, 2) + Fraction(1, 10**6)
