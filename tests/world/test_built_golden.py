@@ -1,6 +1,7 @@
 """What is built of descriptions before anything happens: mechanics, references, what is drawn and moved; golden/built.txt.
 
-The worlds are those of golden/elements.txt. Regenerate with ``make golden ARGS=tests/world/test_built_golden.py`` and read the diff.
+The worlds are those of golden/elements.txt, and one with references across. Regenerate with
+``make golden ARGS=tests/world/test_built_golden.py`` and read the diff.
 """
 
 from __future__ import annotations

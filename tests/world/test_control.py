@@ -158,7 +158,7 @@ def test_a_chip_that_moves_or_was_stopped_in_a_move_takes_no_move() -> None:
     world.run(for_=0.2)
     commands = (Move("c", 1, by=64.0), Jog("c", 1, 6400.0))
     for command in commands:
-        with pytest.raises(Refusal, match="c is not at rest .*: wait, or stop it"):
+        with pytest.raises(Refusal, match=r"c is not at rest .*: wait, or stop it"):
             m1486.CONTROL[type(command)](chip, "chips", command)
     with pytest.raises(Refusal, match="c is not at rest"):
         m1486.seek(chip, "chips", Seek("c", 1, 1, "B4"))

@@ -17,7 +17,7 @@ import pytest
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.motion import MotionState, Profile, at_rest, plan_position, plan_stop, plan_velocity
-from steptwin.motion.divisions import Microstepping, Plan, profile_of, step_train
+from steptwin.motion.divisions import Microstepping, Plan, step_train
 from steptwin.motion.elastic import DriveStretch
 from steptwin.motion.paths import Circular, circle
 from steptwin.motion.ramps import SpeedCurve, plan_distance
