@@ -145,3 +145,27 @@ def test_scripts_are_evaluated_when_what_they_depend_on_has_changed() -> None:
 def test_only_what_computes_signals_is_a_source() -> None:
     with pytest.raises(Misuse, match="nothing computes signals of 'x': there are a, b"):
         joined("a", "b").source("x")
+
+
+def test_who_watches_now_waits_for_no_moment_any_more() -> None:
+    agenda: Agenda[Waiter] = Agenda()
+    script = Waiter(1)
+    agenda.wait(script, 10)
+    agenda.watch(script, None)
+    assert agenda.first() is None
+    agenda.watch(script, 20)
+    assert (agenda.first(), agenda.take_timed(30), agenda.take_watching(20)) == (20, None, [script])
+    assert agenda.first() is None
+    agenda.wait(script, 40)
+    agenda.remove(script)
+    assert (agenda.first(), agenda.take_timed(50)) == (None, None)
+
+
+def test_outdated_entries_do_not_pile_up() -> None:
+    agenda: Agenda[Waiter] = Agenda()
+    script, other = Waiter(1), Waiter(2)
+    agenda.wait(other, 5)
+    for due in range(1000):
+        agenda.wait(script, due)
+        assert len(agenda._timed.entries) < 100
+    assert (agenda.take_timed(999), agenda.take_timed(999), agenda.take_timed(999)) == (other, script, None)

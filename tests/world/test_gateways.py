@@ -122,6 +122,16 @@ def test_what_is_no_table_of_gateways() -> None:
     assert (lines[0], lines[-1].strip()) == ("hall.toml:1:1: error D002: [gateway] is 1", f"= expected tables: {kinds}")
 
 
+def test_what_is_no_gateway() -> None:
+    with pytest.raises(WorldError) as error:
+        read_world("hall.toml", "[gateway.modbsu]\n" + HALL)
+    kinds = ", ".join(f"[gateway.{plain.kind}]" for plain in PLAIN)
+    told = "hall.toml:1:1: error D004: there is no [gateway.modbsu] (did you mean 'modbus'?)"
+    lines = [line.strip() for line in str(error.value).splitlines()]
+    assert lines[0] == told
+    assert f"= permitted: {kinds}" in lines
+
+
 def test_what_keys_just_take() -> None:
     text = """
     [gateway.mqtt]

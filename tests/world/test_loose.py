@@ -269,6 +269,7 @@ def test_what_a_free_rotor_moves_besides_its_own(inertia: float, friction: float
 
 def test_a_stop_of_the_current_moment_is_not_due_again() -> None:
     loose = Looseness(FREE, MOTOR, 0)
+    assert (loose.is_free, loose.has_current, loose.due) == (False, True, None)
     field, here = Field(at_rest(SECOND, 0)), standing(FREE)
     assert moved(loose, field, here, SECOND, 0.76) is None
     assert loose.due == SECOND + 300 * MILLISECOND

@@ -299,6 +299,7 @@ def test_a_belt_is_longer_than_a_step_of_its_drive() -> None:
         ("workpiece = 40.0", 'next = "other"', "no conveyor is called 'other'"),
         ("workpiece = 40.0", 'next = "a"', "no conveyor is called 'a'"),
         ('to = "a.IN1"', 'to = "a.AIN1"', "a.AIN1 is not a digital input"),
+        ("workpiece = 40.0", "workpiece = 40.0\nmarks = [38.5]", "a mark from 38.5 to 40.5 mm is beyond workpiece = 40"),
     ],
 )
 def test_mistakes_have_their_places(old: str, new: str, text: str) -> None:
@@ -355,3 +356,8 @@ def test_places_are_the_nearest_pulses(mm_per_unit: float) -> None:
     assert belt.per_mm == Fraction(3200) / Fraction(mm_per_unit)
     for n in range(1, 30):
         assert abs(belt.places(n * 0.37) - Fraction(str(round(n * 0.37, 2))) * belt.per_mm) <= Fraction(1, 2) + Fraction(1, 10**6)
+
+
+def test_a_mark_and_a_sensor_may_be_at_the_very_end() -> None:
+    text = TEXT.replace("workpiece = 40.0", "workpiece = 40.0\nmarks = [0, 38]").replace("at = 300.0", "at = 400.0")
+    assert World.from_toml(text).read("belt.count") == 0

@@ -8,6 +8,7 @@ from steptwin.errors import Misuse
 from steptwin.machine import SECOND
 from steptwin.world.elements import fault_kinds
 from steptwin.world.faults import ActiveFault, Fault, Faults, read
+from steptwin.world.faults.active import addresses
 
 MS = SECOND // 1000
 
@@ -169,3 +170,21 @@ def test_without_machines_and_elements_there_are_none() -> None:
     with pytest.raises(Misuse, match="fault leak: element = 'a': those that can fail are none"):
         faults.check(Fault(fault_kinds()["leak"], {"element": "a"}))
     assert (faults.active, faults.check(read("busy")), faults.of("a"), faults.of_element("a")) == ((), None, [], [])
+
+
+@pytest.mark.parametrize(
+    ("pdu", "there"),
+    [
+        ("01 1234 0102", range(0x1234, 0x1234 + 0x102)),
+        ("04 00ff 0001", range(255, 256)),
+        ("05 1234 ff00", range(0x1234, 0x1235)),
+        ("06 0100 ff00", range(256, 257)),
+        ("10 0201 0003 06", range(0x201, 0x204)),
+        ("07 0201 0003", None),
+        ("00 0201 0003", None),
+        ("03 0201 00", None),
+        ("16 0201 0003", None),
+    ],
+)
+def test_addresses_of_requests(pdu: str, there: range | None) -> None:
+    assert addresses(bytes.fromhex(pdu)) == there
