@@ -137,6 +137,7 @@ COURSES: dict[str, tuple[Build, Plan, MechanicalState, dict[str, object]]] = {
 def shown(piece: CoursePiece, of: Nanos) -> str:
     rotor, load = ((f"{value:+}" if follows else f"at {value}") for follows, value in (piece[2:4], piece[4:6]))
     state = f"{' stalled' if piece.stalled else ''}{f' behind {piece.behind}' if piece.behind else ''}"
+    state += f" stop {piece.stop}" if piece.stop else ""
     return f"  {piece.begin - of} {'↑' if piece.direction > 0 else '↓'} rotor {rotor} load {load}{state}"
 
 
@@ -144,7 +145,7 @@ def of_course(build: Build, plan: Plan, state: MechanicalState, more: dict[str, 
     course = Course(build, plan, begin, state, **more)  # type: ignore[arg-type]
     yield from (shown(piece, BEGIN) for piece in course.pieces)
     said = (f"{one.begin - BEGIN} {'drive' if one.follows else 'at'} {one.pulses}" for one in course.load_pieces())
-    yield f"  told: {', '.join(said)}; exact {course.is_exact}"
+    yield f"  told: {', '.join(said)}; exact {course.is_exact}; at stop {course.stop(begin)}, then {course.next_stop(begin)}"
     stall, stalls = course.next_stall(begin), []
     while stall is not None:
         stalls.append(f"{stall - BEGIN}{course.why_stalled(stall)}")
