@@ -129,6 +129,9 @@ to = "c.B3"
 { home = "c.M1", seek = "⟨-|+⟩B4", within = "⟨100..300⟩ ms" }
 { wait_for = "⟨c|d⟩.M1", within = "⟨100..300⟩ ms" }
 { set = { "c.B1" = ⟨#0..1⟩ } }
+@ chips ⟨78330d|78610d|7533320d⟩7531⟨34|38⟩0d
+@ chips ⟨78330d|78670d⟩
+@ chips leave
 { until = "not c.moving", within = "⟨20..200⟩ ms" }
 { power_cycle = "d" }
 """,

@@ -148,6 +148,7 @@ def seen(name: str, seed: int) -> dict[str, list[str]]:
     values += go_on(world, steps[cut + 1 :], round(END_S * SECOND), files)
     happened = [repr((*one[:4], shown_value(one), one.facts)) for one in (*world.trace, *statements)]
     follower.close()
+    happened += watched(text, files)
     end, digest_there = shown(world), world.trace.digest()
     replayed = session_of(world).replay()
     other = world if chance.below(2) else world.branch(snapshot)
@@ -168,6 +169,10 @@ def go_on(world: World, steps: list[tuple[int, str]], end: int, files: Mapping[s
         found += shown(world)
         found += do_from_outside(world, step, files)
     world.run(until=end / SECOND)
+    for name, line in world.lines.items():
+        there = line.places.get("python")
+        if there is not None:
+            found.append(repr((name, there.kind, there.at_once, world.line[name].received())))
     return found + shown(world)
 
 
@@ -196,6 +201,18 @@ def do_from_outside(world: World, text: str, files: Mapping[str, bytes]) -> list
     except (Misuse, Refusal) as error:
         return [str(error)]
     return []
+
+
+def watched(text: str, files: Mapping[str, bytes]) -> list[str]:
+    """What programs with a text do in such a world, if nothing comes from outside."""
+    if not any(file.endswith(".prg") for file in files):
+        return []
+    world = World.from_toml(text, files)
+    kernels = world.parts.kernel_of
+    watches = [world.kind(name).watch_program(machine, kernels[name], name) for name, machine in world.machines.items()]
+    world.run(until=END_S)
+    acts = [act for watch in watches if watch is not None for act in watch.happened]
+    return [repr((act.time, act.text, act.place)) for act in acts]
 
 
 def shown_value(record: TraceRecord) -> object:
