@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from math import inf
 from typing import TypeAlias
 
 from steptwin.datasheet import Point
@@ -57,9 +58,18 @@ def turns_of(profile: Callable[[], Profile]) -> TurningPoints:
 
     def turns(now: Nanos) -> Iterator[Nanos]:
         present = profile()
-        for end in present.ends:
-            if end != float("inf") and present.start + int(end) > now:
-                yield present.start + int(end)
+        gone = now - present.start
+        return iter([present.start + int(end) for end in present.ends if gone < end < inf])
+
+    return turns
+
+
+def end_of(profile: Callable[[], Profile]) -> TurningPoints:
+    """The end of a profile alone."""
+
+    def turns(now: Nanos) -> Iterator[Nanos]:
+        end = profile().end
+        return iter(() if end is None or end <= now else (end,))
 
     return turns
 

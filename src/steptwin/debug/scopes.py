@@ -67,7 +67,7 @@ def _measured(name: str, value: float | None, unit: str) -> ShownValue:
 
 def _pins(world: Plant, machine: str) -> Iterator[ShownValue]:
     kind, device = world.kind(machine), world.machine(machine)
-    units = {pin.name: pin.unit for pin in kind.datasheet(device).pins}
+    units = {name: pin.unit for name, pin in kind.pins(device).items()}
     inputs = {*kind.terminals.digital_inputs, *kind.terminals.analog_inputs}
     for name, level in device.pins().items():
         yield ShownValue(name, f"{number_text(level)} {units.get(name, '')}".rstrip(), level, is_settable=name in inputs)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import cache
 
 from steptwin.datasheet import (
@@ -41,12 +41,18 @@ def datasheet_of(variant: Variant) -> Datasheet:
         title="M1486",
         variant=variant.name,
         axes=(axis(variant, UNIT, 1.0),),
-        pins=tuple(_pins(variant)),
+        pins=tuple(pins_of(variant).values()),
         points=tuple(POINTS.values()),
         commands=tuple(_command(spec, variant) for spec in TABLE),
         events=tuple(EVENTS.values()),
         details=tuple(row.detail for row in DETAILS),
     )
+
+
+@cache
+def pins_of(variant: Variant) -> Mapping[str, Pin]:
+    """By name."""
+    return {pin.name: pin for pin in _pins(variant)}
 
 
 def axis(variant: Variant, unit: str, pulses_per_unit: float) -> AxisDescription:

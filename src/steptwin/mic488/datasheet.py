@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 
@@ -38,7 +38,7 @@ def datasheet_of(firmware: str, scales: tuple[tuple[str, float | None], ...] = D
         title="MIC488",
         variant=registers.firmware.name,
         axes=tuple(_axis(number, unit, gear) for number, (unit, gear) in enumerate(scales, start=1)),
-        pins=tuple(_pins()),
+        pins=tuple(PINS.values()),
         points=tuple(points(registers, units)),
         commands=tuple(_commands(registers, units)),
         events=tuple(EVENTS.values()),
@@ -72,6 +72,10 @@ def _pins() -> Iterator[Pin]:
         yield Pin(name=name, direction=PinDirection.INPUT, is_analog=True, unit="V", limits=Limits(0, 10))
     for name in (*OUTPUT_PINS, *ENABLE_PINS, "ERR"):
         yield Pin(name=name, direction=PinDirection.OUTPUT)
+
+
+PINS: Mapping[str, Pin] = {pin.name: pin for pin in _pins()}
+"""By name."""
 
 
 def _commands(registers: RegisterMap, units: Sequence[str]) -> Iterator[CommandDescription]:

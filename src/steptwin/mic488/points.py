@@ -25,7 +25,7 @@ from steptwin.mic488.registers import AXES, CONTROLLER_STATUS_TEXTS
 from steptwin.mic488.status import AXIS_CONDITIONS, CONTROLLER_CONDITIONS
 from steptwin.mic488.values import RegisterItem, UserFormat, named
 from steptwin.motion import Profile
-from steptwin.points import LivePoint, MemoryCells, TurningPoints, turns_of, turns_of_round
+from steptwin.points import LivePoint, MemoryCells, TurningPoints, end_of, turns_of, turns_of_round
 from steptwin.tables import complete
 
 EFFECTS: Mapping[registermap.WriteEffect, PointEffect] = complete(
@@ -294,6 +294,10 @@ def _as_profile(axis: Axis) -> tuple[TurningPoints, bool]:
     return turns_of(partial(_profile, axis)), True
 
 
+def _as_moving(axis: Axis) -> tuple[TurningPoints, bool]:
+    return end_of(partial(_profile, axis)), True
+
+
 def _as_coordinate(axis: Axis) -> tuple[TurningPoints, bool]:
     """A DINT of pulses (MIC-42)."""
     return turns_of_round(partial(_profile, axis), lambda now: axis.profile.count(now) + axis.offset_p - DINT_MIN, 2**32), True
@@ -305,7 +309,7 @@ def _as_encoder(axis: Axis) -> tuple[TurningPoints, bool]:
 
 
 _FOLLOWING: Mapping[str, Callable[[Axis], tuple[TurningPoints, bool]]] = {
-    "moving": _as_profile,
+    "moving": _as_moving,
     "POS_ACT": _as_coordinate,
     "VEL_ACT": _as_profile,
     "ENC_IMP": _as_encoder,

@@ -16,7 +16,7 @@ of the field, and the load keeps its distance to the rotor.
 
 from __future__ import annotations
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
 from math import ceil, inf
 from operator import attrgetter
@@ -25,6 +25,7 @@ from typing import NamedTuple
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion import Profile, Segment
 from steptwin.motion.divisions import Plan, profile_of
+from steptwin.points import turns_of
 from steptwin.world.motor import StepperMotor
 from steptwin.world.resonance import Spell, spells
 
@@ -177,6 +178,14 @@ class Course:
         load = piece.load + lead if piece.load_follows else piece.load
         return MechanicalState(rotor, load, piece.stalled, piece.behind)
 
+    def load_at(self, now: Nanos) -> int:
+        """The load of `at` alone, which is read most."""
+        piece = self._piece(now)
+        if not piece.load_follows:
+            return piece.load
+        plan = self.plan if self.free is None else self.free
+        return piece.load + self.build.sign * plan.count(now) + self.build.zero
+
     def position(self, now: Nanos) -> float:
         """Where the load is, between whole pulses as well."""
         piece = self._piece(now)
@@ -201,6 +210,13 @@ class Course:
                 if time is not None and (end is None or time < end):
                     return time
         return None
+
+    def turns(self, now: Nanos) -> list[Nanos]:
+        """Moments after ``now``, in order, between which field, rotor and load each go one way."""
+        found = {piece.begin for piece in self.pieces if piece.begin > now}  # a segment of the field begins one at least
+        if self.free is not None:
+            found.update(turns_of(lambda: profile_of(self.plan))(now))
+        return sorted(found)
 
     def next_stall(self, after: Nanos) -> Nanos | None:
         """First moment > ``after`` at which the rotor loses the field or is caught again."""
@@ -254,7 +270,9 @@ class Course:
         return tuple(found)
 
     def _piece(self, now: Nanos) -> CoursePiece:
-        return self.pieces[max(bisect_right(self.pieces, now, key=attrgetter("begin")) - 1, 0)]
+        pieces = self._laid or self.pieces
+        after = bisect_left(pieces, (now + 1,))
+        return pieces[after - 1 if after else 0]
 
     def _time(self, lead: int, after: Nanos) -> Nanos | None:
         return (self.plan if self.free is None else self.free).pulse_time((lead - self.build.zero) * self.build.sign, after)

@@ -26,7 +26,7 @@ from steptwin.world.wires import PinName
 if TYPE_CHECKING:
     from steptwin.configuration import ConfigurationFormat
     from steptwin.controllerstate import ControllerState
-    from steptwin.datasheet import Datasheet
+    from steptwin.datasheet import Datasheet, Pin
     from steptwin.diagnostics import Diagnostic, SourceText
     from steptwin.points import LivePoint
     from steptwin.wire.frameline import FrameLine
@@ -205,6 +205,8 @@ class ControllerKind(Generic[S, M, V]):
     """Whether all axes stand and no program runs."""
     datasheet: Callable[[M], Datasheet]
     """Its static description, the same object for all machines that have the same."""
+    pins: Callable[[M], Mapping[str, Pin]]
+    """Those of its data sheet by name. They do not depend on its configuration, so they are there before the sheet."""
     datasheet_of: Callable[[str | None], Datasheet]
     """That of a controller that is not configured: of a variant by its name, or the usual one. Raises `Misuse`."""
     point: Callable[[M, str], LivePoint | None]

@@ -139,7 +139,7 @@ class Mechanism(Stateful):
         """The course that was reported."""
         self._simple = build.ideal
         """Whether the load always was, and always will be, at the commanded position."""
-        drive = self._drive
+        drive = kernel.drive_of(machine, number)
         here = 0 if kernel.is_blank else build.sign * drive.plan.count(kernel.now) + build.zero
         if kernel.is_blank:
             pass  # it is restored, where another one has been
@@ -152,16 +152,16 @@ class Mechanism(Stateful):
 
     @property
     def _drive(self) -> Drive:
-        return self._kernel.drive_of(self.machine, self.number)
+        return self._kernel.machines[self.machine].axes[self.number - 1]
 
     # ------------------------------------------------------------------ position
 
     def course(self, now: Nanos) -> Course:
         """The course at ``now``, which is the kernel's moment or later. What is looked at in advance changes nothing: a course is
         renewed at the kernel's moment."""
-        drive, present = self._drive, self._kernel.now
-        if drive.revision != self._revision or self._is_switched(drive, present):
-            self._renew(drive, present)
+        drive = self._drive
+        if drive.revision != self._revision or (self._loose is not None and self._is_switched(drive, self._kernel.now)):
+            self._renew(drive, self._kernel.now)
         return self._course
 
     def _is_switched(self, drive: Drive, now: Nanos) -> bool:
@@ -177,10 +177,10 @@ class Mechanism(Stateful):
         return course.field(now) - course.at(now).rotor
 
     def version(self) -> object:
-        return self._drive.revision, self._changes
+        return self._kernel.machines[self.machine].axes[self.number - 1].revision, self._changes
 
     def place(self, now: Nanos) -> int:
-        return self.at(now).load
+        return self.course(now).load_at(now)
 
     def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
         return self.course(after).reaches(position, after, direction)

@@ -77,7 +77,7 @@ class SignalOf:
                 source.kernel.is_attentive = True
 
     def turns(self, now: Nanos) -> Iterator[Nanos]:
-        yield from () if self.turning is None else self.turning(now)
+        return iter(() if self.turning is None else self.turning(now))
 
     def version(self) -> object:
         return None if self.versions is None else self.versions()
@@ -164,8 +164,8 @@ def _of_machine(kind: AnyKind, machine: MotionController, source: Source, rest: 
     """The signal of a pin, otherwise of a point of the data sheet."""
     pin = rest.upper()
     if pin in machine.pins():
-        found = next(found for found in kind.datasheet(machine).pins if found.name == pin)
-        return SignalOf((source,), lambda now: machine.pin(pin), unit=found.unit, check=partial(kind.refuse_taken, machine, pin))
+        unit = kind.pins(machine)[pin].unit
+        return SignalOf((source,), lambda now: machine.pin(pin), unit=unit, check=partial(kind.refuse_taken, machine, pin))
     point = kind.point(machine, rest) if rest else None
     if point is None:
         raise _unknown([point.path for point in kind.datasheet(machine).points], rest, name, ", and pins")

@@ -9,6 +9,8 @@ from slides import slide
 
 from steptwin.campaign.properties import Verdict, read_property
 from steptwin.files.world import World
+from steptwin.motion import Profile
+from steptwin.world.course import Course
 
 TWO = slide("left", "left_x") + slide("right", "right_x", ramps=120.0, vel=80.0)
 JOINED = '\n[[wire]]\nfrom = "left.OUT8"\nto = "right.IN8"\n'
@@ -71,3 +73,25 @@ def test_what_a_program_calculates_ahead_is_seen_where_it_happens(tmp_path: Path
     watch = read_property(f"eventually {condition}").watch(watched)
     watched.run(until=2.0)
     assert watch.verdict().at_ns == run.now
+
+
+@pytest.mark.parametrize(("text", "most"), [("always left_x.position < 1000", 7), ("always left.M1.moving == 0", 4)])
+def test_each_motion_is_read_a_few_times_only(text: str, most: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """At its beginning, where it turns, at its end and once before the next one."""
+    moves = 40
+    reads: list[str] = []
+    for kind, name in ((Course, "load_at"), (Profile, "moving")):
+        counted = getattr(kind, name)
+        monkeypatch.setattr(kind, name, lambda self, now, counted=counted: reads.append("") or counted(self, now))
+    counts: list[int] = []
+    for properties in ((), (text,)):
+        world = World.from_toml(slide("left", "left_x", ramps=2000.0, vel=200.0))
+        watches = [read_property(one).watch(world) for one in properties]
+        world.mic488["left"].axis[1].enable()
+        reads.clear()
+        for n in range(moves):
+            world.mic488["left"].axis[1].move_to(5.0 * (n % 2 + 1))
+            world.run(for_=0.5)
+        assert all(one.verdict() is not None for one in watches)
+        counts.append(len(reads))
+    assert 0 < counts[1] - counts[0] <= most * moves + 10

@@ -214,6 +214,7 @@ TOY: ControllerKind[ToySpec, Toy, ToyView] = ControllerKind(
     scale=_scale,
     is_idle=lambda toy, now: not toy.is_busy,
     datasheet=lambda toy: DATASHEET,
+    pins=lambda toy: {pin.name: pin for pin in DATASHEET.pins},
     datasheet_of=lambda variant: DATASHEET,
     point=_point,
     control={Move: _move, StopAxes: _stop},

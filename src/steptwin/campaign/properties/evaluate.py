@@ -259,6 +259,8 @@ def _first(course: Shape, begin: Nanos, end: Nanos, test: Callable[[float], bool
 def _lowest(course: Shape, begin: Nanos, end: Nanos) -> Nanos:
     best: tuple[float, Nanos] | None = None
     for slope in course:
+        if best is not None and slope.first >= best[0] <= slope.last:
+            continue
         if slope.end >= begin and slope.begin <= end:
             for at in (max(slope.begin, begin), min(slope.end, end)):
                 if best is None or slope.at(at) < best[0]:

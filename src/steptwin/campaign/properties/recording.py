@@ -12,7 +12,7 @@ from math import isnan
 from typing import TypeGuard
 
 from steptwin.campaign.properties.evaluate import forced
-from steptwin.campaign.properties.slopes import Shape, Slope
+from steptwin.campaign.properties.slopes import TINY, Shape, Slope
 from steptwin.campaign.properties.tree import Atom
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
@@ -58,8 +58,9 @@ class ComparisonRecord:
         self._reads: dict[str, Callable[[Nanos], float]] = {name: signal.value for name, signal in self._signals.items()}
         self._compare = COMPARE[self.node.sign]
         self._sign = _SIGNS[self.node.sign]
-        self._is_simple = isinstance(self.node.left, SignalName) and isinstance(self.node.right, NumberLiteral)
-        """Whether it is a signal beside a number."""
+        is_simple = isinstance(self.node.left, SignalName) and isinstance(self.node.right, NumberLiteral)
+        self._limit = self.node.right.number if is_simple and isinstance(self.node.right, NumberLiteral) else None
+        """The number, where it is beside a signal alone."""
         self._read()
         self.unit = unit_of_all(self.node, lambda name: self._signals[name].unit)
         self.scale = _scale(world, self.node.left, self.node.right)
@@ -130,18 +131,28 @@ class ComparisonRecord:
 
     def _look_at(self, now: Nanos) -> tuple[float, int]:
         """The value, and the side of 0 on which the difference is."""
-        left, right = self._left_at(now), self._right_at(now)
+        left = self._left_at(now)
+        right = self._right_at(now) if self._limit is None else self._limit
         holds = bool(self._compare(left, right))
         difference = left - right
+        if isnan(difference):
+            return (TINY if holds else -TINY), NO_NUMBER
         if self._sign:
             value = difference / self.scale * self._sign
         elif holds is (self.node.sign == "=="):
             value = 1.0 if holds else -1.0
         else:
             value = abs(difference) / self.scale * (1.0 if holds else -1.0)
-        if isnan(value):
-            return forced(0.0, holds=holds), NO_NUMBER
-        return forced(value, holds=holds), (difference > 0.0) - (difference < 0.0)
+        if holds:  # as `forced`, without calls: this is read most
+            if value < TINY:
+                value = TINY
+            elif value > 1.0:
+                value = 1.0
+        elif value > -TINY:
+            value = -TINY
+        elif value < -1.0:
+            value = -1.0
+        return value, (difference > 0.0) - (difference < 0.0)
 
     # ------------------------------------------------------------------ following
 
@@ -150,15 +161,16 @@ class ComparisonRecord:
             self._last, self._left = self._go_to(moment - 1), moment
 
     def look(self, now: Nanos) -> None:
-        if self._begin is not None and now < self._begin:
+        begin = self._begin
+        if begin is not None and now < begin:
             return  # a snapshot was restored: `rewind` comes next
         if not self._moving:
             self._note(now)
             return
-        known = self._version(now)
-        if self._begin is not None and known is not None and known == self._known:
+        known = self._version(now) if self._only is None else self._only()
+        if begin is not None and known is not None and known == self._known:
             return
-        if self._begin is not None and now > self._begin:
+        if begin is not None and now > begin:
             last = self._last if self._left == now else self._go_to(now - 1)
             self._closed += self._stretch(now - 1, last)
         self._known = known
@@ -166,7 +178,7 @@ class ComparisonRecord:
 
     def _note(self, now: Nanos) -> None:
         """What changes with events only."""
-        sides = self._left_at(now), self._right_at(now)
+        sides = self._left_at(now), self._right_at(now) if self._limit is None else self._limit
         if self._begin is not None:
             if sides == self._known:
                 return
@@ -176,8 +188,6 @@ class ComparisonRecord:
 
     def _version(self, now: Nanos) -> object:
         """What the way depends on; None if that is unknown."""
-        if self._only is not None:
-            return self._only()
         versions = [one.version() for one in self._moving.values()]
         if None in versions:
             return None
@@ -187,16 +197,18 @@ class ComparisonRecord:
         """Begin another way."""
         for name, signal in self._standing.items():
             self._reads[name] = _constant(signal.value(now))
+        turns: Iterator[Nanos] | None = None
         for name, signal in self._moving.items():
             if signal.freeze is not None:
                 self._reads[name] = signal.freeze(now)
-        if self._is_simple:
+            ahead = signal.turns(now)
+            turns = ahead if turns is None else merge(turns, ahead)
+        if self._limit is not None:
             (self._left_at,) = self._reads.values()
         else:
             self._read()
-        several = [one.turns(now) for one in self._moving.values()]
-        turns = several[0] if len(several) == 1 else merge(*several)
-        self._turns = iter(tuple(turns)) if self._stays else turns
+        if turns is not None:
+            self._turns = iter(tuple(turns)) if self._stays else turns
         self._turn = next(self._turns, None)
         self._begin_at(now)
 
@@ -215,7 +227,7 @@ class ComparisonRecord:
                 self._turn = next(self._turns, None)
             end = last if self._turn is None else min(self._turn, last)
             there, side = self._look_at(end)
-            change = self._change(end, side)
+            change = None if side == self._side and self._is_monotonic else self._change(end, side)
             if change is not None:
                 self._closed += self._stretch(change - 1, self._value(change - 1))
                 self._begin_at(change)
@@ -233,8 +245,6 @@ class ComparisonRecord:
         """The first moment after `_seen`, up to ``end``, at which it is on another side of its limit; it does not turn before."""
         if not self._is_monotonic:
             return change_between(Sum(self.node.left, -1, self.node.right), self._reads, self._seen, end)
-        if side == self._side:
-            return None
         low, high = self._seen, end
         while high - low > 1:
             middle = (low + high) // 2
@@ -244,7 +254,7 @@ class ComparisonRecord:
     def _stretch(self, end: Nanos, last: float) -> Shape:
         """The stretch that is not closed, up to ``end``."""
         begin, first = self._begin or 0, self._first
-        if not self._is_fine or end - begin < FINEST_NS or (self._is_monotonic and first == last):
+        if not self._is_fine or end - begin < FINEST_NS or (self._is_monotonic and abs(first - last) <= DEVIATION):
             return [Slope(begin, end, first, last)]
         found: Shape = []
         while True:

@@ -57,11 +57,14 @@ def negative(course: Shape) -> Shape:
 def shortest(course: Iterable[Slope]) -> Shape:
     """With neighbours of one constant value as one."""
     found: Shape = []
+    flat: float | None = None  # the value of the last one, if it is constant
     for slope in course:
-        if found and found[-1].first == found[-1].last == slope.first == slope.last:
-            found[-1] = found[-1]._replace(end=slope.end)
-        else:
+        _, end, first, last = slope
+        if flat is None or not flat == first == last:
             found.append(slope)
+            flat = first if first == last else None
+        else:
+            found[-1] = Slope(found[-1].begin, end, flat, flat)
     return found
 
 

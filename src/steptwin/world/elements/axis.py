@@ -8,8 +8,6 @@ from functools import partial
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
-from steptwin.motion.divisions import profile_of
-from steptwin.points import turns_of
 from steptwin.world.contacts import Zone
 from steptwin.world.course import Build, Course
 from steptwin.world.element import Element, NamedSpec, Reference
@@ -157,13 +155,12 @@ def find_axis(name: str, site: Site) -> BuiltAxis:
 
 def turns_of_axis(fitted: BuiltAxis, now: Nanos) -> Iterator[Nanos]:
     """Moments after ``now`` between which its load moves one way."""
-    course = fitted.mechanism.course(now)
-    ends = set(turns_of(lambda: profile_of(course.plan))(now)) | {piece.begin for piece in course.pieces}
-    yield from sorted(moment for moment in ends if moment > now)
+    return iter(fitted.mechanism.course(now).turns(now))
 
 
 def _signals(fitted: BuiltAxis) -> Mapping[str, SignalOf]:
     mechanism, turning = fitted.mechanism, partial(turns_of_axis, fitted)
+    up, down = fitted.scale.pulses_per_unit.as_integer_ratio()
     source, version = (fitted.source,), mechanism.version
 
     def signal(of: Callable[[Course, Nanos], float], unit: str = "") -> SignalOf:
@@ -176,7 +173,7 @@ def _signals(fitted: BuiltAxis) -> Mapping[str, SignalOf]:
             freeze=lambda now: partial(of, mechanism.course(now)),
         )
 
-    position = signal(lambda course, now: fitted.units(course.at(now).load), fitted.scale.unit)
+    position = signal(lambda course, now: course.load_at(now) * down / up, fitted.scale.unit)
     lost = signal(lambda course, now: float(course.field(now) - course.at(now).rotor))
     stalled = signal(lambda course, now: float(course.at(now).stalled))
     return dict(zip(MECHANICS, (position, lost, stalled), strict=True))

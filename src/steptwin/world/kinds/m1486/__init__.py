@@ -56,6 +56,7 @@ M1486: ControllerKind[M1486Spec, M1486Chip, M1486View] = ControllerKind(
     scale=axes.scale,
     is_idle=lambda chip, now: chip.is_idle(),
     datasheet=datasheet.datasheet,
+    pins=lambda chip: datasheet.pins_of(chip.variant),
     datasheet_of=lambda name: datasheet.datasheet_of(variant(name or table.DEFAULT_VARIANT)),
     point=points.live_point,
     control=control.CONTROL,

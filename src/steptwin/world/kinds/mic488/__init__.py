@@ -88,6 +88,7 @@ MIC488: ControllerKind[Mic488Spec, Mic488Device, Mic488View] = ControllerKind(
     scale=axes.scale,
     is_idle=_is_idle,
     datasheet=datasheet.datasheet,
+    pins=lambda device: datasheet.PINS,
     datasheet_of=lambda variant: datasheet.datasheet_of(variant or DEFAULT_FIRMWARE),
     point=points.live_point,
     marks=points.marks,
