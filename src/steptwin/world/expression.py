@@ -197,6 +197,8 @@ class ConditionParser:
         if len(text) > LONGEST:
             raise Misuse(f"{self._start} has {len(text)} characters: permitted are {LONGEST}")
         self._tokens = list(self._tokens_of(text.rstrip()))
+        self._words = [*(_OTHER_SIGNS.get(found, found.lower()) for _, found, _ in self._tokens), ""]
+        """The tokens as words and signs are compared; empty after the last."""
         self._at = 0
         self._depth = 0
 
@@ -233,7 +235,7 @@ class ConditionParser:
 
     def _accept(self, *words: str) -> str:
         """The next token if it is one of these, otherwise an empty text."""
-        found = self._peek().lower()
+        found = self._words[self._at]
         if found not in words:
             return ""
         self._at += 1
@@ -266,7 +268,7 @@ class ConditionParser:
 
     def _joined(self, word: str, operand: Callable[[], Quantity]) -> Quantity:
         first = operand()
-        if self._peek().lower() != word:
+        if self._words[self._at] != word:
             return first
         parts = [self._truth(first)]
         while self._accept(word):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, NamedTuple, TypeAlias, TypeVar
 
@@ -23,6 +23,8 @@ MOST_FINDINGS = 100
 """Most errors that are reported."""
 _LONGEST_MESSAGE = 400
 _WHOLE = range(-(1 << 63), 1 << 63)
+_MANY_DIGITS = re.compile(r"(?:[0-9A-Fa-f]_?){16}")
+"""What a number of more than 64 bits has."""
 
 
 FILE_ERRORS = "D010"
@@ -302,7 +304,7 @@ def _parsed(text: str) -> tuple[Mapping[Path, Span], dict[str, Any], Path | None
     """The places and values of a text, and its first number that is too long. They are remembered, for a campaign reads one text
     for each of its runs; nothing may change them."""
     places, data = find_places(text), tomllib.loads(text)
-    return places, data, next(_long_numbers((), data), None)
+    return places, data, next(_long_numbers((), data), None) if _MANY_DIGITS.search(text) else None
 
 
 def _long_numbers(path: Path, value: object) -> Iterator[Path]:
@@ -342,10 +344,10 @@ class Key:
     default: Any = _MISSING
     attribute: str = ""
     """The attribute it becomes, where that is not its name."""
+    is_required: bool = field(init=False)
 
-    @property
-    def is_required(self) -> bool:
-        return self.default is _MISSING
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "is_required", self.default is _MISSING)
 
     @property
     def permitted(self) -> str:
@@ -381,9 +383,8 @@ COMMON_WORDS: Mapping[str, tuple[str, ...]] = {
 def read_table(text: TomlText, path: Path, value: object, keys: Sequence[Key], also: Iterable[str] = ()) -> dict[str, Any]:
     """The values of a table by attribute; errors are added to ``text``. Keys in ``also`` are read elsewhere."""
     values: dict[str, Any] = {key.attribute or key.name: key.default for key in keys if not key.is_required}
-    what = _what(path)
     if not isinstance(value, Mapping):
-        text.wrong(path, "D002", f"{what} is {value!r}", "expected a table")
+        text.wrong(path, "D002", f"{_what(path)} is {value!r}", "expected a table")
         return values
     known = {key.name: key for key in keys}
     permitted = [*known, *also]
@@ -395,15 +396,15 @@ def read_table(text: TomlText, path: Path, value: object, keys: Sequence[Key], a
             except Misuse as error:
                 meant = key.read.near(given) if isinstance(key.read, Word) else None
                 fix = text.replacement((*path, name), str(given), meant)
-                text.wrong((*path, name), "D003", f"{what}: {name}: {error}", key.meaning, fix)
+                text.wrong((*path, name), "D003", f"{_what(path)}: {name}: {error}", key.meaning, fix)
         elif name not in also:
             usual = next((key for key in COMMON_WORDS.get(name.lower(), ()) if key in permitted), None)
             near = text.near(name, permitted) if usual is None else f" (did you mean {usual!r}?)"
             fix = text.key_replacement((*path, name), name, permitted)
-            text.wrong((*path, name), "D004", f"{what} has no {name!r}{near}", f"permitted: {_listed(known, also)}", fix)
+            text.wrong((*path, name), "D004", f"{_what(path)} has no {name!r}{near}", f"permitted: {_listed(known, also)}", fix)
     for key in keys:
         if key.is_required and key.name not in value:
-            text.wrong(path, "D005", f"{what}: {key.name} is missing", key.meaning)
+            text.wrong(path, "D005", f"{_what(path)}: {key.name} is missing", key.meaning)
     return values
 
 

@@ -23,17 +23,24 @@ MOST_NESTED = 32
 LONGEST_SCALAR = 64
 """Characters of a number or a moment."""
 
-_BLANKS = re.compile(r"[ \t]*")
-_GAP = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
-_KEY_PART = re.compile(r"""[A-Za-z0-9_-]+|"(?:\\.|[^"\\\n])*"|'[^'\n]*'""")
-_STRING = re.compile(
-    r"\"\"\"(?:\\.|[^\\])*?\"\"\"\"{0,2}"  # of several lines, with escapes
+_BLANKS = r"[ \t]*"
+_GAP = r"(?:[ \t\r\n]+|#[^\n]*)*"
+_REST = re.compile(_GAP)
+_KEY_PART = re.compile(_BLANKS + r"""([A-Za-z0-9_-]+|"(?:\\.|[^"\\\n])*"|'[^'\n]*')""" + _BLANKS + r"(\.?)")
+"""With the point that another part follows."""
+_EQUALS = re.compile("=" + _BLANKS)
+_VALUE = re.compile(
+    r"(?P<string>\"\"\"(?:\\.|[^\\])*?\"\"\"\"{0,2}"  # of several lines, with escapes
     r"|'''.*?''''{0,2}"
     r"|\"(?:\\.|[^\"\\\n])*\""
-    r"|'[^'\n]*'",
+    r"|'[^'\n]*')"
+    r"|(?P<array>\[)|(?P<table>\{)|(?P<scalar>[^\s,\]}#]+(?: [0-9][^\s,\]}#]*)?)",
     re.DOTALL,
 )
-_SCALAR = re.compile(r"[^\s,\]}#]+(?: [0-9][^\s,\]}#]*)?")
+_BEGINS = re.compile(_GAP + r"(?P<comma>)(?P<end>[\]}]?)")
+"""Of an array or a table in a line: its first item, or its end."""
+_FOLLOWS = re.compile(_GAP + r"(?:,(?P<comma>)" + _GAP + r")?(?P<end>[\]}]?)")
+"""After an item: the next one, or the end."""
 
 
 class UnsupportedToml(Misuse):
@@ -69,13 +76,13 @@ class _Finder:
 
     def document(self) -> None:
         table: Path = ()
-        self._skip(_GAP)
+        self._skip(_REST)
         while self.at < len(self.text):
             if self.text[self.at] == "[":
                 table = self._header()
             else:
                 self._key_and_value(table)
-            self._skip(_GAP)
+            self._skip(_REST)
 
     # ------------------------------------------------------------------ parts of the grammar
 
@@ -84,7 +91,9 @@ class _Finder:
         brackets = "[[" if self.text.startswith("[[", begin) else "["
         self.at += len(brackets)
         parts = self._key()
-        self._expect("]" * len(brackets))
+        if not self.text.startswith("]" * len(brackets), self.at):
+            raise _NotToml
+        self.at += len(brackets)
         path: Path = ()
         for n, part in enumerate(parts, 1):
             path = (*path, part)
@@ -100,8 +109,7 @@ class _Finder:
         paths = [table]
         for part in self._key():
             paths.append((*paths[-1], part))
-        self._expect("=")
-        self._skip(_BLANKS)
+        self._skip(_EQUALS)
         self._value(paths[-1], depth)
         for path in paths[1:]:
             self.spans.setdefault(path, Span(begin, self.at))
@@ -109,88 +117,71 @@ class _Finder:
     def _key(self) -> list[str]:
         parts: list[str] = []
         while True:
-            self._skip(_BLANKS)
             found = _KEY_PART.match(self.text, self.at)
             if found is None:
                 raise _NotToml
-            parts.append(_plain(found[0]))
+            part = found[1]
+            parts.append(_plain(part) if part[0] in "\"'" else part)
             if len(parts) > MOST_NESTED:
-                raise UnsupportedToml(Span(found.start(), found.end()), f"a key of more than {MOST_NESTED} parts")
+                raise UnsupportedToml(Span(*found.span(1)), f"a key of more than {MOST_NESTED} parts")
             self.at = found.end()
-            self._skip(_BLANKS)
-            if not self.text.startswith(".", self.at):
+            if not found[2]:
                 return parts
-            self.at += 1
 
     def _value(self, path: Path, depth: int = 0) -> None:
         if depth > MOST_NESTED:
             raise UnsupportedToml(Span(self.at, self.at + 1), f"values are nested more than {MOST_NESTED} deep")
-        found = _STRING.match(self.text, self.at)
-        if found is not None:
-            self.at = found.end()
-        elif self.text.startswith("[", self.at):
+        found = _VALUE.match(self.text, self.at)
+        if found is None:
+            raise _NotToml
+        kind, begin, self.at = found.lastgroup, self.at, found.end()
+        if kind == "array":
             self._array(path, depth)
-        elif self.text.startswith("{", self.at):
+        elif kind == "table":
             self._inline_table(path, depth)
-        else:
-            found = _SCALAR.match(self.text, self.at)
-            if found is None:
-                raise _NotToml
-            if len(found[0]) > LONGEST_SCALAR:
-                message = f"a value of {len(found[0])} characters that is not text: permitted are {LONGEST_SCALAR}"
-                raise UnsupportedToml(Span(found.start(), found.start() + LONGEST_SCALAR), message)
-            self.at = found.end()
+        elif kind == "scalar" and self.at - begin > LONGEST_SCALAR:
+            message = f"a value of {self.at - begin} characters that is not text: permitted are {LONGEST_SCALAR}"
+            raise UnsupportedToml(Span(begin, begin + LONGEST_SCALAR), message)
 
     def _array(self, path: Path, depth: int) -> None:
-        self.at += 1
-        number = 0
-        while not self._ends("]"):
+        number, more = 0, self._goes_on(_BEGINS, "]")
+        while more:
             begin = self.at
             self._value((*path, number), depth + 1)
             self.spans.setdefault((*path, number), Span(begin, self.at))
             number += 1
-            self._comma("]")
+            more = self._goes_on(_FOLLOWS, "]")
 
     def _inline_table(self, path: Path, depth: int) -> None:
-        self.at += 1
-        while not self._ends("}"):
+        more = self._goes_on(_BEGINS, "}")
+        while more:
             self._key_and_value(path, depth + 1)
-            self._comma("}")
+            more = self._goes_on(_FOLLOWS, "}")
 
     # ------------------------------------------------------------------ characters
 
     def _skip(self, what: re.Pattern[str]) -> None:
         found = what.match(self.text, self.at)
-        if found is not None:
-            self.at = found.end()
-
-    def _ends(self, bracket: str) -> bool:
-        self._skip(_GAP)
-        if self.text.startswith(bracket, self.at):
-            self.at += 1
-            return True
-        return False
-
-    def _comma(self, bracket: str) -> None:
-        self._skip(_GAP)
-        if self.text.startswith(",", self.at):
-            self.at += 1
-        elif not self.text.startswith(bracket, self.at):
+        if found is None:
             raise _NotToml
+        self.at = found.end()
 
-    def _expect(self, what: str) -> None:
-        self._skip(_BLANKS)
-        if not self.text.startswith(what, self.at):
+    def _goes_on(self, what: re.Pattern[str], end: str) -> bool:
+        """Whether another item comes, instead of the end."""
+        found = what.match(self.text, self.at)
+        if found is None:
             raise _NotToml
-        self.at += len(what)
+        comma, there = found.groups()
+        if there != end and (there or comma is None):
+            raise _NotToml
+        self.at = found.end()
+        return not there
 
 
 def _plain(part: str) -> str:
     """A part of a key without its quotes."""
     if part[0] == "'":
         return part[1:-1]
-    if part[0] != '"':
-        return part
     try:
         return tomllib.loads(f"x = {part}")["x"] if "\\" in part else part[1:-1]
     except tomllib.TOMLDecodeError:
