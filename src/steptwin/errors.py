@@ -34,3 +34,7 @@ class LineFailure(SteptwinError, OSError):
     """The line failed: time-out, bad CRC, disconnect. ``uncertain``: the peer may have executed the request nevertheless."""
 
     uncertain = False
+
+
+class DatabaseFailure(LineFailure):
+    """A database is damaged, full or gone: nothing is known of what was asked. What was written before stays."""

@@ -17,7 +17,7 @@ from steptwin.campaign.case import Case, CaseResult, Verdict
 from steptwin.campaign.parquet import write_cases
 from steptwin.campaign.store import CAMPAIGN, METADATA, CampaignStore, StoredCase, gaps
 from steptwin.coverage.counts import Coverage
-from steptwin.errors import LineFailure, Misuse
+from steptwin.errors import DatabaseFailure, LineFailure, Misuse
 from steptwin.history.database import engine_of, read_url
 
 
@@ -117,6 +117,22 @@ def test_other_files_and_versions_are_refused(tmp_path: Path) -> None:
         opened(f"sqlite:///{path}", "one")
     path.write_text("no database" * 100)
     with pytest.raises(LineFailure, match="file is not a database"):
+        opened(f"sqlite:///{path}", "one")
+
+
+def test_a_full_disk_and_a_damaged_file_are_told_with_what_to_do(tmp_path: Path) -> None:
+    path = tmp_path / "r.db"
+    store = opened(f"sqlite:///{path}", "one")
+    with store._engine.begin() as connection:  # the only connection, which is used again
+        connection.exec_driver_sql("PRAGMA max_page_count=1")
+    big = StoredCase(Case(1, {"x": "y" * 100_000}, (), (), 0, 1), CaseResult(1, (), "", 0, {}))
+    with pytest.raises(DatabaseFailure, match=r"r\.db: database or disk is full; make room and run it again: what was written"):
+        store.add([big])
+    store.close()
+    pages = bytearray(path.read_bytes())
+    pages[100:4096] = bytes(len(pages[100:4096]))
+    path.write_bytes(pages)
+    with pytest.raises(DatabaseFailure, match=r"r\.db: database disk image is malformed; the file is damaged: put a copy"):
         opened(f"sqlite:///{path}", "one")
 
 

@@ -57,6 +57,16 @@ def test_a_campaign_without_failures_has_exit_code_0(shell: Shell, tmp_path: Pat
     assert shell.code == 0
 
 
+def test_a_database_that_fails_has_an_exit_code_of_its_own(shell: Shell, file: Path, tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "results.db").write_bytes(b"no database" * 100)
+    shell("campaign", "run", str(file), "--jobs", "1", "--out", str(tmp_path / "out"), "--json")
+    assert shell.code == 3
+    told = json.loads(shell.errors)
+    assert told["code"] == 3
+    assert "out/results.db: file is not a database; the file is damaged, or was never a database: put a copy" in told["error"]
+
+
 def test_until_failure_ends_with_the_first(shell: Shell, file: Path, tmp_path: Path) -> None:
     campaign = Campaign.load(file)
     first = next(n for n in range(40) if float(campaign.cases[n].values["t"]) <= 1.0)

@@ -1,7 +1,7 @@
 """The command line. Each command lives in a module of its own and imports what it needs when it runs.
 
 Exit codes: 0 done, 1 not done (a check found something, a peer refused, a line failed), 2 wrong use (an option, a name, a value,
-a file that is missing or has errors), 130 interrupted. docs/reference/command-line.md has the table.
+a file that is missing or has errors), 3 a database failed, 130 interrupted. docs/reference/command-line.md has the table.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ from steptwin.cli import (
     why,
 )
 from steptwin.cli.optiongroups import GroupedCommand
-from steptwin.errors import Misuse, SourceErrors, SteptwinError
+from steptwin.errors import DatabaseFailure, Misuse, SourceErrors, SteptwinError
 
 COMMANDS: Mapping[str, Mapping[str, Callable[..., None]]] = {
     "Twins": {
@@ -131,7 +131,7 @@ GROUPS["Twins"] = ("serve", *GROUPS["Twins"])
 GROUPS["Programs and runs"] = (*GROUPS["Programs and runs"], "campaign")
 """Names, as ``--help`` lists them."""
 LONGEST_SUMMARY = 200
-NOT_DONE, MISUSED = 1, 2
+NOT_DONE, MISUSED, DATABASE = 1, 2, 3
 """Exit codes."""
 
 VALUE_NAMES = {"str": "TEXT", "list[str]": "TEXT", "int": "N", "float": "NUMBER", "path": "PATH", "list[path]": "PATH"}
@@ -202,6 +202,8 @@ def main() -> None:
         _fail(message, MISUSED, head="" if message.startswith("Usage: ") else "steptwin: ")
     except SourceErrors as error:
         _fail(str(error), MISUSED, head="")
+    except DatabaseFailure as error:
+        _fail(str(error), DATABASE)
     except SteptwinError as error:
         _fail(str(error), MISUSED if isinstance(error, Misuse) else NOT_DONE)
     except typer.Abort:

@@ -15,9 +15,9 @@ from alembic.script import ScriptDirectory
 from alembic.util import CommandError
 from sqlalchemy import Connection, Engine, Table, create_engine, event
 from sqlalchemy.engine import URL, make_url
-from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError
+from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError, OperationalError
 
-from steptwin.errors import LineFailure, Misuse
+from steptwin.errors import DatabaseFailure, Misuse
 from steptwin.extras import missing
 
 SQLITE, POSTGRESQL = "sqlite", "postgresql"
@@ -84,10 +84,25 @@ def _write_ahead(connection: Any) -> None:
             return
 
 
-def failure(url: URL, error: DBAPIError) -> LineFailure:
-    """In one line."""
+_REMEDIES = {
+    sqlite3.SQLITE_CORRUPT: "the file is damaged: put a copy in its place, or move it away to begin anew",
+    sqlite3.SQLITE_NOTADB: "the file is damaged, or was never a database: put a copy in its place, or move it away to begin anew",
+    sqlite3.SQLITE_FULL: "make room and run it again: what was written before stays",
+    sqlite3.SQLITE_IOERR: "see that the disk is there, and run it again: what was written before stays",
+    sqlite3.SQLITE_READONLY: "the file must be writable",
+}
+"""By the low byte of the error code of SQLite."""
+_NO_SERVER = "see that the server runs and can be reached, and run it again: what was written before stays"
+
+
+def failure(url: URL, error: DBAPIError) -> DatabaseFailure:
+    """Which database it is, and what to do, in one line."""
     lines = str(error.orig).strip().splitlines()
-    return LineFailure(f"{shown(url)}: {lines[0] if lines else type(error.orig).__name__}")
+    text = f"{shown(url)}: {lines[0] if lines else type(error.orig).__name__}"
+    remedy = _NO_SERVER if url.get_backend_name() == POSTGRESQL and isinstance(error, OperationalError) else None
+    if isinstance(error.orig, sqlite3.Error) and error.orig.sqlite_errorcode is not None:
+        remedy = _REMEDIES.get(error.orig.sqlite_errorcode & 0xFF)
+    return DatabaseFailure(text if remedy is None else f"{text}; {remedy}")
 
 
 # ---------------------------------------------------------------------- the schema
