@@ -122,6 +122,35 @@ def test_the_test_fails_until_the_program_is_mended(found: list[FoundFailure], c
     assert f"{len(tests)} passed" in passing.stdout
 
 
+def test_what_only_the_early_end_of_the_simplest_case_violates_is_left_out(campaign: Path) -> None:
+    """The axis arrives at 0.9 s, long after it is too far: only that is wrong, and once it is mended the test passes."""
+    properties = """expectations = false
+[[property]]
+name = "not so far"
+always = "x.position < 10"
+[[property]]
+name = "arrives"
+eventually = "x.position > 39"
+"""
+    campaign.write_text(CAMPAIGN.partition("[[fault]]")[0].replace("[[vary]]", f"{properties}\n[[vary]]", 1))
+    description = load_campaign(campaign)
+    runner, cases = CaseRunner(description), Cases(description)
+    (found,) = find(runner, [runner.run(cases[3])], cases.__getitem__, campaign.parent / "out", campaign)
+    assert found.result.end_ns < 500_000_000
+    assert found.plain(campaign.parent)["what"].startswith("not so far: x.position is 10 mm, not < 10 mm at 0.")
+    assert "arrives" not in found.plain(campaign.parent)["what"]
+    assert found.files is not None
+    assert found.files.test is not None
+    text = found.files.test.read_text(encoding="utf-8")
+    assert "PROPERTIES = ['not so far']" in text
+    case = cases.made(1, 1, {"t": 0.25}, [], end_ns=found.result.end_ns).plain()
+    with pytest.raises(AssertionError, match=r"not so far: [^;]*$"):
+        check_case(campaign, case, ["not so far"])
+    with pytest.raises(AssertionError, match="arrives"):
+        check_case(campaign, case)
+    check_case(campaign, {**case, "end_ns": 200_000_000}, ["not so far"])
+
+
 def test_a_case_that_fails_is_an_assertion(campaign: Path) -> None:
     case = Cases(load_campaign(campaign)).made(1, 1, {"t": 0.25}, [0])
     with pytest.raises(AssertionError, match=r"x\.lost == 0"):

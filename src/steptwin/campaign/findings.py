@@ -114,7 +114,7 @@ def find(
             result = firsts[number] if number in firsts else runner.run(case_of(number))
             found[failure.property, f"case {number}"] = FoundFailure(failure, tuple(numbers), result, None, None)
             continue
-        shrunk = simpler(case_of(number), failure, runs=runs, is_over=is_over)
+        shrunk = _without_cut(simpler(case_of(number), failure, runs=runs, is_over=is_over), runner.run)
         alike, others = _alike(shrunk.case, numbers, case_of)
         if others:
             waiting.append((failure, others))
@@ -125,6 +125,18 @@ def find(
         files = reproduce(runner, shrunk.case, shrunk.result, folder, f"{identifier(failure.property)}-{number}", campaign)
         found[key] = FoundFailure(shrunk.failure, tuple(alike), shrunk.result, shrunk, files)
     return sorted(found.values(), key=lambda one: -len(one.numbers))
+
+
+def _without_cut(shrunk: ShrunkCase, run: RunCase) -> ShrunkCase:
+    """Without the violations in its result that only its early end makes: what was to come had no time to."""
+    case, result = shrunk.case, shrunk.result
+    if case.end_ns >= shrunk.original.end_ns or result.error is not None or len(failures_of(result)) < 2:
+        return shrunk
+    longer = run(replace(case, end_ns=shrunk.original.end_ns))
+    meant = {one.name for one in longer.verdicts if not one.holds and one.at_ns is not None and one.at_ns <= case.end_ns}
+    meant.add(shrunk.failure.property)
+    kept = tuple(one for one in result.verdicts if one.holds or one.name in meant)
+    return replace(shrunk, result=replace(result, verdicts=kept))
 
 
 def _alike(simplest: Case, numbers: list[int], case_of: Callable[[int], Case]) -> tuple[list[int], list[int]]:

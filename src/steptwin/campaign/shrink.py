@@ -53,8 +53,11 @@ def without_numbers(text: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class ShrunkCase:
-    """``result`` is that of ``case``. ``repeats``: whether the failure came again when the case was run again; if not, ``case``
-    is the original. ``is_complete``: whether no edit makes it simpler; otherwise the budget was used up."""
+    """``result`` is that of ``case``; in a finding without what only its early end violates.
+
+    ``repeats``: whether the failure came again when the case was run again; if not, ``case`` is the original. ``is_complete``:
+    whether no edit makes it simpler; otherwise the budget was used up.
+    """
 
     original: Case
     case: Case
