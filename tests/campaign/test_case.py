@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 from steptwin.campaign.case import Case, CaseResult, FaultAt, StepAt, Verdict
 
@@ -17,6 +17,11 @@ RESULT = CaseResult(3, (Verdict("quiet", True, 0.5, None, ""), Verdict("safe", F
 def test_a_case_is_json_and_pickles() -> None:
     assert Case.of_plain(json.loads(json.dumps(CASE.plain()))) == CASE
     assert pickle.loads(pickle.dumps(CASE)) == CASE
+
+
+def test_all_that_a_case_and_a_result_have_is_in_their_plain_values() -> None:
+    for one in (CASE, RESULT):
+        assert json.dumps(one.plain()) == json.dumps(asdict(one))
 
 
 def test_equal_cases_have_equal_digests_whatever_their_number() -> None:

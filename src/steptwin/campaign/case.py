@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from hashlib import blake2b
 from typing import Any, TypeAlias
 
 from steptwin.machine import Nanos
 
 VariedValue: TypeAlias = float | int | str | bool
+PickledCase: TypeAlias = "tuple[type, tuple[object, ...]]"
+"""Many cases and results go to other processes; what `dataclass` does for frozen ones with slots takes ten times as long."""
 DIGEST_BYTES = 16
 EXPECTATIONS = "expectations of the scripts"
 """The name of the verdict on a run whose scripts expected something in vain."""
@@ -28,6 +30,9 @@ class Verdict:
     at_ns: Nanos | None
     why: str
 
+    def __reduce__(self) -> PickledCase:
+        return Verdict, (self.name, self.holds, self.robustness, self.at_ns, self.why)
+
 
 @dataclass(frozen=True, slots=True)
 class FaultAt:
@@ -37,6 +42,9 @@ class FaultAt:
     fault: str
     table: int = 0
 
+    def __reduce__(self) -> PickledCase:
+        return FaultAt, (self.at_ns, self.fault, self.table)
+
 
 @dataclass(frozen=True, slots=True)
 class StepAt:
@@ -45,6 +53,9 @@ class StepAt:
     at_ns: Nanos
     step: str
     table: int = 0
+
+    def __reduce__(self) -> PickledCase:
+        return StepAt, (self.at_ns, self.step, self.table)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +72,20 @@ class Case:
     seed: int
     end_ns: Nanos
 
+    def __reduce__(self) -> PickledCase:
+        return Case, (self.number, self.values, self.faults, self.steps, self.seed, self.end_ns)
+
     def plain(self) -> dict[str, Any]:
-        return asdict(self)
+        faults = [{"at_ns": one.at_ns, "fault": one.fault, "table": one.table} for one in self.faults]
+        steps = [{"at_ns": one.at_ns, "step": one.step, "table": one.table} for one in self.steps]
+        return {
+            "number": self.number,
+            "values": dict(self.values),
+            "faults": faults,
+            "steps": steps,
+            "seed": self.seed,
+            "end_ns": self.end_ns,
+        }
 
     @classmethod
     def of_plain(cls, plain: Mapping[str, Any]) -> Case:
@@ -89,6 +112,9 @@ class CaseResult:
     measures: Mapping[str, float]
     error: str | None = None
 
+    def __reduce__(self) -> PickledCase:
+        return CaseResult, (self.number, self.verdicts, self.digest, self.end_ns, self.measures, self.error)
+
     @property
     def failed(self) -> bool:
         return self.error is not None or not all(verdict.holds for verdict in self.verdicts)
@@ -99,7 +125,18 @@ class CaseResult:
         return min((verdict.robustness for verdict in self.verdicts), default=None)
 
     def plain(self) -> dict[str, Any]:
-        return asdict(self)
+        verdicts = [
+            {"name": one.name, "holds": one.holds, "robustness": one.robustness, "at_ns": one.at_ns, "why": one.why}
+            for one in self.verdicts
+        ]
+        return {
+            "number": self.number,
+            "verdicts": verdicts,
+            "digest": self.digest,
+            "end_ns": self.end_ns,
+            "measures": dict(self.measures),
+            "error": self.error,
+        }
 
     @classmethod
     def of_plain(cls, plain: Mapping[str, Any]) -> CaseResult:

@@ -17,6 +17,7 @@ _Z = 1.959963984540054
 MOST_FAILURES = 1000
 """Failures that a summary lists; the database has all."""
 LONGEST_WHY = 300
+_digested = json.JSONEncoder(sort_keys=True, separators=(",", ":")).encode
 
 
 class PassInterval(NamedTuple):
@@ -74,7 +75,7 @@ class CampaignSummary:
         for case, result in results:
             if before is not None and case.number >= before:
                 break
-            whole.update(json.dumps(result.plain(), sort_keys=True, separators=(",", ":")).encode())
+            whole.update(_digested(result.plain()).encode())
             found._add(case, result)
         found.digest = whole.hexdigest()
         return found
