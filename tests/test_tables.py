@@ -54,7 +54,7 @@ def test_a_complete_table_is_read_only() -> None:
         ),
         (
             "import steptwin.wbc.steps as t; t.STEPS += (t.ProgramStep,)",
-            "steptwin.wbc.compile",
+            "steptwin.wbc.usage",
             "step ProgramStep lacks its sources",
         ),
         (
@@ -63,7 +63,7 @@ def test_a_complete_table_is_read_only() -> None:
             "successors of SetStep: there is no such step",
         ),
         (
-            "import steptwin.wbc.usage, steptwin.wbc.steps as t; t.STEPS += (t.ProgramStep,)",
+            "import steptwin.wbc.flow, steptwin.wbc.usage, steptwin.wbc.steps as t; t.STEPS += (t.ProgramStep,)",
             "steptwin.wbc.compile",
             "step ProgramStep lacks its code",
         ),

@@ -162,5 +162,5 @@ def test_databases_that_are_none(tmp_path: Path) -> None:
     found = run_command(("history", str(tmp_path / "nothing.db")), dict(os.environ))
     assert (found.returncode, found.stderr) == (2, f"steptwin: {tmp_path / 'nothing.db'} does not exist\n")
     found = run_command(("history", "postgresql://127.0.0.1:9/plant"), dict(os.environ))
-    assert found.returncode == 1
+    assert found.returncode == 3
     assert found.stderr.startswith("steptwin: postgresql://127.0.0.1:9/plant: connection failed")

@@ -17,7 +17,7 @@ from steptwin.subject import debugcommands as debug
 from steptwin.subject.commands import COMMANDS, plain_command, read_command
 from steptwin.subject.schema import schema
 from steptwin.world import script as do
-from steptwin.world.actions import ACTIONS, Bytes, Download, Leave, See, SetVariable
+from steptwin.world.actions import ACTIONS, Bytes, Download, Leave, Refused, See, SetVariable
 from steptwin.world.faults import read as read_fault
 
 SCHEMA = Path(__file__).parents[2] / "docs" / "control.schema.json"
@@ -116,8 +116,10 @@ def test_every_command_is_among_the_examples() -> None:
 
 
 def test_every_step_that_is_not_only_for_scripts_is_a_command() -> None:
-    # Bytes and Leave belong to the connections of programs, SetVariable to debuggers, ExpectReached to the steps that move.
-    assert {row.kind for row in COMMANDS.values()} >= set(ACTIONS) - {Bytes, Leave, SetVariable, do.ExpectReached}
+    # Bytes and Leave belong to the connections of programs, SetVariable to debuggers, ExpectReached to the steps that move,
+    # Refused to scripts of Python.
+    others = {Bytes, Leave, SetVariable, do.ExpectReached, Refused}
+    assert {row.kind for row in COMMANDS.values()} >= set(ACTIONS) - others
 
 
 @pytest.mark.parametrize(
