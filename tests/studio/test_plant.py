@@ -113,6 +113,7 @@ def test_who_uses_the_gateways_and_what_has_been_kept(
         assert reader["follows"] == ["table.M1.position"]
         assert reader["role"] == "engineer"
         assert reader["place"].startswith("127.0.0.1:")
+        client("close")
     until(lambda: gateways(studio)["opcua"]["clients"] == [], "the client has gone")
 
     httpx.get(studio.end_points["prometheus"]["url"], headers={"user-agent": "Prometheus/3"})
