@@ -9,6 +9,8 @@ export const DESCRIPTIONS: Readonly<Record<string, string>> = {
   "read {names} = all off": "odczyt: {names} = wszystkie wyłączone",
   "read {names} = all on": "odczyt: {names} = wszystkie włączone",
   "read {name} = {text} ({#value})": "odczyt: {name} = {text} ({#value})",
+  "{place} (unmapped)": "{place} (brak w mapie)",
+  "{place} (unmapped) = {values}": "{place} (brak w mapie) = {values}",
   "exception {code} {name} ({where})": "wyjątek {code} {name} ({where})",
   "malformed: {what}": "błędna ramka: {what}",
   "empty request": "puste zapytanie",
