@@ -83,7 +83,7 @@ class Ownership:
         is_removed = not self._is_at(file)
         if not is_removed:
             os.ftruncate(file, 0)
-            with contextlib.suppress(PermissionError):  # Windows removes no open files
+            with contextlib.suppress(PermissionError, FileNotFoundError):  # Windows removes no open files; somebody else has
                 self.path.unlink()
                 is_removed = True
         unlock(file)
