@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import pytest
+from why_worlds import PROGRAM as WAITS_PROGRAM
+from why_worlds import WAITS
 
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND
@@ -10,6 +12,7 @@ from steptwin.why import kept, search
 from steptwin.why.kept import PastQuestions
 from steptwin.why.question import Why, finish
 from steptwin.world import script as do
+from steptwin.world.faults import read
 from steptwin.world.history import History
 
 PROGRAM = """\
@@ -205,3 +208,39 @@ def test_points_that_changed_after_the_world_went_back_are_noted() -> None:
         if not history.branch:
             world.restore(history.state_at(SECOND).snapshot)
             history.gone_back()
+
+
+HELD = ("IN1", "IN2", "cell.IN1 == 1", "cell.IN2 == 0 and cell.OUT1 == 1", "cell")
+
+
+@pytest.mark.parametrize("since", [500, 5_000, 59_900])
+def test_a_fault_that_holds_a_level_is_shown_however_old(since: int) -> None:
+    """It began before all that is noted near the moment, and after the level changed or before."""
+    world = World.from_toml(WAITS, {"p.prg": WAITS_PROGRAM.encode()})
+    history = History(world)
+    for moment in range(0, 60_001, 300):
+        world.run_to(moment * MILLISECOND)
+        history.take()
+        if moment <= since < moment + 300:
+            world.run_to(since * MILLISECOND)
+            world.apply_input(do.SetFault(read("stuck machine=cell pin=IN1 value=1")))
+            world.apply_input(do.SetFault(read("stuck machine=cell pin=IN2 value=0 name=cut")))
+    past, whole = PastQuestions(history), Why(lambda: World(world.blueprint), world.inputs, world.now)
+    for question in HELD:
+        found, expected = finish(past.asking(question)), whole.ask(question)
+        assert (found.state, found.since) == (expected.state, expected.since), question
+        shown = len(found.links)
+        assert found.links == expected.links[:shown], question
+        assert any("fault" in link.text for link in found.links), question
+
+
+def test_a_fault_from_before_the_past_that_is_kept() -> None:
+    world = World.from_toml(WAITS, {"p.prg": WAITS_PROGRAM.encode()})
+    world.run_to(5 * SECOND)
+    world.fault("stuck machine=cell pin=IN2 value=0 name=cut")
+    world.run_to(7 * SECOND)
+    history = History(world)
+    world.run_to(9 * SECOND)
+    answer = finish(PastQuestions(history).asking("IN2"))
+    assert [(link.time, link.text) for link in answer.links] == [(5 * SECOND, "cell.IN2 is held at 0 by fault cut")]
+    assert (answer.since, answer.known_from) == (None, 7 * SECOND)

@@ -44,6 +44,19 @@ def test_answers_are_those_of_a_run_from_the_beginning(question: str, monkeypatc
     assert len({answer.since for answer in found}) > 1
 
 
+@pytest.mark.parametrize("begin", [0, 6 * SECOND, 6_100 * MILLISECOND])
+def test_what_came_from_outside_at_the_moment_of_a_state_is_a_change(begin: int) -> None:
+    world = World.from_toml(WORLD, {"m.prg": b"M1 = ON\nPABS M1 500\nWAITPOS\n"})
+    world.run_to(begin)
+    state = world.snapshot()
+    world.run_to(10 * SECOND)  # many times the distance of states after the first one
+    world.apply_input(do.Write((("m", "M1_POS_ACT", 77.0),)))
+    world.run(for_=1.0)
+    past = Why(lambda: World(world.blueprint, at=state), world.inputs, world.now)
+    answer = past.ask("m.M1.position")
+    assert (answer.since, answer.links[0].text) == (10 * SECOND, "from outside: writes m.M1_POS_ACT = 77")
+
+
 def test_as_many_states_are_kept_as_may_be() -> None:
     world = World.from_toml(WAITS, {"p.prg": PROGRAM.encode()})
     kept = states.StatesOnTheWay(world)

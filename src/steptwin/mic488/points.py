@@ -7,7 +7,6 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from operator import attrgetter
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -191,14 +190,17 @@ def live_point(device: Mic488Device, text: str) -> LivePoint | None:
     return _live(point, owner, register.key, behaviour.read, is_kept=behaviour.quiet)
 
 
-_axis_marks = attrgetter("status", "enabled", "limit_l_p", "limit_r_p")
-
-
 def marks(device: Mic488Device) -> object:
     """See `steptwin.world.kind.ControllerKind.marks`."""
-    program = device.program
-    flags = program.state, program.error, device.master_error
-    return *flags, *device.triggered.values(), *map(_axis_marks, device.axes)
+    program, (m1, m2, m3, m4) = device.program, device.axes
+    return (  # written out, because it is asked for after each event
+        program.state, program.error, device.master_error,
+        m1.status, m1.enabled, m1.limit_l_p, m1.limit_r_p,
+        m2.status, m2.enabled, m2.limit_l_p, m2.limit_r_p,
+        m3.status, m3.enabled, m3.limit_l_p, m3.limit_r_p,
+        m4.status, m4.enabled, m4.limit_l_p, m4.limit_r_p,
+        *device.triggered.values(),
+    )  # fmt: skip
 
 
 def _short_name(text: str) -> tuple[ShortName, int | None] | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import partial
 from itertools import takewhile
@@ -94,11 +94,11 @@ class Courses:
 
 
 def _within(turns: CourseTurns, interval: Interval) -> Iterator[tuple[Nanos, float]]:
-    """The turns in an interval, the first one at its beginning."""
+    """The turns in an interval, the first one at its beginning: what came from outside at this moment came after the state."""
     begin = interval.state.snapshot.now
-    first, last = (bisect_right(turns, moment, key=_moment) for moment in (begin, interval.end))
-    yield begin, turns[max(0, first - 1)][1]
-    yield from turns[first:last]
+    first = max(1, bisect_left(turns, begin, key=_moment))
+    yield begin, turns[first - 1][1]
+    yield from turns[first : bisect_right(turns, interval.end, key=_moment)]
 
 
 def _moment(turn: tuple[Nanos, float]) -> Nanos:

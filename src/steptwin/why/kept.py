@@ -12,7 +12,7 @@ from typing import Protocol
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
-from steptwin.why.answer import Answer
+from steptwin.why.answer import MOST_LINKS, Answer
 from steptwin.why.question import Asking, Why
 from steptwin.why.search import Asked, LastChanges, PastStates
 from steptwin.world.history import outside_past
@@ -51,20 +51,27 @@ class PastQuestions:
         at = now if at is None else at
         if not history.begin <= at <= now:
             raise Misuse(outside_past(at, history.begin, now))
-        known, span = self._known, self._first_span()
+        known, span = self._known, first_span(history.world)
         if known is None or not known.fits(at, now - span):
             known = self._known = _Known(history, max(history.begin, at - span), self._most)
         answer = yield from known.asking(question, at)
         if answer.is_cut and answer.since is None and (asked := known.asked(question)) is not None:
             found = yield from self._changes.before(asked, known.begin)
+            if answer.links and history.begin <= answer.links[0].time < known.begin:  # a fault has held it since then
+                answer = (yield from self._then(question, answer.links[0].time))._replace(at=at, since=None)
             if found.since is None:
                 begin = found.known_from
                 return answer._replace(known_from=begin, is_cut=begin > 0, is_complete=begin == 0)
-            then = _Known(history, max(history.begin, found.since - span), self._most)
-            before = yield from self._further(then, question, found.since)
+            before = yield from self._then(question, found.since, further=True)
             if before.since == found.since:
-                return before._replace(at=at)
+                return _joined(answer, before)
         return (yield from self._further(known, question, at, answer))
+
+    def _then(self, question: str, at: Nanos, *, further: bool = False) -> Asking:
+        """The answer for a moment from what is noted near it; ``further``: and from older states, as `_further`."""
+        history = self._history
+        known = _Known(history, max(history.begin, at - first_span(history.world)), self._most)
+        return (yield from self._further(known, question, at) if further else known.asking(question, at))
 
     def _further(self, known: _Known, question: str, at: Nanos, answer: Answer | None = None) -> Asking:
         """The answer from what is known, and from older states as long as causes are older."""
@@ -80,11 +87,6 @@ class PastQuestions:
             if is_near:
                 self._known = known
         return answer
-
-    def _first_span(self) -> Nanos:
-        """Shorter where statements take less time."""
-        times = [programs.statement_time for programs in self._history.world.programs.values() if programs.statement_time]
-        return min([FIRST_SPAN_NS, *(FIRST_STATEMENTS * time for time in times)])
 
 
 class _Known:
@@ -128,6 +130,23 @@ class _Known:
             span = min(span, self._most * (end - log.begin) // (2 * log.noted) - (end - at))
         moment = max(history.begin, at - span)
         return moment if moment < log.begin and history.state_at(moment)[0].now < log.begin else None
+
+
+def _joined(answer: Answer, before: Answer) -> Answer:
+    """``before``: the answer for the moment of the last change, before all that is known of the later one; what has held it
+    since comes first."""
+    held = [link for link in answer.links if link not in before.links]
+    links = (*(held if held and held[0].time > (before.since or 0) else ()), *before.links)
+    is_all = len(links) <= MOST_LINKS
+    return before._replace(
+        at=answer.at, links=links[:MOST_LINKS], is_complete=before.is_complete and is_all, is_cut=before.is_cut and is_all
+    )
+
+
+def first_span(world: Plant) -> Nanos:
+    """How much of the past of a world is looked at first: less where statements take less time."""
+    times = [programs.statement_time for programs in world.programs.values() if programs.statement_time]
+    return min([FIRST_SPAN_NS, *(FIRST_STATEMENTS * time for time in times)])
 
 
 def _second_world(world: Plant, snapshot: PlantSnapshot) -> Plant:

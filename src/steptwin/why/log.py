@@ -117,8 +117,10 @@ class CauseLog:
         for record in world.trace if self.is_whole else _plans(world):
             self._take(record)
         world.trace.stop()  # it is noted here
+        began = {fault.name: fault.begin for fault in parts.faults.active}
         for owner in (*parts.faults.machines, *parts.faults.elements):
-            self._note_holds(owner, self.begin)
+            for signal, held in parts.faults.held(owner).items():
+                self._holds[signal].append(Hold(began.get(held.fault, self.begin), held))
         self._built = {group: len(records) for group, records in self.records.items()}
         self.points = points.PointTurns(world)
         world.trace.watchers.append(self._take)

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.why.answer import Answer
-from steptwin.why.kept import FIRST_SPAN_NS, PastQuestions
-from steptwin.why.log import MOST_NOTED, in_parts
-from steptwin.why.question import Asking, finish
-from steptwin.world.history import ChangedSince, PastState, outside_past
+from steptwin.why.kept import PastQuestions, first_span
+from steptwin.why.log import MOST_NOTED
+from steptwin.why.question import finish
+from steptwin.world.history import ChangedSince, PastState, outside_past, replay
 from steptwin.world.plant import Plant
 from steptwin.world.plantsnapshot import RecordedInput
 
-STATES = 32
+STATES = 16
 """Number of states at equal distances; further ones are near the end, about which most questions are."""
 
 
@@ -31,15 +31,11 @@ class RepeatedPast:
 
     def ask(self, question: str, at: Nanos | None = None) -> Answer:
         """The answer for a moment (ns), the end by default. Raises `Misuse` for what is no question here."""
-        return finish(self.asking(question, at))
-
-    def asking(self, question: str, at: Nanos | None = None) -> Asking:
-        """As `ask`, in parts."""
         if self._questions is None:
             states = StatesOfRun(self._make(), self._inputs, self._end)
-            yield from states.run()
+            states.run()
             self._questions = PastQuestions(states, MOST_NOTED)
-        return (yield from self._questions.asking(question, at))
+        return finish(self._questions.asking(question, at))
 
 
 class StatesOfRun:
@@ -54,21 +50,23 @@ class StatesOfRun:
         self._end = end
         self._states = [PastState(world.snapshot(with_inputs=False), 0)]
 
-    def run(self) -> Iterator[None]:
-        """Run the world, in parts."""
+    def run(self) -> None:
+        """Run the world."""
         self.world.stop_recording()
         changed = ChangedSince(self.world)
-        span = self._end - self.begin
-        moments = {self.begin + span * number // STATES for number in range(1, STATES + 1)}
-        while span > FIRST_SPAN_NS:
-            span //= 2
-            moments.add(self._end - span)
         done = 0
-        for moment in sorted(moments):
-            for is_input in in_parts(self.world, self._inputs[done:], moment):
-                done += is_input
-                yield
+        for moment in self._moments():
+            done += sum(replay(self.world, self._inputs[done:], moment))
             self._states.append(PastState(self.world.snapshot(with_inputs=False), done, changed.take()))
+
+    def _moments(self) -> Sequence[Nanos]:
+        """Those of the states after the first one."""
+        whole, span = self._end - self.begin, first_span(self.world)
+        moments = {self.begin + whole * number // STATES for number in range(1, STATES + 1)}
+        while span < whole:
+            moments.add(self._end - span)
+            span *= 2
+        return sorted(moments)
 
     def state_at(self, moment: Nanos) -> PastState:
         index = bisect_right(self._states, moment, key=lambda state: state.snapshot.now)
