@@ -1,19 +1,16 @@
 """Small worlds with values by chance, and all that can be seen of them.
 
-A world is made of a `Scene`, a description with gaps: ``⟨2..9⟩`` becomes a number, ``⟨#2..9⟩`` a whole one, ``⟨a|b⟩`` one
-of these. What begins with ``?``, a line or a whole table, is left out by chance. ``! kind = ...`` is a fault, of the description
-or of a step. ``* condition`` is an event. In one half of the worlds numbers are on a coarse grid, so that moments and places
-coincide; in the other one they have decimals. All comes from `random.Random.random`, which is the same in every Python.
+A world is made of a `Scene`, a description with gaps (`Chance.filled`). What begins with ``?``, a line or a whole table, is left
+out by chance. ``! kind = ...`` is a fault, of the description or of a step. ``* condition`` is an event.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from hashlib import blake2b
-from random import Random
 
 from axis_scenes import AXIS_SCENES
+from chance import Chance
 from machine_scenes import MACHINE_SCENES
 from plant_scenes import PLANT_SCENES
 from scenes import BELT_SCENES, Scene
@@ -39,48 +36,11 @@ from steptwin.world.steptable import read_steps
 from steptwin.world.trace import TraceRecord, encode
 from steptwin.world.unfinished import unchanged_inputs, waiting
 
-GAP = re.compile(r"⟨([^⟩]*)⟩")
 STEPS = 16
 MOMENTS = 7
 WRONG = 16
 END_S = 1.5
 SCENES = BELT_SCENES | AXIS_SCENES | MACHINE_SCENES | PLANT_SCENES
-
-
-class Chance:
-    """Where all that is by chance comes from."""
-
-    def __init__(self, name: str, seed: int) -> None:
-        self._random = Random(f"{name} {seed}")
-        self.is_even = seed % 2 == 0
-
-    def below(self, end: int) -> int:
-        return int(self._random.random() * end)
-
-    def is_so(self) -> bool:
-        """Two times of three."""
-        return self.below(3) > 0
-
-    def number(self, low: str, high: str) -> str:
-        places = max(len(end.partition(".")[2]) for end in (low, high))
-        begin, end = float(low), float(high)
-        if self.is_even:
-            return f"{begin + (end - begin) * self.below(9) / 8:.{places}f}"
-        return f"{begin + (end - begin) * self._random.random():.{places + 3}f}"
-
-    def whole(self, low: str, high: str) -> str:
-        return str(int(low) + self.below(int(high) - int(low) + 1))
-
-    def gap(self, inside: str) -> str:
-        chosen = inside.split("|")
-        one = chosen[self.below(len(chosen))]
-        low, dots, high = one.partition("..")
-        if not dots:
-            return one
-        return self.whole(low[1:], high) if low.startswith("#") else self.number(low, high)
-
-    def filled(self, text: str) -> str:
-        return GAP.sub(lambda found: self.gap(found[1]), text)
 
 
 def described(chance: Chance, scene: Scene) -> tuple[str, list[str]]:
@@ -259,10 +219,6 @@ def programs_of(world: World) -> Iterator[str]:
                 yield repr((programs.use(at), programs.comes_back(at), sorted(programs.reached(place, [number]))))
         for text in program_texts(world, machine):
             yield repr((text.place, to_json(text.source, text.check()), text.memory(text.source.text)))
-
-
-def digest(lines: list[str]) -> str:
-    return blake2b("\n".join(lines).encode(), digest_size=6).hexdigest()
 
 
 VALUES = ("0", "-1", "1e300", "''", "'x'", "'c.IN1'", "'c.OUT1'", "'c.M1'", "[]", "[[0, 1]]", "true", "'10 ms'", "{}")

@@ -10,7 +10,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from random_worlds import SCENES, digest, seen, wrong
+from chance import digest
+from random_worlds import SCENES, seen, wrong
 
 from steptwin.world.elements import ELEMENTS
 from steptwin.world.faults.kinds import KINDS

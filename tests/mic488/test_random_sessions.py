@@ -1,0 +1,40 @@
+"""A MIC488 answers and does in sessions by chance what it did before: golden/random.txt has digests of each.
+
+Regenerate with ``python tests/mic488/test_random_sessions.py`` where behaviour has changed. ``... SEED`` shows a session, so that
+its lines before and after a change can be compared.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+from chance import digest
+from random_mic488 import session
+
+GOLDEN = Path(__file__).parent / "golden" / "random.txt"
+SEEDS = range(60)
+
+
+def digests(found: dict[str, list[str]]) -> str:
+    return " ".join(f"{what}={digest(lines)}" for what, lines in found.items())
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_it_answers_and_does_what_it_did(seed: int) -> None:
+    assert f"{seed} {digests(session(seed))}" == GOLDEN.read_text().splitlines()[seed]
+
+
+@pytest.mark.parametrize("seed", range(100, 112))
+def test_it_does_not_matter_at_which_moments_it_is_looked_at(seed: int) -> None:
+    found = [session(seed, stepwise=stepwise) for stepwise in (True, False)]
+    assert found[0] == found[1]
+
+
+if __name__ == "__main__":
+    if sys.argv[1:]:
+        for what, lines in session(int(sys.argv[1])).items():
+            print(f"--- {what}", *lines, sep="\n")
+    else:
+        GOLDEN.write_text("".join(f"{seed} {digests(session(seed))}\n" for seed in SEEDS))
