@@ -180,7 +180,7 @@ class AxisMotion(Stateful):
         return due
 
     def advance(self, now: Nanos) -> None:
-        """Execute the deadline at ``now``; the controller calls this at each of the axis' deadlines, in order."""
+        """Execute what is due at ``now``, if anything; the controller calls this at each of the axis' deadlines, in order."""
         leg, end = self._blocked_leg, self.profile.end
         if leg is not None and leg[0] <= now:
             self._limit_stop(now, leg[1])
@@ -191,7 +191,10 @@ class AxisMotion(Stateful):
             self.control.tick(self, now)
 
     def _arrive(self, now: Nanos) -> None:
-        self.profile = at_rest(now, self.profile.count(now), self.profile.phase(now))
+        """The profile has ended."""
+        ended = self.profile
+        rests = ended.counts[-1]
+        self.profile = at_rest(now, ended.base + rests, ended.final_p - rests)
         self.revision += 1
         self.status = self.arrival
         self.homing.leg = Homing.NONE
@@ -270,7 +273,9 @@ class AxisMotion(Stateful):
 
     def _take_ramps(self) -> None:
         """Keep the present ramps for the motion being commanded (MIC-40)."""
-        self.rise_p, self.fall_p = self.up_p, self.down_p
+        # As `up_p` and `down_p`, without their calls: each motion comes here.
+        self.rise_p = max(self.acc_p, SLOWEST_RAMP_P)
+        self.fall_p = max(self.dec_p, SLOWEST_RAMP_P)
 
     def _steer(self, status: AxisStatus, now: Nanos) -> None:
         """Change the velocity to ``velocity_p``, slowing down with ``ramp_p``."""
@@ -340,7 +345,10 @@ class AxisMotion(Stateful):
         self.revision += 1
         self.status = status
         self.arrival = arrival
-        self._guard_switches(now)
+        if self.config.limit_mode:
+            self._guard_switches(now)
+        else:
+            self._blocked_leg = None
         if not profile.moving(now) and self.arrival is not self.status:
             self._arrive(now)
 
@@ -372,8 +380,6 @@ class AxisMotion(Stateful):
     def _guard_switches(self, now: Nanos) -> None:
         """Stop if the profile moves into an active limit switch, or note the moment at which it will (MIC-12)."""
         self._blocked_leg = None
-        if not self.config.limit_mode:  # each motion comes here
-            return
         blocked = [direction for direction in (-1, 1) if self._switch_blocks(direction)]
         for begin, direction in self.profile.legs(now) if blocked else ():
             if direction in blocked:

@@ -238,9 +238,7 @@ class ControllerCore(Stateful):
         if due is not None and due <= at:
             changed = self.inputs.settle(at)
         for axis in self.axes:
-            due = axis.deadline()
-            if due is not None and due <= at:
-                axis.advance(at)
+            axis.advance(at)
         self.program.disturbed(at, inside=True)
         if changed:
             self.program.inputs_changed(changed, at)

@@ -256,6 +256,8 @@ class ProgramControl(Stateful):
             for at in self.registers.ticks.values():
                 if due is None or at < due:
                     due = at
+        elif not self._pulses:
+            return None
         for at in self._pulses.values():
             if due is None or at < due:
                 due = at
@@ -320,7 +322,8 @@ class ProgramControl(Stateful):
         first = now if inside else self.interpreter.after(now)
         if self.state is RUNNING:
             self.interpreter.disturb(first)
-        self._check_drives(now, first)
+        if self.together or self.state is not STOPPED:
+            self._check_drives(now, first)
 
     def _check_drives(self, now: Nanos, first: Nanos) -> None:
         axes = self.device.axes

@@ -31,9 +31,9 @@ class RecordedPlans:
             if revisions[i] == revision:
                 continue
             plan = drive.plan
-            before, profile = self._profiles[i], profile_of(plan)
+            before, profile = self._profiles[i], plan if type(plan) is Profile else profile_of(plan)
             revisions[i], self._profiles[i] = revision, profile
-            if before is None or not _only_rests(before, profile):
+            if before is None or profile.segments or not _only_rests(before, profile):
                 record(TraceRecord(now, self._name, "plan", number, plan))
 
     def mark_reported(self) -> None:
@@ -43,7 +43,5 @@ class RecordedPlans:
 
 
 def _only_rests(before: Profile, after: Profile) -> bool:
-    """Whether ``after`` is rest at the end position of ``before``."""
-    if after.segments or before.end is None or before.end > after.start:
-        return False
-    return before.base + before.counts[-1] == after.base
+    """Whether ``after``, which is rest, is at the end position of ``before``."""
+    return before.end is not None and before.end <= after.start and before.base + before.counts[-1] == after.base
