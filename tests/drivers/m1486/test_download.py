@@ -200,6 +200,36 @@ def test_a_block_that_ends_late_is_seen_to_have_ended() -> None:
         chip.uploaded(1)
 
 
+@pytest.mark.parametrize("seconds", [1, 20, 50])
+def test_short_waits_see_that_wrong_data_have_ended_a_program(seconds: int) -> None:
+    """The queries go with it (M-11). They are repeated, but rarely: they lie in the input buffer as long as it runs, and would
+    find no room there."""
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    begin = wire.now
+    chip.download(f"[\nF640\nR\nW{1000 * seconds}\n?102\nQ\nR\n]")  # Q3: B10 and B11 are high
+    while not (end := chip.wait(0.1, check=False)).ok:
+        assert end.reason is ChipReason.OVERDUE
+        assert wire.now - begin < 2.2 * max(seconds, 2) * SECOND
+    assert wire.now - begin > seconds * SECOND
+    assert wire.codes().count("wrong-data") == 1
+    assert chip.counter() == 640
+    assert not chip.is_busy()
+
+
+def test_short_waits_see_that_a_block_was_cut_short() -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    with pytest.raises(ChipMoveFailed, match="not done yet"):
+        chip.run_block(["f640", "r", "w20000", "e"], 0.1)
+    ends = [chip.wait(0.1, check=False).reason]
+    while ends[-1] is ChipReason.OVERDUE:
+        ends.append(chip.wait(0.1, check=False).reason)
+        assert len(ends) < 100
+    assert ends[-1] is ChipReason.CUT
+    assert chip.counter() == 640
+
+
 PROGRAM = "[\n@1\nf640\nr ; to and fro\nw500\nd\nr\nw500\nj1\n]\n"
 
 

@@ -12,7 +12,7 @@ from steptwin.drivers.exchange import Job, NoAnswer, Overtaken, SentLate, TooLat
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.m1486.failures import Busy, Garbled, NoEcho, Restarted, WrongType, unconfirmed
 from steptwin.drivers.m1486.lines import TALK
-from steptwin.drivers.m1486.motion import ChipMotionCommand
+from steptwin.drivers.m1486.motion import ChipMotion, ChipMotionCommand
 from steptwin.drivers.m1486.settings import ChipSettings
 from steptwin.drivers.m1486.talk import INVALID_COMMAND, TYPE_QUERY, CharacterTalk, ChipRequest, ChipRequestKind, chip_name
 from steptwin.drivers.permission import Permission
@@ -37,6 +37,8 @@ PATIENCE_NS: Nanos = 10 * SECOND
 """A motion is not begun after this time without progress towards it, ns."""
 SLICE_NS: Nanos = 20 * MILLISECOND
 """Waiting for a pending answer is interrupted for stops at this interval, ns."""
+ASK_AGAIN_NS: Nanos = SECOND
+"""First interval of further queries of a program that does not end, ns; it doubles each time."""
 _NAMES = {variant.type_letter: variant.name for variant in reversed(VARIANTS)}
 _STATUS_BYTES = (15, 17, 18, 19, 20)
 """Interface, functions 40 to 63 and type letter, by the numbers of ``U``."""
@@ -67,6 +69,8 @@ class ChipNotes:
         """Unread uploads of the program that was started last."""
         self.ready_at: Nanos = 0
         """The end of the present EEPROM write, ns."""
+        self.asked_at: Nanos = 0
+        """The moment of the last query of its type, ns."""
 
     def forget(self) -> None:
         """Forget the state of a chip that was switched off or reset by others."""
@@ -314,8 +318,8 @@ class ChipUnit:
         if not self.talk.owes(self.address):
             await self.ask()
         letter = await self._listen(patience_ns, permission)
-        if letter is None and self.talk.owes(self.address) == 1:
-            await self.ask()  # the answer may have been lost
+        if letter is None and self._is_query_gone():
+            await self.ask()
             letter = await self._listen(self._patience(True))
         if letter is not None:
             await self._receive_rest()
@@ -323,6 +327,24 @@ class ChipUnit:
             if self.talk.uploads is self.notes.uploads:
                 self.talk.uploads = None
         return letter
+
+    def _is_query_gone(self) -> bool:
+        """Whether a query that was not answered in time is to be repeated: the answer may have been lost, or the query with a
+        program that wrong data have ended (`should_ask_again`)."""
+        motion = self.notes.motion
+        if motion is not None and motion.kind is ChipMotion.BLOCK:
+            return self.should_ask_again(ASK_AGAIN_NS)
+        return self.talk.owes(self.address) == 1
+
+    def should_ask_again(self, interval_ns: Nanos) -> bool:
+        """Whether to query a program that has not ended once more; ``interval_ns``: from the first query to the second.
+
+        Wrong data that end it drop the queries received before, too (M-11). They stay in the input buffer as long as it runs, so
+        they become rarer and rarer, and one more fits in the end.
+        """
+        owed = self.talk.owes(self.address)
+        most = self.variant.input_bits // (8 * (len(TYPE_QUERY) + 1)) - 1
+        return 0 < owed < most and self.line.now() >= self.notes.asked_at + (interval_ns << owed - 1)
 
     async def _receive_rest(self) -> None:
         """Receive the second letter of a chip that was asked twice, so that it is not taken for the next answer."""
@@ -338,6 +360,7 @@ class ChipUnit:
         """Request the type letter, which the chip sends when it has executed all commands."""
         self.talk.arrived.pop(self.address, None)
         await self.send(TYPE_QUERY)
+        self.notes.asked_at = self.line.now()
 
     async def _listen(self, patience_ns: Nanos, permission: Permission | None = None) -> int | None:
         """Wait for a pending letter, in slices that stops can interrupt."""

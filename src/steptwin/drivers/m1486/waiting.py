@@ -6,14 +6,10 @@ from collections.abc import Callable
 
 from steptwin.drivers.line import check_wait
 from steptwin.drivers.m1486.motion import MARGIN, MARGIN_S, UNKNOWN_S, ChipMotion, ChipMotionCommand, ChipMoveEnd, ChipReason
-from steptwin.drivers.m1486.talk import TYPE_QUERY
-from steptwin.drivers.m1486.unit import SLICE_NS, ChipUnit
+from steptwin.drivers.m1486.unit import ASK_AGAIN_NS, SLICE_NS, ChipUnit
 from steptwin.drivers.m1486.watching import early_ns, watch
 from steptwin.errors import LineFailure, Misuse
 from steptwin.machine import SECOND, Nanos
-
-ASK_AGAIN_NS: Nanos = SECOND
-"""First interval of queries about a block that does not end, ns; it doubles each time."""
 
 
 async def wait_for(
@@ -64,23 +60,14 @@ async def wait_for(
 
 
 async def _end_of_block(unit: ChipUnit, limit: Nanos) -> None:
-    """Wait until a block has sent its mark, the chip answers without it, or ``limit``.
-
-    A block that is dropped because of wrong data takes the query with it (M-11). So the query is repeated, but not so often
-    that it fills the input buffer.
-    """
+    """Wait until a block has sent its mark, the chip answers without it, or ``limit``."""
     line, talk, notes = unit.line, unit.talk, unit.notes
-    most = unit.variant.input_bits // (8 * (len(TYPE_QUERY) + 1)) - 1
-    pause = ASK_AGAIN_NS
-    due = line.now() + pause
+    begin = line.now()
     while not notes.uploads and unit.address not in talk.arrived and line.now() < limit:
-        await unit.receive_upload(SLICE_NS)
-        if line.now() >= due and talk.owes(unit.address) < most - 1:
+        is_first = not talk.owes(unit.address) and line.now() >= begin + ASK_AGAIN_NS
+        if is_first or unit.should_ask_again(2 * ASK_AGAIN_NS):
             await unit.ask()
-            pause *= 2
-            due = line.now() + pause
-    if line.now() >= limit and talk.owes(unit.address) < most:
-        await unit.ask()  # those before may be gone
+        await unit.receive_upload(SLICE_NS)
 
 
 def _time_out_s(unit: ChipUnit, motion: ChipMotionCommand | None) -> float:
