@@ -18,7 +18,6 @@ from steptwin.drivers.mic488.decoder import ModbusDecoder
 from steptwin.drivers.place import parse_line_address
 from steptwin.errors import LineFailure, Misuse
 from steptwin.wire.frameline import FrameLine
-from steptwin.wire.slave import FrameDirection
 from steptwin.world.addresses import Address
 
 READ, ANSWER = bytes.fromhex("01 03 27 24 00 02 8E B4"), bytes.fromhex("01 03 04 00 00 41 48 CA 55")
@@ -85,58 +84,6 @@ def test_the_m1486_passes_and_is_told() -> None:
     assert frames[1].meaning.endswith(" = 42")
     assert frames[2].meaning == "+100  Add 100"
     assert frames[3].meaning == "no room in the input buffer: a character is lost"
-
-
-def decoded(*heard: tuple[str, bytes]) -> list[str]:
-    """What a decoder says of bytes typed (``>``) and come (``<``), with a silence (``.``)."""
-    frames: list[FrameLine] = []
-    decoder = M1486Decoder(frames.append, "A")
-    now = 0
-    for what, data in heard:
-        now += 1_000_000
-        if what == ".":
-            due = decoder.deadline()
-            assert due is not None
-            now = due
-            decoder.expire(now)
-        else:
-            decoder.feed(data, now, FrameDirection.IN if what == ">" else FrameDirection.OUT)
-    return told(frames)
-
-
-def test_the_echo_of_an_m1486_is_told_once_for_a_line_and_is_no_upload() -> None:
-    at_once = decoded((">", b"u16\ru2\r"), ("<", b"u16\r\x01"), ("<", b"u2\r\x32"))
-    assert at_once == [
-        "IN U16  Upload 16",
-        "IN U2  Upload 2",
-        r"OUT echo of 'u16\r'",
-        "OUT U16 production series = 1",
-        r"OUT echo of 'u2\r'",
-        "OUT U2 position, middle byte = 50",
-    ]
-    by_hand = decoded((">", b"u1"), ("<", b"u"), ("<", b"1"), (".", b""), (">", b"6\r"), ("<", b"6\r\x01"))
-    assert by_hand == ["OUT echo of 'u1'", "IN U16  Upload 16", r"OUT echo of '6\r'", "OUT U16 production series = 1"]
-
-
-def test_what_was_typed_before_the_echo_was_on() -> None:
-    assert decoded((">", b"x7\rt41\rv5\r"), ("<", b"v5\r"))[3:] == [r"OUT echo of 'v5\r'"]
-
-
-def test_an_upload_of_an_m1486_that_looks_like_an_echo() -> None:
-    without_echo = decoded((">", b"v100\ru2\r"), ("<", b"v"), (".", b""), (">", b"u3\r"), ("<", b"u"), (".", b""))
-    assert [line.partition("=")[2] for line in without_echo if "= " in line] == [" 118", " 117"]
-    assert decoded((">", b"u2\ru3\r"), ("<", b"u\x07"))[2:] == [
-        "OUT U2 position, middle byte = 117",
-        "OUT U3 position, high byte = 7",
-    ]
-
-
-def test_what_several_chips_of_a_line_echo_at_once() -> None:
-    assert decoded((">", b"urz"), ("<", b"ppz"), (".", b"")) == [
-        "OUT 'p' where 'u' was typed: a garbled echo, or that of several chips at once",
-        "OUT 'p' where 'r' was typed: a garbled echo, or that of several chips at once",
-        "OUT echo of 'z'",
-    ]
 
 
 def test_listening_only() -> None:

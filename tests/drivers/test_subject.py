@@ -356,6 +356,7 @@ def test_a_request_that_is_none_is_not_sent(table: DeviceSubject, request_: byte
         ("0507d80000", RawEffect.STOP),  # M1_JOG_PLUS OFF
         ("0507d8ff00", RawEffect.WRITE),
         ("100064000102", RawEffect.WRITE),  # cut
+        ("10271400010200ff", RawEffect.WRITE),  # several registers
     ],
 )
 def test_raw_requests_that_stop_are_known(rig: Rig, pdu: str, effect: RawEffect) -> None:

@@ -15,12 +15,15 @@ A case is ``=== name``, the script, ``---``, the transcript. Lines of a script:
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import groupby, pairwise
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
+
+from line_rig import VirtualWire
 
 from steptwin.errors import SteptwinError
 from steptwin.machine import MILLISECOND, Nanos
@@ -29,6 +32,7 @@ CASE, RESULT = "=== ", "---"
 PAUSE_NS = 20 * MILLISECOND
 """Longer ones are shown, with their moment since the call."""
 MANY = 5
+FAULT = re.compile(r"(.+) (\d+) (to .+)")
 
 
 @dataclass(frozen=True)
@@ -67,7 +71,7 @@ class Case:
 def _run(bench: Bench, steps: list[str]) -> Iterator[str]:
     for step in steps:
         if step.startswith("% "):
-            kind, number, direction = step[2:].split(" ", 2)
+            kind, number, direction = FAULT.fullmatch(step[2:]).groups()  # type: ignore[union-attr]
             bench.wire.put(bench.fault(kind, direction, int(number)))
             yield f"  {step}"
         elif step.startswith("| "):
@@ -167,7 +171,11 @@ def _ms(nanos: int) -> str:
     return f"{nanos / 1e6:.9g}"
 
 
-def cases(golden: Path) -> list[Case]:
+def cases(*goldens: Path) -> list[Case]:
+    return [case for golden in goldens for case in _cases_in(golden)]
+
+
+def _cases_in(golden: Path) -> list[Case]:
     found = []
     for part in golden.read_text(encoding="utf-8").split(CASE)[1:]:
         name, _, body = part.partition("\n")
@@ -176,7 +184,26 @@ def cases(golden: Path) -> list[Case]:
     return found
 
 
-def regenerate(golden: Path, make: Callable[[str], Bench]) -> None:
-    head = golden.read_text(encoding="utf-8").split(CASE)[0]
-    written = (f"{CASE}{case.name}\n{case.script}{RESULT}\n{case.transcript(make)}\n" for case in cases(golden))
-    golden.write_text(head + "\n".join(written), encoding="utf-8")
+def regenerate(make: Callable[[str], Bench], *goldens: Path) -> None:
+    for golden in goldens:
+        head = golden.read_text(encoding="utf-8").split(CASE)[0]
+        written = (f"{CASE}{case.name}\n{case.script}{RESULT}\n{case.transcript(make)}\n" for case in cases(golden))
+        golden.write_text(head + "\n".join(written), encoding="utf-8")
+
+
+def suspending(wire: VirtualWire) -> Callable[[int, float, str], None]:
+    """``suspend(3, 1000.0, "sending")`` for scripts: the program is suspended for so many seconds immediately before it sends
+    something for the third time from now on; likewise "reading"."""
+
+    def suspend(number: int, seconds: float, what: str) -> None:
+        left = number
+
+        def count(*_: object) -> None:
+            nonlocal left
+            left -= 1
+            if left == 0:
+                wire.sleep(seconds)
+
+        setattr(wire, {"sending": "before_each", "reading": "before_read"}[what], count)
+
+    return suspend

@@ -127,6 +127,22 @@ def test_what_stops_the_motor_ends_the_jog(meanwhile: Callable[[ChipWire, AsyncM
     assert wire.true(7) == stood
 
 
+def test_a_stop_between_the_distance_and_its_move_ends_the_jog() -> None:
+    """The next move is specified, but not begun."""
+    wire, chip = ready()
+    jog = begun(chip, 400.0)
+
+    def stop(data: bytes) -> None:
+        if data.startswith(b"f"):
+            chip._unit.notes.stops += 1
+
+    wire.before_each = stop
+    assert not finish(jog.hold())
+    assert jog.end == "'chip 7: r' was not sent: a stop was requested meanwhile"
+    wire.sleep(5.0)
+    assert wire.true(7) == 60 * STEP
+
+
 def test_a_jog_is_held_inside_its_with_block() -> None:
     wire, chip = ready()
     with pytest.raises(Misuse, match="a jog is held inside its with block"):

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import pytest
 
-from steptwin.drivers.m1486.settings import ChipSettings, after_reset, checked_number
+from steptwin.drivers.m1486.settings import COMMANDS, ChipSettings, after_reset, checked_number
 from steptwin.errors import Misuse
 from steptwin.m1486.lines import DUAL_DAC, STEP_DIRECTION, TWO_DACS
 from steptwin.m1486.variants import variant
@@ -20,6 +22,10 @@ def test_m_3_after_a_reset(interface: object, microstep: int) -> None:
     assert after_reset(B, interface) == ChipSettings(  # type: ignore[arg-type]
         start_stop=200, acceleration=5000, velocity=1000, profile=25000, microstep=microstep, qualification=1, waveform=1
     )
+
+
+def test_each_setting_has_its_command() -> None:
+    assert {field.name for field in fields(ChipSettings)} == set(COMMANDS)
 
 
 def test_distances_are_multiples_of_a_microstep() -> None:

@@ -1,4 +1,4 @@
-"""What the driver types into chips, character by character and in its time: golden/transcripts.txt.
+"""What the driver types into chips, character by character and in its time: golden/*.txt.
 
 Rules and errors have their own tests; here whole sessions are compared, and what each character that goes wrong leads to.
 Regenerate with ``PYTHONPATH=tests/support python tests/drivers/m1486/test_transcripts.py`` and read the diff.
@@ -10,20 +10,22 @@ from pathlib import Path
 
 import pytest
 from chip_rig import ChipWire, Fault, chip_line
-from transcripts import Bench, Case, cases, regenerate
+from transcripts import Bench, Case, cases, regenerate, suspending
 
 from steptwin.drivers import m1486
 from steptwin.drivers.m1486 import sync
 
-GOLDEN = Path(__file__).parent / "golden" / "transcripts.txt"
+GOLDENS = [Path(__file__).parent / "golden" / name for name in ("transcripts.txt", "random_sessions.txt")]
 
 
 def bench(options: str) -> Bench:
-    """Options are the type of the chips and their addresses (none: one chip that is not addressed); ``chip`` is the first one."""
-    kind, *addresses = options.split()
+    """Options are the type of the chips and their addresses (none: one chip that is not addressed), and ``logged``; ``chip`` is
+    the first one, ``other`` the last."""
+    kind, *addresses = (word for word in options.split() if word != "logged")
+    log: list[str] = []
     numbers = tuple(int(address) for address in addresses)
     wire = ChipWire(kind, numbers or (15,))
-    line = chip_line(wire)
+    line = chip_line(wire, log.append if "logged" in options else None)
     chips = [sync.M1486(line, number) for number in numbers or (None,)]
     seen = 0
 
@@ -38,6 +40,9 @@ def bench(options: str) -> Bench:
         "chip": chips[0],
         "other": chips[-1],
         "download_to": sync.download_to,
+        "suspend": suspending(wire),
+        "log": log,
+        "told": [],
     }
     return Bench(
         wire=wire,
@@ -49,10 +54,10 @@ def bench(options: str) -> Bench:
     )
 
 
-@pytest.mark.parametrize("case", cases(GOLDEN), ids=lambda case: case.name)
+@pytest.mark.parametrize("case", cases(*GOLDENS), ids=lambda case: case.name)
 def test_transcripts_are_the_reviewed_ones(case: Case) -> None:
     assert case.transcript(bench).splitlines() == case.expected.splitlines()
 
 
 if __name__ == "__main__":
-    regenerate(GOLDEN, bench)
+    regenerate(bench, *GOLDENS)

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 from host_rig import Fault, Wire, thread_line
 
-from steptwin.drivers import Mic488, NoAnswer, NoMic488
+from steptwin.drivers import LineLost, Mic488, NoAnswer, NoMic488
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.mic488.failures import ModbusRefusal
 from steptwin.drivers.mic488.identify import SCAN_NS, FoundUnit, scan
@@ -143,3 +143,42 @@ def test_a_search_waits_once_for_each_unit_and_twice_as_long_for_what_one_that_i
         return line.now() - begin
 
     assert took(90 * MILLISECOND) - took(50 * MILLISECOND) == time_outs * 40 * MILLISECOND
+
+
+def test_a_line_that_is_lost_ends_the_search() -> None:
+    """No other unit can answer on it either."""
+    tried: list[int] = []
+    wire = Wire()
+    wire.gone = "unplugged"
+    with pytest.raises(LineLost, match="unplugged"):
+        finish(scan(thread_line(wire), range(1, 9), progress=tried.append))
+    assert tried == [1]
+
+
+@pytest.mark.parametrize("sent", [2, 3, 4])
+def test_a_line_that_is_lost_while_the_firmware_is_found_out(sent: int) -> None:
+    """Neither is a missing answer taken for another firmware, nor the unit for something else."""
+    wire = Wire(firmware="1.23")
+    line = thread_line(wire)
+    finish(line.open())
+
+    def lose(_: bytes) -> None:
+        if len(wire.sent) == sent - 1:
+            wire.gone = "unplugged"
+
+    wire.before_each = lose
+    if sent > 3:
+        assert finish(scan(line, [1])) == [FoundUnit(1, "1.23")]
+        return
+    with pytest.raises(LineLost, match="unplugged"):
+        finish(scan(line, [1]))
+    wire.gone = None
+
+
+@pytest.mark.parametrize("code", [10, 11])
+def test_a_gateway_that_finds_nobody_is_nobody(code: int) -> None:
+    wire = Wire()
+    answering(wire, lambda request: bytes((request[0] | 0x80, code)))
+    assert finish(scan(thread_line(wire), [1, 2])) == []
+    answering(wire, lambda request: bytes((request[0] | 0x80, 12)))
+    assert finish(scan(thread_line(wire), [1, 2])) == [FoundUnit(1, None), FoundUnit(2, None)]

@@ -400,3 +400,37 @@ def test_a_jog_begins_within_its_hold_time_and_two_time_outs_or_not_at_all(hold_
             jog.__enter__()
         wire.rest()
         assert wire.position() == 0
+
+
+def stopping_at(wire: Wire, mic: Mic488, what: str) -> None:
+    """Another thread requests a stop while something is sent for the first time from now on."""
+    address = register_map().of(what, 1).address.to_bytes(2, "big")
+
+    def stop(frame: bytes) -> None:
+        if frame[2:4] == address:
+            mic._driver._unit.notes.stops[1] += 1
+
+    wire.before_each = stop
+
+
+def test_a_stop_before_a_jog_has_begun() -> None:
+    wire, mic = ready()
+    stopping_at(wire, mic, "VMAX")
+    with mic.axis(1).jog(5.0) as jog:
+        assert jog.end is not None
+        assert (jog.end.reason, jog.end.detail) == (Reason.STOPPED, "by this program")
+        assert not jog.hold()
+    wire.rest()
+    assert wire.position() == 0
+    assert mic.get("M1_VMAX") == {"M1_VMAX": 25.0}
+
+
+def test_a_stop_while_a_jog_is_released() -> None:
+    _, mic = ready()
+    jog = mic.axis(1).jog(5.0)
+    jog.__enter__()
+    assert jog.hold()
+    mic._driver._unit.notes.stops[1] += 1
+    jog.release()
+    assert jog.end is not None
+    assert (jog.end.reason, jog.end.detail) == (Reason.STOPPED, "by this program")

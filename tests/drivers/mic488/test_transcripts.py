@@ -1,4 +1,4 @@
-"""What the driver sends to controllers, frame by frame and in its time: golden/transcripts.txt.
+"""What the driver sends to controllers, frame by frame and in its time: golden/*.txt.
 
 Rules and errors have their own tests; here whole sessions are compared, and what each byte that goes wrong leads to.
 Regenerate with ``PYTHONPATH=tests/support python tests/drivers/mic488/test_transcripts.py`` and read the diff.
@@ -10,21 +10,23 @@ from pathlib import Path
 
 import pytest
 from host_rig import Fault, Wire, thread_line
-from transcripts import Bench, Case, cases, regenerate
+from transcripts import Bench, Case, cases, regenerate, suspending
 
 from steptwin import drivers
 from steptwin.wire import pdu
 
-GOLDEN = Path(__file__).parent / "golden" / "transcripts.txt"
+GOLDENS = [Path(__file__).parent / "golden" / name for name in ("transcripts.txt", "random_sessions.txt")]
 
 
 def bench(options: str) -> Bench:
-    """Options are the words ``tcp``, ``observe`` and ``bare`` (a driver without configuration), and a firmware."""
+    """Options are the words ``tcp``, ``observe``, ``logged`` and ``bare`` (a driver without configuration), and a firmware."""
     words = options.split()
     wire = Wire(tcp="tcp" in words, firmware=next((word for word in words if word[0].isdigit()), "1.70"))
+    log: list[str] = []
     config = None if "bare" in words else wire.config
     firmware = None if "bare" in words else wire.twin.firmware.name
-    mic = drivers.Mic488(thread_line(wire), 1, config=config, firmware=firmware, observe="observe" in words)
+    line = thread_line(wire, log=log if "logged" in words else None)
+    mic = drivers.Mic488(line, 1, config=config, firmware=firmware, observe="observe" in words)
     events = wire.twin.events
 
     def happened() -> list[str]:
@@ -35,7 +37,14 @@ def bench(options: str) -> Bench:
     def shown(data: bytes) -> str:
         return data[6:].hex() if wire.tcp else data[:-2].hex()
 
-    names = {name: getattr(drivers, name) for name in drivers.__all__} | {"wire": wire, "mic": mic, "axis": mic.axis, "pdu": pdu}
+    names = {name: getattr(drivers, name) for name in drivers.__all__} | {
+        "wire": wire,
+        "mic": mic,
+        "axis": mic.axis,
+        "pdu": pdu,
+        "suspend": suspending(wire),
+        "log": log,
+    }
     return Bench(
         wire=wire,
         names=names,
@@ -46,10 +55,10 @@ def bench(options: str) -> Bench:
     )
 
 
-@pytest.mark.parametrize("case", cases(GOLDEN), ids=lambda case: case.name)
+@pytest.mark.parametrize("case", cases(*GOLDENS), ids=lambda case: case.name)
 def test_transcripts_are_the_reviewed_ones(case: Case) -> None:
     assert case.transcript(bench).splitlines() == case.expected.splitlines()
 
 
 if __name__ == "__main__":
-    regenerate(GOLDEN, bench)
+    regenerate(bench, *GOLDENS)

@@ -6,7 +6,7 @@ commands; at 24 MHz the motor turns twice as fast with the same numbers.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from math import isfinite
 
 from steptwin.errors import Misuse
@@ -82,7 +82,3 @@ def checked_number(letter: str, number: float, variant: Variant, what: str) -> i
         (spec,) = rows(key)
         raise Misuse(f"{what} = {number:.15g}: {variant.title} takes {range_text(spec, variant, named=False)}")
     return int(number)
-
-
-if {field.name for field in fields(ChipSettings)} != set(COMMANDS):
-    raise ValueError("each setting needs its command")

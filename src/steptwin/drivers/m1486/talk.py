@@ -361,14 +361,15 @@ class CharacterTalk:
 
     def abandon(self, now: Nanos) -> bytes:
         received, request = self._echoed, self._request
-        if request is None:
-            return b""
+        if request is not None and not self._expects_nothing(request):
+            self._give_up(now)
+            return received
+        return self._done(b"")
+
+    def _expects_nothing(self, request: ChipRequest) -> bool:
+        """Whether nothing is wrong with the line if nothing came: no echo is missing."""
         awaits_answer = request.committed and request.answers and not self._sent and not self._lines
-        if request.sort in _SILENT or request.sort is ChipRequestKind.BLIND or awaits_answer:
-            self._done(b"")
-            return b""
-        self._give_up(now)
-        return received
+        return request.sort in (*_SILENT, ChipRequestKind.BLIND) or awaits_answer
 
     def stray(self, data: bytes, now: Nanos) -> None:
         if self._on_bytes is not None and data:
