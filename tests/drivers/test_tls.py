@@ -92,10 +92,14 @@ def test_bytes_go_to_and_fro(serve: Serve, folder: Path, trusted: str) -> None:
 def test_a_task_speaks_to_it_too(serve: Serve, folder: Path) -> None:
     async def main() -> bytes:
         heard: asyncio.Future[bytes] = asyncio.get_running_loop().create_future()
+        closed = asyncio.Event()
 
         class Ear(asyncio.Protocol):
             def data_received(self, data: bytes) -> None:
                 heard.set_result(data)
+
+            def connection_lost(self, exc: Exception | None) -> None:
+                closed.set()
 
         transport = await address(folder, port).endpoint.connect(Ear)
         transport.write(b"ab")
@@ -103,6 +107,7 @@ def test_a_task_speaks_to_it_too(serve: Serve, folder: Path) -> None:
             return await heard
         finally:
             transport.close()
+            await closed.wait()
 
     port = serve(echo)
     assert asyncio.run(main()) == b"ab"

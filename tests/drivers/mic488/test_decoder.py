@@ -44,6 +44,7 @@ def test_what_is_no_frame_is_told_after_a_silence() -> None:
     decoder = ModbusDecoder(frames.append, "1.70", tcp=False)
     decoder.feed(b"\xff\x00", 0, FrameDirection.IN)
     due = decoder.deadline()
+    assert due is not None
     assert due == 20 * MILLISECOND  # MIC-15
     decoder.expire(due - 1)
     assert frames == []
