@@ -1,7 +1,7 @@
 """Plans by chance are to the last bit what they were: golden/random.txt has digests of each kind.
 
-Regenerate with ``python tests/motion/test_random_plans.py`` where plans have changed. ``... SEED`` shows all questions and answers,
-so that its lines before and after a change can be compared. That velocities are the slopes of positions, and pulses where the
+Regenerate with ``python tests/motion/test_random_plans.py`` where plans have changed. ``... SEED`` shows questions and answers,
+so that their lines before and after a change can be compared. That velocities are the slopes of positions, and pulses where the
 count changes, is checked besides.
 """
 
@@ -153,9 +153,9 @@ class Plans:
 
     def arcs(self) -> Iterator[Arc]:
         yield circle(self.real("⟨0|-50..50⟩"), self.real("⟨0|-50..50⟩"), self.real("⟨1..90⟩"), self.real("⟨-9..9⟩"))
-        points = [self.real("⟨-50..50⟩") for _ in range(4)]
+        x0, y0, x1, y1 = (self.real("⟨-50..50⟩") for _ in range(4))
         try:
-            yield arc_between(*points, self.real("⟨5..90⟩"), outward=self.chance.below(2) == 0, slack=self.real("⟨0|3⟩"))
+            yield arc_between(x0, y0, x1, y1, self.real("⟨5..90⟩"), outward=self.chance.below(2) == 0, slack=self.real("⟨0|3⟩"))
         except Misuse as error:
             self.found["paths"].append(str(error))
 

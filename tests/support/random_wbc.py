@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from chance import Chance
-from random_programs import mistaken, program, restyled, rows, sound
+from random_programs import foreign, mistaken, program, restyled, rows, sound
 
 from steptwin.diagnostics import Diagnostic, SourceText, render, split_lines
 from steptwin.machine import MILLISECOND, SECOND
@@ -52,6 +52,12 @@ def said(chance: Chance, text: str, table: PositionTable) -> list[str]:
         edited.update(part)
         assert edited.check(table, setup)[0].diagnostics == check(part, table, setup).diagnostics
     return [*differences(old, new), render(SourceText("p", text), found), *map(repr, found)]
+
+
+def told(text: str) -> list[str]:
+    """Diagnostics of lines, each alone and all together: what follows from a line, may hide what follows from another."""
+    lines = [f"MAIN:\nBLINK:\n{line}\nJUMP MAIN\nJUMP BLINK\n" for line in text.splitlines()]
+    return [repr(found) for one in (text, *lines) for found in check(one).diagnostics]
 
 
 def made(text: str, table: PositionTable) -> list[str]:
@@ -124,6 +130,7 @@ def seen(seed: int) -> dict[str, list[str]]:
     raw = program(chance)
     text = restyled(chance, sound(raw, table))
     broken = mistaken(chance, raw)
+    strange = foreign(chance)
     loaded = load(check(text, table))
     resting, looking = (Run(seed, loaded, table, rests=rests) for rests in (True, False))
     resting.run()
@@ -135,4 +142,5 @@ def seen(seed: int) -> dict[str, list[str]]:
         "made": made(text, table),
         "does": [*resting.found, *resting.statements],
         "wrong": [broken, *said(chance, broken, table), *made(broken, table)],
+        "foreign": [strange, *told(strange)],
     }
