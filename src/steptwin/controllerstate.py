@@ -7,14 +7,16 @@ and what each of the ``details`` means.
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Generic, TypeAlias, TypeVar
+from typing import Any, Generic, TypeAlias, TypeVar, cast
 
-from steptwin.datasheet import Detail, plain
-from steptwin.machine import Nanos
+from steptwin.datasheet import AxisDescription, Datasheet, Detail, plain
+from steptwin.errors import Misuse
+from steptwin.machine import SECOND, MotionController, Nanos
+from steptwin.nearmiss import NearMiss
 
-M = TypeVar("M")
+M = TypeVar("M", bound=MotionController)
 DetailValue: TypeAlias = bool | int | float | str | tuple[int, ...] | Mapping[str, int] | None
 """Of the type that its `Detail` has."""
 
@@ -141,6 +143,68 @@ class DetailRow(Generic[M]):
 
     detail: Detail
     read: Callable[[M, Nanos], DetailValue]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StateReader(Generic[M]):
+    """How the state of a kind of controller is read at the present moment of the machine: all of it, or some of its parts, which
+    are ``status``, ``program``, ``pins``, ``details`` and its axes by name."""
+
+    datasheet: Callable[[M], Datasheet]
+    status: Callable[[M, Nanos], StateStatus]
+    program: Callable[[M, Nanos], StateProgram]
+    axis: Callable[[M, AxisDescription, Nanos], StateAxis]
+    details: tuple[DetailRow[M], ...] = ()
+
+    def __call__(self, machine: M, now: Nanos) -> ControllerState:
+        sheet = self.datasheet(machine)
+        return ControllerState(
+            kind=sheet.kind,
+            variant=sheet.variant,
+            time_s=now / SECOND,
+            status=self.status(machine, now),
+            program=self.program(machine, now),
+            axes=tuple([self.axis(machine, axis, now) for axis in sheet.axes]),
+            pins=dict(machine.pins()),
+            details=details_of(self.details, machine, now),
+        )
+
+    def parts(self, machine: M, now: Nanos, wanted: Collection[str]) -> dict[str, object]:
+        """As JSON, as far as there is anything of them. Raises `Misuse` for a name that is none."""
+        sheet = self.datasheet(machine)
+        found: dict[str, object] = {}
+        if "status" in wanted:
+            found["status"] = self.status(machine, now).plain()
+        if "program" in wanted:
+            found["program"] = self.program(machine, now).plain()
+        found["axes"] = [self.axis(machine, axis, now).plain() for axis in sheet.axes if axis.name in wanted]
+        if "pins" in wanted:
+            found["pins"] = dict(machine.pins())
+        if "details" in wanted:
+            found["details"] = plain(details_of(self.details, machine, now))
+        if len(found) - 1 + len(cast("list[object]", found["axes"])) != len(wanted):
+            check_parts(sheet, wanted)
+        return found
+
+
+PARTS = ("status", "program", "pins", "details")
+"""Of a state, beside its axes."""
+
+
+def check_parts(sheet: Datasheet, wanted: Collection[str]) -> None:
+    """Raises `Misuse` for what is no part of a state."""
+    known = (*PARTS, *(axis.name for axis in sheet.axes))
+    for name in wanted:
+        if name not in known:
+            raise Misuse(f"parts: a state has no part {name!r}{NearMiss().hint(name, known)}; there are {', '.join(known)}")
+
+
+def parts_of(state: ControllerState, sheet: Datasheet, wanted: Collection[str]) -> dict[str, object]:
+    """As `StateReader.parts`, of a state that has been read."""
+    check_parts(sheet, wanted)
+    whole = state.plain()
+    found = {name: whole[name] for name in PARTS if name in wanted}
+    return {**found, "axes": [axis.plain() for axis in state.axes if axis.name in wanted]}
 
 
 def details_of(rows: Iterable[DetailRow[M]], machine: M, now: Nanos) -> dict[str, DetailValue]:

@@ -219,6 +219,9 @@ class Datasheet:
     events: tuple[EventDescription, ...]
     details: tuple[Detail, ...] = ()
     """Of its state (`steptwin.controllerstate`)."""
+    also_change: Mapping[str, tuple[str, ...]] | None = None
+    """By the name of a pin or an axis: other parts of the state (`steptwin.controllerstate.StateReader`) that may change with its
+    level or its motion; pins and axes that are not named change nothing else. None: any part may change."""
 
     def point(self, path: str) -> Point:
         """Raises `KeyError` for a point that is not there."""
@@ -261,6 +264,7 @@ def read_datasheet(data: Mapping[str, Any]) -> Datasheet:
         "commands": tuple(map(_read_command, data["commands"])),
         "events": tuple(map(_read_event, data["events"])),
         "details": tuple(map(_read_detail, data["details"])),
+        "also_change": None if data["also_change"] is None else {name: tuple(of) for name, of in data["also_change"].items()},
     }
     return Datasheet(**{**data, **lists})
 

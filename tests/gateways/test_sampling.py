@@ -11,10 +11,10 @@ from virtual_loop import run_virtually
 
 from steptwin.errors import LineFailure, Refusal, SteptwinError
 from steptwin.gateways.points import CLOCK, CLOCK_POINTS, State
-from steptwin.gateways.sampling import AT_ONCE, MOST_EVENTS, RESTING_INTERVALS, TICK_S, Sampler
+from steptwin.gateways.sampling import AT_ONCE, MOST_EVENTS, REST_S, TICK_S, Sampler
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.subject import commands as command
-from steptwin.world.script import Note, Set
+from steptwin.world.script import Note, Send, Set, Turn
 
 TEXT = '[[mic488]]\nname = "table"\n[[mic488]]\nname = "other"\n'
 MACHINES = ("table", "other")
@@ -60,7 +60,7 @@ class Gateway:
 
     @property
     def reads(self) -> int:
-        return self.world.done.count(command.ReadState("table"))
+        return len([one for one in self.world.done if isinstance(one, command.ReadState) and one.machine == "table"])
 
 
 def story(act: Callable[[Gateway], Awaitable[None]], *, registers: Iterable[str] = (), text: str = TEXT) -> None:
@@ -76,11 +76,12 @@ def set_pin(gateway: Gateway, level: float = 1.0) -> None:
     gateway.world.inner.do(Set((("table", "IN3", level),)))
 
 
-def test_controllers_at_rest_are_looked_at_now_and_then() -> None:
+def test_controllers_at_rest_are_read_as_a_whole_now_and_then() -> None:
     async def act(gateway: Gateway) -> None:
         await gateway.rest()
-        assert await gateway.after(RESTING_INTERVALS * INTERVAL_S * 0.9) == []
-        assert sorted(await gateway.after(RESTING_INTERVALS * INTERVAL_S * 0.2)) == ["other", "table"]
+        gateway.world.done.clear()
+        assert sorted(await gateway.after(REST_S)) == ["other", "table"]
+        assert gateway.world.done == [command.ReadState(machine) for _, machine in gateway.seen]
 
     story(act)
 
@@ -163,8 +164,8 @@ def test_gateways_share_samples() -> None:
         await gateway.rest()
         await gateway.after(0.3)
         before = gateway.reads
-        for level in (1.0, 0.0, 1.0):
-            set_pin(gateway, level)
+        for position in (1.0, 2.0, 3.0):
+            gateway.world.inner.do(Turn("table", 1, round(position)))
             await asyncio.sleep(0.3)
         seen = [len([name for _, name in one.seen if name == "table"]) for one in (gateway, second, third)]
         assert min(seen) >= 3
@@ -250,3 +251,36 @@ def test_nothing_is_followed_after_the_end() -> None:
     assert world.inner.followers
     samplers[1].close()
     assert not world.inner.followers
+
+
+def test_an_edge_brings_its_level() -> None:
+    """Nothing is read for it."""
+
+    async def act(gateway: Gateway) -> None:
+        await gateway.rest()
+        set_pin(gateway)
+        await gateway.after(2 * INTERVAL_S)
+        gateway.world.done.clear()
+        set_pin(gateway, 0.0)
+        assert await gateway.after(2 * TICK_S) == ["table"]
+        assert gateway.world.done == []
+        assert gateway.states["table"] is not None
+        assert gateway.states["table"]["pins"]["IN3"] == 0.0
+
+    story(act)
+
+
+def test_a_write_on_a_line_may_change_all_of_its_controllers() -> None:
+    text = '[[line]]\nname = "chips"\nkind = "m1486"\n' + "".join(
+        f'[[m1486]]\nname = "{name}"\nline = "chips"\naddress = {number}\n' for number, name in enumerate(MACHINES, start=3)
+    )
+
+    async def act(gateway: Gateway) -> None:
+        await gateway.rest()
+        await gateway.after(2 * INTERVAL_S)
+        gateway.world.inner.do(Send("chips", b"x3\rs77\r"))
+        assert sorted(set(await gateway.after(2 * TICK_S))) == ["other", "table"]
+        await gateway.after(INTERVAL_S)
+        assert [state["details"]["S"] for state in gateway.states.values() if state is not None].count(77) == 1
+
+    story(act, text=text)

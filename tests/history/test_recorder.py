@@ -14,7 +14,7 @@ from steptwin.machine import SECOND
 from steptwin.motion.plain import read_plan
 from steptwin.subject import commands as command
 from steptwin.subject.commands import Enable, Move
-from steptwin.world.script import Note, Set, Write
+from steptwin.world.script import Note, Set, Turn, Write
 
 CELL = """
 [world]
@@ -216,6 +216,7 @@ def test_a_controller_that_does_not_answer_is_not_known() -> None:
     made = RecordedWorld(CELL)
     made.look()
     made.subject.silent.add("table")
+    made.subject.inner.do(Turn("table", 1, 5))
     made.run(2.0)
     assert made.rows("samples", "table.status")[-1][1] is None
 

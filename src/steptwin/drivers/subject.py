@@ -16,7 +16,7 @@ from enum import Enum
 from types import TracebackType
 from typing import Any, Protocol, TypeAlias
 
-from steptwin.controllerstate import ControllerState
+from steptwin.controllerstate import ControllerState, parts_of
 from steptwin.datasheet import Datasheet
 from steptwin.drivers.blocking import Blocking, blocking, finish
 from steptwin.drivers.line import DriverLine
@@ -280,8 +280,9 @@ class AsyncDeviceSubject:
         pins = (f"{self.name}.{pin.name}" for pin in self._device.datasheet.pins)
         return {one.point: one.value for one in await self.read(*pins)}
 
-    async def _state(self, _: command.ReadState) -> object:
-        return (await self._device.state()).plain()
+    async def _state(self, wanted: command.ReadState) -> object:
+        found = await self._device.state()
+        return found.plain() if wanted.parts is None else parts_of(found, self._device.datasheet, wanted.parts)
 
     async def _time(self, _: command.Time) -> object:
         now = self.now()

@@ -1,7 +1,8 @@
 """Present values of controllers for gateways, taken when they may have changed.
 
 An event of a controller makes it due at once, but at most once in an interval; what changes without events (a motion, a running
-program, named registers) is due once in an interval. Nothing waits in queues: a gateway that is late gets the latest values.
+program, named registers) is due once in an interval. Of a twin only what its events name is read again (`HeldState`); a device is
+read as a whole. Nothing waits in queues: a gateway that is late gets the latest values.
 """
 
 from __future__ import annotations
@@ -13,27 +14,33 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, cast
+from zlib import crc32
 
 from steptwin.errors import LineFailure, Refusal
+from steptwin.gateways.heldstate import HeldState, is_resting, merged, parts_only
 from steptwin.gateways.points import CLOCK, State
 from steptwin.machine import SECOND, Nanos
 from steptwin.subject import commands as command
+from steptwin.subject.events import Event
 from steptwin.subject.following import USUAL, Filter, Following
 from steptwin.subject.payloads import RestoredPayload
 
 if TYPE_CHECKING:
     from steptwin.gateways.contract import GatewaySubject
 
-ACTIVE = ("running", "waiting")
-"""Programs in these states change what they show without an event."""
-MOST_EVENTS = 4096
+KINDS = USUAL | {"write"}
+"""Of events; a write of a program on a line may change what no other event tells."""
+MOST_EVENTS = 16_384
 RESTING_INTERVALS = 10
-"""A controller at rest is sampled once in so many intervals: for what changes without an event, such as a register."""
+"""A device at rest is sampled once in so many intervals."""
+REST_S = 10.0
+"""A twin is read as a whole so often: for what no event tells, such as a character that a chip has received."""
 TICK_S = 0.01
 """Controllers become due at multiples of this, so that what happens at almost the same time is looked at together."""
 AT_ONCE = 64
 """Controllers that are sampled before others in this event loop have their turn."""
 INTERVAL = SECOND // 10
+_REST_SLOTS = round(REST_S / TICK_S)
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +54,7 @@ class Sample:
     state: State | None
     at: datetime
     time: Nanos = 0
-    """The same moment by the clock of the subject, which may stand; 0 without an answer."""
+    """When it was read, by the clock of the subject, which may stand; 0 without an answer."""
 
 
 class SharedSamples:
@@ -60,13 +67,24 @@ class SharedSamples:
         self._latest: dict[str, tuple[float, Sample]] = {}
         """The last sample of each controller, and when it was taken by the clock of the event loop."""
         self._past: set[str] = set()
-        """Controllers to which something has happened since."""
+        """Controllers that have to be read as a whole."""
+        self._held: dict[str, HeldState] = {}
+        """Of twins."""
+        self._whole: dict[str, float] = {}
+        """When each of them was read as a whole."""
+        self._on_line: dict[str, list[str]] = {}
+        """Controllers by their line."""
         self._registers: dict[str, tuple[str, ...]] = {}
 
     def join(self, sampler: Sampler) -> None:
         if self._following is None:
-            self._following = self._subject.follow(Filter(USUAL), MOST_EVENTS)
+            self._following = self._subject.follow(Filter(KINDS), MOST_EVENTS)
             self._following.on_event = self._wake
+            for part in self._subject.description.machines:
+                if not part.is_real:
+                    self._held[part.name] = HeldState(part)
+                if part.line is not None:
+                    self._on_line.setdefault(part.line, []).append(part.name)
         self._samplers.append(sampler)
         self._collect_registers()
 
@@ -77,22 +95,27 @@ class SharedSamples:
         if self._following is not None and not self._samplers:
             self._following.close()
             self._following = None
-            self._latest.clear()
+            for known in (self._latest, self._held, self._whole, self._on_line):
+                known.clear()
 
     def _collect_registers(self) -> None:
         found: dict[str, dict[str, None]] = {}
         for sampler in self._samplers:
             for machine, names in sampler.registers.items():
                 found.setdefault(machine, {}).update(dict.fromkeys(names))
-        self._registers = {machine: tuple(names) for machine, names in found.items()}
+        registers = {machine: tuple(names) for machine, names in found.items()}
+        self._past.update(name for name in registers if registers[name] != self._registers.get(name))
+        self._registers = registers
 
     def _wake(self) -> None:
         for sampler in self._samplers:
             sampler.wake()
 
+    # ------------------------------------------------------------------ events
+
     def see_events(self) -> None:
         """Tell all samplers what has happened."""
-        if self._following is None:
+        if self._following is None or not len(self._following):
             return
         missed, events = self._following.take()
         if missed or any(isinstance(event.payload, RestoredPayload) for event in events):
@@ -100,31 +123,90 @@ class SharedSamples:
             for sampler in self._samplers:
                 sampler.everything_changed()
             return
-        for name in {event.machine for event in events}:
+        changed: dict[str, None] = {}
+        for event in events:
+            for name in self._on_line.get(event.machine, (event.machine,)):
+                if self._may_change(name, event):
+                    changed[name] = None
+        for sampler in self._samplers:
+            sampler.changed_by_events(changed)
+
+    def _may_change(self, name: str, event: Event) -> bool:
+        held = self._held.get(name)
+        if held is None:
             self._past.add(name)
-            for sampler in self._samplers:
-                sampler.changed_by_event(name)
+            return True
+        return held.take(event)
+
+    # ------------------------------------------------------------------ samples
+
+    def is_resting(self, sample: Sample) -> bool:
+        """Whether it does not change without events."""
+        if sample.machine == CLOCK or sample.state is None:
+            return False
+        held = self._held.get(sample.machine)
+        return is_resting(sample.state) if held is None else not held.is_active
 
     async def recent(self, machine: str, since: float) -> Sample:
         """One that was taken after ``since`` and everything that has happened, or a new one."""
         known = self._latest.get(machine)
-        if known is not None and known[0] >= since and machine not in self._past:
-            return known[1]
-        return await self.take(machine)
+        if known is None or machine in self._past:
+            return await self.take(machine)
+        taken_at, sample = known
+        held = self._held.get(machine)
+        if held is None or sample.state is None:
+            return sample if taken_at >= since else await self.take(machine)
+        if asyncio.get_running_loop().time() - self._whole[machine] > REST_S / 2:
+            return await self.take(machine)
+        is_due = taken_at < since
+        if not is_due and not held.has_news:
+            return sample
+        return await self._part(machine, held, sample, is_due=is_due)
+
+    async def _part(self, machine: str, held: HeldState, before: Sample, *, is_due: bool) -> Sample:
+        """Read what events have named."""
+        wanted = held.wanted(is_due=is_due)
+        parts: dict[str, Any] = {}
+        now: Nanos | None = None
+        try:
+            if wanted:
+                answer = await self._subject.do(command.ReadState(machine, wanted))
+                parts, now = answer.value, answer.time
+            if is_due and machine in self._registers:
+                parts = {**parts, "registers": await self._read(machine)}
+        except (LineFailure, Refusal):
+            return self._keep(Sample(machine, None, datetime.now(UTC)))
+        state = held.put(parts, now)
+        if state is before.state:
+            return self._keep(before)
+        return self._keep(Sample(machine, state, datetime.now(UTC), before.time if now is None else now))
+
+    async def present(self, machine: str) -> Sample:
+        """The present values of a controller; of a twin what may have changed is read."""
+        self.see_events()
+        return await self.recent(machine, asyncio.get_running_loop().time())
 
     async def take(self, machine: str) -> Sample:
-        """The present values of a controller, or of the `CLOCK`."""
+        """The present values of a controller, read as a whole, or of the `CLOCK`."""
         if machine == CLOCK:
             return Sample(CLOCK, cast("State", (await self._subject.do(command.Time())).value), datetime.now(UTC))
         self._past.discard(machine)
         try:
             answer = await self._subject.do(command.ReadState(machine))
-            state = {**cast("State", answer.value), "registers": await self._read(machine)}
-            found = Sample(machine, self._merged(machine, state), datetime.now(UTC), answer.time)
+            state = parts_only(cast("State", answer.value), await self._read(machine))
         except (LineFailure, Refusal):  # a device may refuse a register
-            found = Sample(machine, None, datetime.now(UTC))
-        self._latest[machine] = asyncio.get_running_loop().time(), found
-        return found
+            return self._keep(Sample(machine, None, datetime.now(UTC)))
+        held, known = self._held.get(machine), self._latest.get(machine)
+        if held is not None:
+            state = held.put_all(state, answer.time)
+            self._whole[machine] = asyncio.get_running_loop().time()
+        elif known is not None and known[1].state is not None:
+            state = merged(known[1].state, state)
+        return self._keep(Sample(machine, state, datetime.now(UTC), answer.time))
+
+    def _keep(self, sample: Sample) -> Sample:
+        self._latest[sample.machine] = asyncio.get_running_loop().time(), sample
+        return sample
 
     async def _read(self, machine: str) -> Mapping[str, float | None]:
         names = self._registers.get(machine, ())
@@ -133,18 +215,6 @@ class SharedSamples:
         points = tuple(f"{machine}.{name}" for name in names)
         readings = cast("list[Mapping[str, Any]]", (await self._subject.do(command.ReadPoints(points))).value)
         return {name: reading["value"] for name, reading in zip(names, readings, strict=True)}
-
-    def _merged(self, machine: str, state: dict[str, Any]) -> State:
-        """``state`` with those parts of the last one in which nothing has changed."""
-        known = self._latest.get(machine)
-        before = None if known is None else known[1].state
-        if before is None:
-            return state
-        state["axes"] = [old if old == new else new for old, new in zip(before["axes"], state["axes"], strict=True)]
-        for name in ("status", "program", "pins", "details", "registers"):
-            if state[name] == before[name]:
-                state[name] = before[name]
-        return state
 
 
 class Sampler:
@@ -183,7 +253,7 @@ class Sampler:
             del self._last[name]
             self._at.pop(name, None)
         for name in wanted - self._last.keys():
-            self._last[name] = -RESTING_INTERVALS * self._slots
+            self._last[name] = -self._slots
             self._plan(name, self._now())
 
     def hasten(self, machine: str) -> None:
@@ -191,7 +261,12 @@ class Sampler:
         if machine in self._last:
             self._plan(machine, max(self._last[machine] + self._slots, self._now()))
 
-    changed_by_event = hasten
+    def changed_by_events(self, machines: Iterable[str]) -> None:
+        now = self._now()
+        for name in machines:
+            last = self._last.get(name)
+            if last is not None:
+                self._plan(name, max(last + self._slots, now))
 
     def everything_changed(self) -> None:
         for name in self._last:
@@ -245,9 +320,16 @@ class Sampler:
     def taken(self, sample: Sample) -> None:
         """This sample of a controller that was due has been taken."""
         name = sample.machine
-        if name in self._last:
-            rests = name != CLOCK and sample.state is not None and not self.registers.get(name) and _is_resting(sample.state)
-            self._plan(name, max(self._last[name] + self._slots * (RESTING_INTERVALS if rests else 1), self._now()))
+        last = self._last.get(name)
+        if last is None:
+            return
+        slot = last + self._slots
+        if self._shared.is_resting(sample) and not self.registers.get(name):
+            if name in self._real:
+                slot = last + self._slots * RESTING_INTERVALS
+            else:
+                slot += (crc32(name.encode()) - slot) % _REST_SLOTS  # not all of a thousand at the same moment
+        self._plan(name, max(slot, self._now()))
 
     async def changed(self, within_s: float) -> list[Sample]:
         """Samples of controllers that may have changed, as `due`. A device that does not answer holds up no other controller."""
@@ -273,9 +355,9 @@ class Sampler:
         self.wake()
 
     async def take(self, machine: str) -> Sample:
-        """The present values of a controller, or of the `CLOCK`."""
+        """The present values of a controller, read as a whole, or of the `CLOCK`."""
         return await self._shared.take(machine)
 
-
-def _is_resting(state: State) -> bool:
-    return state["program"]["state"] not in ACTIVE and not any(axis["moving"] for axis in state["axes"])
+    async def present(self, machine: str) -> Sample:
+        """The present values of a controller; of a twin only what may have changed is read."""
+        return await self._shared.present(machine)

@@ -238,7 +238,7 @@ class Recorder:
                 self._sampler.taken(sample)
                 self._take_sample(sample, now, wall)
         for name in self._due(events, now):
-            self._take_sample(await self._sampler.take(name), now, wall)
+            self._take_sample(await self._sampler.present(name), now, wall)
 
     def note(self, entry: Entry) -> None:
         """Keep a command, with who gave it and what became of it."""

@@ -27,6 +27,8 @@ from steptwin.m1486.variants import Variant
 MOTION_SECTION = "VII.2"
 STARTS = frozenset({"R", ")", "(", "]"})
 """Commands that start a motion, or the file that may; the others of the section on motions set the next motion."""
+_ALSO_CHANGE = {"M1": ("status", "program", "pins", "details"), "LIMIT": ("status", "program"), "SD": ("status", "program")}
+"""Signals of the driver are pins without edges, and the counter is a detail."""
 ACTIVE_LOW = frozenset({"JOG", "LIMIT", "SD", "S&D", "DUAL", "BOOST"})
 
 
@@ -46,6 +48,7 @@ def datasheet_of(variant: Variant) -> Datasheet:
         commands=tuple(_command(spec, variant) for spec in TABLE),
         events=tuple(EVENTS.values()),
         details=tuple(row.detail for row in DETAILS),
+        also_change=_ALSO_CHANGE,
     )
 
 

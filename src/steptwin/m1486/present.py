@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from steptwin.controllerstate import (
-    ControllerState,
     ProgramActivity,
     StateAxis,
     StateProgram,
+    StateReader,
     StateStatus,
     StatusLevel,
-    details_of,
 )
 from steptwin.datasheet import AxisDescription
 from steptwin.m1486.chip import M1486Chip
@@ -46,27 +45,19 @@ def velocity(chip: M1486Chip, now: Nanos) -> float:
     return 0.0 if chip.drive.motion is MotionMode.REST else chip.drive.profile.velocity(now) / FULL_STEP
 
 
-def state_of(chip: M1486Chip, now: Nanos) -> ControllerState:
-    """State of a chip. The position is the sum of the pulses so far, as the point ``position``; `details` have the counter."""
-    sheet = datasheet(chip)
-    is_stopped = chip.is_shut_down or chip.program.is_held
-    words = program_words(chip, now)
-    return ControllerState(
-        kind=sheet.kind,
-        variant=sheet.variant,
-        time_s=now / SECOND,
-        status=StateStatus(text=words, level=StatusLevel.WARNING) if is_stopped else StateStatus(text="ok"),
-        program=_program(chip, words, now),
-        axes=tuple(_axis(chip, described, now) for described in sheet.axes),
-        pins=dict(chip.pins()),
-        details=details_of(DETAILS, chip, now),
-    )
+def _status(chip: M1486Chip, now: Nanos) -> StateStatus:
+    if chip.is_shut_down or chip.program.is_held:
+        return StateStatus(text=program_words(chip, now), level=StatusLevel.WARNING)
+    return StateStatus(text="ok")
 
 
-def _program(chip: M1486Chip, words: str, now: Nanos) -> StateProgram:
+def _program(chip: M1486Chip, now: Nanos) -> StateProgram:
     following = next_command(chip)
     return StateProgram(
-        state=_activity(chip, now), text=words, statement=None if following is None else str(following), variables={}
+        state=_activity(chip, now),
+        text=program_words(chip, now),
+        statement=None if following is None else str(following),
+        variables={},
     )
 
 
@@ -95,3 +86,7 @@ def _axis(chip: M1486Chip, described: AxisDescription, now: Nanos) -> StateAxis:
         encoder=None,
         status=StateStatus(text=drive.motion.value),
     )
+
+
+state_of: StateReader[M1486Chip] = StateReader(datasheet=datasheet, status=_status, program=_program, axis=_axis, details=DETAILS)
+"""The position is the sum of the pulses so far, as the point ``position``; `details` have the counter."""

@@ -43,6 +43,7 @@ def datasheet_of(firmware: str, scales: tuple[tuple[str, float | None], ...] = D
         commands=tuple(_commands(registers, units)),
         events=tuple(EVENTS.values()),
         details=tuple(row.detail for row in DETAILS),
+        also_change=_ALSO_CHANGE,
     )
 
 
@@ -76,6 +77,11 @@ def _pins() -> Iterator[Pin]:
 
 PINS: Mapping[str, Pin] = {pin.name: pin for pin in _pins()}
 """By name."""
+_ALSO_CHANGE: Mapping[str, tuple[str, ...]] = {
+    **{pin: (f"M{number}",) for number, pin in enumerate(ENABLE_PINS, start=1)},
+    **{f"M{number}": ("status",) for number in range(1, AXES + 1)},
+    "ERR": ("status",),
+}
 
 
 def _commands(registers: RegisterMap, units: Sequence[str]) -> Iterator[CommandDescription]:

@@ -7,18 +7,16 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from steptwin.controllerstate import (
-    ControllerState,
     ProgramActivity,
     StateAxis,
     StateProgram,
+    StateReader,
     StateStatus,
     StatusLevel,
-    details_of,
 )
 from steptwin.datasheet import AxisDescription
 from steptwin.diagnostics import visible
-from steptwin.machine import SECOND, Nanos
-from steptwin.mic488.axis import Axis
+from steptwin.machine import Nanos
 from steptwin.mic488.datasheet import datasheet
 from steptwin.mic488.details import DETAILS
 from steptwin.mic488.device import Mic488Device
@@ -81,21 +79,6 @@ def empty_banks(name: str, device: Mic488Device) -> list[str]:
     return []
 
 
-def state_of(device: Mic488Device, now: Nanos) -> ControllerState:
-    """Positions in configured units; user registers that are 0 are left out."""
-    sheet = datasheet(device)
-    return ControllerState(
-        kind=sheet.kind,
-        variant=sheet.variant,
-        time_s=now / SECOND,
-        status=controller_status(device.status()),
-        program=_program(device, now),
-        axes=tuple(_axis(axis, described, now) for axis, described in zip(device.axes, sheet.axes, strict=True)),
-        pins=dict(device.pins()),
-        details=details_of(DETAILS, device, now),
-    )
-
-
 def _program(device: Mic488Device, now: Nanos) -> StateProgram:
     place, fault = place_of(device), device.program.fault
     activity = ACTIVITIES[device.program.state]
@@ -114,7 +97,8 @@ def _program(device: Mic488Device, now: Nanos) -> StateProgram:
     )
 
 
-def _axis(axis: Axis, described: AxisDescription, now: Nanos) -> StateAxis:
+def _axis(device: Mic488Device, described: AxisDescription, now: Nanos) -> StateAxis:
+    axis = device.axes[described.number - 1]
     return StateAxis(
         number=axis.number,
         name=described.name,
@@ -140,3 +124,13 @@ def axis_status(code: int) -> StateStatus:
     """The meaning of a register Mx_STATUS."""
     text = AXIS_STATUS_TEXTS.get(code, f"unknown status {code}")
     return StateStatus(code=int(code), text=text, level=_LEVELS.get(code, StatusLevel.OK))
+
+
+state_of: StateReader[Mic488Device] = StateReader(
+    datasheet=datasheet,
+    status=lambda device, now: controller_status(device.status()),
+    program=_program,
+    axis=_axis,
+    details=DETAILS,
+)
+"""Positions in configured units; user registers that are 0 are left out."""

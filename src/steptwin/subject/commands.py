@@ -68,9 +68,10 @@ class ReadPins:
 
 @dataclass(frozen=True, slots=True)
 class ReadState:
-    """The present state of a machine: status, program, axes, pins, details (`steptwin.controllerstate`)."""
+    """The present state of a machine: status, program, axes, pins, details (`steptwin.controllerstate`), or some of it."""
 
     machine: str
+    parts: tuple[str, ...] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -252,7 +253,13 @@ _ROWS = (
         '{"MACHINE.PIN": LEVEL, ...}',
         (Field("machine", TEXT, "The name of a machine; all of them without.", None),),
     ),
-    CommandRow("state", ReadState, "The present state of a machine.", "the state, alike for all kinds", (MACHINE,)),
+    CommandRow(
+        "state",
+        ReadState,
+        "The present state of a machine.",
+        "the state, alike for all kinds",
+        (MACHINE, Field("parts", NAMES, "Only these parts: status, program, pins, details, names of axes.", None)),
+    ),
     CommandRow("encoders", Encoders, "The encoders of a machine.", "a list of axis, counts, turned_by", (MACHINE,)),
     CommandRow("faults", ListFaults, "The faults that are set.", "a list of name, fault, seen (occasions), happened (how often)"),
     CommandRow(

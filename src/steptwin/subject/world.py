@@ -189,7 +189,10 @@ class WorldSubject:
     def _state(self, wanted: command.ReadState) -> object:
         machine = self.world.machine(wanted.machine)
         self.world.touch(wanted.machine)
-        return self.world.kind(wanted.machine).state(machine, self.world.now).plain()
+        reader = self.world.kind(wanted.machine).state
+        if wanted.parts is not None:
+            return reader.parts(machine, self.world.now, wanted.parts)
+        return reader(machine, self.world.now).plain()
 
     def _encoders(self, wanted: command.Encoders) -> object:
         encoders = self.world.encoders(wanted.machine)

@@ -25,7 +25,7 @@ from steptwin.world.wires import PinName
 
 if TYPE_CHECKING:
     from steptwin.configuration import ConfigurationFormat
-    from steptwin.controllerstate import ControllerState
+    from steptwin.controllerstate import StateReader
     from steptwin.datasheet import Datasheet, Pin
     from steptwin.diagnostics import Diagnostic, SourceText
     from steptwin.points import LivePoint
@@ -226,7 +226,7 @@ class ControllerKind(Generic[S, M, V]):
     machine is at the present. Raises `Misuse`, and `Refusal` for what cannot be done now."""
     held_jog: Callable[[M, str | None, Jog], HeldJog] | None = None
     """A jog that lasts only while it is extended; arguments and exceptions as those of ``control``."""
-    state: Callable[[M, Nanos], ControllerState]
+    state: StateReader[M]
     """Its present state; the machine is at that moment."""
     statement: Callable[[M], str | None] = lambda machine: None
     """The statement that its program is at, while one runs or is paused, as text."""

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from steptwin.controllerstate import ControllerState, StateAxis, StateProgram, StateStatus
+from steptwin.controllerstate import DetailRow, StateAxis, StateProgram, StateReader, StateStatus
 from steptwin.datasheet import Access, AxisDescription, Datasheet, Detail, FactType, Pin, PinDirection, Point, PointEffect
 from steptwin.errors import Misuse, Refusal
-from steptwin.machine import SECOND, MachineEvent, Nanos
+from steptwin.machine import MachineEvent, Nanos
 from steptwin.points import LivePoint, turns_of
 from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection as Way
@@ -110,27 +110,17 @@ def _body(toy: Toy, service: LineUnit, shafts: Mapping[int, AxisLoad]) -> ToyBod
     return ToyBody(shafts.values())
 
 
-def _state(toy: Toy, now: Nanos) -> ControllerState:
-    axis = StateAxis(
+def _axis(toy: Toy, described: AxisDescription, now: Nanos) -> StateAxis:
+    return StateAxis(
         number=1,
-        name="M1",
-        unit="pulse",
+        name=described.name,
+        unit=described.unit,
         position=_position(toy, now),
         velocity=toy.axis.plan.velocity(now),
         moving=toy.is_busy,
         enabled=None,
         encoder=None,
         status=StateStatus(text="busy" if toy.is_busy else "at rest"),
-    )
-    return ControllerState(
-        kind="toy",
-        variant="",
-        time_s=now / SECOND,
-        status=StateStatus(text="off" if toy.is_off else "ok"),
-        program=StateProgram(state=None, text="none", variables={}),
-        axes=(axis,),
-        pins=dict(toy.pins()),
-        details={"commands": toy.taken},
     )
 
 
@@ -218,7 +208,13 @@ TOY: ControllerKind[ToySpec, Toy, ToyView] = ControllerKind(
     datasheet_of=lambda variant: DATASHEET,
     point=_point,
     control={Move: _move, StopAxes: _stop},
-    state=_state,
+    state=StateReader(
+        datasheet=lambda toy: DATASHEET,
+        status=lambda toy, now: StateStatus(text="off" if toy.is_off else "ok"),
+        program=lambda toy, now: StateProgram(state=None, text="none", variables={}),
+        axis=_axis,
+        details=(DetailRow(DATASHEET.details[0], lambda toy, now: toy.taken),),
+    ),
     view=ToyView,
     lanes=_lanes,
     body=_body,

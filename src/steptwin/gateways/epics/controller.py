@@ -54,6 +54,7 @@ class EpicsController:
         self._commands = 0
         self._on_their_way = 0
         self._sampling: asyncio.Task[None] | None = None
+        self._is_asked = False
 
     @property
     def is_wanted(self) -> bool:
@@ -67,6 +68,7 @@ class EpicsController:
 
     async def refresh(self) -> None:
         """Take a sample; those who ask while one is taken get that one."""
+        self._is_asked = True
         await asyncio.shield(self.look())
 
     def look(self) -> asyncio.Task[None]:
@@ -83,7 +85,10 @@ class EpicsController:
     async def _sample(self) -> None:
         try:
             before = self._commands
-            sample = await self._sampler.take(self.name)
+            # Of a motion the moment counts; a client that asks is given what is so now.
+            is_whole = self._is_asked or self.is_busy
+            self._is_asked = False
+            sample = await (self._sampler.take(self.name) if is_whole else self._sampler.present(self.name))
             self._sampler.taken(sample)
             is_sure = before == self._commands and not self._on_their_way
         finally:

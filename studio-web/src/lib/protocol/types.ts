@@ -537,6 +537,7 @@ export type Description = {
       unit: string;
       is_brief: boolean;
     })[];
+    also_change: Record<string, string[]> | null;
   })[];
 };
 
@@ -613,6 +614,8 @@ export type StateRequest = {
   version?: 1;
   /** The name of a machine. */
   machine: string;
+  /** Only these parts: status, program, pins, details, names of axes. */
+  parts?: string[] | null;
 };
 
 /** The encoders of a machine. Answer: a list of axis, counts, turned_by. */

@@ -1,0 +1,143 @@
+"""What is held of twins by their events is what a fresh read of their whole states gives, whatever happens in a world."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from random_worlds import END_S, SCENES, Chance, described, do_from_outside
+from tests.subject.test_world import DEEDS
+
+from steptwin import World
+from steptwin.errors import Misuse, Refusal
+from steptwin.gateways.heldstate import HeldState, parts_only
+from steptwin.gateways.sampling import KINDS
+from steptwin.machine import MILLISECOND, SECOND
+from steptwin.motion import at_rest
+from steptwin.subject.commands import Advance, ReadState
+from steptwin.subject.events import Event
+from steptwin.subject.following import Filter
+from steptwin.subject.payloads import (
+    CoordinatePayload,
+    EdgePayload,
+    InputPayload,
+    NotePayload,
+    Payload,
+    PlanPayload,
+    RestoredPayload,
+    StatusPayload,
+)
+from steptwin.subject.world import WorldSubject
+from steptwin.world.actions import Bytes
+
+FEEDER = Path(__file__).parents[2] / "examples/worlds/feeder.toml"
+UNTOLD = {"details": ("listens", "input_waiting")}
+"""What a chip receives is told at the end of a line of characters."""
+
+
+MIC488 = World.from_toml('[[mic488]]\nname = "table"\n')
+PLAN = PlanPayload("2", at_rest(0, 7))
+
+
+@pytest.mark.parametrize(
+    ("payload", "wanted"),
+    [
+        (EdgePayload("AIN1", 3.5), set()),
+        (EdgePayload("M3_EN", 1.0), {"M3"}),
+        (EdgePayload("cup.held", 1.0), set()),
+        (PLAN, {"M2", "status"}),
+        (CoordinatePayload("4", 100), {"M4", "status"}),
+        (StatusPayload("homed", "homed", (("axis", 1),)), {"M1", "status", "program", "details"}),
+        (StatusPayload("power-on", "power-on"), {"M1", "M2", "M3", "M4", "status", "program", "details"}),
+        (InputPayload("request", b"1"), {"M1", "M2", "M3", "M4", "status", "program", "details"}),
+        (NotePayload("nothing"), set()),
+    ],
+)
+def test_an_event_names_what_is_read_again(payload: Payload, wanted: set[str]) -> None:
+    """An edge brings its level; a new plan may end an error of the controller."""
+    holder = Holder(MIC488)
+    held = holder.held["table"]
+    held.take(Event(1, 0, "table", payload))
+    assert set(held.wanted(is_due=False)) == wanted
+
+
+class Holder:
+    """Holds the states of the twins of a world, and compares them with what is read."""
+
+    def __init__(self, world: World) -> None:
+        self.subject = WorldSubject(world)
+        self.following = self.subject.follow(Filter(KINDS), 1 << 20)
+        self.held = {part.name: HeldState(part) for part in self.subject.description.machines}
+        self.parts = self.subject.description.machines
+        for name, held in self.held.items():
+            held.put_all(*self._whole(name))
+
+    def _whole(self, name: str) -> tuple[Any, int]:
+        found = self.subject.do(ReadState(name))
+        return parts_only(found.value, {}), found.time
+
+    def check(self) -> None:
+        for name in self.held:
+            self.subject.world.touch(name)  # as the timer of a running world does
+        for event in self.following.take().events:
+            for part in self.parts:
+                if isinstance(event.payload, RestoredPayload):
+                    self.held[part.name].put_all(*self._whole(part.name))
+                elif event.machine in (part.name, part.line):
+                    self.held[part.name].take(event)
+        for name, held in self.held.items():
+            before = held.state
+            wanted = held.wanted(is_due=True)
+            found = self.subject.do(ReadState(name, wanted)) if wanted else None
+            state = held.put({} if found is None else found.value, None if found is None else found.time)
+            fresh = _told(self._whole(name)[0])
+            assert _told(state) == fresh, (name, wanted, _difference(_told(state), fresh))
+            assert before is not None
+            assert state is before or state != before
+
+
+def _told(state: Any) -> dict[str, Any]:
+    """Without what no event tells."""
+    details = {name: value for name, value in state["details"].items() if name not in UNTOLD["details"]}
+    return {**state, "details": details}
+
+
+def _difference(held: dict[str, Any], fresh: dict[str, Any]) -> object:
+    return {name: (held[name], fresh[name]) for name in held if held[name] != fresh[name]}
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("name", SCENES)
+def test_the_state_that_is_held_is_the_one_that_is_read(name: str, seed: int) -> None:
+    chance, scene = Chance(name, seed), SCENES[name]
+    text, steps = described(chance, scene)
+    files = {file: chance.filled(content).encode() for file, content in scene.files.items()}
+    world = World.from_toml(text, files)
+    holder = Holder(world)
+    while world.now < END_S * SECOND:
+        holder.subject.do(Advance(duration=(1 + chance.below(40)) * MILLISECOND))
+        holder.check()
+        if steps and chance.below(5) == 0:
+            do_from_outside(world, steps.pop(), files)
+            holder.check()
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(deeds=st.lists(st.tuples(DEEDS, st.integers(0, 60)), max_size=16))
+def test_the_state_that_is_held_of_a_cell_is_the_one_that_is_read(deeds: list[tuple[Any, int]]) -> None:
+    world = World.load(FEEDER)
+    holder = Holder(world)
+    for deed, pause_ms in deeds:
+        try:
+            if isinstance(deed, tuple) and len(deed) == 2 and deed[0] in ("bus", "chips"):
+                world.apply_input(Bytes(deed[0], "tcp-1", world.lines[deed[0]].kinds[0], deed[1]))
+            else:
+                holder.subject.do(deed)
+        except (Misuse, Refusal):
+            continue
+        holder.check()
+        holder.subject.do(Advance(duration=pause_ms * MILLISECOND))
+        holder.check()
