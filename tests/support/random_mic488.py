@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
+from itertools import islice
 
 from chance import Chance
 from mic488_rig import EN, IN, JOG, OFFSETS, OUT, STOP, USER_REG_READ, VALUES, WORDS, coil_pdu, read_pdu, word_pdu, words_pdu
@@ -18,14 +19,19 @@ from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.config import AnalogConfig, AxisConfig, ControllerConfig, InputConfig, ProgramConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.encoder import Coupling
+from steptwin.mic488.framelog import FrameLog
+from steptwin.mic488.points import live_point, marks, points
+from steptwin.mic488.present import state_of
 from steptwin.mic488.program_banks import LoadedProgram, load
 from steptwin.mic488.vision import VisionRecord
 from steptwin.motion.profile import Profile
 from steptwin.wbc.check import check
 from steptwin.wbc.dialect import dialect_for
 from steptwin.wbc.positions import parse_positions
+from steptwin.wire.slave import FrameDirection
 
 STEPS = 110
+WORDED = 300
 MUCH = 2500
 """After so many lines a session ends: a program commands axes again and again."""
 FIRMWARES = ("1.23", "1.40", "1.70")
@@ -100,7 +106,7 @@ class RandomMic488:
         self.stored: list[bytes] = []
         self.now = 0
         self.dint = False
-        self.found: dict[str, list[str]] = {name: [] for name in ("answers", "happened", "motions", "values")}
+        self.found: dict[str, list[str]] = {name: [] for name in ("answers", "happened", "motions", "values", "words")}
         self.profiles: list[Profile] = [axis.profile for axis in self.device.axes]
         self.revisions = [0] * 4
         self._hook()
@@ -113,6 +119,9 @@ class RandomMic488:
         device.on_event = lambda event: self.found["happened"].append(f"{event.time} {event.axis} {event.code}: {event.text}")
         device.changed = self._look
         device.store = self._store
+        log = FrameLog({1: device})
+        log.sinks.append(lambda line: self.found["words"].append(line.meaning))
+        self.observe = log.observer("line", tcp=False)
 
     def _store(self, memory: bytes) -> bytes | None:
         if self.chance.below(5) == 0:
@@ -147,6 +156,20 @@ class RandomMic488:
         yield f"{device.status().name} {dict(device.pins())}"
         yield " ".join(f"{number}={word}" for number, word in enumerate(device.user) if word)
 
+    def points(self) -> Iterator[str]:
+        """All that points show now, and when that turns next."""
+        device, now = self.device, self.now
+        yield f"{state_of(device, now)} {marks(device)}"
+        for point in points(device.registers, [axis.unit_name for axis in self.config.axes]):
+            if "USER" not in point.path:
+                live = live_point(device, point.path)
+                assert live is not None
+                read, turns = live.read, live.turns
+                frozen = read if live.freeze is None else live.freeze(now)
+                later = now + SECOND // 7
+                ahead = turns and list(islice(turns(now), 3))
+                yield f"{point} {read and read(now)} {frozen and frozen(later)} {ahead} {live.is_kept}"
+
     # ------------------------------------------------------------------ what is done
 
     def run(self) -> None:
@@ -161,7 +184,7 @@ class RandomMic488:
             self.wait()
             if len(self.found["happened"]) + len(self.found["motions"]) > MUCH:
                 break
-        self.found["values"] += self.values()
+        self.found["values"] += [*self.values(), *self.points()]
         for first, last in ((0, 40), (490, 500), (1000, 1136), (1980, 2000), (10_000, 10_136)):
             for address in range(first, last):
                 self.ask(read_pdu(3, address, 1))
@@ -191,6 +214,9 @@ class RandomMic488:
 
     def ask(self, pdu: bytes) -> None:
         answer = self.device.execute(pdu, self.now)
+        if pdu and len(self.found["words"]) < WORDED:
+            self.observe(self.now, FrameDirection.IN, bytes((1, *pdu, 0, 0)))
+            self.observe(self.now, FrameDirection.OUT, bytes((1, *answer, 0, 0)))
         self.found["answers"].append(f"{self.now} {pdu.hex()} -> {answer.hex()}")
 
     def value(self) -> float:

@@ -13,9 +13,9 @@ from steptwin.mic488.config import AxisConfig, ControllerConfig, InputConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.program_banks import LoadedProgram, load, setup_of
 from steptwin.wbc.check import check, check_program
-from steptwin.wbc.decompile import decompile
+from steptwin.wbc.decompile import ImageError, decompile, read_image
 from steptwin.wbc.dialect import dialect_for
-from steptwin.wbc.image import build
+from steptwin.wbc.image import COMMANDS_AT, build, image_of
 from steptwin.wbc.incremental import Edited
 from steptwin.wbc.migration import differences, findings
 from steptwin.wbc.positions import PositionTable, parse_positions
@@ -60,7 +60,7 @@ def told(text: str) -> list[str]:
     return [repr(found) for one in (text, *lines) for found in check(one).diagnostics]
 
 
-def made(text: str, table: PositionTable) -> list[str]:
+def made(chance: Chance, text: str, table: PositionTable) -> list[str]:
     """How it is written, the meaning of its names, its steps, its image, and what can be read of that."""
     tree, _ = parse(text)
     checked, scope = check_program(text, tree, [], table, None, dialect_for("1.70"))
@@ -75,6 +75,47 @@ def made(text: str, table: PositionTable) -> list[str]:
         if image is not None:
             back = decompile(image)
             found += [back.text, back.positions.text, f"{back.unknown} {back.inferred}"]
+            found += damaged(chance, image)
+    return found
+
+
+def encodable(text: str, table: PositionTable) -> str:
+    """The program with only what has a form in the image."""
+    for _ in range(20):
+        executable = check(text, table).executable
+        assert executable is not None, text
+        source = SourceText("", text)
+        wrong = {source.position(found.span.start)[0] for found in build(executable, table, inferred=True)[1]}
+        if not wrong:
+            return text
+        lines = []
+        for number, line in enumerate(text.splitlines(), 1):
+            word = line.split()[0].upper() if line.strip() else ""
+            if number not in wrong:
+                lines.append(line)
+            elif word in ("IF", "WHILE"):
+                lines.append(f"{word} IN{number % 20 + 1} = ON")
+        text = sound("".join(f"{line}\n" for line in lines), table)
+    raise AssertionError(text)
+
+
+def damaged(chance: Chance, data: bytes) -> list[str]:
+    """What can be read of an image in which records are others, or which is broken."""
+    image = read_image(data)
+    records = [bytearray(record) for record in image.records]
+    for _ in range(4):
+        record = chance.one(records)
+        record[chance.one((0, 0, 1, 1, 2, 6, 12, 13, 14))] = chance.one((0, 1, 2, 3, 5, 9, 61, 255, chance.below(40)))
+    changed = image_of([bytes(record) for record in records], list(image.rows))
+    broken = bytearray(data)
+    broken[chance.one((0, 16 * len(records), *range(COMMANDS_AT, COMMANDS_AT + 4)))] ^= 1 + chance.below(255)
+    found = []
+    for one in (changed, bytes(broken), data[: chance.below(len(data))]):
+        try:
+            back = decompile(one)
+            found += [back.text, f"{back.unknown} {back.inferred}"]
+        except ImageError as error:
+            found.append(str(error))
     return found
 
 
@@ -139,8 +180,9 @@ def seen(seed: int) -> dict[str, list[str]]:
     return {
         "text": text.splitlines(),
         "says": said(chance, text, table),
-        "made": made(text, table),
+        "made": made(chance, text, table),
         "does": [*resting.found, *resting.statements],
-        "wrong": [broken, *said(chance, broken, table), *made(broken, table)],
+        "wrong": [broken, *said(chance, broken, table), *made(chance, broken, table)],
+        "image": made(chance, encodable(text, table), table),
         "foreign": [strange, *told(strange)],
     }
