@@ -178,6 +178,10 @@ class CommandMemory(Stateful):
 
     # ------------------------------------------------------------------ registers 1 to 8
 
+    def registers(self) -> bytes:
+        """All of them."""
+        return (self._own if self._shared is None else self._bytes[self._shared : self._shared + 2 * len(GENERAL)]).tobytes()
+
     def register(self, number: int) -> int:
         if self._shared is None:
             return self._own[number - 1]

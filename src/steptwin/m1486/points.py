@@ -20,6 +20,8 @@ from steptwin.points import LivePoint, TurningPoints, turns_of, turns_of_round
 POSITION_BITS = 24
 FLAGS_UPLOAD = 14
 """The byte with the user flags, which commands set without an event (``T``, ``C``)."""
+_STATE, _VARIABLE, _REMAINDER, _REGISTERS, _FUNCTIONS = range(5)
+_MARKS_OF_UPLOADS = {4: _VARIABLE, 5: _VARIABLE, 6: _VARIABLE, 17: _FUNCTIONS, 18: _FUNCTIONS, 19: _FUNCTIONS}
 
 
 class _PointRow(NamedTuple):
@@ -32,6 +34,8 @@ class _PointRow(NamedTuple):
     has_version: bool = False
     is_kept: bool = False
     """As in `steptwin.points.LivePoint`."""
+    mark: int = 0
+    """The number of the value of `marks` that is another one when this point is."""
 
 
 def _sentence(text: str) -> str:
@@ -89,7 +93,8 @@ def _values() -> Iterator[_PointRow]:
         _value("room", "Whether a host may send the next line: chips not addressed take any.", kind="switch"),
         _has_room,
     )
-    yield _PointRow(_value("variable", "Internal variable, 24 bits.", "", "VII.7"), lambda chip, now: chip.unit.variable)
+    variable = _value("variable", "Internal variable, 24 bits.", "", "VII.7")
+    yield _PointRow(variable, lambda chip, now: chip.unit.variable, mark=_VARIABLE)
 
 
 def _registers() -> Iterator[_PointRow]:
@@ -111,9 +116,9 @@ def _registers() -> Iterator[_PointRow]:
         if number == POSITION_REGISTER:
             yield _PointRow(point, lambda chip, now: chip.drive.counter_u(now), follows=True, bits=POSITION_BITS)
         elif number == REMAINDER_REGISTER:
-            yield _PointRow(point, lambda chip, now: chip.unit.remainder)
+            yield _PointRow(point, lambda chip, now: chip.unit.remainder, mark=_REMAINDER)
         else:
-            yield _PointRow(point, partial(_general, number))
+            yield _PointRow(point, partial(_general, number), mark=_REGISTERS)
 
 
 def _general(number: int, chip: M1486Chip, now: Nanos) -> float:
@@ -134,12 +139,24 @@ def _uploads() -> Iterator[_PointRow]:
         )
         is_of_position = number <= POSITION_BITS // 8
         bits = 8 * number if is_of_position else None
-        yield _PointRow(point, UPLOADED[number], is_of_position, bits, is_kept=number == FLAGS_UPLOAD)
+        mark = _MARKS_OF_UPLOADS.get(number, _STATE)
+        yield _PointRow(point, UPLOADED[number], is_of_position, bits, is_kept=number == FLAGS_UPLOAD, mark=mark)
 
 
 _ROWS: Mapping[str, _PointRow] = {row.point.path.upper(): row for row in (*_values(), *_registers(), *_uploads())}
 POINTS: Mapping[str, Point] = {path: row.point for path, row in _ROWS.items()}
 """By path in capitals."""
+
+
+def marks(chip: M1486Chip) -> tuple[object, ...]:
+    """See `steptwin.world.kind.PointMarks`."""
+    unit, drive, now = chip.unit, chip.drive, chip.now
+    state = chip.is_busy(now), drive.motion, drive.is_valid, _has_room(chip, now), chip.interface
+    return state, unit.variable, unit.remainder, chip.memory.registers(), tuple(unit.functions)
+
+
+def mark_of(path: str) -> int:
+    return _ROWS[path.upper()].mark
 
 
 def live_point(chip: M1486Chip, text: str) -> LivePoint | None:

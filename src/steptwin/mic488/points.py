@@ -190,10 +190,11 @@ def live_point(device: Mic488Device, text: str) -> LivePoint | None:
     return _live(point, owner, register.key, behaviour.read, is_kept=behaviour.quiet)
 
 
-def marks(device: Mic488Device) -> object:
-    """See `steptwin.world.kind.ControllerKind.marks`."""
+def marks(device: Mic488Device) -> tuple[object, ...]:
+    """See `steptwin.world.kind.PointMarks`: one for all points."""
     program, (m1, m2, m3, m4) = device.program, device.axes
-    return (  # written out, because it is asked for after each event
+    # Written out, because it is asked for after each event.
+    mark = (
         program.state, program.error, device.master_error,
         m1.status, m1.enabled, m1.limit_l_p, m1.limit_r_p,
         m2.status, m2.enabled, m2.limit_l_p, m2.limit_r_p,
@@ -201,6 +202,7 @@ def marks(device: Mic488Device) -> object:
         m4.status, m4.enabled, m4.limit_l_p, m4.limit_r_p,
         *device.triggered.values(),
     )  # fmt: skip
+    return (mark,)
 
 
 def _short_name(text: str) -> tuple[ShortName, int | None] | None:

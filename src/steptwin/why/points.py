@@ -8,8 +8,9 @@ from contextlib import suppress
 from typing import TypeAlias
 
 from steptwin.errors import Misuse
-from steptwin.machine import MotionController, Nanos
+from steptwin.machine import Nanos
 from steptwin.points import LivePoint, MemoryCells
+from steptwin.world.eventpoints import EventPoints, points_of, stays_between_events
 from steptwin.world.plant import Plant
 
 MOST_TURNS = 1_000_000
@@ -68,13 +69,12 @@ class _Reader:
 
     def __init__(self, noted: PointTurns, world: Plant, owner: str) -> None:
         self._all = noted
-        sheet = world.kind(owner).datasheet(world.machine(owner))
-        points = {point.path: _point(world, owner, point.path) for point in sheet.points}
-        found = dict(_readable(world.machine(owner), points))
+        points = dict(points_of(world, owner))
+        found = {path: point for path, point in points.items() if point is not None and stays_between_events(point)}
         now = world.now
-        self.points: dict[str, list[PointTurn]] = {}
-        self._kept = _Compared({path: point for path, point in found.items() if point.is_kept}, self.points, now)
-        self._others = _Compared({path: point for path, point in found.items() if not point.is_kept}, self.points, now)
+        self._kept = _Compared({path: point for path, point in found.items() if point.is_kept}, now)
+        self._others = EventPoints(world, owner, {path: point for path, point in found.items() if not point.is_kept})
+        self.points = self._kept.turns | {path: [(now, float(value))] for path, value in self._others.read(now).items()}
         rows = (_memory(world, owner, f"{path}[0]") for path, point in points.items() if point is None)
         memory = next((row for row in rows if row is not None), None)
         self.cells = None if memory is None else _Cells(memory, now)
@@ -93,22 +93,22 @@ class _Reader:
         """Note what has another value after an event."""
         noted = self._look_at_kept(now if self._keeping is None else self._keeping)
         self._keeping = None
-        self._all.looked(noted + self._others.look(now))
+        changed = self._others.changed(now)
+        for path, value in changed.items():
+            note_turn(self.points[path], now, float(value))
+        self._all.looked(noted + len(changed))
 
     def _look_at_kept(self, now: Nanos) -> int:
         return self._kept.look(now) + (0 if self.cells is None else self.cells.look(now))
 
 
 class _Compared:
-    """Points that are compared together."""
+    """Points that are only kept, compared together."""
 
-    def __init__(self, found: Mapping[str, LivePoint], points: dict[str, list[PointTurn]], now: Nanos) -> None:
-        """Their turns come into ``points``."""
+    def __init__(self, found: Mapping[str, LivePoint], now: Nanos) -> None:
         self._reads = [point.read for point in found.values() if point.read is not None]
         self._values = [float(read(now)) for read in self._reads]
-        own = {path: [(now, value)] for path, value in zip(found, self._values, strict=True)}
-        points.update(own)
-        self._turns = list(own.values())
+        self.turns: dict[str, list[PointTurn]] = {path: [(now, value)] for path, value in zip(found, self._values, strict=True)}
 
     def look(self, now: Nanos) -> int:
         """Note what has another value at the present moment; how many changes that are."""
@@ -116,7 +116,7 @@ class _Compared:
         if values == self._values:
             return 0
         noted = 0
-        for turns, value, before in zip(self._turns, values, self._values, strict=True):
+        for turns, value, before in zip(self.turns.values(), values, self._values, strict=True):
             if value != before:
                 note_turn(turns, now, float(value))
                 noted += 1
@@ -163,14 +163,6 @@ def note_turn(turns: list[PointTurn], now: Nanos, value: float) -> None:
         turns.pop()
     if not turns or turns[-1][1] != value:
         turns.append((now, value))
-
-
-def _readable(machine: MotionController, points: Mapping[str, LivePoint | None]) -> Iterator[tuple[str, LivePoint]]:
-    """The points of a controller that keep their value between events; pins have their edges."""
-    pins = machine.pins()
-    for path, found in points.items():
-        if found is not None and found.read is not None and found.turns is None and path not in pins:
-            yield path, found
 
 
 def _point(world: Plant, owner: str, path: str) -> LivePoint | None:

@@ -10,8 +10,6 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import suppress
-from functools import partial
 from itertools import islice
 from typing import NamedTuple, TypeAlias
 
@@ -19,6 +17,7 @@ from steptwin.durations import duration_text
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.world.actions import ExternalInput, size_of
+from steptwin.world.eventpoints import EventPoints, points_of, stays_between_events
 from steptwin.world.plant import Plant
 from steptwin.world.plantsnapshot import PlantSnapshot, RecordedInput
 from steptwin.world.trace import TraceRecord
@@ -131,21 +130,9 @@ class _ChangedPoints:
     `steptwin.world.followers.KernelFollower`."""
 
     def __init__(self, world: Plant, owner: str, note: Callable[[Changed], None]) -> None:
-        machine, kind = world.machine(owner), world.kind(owner)
         self._world, self._owner, self._note = world, owner, note
-        self._reads: list[Callable[[Nanos], float]] = []
-        self._paths: list[str] = []
-        pins = machine.pins()
-        for point in (one for one in kind.datasheet(machine).points if one.path not in pins):
-            with suppress(Misuse):  # of a row of registers one must be chosen
-                live = kind.point(machine, point.path)
-                if live is not None and live.read is not None and live.turns is None and not live.is_kept:
-                    self._reads.append(live.read)
-                    self._paths.append(point.path)
-        self._marks_of = (lambda: None) if kind.marks is None else partial(kind.marks, machine)
-        self._marks: object = None
-        self._values: list[float] = []
-        self.read()
+        found = {path: point for path, point in points_of(world, owner) if point is not None and not point.is_kept}
+        self._points = EventPoints(world, owner, {path: point for path, point in found.items() if stays_between_events(point)})
         world.parts.kernel_of[owner].follow(self, (owner,))
 
     def close(self) -> None:
@@ -153,23 +140,14 @@ class _ChangedPoints:
 
     def read(self) -> None:
         """The present values, whatever they were before."""
-        self._marks = self._marks_of()
-        self._values = [read(self._world.now) for read in self._reads]
+        self._points.read(self._world.now)
 
     def leave(self, moment: Nanos) -> None:
         """It need not know."""
 
     def look(self, now: Nanos) -> None:
-        marks = self._marks_of()
-        if marks == self._marks and marks is not None:
-            return
-        self._marks = marks
-        values = [read(now) for read in self._reads]
-        if values != self._values:
-            for path, value, before in zip(self._paths, values, self._values, strict=True):
-                if value != before:
-                    self._note((self._owner, path))
-            self._values = values
+        for path in self._points.changed(now):
+            self._note((self._owner, path))
 
 
 class History:

@@ -50,6 +50,15 @@ NewValues: TypeAlias = tuple[tuple[str, float], ...]
 """Registers by name, and the values to write."""
 
 
+class PointMarks(NamedTuple, Generic[M]):
+    """Values of which some are others after an event that has changed points which neither move nor are only kept
+    (`steptwin.points.LivePoint`)."""
+
+    values: Callable[[M], tuple[object, ...]]
+    of: Callable[[str], int] = lambda path: 0
+    """The number of the value that is another one if the point with this path is."""
+
+
 class BuildContext(Protocol):
     """The description and the files that it refers to, while those of a controller are read."""
 
@@ -212,9 +221,8 @@ class ControllerKind(Generic[S, M, V]):
     point: Callable[[M, str], LivePoint | None]
     """The point of its data sheet that a name or an address means: what conditions, scripts and programs outside read of it. None
     where there is none; raises `Misuse` for what is half a value."""
-    marks: Callable[[M], object] | None = None
-    """A value that is another one after an event that has changed points which neither move nor are only kept
-    (`steptwin.points.LivePoint`); faster than to compare these, which is done where there is none."""
+    marks: PointMarks[M] | None = None
+    """Faster than to compare all points after each event, which is done where there is none."""
     motion_ends: Callable[[str, str | None, Seek | None], MotionEnds] | None = None
     """Conditions on an axis, which has that name in conditions, of a controller on a line with that name, or at the end of a
     seek; None where its state does not show how a motion ended."""

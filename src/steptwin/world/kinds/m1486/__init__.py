@@ -10,7 +10,7 @@ from steptwin.m1486.pins import CONTROL_PINS, LINE_PINS, OUTPUT_PINS, refuse_tak
 from steptwin.m1486.present import state_of
 from steptwin.m1486.variants import Store, variant
 from steptwin.machine import MachineEvent
-from steptwin.world.kind import ControllerKind, LineKind, LinkKind, Terminals
+from steptwin.world.kind import ControllerKind, LineKind, LinkKind, PointMarks, Terminals
 from steptwin.world.kinds.m1486 import axes, build, control, faults, lanes, line, memory, programs, table
 from steptwin.world.kinds.m1486.heldjog import M1486HeldJog
 from steptwin.world.kinds.m1486.table import M1486Spec
@@ -59,6 +59,7 @@ M1486: ControllerKind[M1486Spec, M1486Chip, M1486View] = ControllerKind(
     pins=lambda chip: datasheet.pins_of(chip.variant),
     datasheet_of=lambda name: datasheet.datasheet_of(variant(name or table.DEFAULT_VARIANT)),
     point=points.live_point,
+    marks=PointMarks(points.marks, points.mark_of),
     control=control.CONTROL,
     motion_ends=control.motion_ends,
     seek=control.seek,

@@ -12,7 +12,7 @@ from steptwin.mic488.present import empty_banks, state_of, statement_of
 from steptwin.mic488.registers import DEFAULT_FIRMWARE
 from steptwin.mic488.status import ProgramState
 from steptwin.mic488.vision import VisionReceiver, VisionRecord
-from steptwin.world.kind import ControllerKind, LineKind, LinkKind, NamedRegisters, Terminals, Vision
+from steptwin.world.kind import ControllerKind, LineKind, LinkKind, NamedRegisters, PointMarks, Terminals, Vision
 from steptwin.world.kinds.mic488 import axes, build, control, faults, line, memory, programs, table
 from steptwin.world.kinds.mic488.configuration import Mic488Configuration
 from steptwin.world.kinds.mic488.heldjog import Mic488HeldJog
@@ -91,7 +91,7 @@ MIC488: ControllerKind[Mic488Spec, Mic488Device, Mic488View] = ControllerKind(
     pins=lambda device: datasheet.PINS,
     datasheet_of=lambda variant: datasheet.datasheet_of(variant or DEFAULT_FIRMWARE),
     point=points.live_point,
-    marks=points.marks,
+    marks=PointMarks(points.marks),
     motion_ends=control.motion_ends,
     control=control.CONTROL,
     held_jog=Mic488HeldJog,
