@@ -18,6 +18,8 @@ from pygls.exceptions import JsonRpcInvalidParams
 from pytest_lsp import ClientServerConfig, LanguageClient, client_capabilities
 from tests.lsp.conftest import BROKEN, BROKEN_CHIP, CHIP, CONFIG, PROGRAM, TABLE, WORLD
 
+from steptwin.diagnostics import Diagnostic, Severity, Span
+from steptwin.lsp.editorserver import most_severe
 from steptwin.lsp.files import NoFiles
 from steptwin.lsp.server import server
 
@@ -61,6 +63,26 @@ def machine(tmp_path: Path) -> str:
     (tmp_path / "machine.csv").write_text(TABLE)
     (tmp_path / "machine.cfg").write_bytes(CONFIG.encode("utf-16"))
     return (tmp_path / "machine.prg").as_uri()
+
+
+def test_of_very_many_findings_the_most_severe_are_sent() -> None:
+    def finding(number: int) -> Diagnostic:
+        severity = Severity.ERROR if number % 2 else Severity.WARNING
+        return Diagnostic(f"X{number}", severity, Span(number, number + 1), "wrong")
+
+    few, many = [finding(number) for number in range(1000)], [finding(number) for number in range(1500)]
+    assert most_severe(few) == few
+    *shown, last = most_severe(many)
+    assert [found.span.start for found in shown] == sorted([*range(1, 1500, 2), *range(0, 500, 2)])
+    assert (last.span.start, last.message) == (500, "1500 findings: the 1000 most severe are shown")
+
+
+@pytest.mark.asyncio
+async def test_very_many_findings_are_not_sent(client: LanguageClient, tmp_path: Path) -> None:
+    uri = (tmp_path / "chip.m1486").as_uri()
+    open_text(client, uri, "R" * 1200)
+    found = await diagnostics(client, uri)
+    assert (len(found), found.count("S002")) == (1001, 1)
 
 
 @pytest.mark.asyncio

@@ -163,6 +163,11 @@ def test_texts_of_other_programs_are_left_alone() -> None:
 def test_a_text_of_any_size_is_not_looked_at() -> None:
     made = session("x = 1\n" * 300_000)
     assert codes(made) == ["S001"]
+    made.open("file:///chip.m1486", "m1486", 1, "+1\n" * 50_000)
+    analysis = made.analysis("file:///chip.m1486")
+    assert analysis is not None
+    (found,) = analysis.diagnostics()
+    assert found.message == "the text has 150000 characters: texts of more than 131072 are not looked at"
 
 
 # ---------------------------------------------------------------------- questions

@@ -7,6 +7,7 @@ to check, the longer that moment.
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Sequence
 from time import perf_counter
 
 from lsprotocol import types as lsp
@@ -15,6 +16,7 @@ from pygls.lsp.server import LanguageServer
 from pygls.protocol import default_converter
 
 from steptwin import __version__
+from steptwin.diagnostics import Diagnostic, Severity
 from steptwin.lsp.analysis import Analysis
 from steptwin.lsp.answers import TextLocation
 from steptwin.lsp.convert import Converter
@@ -28,6 +30,10 @@ LONGEST_DELAY_S = 0.5
 """Between a change and its diagnostics."""
 OTHERS_DELAY_S = 0.3
 """Delay before the other files of a machine are analysed again."""
+
+MOST_DIAGNOSTICS = 1000
+"""Of one text: editors become slow with more, and one mistake is often the reason of all."""
+_RANKS = {severity: rank for rank, severity in enumerate(Severity)}
 
 
 class EditorServer(LanguageServer):
@@ -89,7 +95,9 @@ class EditorServer(LanguageServer):
         begin = perf_counter()
         analysis = self.session.analysis(uri)
         converter = Converter(document.lines, self.session.encoding)
-        found = [] if analysis is None else [converter.diagnostic(diagnostic) for diagnostic in analysis.diagnostics()]
+        found = (
+            [] if analysis is None else [converter.diagnostic(diagnostic) for diagnostic in most_severe(analysis.diagnostics())]
+        )
         # A text whose analysis takes long is analysed less often during typing.
         taken = perf_counter() - begin
         self._delays[uri] = FIRST_DELAY_S if taken < 0.05 else min(taken, LONGEST_DELAY_S)
@@ -110,3 +118,13 @@ class EditorServer(LanguageServer):
         converter = self.converter(place.uri)
         nowhere = lsp.Range(lsp.Position(0, 0), lsp.Position(0, 0))
         return lsp.Location(self.session.shown(place.uri), nowhere if converter is None else converter.range(place.span))
+
+
+def most_severe(diagnostics: Sequence[Diagnostic]) -> Sequence[Diagnostic]:
+    """As many as are shown, in order of the text, and at the first place that is not shown how many there are."""
+    if len(diagnostics) <= MOST_DIAGNOSTICS:
+        return diagnostics
+    numbers = sorted(range(len(diagnostics)), key=lambda number: _RANKS[diagnostics[number].severity])
+    shown, others = sorted(numbers[:MOST_DIAGNOSTICS]), numbers[MOST_DIAGNOSTICS:]
+    message = f"{len(diagnostics)} findings: the {MOST_DIAGNOSTICS} most severe are shown"
+    return [*(diagnostics[number] for number in shown), Diagnostic("S002", Severity.NOTE, diagnostics[min(others)].span, message)]

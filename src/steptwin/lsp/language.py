@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 from steptwin.lsp.analysis import Analysis
+from steptwin.lsp.documents import MOST_CHARACTERS
 from steptwin.lsp.positions import LineIndex
 
 T = TypeVar("T")
@@ -79,6 +80,8 @@ class EditorLanguage:
     around: Callable[[OtherTexts, str], tuple[object, ...]] = lambda session, uri: ()
     """What the analysis of a text depends on beside the text."""
     analyse: Callable[[OtherTexts, str, LineIndex], Analysis]
+    most_characters: int = MOST_CHARACTERS
+    """Longer texts are not analysed."""
     machines: Callable[[str, str], list[MachineFiles]] | None = None
     """The controllers that a text describes, by its address and itself. Raises `Misuse` for one that cannot be read. None for
     languages that describe none."""

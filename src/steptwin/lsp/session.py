@@ -13,7 +13,7 @@ from typing import Any, TypeVar, cast
 
 from steptwin.errors import Misuse
 from steptwin.lsp.analysis import Analysis
-from steptwin.lsp.documents import MOST_CHARACTERS, Document, TextChange
+from steptwin.lsp.documents import Document, TextChange
 from steptwin.lsp.files import Files, NoFiles, normal, with_suffix
 from steptwin.lsp.language import EditorLanguage, MachineFiles
 from steptwin.lsp.languages import LANGUAGES, language_of
@@ -128,7 +128,8 @@ class EditorSession:
         return known.analysis
 
     def _analyse(self, uri: str, language: EditorLanguage, lines: LineIndex) -> Analysis:
-        return TooLong(uri, lines) if len(lines.text) > MOST_CHARACTERS else language.analyse(self, uri, lines)
+        most = language.most_characters
+        return TooLong(uri, lines, most) if len(lines.text) > most else language.analyse(self, uri, lines)
 
     # -- what languages need
 

@@ -6,12 +6,16 @@ from collections.abc import Sequence
 
 from steptwin.diagnostics import Diagnostic, Severity, Span
 from steptwin.lsp.analysis import Analysis
-from steptwin.lsp.documents import MOST_CHARACTERS
+from steptwin.lsp.positions import LineIndex
 
 
 class TooLong(Analysis):
-    """Reports only that."""
+    """Reports only that. ``most``: how many characters it may have."""
+
+    def __init__(self, uri: str, lines: LineIndex, most: int) -> None:
+        super().__init__(uri, lines)
+        self._most = most
 
     def diagnostics(self) -> Sequence[Diagnostic]:
-        message = f"the text has {len(self.text)} characters; only {MOST_CHARACTERS} are looked at"
+        message = f"the text has {len(self.text)} characters: texts of more than {self._most} are not looked at"
         return [Diagnostic("S001", Severity.NOTE, Span(0, 0), message)]

@@ -11,7 +11,7 @@ from steptwin.m1486.lines import STEP_DIRECTION, Interface
 from steptwin.m1486.position_rules import position_rules
 from steptwin.m1486.structure import CommandStream, stored_bits, streams
 from steptwin.m1486.structure_rules import structure_rules
-from steptwin.m1486.syntax import ChipCommand, ParsedProgram, parse
+from steptwin.m1486.syntax import ChipCommand, Parsed, ParsedProgram, parse
 from steptwin.m1486.variants import DEFAULT, Variant
 
 
@@ -54,7 +54,12 @@ class CommandSize:
 
 def check(text: str, variant: Variant = DEFAULT, interface: Interface = STEP_DIRECTION) -> CheckedChipProgram:
     """Check the text of a program for one variant and driver interface, as if started after power-up. Never raises."""
-    program, found = parse(text)
+    return check_parsed(parse(text), variant, interface)
+
+
+def check_parsed(parsed: Parsed, variant: Variant, interface: Interface) -> CheckedChipProgram:
+    """As `check`, of a text that has been read."""
+    program, found = parsed
     diagnostics = list(found)
     labels = free_labels(program.all_commands, variant)
     for command in program.all_commands:

@@ -25,12 +25,12 @@ from steptwin.lsp.folding import NestedFolds, runs
 from steptwin.lsp.m1486 import items, texts
 from steptwin.lsp.m1486.hints import hints
 from steptwin.lsp.positions import LineIndex
-from steptwin.m1486.check import CheckedChipProgram, check
+from steptwin.m1486.check import CheckedChipProgram, check_parsed
 from steptwin.m1486.commands import find
 from steptwin.m1486.lines import Interface
 from steptwin.m1486.structure import written_label
 from steptwin.m1486.symbols import by_chip, label_key, uses
-from steptwin.m1486.syntax import ChipCommand, JumpCondition, ParsedProgram, format_program, parse
+from steptwin.m1486.syntax import ChipCommand, JumpCondition, Parsed, ParsedProgram, format_program, parse
 from steptwin.m1486.variants import Variant
 from steptwin.symbols import Symbol, SymbolKind, SymbolRole, Use
 
@@ -46,12 +46,16 @@ class M1486Analysis(Analysis):
         self._interface = interface
 
     @cached_property
+    def _parsed(self) -> Parsed:
+        return parse(self.text)
+
+    @property
     def _program(self) -> ParsedProgram:
-        return parse(self.text).program
+        return self._parsed.program
 
     @cached_property
     def _checked(self) -> CheckedChipProgram:
-        return check(self.text, self._variant, self._interface)
+        return check_parsed(self._parsed, self._variant, self._interface)
 
     @cached_property
     def _commands(self) -> Sequence[tuple[int | None, ChipCommand]]:

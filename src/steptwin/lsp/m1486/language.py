@@ -45,6 +45,10 @@ def chip_of(world: str, table: Mapping[str, Any]) -> ChipFiles | None:
     return ChipFiles(kind, drive, relative(world, program))
 
 
+MOST_CHARACTERS = 1 << 17
+"""Limit of an analysed program: many times what the chips of a line hold."""
+
+
 def _around(session: OtherTexts, uri: str) -> tuple[Variant, Interface]:
     chip = next((one for one in session.machines(ChipFiles) if one.program == uri), None)
     return (DEFAULT, STEP_DIRECTION) if chip is None else (chip.variant, chip.interface)
@@ -54,5 +58,6 @@ M1486_PROGRAMS = EditorLanguage(
     name="m1486",
     suffix=".m1486",
     around=_around,
+    most_characters=MOST_CHARACTERS,
     analyse=lambda session, uri, lines: M1486Analysis(uri, lines, *_around(session, uri)),
 )
