@@ -36,6 +36,7 @@ def test_addresses() -> None:
     [
         *("", "127.0.0.1:5020", "http://x:1", "rtu-tcp://host", "tcp://", "tcp://h:99999", "tcp://h:1/x"),
         *("tcp://h:1?key=k", "tls://h:1", "tls://h:1?certificate=c&key=k"),
+        *("tls://h:1?certificate=c&key=k&trusted=t&x=", "tls://h:1?certificate=c&key=k&trusted="),
     ],
 )
 def test_what_is_no_address(text: str) -> None:

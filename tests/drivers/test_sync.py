@@ -113,3 +113,16 @@ def test_with_opens_a_line_and_closes_it(line: ModbusLine | M1486Line) -> None:
         assert same is line
         assert (wire.opened, closed) == (1, [])
     assert closed == [True]
+
+
+def test_a_driver_for_asyncio_opens_its_own_line_with_its_baud_rate_and_log(monkeypatch: pytest.MonkeyPatch) -> None:
+    log: list[str] = []
+    lines = given(monkeypatch, AsyncModbusLine), given(monkeypatch, AsyncM1486Line)
+    AsyncMic488("/dev/ttyUSB0", baud=9600, log=log.append)
+    AsyncM1486("/dev/ttyUSB0", baud=1200, log=log.append)
+    AsyncMic488("/dev/ttyUSB0")
+    AsyncM1486("/dev/ttyUSB0")
+    assert [[named for _, named in seen] for seen in lines] == [
+        [{"baud": 9600, "log": log.append}, {"baud": 38400, "log": None}],
+        [{"baud": 1200, "log": log.append}, {"baud": 4800, "log": None}],
+    ]

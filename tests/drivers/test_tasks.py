@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+import contextlib
+from collections.abc import Callable, Generator, Mapping
 
 import pytest
-from host_rig import INTERVAL, TIMEOUT, Wire, async_driver, driver, fill, run_virtual, task_line, thread_line
+from host_rig import INTERVAL, TIMEOUT, Fault, Wire, async_driver, driver, fill, run_virtual, task_line, thread_line
 from line_rig import MemoryEndpoint, MemoryTransport
 
 from steptwin.drivers import LineLost, Mic488, NoAnswer, Overtaken
@@ -15,6 +16,7 @@ from steptwin.drivers.exchange import Job
 from steptwin.drivers.modbus import ModbusQuery, words
 from steptwin.errors import LineFailure, Misuse
 from steptwin.machine import MILLISECOND, SECOND
+from steptwin.tracing import traced_by
 from steptwin.wire.pdu import ReadRequest
 
 
@@ -325,3 +327,73 @@ def test_a_task_that_is_cancelled_while_it_waits_for_a_lock_does_not_keep_it(tic
 
     run_virtual(Wire(), main())
     assert len(said) == 3, "each second"
+
+
+def test_a_line_counts_what_it_has_sent_and_what_failed() -> None:
+    wire = Wire()
+    line = task_line(wire)
+
+    async def main() -> None:
+        async with line as entered:
+            assert entered is line
+            assert line.counts == (0, 0)
+            await line.exchange(Job(ModbusQuery(1, ReadRequest(3, 10020, 2)), TIMEOUT))
+            wire.severed = True
+            with pytest.raises(NoAnswer):
+                await line.exchange(Job(ModbusQuery(1, ReadRequest(3, 10020, 2)), TIMEOUT, most_attempts=2))
+            assert line.counts == (3, 2)
+        with pytest.raises(Misuse, match="the line memory is closed"):
+            await line.exchange(Job(ModbusQuery(1, ReadRequest(3, 10020, 2)), TIMEOUT))
+
+    run_virtual(wire, main())
+
+
+def test_an_exchange_is_traced_with_its_failed_attempts() -> None:
+    wire = Wire()
+    line = task_line(wire)
+    spans: list[tuple[object, ...]] = []
+
+    class Noted:
+        def note(self, name: str, value: object) -> None:
+            spans.append((name, value))
+
+    @contextlib.contextmanager
+    def tracer(name: str, attributes: Mapping[str, object], is_part: bool) -> Generator[Noted]:
+        spans.append((name, dict(attributes), is_part))
+        yield Noted()
+
+    async def main() -> None:
+        async with line:
+            await line.exchange(Job(ModbusQuery(1, ReadRequest(3, 10020, 2)), TIMEOUT))
+            assert spans == []
+            wire.put(Fault("to twin", 0, "drop"))
+            with traced_by(tracer):
+                answer = await line.exchange(Job(ModbusQuery(1, ReadRequest(3, 10020, 2)), TIMEOUT, most_attempts=2))
+            assert words(answer) == (0, 0)
+
+    run_virtual(wire, main())
+    assert spans == [
+        ("line memory", {"line": "memory", "request": "unit 1: 03 27 24 00 02"}, True),
+        ("failed_attempts", 1),
+    ]
+
+
+def test_a_line_that_is_closed_while_it_is_opened_again_stays_closed() -> None:
+    wire = Wire()
+    line = task_line(wire)
+    endpoint = Slow(wire)
+
+    async def main() -> None:
+        await line.open()
+        line._endpoint = endpoint
+        assert line._transport is not None
+        line._transport.lose()  # type: ignore[attr-defined]
+        asking = asyncio.create_task(line.exchange(Job(ModbusQuery(1, ReadRequest(3, 10020, 2)), TIMEOUT)))
+        await asyncio.sleep(0.5)
+        await line.close()
+        with pytest.raises(LineLost, match="the line memory was closed"):
+            await asking
+        await asyncio.sleep(2.0)
+        assert endpoint.transport is None
+
+    run_virtual(wire, main())

@@ -323,3 +323,33 @@ def test_what_cannot_be_told_to_stop_is_said() -> None:
     wire.severed = False
     mic.stop_all()
     assert not wire.moving()
+
+
+def test_a_line_counts_what_it_has_sent_and_what_failed() -> None:
+    wire = Wire()
+    line = thread_line(wire)
+    finish(line.open())
+    query = ModbusQuery(1, ReadRequest(3, 10020, 2))
+    assert words(finish(line.exchange(Job(query, TIMEOUT)))) == (0, 0)
+    wire.severed = True
+    with pytest.raises(NoAnswer):
+        finish(line.exchange(Job(query, TIMEOUT, most_attempts=2)))
+    assert line.counts == (3, 2)
+
+
+def test_a_port_that_goes_while_late_bytes_are_discarded_is_opened_again() -> None:
+    """After a lost answer the line is emptied before the next request."""
+    wire = Wire()
+    mic = driver(wire)
+    wire.severed = True
+    with pytest.raises(NoAnswer):
+        mic.positions()
+    wire.severed = False
+
+    def unplug() -> None:
+        wire.before_read = None
+        raise LineLost("unplugged")
+
+    wire.before_read = unplug
+    assert mic.positions() == (0.0, 0.0, 0.0, 0.0)
+    assert wire.opened == 2

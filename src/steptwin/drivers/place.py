@@ -59,7 +59,7 @@ def parse_line_address(text: str, baud: int) -> LineAddress:
         rest = parts.path.strip("/") + parts.fragment
     except ValueError:
         host, port, files, rest = None, None, [], ""
-    if not host or rest or sorted(name for name, value in files if value) != sorted(TLS_FILES if scheme == "tls" else ()):
+    if not host or rest or sorted(name if value else "" for name, value in files) != sorted(TLS_FILES if scheme == "tls" else ()):
         raise Misuse(f"{text!r} is not an address: {FORMS}")
     if port is None:
         if scheme == "rtu-tcp":

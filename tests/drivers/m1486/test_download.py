@@ -241,6 +241,10 @@ def test_a_file_of_another_kind_is_refused_in_a_few_words() -> None:
         chip.download("~\n" * 1000, name="notes.txt")
     assert str(refused.value).count("error M") == 10
     assert str(refused.value).endswith("\nand 990 more errors")
+    with pytest.raises(Misuse) as refused:
+        chip.download("~\n" * 10)
+    assert str(refused.value).count("error M") == 10
+    assert "more errors" not in str(refused.value)
     assert wire.sent == []
 
 

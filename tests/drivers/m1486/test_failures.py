@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
-from chip_rig import KNOWN, ChipWire, chip_driver
+from chip_rig import KNOWN, ChipWire, chip_driver, typed
 
 from steptwin.drivers import SentLate, Unconfirmed
 from steptwin.drivers.m1486 import (
@@ -17,7 +18,9 @@ from steptwin.drivers.m1486 import (
     NoEcho,
     PositionUnknown,
     Restarted,
+    WrongType,
 )
+from steptwin.errors import LineFailure
 from steptwin.machine import SECOND
 
 
@@ -173,3 +176,62 @@ def test_an_end_says_how_long_it_was_waited_for() -> None:
     end = chip.wait()
     assert end.after_s == pytest.approx((wire.now - begin) / SECOND, abs=0.05)
     assert 0.1 < end.after_s < 10.0
+
+
+@pytest.mark.parametrize("number", [2, 3])
+def test_bytes_that_differ_at_every_reading_are_no_value(number: int) -> None:
+    """The line has no checksum: a byte counts when it was the same twice, of four readings."""
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    readings = 0
+
+    def change(data: bytes) -> None:
+        nonlocal readings
+        if data == b"u1":
+            readings += 1
+            if readings < number + 2:
+                wire.chip.drive.set_counter(64 * readings, wire.now)
+
+    wire.before_each = change
+    if number == 2:
+        assert chip.counter() == 64 * 3
+        assert readings == 4
+        return
+    with pytest.raises(LineFailure, match="^memory: the chip: what U1 U2 U3 sends differs at every reading$"):
+        chip.counter()
+    assert readings == 4
+
+
+def test_a_letter_that_no_type_has_is_told() -> None:
+    """Function 57 may have put a report before it, so that is switched off, and it is read once more."""
+    wire = ChipWire("B")
+
+    def change(data: bytes) -> None:
+        if data == b"u15":
+            wire.chip.variant = replace(wire.chip.variant, type_letter=0x5A)
+
+    wire.before_each = change
+    with pytest.raises(WrongType, match="^memory: the chip reports the type letter 5AH, which no M1486 has$"):
+        chip_driver(wire)
+    assert typed(wire).count("c57") == 1
+
+
+def test_a_chip_that_did_not_answer_is_asked_three_times_whether_it_still_echoes() -> None:
+    """Its echo is garbled each time, so it counts as switched off."""
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    asked = 0
+
+    def disturb(data: bytes) -> None:
+        nonlocal asked
+        wire.severed = data == b"u20"
+        if data == b"t41":
+            asked += 1
+            wire.inject(b"z")
+
+    wire.before_each = disturb
+    wire.sent.clear()
+    with pytest.raises(NoEcho):
+        chip.counter()
+    assert asked == 3 + 2
+    assert typed(wire).startswith("u20% t41% t41% t41t41 t41 ")

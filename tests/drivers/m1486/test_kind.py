@@ -17,6 +17,8 @@ from steptwin.drivers.m1486.kind import LOST, M1486_DRIVER
 from steptwin.drivers.m1486.sync import M1486
 from steptwin.errors import Misuse, Refusal
 from steptwin.machine import Nanos
+from steptwin.wire.frameline import FrameLine
+from steptwin.wire.slave import FrameDirection
 
 ADDRESS = DeviceAddress("memory", "m1486", 7, 4800, 1.0)
 
@@ -106,6 +108,7 @@ def test_a_held_jog() -> None:
     assert (end.ok, end.reason, end.name) == (True, "released", "chip 7")
     assert not wire.moving()
     assert end.position == wire.true() / 64 > 0.0
+    assert chip.settings.velocity == wire.chip.drive.velocity == 1000
 
 
 def test_a_jog_that_others_end_is_not_ok() -> None:
@@ -238,6 +241,15 @@ def test_a_server_of_modbus_tcp_has_no_chips(monkeypatch: pytest.MonkeyPatch) ->
     with pytest.raises(LineLost):
         search.find("memory", 4800, range(16), 0.25, lambda number: None)
     assert waited == [100_000_000, 250_000_000]
+
+
+@pytest.mark.parametrize(("variant", "told"), [(None, "@80  out of range"), ("B", "@80  Address 80")])
+def test_traffic_is_decoded_for_a_type(variant: str | None, told: str) -> None:
+    """An A has 15 labels, and is what the manual speaks of."""
+    frames: list[FrameLine] = []
+    assert M1486_DRIVER.decoding.protocol == "m1486"
+    M1486_DRIVER.decoding.make(frames.append, variant, False).feed(b"@80\r", 5, FrameDirection.IN)
+    assert frames == [FrameLine(5, "", FrameDirection.IN, b"@80\r", told)]
 
 
 def test_what_it_takes() -> None:

@@ -117,6 +117,8 @@ def test_numbers() -> None:
     [
         ("V=1.5", "'V=1.5': V takes whole numbers"),
         ("VARIABLE=0.5", "VARIABLE takes whole numbers"),
+        ("V=inf", "'V=inf': V takes whole numbers"),
+        ("VARIABLE=nan", "'VARIABLE=nan': VARIABLE takes whole numbers"),
         ("V=x", "'V=x': 'x' is not a number"),
         ("B6=maybe", "'B6=maybe': expected on or off"),
         ("X=1", r"'X=1': X cannot be set: permitted are POSITION, VARIABLE, B1…B21"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
 
 import pytest
 
@@ -116,6 +117,7 @@ def test_a_conversation() -> None:
     assert told == ["05H  U1 position, low byte: 5"]
     terminal.type("r")
     assert terminal.settle(60.0) == 2
+    assert terminal._thread.daemon, "a program that ends without closing it does not hang"
     assert terminal.selected == "7"
     terminal.type("xg")
     assert terminal.selected == ""
@@ -177,3 +179,119 @@ def test_what_waits_for_an_eeprom_is_not_typed_after_a_suspension() -> None:
     terminal.close()
     assert b"r\r" not in wire.written
     assert wire.written[-1] == b"k\r"
+
+
+class Scene:
+    """A terminal in virtual time: lines typed (text) and bytes that come at given milliseconds, what is written and shown when.
+
+    Everything happens in the thread of the terminal, between two of its steps.
+    """
+
+    def __init__(self, *happens: tuple[float, str | bytes | Callable[[Scene], object]], kind: str | None = None) -> None:
+        self.now_s = 0.0
+        self.written: list[tuple[float, bytes]] = []
+        self.shown: list[tuple[float, str]] = []
+        self._happens = list(happens)
+        self._is_made = threading.Event()
+        self.terminal = ChipTerminal(
+            self,
+            4800,
+            None if kind is None else variant(kind),
+            lambda text: self.shown.append((self._ms(), text)),
+            clock=lambda: self.now_s,
+        )
+        self._is_made.set()
+        self.terminal._thread.join()
+
+    def _ms(self) -> float:
+        return round(1000 * self.now_s, 1)
+
+    def write(self, data: bytes) -> None:
+        self.written.append((self._ms(), data))
+
+    def read(self, timeout_s: float) -> bytes:
+        self._is_made.wait()
+        end = self.now_s + timeout_s
+        if not self._happens or self._happens[0][0] > 1000 * end:
+            self.now_s = end
+            self.terminal._ends = not self._happens and end > 1.0 + max([0.0, *(at for at, _ in self.written)]) / 1000
+            return b""
+        at, what = self._happens.pop(0)
+        self.now_s = max(at / 1000, self.now_s)
+        if isinstance(what, bytes):
+            return what
+        self.terminal.type(what) if isinstance(what, str) else what(self)
+        return b""
+
+    def close(self) -> None:
+        pass
+
+
+def test_bytes_between_two_silences_are_decoded_together() -> None:
+    """Three characters take 6.25 ms at 4800 bit/s, and adapters delay them; the terminal looks every 20 ms."""
+    scene = Scene((0, "u1"), (30, b"u1\r"), (130, b"\x05"), (300, b"\x07"), (500, b"\x08"))
+    assert scene.written == [(0.0, b"u1\r")]
+    assert scene.shown == [(250.0, "05H  U1 position, low byte: 5"), (420.0, "07H  7"), (620.0, "08H  8")]
+    assert Scene((0, b"A")).shown == [(120.0, "41H  65, 'A'")]
+
+
+def test_the_echo_of_a_long_line_is_awaited_as_long_as_it_takes() -> None:
+    """40 characters take 83.3 ms: that, 100 ms and three characters more."""
+    settled: list[int] = []
+    scene = Scene((0, "; " + "x" * 37), (0, lambda scene: settled.append(scene.terminal._unsettled)))
+    assert settled == [1]
+    assert scene.terminal.settle(0.0) == 0
+    assert scene.shown == []
+    late = Scene((0, "; " + "x" * 37), (180, b"\x05"))
+    assert late.shown == [(300.0, "05H  5")]
+
+
+def test_commands_of_an_e_type_wait_until_the_one_before_is_written() -> None:
+    """Half a second (chapter II); K and X write nothing, so nothing waits for them."""
+    scene = Scene((0, "v200"), (0, "a5000"), (100, " k"), (120, "s200"), (1200, "x1"), (1210, "p300"), kind="E1")
+    assert scene.written == [
+        (0.0, b"v200\r"),
+        (100.0, b" k\r"),
+        (500.0, b"a5000\r"),
+        (1000.0, b"s200\r"),
+        (1200.0, b"x1\r"),
+        (1510.0, b"p300\r"),
+    ]
+
+
+def test_k_does_not_overtake_the_selection_of_its_chip() -> None:
+    scene = Scene((0, "v200"), (0, "a5000"), (0, "x1"), (0, "k"), (700, "v300"), (700, "k"), kind="E2")
+    assert scene.written == [
+        (0.0, b"v200\r"),
+        (500.0, b"a5000\r"),
+        (520.0, b"x1\r"),
+        (540.0, b"k\r"),
+        (700.0, b"k\r"),
+        (1000.0, b"v300\r"),
+    ]
+
+
+def test_a_type_without_eeprom_waits_for_nothing() -> None:
+    for kind in ("B", None):
+        scene = Scene((0, "v200"), (0, "a5000"), (0, "r"), kind=kind)
+        assert scene.written == [(0.0, b"v200\r"), (0.0, b"a5000\r"), (0.0, b"r\r")]
+
+
+@pytest.mark.parametrize(("seconds", "is_late"), [(1.9, False), (2.1, True)])
+def test_what_waits_is_dropped_after_a_suspension_of_more_than_two_seconds(seconds: float, *, is_late: bool) -> None:
+    failures: list[str] = []
+
+    def suspend(scene: Scene) -> None:
+        scene.now_s += seconds
+
+    def go_on(scene: Scene) -> None:
+        try:
+            scene.terminal.type("v300")
+        except LineFailure as failure:
+            failures.append(str(failure))
+
+    scene = Scene((0, "v200"), (0, "a5000"), (0, "k"), (10, suspend), (3000, go_on), kind="E1")
+    written = [data for _, data in scene.written]
+    assert (b"a5000\r" in written) is not is_late
+    assert written[:2] == [b"v200\r", b"k\r"]
+    assert failures == (["a5000: not sent: the program was suspended for 2 s"] if is_late else [])

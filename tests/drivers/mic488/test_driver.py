@@ -17,6 +17,7 @@ from steptwin.drivers import (
     Unconfirmed,
     load_config,
 )
+from steptwin.drivers.exchange import Overtaken
 from steptwin.drivers.mic488.frames import FrameWords
 from steptwin.drivers.mic488.lines import ThreadModbusLine, modbus_exchanger
 from steptwin.drivers.modbus import ModbusQuery
@@ -237,6 +238,24 @@ def test_who_is_what() -> None:
     with pytest.raises(Misuse, match="a time-out of 0 s is outside"):
         Mic488(thread_line(Wire()), timeout_s=0.0)
     assert driver(Wire(config=ControllerConfig()), config=None).config is None
+
+
+@pytest.mark.parametrize("axis", [1, 2, 3, 4])
+def test_a_stop_of_any_axis_overtakes_the_start_of_the_program(axis: int) -> None:
+    """A program moves whatever it likes."""
+    wire = Wire()
+    mic = driver(wire)
+    notes = mic._driver._unit.notes
+
+    def now() -> int:
+        notes.stops[axis] = 1  # of another thread, right after the call
+        return wire.now
+
+    mic._driver.line.now = now  # type: ignore[method-assign]
+    sent = len(wire.sent)
+    with pytest.raises(Overtaken, match="a stop was requested meanwhile"):
+        mic.program.start()
+    assert len(wire.sent) == sent
 
 
 def test_a_running_program_is_paused_before_what_waits_and_ended_by_a_stop() -> None:

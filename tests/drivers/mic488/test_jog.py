@@ -434,3 +434,17 @@ def test_a_stop_while_a_jog_is_released() -> None:
     jog.release()
     assert jog.end is not None
     assert (jog.end.reason, jog.end.detail) == (Reason.STOPPED, "by this program")
+
+
+def test_with_dint_a_jog_moves_and_ends_in_pulses() -> None:
+    wire = Wire()
+    mic = driver(wire, observe=True)
+    mic.enable(1)
+    mic.set("DATA_TYPE", 1)
+    with mic.axis(1).jog(5.0) as jog:
+        assert jog.hold()
+        assert speed(wire) == pytest.approx(5.0)
+    assert mic.axis(1).wait().ok
+    wire.rest()
+    assert 0 < wire.position() <= (REACH + 0.5) * 100
+    assert mic.get("M1_VMAX") == {"M1_VMAX": 25.0}

@@ -122,3 +122,12 @@ def test_the_gap_that_ends_a_frame_is_a_choice(gap_ms: int) -> None:
     assert gap_ms * MILLISECOND <= due <= gap_ms * MILLISECOND + 1
     ear.expire(due)
     assert ear.deadline() is None
+
+
+def test_an_answer_whose_question_was_not_heard_is_told() -> None:
+    ear, heard = listener()
+    ear.feed(ANSWER, 0)
+    ear.feed(READ + ANSWER, 500 * MILLISECOND)
+    assert [h.direction for h in heard] == [FrameDirection.OUT, FrameDirection.IN, FrameDirection.OUT]
+    assert meanings(heard)[1:] == ["→ unit 1: read M1_POS_ACT", "← unit 1: read M1_POS_ACT = 12.5 u"]
+    assert meanings(heard)[0].startswith("← unit 1: ")

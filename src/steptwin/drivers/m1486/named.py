@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from math import isfinite
 from typing import Any
 
 from steptwin.drivers.kind import DeviceAddress, DeviceOverview, ReadValue, ReadValues
@@ -97,7 +98,7 @@ def _action(name: str, value: str, text: str) -> Callable[[M1486], object]:
         return lambda chip: chip.set_position(position)
     if name in _SETTINGS or name == "VARIABLE":
         number = number_of(value, text)
-        if number != int(number):
+        if not isfinite(number) or number != int(number):
             raise Misuse(f"{text!r}: {name} takes whole numbers")
         if name == "VARIABLE":
             return lambda chip: chip.set_variable(int(number))

@@ -331,7 +331,6 @@ class CharacterTalk:
 
     def _done(self, answer: bytes) -> bytes:
         self._request = None
-        self._lines = []
         return answer
 
     def _uploaded(self, byte: int) -> bool:
@@ -355,7 +354,6 @@ class CharacterTalk:
                 self.selected = ALL  # a selection that may have been taken or not
                 self.echoing.clear()
         self._request = None
-        self._lines = []
         self.free_ns = now + QUIET_NS + self._serial.duration(8)
         self._busy_until = now + NOISE_NS + self._serial.duration(8)
 

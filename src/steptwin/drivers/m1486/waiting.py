@@ -51,9 +51,7 @@ async def wait_for(
         if check:
             raise
         return ended(ChipReason.COMMUNICATION, None, str(failure), failure)
-    reason, detail = _reason(unit, motion, counter, over_at)
-    if reason is ChipReason.DIVERTED and motion is not None and motion.target_u is not None:
-        detail = f"the target was {shown(motion.target_u):g} {unit_name}"
+    reason, detail = _reason(unit, motion, counter, over_at, lambda place: f"{shown(place):g} {unit_name}")
     if motion is not None and motion.kind is ChipMotion.MOVE and reason in (ChipReason.EARLY, ChipReason.STOPPED):
         notes.is_position_valid = False  # M-16
     return ended(reason, shown(counter) if notes.is_position_valid else None, detail)
@@ -81,7 +79,9 @@ def _time_out_s(unit: ChipUnit, motion: ChipMotionCommand | None) -> float:
 _ENDS = {ChipMotion.ENDLESS: ChipReason.LIMIT, ChipMotion.SEEK: ChipReason.SOUGHT}
 
 
-def _reason(unit: ChipUnit, motion: ChipMotionCommand | None, counter: int, over_at: Nanos) -> tuple[ChipReason, str]:
+def _reason(
+    unit: ChipUnit, motion: ChipMotionCommand | None, counter: int, over_at: Nanos, text_of: Callable[[int], str]
+) -> tuple[ChipReason, str]:
     """The reason of the end, and details. ``over_at``: the time at which the end was detected."""
     if motion is None:
         return ChipReason.REST, ""
@@ -96,7 +96,7 @@ def _reason(unit: ChipUnit, motion: ChipMotionCommand | None, counter: int, over
     if motion.kind in _ENDS:
         return _ENDS[motion.kind], ""
     if motion.target_u is not None and counter != motion.target_u:
-        return ChipReason.DIVERTED, ""
+        return ChipReason.DIVERTED, f"the target was {text_of(motion.target_u)}"
     if motion.duration_s is not None and over_at < early_ns(motion):
         return ChipReason.EARLY, f"after at most {(over_at - motion.at) / SECOND:.2f} s of {motion.duration_s:.2f} s"
     return ChipReason.TARGET, ""

@@ -8,7 +8,7 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 from steptwin.drivers.kind import ReadValue, ReadValues
-from steptwin.drivers.mic488.addresses import SPACES, ValueAddress, places, read_places
+from steptwin.drivers.mic488.addresses import ValueAddress, places, read_places
 from steptwin.drivers.mic488.sync import Mic488
 from steptwin.drivers.typed import changes_of
 from steptwin.errors import Misuse
@@ -112,8 +112,5 @@ def _holds(register: Register) -> bool:
 
 
 def _meaning(registers: RegisterMap, name: str, value: Any) -> str:
-    head = re.split(r"[\[:]", name)[0]
-    if head in SPACES:
-        return ""
-    register = registers.named(head)
+    register = registers.named(re.split(r"[\[:]", name)[0])
     return register.values.get(int(value), "") if register.values else ""
