@@ -187,6 +187,19 @@ def test_mic_2_other_broadcasts_are_ignored(bank: Any, body: str) -> None:
     assert bank.executed == []
 
 
+@pytest.mark.parametrize("is_observed", [False, True])
+def test_mic_1_a_refusal_of_function_0_is_counted_on_tcp(*, is_observed: bool) -> None:
+    """Its exception has the smallest function there is, 80h."""
+
+    class Refusing:
+        def execute(self, pdu: bytes, now: int) -> bytes:
+            return bytes((pdu[0] | 0x80, 1))
+
+    port = TcpSlavePort({1: Refusing()}, on_frame=(lambda now, way, raw: None) if is_observed else None)
+    assert port.exchange(mbap.encode_frame(1, 1, b"\0\0"), 0) == mbap.encode_frame(1, 1, b"\x80\x01")
+    assert (port.requests, port.exceptions, port.lost, port.unframed) == (1, 1, 0, 0)
+
+
 def test_several_units_on_one_line(new_bank: NewBank) -> None:
     banks = {unit: new_bank() for unit in (1, 2, 247)}
     port = RtuSlavePort(banks)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 from chip_rig import ChipWire, typed
-from line_rig import at_every_address
+from line_rig import MemoryChannel, at_every_address
 
 from steptwin.drivers.kind import DeviceAddress
 from steptwin.drivers.m1486 import conversation
@@ -146,3 +146,21 @@ def test_a_command_that_finds_no_room_is_refused(talk: Talk) -> None:
             told = str(refusal)
             break
     assert told == "'v500' found no room (5EH): the chip moves, waits or is held. 'wait' before it waits for that"
+
+
+def test_the_line_is_closed_when_its_preparation_is_interrupted(talk: Talk, monkeypatch: pytest.MonkeyPatch) -> None:
+    closed = 0
+
+    def close(channel: MemoryChannel) -> None:
+        nonlocal closed
+        closed += 1
+
+    monkeypatch.setattr(MemoryChannel, "close", close)
+
+    def interrupt(_: bytes) -> None:
+        raise KeyboardInterrupt
+
+    talk.wire.before_each = interrupt
+    with pytest.raises(KeyboardInterrupt):
+        talk("v500")
+    assert closed == 1

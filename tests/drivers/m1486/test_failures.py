@@ -197,7 +197,7 @@ def test_bytes_that_differ_at_every_reading_are_no_value(number: int) -> None:
         assert chip.counter() == 64 * 3
         assert readings == 4
         return
-    with pytest.raises(LineFailure, match="^memory: the chip: what U1 U2 U3 sends differs at every reading$"):
+    with pytest.raises(LineFailure, match=r"^memory: the chip: what U1 U2 U3 sends differs at every reading$"):
         chip.counter()
     assert readings == 4
 
@@ -211,7 +211,7 @@ def test_a_letter_that_no_type_has_is_told() -> None:
             wire.chip.variant = replace(wire.chip.variant, type_letter=0x5A)
 
     wire.before_each = change
-    with pytest.raises(WrongType, match="^memory: the chip reports the type letter 5AH, which no M1486 has$"):
+    with pytest.raises(WrongType, match=r"^memory: the chip reports the type letter 5AH, which no M1486 has$"):
         chip_driver(wire)
     assert typed(wire).count("c57") == 1
 

@@ -247,6 +247,7 @@ def test_a_server_of_modbus_tcp_has_no_chips(monkeypatch: pytest.MonkeyPatch) ->
 def test_traffic_is_decoded_for_a_type(variant: str | None, told: str) -> None:
     """An A has 15 labels, and is what the manual speaks of."""
     frames: list[FrameLine] = []
+    assert M1486_DRIVER.decoding is not None
     assert M1486_DRIVER.decoding.protocol == "m1486"
     M1486_DRIVER.decoding.make(frames.append, variant, False).feed(b"@80\r", 5, FrameDirection.IN)
     assert frames == [FrameLine(5, "", FrameDirection.IN, b"@80\r", told)]

@@ -9,8 +9,10 @@ import pytest
 from device_rig import Rig
 
 from steptwin.controllerstate import ProgramActivity, read_state
+from steptwin.drivers.blocking import finish
 from steptwin.drivers.m1486 import M1486, Busy
-from steptwin.drivers.subject import DeviceSubject
+from steptwin.drivers.m1486.subject import M1486Part
+from steptwin.drivers.subject import DeviceSubject, RawEffect
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.subject import commands as command
 from steptwin.subject.contract import UNKNOWN
@@ -181,3 +183,28 @@ SECOND_AXIS = (command.Move("drum", 2, to=9.0), command.Jog("drum", 2, 50.0), co
 def test_what_an_m1486_does_not_do(drum: DeviceSubject, wanted: command.Command, kind: type[SteptwinError], message: str) -> None:
     with pytest.raises(kind, match=message):
         drum.do(wanted)
+
+
+def test_an_m1486_takes_no_requests_of_modbus(rig: Rig) -> None:
+    assert M1486Part(rig.chip._driver).effect_of(do.Request("chips", 3, b"\x03", 1)) is RawEffect.WRITE
+
+
+def test_a_value_is_not_known_of_an_m1486_that_begins_to_move(rig: Rig) -> None:
+    """It was at rest when it was asked."""
+
+    async def busy() -> float:
+        raise Busy("it moves")
+
+    part = M1486Part(rig.chip._driver)
+    part._readers["COUNTER"] = busy
+    assert finish(part.values(["counter", "variable"])) == {"counter": (None, part.unit_of("counter")), "variable": (0.0, "")}
+
+
+def test_a_move_that_is_stopped_leaves_the_position_unknown(drum: DeviceSubject, rig: Rig) -> None:
+    following = drum.follow(filter_of(["sample"]), 9)
+    following.take()
+    drum.do(command.Move("drum", 1, by=5000.0))
+    rig.time.sleep(1.0)
+    drum.do(command.StopAxes("drum", 1))
+    rig.time.sleep(2.0)
+    assert following.take().events[-1].payload.plain() == {"axis": "1", "position": None, "unit": "step", "velocity": 0.0}

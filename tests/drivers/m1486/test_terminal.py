@@ -126,6 +126,13 @@ def test_a_conversation() -> None:
     assert wire.written[:3] == [b"x7\r", b"u1\r", b"r\r"]
 
 
+def test_a_query_that_found_no_room_is_not_waited_for() -> None:
+    terminal = ChipTerminal(Wire(u1=b"^^^"), 4800, None, str)
+    terminal.type("u1")
+    assert terminal.settle(60.0) == 3
+    terminal.close()
+
+
 def test_what_is_no_byte_is_refused_and_the_rest_goes_on() -> None:
     wire = Wire(u1=b"\x05")
     terminal = ChipTerminal(wire, 4800, None, str)

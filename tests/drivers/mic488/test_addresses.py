@@ -6,7 +6,7 @@ import pytest
 
 from steptwin.drivers.mic488.addresses import places
 from steptwin.errors import Misuse
-from steptwin.mic488.registers import register_map
+from steptwin.mic488.registers import FIRMWARES, register_map
 
 MAP = register_map("1.70")
 M1_POS_ACT = 10020
@@ -36,6 +36,13 @@ M1_POS_ACT = 10020
 def test_what_an_address_stands_for(text: str, expected: list[str] | None) -> None:
     found = places(text, MAP)
     assert (None if found is None else [str(one) for one in found]) == expected
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_an_address_alone_names_one_register(firmware: str) -> None:
+    """Coils, inputs and registers have no address in common."""
+    taken = [address for one in register_map(firmware) for address in range(one.address, one.last + 1)]
+    assert len(taken) == len(set(taken))
 
 
 @pytest.mark.parametrize(

@@ -117,7 +117,16 @@ def test_two_recordings() -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["", "{}", "[" * 100_000, '{"format": "steptwin session 1"}\n{}', "x", '{"format": "steptwin session 1"}\nx']
+    "text",
+    [
+        "",
+        "{}",
+        '{"format": "steptwin session 2"}',
+        "[" * 100_000,
+        '{"format": "steptwin session 1"}\n{}',
+        "x",
+        '{"format": "steptwin session 1"}\nx',
+    ],
 )
 def test_what_is_no_recording(text: str) -> None:
     with pytest.raises(Misuse, match=r"a.json is not a recording"):
@@ -188,3 +197,11 @@ def test_times_that_are_alike(time_s: float | None, differ: bool) -> None:
     for at_s in (1.5, 0.5):
         found = differences([SessionStep("wait", 1.0)], [SessionStep("wait", at_s)], time_s=time_s)
         assert bool(found) is differ
+
+
+def test_every_refusal_is_a_result_in_its_words() -> None:
+    def refuse(mic: object) -> dict[str, object]:
+        raise Refusal("not now")
+
+    ((step),) = carry_out(driver(Wire()), [("set M1_EN=1", refuse)])
+    assert step.result == {"refused": "not now"}

@@ -85,3 +85,15 @@ def test_the_non_volatile_copy() -> None:
     assert mic.user.words.read(1000) == 7
     with pytest.raises(Misuse, match="USER_REG_SAVE"):
         driver(Wire(firmware="1.23")).user.save()
+
+
+def test_what_a_driver_remembers_of_reads_is_bounded() -> None:
+    """A plan and a request for each set of values that was read: 256 at most."""
+    wire = Wire()
+    mic = driver(wire)
+    unit = mic._driver._unit
+    for number in range(300):
+        assert mic.user.words.read_many(number, 2) == [wire.twin.user[number], wire.twin.user[number + 1]]
+        assert len(unit._plans) <= 256
+        assert len(unit._queries) <= 256
+    assert (len(unit._plans), len(unit._queries)) == (300 - 256, 300 - 256)

@@ -77,13 +77,9 @@ def places(text: str, registers: RegisterMap) -> list[ValueAddress] | list[str] 
 
 
 def _register_at(registers: RegisterMap, address: int) -> str:
-    found = [register for space in Space if (register := registers.find(space, address)) is not None]
-    if not found:
+    register = next((found for space in Space if (found := registers.find(space, address)) is not None), None)
+    if register is None:
         raise Misuse(f"firmware {registers.firmware.name} has no register at {address}; hr:{address} reads it all the same")
-    if len(found) > 1:
-        kinds = ", ".join(f"{name}:{address}" for name in SPACES)
-        raise Misuse(f"at {address} there are {', '.join(r.name for r in found)}: name one of them, {kinds}")
-    (register,) = found
     if register.cells > 1:
         return f"{register.name}[{address - register.address}]"
     if address != register.address:
