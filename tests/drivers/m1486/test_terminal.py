@@ -36,6 +36,7 @@ def inverted(text: str) -> bytes:
         (["v200"], b"v200\r\x7f", [EMPTY]),
         (["v200"], b"", []),
         (["r"], b"^^", [f"5EH  {LOST}"] * 2),
+        ([], b"^", [f"5EH  {LOST}"]),
         (
             ["f64"],
             inverted("4\r"),
