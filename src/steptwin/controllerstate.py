@@ -155,6 +155,7 @@ class StateReader(Generic[M]):
     program: Callable[[M, Nanos], StateProgram]
     axis: Callable[[M, AxisDescription, Nanos], StateAxis]
     details: tuple[DetailRow[M], ...] = ()
+    pins: Callable[[M, Nanos], Mapping[str, float]] = lambda machine, now: machine.pins()
 
     def __call__(self, machine: M, now: Nanos) -> ControllerState:
         sheet = self.datasheet(machine)
@@ -165,7 +166,7 @@ class StateReader(Generic[M]):
             status=self.status(machine, now),
             program=self.program(machine, now),
             axes=tuple([self.axis(machine, axis, now) for axis in sheet.axes]),
-            pins=dict(machine.pins()),
+            pins=dict(self.pins(machine, now)),
             details=details_of(self.details, machine, now),
         )
 
@@ -179,7 +180,7 @@ class StateReader(Generic[M]):
             found["program"] = self.program(machine, now).plain()
         found["axes"] = [self.axis(machine, axis, now).plain() for axis in sheet.axes if axis.name in wanted]
         if "pins" in wanted:
-            found["pins"] = dict(machine.pins())
+            found["pins"] = dict(self.pins(machine, now))
         if "details" in wanted:
             found["details"] = plain(details_of(self.details, machine, now))
         if len(found) - 1 + len(cast("list[object]", found["axes"])) != len(wanted):

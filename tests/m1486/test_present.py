@@ -8,7 +8,7 @@ import pytest
 from m1486_rig import Bench
 
 from steptwin.controllerstate import ControllerState, ProgramActivity, StatusLevel
-from steptwin.m1486.lines import TWO_DACS
+from steptwin.m1486.lines import DUAL_DAC, TWO_DACS
 from steptwin.m1486.present import state_of
 from steptwin.machine import SECOND
 
@@ -103,6 +103,21 @@ def test_the_axis_shows_where_the_pulses_led_and_details_the_counter() -> None:
     assert found.details["counter"] == 6400 - 128
     assert (found.variant, found.time_s) == ("B", bench.now / SECOND)
     assert found.pins == dict(bench.chip.pins())
+
+
+def test_the_pins_of_the_driver_interface_follow_the_pulses() -> None:
+    """Also between what the chip has to do: their levels are those of the moment that is asked for."""
+    bench = Bench(interface=DUAL_DAC)
+    bench.do("v200", "f64000")
+    bench.send("r")
+    bench.run(0.5)
+    seen = set()
+    for _ in range(8):
+        ahead = state_of(bench.chip, bench.now + 3_100_000).pins
+        bench.run(ms=3.1)
+        assert ahead == dict(bench.chip.pins())
+        seen.add(tuple(ahead[f"B{line}"] for line in range(8, 18)))
+    assert len(seen) > 4
 
 
 def test_the_next_command() -> None:

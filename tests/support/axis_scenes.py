@@ -2,48 +2,50 @@
 
 from __future__ import annotations
 
-from scenes import DRIVES, MOTOR, MOVES, OUTPUTS, SWITCH, Scene
+from scenes import (
+    BACKLASH,
+    DRIVES,
+    IN_MM,
+    INVERTED,
+    MOTOR,
+    MOVES,
+    OUTPUTS,
+    PITCH,
+    SOME_PITCH,
+    STALL,
+    SWITCH,
+    TRAVEL,
+    Scene,
+    axis,
+    controller,
+    switch,
+)
+
+CLOSED = f"""{IN_MM}
+enc_resol = ⟨#400..4000⟩
+?enc_tolerance = ⟨#1..4⟩
+?pos_ctrl_mode = "ENCODER"
+?err_ctrl_mode = "⟨ERRMODE0|ERRMODE1⟩\""""
+FOLLOWING = """enc_resol = 400
+mot_resol = 3200
+acc = 900.0
+dec = 900.0
+vel = 300.0
+pos_ctrl_mode = "ENCFOLLOW\""""
 
 AXIS_SCENES: dict[str, Scene] = {
     "axes": Scene(
         f"""
 {DRIVES}
-[[axis]]
-name = "x"
-drive = "c.M1"
-?pitch = ⟨4.0..6.0⟩
-?inverted = true
-travel = [⟨-12..-2⟩, ⟨35..58⟩]
-?start = ⟨0..20⟩
-?backlash = ⟨0.02..0.4⟩
-[[axis.switch]]
-above = ⟨20..40⟩
-to = "c.IN1"
-{SWITCH}
-[[axis.switch]]
-below = ⟨0..10⟩
-to = "c.IN2"
-{SWITCH}
-[[axis.switch]]
-position = ⟨1..9⟩
-width = ⟨0.5..3.0⟩
-period = ⟨7.0..11.0⟩
-to = "c.IN3"
+{axis("x", "c.M1", SOME_PITCH, INVERTED, TRAVEL, "?start = ⟨0..20⟩", BACKLASH)}
+{switch("axis", "c.IN1", "above = ⟨20..40⟩", SWITCH)}
+{switch("axis", "c.IN2", "below = ⟨0..10⟩", SWITCH)}
+{switch("axis", "c.IN3", "position = ⟨1..9⟩", "width = ⟨0.5..3.0⟩", "period = ⟨7.0..11.0⟩")}
 
-[[axis]]
-name = "y"
-drive = "c.M2"
-kind = "rotary"
-pulses_per_rev = ⟨#2000..4000⟩
-?unit = "⟨rev|degree⟩"
-?inverted = true
-[[axis.switch]]
-position = ⟨0.1..0.9⟩
-width = ⟨0.1..0.2⟩
-to = "c.IN4"
-{SWITCH}
+{axis("y", "c.M2", 'kind = "rotary"', "pulses_per_rev = ⟨#2000..4000⟩", '?unit = "⟨rev|degree⟩"', INVERTED)}
+{switch("axis", "c.IN4", "position = ⟨0.1..0.9⟩", "width = ⟨0.1..0.2⟩", SWITCH)}
 
-! kind = "stall", axis = ⟨#1..2⟩, at_s = ⟨0.1..0.9⟩, for_s = ⟨0.02..0.3⟩
+! {STALL}
 ! kind = "lost-steps", axis = ⟨#1..2⟩, at_s = ⟨0.1..0.9⟩, pulses = ⟨#-60..60⟩, period_s = ⟨0.1..0.3⟩
 ! kind = "stuck", pin = "IN1", value = ⟨#0..1⟩, from_s = ⟨0.1..0.6⟩, until_s = ⟨0.7..1.2⟩
 ! kind = "bounce", pin = "IN2", bounces = ⟨#1..4⟩, for_ms = ⟨2.0..9.0⟩, every = ⟨#1..2⟩
@@ -62,21 +64,12 @@ to = "c.IN4"
     "motors": Scene(
         f"""
 {DRIVES}
-[[axis]]
-name = "x"
-drive = "c.M1"
-pitch = 5.0
-?travel = [⟨-12..-2⟩, ⟨35..58⟩]
-?backlash = ⟨0.02..0.4⟩
-?inverted = true
+{axis("x", "c.M1", PITCH, f"?{TRAVEL}", BACKLASH, INVERTED)}
 [axis.motor]
 {MOTOR}
 ?resonance = [⟨100..300⟩, ⟨400..700⟩]
 
-[[axis]]
-name = "y"
-drive = "c.M2"
-pitch = 5.0
+{axis("y", "c.M2", PITCH)}
 [axis.motor]
 {MOTOR}
 resonance = [⟨100..300⟩, ⟨400..700⟩]
@@ -102,7 +95,7 @@ points = [[0, ⟨0.0..0.3⟩], [⟨5..30⟩, 1], [⟨40..60⟩, ⟨0.5..2.0⟩]]
 ?resolution = ⟨0.05..0.2⟩
 
 ! kind = "other-load", element = "⟨m|n⟩", factor = ⟨0..5⟩
-! kind = "stall", axis = ⟨#1..2⟩, at_s = ⟨0.1..0.9⟩, for_s = ⟨0.02..0.3⟩
+! {STALL}
 * n.share > ⟨0.2..0.8⟩ or m.acts
 * ⟨x|y⟩.stalled
 """,
@@ -116,12 +109,7 @@ points = [[0, ⟨0.0..0.3⟩], [⟨5..30⟩, 1], [⟨40..60⟩, ⟨0.5..2.0⟩]]
     "falls": Scene(
         f"""
 {DRIVES}
-[[axis]]
-name = "x"
-drive = "c.M1"
-pitch = 5.0
-?travel = [⟨-12..-2⟩, ⟨35..58⟩]
-?backlash = ⟨0.02..0.4⟩
+{axis("x", "c.M1", PITCH, f"?{TRAVEL}", BACKLASH)}
 [axis.motor]
 {MOTOR}
 when_off = "free"
@@ -130,14 +118,11 @@ when_off = "free"
 ?hold_current = ⟨0.0..0.6⟩
 ?full_steps = 200
 
-[[axis]]
-name = "y"
-drive = "c.M2"
-pitch = 5.0
-?inverted = true
+{axis("y", "c.M2", PITCH, INVERTED)}
 [axis.motor]
 {MOTOR}
 overruns = true
+?when_off = "free"; detent = ⟨0.05..0.4⟩; full_steps = 200
 
 [[brake]]
 name = "b"
@@ -174,48 +159,26 @@ when = "x.position ⟨>|<⟩ ⟨5..30⟩ and y.position > ⟨2..9⟩"
 { write = { "c.M1_EN" = ⟨#0..1⟩ } }
 { write = { "c.M1_EN" = 1 } }
 { write = { "c.M2_VEL_ABS" = ⟨-90..90⟩ } }
+{ write = { "c.M2_EN" = 1, "c.M2_VEL_ABS" = ⟨-90..90⟩ } }, { wait = "⟨50..150⟩ ms" }, { write = { "c.M2_EN" = 0 } }
 { write = { "c.M2_STOP" = 1 } }
 """,
     ),
     "encoders": Scene(
         f"""
-{DRIVES}
-enc_resol = ⟨#400..4000⟩
-?enc_tolerance = ⟨#1..4⟩
-?pos_ctrl_mode = "ENCODER"
-?err_ctrl_mode = "⟨ERRMODE0|ERRMODE1⟩"
-[mic488.M3]
-enc_resol = 400
-mot_resol = 3200
-acc = 900.0
-dec = 900.0
-vel = 300.0
-pos_ctrl_mode = "ENCFOLLOW"
+{controller("c", M1=IN_MM, M2=CLOSED, M3=FOLLOWING)}
 
-[[axis]]
-name = "x"
-drive = "c.M1"
-pitch = 5.0
-?backlash = ⟨0.02..0.4⟩
-?travel = [⟨-12..-2⟩, ⟨35..58⟩]
+{axis("x", "c.M1", PITCH, BACKLASH, f"?{TRAVEL}")}
 [axis.encoder]
 ⟨counts_per_rev|counts_per_unit⟩ = ⟨#300..2000⟩
 ?mount = "load"
 
-[[axis]]
-name = "y"
-drive = "c.M2"
-pitch = 5.0
-?backlash = ⟨0.02..0.4⟩
+{axis("y", "c.M2", PITCH, BACKLASH)}
 [axis.encoder]
 counts_per_rev = ⟨#-2000..-300⟩
 ?index = true; offset = ⟨0.0..5.0⟩
 ?mount = "load"
 
-[[axis]]
-name = "z"
-drive = "c.M3"
-kind = "rotary"
+{axis("z", "c.M3", 'kind = "rotary"')}
 [axis.encoder]
 follows = "⟨x|y⟩"
 ?slip = ⟨0.01..0.2⟩
@@ -238,11 +201,7 @@ follows = "⟨x|y⟩"
     "cams": Scene(
         f"""
 {DRIVES}
-[[axis]]
-name = "x"
-drive = "c.M1"
-?backlash = ⟨0.02..0.4⟩
-?inverted = true
+{axis("x", "c.M1", BACKLASH, INVERTED)}
 
 [[shaft]]
 name = "s"
@@ -265,15 +224,8 @@ name = "f"
 shaft = "s"
 points = [[⟨0..40⟩, ⟨0..3⟩], [⟨90..120⟩, ⟨5..12⟩], [⟨150..180⟩, ⟨5..12⟩], [⟨200..350⟩, 0]]
 ?unit = "⟨cm|degree⟩"
-[[follower.switch]]
-above = ⟨3..8⟩
-to = "c.IN3"
-{SWITCH}
-[[follower.switch]]
-position = ⟨2..4⟩
-width = ⟨0.2..1.0⟩
-to = "c.IN4"
-{SWITCH}
+{switch("follower", "c.IN3", "above = ⟨3..8⟩", SWITCH)}
+{switch("follower", "c.IN4", "position = ⟨2..4⟩", "width = ⟨0.2..1.0⟩", SWITCH)}
 
 [[transducer]]
 name = "v"
@@ -298,30 +250,17 @@ resolution = ⟨0.1..0.8⟩
     "carriages": Scene(
         f"""
 {DRIVES}
-[[axis]]
-name = "x"
-drive = "c.M1"
-?backlash = ⟨0.02..0.4⟩
-travel = [⟨-12..-2⟩, ⟨35..58⟩]
+{axis("x", "c.M1", BACKLASH, TRAVEL)}
 
-[[axis]]
-name = "y"
-drive = "c.M2"
-?inverted = true
+{axis("y", "c.M2", INVERTED)}
 
 [[carriage]]
 name = "t"
 axis = "x"
 frequency = ⟨8..30⟩
 ?damping = ⟨0.02..0.3⟩
-[[carriage.switch]]
-above = ⟨10..30⟩
-to = "c.IN1"
-{SWITCH}
-[[carriage.switch]]
-position = ⟨10..30⟩
-width = ⟨1..5⟩
-to = "c.IN2"
+{switch("carriage", "c.IN1", "above = ⟨10..30⟩", SWITCH)}
+{switch("carriage", "c.IN2", "position = ⟨10..30⟩", "width = ⟨1..5⟩")}
 
 [[carriage]]
 name = "u"
@@ -359,19 +298,11 @@ to = "c.IN4"
     "gantries": Scene(
         f"""
 {DRIVES}
-[[axis]]
-name = "x"
-drive = "c.M1"
-pitch = 5.0
-?inverted = true
+{axis("x", "c.M1", PITCH, INVERTED)}
 [axis.motor]
 {MOTOR}
 
-[[axis]]
-name = "y"
-drive = "c.M2"
-pitch = 5.0
-?start = ⟨0.5..2.0⟩
+{axis("y", "c.M2", PITCH, "?start = ⟨0.5..2.0⟩")}
 [axis.motor]
 {MOTOR}
 
@@ -401,5 +332,99 @@ to = "c.IN1"
 { write = { "c.M1_POS_ABS" = ⟨10..30⟩, "c.M2_POS_ABS" = ⟨10..30⟩ } }
 { write = { "c.OUT1" = ⟨#0..1⟩ } }
 """,
+    ),
+    "ways": Scene(
+        f"""
+{controller("c", 'program = "p.prg"', 'positions = "p.csv"', "start = true", M1=IN_MM, M2=IN_MM)}
+[[line]]
+name = "chips"
+kind = "m1486"
+[[m1486]]
+name = "k"
+line = "chips"
+address = 1
+[[m1486]]
+name = "l"
+line = "chips"
+address = 2
+
+{axis("x", "c.M1", PITCH, BACKLASH)}
+
+{axis("y", "c.M2", PITCH, INVERTED)}
+[axis.motor]
+{MOTOR}
+
+{axis("u", "k.M1", PITCH, "pulses_per_rev = 12800", BACKLASH)}
+[axis.motor]
+torque = [[0, ⟨0.4..1.2⟩], [⟨400..900⟩, ⟨0.2..0.6⟩], [⟨1200..3000⟩, ⟨0.1..0.3⟩]]
+inertia = ⟨0.00001..0.00008⟩
+?friction = ⟨0.01..0.08⟩
+?load = ⟨-0.15..0.15⟩
+?start_speed = ⟨180..500⟩
+?resonance = [⟨220..300⟩, ⟨400..600⟩]
+
+{axis("v", "l.M1", PITCH, "pulses_per_rev = 12800", INVERTED)}
+
+[[tool]]
+name = "h"
+axis = "x"
+other = "y"
+?x = [⟨0.3..0.7⟩, ⟨-0.7..0.7⟩]
+[[tool.x_switch]]
+above = ⟨2..12⟩
+to = "c.IN1"
+{SWITCH}
+
+[[tool]]
+name = "i"
+axis = "u"
+other = "v"
+?y_travel = [⟨-90..-20⟩, ⟨20..90⟩]
+[[tool.x_switch]]
+above = ⟨1..9⟩
+to = "k.B2"
+[[tool.y_switch]]
+position = ⟨-3..3⟩
+width = ⟨0.5..2.0⟩
+period = ⟨4..9⟩
+to = "l.B3"
+
+[[carriage]]
+name = "t"
+axis = "x"
+frequency = ⟨8..30⟩
+[[carriage.switch]]
+above = ⟨2..12⟩
+to = "c.IN3"
+
+[[carriage]]
+name = "s"
+axis = "u"
+frequency = ⟨8..30⟩
+?damping = ⟨0.02..0.3⟩
+[[carriage.switch]]
+above = ⟨1..9⟩
+to = "k.B4"
+
+! kind = "slipping-belt", element = "⟨h|i⟩", belt = "⟨axis|other⟩"
+! kind = "slack-belt", element = "⟨t|s⟩", share = ⟨0.2..0.9⟩
+* i.x > ⟨1..9⟩ or s.position - u.position > ⟨0.1..0.6⟩
+""",
+        """
++ { send = "chips", text = "x1\\ra⟨#2000..9000⟩\\rv⟨#400..2000⟩\\rf⟨#6400..32000⟩\\rr\\r" }
++ { send = "chips", text = "x2\\ra⟨#2000..9000⟩\\rv⟨#400..2000⟩\\rf⟨#6400..32000⟩\\rr\\r" }
+{ send = "chips", text = "x⟨1|2⟩\\r⟨f|b⟩⟨#640..32000⟩\\rr\\r" }
+{ send = "chips", text = "x⟨1|2⟩\\rg⟨+|-⟩\\rr\\r" }
+{ send = "chips", text = "x⟨1|2⟩\\rk\\r" }
+{ until = "i.⟨x|y⟩ ⟨>|<⟩ ⟨1..9⟩", within = "⟨20..90⟩ ms" }
+{ until = "s.position ⟨>|<⟩ ⟨1..9⟩", within = "⟨20..90⟩ ms" }
+""",
+        {
+            "p.prg": (
+                "M1 = ON\nM2 = ON\nA:\nMOVETOCIRC @C\nWAITPOS\nDOCIRC @C\nWAITPOS\nMOVELIN @E\nWAITPOS\nDOARC @D\nWAITPOS\n"
+                "MOVEPTP @E\nWAITPOS\nJUMP A\n"
+            ),
+            "p.csv": "C;⟨6..9⟩;⟨-3..3⟩;⟨2..4⟩;⟨-360..360⟩\nD;⟨2..9⟩;⟨-4..4⟩;⟨12..20⟩;⟨#0..1⟩\nE;⟨-2..6⟩;⟨-4..4⟩;⟨30..90⟩;0\n",
+        },
     ),
 }

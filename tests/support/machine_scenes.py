@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from plant_scenes import CHIP
-from scenes import DRIVES, MOVES, Scene
+from scenes import DRIVES, IN_MM, MOVES, QUICK, Scene, axis, controller, switch
 
 PROGRAM = """
 COUNT = 0
@@ -48,7 +48,17 @@ OUT4 = OFF
 RETURN
 """
 
-PROGRAMMED = DRIVES.replace('name = "c"', 'name = "c"\nprogram = "p.prg"\nstart = true\n?statement_time = "⟨1..3⟩ ms"')
+PROGRAMMED = controller("c", 'program = "p.prg"', "start = true", '?statement_time = "⟨1..3⟩ ms"', M1=IN_MM, M2=IN_MM)
+HOMED = f"""{IN_MM}
+pos_ctrl_mode = "⟨ENCODER|OFF⟩"
+enc_resol = 400
+home_mode = "⟨HOME1|HOME2⟩"
+limit_mode = "⟨KL|KR|KL+KR⟩"
+in_kl = "IN1"
+in_kr = "IN2"
+[mic488.IN5]
+?filter = ⟨#1..2⟩
+?level = 1"""
 HELD = "\n" + "\n".join(
     f'{{ fault = {{ {fault}, machine = "c", pin = "IN4", name = "held" }} }}, '
     '{ set = { "c.IN4" = ⟨#0..1⟩ } }, { wait = "⟨1..30⟩ ms" }, { clear_fault = "held" }'
@@ -57,15 +67,10 @@ HELD = "\n" + "\n".join(
 
 MACHINE_SCENES: dict[str, Scene] = {
     "supplies": Scene(
-        """
-[[mic488]]
-name = "c"
-program = "p.prg"
-start = true
-[[mic488]]
-name = "d"
-[[mic488]]
-name = "e"
+        f"""
+{controller("c", 'program = "p.prg"', "start = true")}
+{controller("d")}
+{controller("e")}
 
 [[supply]]
 name = "s"
@@ -115,15 +120,9 @@ points = [[0, 0], [⟨10..30⟩, ⟨5..9⟩]]
         {"p.prg": "A:\nOUT1 = ON\nDELAY ⟨0.02..0.09⟩\nOUT1 = OFF\nDELAY ⟨0.02..0.09⟩\nJUMP A\n"},
     ),
     "voltages": Scene(
-        """
-[[mic488]]
-name = "c"
-[mic488.M1]
-acc = ⟨3000..9000⟩
-dec = ⟨3000..9000⟩
-vel = ⟨600..1200⟩
-[[mic488]]
-name = "d"
+        f"""
+{controller("c", M1=QUICK)}
+{controller("d")}
 
 [[source]]
 ?name = "one"
@@ -174,34 +173,13 @@ value = ⟨0..10⟩
     ),
     "machines": Scene(
         f"""
-{DRIVES}
-pos_ctrl_mode = "⟨ENCODER|OFF⟩"
-enc_resol = 400
-home_mode = "⟨HOME1|HOME2⟩"
-limit_mode = "⟨KL|KR|KL+KR⟩"
-in_kl = "IN1"
-in_kr = "IN2"
-[mic488.IN5]
-?filter = ⟨#1..2⟩
-?level = 1
-[[mic488]]
-name = "e"
+{controller("c", M1=IN_MM, M2=HOMED)}
+{controller("e")}
 
-[[axis]]
-name = "x"
-drive = "c.M2"
-start = ⟨5..20⟩
-[[axis.switch]]
-below = ⟨0..4⟩
-to = "c.IN1"
-[[axis.switch]]
-above = ⟨30..50⟩
-to = "c.IN2"
-?join = "parallel"
-[[axis.switch]]
-position = ⟨22..29⟩
-width = ⟨0.2..1.0⟩
-to = "c.IN5"
+{axis("x", "c.M2", "start = ⟨5..20⟩")}
+{switch("axis", "c.IN1", "below = ⟨0..4⟩")}
+{switch("axis", "c.IN2", "above = ⟨30..50⟩", '?join = "parallel"')}
+{switch("axis", "c.IN5", "position = ⟨22..29⟩", "width = ⟨0.2..1.0⟩")}
 
 ! kind = "stall", machine = "c", axis = ⟨#1..2⟩, at_s = ⟨0.1..0.9⟩, for_s = ⟨0.02..0.3⟩, period_s = ⟨0.3..0.5⟩, count = 2
 ! kind = "slip", machine = "c", axis = ⟨#1..2⟩, counts = ⟨#-40..40⟩, at_s = ⟨0.1..0.9⟩, probability = 0.8

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from scenes import Scene
+from scenes import INVERTED, QUICK, SOME_PITCH, Scene, axis, controller, switch
 
 CHIP = "[\n@1\nF⟨640|1280|6400⟩\nR\nW⟨#1..90⟩\nB⟨128|640|3200⟩\nR\n+2\nJ1\n.\n]\n"
 
 PLANT_SCENES: dict[str, Scene] = {
     "lines": Scene(
-        """
+        f"""
 [[line]]
 name = "bus"
 ?baud = ⟨9600|19200|115200⟩
@@ -17,23 +17,9 @@ name = "bus"
 [[line]]
 name = "two"
 timing = "⟨real|strict⟩"
-[[mic488]]
-name = "c"
-line = "bus"
-unit = ⟨#2..9⟩
-?firmware = "⟨1.40|1.23⟩"
-[mic488.M1]
-acc = ⟨3000..9000⟩
-dec = ⟨3000..9000⟩
-vel = ⟨600..1200⟩
-[[mic488]]
-name = "d"
-line = "⟨bus|two⟩"
-unit = ⟨#10..19⟩
-[[mic488]]
-name = "e"
-line = "two"
-unit = ⟨#20..29⟩
+{controller("c", 'line = "bus"', "unit = ⟨#2..9⟩", '?firmware = "⟨1.40|1.23⟩"', M1=QUICK)}
+{controller("d", 'line = "⟨bus|two⟩"', "unit = ⟨#10..19⟩")}
+{controller("e", 'line = "two"', "unit = ⟨#20..29⟩")}
 
 [[wire]]
 from = "c.OUT1"
@@ -64,7 +50,7 @@ to = "d.IN1"
 """,
     ),
     "chips": Scene(
-        """
+        f"""
 [[line]]
 name = "chips"
 kind = "m1486"
@@ -83,28 +69,12 @@ line = "chips"
 address = "A"
 ?program = "p.m1486"
 
-[[axis]]
-name = "x"
-drive = "c.M1"
-?pitch = ⟨4.0..6.0⟩
-?pulses_per_rev = 12800
-?inverted = true
-[[axis.switch]]
-above = ⟨1..5⟩
-to = "d.B2"
-?bounce = "⟨1..5⟩ ms"
-[[axis.switch]]
-below = ⟨-9..-1⟩
-to = "c.B4"
+{axis("x", "c.M1", SOME_PITCH, "?pulses_per_rev = 12800", INVERTED)}
+{switch("axis", "d.B2", "above = ⟨1..5⟩", '?bounce = "⟨1..5⟩ ms"')}
+{switch("axis", "c.B4", "below = ⟨-9..-1⟩")}
 
-[[axis]]
-name = "y"
-drive = "d.M1"
-kind = "rotary"
-[[axis.switch]]
-position = ⟨20..90⟩
-width = ⟨5..20⟩
-to = "d.B5"
+{axis("y", "d.M1", 'kind = "rotary"')}
+{switch("axis", "d.B5", "position = ⟨20..90⟩", "width = ⟨5..20⟩")}
 
 [[wire]]
 from = "d.B3"
@@ -120,11 +90,11 @@ to = "c.B3"
 * x.position > ⟨0..9⟩ or c.counter > ⟨#0..300⟩
 """,
         """
-+ { send = "chips", text = "x3\\\\ra⟨#2000..9000⟩\\\\rv⟨#2000..9000⟩\\\\rf⟨#3000..12800⟩\\\\rr\\\\r" }
-{ send = "chips", text = "x3\\\\r⟨f|b⟩⟨#300..12800⟩\\\\rr\\\\r" }
-{ send = "chips", text = "x⟨3|a|g⟩\\\\ru⟨#14..21⟩\\\\r" }
-{ send = "chips", text = "xa\\\\rf⟨#300..9000⟩\\\\rr\\\\r" }
-{ send = "chips", text = "xa\\\\r⟨+|-⟩3\\\\r" }
++ { send = "chips", text = "x3\\ra⟨#2000..9000⟩\\rv⟨#2000..9000⟩\\rf⟨#3000..12800⟩\\rr\\r" }
+{ send = "chips", text = "x3\\r⟨f|b⟩⟨#300..12800⟩\\rr\\r" }
+{ send = "chips", text = "x⟨3|a|g⟩\\ru⟨#14..21⟩\\r" }
+{ send = "chips", text = "xa\\rf⟨#300..9000⟩\\rr\\r" }
+{ send = "chips", text = "xa\\r⟨+|-⟩3\\r" }
 { move = "⟨c|d⟩.M1", by = ⟨#-3000..3000⟩, within = "⟨100..300⟩ ms" }
 { home = "c.M1", seek = "⟨-|+⟩B4", within = "⟨100..300⟩ ms" }
 { wait_for = "⟨c|d⟩.M1", within = "⟨100..300⟩ ms" }
@@ -138,7 +108,7 @@ to = "c.B3"
         {"p.m1486": CHIP},
     ),
     "plants": Scene(
-        """
+        f"""
 [[line]]
 name = "bus"
 ?tcp = "127.0.0.1:⟨#5000..5099⟩"
@@ -150,21 +120,13 @@ name = "chips"
 kind = "m1486"
 ?tcp = "127.0.0.1:⟨#5200..5299⟩"
 ?rfc2217 = "127.0.0.1:⟨#5300..5399⟩"
-[[mic488]]
-name = "c"
-line = "bus"
-unit = 3
-?lenient = true
-?vision = "127.0.0.1:⟨#5400..5499⟩"
-?trigger_keeps = true
+{controller("c", 'line = "bus"', "unit = 3", "?lenient = true", '?vision = "127.0.0.1:⟨#5400..5499⟩"', "?trigger_keeps = true")}
 [[m1486]]
 name = "k"
 line = "chips"
 ?address = ⟨#1..9⟩
 
-[[axis]]
-name = "x"
-drive = "c.M1"
+{axis("x", "c.M1")}
 
 ?[gateway.opcua]
 listen = "127.0.0.1:⟨#4840..4849⟩"
@@ -175,7 +137,7 @@ listen = "127.0.0.1:⟨#4840..4849⟩"
 
 ?[gateway.mqtt]
 ?broker = "127.0.0.1:⟨#1883..1889⟩"
-?⟨topic = "a/b"|topic = "hall"|sparkplug = { group = "g", node = "n" }; store = 90⟩
+?⟨topic = "a/b"|topic = "hall"|sparkplug = {{ group = "g", node = "n" }}; store = 90⟩
 ?interval = "⟨20..90⟩ ms"
 ?keep_alive = "⟨#5..60⟩ s"
 ?user = "me"; password_variable = "SECRET"
@@ -193,7 +155,7 @@ listen = "127.0.0.1:⟨#5064..5069⟩"
 
 ?[gateway.modbus]
 listen = "127.0.0.1:⟨#5500..5599⟩"
-?units = { c = ⟨#20..29⟩ }
+?units = {{ c = ⟨#20..29⟩ }}
 ?role = "⟨viewer|operator⟩"
 
 ?[history]

@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from itertools import islice
 
 from axis_scenes import AXIS_SCENES
+from belt_scenes import BELT_SCENES
 from chance import Chance
+from heard import Listener, faults_as_text
 from machine_scenes import MACHINE_SCENES
 from plant_scenes import PLANT_SCENES
-from scenes import BELT_SCENES, Scene
+from scenes import Scene
 
 from steptwin.diagnostics import render, to_json
 from steptwin.errors import Misuse, Refusal
@@ -27,17 +30,21 @@ from steptwin.subject.describe import describe
 from steptwin.wire.crc import with_crc
 from steptwin.world.actions import ACTIONS, Download, Leave, See, SetVariable
 from steptwin.world.check import diagnose
+from steptwin.world.history import History, Past
 from steptwin.world.overrides import read_overrides
 from steptwin.world.pieces import given_files
+from steptwin.world.plant import Plant
 from steptwin.world.programs import Place, StatementFollower
 from steptwin.world.programtexts import WorldPrograms, program_texts
 from steptwin.world.reader import TomlText
 from steptwin.world.steptable import read_steps
 from steptwin.world.trace import TraceRecord, encode
 from steptwin.world.unfinished import unchanged_inputs, waiting
+from steptwin.world.views import MechanicsView
 
 STEPS = 16
 MOMENTS = 7
+TURNS = 3
 WRONG = 16
 END_S = 1.5
 SCENES = BELT_SCENES | AXIS_SCENES | MACHINE_SCENES | PLANT_SCENES
@@ -99,17 +106,21 @@ def seen(name: str, seed: int) -> dict[str, list[str]]:
     world = World.from_toml(text, files)
     statements: list[TraceRecord] = []
     follower = StatementFollower(world, statements.append)
+    listener, history = Listener(world), History(world)
     moments = sorted(chance.below(round(END_S * SECOND)) for _ in range(MOMENTS))
     steps = list(zip(moments, from_outside, strict=True))
     cut = chance.below(MOMENTS)
     values = go_on(world, steps[:cut], moments[cut], files)
     values += do_from_outside(world, steps[cut][1], files)
+    history.take()
     snapshot = world.snapshot()
     values += go_on(world, steps[cut + 1 :], round(END_S * SECOND), files)
     happened = [repr((*one[:4], shown_value(one), one.facts)) for one in (*world.trace, *statements)]
     follower.close()
-    happened += watched(text, files)
+    listener.close()
+    happened += listener.found + watched(text, files)
     end, digest_there = shown(world), world.trace.digest()
+    values += past_of(history, chance.below(round(END_S * SECOND)))
     replayed = session_of(world).replay()
     other = world if chance.below(2) else world.branch(snapshot)
     other.restore(snapshot)
@@ -121,12 +132,28 @@ def seen(name: str, seed: int) -> dict[str, list[str]]:
     return {"parts": parts(world), "values": values, "trace": happened}
 
 
+def past_of(history: History, moment: int) -> list[str]:
+    """What has changed between its states, and what another world shows that goes back to a moment and then to the end."""
+    history.take()
+    found = [repr(sorted(history.state_at(history.world.now).changed)), repr(sorted(history.state_at(moment).changed))]
+    past = Past(history)
+    for _ in past.go(moment):
+        pass
+    found += shown(past.world)
+    for _ in past.go(history.world.now):
+        pass
+    history.close()
+    if seen_of_machines(past.world) != seen_of_machines(history.world):
+        found.append("it was different in the past")
+    return found
+
+
 def go_on(world: World, steps: list[tuple[int, str]], end: int, files: Mapping[str, bytes]) -> list[str]:
     """Do steps at their moments, and run on to the end; what the world shows then."""
     found: list[str] = []
     for moment, step in steps:
         world.run(until=moment / SECOND)
-        found += shown(world)
+        found += [f"due {world.due()}", *shown(world)]
         found += do_from_outside(world, step, files)
     world.run(until=end / SECOND)
     for name, line in world.lines.items():
@@ -180,13 +207,18 @@ def shown_value(record: TraceRecord) -> object:
     return encode(record).hex() if isinstance(record.value, Profile | StepTrain) else record.value
 
 
-def shown(world: World) -> list[str]:
-    """Signals of elements, and what a viewer sees of controllers and axes."""
-    found = [f"{world.now} {world.stopped} due {world.due()}"]
+def shown(world: Plant) -> list[str]:
+    """What a viewer sees of it, and what scripts wait for."""
+    return [f"stopped: {world.stopped}", *seen_of_machines(world), *(repr(one) for one in waiting(world))]
+
+
+def seen_of_machines(world: Plant) -> list[str]:
+    """Signals of elements, controllers and axes."""
+    found = [f"{world.now}"]
     for name in world.parts.element_names:
-        signals = world.parts.element_signals(name) or {}
-        found += [f"{name}.{signal} {world.read(f'{name}.{signal}'):.9g}" for signal in signals]
-    for name, axis in world.axis.items():
+        found += [told_of(world, f"{name}.{signal}") for signal in world.parts.element_signals(name) or {}]
+    for name, fitted in world.axes.items():
+        axis = MechanicsView(world, fitted)
         found.append(f"{name} {axis.position:.9g} {axis.rotor:.9g} {axis.lost} {axis.stalled}")
     for name in world.machines:
         world.touch(name)
@@ -194,8 +226,15 @@ def shown(world: World) -> list[str]:
     for programs in world.programs.values():
         found.append(repr((programs.stack(world.now), dict(programs.variables(world.now)), programs.depth())))
     found.append(repr(WorldPrograms(world).list()))
-    found += [repr(one) for one in waiting(world)]
     return found
+
+
+def told_of(world: Plant, name: str) -> str:
+    """A signal: its value, unit and bounds, and where it may turn next."""
+    signal = world.signal(name)
+    signal.bring(world.now)
+    turns = list(islice(signal.turning(world.now), TURNS)) if signal.turning is not None else []
+    return f"{name} {signal.value(world.now):.9g} {signal.unit} {signal.bounds} {turns}"
 
 
 def parts(world: World) -> list[str]:
@@ -204,7 +243,7 @@ def parts(world: World) -> list[str]:
     found: list[object] = [*there.axes, there.buttons, *there.elements, *there.connections, *there.lines]
     spec = world.spec
     found += [spec.lines, spec.gateways, spec.history, spec.drawing, dict(axis_views(world)), unchanged_inputs(world, 0)]
-    return [*(repr(one) for one in found), *programs_of(world)]
+    return [*(repr(one) for one in found), *faults_as_text(world), *programs_of(world)]
 
 
 def programs_of(world: World) -> Iterator[str]:

@@ -1,6 +1,6 @@
 """What `random_worlds` makes small worlds of: descriptions with gaps, and steps of an operator. See there for the notation.
 
-Here are logic, pneumatics and belts.
+Here is what several of them have: controllers, axes, switches, motors, and what is done with them.
 """
 
 from __future__ import annotations
@@ -17,29 +17,56 @@ class Scene(NamedTuple):
     files: Mapping[str, str] = MappingProxyType({})
 
 
+def controller(name: str, *lines: str, **drives: str) -> str:
+    """A MIC488, its keys, and those of its drives by their names."""
+    tables = (f"[mic488.{drive}]\n{keys}" for drive, keys in drives.items())
+    return "\n".join((f'[[mic488]]\nname = "{name}"', *lines, *tables))
+
+
+def axis(name: str, drive: str, *lines: str) -> str:
+    return "\n".join((f'[[axis]]\nname = "{name}"\ndrive = "{drive}"', *lines))
+
+
+def switch(of: str, to: str, *lines: str) -> str:
+    """A switch of an element that moves: of its last one above."""
+    return "\n".join((f'[[{of}.switch]]\nto = "{to}"', *lines))
+
+
+QUICK = """acc = ⟨3000..9000⟩
+dec = ⟨3000..9000⟩
+vel = ⟨600..1200⟩"""
+"""A drive in pulses."""
+IN_MM = """unit = "mm"
+gear = 640.0
+acc = ⟨300..900⟩
+dec = ⟨300..900⟩
+vel = ⟨60..120⟩
+mot_resol = 3200"""
+DRIVES = controller("c", M1=IN_MM, M2=IN_MM)
+
+PITCH = "pitch = 5.0"
+SOME_PITCH = "?pitch = ⟨4.0..6.0⟩"
+INVERTED = "?inverted = true"
+TRAVEL = "travel = [⟨-12..-2⟩, ⟨35..58⟩]"
+BACKLASH = "?backlash = ⟨0.02..0.4⟩"
+MOTOR = """torque = [[0, ⟨0.7..1.2⟩], [⟨400..600⟩, ⟨0.4..0.7⟩], [⟨900..1400⟩, ⟨0.1..0.3⟩]]
+inertia = ⟨0.00001..0.00008⟩
+?mass = ⟨0.5..3.0⟩
+?friction = ⟨0.01..0.08⟩
+?friction_force = ⟨1.0..12.0⟩
+?load = ⟨-0.15..0.15⟩
+?force = ⟨-20.0..20.0⟩
+?start_speed = ⟨60..300⟩"""
+SWITCH = """?hysteresis = ⟨0.1..2.0⟩
+?contact = "NC"
+?bounce = "⟨1..5⟩ ms"; bounces = ⟨#1..4⟩"""
+
+STALL = 'kind = "stall", axis = ⟨#1..2⟩, at_s = ⟨0.1..0.9⟩, for_s = ⟨0.02..0.3⟩'
 OUTPUTS = """
 { write = { "c.OUT⟨#1..4⟩" = ⟨#0..1⟩ } }
 { write = { "c.OUT⟨#1..4⟩" = 1, "c.OUT⟨#5..6⟩" = ⟨#0..1⟩ } }
 { write = { "c.OUT⟨#1..4⟩" = 1 } }
 { write = { "c.OUT⟨#1..4⟩" = 0 } }
-"""
-DRIVES = """
-[[mic488]]
-name = "c"
-[mic488.M1]
-unit = "mm"
-gear = 640.0
-acc = ⟨300..900⟩
-dec = ⟨300..900⟩
-vel = ⟨60..120⟩
-mot_resol = 3200
-[mic488.M2]
-unit = "mm"
-gear = 640.0
-acc = ⟨300..900⟩
-dec = ⟨300..900⟩
-vel = ⟨60..120⟩
-mot_resol = 3200
 """
 MOVES = """
 + { write = { "c.M1_EN" = 1, "c.M2_EN" = 1 } }
@@ -50,384 +77,3 @@ MOVES = """
 { write = { "c.M⟨#1..2⟩_STOP" = 1 } }
 { write = { "c.M2_POS_ABS" = ⟨0..60⟩ } }
 """
-MOTOR = """
-torque = [[0, ⟨0.7..1.2⟩], [⟨400..600⟩, ⟨0.4..0.7⟩], [⟨900..1400⟩, ⟨0.1..0.3⟩]]
-inertia = ⟨0.00001..0.00008⟩
-?mass = ⟨0.5..3.0⟩
-?friction = ⟨0.01..0.08⟩
-?friction_force = ⟨1.0..12.0⟩
-?load = ⟨-0.15..0.15⟩
-?force = ⟨-20.0..20.0⟩
-?start_speed = ⟨60..300⟩
-"""
-SWITCH = """
-?hysteresis = ⟨0.1..2.0⟩
-?contact = "NC"
-?bounce = "⟨1..5⟩ ms"; bounces = ⟨#1..4⟩
-"""
-
-BELT_SCENES: dict[str, Scene] = {
-    "logic": Scene(
-        """
-[[mic488]]
-name = "c"
-
-[[button]]
-name = "a"
-to = "g1.in1"
-?contact = "NC"
-?bounce = "⟨1..6⟩ ms"; bounces = ⟨#1..5⟩
-
-[[button]]
-name = "b"
-to = "g1.in2"
-
-[[button]]
-name = "d"
-to = "c.IN1"
-join = "series"
-?contact = "NC"
-
-[[button]]
-name = "e"
-to = "c.IN1"
-join = "series"
-bounce = "⟨1..6⟩ ms"
-
-[[gate]]
-name = "g1"
-kind = "⟨and|or|nand|nor|xor⟩"
-inputs = ⟨#2..4⟩
-
-[[gate]]
-name = "g2"
-kind = "⟨and|or|nand|nor|xor⟩"
-inputs = ["c.OUT1", "t1.out", "l1.out"]
-
-[[gate]]
-name = "g3"
-kind = "not"
-inputs = ["⟨g1.out|c.OUT2⟩"]
-
-[[latch]]
-name = "l1"
-set = "⟨g1.out|c.OUT1⟩"
-reset = "⟨c.OUT2|n1.out⟩"
-?priority = "⟨set|reset⟩"
-
-[[timer]]
-name = "t1"
-kind = "⟨on-delay|off-delay|pulse⟩"
-time = "⟨10..90⟩ ms"
-input = "⟨c.OUT1|g1.out⟩"
-
-[[timer]]
-name = "t2"
-kind = "⟨on-delay|off-delay|pulse⟩"
-time = "⟨10..90⟩ ms"
-input = "⟨l1.out|g3.out⟩"
-
-[[counter]]
-name = "n1"
-preset = ⟨#1..4⟩
-up = "⟨c.OUT1|g1.out|t1.out⟩"
-?down = "c.OUT2"
-?reset = "c.OUT3"
-
-[[relay]]
-name = "k1"
-coil = "⟨c.OUT1|g2.out⟩"
-?pull_in = "⟨5..30⟩ ms"
-?drop_out = "⟨5..30⟩ ms"
-
-[[wire]]
-from = "k1.⟨no|nc⟩"
-to = "c.IN2"
-?delay = "⟨1..20⟩ ms"
-?inverted = true
-
-[[wire]]
-from = "n1.out"
-to = "c.IN3"
-?delay = "⟨1..20⟩ ms"
-
-! kind = "⟨welded-contact|open-coil⟩", element = "k1"
-! kind = "stuck-output", element = "⟨g1|g2|g3|l1|t1|t2|n1⟩", level = ⟨#0..1⟩
-! kind = "stuck-input", element = "l1", input = "⟨set|reset⟩", level = ⟨#0..1⟩
-* n1.count ⟨>|>=|==⟩ ⟨#1..3⟩ or t1.out != t2.out
-* not (a.pressed and k1.no) and c.IN1 < 0.5
-""",
-        OUTPUTS
-        + """
-{ press = "⟨a|b|d|e⟩", for = "⟨5..120⟩ ms" }
-{ press = "⟨a|b|d|e⟩" }
-{ release = "⟨a|b|d|e⟩" }
-{ until = "⟨g1|g2|l1|t1|t2|n1⟩.out ⟨==|!=⟩ ⟨#0..1⟩", within = "⟨20..90⟩ ms" }
-{ expect = "n1.count ⟨==|<|>=⟩ ⟨#0..3⟩ and ⟨a|b⟩.pressed" }
-""",
-    ),
-    "pneumatics": Scene(
-        f"""
-[[mic488]]
-name = "c"
-
-[[cylinder]]
-name = "z"
-extend = "c.OUT1"
-?stroke = ⟨40..160⟩
-?extend_time = "⟨50..200⟩ ms"
-?retract_time = "⟨50..200⟩ ms"
-?switching = "⟨5..40⟩ ms"
-[[cylinder.switch]]
-above = ⟨20..40⟩
-to = "c.IN1"
-{SWITCH}
-[[cylinder.switch]]
-position = ⟨10..30⟩
-width = ⟨1..6⟩
-to = "c.IN2"
-{SWITCH}
-
-[[cylinder]]
-name = "y"
-valve = "double"
-extend = "c.OUT2"
-retract = "⟨c.OUT3|z.extended⟩"
-?extend_time = "⟨50..200⟩ ms"
-?retract_time = "⟨50..200⟩ ms"
-?switching = "⟨5..40⟩ ms"
-?start = "extended"
-
-[[wire]]
-from = "⟨z|y⟩.⟨extended|retracted⟩"
-to = "c.IN3"
-
-[[transducer]]
-name = "way"
-of = "⟨z|y⟩.position"
-to = "c.AIN1"
-points = [[0, ⟨0..1⟩], [⟨20..60⟩, ⟨5..8⟩], [100, ⟨2..4⟩]]
-resolution = ⟨0.2..0.8⟩
-
-! kind = "no-air", element = "⟨z|y⟩"
-! kind = "jam", element = "⟨z|y⟩"
-! kind = "stuck-output", element = "⟨z|y⟩", output = "⟨extended|retracted⟩", level = ⟨#0..1⟩
-! kind = "drift", element = "way", volts = ⟨-2..2⟩
-* z.position ⟨>|<|>=⟩ ⟨5..60⟩
-* way.volts > ⟨1..5⟩ and y.position < ⟨20..80⟩
-""",
-        OUTPUTS
-        + """
-{ until = "⟨z|y⟩.⟨extended|retracted⟩", within = "⟨20..200⟩ ms" }
-{ until = "z.position ⟨>|<⟩ y.position", within = "⟨20..200⟩ ms" }
-""",
-    ),
-    "belts": Scene(
-        """
-[[mic488]]
-name = "c"
-
-[[conveyor]]
-name = "p"
-length = ⟨150..250⟩
-speed = ⟨200..500⟩
-?run = "c.OUT1"
-feed = "c.OUT2"
-?feed_every = "⟨150..400⟩ ms"
-?workpiece = ⟨20..60⟩
-?mass = ⟨0.1..2.0⟩
-?marks = [⟨3..6⟩, ⟨10..15⟩]
-?mark_width = ⟨1.0..3.0⟩
-next = "q"
-[[conveyor.sensor]]
-at = ⟨40..120⟩
-to = "c.IN1"
-?contact = "NC"
-?bounce = "⟨1..5⟩ ms"
-[[conveyor.sensor]]
-at = ⟨40..140⟩
-to = "⟨c.IN2|t.in⟩"
-sees = "⟨mark|workpiece⟩"
-[[conveyor.stop]]
-at = ⟨60..140⟩
-hold = "c.OUT3"
-[[conveyor.stop]]
-at = ⟨60..140⟩
-hold = "⟨c.OUT4|t.out⟩"
-
-[[timer]]
-name = "t"
-kind = "off-delay"
-time = "⟨30..120⟩ ms"
-
-[[wire]]
-from = "t.out"
-to = "c.IN5"
-
-[[conveyor]]
-name = "q"
-length = ⟨120..200⟩
-speed = ⟨100..500⟩
-?run = "c.OUT⟨#4..5⟩"
-[[conveyor.sensor]]
-at = ⟨5..90⟩
-to = "c.IN4"
-join = "⟨parallel|series⟩"
-[[conveyor.stop]]
-at = ⟨20..110⟩
-?hold = "c.OUT⟨#5..6⟩"
-
-! kind = "⟨belt-stop|empty-feeder⟩", element = "p"
-! kind = "stuck-input", element = "⟨p|q⟩", input = "stop1", level = ⟨#0..1⟩
-* p.count ⟨>|==|>=⟩ ⟨#1..3⟩ and q.count < ⟨#1..3⟩
-""",
-        OUTPUTS
-        + """
-+ { write = { "c.OUT1" = 1, "c.OUT5" = 1, "c.OUT2" = 1 } }
-{ write = { "c.OUT2" = 0 } }
-{ write = { "c.OUT2" = 1 } }
-{ until = "c.IN⟨#1..4⟩ == ⟨#0..1⟩", within = "⟨20..200⟩ ms" }
-{ expect = "p.count == ⟨#0..3⟩" }
-""",
-    ),
-    "driven": Scene(
-        f"""
-{DRIVES}
-[[axis]]
-name = "x"
-drive = "c.M1"
-?pitch = ⟨4.0..6.0⟩
-?inverted = true
-?start = ⟨0..20⟩
-
-[[conveyor]]
-name = "p"
-length = ⟨60..120⟩
-axis = "x"
-?mm_per_unit = ⟨0.5..3.0⟩
-feed = "c.OUT1"
-?feed_every = "⟨90..300⟩ ms"
-workpiece = ⟨10..25⟩
-marks = [⟨1..2⟩, ⟨3..4⟩]
-next = "q"
-[[conveyor.sensor]]
-at = ⟨10..40⟩
-to = "c.IN1"
-sees = "⟨mark|workpiece⟩"
-?bounce = "⟨1..5⟩ ms"
-[[conveyor.sensor]]
-at = ⟨15..60⟩
-to = "c.IN2"
-[[conveyor.stop]]
-at = ⟨20..60⟩
-hold = "c.OUT2"
-
-[[conveyor]]
-name = "q"
-length = ⟨30..90⟩
-?mass = ⟨0.1..2.0⟩
-axis = "x"
-mm_per_unit = ⟨0.5..3.0⟩
-[[conveyor.sensor]]
-at = ⟨5..20⟩
-to = "c.IN3"
-?contact = "NC"
-
-[[gripper]]
-name = "jaws"
-close = "c.OUT3"
-pick = "c.OUT2"
-from = "⟨p|q⟩"
-pick_at = ⟨10..30⟩
-onto = "⟨p|q⟩"
-place = "c.OUT4"
-
-! kind = "empty-feeder", element = "p"
-* p.count > ⟨#0..2⟩ and q.count >= ⟨#0..2⟩
-* c.IN1 != c.IN2 or jaws.held
-""",
-        OUTPUTS
-        + """
-+ { write = { "c.M1_EN" = 1, "c.OUT1" = 1 } }
-{ write = { "c.M1_VEL_ABS" = ⟨20..90⟩ } }
-{ write = { "c.M1_VEL_ABS" = ⟨-50..90⟩, "c.OUT1" = ⟨#0..1⟩ } }
-{ write = { "c.M1_POS_REL" = ⟨5..60⟩, "c.OUT1" = ⟨#0..1⟩ } }
-{ write = { "c.M1_STOP" = 1 } }
-""",
-    ),
-    "hands": Scene(
-        """
-[[mic488]]
-name = "c"
-
-[[conveyor]]
-name = "p"
-length = ⟨150..250⟩
-speed = ⟨200..500⟩
-?run = "cup.held"
-feed_every = "⟨90..250⟩ ms"
-workpiece = ⟨20..60⟩
-?mass = ⟨0.1..2.0⟩
-[[conveyor.stop]]
-at = ⟨100..140⟩
-hold = "c.OUT5"
-
-[[conveyor]]
-name = "q"
-length = ⟨150..250⟩
-speed = ⟨50..500⟩
-?next = "p"
-
-[[vacuum]]
-name = "cup"
-ejector = "c.OUT1"
-pick = "c.OUT2"
-place = "c.OUT3"
-?from = "p"
-?onto = "q"
-?place_at = ⟨10..90⟩
-?vacuum = ⟨60..90⟩
-?threshold = ⟨20..55⟩
-?build_up = "⟨10..90⟩ ms"
-?release = "⟨10..90⟩ ms"
-
-[[gripper]]
-name = "jaws"
-close = "c.OUT4"
-pick = "⟨c.OUT2|cup.held⟩"
-place = "c.OUT3"
-from = "⟨p|q⟩"
-pick_at = ⟨60..120⟩
-?onto = "q"
-?place_at = ⟨60..120⟩
-?stroke = ⟨15..30⟩
-?width = ⟨5..12⟩
-?close_time = "⟨20..120⟩ ms"
-?open_time = "⟨20..120⟩ ms"
-
-[[wire]]
-from = "jaws.⟨opened|closed|held⟩"
-to = "c.IN1"
-
-[[transducer]]
-name = "air"
-of = "cup.pressure"
-to = "c.AIN1"
-points = [[0, 1], [⟨20..60⟩, ⟨5..8⟩]]
-resolution = ⟨0.2..0.8⟩
-
-! kind = "leak", element = "cup"
-! kind = "worn-jaws", element = "jaws"
-! kind = "stuck-output", element = "⟨cup|jaws⟩", output = "held", level = ⟨#0..1⟩
-* cup.pressure ⟨>|<⟩ ⟨10..50⟩
-* jaws.position >= ⟨3..12⟩ or jaws.mass > 0 or cup.dropped + jaws.dropped > ⟨#0..1⟩
-""",
-        OUTPUTS
-        + """
-+ { write = { "c.OUT5" = 1, "c.OUT1" = 1, "c.OUT2" = 1 } }
-{ write = { "c.OUT2" = ⟨#0..1⟩, "c.OUT3" = ⟨#0..1⟩ } }
-{ write = { "c.OUT1" = ⟨#0..1⟩, "c.OUT4" = ⟨#0..1⟩ } }
-{ until = "⟨cup|jaws⟩.held == ⟨#0..1⟩", within = "⟨20..200⟩ ms" }
-""",
-    ),
-}

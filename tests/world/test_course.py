@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from math import inf
+
+import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from pulse_by_pulse import changes, pulse_by_pulse
@@ -9,7 +12,10 @@ from pulse_by_pulse import changes, pulse_by_pulse
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion import MotionState, Profile, plan_position
 from steptwin.motion.divisions import Microstepping, step_train
+from steptwin.motion.profile import cruise
 from steptwin.world.course import Build, Course, MechanicalState
+from steptwin.world.motor import StepperMotor
+from steptwin.world.resonance import Resonance
 
 END = 20 * SECOND
 
@@ -166,3 +172,19 @@ def test_the_division_of_an_m1486_is_seen() -> None:
     course = Course(Build(high=300), train, 0, MechanicalState(0, 0))
     assert course.reaches(100, 0, 1) == train.pulse_time(128, 0)
     assert course.at(10 * SECOND).load == 300
+
+
+@pytest.mark.parametrize("velocity", [150.0, -150.0])
+def test_at_one_speed_in_its_band_a_rotor_is_lost_once(velocity: float) -> None:
+    """Without end, and slow enough to be caught: from 0.05 to the 1.27 full steps that lose the field it grows in ln(25.5)/10 s."""
+    band = Resonance(low=100.0, high=200.0, growth=10.0, fading=10.0, least=0.05)
+    motor = StepperMotor(((0.0, 1.0), (1000.0, 1.0)), 1e-6, friction=0.0, load=0.0, start_p=180.0, resonance=band)
+    for end_s in (inf, 60.0):
+        plan = Profile(0, 0, (cruise(0.0, end_s, 0.0, velocity),), 0.0 if end_s == inf else end_s * velocity)
+        course = Course(Build(motor=motor, period_p=4), plan, 0, MechanicalState(0, 0))
+        lost = course.next_stall(0)
+        assert lost == pytest.approx(0.324 * SECOND, rel=0.01)
+        assert lost is not None
+        assert course.at(lost - 1).rotor == pytest.approx(0.324 * velocity, abs=2)
+        assert course.at(lost).rotor == course.at(59 * SECOND).rotor
+        assert course.next_stall(lost) == (None if end_s == inf else 60 * SECOND)

@@ -16,6 +16,7 @@ from steptwin.m1486.datasheet import datasheet
 from steptwin.m1486.details import DETAILS, next_command
 from steptwin.m1486.drive import MotionMode
 from steptwin.m1486.microsteps import FULL_STEP
+from steptwin.m1486.pins import LINE_PINS
 from steptwin.m1486.program import WaitReason
 from steptwin.machine import SECOND, Nanos
 
@@ -49,6 +50,13 @@ def _status(chip: M1486Chip, now: Nanos) -> StateStatus:
     if chip.is_shut_down or chip.program.is_held:
         return StateStatus(text=program_words(chip, now), level=StatusLevel.WARNING)
     return StateStatus(text="ok")
+
+
+def _pins(chip: M1486Chip, now: Nanos) -> dict[str, float]:
+    """Their levels at ``now``: those of the driver interface follow the pulses, between which the chip has nothing to do."""
+    levels = dict(chip.pins())
+    levels |= {name: float(chip.level(line, now)) for name, line in LINE_PINS.items() if line in chip.interface.occupied}
+    return levels
 
 
 def _program(chip: M1486Chip, now: Nanos) -> StateProgram:
@@ -88,5 +96,7 @@ def _axis(chip: M1486Chip, described: AxisDescription, now: Nanos) -> StateAxis:
     )
 
 
-state_of: StateReader[M1486Chip] = StateReader(datasheet=datasheet, status=_status, program=_program, axis=_axis, details=DETAILS)
+state_of: StateReader[M1486Chip] = StateReader(
+    datasheet=datasheet, status=_status, program=_program, axis=_axis, pins=_pins, details=DETAILS
+)
 """The position is the sum of the pulses so far, as the point ``position``; `details` have the counter."""

@@ -321,6 +321,7 @@ class Course:
             return
         end_s = inf if end is None else (end - start) / SECOND
         now, caught = begin, None
+        is_steady = isinstance(s, Segment) and s.c2 == s.c3 == 0.0
         while True:
             before, now_s = now, (now - start) / SECOND
             if self._now.stalled:
@@ -338,13 +339,13 @@ class Course:
                     self._follow(now, end, direction)
                     return
                 now = max(now, start + ceil(found * SECOND))
-                if now == caught:
-                    # It would be caught and lost for ever in one moment.
-                    self._now = self._now._replace(stalled=True)
+                if now != caught:
+                    self._follow(before, now, direction)
+                self._now = self._now._replace(stalled=True)
+                if now == caught or is_steady:
+                    # It would be caught and lost for ever, in one moment or again and again.
                     self._stand(now, direction)
                     return
-                self._follow(before, now, direction)
-                self._now = self._now._replace(stalled=True)
 
     def _loses(self, motor: StepperMotor, s: Segment, now_s: float, end_s: float) -> float | None:
         """When the rotor loses the field in a segment, because it is too weak or vibrates too much."""

@@ -266,7 +266,8 @@ class Past:
         self.world = Plant(world.blueprint, keep_trace=world.trace.is_kept, keep_inputs=False)
         if not world.trace.is_recorded:
             self.world.stop_recording()
-        self._branch = -1
+        self._branch: int | None = None
+        """Of the history, when it was brought there."""
         self._inputs = 0
         """Number of inputs applied to it."""
         self._near: deque[PastState] = deque(maxlen=MOST_NEAR)
@@ -274,7 +275,7 @@ class Past:
 
     def forget(self) -> None:
         """Let the next `go` begin with a snapshot, because the world was used for something else."""
-        self._branch = -1
+        self._branch = None
 
     @property
     def is_in_step(self) -> bool:
@@ -310,7 +311,7 @@ class Past:
         for _ in self.go_on(moment):
             if kept + SLICE_NS <= self.world.now < moment:
                 kept = self.world.now
-                self._near.append(PastState(self.world.snapshot(with_inputs=False), self._inputs))
+                self._near.append(PastState(self.world.snapshot(), self._inputs))
             yield
 
     def go_on(self, moment: Nanos) -> Iterator[None]:

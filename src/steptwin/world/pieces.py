@@ -93,7 +93,7 @@ class Pieces:
         for number, use in enumerate(uses):
             path: Path = (USE, number)
             values = read_table(text, path, use, USES.keys, (WITH,))
-            if {"name", "file"} <= set(values):
+            if all(name in values for name in ("name", "file")):
                 self._use(text, path, values["name"], values["file"], use.get(WITH, {}), above)
 
     def _use(self, text: TomlText, path: Path, name: str, file: str, given: object, above: tuple[str, ...]) -> None:

@@ -408,17 +408,12 @@ def read_table(text: TomlText, path: Path, value: object, keys: Sequence[Key], a
     return values
 
 
-_MANY = 5
-
-
 def _listed(known: Iterable[str], also: Iterable[str]) -> str:
-    """Keys for messages; of the many numbered tables of a controller the first and last."""
-    others = list(also)
-    names = {name.rstrip("0123456789") for name in others}
-    if len(others) > _MANY:
-        ends = [[other for other in others if other.rstrip("0123456789") == name] for name in sorted(names)]
-        others = [f"{group[0]} to {group[-1]}" for group in ends]
-    return ", ".join([*known, *others])
+    """Keys for messages; of numbered tables, such as those of the inputs of a controller, the first and last."""
+    numbered: dict[str, list[str]] = {}
+    for name in also:
+        numbered.setdefault(name.rstrip("0123456789"), []).append(name)
+    return ", ".join([*known, *(" to ".join(dict.fromkeys((names[0], names[-1]))) for names in numbered.values())])
 
 
 def _what(path: Path) -> str:

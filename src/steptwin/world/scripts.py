@@ -225,10 +225,8 @@ class Scripts:
         """Steps of a description go on whether or not what they wait for comes; code from outside is sent that, and decides."""
         if script.is_external or waiting.is_request:
             return
-        if waiting.condition is not None:
-            if not has_come:
-                self._plant.report_overdue(f"{script.name} waited in vain for {self._plant.told(waiting.condition)}")
-            return
+        if waiting.condition is not None and not has_come:
+            self._plant.report_overdue(f"{script.name} waited in vain for {self._plant.told(waiting.condition)}")
         for asked in waiting.asked:
             if asked.first <= self._master(asked.line).unanswered <= asked.last:
                 self._plant.report_overdue(f"{script.name} waited in vain for an answer on {asked.line}")

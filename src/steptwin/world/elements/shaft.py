@@ -161,7 +161,7 @@ def _read_cams(text: TomlText, path: Path, table: Table) -> Iterator[CamSpec]:
     for n, cam in enumerate(given if isinstance(given, list) else [given]):
         of_cam = (*path, "cam", n)
         values = read_table(text, of_cam, cam, CAM.keys)
-        if {"begin", "end", "target"} <= set(values):
+        if all(name in values for name in ("begin", "end", "target")):
             check_sense(text, of_cam, CAM, cam)
             if values["begin"] == values["end"]:
                 text.wrong((*of_cam, "until"), "D007", f"from and until are {values['end']:g} degrees: the cam has no width")

@@ -58,7 +58,7 @@ def follow_writes(line: ModbusBus, take: Callable[[LineWrite], None]) -> Callabl
         there = line.places.get(place)
         words = log.request(unit, request, tcp=there is not None and there.kind == "tcp")
         units = (unit,) if unit in line.devices else line.units
-        outcome = "" if not response else "refusal" if response[0] >= REFUSED else "done"
+        outcome = "" if not response else "refusal" if response[0] & REFUSED else "done"
         take(LineWrite(now, place, units, words, outcome))
 
     line.watch_writes(seen)

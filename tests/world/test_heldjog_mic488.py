@@ -3,109 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from textwrap import dedent
 from typing import Any
 
 import pytest
+from heldjog_rig import MIC, TIMED, Rig, chip, mic
 from mic488_rig import loaded
 
 from steptwin.errors import Misuse, Refusal
 from steptwin.files.world import World
-from steptwin.later import start
-from steptwin.m1486.drive import speed_curve
-from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.machine import MILLISECOND
 from steptwin.mic488.registers import AXIS_STATUS_TEXTS
 from steptwin.mic488.status import AxisStatus
-from steptwin.motion.divisions import profile_of
-from steptwin.motion.ramps import plan_distance
 from steptwin.subject.commands import Enable, Home, Jog, StopAxes
-from steptwin.subject.following import filter_of
-from steptwin.subject.jogs import Held, WorldJogs
 from steptwin.subject.payloads import FramePayload, PlanPayload
-from steptwin.subject.world import WorldSubject
 from steptwin.world import script as do
 from steptwin.world.heldjog import STANDS_NS, STOP_NS
 from steptwin.world.kinds.m1486.heldjog import M1486HeldJog
 from steptwin.world.kinds.mic488.heldjog import Mic488HeldJog
-
-MIC = """
-    [[line]]
-    name = "bus"
-    kind = "modbus"
-    {timing}
-    [[mic488]]
-    name = "a"
-    line = "bus"
-    [mic488.M1]
-    unit = "mm"
-    gear = 100.0
-    acc = {acc}
-    dec = {acc}
-    vel = 40.0
-"""
-CHIPS = """
-    [[line]]
-    name = "chips"
-    kind = "m1486"
-    {timing}
-    [[m1486]]
-    name = "drum"
-    line = "chips"
-    address = 7
-    variant = "{variant}"
-"""
-TIMED = 'timing = "real"'
-
-
-class Rig:
-    """A world in virtual time with held jogs, as a live world keeps them."""
-
-    def __init__(self, text: str) -> None:
-        self.world = World.from_toml(dedent(text))
-        self.subject = WorldSubject(self.world)
-        self.jogs = WorldJogs(self.subject)
-        self.followed = self.subject.follow(filter_of(["plan", "frame"]), 100_000)
-
-    def begin(self, wanted: Jog) -> Held:
-        return start(self.jogs.begin(wanted)).result()
-
-    def run(self, for_ms: float) -> None:
-        end = self.world.now + round(for_ms * MILLISECOND)
-        while (due := self.jogs.deadline()) is not None and due <= end:
-            self.world.advance(max(due, self.world.now))
-            self.world.settle_all()
-            self.jogs.advance(self.world.now)
-        self.world.advance(end)
-        self.world.settle_all()
-
-    def stands_at(self) -> Nanos:
-        """When the last plan ends or ended."""
-        end: Nanos = 0
-        for event in self.followed.take().events:
-            if isinstance(event.payload, PlanPayload):
-                end = profile_of(event.payload.plan).end or event.time
-        return end
-
-    def sent(self) -> str:
-        """What was typed on a line of chips."""
-        frames = (event.payload for event in self.followed.take().events)
-        return b"".join(one.data for one in frames if isinstance(one, FramePayload) and one.direction == "in").decode("ascii")
-
-    def position(self, point: str) -> float:
-        (reading,) = self.subject.read(point)
-        assert reading.value is not None
-        return reading.value
-
-
-def mic(acc: float = 1000.0, timing: str = "") -> Rig:
-    rig = Rig(MIC.format(acc=acc, timing=timing))
-    rig.subject.do(Enable("a", 1))
-    rig.run(100)
-    return rig
-
-
-def chip(variant: str = "A", timing: str = "") -> Rig:
-    return Rig(CHIPS.format(variant=variant, timing=timing))
 
 
 @pytest.mark.parametrize("timing", ["", TIMED])
@@ -265,72 +179,6 @@ def test_a_drive_that_is_off_is_not_jogged() -> None:
         rig.begin(Jog("a", 5, 5.0))
 
 
-@pytest.mark.parametrize("timing", ["", TIMED])
-@pytest.mark.parametrize("velocity", [64.0 * 20, 64.0 * 640, -64.0 * 4000])
-@pytest.mark.parametrize("renewals", [0, 1, 7])
-def test_an_m1486_stands_in_time_after_the_last_renewal(velocity: float, renewals: int, timing: str) -> None:
-    rig = chip(timing=timing)
-    rig.run(100)
-    held = rig.begin(Jog("drum", 1, velocity))
-    for _ in range(renewals):
-        rig.run(held.lasts_ns / MILLISECOND / 3)
-        held.extend()
-    last = rig.world.now
-    rig.run(2000)
-    assert rig.stands_at() <= last + STANDS_NS
-    assert rig.position("drum.position") * velocity > 0
-    assert held.over == "lapsed"
-    assert rig.jogs.deadline() is None
-
-
-def test_a_jog_of_an_m1486_is_a_row_of_moves_without_any_that_never_ends() -> None:
-    rig = chip()
-    held = rig.begin(Jog("drum", 1, -64.0 * 640))
-    for _ in range(10):
-        rig.run(60)
-        held.extend()
-    held.release()
-    rig.run(1000)
-    commands = rig.sent().split("\r")
-    assert commands[:2] == ["x7", "v640"]
-    assert commands.count("r") >= 5
-    assert {one[0] for one in commands if one} == {"x", "v", "b", "r"}
-    assert commands[-2] == "v1000"  # as before: the default
-    assert rig.position("drum.counter") == (rig.position("drum.position") % 2**24)
-
-
-def test_an_m1486_that_was_killed_is_not_jogged_on() -> None:
-    rig = chip()
-    held = rig.begin(Jog("drum", 1, 64.0 * 640))
-    rig.run(30)
-    rig.subject.do(StopAxes("drum"))
-    for _ in range(30):
-        rig.run(80)
-        if held.over is None:
-            try:
-                held.extend()
-            except Refusal:
-                break
-    assert held.over is not None
-    assert rig.sent().count("r\r") == 1
-
-
-def test_what_cannot_be_jogged_is_refused() -> None:
-    with pytest.raises(Refusal, match="EEPROM"):
-        chip("E1").begin(Jog("drum", 1, 6400.0))
-    rig = chip()
-    rig.subject.do(Jog("drum", 1, 6400.0))
-    rig.run(50)
-    with pytest.raises(Refusal, match="not at rest"):
-        rig.begin(Jog("drum", 1, 6400.0))
-    with pytest.raises(Misuse, match="drum: no axis 2: an M1486 has one, 1"):
-        chip().begin(Jog("drum", 2, 6400.0))
-    with pytest.raises(Misuse, match=r"velocity 1\.28006e\+06 min\. microsteps/s, V20001: "):
-        chip().begin(Jog("drum", 1, 20001 * 64.0))
-    with pytest.raises(Refusal, match="drum is on no line, so no commands can be sent to it"):
-        Rig('[[m1486]]\nname = "drum"\n').begin(Jog("drum", 1, 6400.0))
-
-
 @pytest.mark.parametrize(
     ("values", "text"),
     [
@@ -356,66 +204,6 @@ def test_a_mic488_with_a_position_error_is_not_jogged() -> None:
     rig.world.mic488["a"].device.axes[0].status = AxisStatus.ERROR
     with pytest.raises(Refusal, match="a M1 has a position error: stop it first"):
         rig.begin(Jog("a", 1, 10.0))
-
-
-@pytest.mark.parametrize(
-    ("variant", "velocity", "microsteps"),
-    [
-        # Within 100 ms: what fits with the ramps, but one full step at least; a chip at 24 MHz is twice as fast.
-        ("A", 16.0, 64),
-        ("A2x", 32.0, 3 * 64),
-    ],
-)
-def test_a_slow_jog_of_an_m1486_makes_whole_steps(variant: str, velocity: float, microsteps: int) -> None:
-    rig = chip(variant)
-    held = rig.begin(Jog("drum", 1, 64.0 * velocity))
-    rig.run(50)
-    held.release()
-    rig.run(1000)
-    assert [one for one in rig.sent().split("\r") if one[:1] in ("v", "f")] == ["v16", f"f{microsteps}", "v1000"]
-
-
-def test_a_jog_of_an_m1486_begins_with_its_first_extension() -> None:
-    rig = chip()
-    wanted = Jog("drum", 1, 6400.0)
-    held = M1486HeldJog(rig.world.m1486["drum"].chip, "chips", wanted)
-    assert (held.deadline(), held.advance(rig.world.now)) == (None, ())
-    assert held.extend(rig.world.now) == (do.Send("chips", b"x7\rv100\rf640\rr\r"),)
-
-
-def test_a_jog_that_is_over_asks_for_nothing_more() -> None:
-    for rig, wanted in ((mic(), Jog("a", 1, 10.0)), (chip(), Jog("drum", 1, 6400.0))):
-        held = rig.begin(wanted)
-        rig.run(3000)
-        assert held.over == "lapsed"
-        assert rig.jogs.deadline() is None
-        rig.followed.take()
-        with pytest.raises(Refusal, match="the jog has ended: lapsed"):
-            held.extend()
-        rig.run(1000)
-        assert [event for event in rig.followed.take().events if isinstance(event.payload, PlanPayload)] == []
-
-
-def test_a_jog_that_is_cut_says_so_and_asks_for_nothing_more() -> None:
-    of_mic, of_chip = mic(), chip()
-    makers: list[tuple[Rig, Callable[[], Mic488HeldJog | M1486HeldJog]]] = [
-        (of_mic, lambda: Mic488HeldJog(of_mic.world.mic488["a"].device, "bus", Jog("a", 1, 10.0))),
-        (of_chip, lambda: M1486HeldJog(of_chip.world.m1486["drum"].chip, "chips", Jog("drum", 1, 6400.0))),
-    ]
-    for rig, make in makers:
-        for begun in (False, True):
-            held = make()
-            if begun:
-                held.extend(rig.world.now)
-            held.cut()
-            assert held.over == "stopped"
-            assert held.extend(rig.world.now) == ()
-            held.cut()
-            assert held.over == "stopped"
-        ended = make()
-        ended.release(rig.world.now)
-        ended.cut()
-        assert ended.over == "let go"
 
 
 def asked(held: Mic488HeldJog, world: World) -> tuple[tuple[tuple[str, float], ...], ...]:
@@ -505,51 +293,36 @@ def test_a_jog_of_a_mic488_that_another_has_stopped_is_over() -> None:
     assert (held.deadline(), held.extend(rig.world.now)) == (None, ())
 
 
-@pytest.mark.parametrize("variant", ["A", "A2x"])
-@pytest.mark.parametrize("velocity", [33, 100, 640, 1999, 5000])
-def test_a_move_of_a_held_jog_of_an_m1486_is_the_longest_that_ends_in_time(variant: str, velocity: int) -> None:
-    """100 ms: with one microstep more it would take longer."""
-    rig = chip(variant)
-    unit = 64 * rig.world.m1486["drum"].chip.variant.clock
-    held = M1486HeldJog(rig.world.m1486["drum"].chip, "chips", Jog("drum", 1, float(unit * velocity)))
-    (given,) = held.extend(rig.world.now)
-    assert isinstance(given, do.Send)
-    _, _, text, _, _ = given.data.decode().split("\r")
-    drive = rig.world.m1486["drum"].chip.drive
-    curve = speed_curve(
-        (drive.start_stop, drive.acceleration, drive.profile_speed, velocity),
-        drive.qualification,
-        rig.world.m1486["drum"].chip.variant.clock,
-    )
-    longest, longer = (plan_distance(0, 0, int(text[1:]) + more, curve).end or 0 for more in (0, drive.grid_u))
-    assert longest <= 100 * MILLISECOND < longer
+def test_a_jog_that_is_over_asks_for_nothing_more() -> None:
+    for rig, wanted in ((mic(), Jog("a", 1, 10.0)), (chip(), Jog("drum", 1, 6400.0))):
+        held = rig.begin(wanted)
+        rig.run(3000)
+        assert held.over == "lapsed"
+        assert rig.jogs.deadline() is None
+        rig.followed.take()
+        with pytest.raises(Refusal, match="the jog has ended: lapsed"):
+            held.extend()
+        rig.run(1000)
+        assert [event for event in rig.followed.take().events if isinstance(event.payload, PlanPayload)] == []
 
 
-def test_a_jog_of_an_m1486_lapses_in_its_last_nanosecond() -> None:
-    rig = chip()
-    held = M1486HeldJog(rig.world.m1486["drum"].chip, "chips", Jog("drum", 1, -6400.0))
-    begun = rig.world.now
-    held.extend(begun)
-    assert held.deadline() == begun + MILLISECOND
-    drive = rig.world.m1486["drum"].chip.drive
-    held._target_u = drive.true_u(begun)  # as if it had moved
-    assert held.advance(begun + held.lasts_ns) != ()
-    assert held.over is None
-    held._target_u = drive.true_u(begun)
-    assert held.advance(begun + held.lasts_ns + 1) == (do.Send("chips", b"x7\rv1000\r"),)
-    assert (held.over, held.deadline()) == ("lapsed", None)
-
-
-def test_a_chip_that_does_something_else_for_two_seconds_ends_its_jog() -> None:
-    rig = chip()
-    held = M1486HeldJog(rig.world.m1486["drum"].chip, "chips", Jog("drum", 1, 6400.0))
-    begun = rig.world.now
-    held.extend(begun)
-    rig.subject.do(Jog("drum", 1, 64.0 * 640))
-    rig.run(100)
-    assert held.advance(begun + 2 * SECOND) == ()
-    assert (held.over, held.deadline()) == (None, begun + 2 * SECOND + MILLISECOND)
-    assert held.advance(begun + 2 * SECOND + 1) == ()
-    assert held.over is not None
-    assert held.over.startswith("the chip ")
-    assert held.deadline() is None
+def test_a_jog_that_is_cut_says_so_and_asks_for_nothing_more() -> None:
+    of_mic, of_chip = mic(), chip()
+    makers: list[tuple[Rig, Callable[[], Mic488HeldJog | M1486HeldJog]]] = [
+        (of_mic, lambda: Mic488HeldJog(of_mic.world.mic488["a"].device, "bus", Jog("a", 1, 10.0))),
+        (of_chip, lambda: M1486HeldJog(of_chip.world.m1486["drum"].chip, "chips", Jog("drum", 1, 6400.0))),
+    ]
+    for rig, make in makers:
+        for begun in (False, True):
+            held = make()
+            if begun:
+                held.extend(rig.world.now)
+            held.cut()
+            assert held.over == "stopped"
+            assert held.extend(rig.world.now) == ()
+            held.cut()
+            assert held.over == "stopped"
+        ended = make()
+        ended.release(rig.world.now)
+        ended.cut()
+        assert ended.over == "let go"
