@@ -176,7 +176,7 @@ def test_the_division_of_an_m1486_is_seen() -> None:
 
 @pytest.mark.parametrize("velocity", [150.0, -150.0])
 def test_at_one_speed_in_its_band_a_rotor_is_lost_once(velocity: float) -> None:
-    """Without end, and slow enough to be caught: from 0.05 to the 1.27 full steps that lose the field it grows in ln(25.5)/10 s."""
+    """Without end, and slow enough to be caught: it grows in ln(25.5)/10 s from 0.05 to 1.27 full steps, which lose the field."""
     band = Resonance(low=100.0, high=200.0, growth=10.0, fading=10.0, least=0.05)
     motor = StepperMotor(((0.0, 1.0), (1000.0, 1.0)), 1e-6, friction=0.0, load=0.0, start_p=180.0, resonance=band)
     for end_s in (inf, 60.0):

@@ -85,6 +85,10 @@ RANGES = {"a": (1.0, 4.0), "b": (-3.0, -1.0), "c": (0.0, 0.0), "d": (-1.0, 1.0)}
         ("not d > 0", 0.0, 1.0),
         ("not (a > 4 or b > 0)", 1.0, 1.0),
         ("a / d > 0", 0.0, 1.0),
+        ("d / d > 0", 0.0, 1.0),
+        ("1 / abs(d / d) > 2", 0.0, 1.0),
+        ("1 / (a / d - a / c) > 2", 0.0, 1.0),
+        ("(a / c - a / c) / (a / c - c) != 0", 0.0, 1.0),
     ],
 )
 def test_what_a_condition_can_be_within_ranges(text: str, least: float, most: float) -> None:

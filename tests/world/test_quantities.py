@@ -99,6 +99,10 @@ def test_values(quantity: Quantity, a: float, b: float, value: float) -> None:
         (ABSOLUTE, (-2, 0), (0, 0), (0, 2)),
         (ABSOLUTE, (-3, 2), (0, 0), (0, 3)),
         (ABSOLUTE, (-2, 3), (0, 0), (0, 3)),
+        (ABSOLUTE, (nan, nan), (0, 0), (nan, nan)),
+        (SUM, (-inf, 1), (inf, inf), (nan, nan)),
+        (SUM, (-inf, inf), (-inf, -inf), (nan, nan)),
+        (DIFFERENCE, (-inf, 1), (-inf, -inf), (nan, nan)),
     ],
 )
 def test_ranges(quantity: Quantity, a: Range, b: Range, found: Range) -> None:

@@ -1,4 +1,4 @@
-"""Every key of a description and of a step, with its default and what it refuses and what it needs, reviewed once: golden/tables.txt.
+"""Every key of a description and of a step, its default, what it refuses and what it needs, reviewed once: golden/tables.txt.
 
 Regenerate with ``python tests/world/test_tables.py`` and read the diff.
 """

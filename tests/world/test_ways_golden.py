@@ -13,20 +13,19 @@ from itertools import islice
 from pathlib import Path
 
 import pytest
+from way_texts import course_text, profile_text
 
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND, SECOND, Nanos
-from steptwin.motion import MotionState, Profile, at_rest, plan_position, plan_stop, plan_velocity
+from steptwin.machine import MILLISECOND, SECOND
+from steptwin.motion import MotionState, at_rest, plan_position, plan_stop, plan_velocity
 from steptwin.motion.divisions import Microstepping, Plan, step_train
-from steptwin.motion.elastic import DriveStretch
 from steptwin.motion.paths import Circular, circle
 from steptwin.motion.ramps import SpeedCurve, plan_distance
 from steptwin.world.cam import Cam
 from steptwin.world.coordinate import Coordinate, Pulled
-from steptwin.world.course import Build, Course, CoursePiece, MechanicalState
+from steptwin.world.course import Build, Course, MechanicalState
 from steptwin.world.elements.axis import AXIS
-from steptwin.world.free import FreeMotion, slow_from
-from steptwin.world.loadmotion import load_stretches
+from steptwin.world.free import FreeMotion
 from steptwin.world.motor import StepperMotor
 from steptwin.world.resonance import Resonance
 from steptwin.world.wells import Wells
@@ -134,50 +133,15 @@ COURSES: dict[str, tuple[Build, Plan, MechanicalState, dict[str, object]]] = {
 }
 
 
-def shown(piece: CoursePiece, of: Nanos) -> str:
-    rotor, load = ((f"{value:+}" if follows else f"at {value}") for follows, value in (piece[2:4], piece[4:6]))
-    state = f"{' stalled' if piece.stalled else ''}{f' behind {piece.behind}' if piece.behind else ''}"
-    state += f" stop {piece.stop}" if piece.stop else ""
-    return f"  {piece.begin - of} {'↑' if piece.direction > 0 else '↓'} rotor {rotor} load {load}{state}"
-
-
-def of_course(build: Build, plan: Plan, state: MechanicalState, more: dict[str, object], begin: Nanos) -> Iterator[str]:
-    course = Course(build, plan, begin, state, **more)  # type: ignore[arg-type]
-    yield from (shown(piece, BEGIN) for piece in course.pieces)
-    said = (f"{one.begin - BEGIN} {'drive' if one.follows else 'at'} {one.pulses}" for one in course.load_pieces())
-    yield f"  told: {', '.join(said)}; exact {course.is_exact}; at stop {course.stop(begin)}, then {course.next_stop(begin)}"
-    stall, stalls = course.next_stall(begin), []
-    while stall is not None:
-        stalls.append(f"{stall - BEGIN}{course.why_stalled(stall)}")
-        stall = course.next_stall(stall)
-    if stalls or build.motor is not None:
-        looks = " ".join(f"{course.vibration(begin + n * 211 * MILLISECOND):.9g}" for n in range(5))
-        yield f"  stalls: {', '.join(stalls)}; vibration {looks}"
-    for rotor in (False, True):
-        found = []
-        for after in (begin, BEGIN + 700 * MILLISECOND):
-            for position in (-65, -20, -3, 8, 55):
-                reached = (course.reaches(position, max(begin, after), way, rotor=rotor) for way in (1, -1))
-                found.append("/".join("-" if one is None else f"{one - BEGIN}" for one in reached))
-        yield f"  {'rotor' if rotor else 'load'}: {' '.join(found)}"
-    at = (begin + n * 150 * MILLISECOND for n in range(6))
-    yield "  " + " ".join(f"{course.position(now):.9g}{'←'[: course.leads(now)]}{'*'[: course.moves(now)]}" for now in at)
-    yield from (f"  {stretch_text(one, BEGIN)}" for one in islice(load_stretches(course, begin + 40 * MILLISECOND), 5))
-
-
-def stretch_text(one: DriveStretch, of: Nanos) -> str:
-    return f"{one.begin - of}: {' '.join(f'{value:.9g}' for value in one[1:])}"
-
-
 def courses() -> Iterator[tuple[str, list[str]]]:
     for name, (build, plan, state, more) in COURSES.items():
-        yield name, [*of_course(build, plan, state, more, BEGIN)]
+        yield name, [*course_text(build, plan, state, more, BEGIN, BEGIN)]
     # Begun again on the way.
     for name in ("stops, periods and play", "a motor that stalls", "microsteps", "an arc"):
         build, plan, state, more = COURSES[name]
         begin = BEGIN + 511 * MILLISECOND
         there = Course(build, plan, BEGIN, state, **more).at(begin)  # type: ignore[arg-type]
-        yield f"{name}, from its middle", [*of_course(build, plan, there, more, begin)]
+        yield f"{name}, from its middle", [*course_text(build, plan, there, more, begin, BEGIN)]
 
 
 # ---------------------------------------------------------------------- free motions
@@ -196,14 +160,6 @@ BODIES: dict[str, FreeMotion] = {
     "a detent and a load": replace(CAUGHT, load=-0.2),
     "a detent that is too weak": replace(CAUGHT, load=0.41),
 }
-
-
-def profile_text(found: Profile) -> str:
-    parts = (
-        f"[{s.end_s:.9g} {s.anchor_s:.9g}: {s.c0:.9g} {s.c1:.9g} {s.c2:.9g} {s.c3:.9g} {s.direction}]" for s in found.segments
-    )
-    slow = " ".join(str(slow_from(found, found.start, speed)) for speed in (0.0, 20.0, 150.0, 400.0))
-    return f"{found.start} {found.base} {found.final_p:.9g} {' '.join(parts)} slow {slow}"
 
 
 def free_motions() -> Iterator[tuple[str, list[str]]]:

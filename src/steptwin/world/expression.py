@@ -25,7 +25,6 @@ from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.world.quantities import (
     LARGEST,
-    NO_NUMBER,
     UNIT_NAMES,
     Absolute,
     NumberLiteral,
@@ -46,9 +45,9 @@ MOST_NESTED = 64
 MOST_OPERATIONS = 200
 """Limit of the signs + - * / % of an expression, because they are evaluated recursively."""
 LONGEST = 20_000
+"""Limit of the characters of an expression."""
 REMEMBERED = 512
 """Conditions whose parts are remembered by their text, since worlds of one description have the same."""
-"""Limit of the characters of an expression."""
 
 COMPARE: Mapping[str, Callable[[float, float], bool]] = {"==": eq, "!=": ne, "<=": le, ">=": ge, "<": lt, ">": gt}
 _OTHER_SIGNS: Mapping[str, str] = {"=": "==", "<>": "!=", "&&": "and", "||": "or"}
@@ -79,7 +78,7 @@ class Comparison:
 
     def range(self, ranges: Callable[[str], Range]) -> Range:
         touched = sides(*Sum(self.left, -1, self.right).range(ranges))
-        truths = {False, True} if NO_NUMBER in touched else {COMPARE[self.sign](side, 0) for side in touched}
+        truths = {COMPARE[self.sign](side, 0) for side in touched}
         return float(min(truths)), float(max(truths))
 
     def in_unit(self, unit: str, unit_of: UnitOf) -> Comparison:

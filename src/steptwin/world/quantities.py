@@ -110,7 +110,7 @@ class Sum:
 
     def range(self, ranges: Callable[[str], Range]) -> Range:
         (a, b), (c, d) = self.left.range(ranges), self.right.range(ranges)
-        return (a + c, b + d) if self.sign > 0 else (a - d, b - c)
+        return _numbers(a + c, b + d) if self.sign > 0 else _numbers(a - d, b - c)
 
     def in_unit(self, unit: str, unit_of: UnitOf) -> Quantity:
         return Sum(self.left.in_unit(unit, unit_of), self.sign, self.right.in_unit(unit, unit_of))
@@ -187,7 +187,7 @@ class Absolute:
 
     def range(self, ranges: Callable[[str], Range]) -> Range:
         low, high = self.inner.range(ranges)
-        return (low, high) if low >= 0.0 else (-high, -low) if high <= 0.0 else (0.0, max(-low, high))
+        return (low, high) if low >= 0.0 else (-high, -low) if high <= 0.0 else _numbers(0.0, max(-low, high))
 
     def in_unit(self, unit: str, unit_of: UnitOf) -> Quantity:
         return Absolute(self.inner.in_unit(unit, unit_of))
@@ -196,6 +196,11 @@ class Absolute:
 def unit_of_all(quantity: Quantity, unit_of: UnitOf) -> str:
     """The unit of the first of its signals that has one; empty: none has."""
     return next(filter(None, map(unit_of, quantity.names())), "")
+
+
+def _numbers(low: float, high: float) -> Range:
+    """The range between these; no number at all where one of them is none."""
+    return (nan, nan) if isnan(low) or isnan(high) else (low, high)
 
 
 def negative(quantity: Quantity) -> Quantity:
