@@ -23,7 +23,7 @@ from steptwin.errors import Misuse, Refusal
 from steptwin.files.export import axis_views
 from steptwin.files.session import session_of
 from steptwin.files.world import World
-from steptwin.machine import SECOND
+from steptwin.machine import SECOND, Nanos
 from steptwin.motion.divisions import StepTrain
 from steptwin.motion.profile import Profile
 from steptwin.subject.describe import describe
@@ -37,6 +37,7 @@ from steptwin.world.plant import Plant
 from steptwin.world.programs import Place, StatementFollower
 from steptwin.world.programtexts import WorldPrograms, program_texts
 from steptwin.world.reader import TomlText
+from steptwin.world.signals import SignalOf
 from steptwin.world.steptable import read_steps
 from steptwin.world.trace import TraceRecord, encode
 from steptwin.world.unfinished import unchanged_inputs, waiting
@@ -216,7 +217,8 @@ def seen_of_machines(world: Plant) -> list[str]:
     """Signals of elements, controllers and axes."""
     found = [f"{world.now}"]
     for name in world.parts.element_names:
-        found += [told_of(world, f"{name}.{signal}") for signal in world.parts.element_signals(name) or {}]
+        signals = world.parts.element_signals(name) or {}
+        found += [told_of(f"{name}.{signal}", of, world.now) for signal, of in signals.items()]
     for name, fitted in world.axes.items():
         axis = MechanicsView(world, fitted)
         found.append(f"{name} {axis.position:.9g} {axis.rotor:.9g} {axis.lost} {axis.stalled}")
@@ -229,12 +231,11 @@ def seen_of_machines(world: Plant) -> list[str]:
     return found
 
 
-def told_of(world: Plant, name: str) -> str:
+def told_of(name: str, signal: SignalOf, now: Nanos) -> str:
     """A signal: its value, unit and bounds, and where it may turn next."""
-    signal = world.signal(name)
-    signal.bring(world.now)
-    turns = list(islice(signal.turning(world.now), TURNS)) if signal.turning is not None else []
-    return f"{name} {signal.value(world.now):.9g} {signal.unit} {signal.bounds} {turns}"
+    signal.bring(now)
+    turns = list(islice(signal.turning(now), TURNS)) if signal.turning is not None else []
+    return f"{name} {signal.value(now):.9g} {signal.unit} {signal.bounds} {turns}"
 
 
 def parts(world: World) -> list[str]:

@@ -64,7 +64,7 @@ class MachineView:
     @property
     def pins(self) -> Mapping[str, float]:
         """The level of every pin: 0, 1, volts."""
-        return self.state.pins
+        return {name: level for name, level in self.state.pins.items() if level is not None}
 
     def set_pin(self, pin: str, value: float) -> None:
         """Set an input from outside: 0, 1, volts. Raises `Misuse`."""
