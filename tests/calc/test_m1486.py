@@ -56,7 +56,7 @@ def test_m_7_a_short_move() -> None:
 def test_the_chip_takes_as_long(name: str, clock: int) -> None:
     kind = variant(name)
     result = move(Calculator(M1486Model(kind, STEP_DIRECTION)), distance=128000, velocity=3000, acceleration=9000, profile=1500)
-    drive = ChipDrive(kind, STEP_DIRECTION, 0)
+    drive = ChipDrive(kind, STEP_DIRECTION)
     drive.distance_u, drive.velocity, drive.acceleration, drive.profile_speed = 128000, 3000, 9000, 1500
     assert drive.run(0)
     assert result.times["time"] * SECOND == pytest.approx(drive.deadline(), abs=1)

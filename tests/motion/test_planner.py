@@ -287,9 +287,10 @@ def test_velocities_that_are_not_finite_are_refused(value: float) -> None:
     with pytest.raises(Misuse, match=message):
         plan_velocity(MotionState(0, 0, 0.0, 0.0), value, 1.0, 1.0)
     with pytest.raises(Misuse, match=message):
-        plan_velocity(MotionState(0, 0, 0.0, value), 1.0, 1.0, 1.0)
-    with pytest.raises(Misuse, match=message):
         plan_position(MotionState(0, 0, 0.0, value), 1, 1.0, 1.0, 1.0)
+    for other in (1.0, 1e60, -1e60):
+        with pytest.raises(Misuse, match=message):
+            plan_velocity(MotionState(0, 0, 0.0, value), other, 1.0, 1.0)
 
 
 def test_distances_too_far_to_be_exact_are_refused() -> None:

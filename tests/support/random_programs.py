@@ -125,6 +125,7 @@ FOREIGN = (
     "⟨|SET ⟩⟨x|OUT1|count⟩ ⟨++|--|+= 2|-= y|*= 3|/= 2 + 1|+ 1|:= 2|== 2|=|= =⟩",
     "⟨SET|SET ⟩ ⟨OUT1|x|M1|IN1|OUT1 OUT2|⟩",
     "x = ⟨(y)|(y + 1)|y * (z + 1)|sin x|(y) + 1|sin(x|max(x)|max x, y⟩",
+    "IF x ⟨y|+|- y|y z⟩ > ⟨2|2 3|x y|+ 2⟩",
     "x = y ⟨MOD|AND|OR|XOR|DIV|SHL|mod|NOT|^|**⟩ ⟨2|z|2 + 1⟩",
     "⟨TRUE|M1|OUT1|IN1|x|20|@P0|,|)⟩⟨| M1| 2|()⟩",
     "JUMP ⟨MAIN:|(MAIN)|= MAIN|MAIN, x|TO MAIN|main now⟩",

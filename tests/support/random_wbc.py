@@ -132,6 +132,8 @@ class Run:
         """Those of a loop that rests are not executed."""
         if seed % 3 == 0:
             device.program.interpreter.hook(lambda now, number: self.statements.append(f"{now} {number}"))
+        self.dues: list[str] = []
+        """When it acts next, seen now and then: of a loop or wait that rests, when that can end."""
         device.on_event = lambda event: self.found.append(f"{event.time} {event.code}: {event.text}")
         device.changed = self._look
 
@@ -146,6 +148,7 @@ class Run:
             now += int(float(chance.filled("⟨0..100|1..20|100..300⟩")) * MILLISECOND)
             device.advance(now)
             self.found.append(self._shown(now))
+            self.dues.append(f"{now} {device.deadline()} {device.program.interpreter.place(now)}")
             kind = chance.below(6)
             if kind <= 2:
                 device.set_pin(chance.filled("IN⟨#1..8⟩"), chance.below(2), now)
@@ -181,7 +184,7 @@ def seen(seed: int) -> dict[str, list[str]]:
         "text": text.splitlines(),
         "says": said(chance, text, table),
         "made": made(chance, text, table),
-        "does": [*resting.found, *resting.statements],
+        "does": [*resting.found, *resting.statements, *resting.dues],
         "wrong": [broken, *said(chance, broken, table), *made(chance, broken, table)],
         "image": made(chance, encodable(text, table), table),
         "foreign": [strange, *told(strange)],

@@ -89,7 +89,7 @@ class ChipCore(Stateful):
             self, 2 * variant.memory_bits // 8, variant.statement_ns if statement_ns is None else statement_ns
         )
         self.memory = CommandMemory(variant, self.program)
-        self.motor = MotorControl(self, ChipDrive(variant, interface, 0))
+        self.motor = MotorControl(self, ChipDrive(variant, interface))
         self.receiver = Receiver(self)
         if file is not None and (variant.store is Store.RAM or self.address != 0):
             self.memory.load(file)

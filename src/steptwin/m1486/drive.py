@@ -92,7 +92,7 @@ class ChipDrive(Stateful):
     offset_p = 0
     """0: traces show the count since power-on, because the position counter has its own scale and 24 bits (`counter_u`)."""
 
-    def __init__(self, variant: Variant, interface: Interface, now: Nanos) -> None:
+    def __init__(self, variant: Variant, interface: Interface) -> None:
         self._clock = variant.clock
         self.revision = 0
         self.is_energised = True
@@ -100,8 +100,8 @@ class ChipDrive(Stateful):
         self._curve = self._speed_curve()
         self.motion = MotionMode.REST
         self.is_stopping = False
-        self.train = self._resting(now, 0)
-        self.zero_counter(now)
+        self.train = self._resting(0, 0)
+        self.zero_counter(0)
 
     def reset_settings(self, variant: Variant, interface: Interface) -> None:
         """Settings after power-up and reset; speeds in full steps/s as commands give them."""

@@ -31,9 +31,9 @@ class Execution(Protocol):
     controller: ProgramController
     now: Nanos
     stack: deque[tuple[int, Nanos]]
-    effects: int
     forgotten: bool
     handling: bool
+    has_effect: bool
     waiting: bool
     not_before: Nanos
 

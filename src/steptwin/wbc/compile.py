@@ -121,7 +121,7 @@ class _Compiler:
 
             def set_quietly(m: Execution, cells: Cells) -> int:
                 if write(m.controller, taken(value(m, cells)), m.now):
-                    m.effects += 1
+                    m.has_effect = True
                 return following
 
             return set_quietly
@@ -132,7 +132,7 @@ class _Compiler:
             number = taken(value(m, cells))
             if not write(m.acting(), number, m.now):
                 return following
-            m.effects += 1
+            m.has_effect = True
             return around
 
         return set_register
@@ -346,7 +346,7 @@ def _acting(act: Callable[[Execution, Cells], None], following: int) -> StepCode
 
     def step(m: Execution, cells: Cells) -> int:
         act(m, cells)
-        m.effects += 1
+        m.has_effect = True
         return around
 
     return step

@@ -66,9 +66,9 @@ class Interpreter(Stateful):
         "acted",
         "cells",
         "due",
-        "effects",
         "forgotten",
         "handling",
+        "has_effect",
         "not_before",
         "now",
         "paused_at",
@@ -99,8 +99,8 @@ class Interpreter(Stateful):
         """The moment of the statement being executed."""
         self.acted = False
         """A statement has acted on the controller since this was set to False."""
-        self.effects = 0
-        """Number of changes outside the cells since the mark."""
+        self.has_effect = False
+        """Something outside the cells has changed since the mark."""
         self._moment: Nanos = -1
         self._spent = 0
         """Statements executed at that moment, also before a restart by the program itself."""
@@ -403,7 +403,7 @@ class Interpreter(Stateful):
         """Begin to record at ``now``. Returns the number of jumps backwards that are not marked after it."""
         self._trail = []
         self._mark = now
-        self.effects = 0
+        self.has_effect = False
         return 0 if self._marks < MARKS else MOST_UNMARKED
 
     def _record(self, code: Code, trail: list[Visit], until: Nanos) -> bool:
@@ -415,7 +415,7 @@ class Interpreter(Stateful):
             if trail and visit.step <= trail[-1].step:
                 again = next((i for i, earlier in enumerate(trail) if earlier.step == visit.step), None)
                 if again is not None:
-                    if self.effects == 0 and self._close(code, trail[again:], visit):
+                    if not self.has_effect and self._close(code, trail[again:], visit):
                         return False
                     break
             trail.append(visit)
