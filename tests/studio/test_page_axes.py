@@ -24,6 +24,25 @@ def test_an_axis_is_enabled_and_moved(studio: Studio) -> None:
     until(lambda: studio.at(1) == 17.5, "the axis has gone back by 2.5 mm")
 
 
+def test_a_move_that_is_ignored_says_why(studio: Studio) -> None:
+    page = studio.page()
+    page.get_by_label("Target M1").fill("20")
+    button(page, "Move M1 to").click()
+    expect(page.get_by_role("alert").last).to_contain_text("position command ignored: M1 is not enabled")
+    assert studio.at(1) == 0.0
+
+
+def test_a_move_while_time_is_paused_says_when_it_begins(studio: Studio) -> None:
+    page = studio.page()
+    enable(page)
+    button(page, "Pause time").click()
+    page.get_by_label("Target M1").fill("20")
+    button(page, "Move M1 to").click()
+    expect(page.get_by_role("alert").last).to_contain_text("Time is paused: M1 moves when it runs again.")
+    button(page, "Let time go on").click()
+    until(lambda: studio.at(1) == 20.0, "the axis is at 20 mm")
+
+
 def test_a_jog_lasts_as_long_as_it_is_held(studio: Studio) -> None:
     page = studio.page()
     enable(page)
@@ -55,6 +74,9 @@ def test_a_program_that_is_in_the_way_of_a_jog_is_paused_there(start_studio: Cal
     page.mouse.down()
     until(lambda: studio.at(1) > there, "the axis jogs")
     page.mouse.up()
+    expect(page.get_by_text("The program of table is paused.")).to_be_visible()
+    button(page, "Resume the program of table").click()
+    expect(button(page, "Pause the program of table")).to_be_visible()
     studio.close()
     assert studio.complaints == []
 
