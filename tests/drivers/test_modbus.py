@@ -417,3 +417,17 @@ def test_after_a_reset_nothing_is_awaited(over: str) -> None:
         if is_reset:
             master.reset()
         assert master.receive(frame, MILLISECOND) == (None if is_reset else answer)
+
+
+@pytest.mark.parametrize(("request_", "frame", "answer"), ANSWERS)
+def test_a_whole_answer_alone_is_taken_without_a_search(
+    monkeypatch: pytest.MonkeyPatch, request_: ReadRequest | WriteCoilRequest, frame: bytes, answer: bytes
+) -> None:
+    """That is what nearly always comes, so it costs little."""
+    monkeypatch.setattr(RtuMaster, "_found", lambda *_: pytest.fail("an answer was searched for"))
+    monkeypatch.setattr(mbap.TcpFramer, "feed", lambda *_: pytest.fail("the framer was asked"))
+    assert asked(request_).receive(frame, 1) == answer
+    master = TcpMaster()
+    for number in (1, 2):
+        master.start(ModbusQuery(1, request_), 0, urgent=False)
+        assert master.receive(mbap.encode_frame(number, 1, answer), 1) == answer

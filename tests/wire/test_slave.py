@@ -24,7 +24,7 @@ from steptwin.wire.pdu import (
     answer,
     encode_request,
 )
-from steptwin.wire.slave import FrameDirection, RtuSlavePort, SlaveDevice, TcpSlavePort
+from steptwin.wire.slave import FrameDirection, RtuSlavePort, SlaveDevice, SlavePort, TcpSlavePort
 from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
 
 NewBank = Callable[[], Any]
@@ -198,6 +198,39 @@ def test_mic_1_a_refusal_of_function_0_is_counted_on_tcp(*, is_observed: bool) -
     port = TcpSlavePort({1: Refusing()}, on_frame=(lambda now, way, raw: None) if is_observed else None)
     assert port.exchange(mbap.encode_frame(1, 1, b"\0\0"), 0) == mbap.encode_frame(1, 1, b"\x80\x01")
     assert (port.requests, port.exceptions, port.lost, port.unframed) == (1, 1, 0, 0)
+
+
+WHOLE = [
+    *(bytes((function, 0, 9, 0, 2)) for function in (1, 2, 3)),
+    *(bytes.fromhex(text) for text in ("050009FF00", "0600091234", "10 0009 0001 02 0102")),
+    bytes((16, 0, 9, 0, 123, 246)) + bytes(246),
+]
+LONGEST = bytes((16, 0, 9, 0, 123, 247)) + bytes(247)
+"""As long as a frame can be; its count does not match."""
+
+
+@pytest.mark.parametrize(("is_tcp", "pdu"), [*((way, pdu) for way in (False, True) for pdu in WHOLE), (False, LONGEST)])
+def test_a_whole_request_alone_is_answered_without_the_framer(
+    new_bank: NewBank, monkeypatch: pytest.MonkeyPatch, pdu: bytes, *, is_tcp: bool
+) -> None:
+    """That is what nearly always comes, so it costs little; in pieces it has the same answer."""
+    port: SlavePort = TcpSlavePort({1: new_bank()}) if is_tcp else RtuSlavePort({1: new_bank()})
+    request = mbap.encode_frame(7, 1, pdu) if is_tcp else with_crc(b"\1" + pdu)
+    assert port.exchange(request[:3], 0) == b""
+    answer = port.exchange(request[3:], 0)
+    assert len(answer) >= 5
+    for framer in (rtu.RtuFramer, mbap.TcpFramer):
+        monkeypatch.setattr(framer, "feed", lambda *_: pytest.fail("the framer was asked"))
+    assert port.exchange(request, 10) == answer
+    port.on_write = lambda *_: None
+    if not is_tcp or pdu[0] in (1, 2, 3):
+        assert port.exchange(request, 20) == answer
+
+
+@pytest.mark.parametrize("function", [0, 7])
+def test_mic_1_other_functions_of_the_size_of_a_request_are_not_answered_as_one(bank: Any, function: int) -> None:
+    assert RtuSlavePort({1: bank}).exchange(with_crc(bytes((1, function, 0, 9, 0, 1))), 0) == b""
+    assert bank.executed == []
 
 
 def test_several_units_on_one_line(new_bank: NewBank) -> None:
