@@ -19,7 +19,7 @@ from steptwin.wire.pdu import GATEWAY_TARGET_FAILED, READS, REFUSED, WRITE_MULTI
 
 _PLAIN = bytes(3)
 """Protocol 0 and a length below 256, in an MBAP header from its third byte."""
-_HEADERS = {size: bytes((0, 0, 0, size - 6)) for size in range(8, 260)}
+_HEADERS = {size: bytes((0, 0, 0, size - 6)) for size in range(8, 261)}
 """The third to the sixth byte of an MBAP header, by the size of the whole frame."""
 _LENGTHS = [bytes((size + 1,)) for size in range(255)]
 """The low byte of the length in the header of a response, by the size of its PDU."""
@@ -110,9 +110,8 @@ def execute_frame(
         broadcast(devices.values(), raw[1:-2], now)
         if on_write is not None and function in WRITES:
             on_write(now, unit, raw[1:-2], b"")
-        return b""
     device = devices.get(unit)
-    if device is None:
+    if device is None:  # a foreign unit, or a broadcast
         return b""
     response = device.execute(raw[1:-2], now)
     if on_write is not None and function not in READS:

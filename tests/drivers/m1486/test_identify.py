@@ -151,3 +151,19 @@ def test_the_answer_in_what_was_heard(said: str, heard: bytes, answer: bytes) ->
 def test_all_rates_that_pins_choose_are_tried_the_usual_ones_first() -> None:
     assert CHIP_BAUDS[:2] == (4800, 9600)
     assert sorted(CHIP_BAUDS) == sorted({one.baud(br1, br0) for one in VARIANTS for br1 in (0, 1) for br0 in (0, 1)})
+
+
+def test_a_chip_whose_buffer_is_nearly_full_is_busy() -> None:
+    """What took the last places of it comes back inverted, and nothing else does."""
+    wire = ChipWire("B")
+    wire.severed = True
+
+    def answer(data: bytes) -> None:
+        if b"g" in data:
+            wire.inject(b"^")
+        for number, ends in ((b"x5", b"0\r"), (b"x9", b"7\r")):
+            if number in data:
+                wire.inject(bytes(~byte & 0xFF for byte in ends))
+
+    wire.before_each = answer
+    assert finish(scan_chips(search_line(wire))) == [FoundChip(5, None)]

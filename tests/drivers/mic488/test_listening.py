@@ -9,6 +9,7 @@ from steptwin.drivers.mic488.listening import RtuListener, TcpListener
 from steptwin.machine import MILLISECOND
 from steptwin.mic488.registermap import DataType
 from steptwin.wire import mbap
+from steptwin.wire.crc import with_crc
 from steptwin.wire.rtu import BURSTY_GAP_NS
 from steptwin.wire.slave import FrameDirection
 
@@ -131,3 +132,11 @@ def test_an_answer_whose_question_was_not_heard_is_told() -> None:
     assert [h.direction for h in heard] == [FrameDirection.OUT, FrameDirection.IN, FrameDirection.OUT]
     assert meanings(heard)[1:] == ["→ unit 1: read M1_POS_ACT", "← unit 1: read M1_POS_ACT = 12.5 u"]
     assert meanings(heard)[0].startswith("← unit 1: ")
+
+
+def test_a_whole_frame_of_an_unknown_function_is_told_as_it_is() -> None:
+    ear, heard = listener()
+    frame = with_crc(b"\x01\x63\x05")
+    ear.feed(frame, 0)
+    ear.expire(BURSTY_GAP_NS)
+    assert [(h.time, h.direction, h.unit, h.raw, h.meaning) for h in heard] == [(BURSTY_GAP_NS, None, None, frame, "no frame")]

@@ -88,6 +88,17 @@ def test_what_the_controller_has_not_kept_is_told() -> None:
         mic.restore_snapshot(kept)
 
 
+def test_changes_are_in_the_order_of_the_snapshot_but_for_data_type() -> None:
+    mic = driver(Wire())
+    kept = mic.take_snapshot()
+    for name, value in (("OUT2", 1), ("M2_ACC", 7.0), ("M1_ACC", 8.0), ("DATA_TYPE", 1)):
+        mic.set(name, value)
+    order = ("M2_ACC", "OUT2", "DATA_TYPE", "M1_ACC")
+    values = {name: kept.values[name] for name in order}
+    found = mic.restore_snapshot(replace(kept, values=values), outputs=True, dry_run=True)
+    assert [change.item.name for change in found] == ["DATA_TYPE", "M2_ACC", "OUT2", "M1_ACC"]
+
+
 @pytest.mark.parametrize("backwards", [False, True])
 def test_values_are_put_back_with_the_data_type_they_were_read_with(backwards: bool) -> None:
     """Whatever the order of the names in the file."""

@@ -52,7 +52,7 @@ class AsyncM1486Jog:
         self._velocity = round(abs(velocity) * chip.scale_u / (FULL_STEP * chip.variant.clock))
         self._before = chip.settings.velocity
         self._distance_u = 0
-        self._counter = 0
+        self._counter: int  # after the present move
         self._permission: Permission | None = None
         """For the next move; it ends with a stop, or when the program was suspended."""
         self.end: str | None = None

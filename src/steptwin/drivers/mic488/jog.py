@@ -19,7 +19,7 @@ from typing import Self
 
 from steptwin.drivers.exchange import Overtaken, SentLate, TooLate
 from steptwin.drivers.mic488.failures import NotReady, Unconfirmed
-from steptwin.drivers.mic488.motion import MotionCommand, MotionKind, MoveEnd, Reason, reason_of, status_text
+from steptwin.drivers.mic488.motion import MotionKind, MoveEnd, Reason, end_of, status_text
 from steptwin.drivers.mic488.unit import ControlRegisters, Unit
 from steptwin.drivers.mic488.waiting import dynamics
 from steptwin.drivers.permission import Permission
@@ -170,8 +170,7 @@ class AsyncMic488Jog:
         if status in (AxisStatus.VELOCITY, AxisStatus.HOMING):
             self._stopped(Reason.DIVERTED, status_text(status))
             return
-        motion = MotionCommand(MotionKind.DISTANCE, self._reach_u, self._held_ns or 0, AxisStatus.ON)
-        reason = reason_of(status, motion)
+        reason = end_of(status)
         if reason is Reason.TARGET or status == AxisStatus.CORRECTION:
             reason = Reason.NOT_HELD
         self._stopped(reason, status_text(status) if reason is Reason.STOPPED else "")

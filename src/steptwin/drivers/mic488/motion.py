@@ -91,11 +91,16 @@ def status_text(code: int) -> str:
     return AXIS_STATUS_TEXTS.get(code, f"unknown status {code}")
 
 
+def end_of(status: int) -> Reason:
+    """Why an axis is at rest that has moved."""
+    return _REASONS.get(status, Reason.STOPPED)
+
+
 def reason_of(status: int, motion: MotionCommand | None) -> Reason:
     """Why an axis is at rest; `Reason.REST` without a known motion or after a velocity of 0."""
     if status == AxisStatus.ON and (motion is None or (motion.kind is MotionKind.VELOCITY and motion.value_u == 0.0)):
         return Reason.REST
-    return _REASONS.get(status, Reason.STOPPED)
+    return end_of(status)
 
 
 def travel_s(distance_u: float, velocity_u: float, acc_u: float, dec_u: float, vmax_u: float) -> float | None:
