@@ -202,3 +202,16 @@ def test_a_connection_is_used_by_tasks(listener: Callable[[Callable[[socket.sock
         return answer
 
     assert asyncio.run(main()) == b"answer"
+
+
+def test_an_end_that_does_not_answer_is_waited_for_three_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
+    waited: list[float] = []
+
+    def silent(address: object, timeout_s: float) -> socket.socket:
+        waited.append(timeout_s)
+        raise TimeoutError
+
+    monkeypatch.setattr(socket, "create_connection", silent)
+    with pytest.raises(LineLost, match=r"^cannot connect to tcp://127\.0\.0\.1:9: no answer within 3 s$"):
+        TcpEndpoint("tcp", "127.0.0.1", 9).open()
+    assert waited == [3.0]

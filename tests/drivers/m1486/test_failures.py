@@ -6,7 +6,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
-from chip_rig import KNOWN, ChipWire, chip_driver, typed
+from chip_rig import KNOWN, ChipWire, Fault, chip_driver, typed
+from transcripts import suspending
 
 from steptwin.drivers import SentLate, Unconfirmed
 from steptwin.drivers.m1486 import (
@@ -15,6 +16,7 @@ from steptwin.drivers.m1486 import (
     ChipReason,
     ChipSettings,
     DoubtfulMove,
+    Garbled,
     NoEcho,
     PositionUnknown,
     Restarted,
@@ -235,3 +237,28 @@ def test_a_chip_that_did_not_answer_is_asked_three_times_whether_it_still_echoes
         chip.counter()
     assert asked == 3 + 2
     assert typed(wire).startswith("u20% t41% t41% t41t41 t41 ")
+
+
+def test_a_move_that_was_sent_too_late_leaves_the_position_unknown() -> None:
+    """The program was suspended immediately before the CR of R; the motor is stopped afterwards."""
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    chip.configure(**KNOWN)
+    suspending(wire)(18, 1000.0, "sending")
+    with pytest.raises(SentLate):
+        chip.move_by(100.0)
+    assert typed(wire).endswith("r k ")
+    wire.sleep(5.0)
+    with pytest.raises(PositionUnknown):
+        chip.position()
+
+
+@pytest.mark.parametrize("call", [lambda chip: chip.command("t6"), lambda chip: chip.set_output(6, True)])
+def test_a_command_before_a_comment_that_came_by_a_fault_may_have_acted(call: Callable[[M1486], object]) -> None:
+    """A semicolon hides what follows from the chip, also what would make the command invalid (M-1)."""
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    wire.put(Fault("to chip", 5, "semicolon"))
+    with pytest.raises(Garbled) as garbled:
+        call(chip)
+    assert garbled.value.uncertain
