@@ -1,7 +1,10 @@
-"""Changes of many controllers behind OPC UA and MQTT at once: how many in a second, and how late independent clients see them.
+"""Changes of many controllers behind OPC UA and MQTT at once: what a change takes, and how late independent clients see it.
 
-``CONTROLLERS``, ``RATE`` (changes of each in a second), ``SECONDS`` and ``GATEWAYS`` (``opcua``, ``mqtt``, ``sparkplug``) in the
-environment make it another one. The process with world and gateways has one processor, the clients and the broker another one.
+First what a change takes of a processor: without a gateway, with each of them, with both. Changes come then in batches with
+pauses, in which all is done, so that this means something on a busy computer. Then how late clients see changes that come
+evenly, with the gateways ``GATEWAYS`` (``opcua,mqtt``). ``CONTROLLERS``, ``RATE`` (changes of each in a second; 0: only the
+first part) and ``SECONDS`` in the environment make it another one. The process with world and gateways has one processor, the
+clients and the broker another one.
 
 A change is a level at an analog input, which is the time at which it was set: client and server have the same clock.
 """
@@ -36,6 +39,8 @@ ROUND_MS = 10_000
 """Levels begin anew: 0 to 10 V."""
 TICK_S = 0.01
 SETTLE_S = 5.0
+BATCH, BATCHES, PAUSE_S = 200, 50, 0.2
+"""At 10 changes of 1000 controllers in a second so many come in the publishing interval of a client, 20 ms."""
 
 
 def size(name: str, usual: int) -> int:
@@ -56,11 +61,31 @@ def serve(controllers: int, rate: int, seconds: int, file: Path) -> None:
     async def change(running: Running) -> None:
         begin = asyncio.Event()
         asyncio.get_running_loop().add_signal_handler(signal.SIGUSR1, begin.set)
-        tasks.append(asyncio.create_task(drive(running, controllers, rate, seconds, begin)))
+        driven = drive(running, controllers, rate, seconds, begin) if rate else drive_batches(running, controllers, begin)
+        tasks.append(asyncio.create_task(driven))
 
     tasks: list[asyncio.Task[None]] = []
     options = UpOptions(world=file, trace="off", ready_file=file.with_name("ready.json"))
     up_with(World.from_toml(file.read_text()), options, change)
+
+
+async def drive_batches(running: Running, controllers: int, begin: asyncio.Event) -> None:
+    """What the process takes without changes in the same time does not count."""
+    await begin.wait()
+    gc.collect()
+    gc.freeze()
+    taken: list[float] = []
+    for count in (0, BATCH):
+        cpu, began, done = time.process_time(), time.monotonic(), 0
+        for number in range(BATCHES):
+            volts = (time.time_ns() // 1_000_000 % ROUND_MS) / 1000
+            if count:
+                running.control.do(Set(tuple((f"t{(number * count + one) % controllers}", PIN, volts) for one in range(count))))
+            done += count
+            await asyncio.sleep(PAUSE_S)
+        wall = time.monotonic() - began
+        taken.append((time.process_time() - cpu) / wall)
+    print(json.dumps({"changes": done, "cpu_s": (taken[1] - taken[0]) * wall, "wall_s": wall}), flush=True)
 
 
 async def drive(running: Running, controllers: int, rate: int, seconds: int, begin: asyncio.Event) -> None:
@@ -165,11 +190,12 @@ def measure(gateways: list[str], controllers: int, rate: int, seconds: int) -> N
             one.terminate()
             one.wait()
         per = found["cpu_s"] / found["changes"] * 1e6
+        title = f"{controllers} MIC488, {' and '.join(gateways) or 'no gateway'}"
+        if not rate:
+            print(f"{title}: {per:.0f} us of processor time for a change")
+            return
         used = 100 * found["cpu_s"] / found["wall_s"]
-        print(
-            f"{controllers} MIC488, {' and '.join(gateways)}: {found['changes'] / found['wall_s']:.0f} changes/s, "
-            f"{per:.0f} us of processor time for each, {used:.0f} % of a processor"
-        )
+        print(f"{title}: {found['changes'] / found['wall_s']:.0f} changes/s, {used:.0f} % of a processor")
         if "opcua" in gateways:
             rows = [tuple(map(float, line.split())) for line in (folder / "opcua").read_text().splitlines()]
             told("OPC UA (node-opcua)", [late_ms(at, volts) for at, volts in rows if volts], found["wall_s"])
@@ -180,9 +206,12 @@ def measure(gateways: list[str], controllers: int, rate: int, seconds: int) -> N
 def main() -> None:
     if shutil.which("node") is None or shutil.which("mosquitto") is None:
         raise SystemExit("node and mosquitto are needed")
-    gateways = os.environ.get("GATEWAYS", "opcua,mqtt").split(",")
-    measure(gateways, size("CONTROLLERS", 1000), size("RATE", 10), size("SECONDS", 20))
+    controllers, rate = size("CONTROLLERS", 1000), size("RATE", 10)
+    for some in ([], ["opcua"], ["mqtt"], ["opcua", "mqtt"]):
+        measure(some, controllers, 0, 0)
+    if rate:
+        measure(os.environ.get("GATEWAYS", "opcua,mqtt").split(","), controllers, rate, size("SECONDS", 20))
 
 
 if __name__ == "__main__":
-    serve(int(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]), Path(sys.argv[4]))
+    serve(int(sys.argv[1]), int(float(sys.argv[2])), int(sys.argv[3]), Path(sys.argv[4]))

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Iterable
 from typing import Any
 
 import pytest
 from aiomqtt import MqttError
 
-from steptwin.gateways.mqtt.connection import AT_ONCE, Publication, _ClientLink
+from steptwin.gateways.mqtt.connection import AT_ONCE, Publication, _ClientLink, publish_packet
 
 
 class SomeClient:
@@ -16,9 +17,9 @@ class SomeClient:
         self.seen: list[tuple[str, str]] = []
         self.is_lost = False
 
-    def send(self, one: Publication) -> bool:
+    def send(self, all_of: Iterable[Publication]) -> bool:
         if not self.is_lost:
-            self.seen.append(("sent", one.topic))
+            self.seen += [("sent", one.topic) for one in all_of]
         return not self.is_lost
 
     async def publish(self, topic: str, *given: Any) -> None:
@@ -40,6 +41,15 @@ def test_those_with_confirmation_stay_in_their_order() -> None:
     all_of = [Publication("a", b""), Publication("b", b"", qos=1), Publication("c", b""), Publication("d", b"", correlation=b"1")]
     asyncio.run(_ClientLink(client).publish_all(all_of))
     assert client.seen == [("sent", "a"), ("waited for", "b"), ("sent", "c"), ("waited for", "d")]
+
+
+@pytest.mark.parametrize(
+    ("payload", "length"), [(b"", "04"), (b"x" * 123, "7f"), (b"x" * 124, "80 01"), (b"x" * 16380, "80 80 01")]
+)
+def test_the_packet_of_a_message(payload: bytes, length: str) -> None:
+    """MQTT 5, 3.3 and 1.5.5: type 3 with RETAIN, remaining length in groups of seven bits, topic, no properties, payload."""
+    packet = publish_packet(Publication("t", payload, retain=True))
+    assert packet == bytes.fromhex(f"31 {length} 00 01 74 00") + payload
 
 
 def test_a_lost_broker_is_told() -> None:

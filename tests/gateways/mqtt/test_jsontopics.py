@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import json
+from typing import Any
 
 import pytest
 from gateway_rig import GatewayWorld
 
 from steptwin.errors import Misuse
 from steptwin.gateways.mqtt.homeassistant import discovery
-from steptwin.gateways.mqtt.jsontopics import Topics, encode_sample
+from steptwin.gateways.mqtt.jsontopics import Group, GroupText, Topics
 from steptwin.gateways.sampling import Sample, Sampler
+from steptwin.world.script import Set
 
 TEXT = """
     [[mic488]]
@@ -53,9 +55,13 @@ def test_a_controller_cannot_be_called_like_a_topic(name: str) -> None:
         topics(f'[[mic488]]\nname = "{name}"\n')
 
 
+def values(group: Group, taken: Sample) -> dict[str, Any]:
+    return dict(zip(group.names(taken.machine), group.values(taken), strict=True))
+
+
 def test_values_have_their_types() -> None:
     world, found = topics()
-    shown = {group.name: group.values(sample(world, "table")) for group in found.groups["table"]}
+    shown = {group.name: values(group, sample(world, "table")) for group in found.groups["table"]}
     assert shown[""] == {"answers": True, "status": "ok", "status_code": 0, "status_level": "ok"}
     assert (shown["pins"]["IN3"], shown["pins"]["AIN1"]) == (False, 0.0)
     assert shown["registers"] == {"USER_REGISTER[5]": 0.0}
@@ -66,21 +72,38 @@ def test_a_controller_that_is_silent_has_unknown_values() -> None:
     world, found = topics()
     world.silent.add("table")
     taken = sample(world, "table")
-    assert found.groups["table"][0].values(taken) == {
+    assert values(found.groups["table"][0], taken) == {
         "answers": False,
         "status": None,
         "status_code": None,
         "status_level": None,
     }
-    assert set(found.groups["table"][2].values(taken).values()) == {None}
+    assert set(found.groups["table"][2].values(taken)) == {None}
 
 
 def test_a_payload_has_the_moment_of_its_values() -> None:
     world, found = topics()
     taken = sample(world, "drum")
-    payload = json.loads(encode_sample(found.groups["drum"][0].values(taken), taken))
+    payload = json.loads(GroupText(found.groups["drum"][0], "drum").changed(taken) or b"")
     assert payload["at"].endswith("Z")
     assert payload["status"] == "ok"
+
+
+def test_a_text_has_the_present_values_after_any_changes() -> None:
+    world, found = topics()
+    (group,) = (group for group in found.groups["table"] if group.name == "pins")
+    text = GroupText(group, "table")
+    assert text.changed(sample(world, "table")) is not None
+    assert text.changed(sample(world, "table")) is None
+    for level in (2.5, 7.0, 0.0):
+        world.inner.do(Set((("table", "AIN1", level), ("table", "IN4", float(level > 5.0)))))
+        taken = sample(world, "table")
+        payload = json.loads(text.changed(taken) or b"")
+        assert payload.pop("at")
+        assert payload == values(group, taken)
+    world.silent.add("table")
+    silent = json.loads(text.changed(sample(world, "table")) or b"")
+    assert {value for name, value in silent.items() if name != "at"} == {None}
 
 
 def test_the_description_has_units_and_what_can_be_written() -> None:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Iterator
+from typing import Any
 
+from asyncua import ua
+from asyncua.server.address_space import AttributeValue
 from gateway_rig import GatewayWorld
 
-from steptwin.gateways.opcua.addressspace import PointNode, node_id
-from steptwin.gateways.opcua.service import WatchedNodes
-from steptwin.gateways.points import PointValue, points_of
+from steptwin.gateways.opcua.service import WatchedNode, WatchedNodes
+from steptwin.gateways.points import GatewayPoint, PointValue, points_of
 from steptwin.gateways.sampling import Sample, Sampler
 from steptwin.world.script import Set
 
@@ -22,15 +24,22 @@ class Rig:
         self.sampler = Sampler(self.world, {})
         self.nodes = WatchedNodes()
         points = {point.name: point for point in points_of(self.world.description.machines[0], self.world.description)}
-        self.all_of = {name: PointNode(node_id(f"table.{name}"), points[name]) for name in WATCHED}
-        for node in self.all_of.values():
-            self.nodes.add(node)
+        self.all_of: dict[str, tuple[GatewayPoint, Any]] = {
+            name: (points[name], AttributeValue(ua.DataValue())) for name in WATCHED
+        }
+        self.notified: list[Any] = []
+        for point, attribute in self.all_of.values():
+            attribute.datachange_callbacks[1] = self._notified
+            self.nodes.add(point, attribute)
+
+    async def _notified(self, handle: int, value: Any) -> None:
+        self.notified.append((handle, value.Value.Value))
 
     def sample(self) -> Sample:
         return asyncio.run(self.sampler.take("table"))
 
     def changes(self) -> dict[str, PointValue]:
-        found: Iterator[tuple[PointNode, PointValue]] = self.nodes.changes(self.sample())
+        found: Iterator[tuple[WatchedNode, PointValue]] = self.nodes.changes(self.sample())
         return {node.point.name: value for node, value in found}
 
 
@@ -40,7 +49,7 @@ def test_only_what_has_changed() -> None:
     assert rig.changes() == {}
     rig.world.inner.do(Set((("table", "IN3", 1.0),)))
     assert rig.changes() == {"pins.IN3": 1.0}
-    rig.nodes.add(rig.all_of["pins.IN4"])
+    rig.nodes.add(*rig.all_of["pins.IN4"])
     assert rig.changes() == {}
 
 
@@ -55,6 +64,18 @@ def test_what_is_not_known_and_is_known_again() -> None:
 
 def test_what_nobody_follows_is_left_out() -> None:
     rig = Rig()
-    assert rig.nodes.keep(lambda node: node == node_id("table.pins.IN3"))
+    for name in ("pins.IN4", "M1.position", "program.state"):
+        rig.all_of[name][1].datachange_callbacks.clear()
+    assert rig.nodes.keep_followed()
     assert rig.changes() == {"pins.IN3": 0.0}
-    assert not rig.nodes.keep(lambda node: False)
+    rig.all_of["pins.IN3"][1].datachange_callbacks.clear()
+    assert not rig.nodes.keep_followed()
+
+
+def test_who_follows_is_told_and_who_reads_gets_the_same_value() -> None:
+    rig = Rig()
+    sample = rig.sample()
+    for node, value in rig.nodes.changes(sample):
+        asyncio.run(node.notify(sample, value))
+    assert rig.notified == [(1, False), (1, False), (1, 0.0), (1, "stopped")]
+    assert rig.all_of["program.state"][1].value.Value.Value == "stopped"

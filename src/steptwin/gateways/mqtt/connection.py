@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 from aiomqtt import Client, Message, MqttError, ProtocolVersion, Will
-from paho.mqtt.enums import MQTTErrorCode
+from paho.mqtt.enums import MessageType, MQTTErrorCode
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 from paho.mqtt.subscribeoptions import SubscribeOptions
@@ -212,9 +212,28 @@ class BrokerConnection:
 
 
 class _SendingClient(Client):
-    def send(self, one: Publication) -> bool:
-        """Publish with QoS 0, without waiting until it has left. Whether that is possible."""
-        return self._client.publish(one.topic, one.payload, 0, one.retain).rc == MQTTErrorCode.MQTT_ERR_SUCCESS
+    def send(self, all_of: Iterable[Publication]) -> bool:
+        """Publish with QoS 0, without waiting until they have left. Whether that is possible.
+
+        The library makes locks, properties and a result for each message: together they are one piece of bytes for it. QoS 1
+        tells it that nobody waits for this piece."""
+        if not self._client.is_connected():
+            return False
+        packets = b"".join(map(publish_packet, all_of))
+        return self._client._packet_queue(MessageType.PUBLISH, packets, 0, 1) == MQTTErrorCode.MQTT_ERR_SUCCESS
+
+
+def publish_packet(one: Publication) -> bytes:
+    """The packet PUBLISH of a message with QoS 0 and without properties (MQTT 5, 3.3)."""
+    topic = one.topic.encode()
+    rest, length = len(topic) + len(one.payload) + 3, bytearray()
+    while True:
+        rest, seven = divmod(rest, 128)
+        length.append(seven | (128 if rest else 0))
+        if not rest:
+            break
+    head = MessageType.PUBLISH | one.retain
+    return b"".join((bytes((head,)), length, len(topic).to_bytes(2), topic, b"\0", one.payload))
 
 
 class _ClientLink:
@@ -233,13 +252,21 @@ class _ClientLink:
     async def publish_all(self, all_of: Iterable[Publication]) -> None:
         """The library waits for each message by itself, which takes longer than the message. They leave in their order, so when
         one has left, all before it have."""
+        together: list[Publication] = []
         for one in all_of:
-            is_simple = one.qos == 0 and one.correlation is None and self._on_their_way < AT_ONCE
-            if is_simple and self._client.send(one):
+            if one.qos == 0 and one.correlation is None and self._on_their_way < AT_ONCE:
+                together.append(one)
                 self._on_their_way += 1
             else:
+                await self._send(together)
                 await self.publish(one)
                 self._on_their_way = 0
+        await self._send(together)
+
+    async def _send(self, together: list[Publication]) -> None:
+        if together and not self._client.send(together):
+            await self.publish(together[0])  # raises what is wrong
+        together.clear()
 
     async def subscribe(self, topic: str, *, retained: bool) -> None:
         handling = SubscribeOptions.RETAIN_SEND_ON_SUBSCRIBE if retained else SubscribeOptions.RETAIN_DO_NOT_SEND

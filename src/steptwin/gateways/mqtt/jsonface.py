@@ -21,11 +21,11 @@ from steptwin.gateways.mqtt.jsontopics import (
     EVENTS,
     INSTANCE,
     ONLINE,
+    GroupText,
     Topics,
     encode,
-    encode_sample,
 )
-from steptwin.gateways.points import CLOCK, PointValue
+from steptwin.gateways.points import CLOCK
 from steptwin.gateways.sampling import Sample, Sampler
 from steptwin.machine import SECOND
 from steptwin.subject.dispatch import failure
@@ -52,10 +52,8 @@ class JsonFace:
         self._commands = commands
         self._following = subject.follow(Filter(KINDS), spec.store)
         self._instance = secrets.token_hex(8)
-        self._shown: dict[str, Mapping[str, PointValue]] = {}
-        """What has been published in this session, by topic."""
-        self._parts: dict[str, object] = {}
-        """Where they were taken from."""
+        self._texts: dict[str, list[tuple[str, GroupText]]] = {}
+        """What has been published in this session, by controller: topics and texts."""
         self._doing: set[asyncio.Task[None]] = set()
         self._others: dict[str, bytes] = {}
         """What is known of whoever uses these topics, until this gateway does."""
@@ -113,8 +111,7 @@ class JsonFace:
 
     def lost(self) -> None:
         self._is_online = False
-        self._shown.clear()
-        self._parts.clear()
+        self._texts.clear()
         self._commands.lost()
 
     # ------------------------------------------------------------------ values and events
@@ -122,15 +119,13 @@ class JsonFace:
     async def _publish(self, link: BrokerLink, samples: list[Sample]) -> None:
         found: list[Publication] = []
         for sample in samples:
-            for group in self._topics.groups[sample.machine]:
-                part = group.part(sample)
-                if part is not None and self._parts.get(group.topic) is part:
-                    continue
-                self._parts[group.topic] = part
-                values = group.values(sample)
-                if self._shown.get(group.topic) != values:
-                    self._shown[group.topic] = values
-                    found.append(Publication(group.topic, encode_sample(values, sample), retain=True))
+            machine = sample.machine
+            if machine not in self._texts:
+                self._texts[machine] = [(group.topic, GroupText(group, machine)) for group in self._topics.groups[machine]]
+            for topic, group in self._texts[machine]:
+                payload = group.changed(sample)
+                if payload is not None:
+                    found.append(Publication(topic, payload, retain=True))
         await link.publish_all(found)
 
     async def _publish_events(self, link: BrokerLink) -> None:

@@ -44,11 +44,46 @@ class Group:
         """What its values are taken from: the same object in two samples between which nothing has changed in it."""
         return None if sample.state is None else self.points[0].part(sample.state)
 
-    def values(self, sample: Sample) -> dict[str, PointValue]:
-        """By name; all unknown where the controller does not answer."""
+    def names(self, machine: str) -> list[str]:
+        names = [point.path[-1] for point in self.points]
+        return names if self.name or machine == CLOCK else [*names, ANSWERS]
+
+    def values(self, sample: Sample) -> list[PointValue]:
+        """In the order of `names`; all unknown where the controller does not answer."""
         part = self.part(sample)
-        found = {point.path[-1]: None if part is None else point.shown_in(part) for point in self.points}
-        return found if self.name or sample.machine == CLOCK else {ANSWERS: sample.state is not None, **found}
+        found: list[PointValue] = [None if part is None else point.shown_in(part) for point in self.points]
+        if not self.name and sample.machine != CLOCK:
+            found.append(sample.state is not None)
+        return found
+
+
+class GroupText:
+    """The values of a group that were published last, as JSON: a change of one makes one of them anew."""
+
+    def __init__(self, group: Group, machine: str) -> None:
+        self._group = group
+        self._names = [encode(name).decode() for name in group.names(machine)]
+        self._part: object = None
+        self._values: list[PointValue] = []
+        self._texts: list[str] = []
+
+    def changed(self, sample: Sample) -> bytes | None:
+        """The group with the moment of ``sample``; None where it is as before."""
+        part = self._group.part(sample)
+        if part is not None and part is self._part:
+            return None
+        self._part = part
+        values, before = self._group.values(sample), self._values
+        if values == before:
+            return None
+        self._values = values
+        if not before:
+            self._texts = [f"{name}:{_text(value)}" for name, value in zip(self._names, values, strict=True)]
+        for number, (old, new) in enumerate(zip(before, values, strict=False)):
+            if old != new:
+                self._texts[number] = f"{self._names[number]}:{_text(new)}"
+        at = sample.at.isoformat(timespec="milliseconds").replace("+00:00", "Z")
+        return f'{{{",".join(self._texts)},"{AT}":"{at}"}}'.encode()
 
 
 class Topics:
@@ -120,9 +155,8 @@ def _described(group: Group) -> dict[str, object]:
 _ENCODER = json.JSONEncoder(ensure_ascii=False, separators=(",", ":"))
 
 
+_text = _ENCODER.encode
+
+
 def encode(value: Any) -> bytes:
-    return _ENCODER.encode(value).encode()
-
-
-def encode_sample(values: Mapping[str, PointValue], sample: Sample) -> bytes:
-    return encode({**values, AT: sample.at.isoformat(timespec="milliseconds").replace("+00:00", "Z")})
+    return _text(value).encode()

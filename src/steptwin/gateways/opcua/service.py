@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any
 
 from asyncua import ua
-from asyncua.server.address_space import AddressSpace
+from asyncua.server.address_space import AddressSpace, AttributeValue
 
 from steptwin.datasheet import Argument, Limits
 from steptwin.errors import LineFailure, Refusal
@@ -16,7 +16,7 @@ from steptwin.gateways.contract import GatewaySubject
 from steptwin.gateways.leases import JogLeases
 from steptwin.gateways.opcua.addressspace import ArrayNode, BoundMethod, PointNode
 from steptwin.gateways.opcua.nodetypes import data_value, number_of, status
-from steptwin.gateways.points import PointValue, State
+from steptwin.gateways.points import GatewayPoint, PointValue, State
 from steptwin.gateways.sampling import Sample, Sampler
 from steptwin.subject.commands import Jog, ReadPoints, StopAxes
 
@@ -24,46 +24,69 @@ ARRAY_PAUSE = 10
 """Arrays take long to read: they are looked at once in so many publications."""
 
 
+_NOTHING = object()
+
+
+class WatchedNode:
+    """A variable that clients follow: ``attribute`` has its value in the address space, ``shown`` is the last one."""
+
+    __slots__ = ("attribute", "point", "shown")
+
+    def __init__(self, point: GatewayPoint, attribute: AttributeValue) -> None:
+        self.point = point
+        self.attribute = attribute
+        self.shown: object = _NOTHING
+
+    @property
+    def is_followed(self) -> bool:
+        return bool(self.attribute.datachange_callbacks)
+
+    async def notify(self, sample: Sample, value: PointValue) -> None:
+        """As the library's `write_attribute_value`, which looks for the node and checks the type of each value."""
+        fresh = data_value(value, self.point.type, sample.at, is_answered=sample.state is not None)
+        self.attribute.value = fresh
+        for handle, call in list(self.attribute.datachange_callbacks.items()):
+            await call(handle, fresh)
+
+
 class WatchedNodes:
     """Variables of one controller that clients follow."""
 
     def __init__(self) -> None:
-        self._groups: dict[str, dict[ua.NodeId, PointNode]] = {}
-        self._shown: dict[ua.NodeId, PointValue] = {}
+        self._groups: dict[str, list[WatchedNode]] = {}
         self._state: State | None = None
         """Of the last sample; None: everything has to be looked at."""
 
-    def add(self, node: PointNode) -> None:
-        self._groups.setdefault(node.point.group, {})[node.id] = node
+    def add(self, point: GatewayPoint, attribute: AttributeValue) -> None:
+        group = self._groups.setdefault(point.group, [])
+        if not any(node.point is point for node in group):
+            group.append(WatchedNode(point, attribute))
         self._state = None
 
-    def keep(self, is_followed: Callable[[ua.NodeId], bool]) -> bool:
-        """Only those; whether there are any."""
-        groups = {name: {one: nodes[one] for one in nodes if is_followed(one)} for name, nodes in self._groups.items()}
+    def keep_followed(self) -> bool:
+        """Only those that are followed; whether there are any."""
+        groups = {name: [node for node in nodes if node.is_followed] for name, nodes in self._groups.items()}
         self._groups = {name: nodes for name, nodes in groups.items() if nodes}
-        self._shown = {node: value for node, value in self._shown.items() if is_followed(node)}
         return bool(self._groups)
 
-    def changes(self, sample: Sample) -> Iterator[tuple[PointNode, PointValue]]:
+    def changes(self, sample: Sample) -> Iterator[tuple[WatchedNode, PointValue]]:
         """Those with another value than before, and this value."""
         before, self._state = self._state, sample.state
-        if sample.state is None:
-            self._shown.clear()
-            yield from ((node, None) for nodes in self._groups.values() for node in nodes.values())
-            return
         for nodes in self._groups.values():
-            point = next(iter(nodes.values())).point
+            if sample.state is None:
+                for node in nodes:
+                    node.shown = _NOTHING
+                    yield node, None
+                continue
+            point = nodes[0].point
             part = point.part(sample.state)
             if before is not None and point.part(before) is part:
                 continue
-            for node in nodes.values():
+            for node in nodes:
                 value = node.point.of(part)
-                if self._shown.get(node.id, _NOTHING) != value:
-                    self._shown[node.id] = value
+                if node.shown != value:
+                    node.shown = value
                     yield node, value
-
-
-_NOTHING = object()
 
 
 class NodeService:
@@ -117,7 +140,8 @@ class NodeService:
             found = self._of_node.get(node)
             if found is not None:
                 machine, point = found
-                self._watched.setdefault(machine, WatchedNodes()).add(point)
+                attribute = self._space[node].attributes[ua.AttributeIds.Value]
+                self._watched.setdefault(machine, WatchedNodes()).add(point.point, attribute)
                 self._sampler.hasten(machine)
         self._sampler.watch(self._watched)
 
@@ -133,7 +157,7 @@ class NodeService:
             watched = self._watched.get(sample.machine)
             if watched is not None:
                 for node, value in watched.changes(sample):
-                    await self._write(sample, node, value)
+                    await node.notify(sample, value)
 
     async def publish_arrays(self) -> None:
         for node, left in list(self._watched_arrays.items()):
@@ -147,7 +171,7 @@ class NodeService:
             if not self._is_followed(node):
                 del self._watched_arrays[node]
         for machine, nodes in list(self._watched.items()):
-            if not nodes.keep(self._is_followed):
+            if not nodes.keep_followed():
                 del self._watched[machine]
         self._sampler.watch(self._watched)
 
