@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mic488_rig import Rig, coil_pdu, real_words, word_pdu
+from mic488_rig import Rig, coil_pdu, encoder_rig, real_words, turn, word_pdu
 
 from steptwin.machine import SECOND
 
@@ -70,3 +70,17 @@ def test_mic_41_the_sign_of_the_jog_speed_is_ignored(rig: Rig) -> None:
         rig.jog(1, direction, True)
         rig.wait(2.0)
         assert rig.velocity() == direction * 250.0
+
+
+def test_a_jog_bit_that_is_off_already_ends_no_motion_of_the_encoder() -> None:
+    rig = encoder_rig(2)
+    rig.ask(word_pdu(rig.base + 17, 0))
+    rig.jog(1, +1, True)
+    rig.jog(1, +1, False)
+    turn(rig, 40)
+    rig.wait(0.1)
+    moving = rig.velocity()
+    rig.jog(1, +1, False)
+    rig.wait(3.0)
+    assert moving > 0.0
+    assert (rig.position(), rig.velocity()) == (320.0, 0.0)

@@ -39,7 +39,7 @@ STATEMENT_TIMES = (MILLISECOND, MILLISECOND, 0, 300_001, 7 * MILLISECOND)
 REALS = (0.0, -0.0, 0.5, -0.5, 1e-44, -3.4e38, 3.4e38, float("inf"), float("nan"), 2.0**31, -(2.0**31), 1e9, -1.5e6)
 DINTS = (0, 1, -1, 0x7FFFFFFF, -0x80000000, 16_777_217, -70_000)
 WORD_VALUES = (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 15, 16, 31, 255, 0x7FFF, 0x8000, 0xFFF0, 0xFFFF)
-JOG_SPEED = 18
+JOG_SPEED = 17
 """A value register of which there is one, after the 17 of type WORD."""
 EDGES = (0, 498, 499, 500, 999, 1000, 1017, 1018, 1135, 1136, 1998, 1999, 2000, 10_000, 10_013, 10_018, 10_134, 10_136, 65_534)
 

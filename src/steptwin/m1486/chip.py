@@ -134,11 +134,10 @@ class M1486Chip(ChipCore):
         if due is not None and due <= at:
             self.receiver.eeprom_done(at)
             return True
-        if self.uart.leave(at):
-            if self.on_sent is not None:
-                self.on_sent()
-            return True
-        return False
+        has_left = self.uart.leave(at)
+        if has_left and self.on_sent is not None:
+            self.on_sent()
+        return has_left
 
     def _run_program(self, at: Nanos, until: Nanos) -> None:
         """Run the program until the next other deadline; a single command if the drive or the receiver may depend on it."""
