@@ -292,17 +292,17 @@ class Interpreter(Stateful):
             self._hooked = code, replace(code, steps=steps, straight=tuple(straight))
         return self._hooked[1]
 
-    def _with_hook(self, number: int, code: StepCode) -> StepCode:
+    def _with_hook(self, number: int, own: StepCode) -> StepCode:
         hook = hook_before(self._hooks, number)
         if hook is None:
-            return code
+            return own
 
         def step(machine: Execution, cells: Cells) -> int:
             if self._repeated == number:
                 self._repeated = -1
             else:
                 hook(machine.now, number)
-            return code(machine, cells)
+            return own(machine, cells)
 
         return step
 
