@@ -368,6 +368,15 @@ def test_values_are_read_and_set_with_their_units() -> None:
     assert (pins["IN3"].text, pins["IN3"].is_settable, pins["OUT1"].is_settable) == ("1", True, False)
 
 
+def test_whether_an_axis_moves_is_said_once() -> None:
+    debugger = started(world=BOTH)
+
+    def status(machine: str) -> str:
+        return next(value.text for value in debugger.scope(machine, "Axes").values if value.name == "M1.status")
+
+    assert (status("c"), status("m")) == ("at rest", "off, at rest")
+
+
 @pytest.mark.parametrize("scope", ["Variables", "Axes", "Pins", "Registers", "World"])
 @pytest.mark.parametrize("machine", ["m", "c"])
 def test_what_is_shown_can_be_evaluated(machine: str, scope: str) -> None:

@@ -81,8 +81,10 @@ def test_what_it_contributes_is_registered(run_node: Callable[..., str]) -> None
     assert registered["registerInlineValuesProvider"] == [DEBUGGER["languages"]]
 
 
-def test_the_expressions_of_inline_values_are_names_with_a_value(run_node: Callable[..., str]) -> None:
-    done = run_node("tests/names.test.mjs", "", "--test")
+@pytest.mark.parametrize("tests", ["names", "found"])
+def test_what_its_modules_compute(tests: str, run_node: Callable[..., str]) -> None:
+    """Which expressions have inline values, and whether a command is there."""
+    done = run_node(f"tests/{tests}.test.mjs", "", "--test")
     assert re.search(r"^\S+ fail 0$", done, re.MULTILINE), done
 
 

@@ -3,6 +3,7 @@
 import { existsSync } from "node:fs";
 import { join } from "node:path";
 import { commands, window, workspace } from "vscode";
+import { isFound } from "./found";
 
 const IN_ENVIRONMENT = process.platform === "win32" ? "Scripts\\steptwin.exe" : "bin/steptwin";
 
@@ -11,6 +12,13 @@ export function command(): string {
   const given = workspace.getConfiguration("steptwin").get("command", "").trim();
   if (given) return given.replace("${workspaceFolder}", folders[0] ?? "");
   return folders.map((folder) => join(folder, ".venv", IN_ENVIRONMENT)).find(existsSync) ?? "steptwin";
+}
+
+/** Whether the command is there; otherwise it is said. */
+export function isThere(what: string): boolean {
+  const there = isFound(command());
+  if (!there) void showFailure(what, "there is no such command");
+  return there;
 }
 
 /** Says that the command did not start, and offers the setting. */

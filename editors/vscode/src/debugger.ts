@@ -1,7 +1,7 @@
 // The debug adapter `steptwin dap`.
 
 import * as vscode from "vscode";
-import { command } from "./command";
+import { command, isThere } from "./command";
 
 export const TYPE = "steptwin";
 export const LANGUAGES = ["wbc", "m1486"];
@@ -15,11 +15,12 @@ export class Adapter implements vscode.DebugAdapterDescriptorFactory {
 }
 
 export class Configurations implements vscode.DebugConfigurationProvider {
-  /** Without a launch.json the program in the editor is debugged. */
+  /** Without a launch.json the program in the editor is debugged. VS Code says nothing of a command that is not there. */
   resolveDebugConfiguration(
     _folder: vscode.WorkspaceFolder | undefined,
     configuration: vscode.DebugConfiguration,
   ): vscode.DebugConfiguration | undefined {
+    if (!isThere("The debugger")) return undefined;
     if (configuration.type || configuration.request) return configuration;
     const document = vscode.window.activeTextEditor?.document;
     return document !== undefined && LANGUAGES.includes(document.languageId) ? launchOf(document.uri) : undefined;

@@ -2,7 +2,7 @@
 
 import { workspace } from "vscode";
 import { LanguageClient, type LanguageClientOptions } from "vscode-languageclient/node";
-import { command, showFailure } from "./command";
+import { command, isThere, showFailure } from "./command";
 
 // The server looks into tables, configurations and descriptions of worlds to see whether they are its own.
 const OPTIONS: LanguageClientOptions = {
@@ -40,6 +40,7 @@ export class Server {
 
   private async startNow(): Promise<void> {
     if (!workspace.isTrusted) return; // a folder may bring a command of its own
+    if (!isThere("The language server")) return;
     const run = { command: command(), args: ["lsp"] };
     const client = new LanguageClient("steptwin", "steptwin", run, OPTIONS);
     try {

@@ -53,8 +53,8 @@ def _axes(world: Plant, machine: str) -> Iterator[ShownValue]:
 def _axis(axis: StateAxis) -> Iterator[ShownValue]:
     yield _measured(f"{axis.name}.position", axis.position, axis.unit)
     yield _measured(f"{axis.name}.velocity", axis.velocity, f"{axis.unit}/s")
-    moves = "" if axis.moving is None else ", moves" if axis.moving else ", at rest"
-    yield _status(f"{axis.name}.status", axis.status, moves)
+    moves = "" if axis.moving is None else "moves" if axis.moving else "at rest"
+    yield _status(f"{axis.name}.status", axis.status, f", {moves}" if moves not in ("", axis.status.text) else "")
 
 
 def _status(name: str, status: StateStatus, more: str = "") -> ShownValue:
