@@ -362,8 +362,11 @@ class Kernel:
 
     def _nothing_else_until(self, now: Nanos) -> Nanos:
         """The last moment, at most ``now``, before anything is due besides a machine that is due now."""
-        dues = [self._machine_dues.first(), self._part_dues.first(), self.wires.next_arrival()]
-        return min((due - 1 for due in dues if due is not None and due <= now), default=now)
+        until, dues = now, (self._machine_dues.first(), self._part_dues.first())
+        for due in (*dues, self.wires.next_arrival()) if self.wires.delayed else dues:
+            if due is not None and due <= until:
+                until = due - 1
+        return until
 
     def _advance_alone(self, name: str, plans: RecordedPlans, now: Nanos) -> None:
         machine, due = self.machines[name], self._due

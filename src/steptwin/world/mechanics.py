@@ -223,8 +223,11 @@ class Mechanism(Stateful):
 
     def deadline(self) -> Nanos | None:
         """Courses are computed in advance: what is due is to be reported, or concerns followers and the current of the axis."""
-        dues = (self._due, self._stall_due, self._stop_due, self._rest_due, None if self._loose is None else self._loose.due)
-        return min((due for due in dues if due is not None), default=None)
+        first = None if self._loose is None else self._loose.due
+        for due in (self._due, self._stall_due, self._stop_due, self._rest_due):
+            if due is not None and (first is None or due < first):
+                first = due
+        return first
 
     def _watch_motor(self, now: Nanos) -> None:
         """Report that the motor has stalled or has synchronised again."""
