@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from steptwin.durations import LONGEST_NS, duration
+from steptwin.durations import LONGEST_NS, duration, duration_text
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND
 
@@ -52,3 +52,8 @@ def test_what_is_no_duration_is_misuse(value: object) -> None:
 def test_a_text_needs_a_unit(value: str) -> None:
     with pytest.raises(Misuse, match=rf"^{value!r} has no unit: expected a number with us, ms, s, min, h, such as '90 s'"):
         duration(value)
+
+
+@pytest.mark.parametrize(("time", "text"), [(0, "0 s"), (1, "0.001 us"), (-1, "-0.001 us"), (-90 * SECOND, "-90 s")])
+def test_a_duration_as_text(time: int, text: str) -> None:
+    assert duration_text(time) == text

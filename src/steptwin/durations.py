@@ -41,7 +41,9 @@ def _of_text(text: str) -> Nanos | None:
 
 
 def duration_text(time: Nanos) -> str:
-    """A duration as `duration` reads it, exactly: ``90 s``, ``1500 us``."""
+    """A duration as `duration` reads it, exactly: ``90 s``, ``1500 us``; with a sign where it is negative."""
+    if time < 0:
+        return f"-{duration_text(-time)}"
     for unit, size in (("s", SECOND), ("ms", MILLISECOND), ("us", MICROSECOND)):
         if time % size == 0:
             return f"{time // size} {unit}"

@@ -86,12 +86,18 @@ def test_a_wait_for_ever_shows_what_it_depends_on() -> None:
 
 
 def test_names_of_registers_in_the_program() -> None:
-    world = World.from_toml('[[mic488]]\nname = "m"\nprogram = "p.prg"\nstart = true\n', {"p.prg": b"DELAY 0.5\n$R10 = 2,5\n"})
+    world = World.from_toml(
+        '[[mic488]]\nname = "m"\nprogram = "p.prg"\nstart = true\n', {"p.prg": b"n = 1\nDELAY 0.5\n$R10 = 2,5\nWAIT IN1 = ON\n"}
+    )
     world.run(1.0)
     assert shown(world, "$R10 > 1")[0].startswith("m.USER_REGISTER[10]:real > 1 is true, since 0.50")
     assert shown(world, "m.VmaxM1") == ["m.M1_VMAX is 1000, from the beginning (at 1 s)"]
+    assert shown(world, "m.$R10 > 1")[0].startswith("m.USER_REGISTER[10]:real > 1 is true, since 0.50")
     with pytest.raises(Misuse, match="no signal '\\$R11'"):
         world.why("$R11")
+    for name in ("n", "m.n"):
+        with pytest.raises(Misuse, match=f"^{name} is a variable of the program of m: a question is about a signal or register"):
+            world.why(f"{name} > 1")
 
 
 def test_the_moment_decides() -> None:

@@ -205,14 +205,14 @@ def marks(device: Mic488Device) -> tuple[object, ...]:
     return (mark,)
 
 
+_OF_DEVICE = {short.name: short for short in SHORT_NAMES}
+_OF_AXES = {f"m{number}.{short.name}": (short, number) for number in range(1, AXES + 1) for short in AXIS_SHORT_NAMES}
+
+
 def _short_name(text: str) -> tuple[ShortName, int | None] | None:
-    axis, dot, name = text.rpartition(".")
-    if not dot:
-        return next(((short, None) for short in SHORT_NAMES if short.name == name.lower()), None)
-    found = next((short for short in AXIS_SHORT_NAMES if short.name == name.lower()), None)
-    number = axis.upper().removeprefix("M")
-    known = {str(n) for n in range(1, AXES + 1)}
-    return None if found is None or number not in known or not axis.upper().startswith("M") else (found, int(number))
+    name = text.lower()
+    of_device = _OF_DEVICE.get(name)
+    return _OF_AXES.get(name) if of_device is None else (of_device, None)
 
 
 def item_of(registers: RegisterMap, text: str) -> RegisterItem | None:

@@ -202,9 +202,16 @@ class Why:
                     owners = [one.partition(".")[0] for one in full]
                     raise Misuse(f"{name} is of {' and '.join(owners)}: ask with the controller, such as {full[0]}")
                 if not full:
+                    self._refuse_variable(name)
                     world.signal(name)
                 text = re.sub(rf"(?<![\w.$]){re.escape(name)}(?![\w.])", full[0], text)
         return text
+
+    def _refuse_variable(self, name: str) -> None:
+        """Raises `Misuse` for a variable of a program, whose values are not noted."""
+        for machine, programs in self.log.world.programs.items():
+            if name.removeprefix(f"{machine}.") in programs.variables(self.log.world.now):
+                raise Misuse(f"{name} is a variable of the program of {machine}: a question is about a signal or register")
 
     def _registers(self, name: str) -> Iterator[str]:
         """What a name of a program language means, of each controller with a program: ``table.USER_REGISTER[10]:real`` for

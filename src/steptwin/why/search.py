@@ -269,8 +269,9 @@ class _Follower:
             kernel.hears_requests |= self._is_kept
         programs = self._world.programs.get(self._owner)
         if self._is_kept and programs is not None:
-            hook = self._hook(programs, {} if is_replaced else dict(_acting(programs)))
-            programs.hook(hook, None if is_replaced else frozenset(dict(_acting(programs))))
+            keeping = {} if is_replaced else dict(_acting(programs))
+            hook = self._hook(programs, keeping)
+            programs.hook(hook, None if is_replaced else frozenset(keeping))
             stack.callback(programs.unhook, hook)
 
     def _hook(self, programs: Programs, keeping: Mapping[Place, bool]) -> StatementHook:

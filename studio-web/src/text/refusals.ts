@@ -374,6 +374,8 @@ export const REFUSALS: Readonly<Record<string, string>> = {
     "{name} do {#at} s nie wykonał żadnej instrukcji: zapytaj o jeden z jego sygnałów",
   "{name} is of {names}: ask with the controller, such as {example}":
     "{name} mają {names}: zapytaj ze sterownikiem, np. {example}",
+  "{name} is a variable of the program of {machine}: a question is about a signal or register":
+    "{name} to zmienna programu sterownika {machine}: pytanie dotyczy sygnału albo rejestru",
   // The calculator.
   "all is given, and a time: name what is to be calculated instead, one of {names}":
     "podano wszystko i jeszcze czas: zamiast tego wskaż, co policzyć: jedno z {names}",
