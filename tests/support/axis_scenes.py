@@ -59,6 +59,7 @@ AXIS_SCENES: dict[str, Scene] = {
 { move = "c.M⟨#1..2⟩", ⟨to|by⟩ = ⟨5..20⟩, within = "⟨100..400⟩ ms" }
 { wait_for = "c.M⟨#1..2⟩", within = "⟨100..400⟩ ms" }
 { expect = "x.position ⟨>|<⟩ ⟨5..40⟩ and y.lost == 0" }
+{ power_cycle = "c" }, { write = { "c.M1_EN" = 1, "c.M1_POS_ABS" = ⟨-10..60⟩ } }
 """,
     ),
     "motors": Scene(
@@ -104,6 +105,7 @@ points = [[0, ⟨0.0..0.3⟩], [⟨5..30⟩, 1], [⟨40..60⟩, ⟨0.5..2.0⟩]]
 { write = { "c.M1_VMAX" = ⟨60..200⟩, "c.M1_ACC" = ⟨300..3000⟩ } }
 { write = { "c.M2_POS_ABS" = ⟨-60..60⟩ } }
 { until = "abs(y.lost) > ⟨0..100⟩", within = "⟨50..300⟩ ms" }
+{ power_cycle = "c" }, { write = { "c.M1_EN" = 1, "c.M1_POS_ABS" = ⟨-10..60⟩ } }
 """,
     ),
     "falls": Scene(

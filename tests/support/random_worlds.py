@@ -28,7 +28,7 @@ from steptwin.motion.divisions import StepTrain
 from steptwin.motion.profile import Profile
 from steptwin.subject.describe import describe
 from steptwin.wire.crc import with_crc
-from steptwin.world.actions import ACTIONS, Download, Leave, See, SetVariable
+from steptwin.world.actions import ACTIONS, Bytes, Download, Leave, See, SetVariable
 from steptwin.world.check import diagnose
 from steptwin.world.history import History, Past
 from steptwin.world.overrides import read_overrides
@@ -182,6 +182,9 @@ def do_from_outside(world: World, text: str, files: Mapping[str, bytes]) -> list
                 world.apply_input(SetVariable(machine, variable, float(value)))
             case ["download", machine, place, file]:
                 world.apply_input(Download(machine, place.replace("_", " "), files[file].decode()))
+            case [line, "tcp", data]:
+                request = bytes.fromhex(data)
+                world.apply_input(Bytes(line, "host", "tcp", bytes((0, 1, 0, 0, 0, len(request))) + request))
             case [line, "leave"]:
                 world.apply_input(Leave(line, "python"))
             case [line, data]:

@@ -45,6 +45,7 @@ def test_programs_go_into_their_banks(keys: str, banks: dict[int, str]) -> None:
         ('programs = { x = "one.prg" }', "'x' is not a bank: expected a number from 0 on"),
         ('programs = { 01 = "one.prg" }', "'01' is not a bank"),
         ('programs = { 900 = "one.prg" }', "programs: one.prg is for bank 900: firmware 1.70 has banks 0 to "),
+        ('programs = { 6 = "one.prg" }', "programs: one.prg is for bank 6: firmware 1.70 has banks 0 to 5"),
         ('positions = { 900 = "a.csv" }', "positions: a.csv is for bank 900"),
         ("programs = 1", "1: expected a file, a list of files, or files by bank"),
         ("programs = [1]", "1: expected a text"),

@@ -339,3 +339,19 @@ def test_what_is_undone_in_its_own_moment_is_gone_too() -> None:
     world.restore(snapshot)
     history.gone_back()
     assert (history.kept_inputs, history.inputs_so_far, len(history)) == (0, 0, 2)
+
+
+@pytest.mark.parametrize("keep", [True, False])
+def test_a_past_keeps_a_trace_like_its_world_but_no_inputs(keep: bool) -> None:
+    world = World.from_toml(TEXT, keep_trace=keep)
+    history = History(world)
+    world.run(for_=1.0)
+    world.apply_input(Set((("m", "IN3", 1.0),)))
+    world.run(for_=1.0)
+    there = go(Past(history), world.now)
+    assert there.trace.is_recorded
+    assert there.trace.is_kept is keep
+    assert there.trace.digest() == world.trace.digest()
+    assert list(there.inputs) == []
+    world.stop_recording()
+    assert not Past(history).world.trace.is_recorded

@@ -172,6 +172,21 @@ def test_frames_in_words() -> None:
     assert [text[15:22].strip() for text in words] == ["p", "p", "q", "q"]
 
 
+@pytest.mark.parametrize("kind", ["rtu", "tcp"])
+def test_whom_a_request_may_change(kind: str) -> None:
+    """Reads change nothing, a write its controller; of all of them one to a unit that is not there, as a broadcast is."""
+    there = world()
+    line, framed = there.lines["bus"], rtu if kind == "rtu" else tcp
+    line.connect("p", kind)
+    words = line_kinds()["modbus"].words(line, "", lambda _: None)
+    assert [sorted(words.changes("p", framed(pdu, unit))) for pdu, unit in ((READ_STATUS, 1), (ON, 1), (ON, 2), (ON, 0))] == [
+        [],
+        [1],
+        [2],
+        [1, 2],
+    ]
+
+
 def test_bytes_that_belong_to_no_frame_are_counted_for_followers() -> None:
     there = world()
     words = followed(there, "bus")
@@ -201,6 +216,7 @@ def test_a_program_that_has_disconnected_gets_nothing_more() -> None:
     line = there.lines["bus"]
     place = line.connect("p", "rtu")
     line.receive("p", rtu(READ_STATUS), there.now)
+    assert place.is_connected
     line.leave("p")
     line.leave("p")
     there.run(for_="1 s")

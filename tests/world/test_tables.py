@@ -33,7 +33,7 @@ def described(table: str, keys: Iterable[Key]) -> list[str]:
     lines = []
     for key in keys:
         default = "required" if key.is_required else f"default {key.default!r}"
-        lines += [f"{table}.{key.name} {key.attribute} | {default} | {key.meaning}"]
+        lines += [f"{table}.{key.name} {key.attribute} | {default} | {key.permitted} | {key.meaning}"]
         answers: dict[str, list[str]] = {}
         for value in PROBES:
             answers.setdefault(answer(key, value), []).append(repr(value).replace("1" + 30 * "0", "10^30"))

@@ -135,8 +135,11 @@ def test_records_by_kind() -> None:
     kinds = ("plan", "coordinate", "load", "edge", "frame", "statement", "event", "input", "fault")
     for time, kind in enumerate(kinds):
         trace.add(TraceRecord(time, "b" if kind == "input" else "a", kind, kind, ""))
+        trace.add(TraceRecord(time, "c", kind, f"{kind} of c", ""))
     views = (trace.loads, trace.edges, trace.frames, trace.statements, trace.events, trace.inputs, trace.faults)
-    assert [[record.subject for record in view()] for view in views] == [[kind] for kind in kinds[2:]]
+    assert [[record.subject for record in view()] for view in views] == [[kind, f"{kind} of c"] for kind in kinds[2:]]
+    assert [[record.subject for record in view("c")] for view in views] == [[f"{kind} of c"] for kind in kinds[2:]]
+    assert [record.subject for record in trace.plans("c")] == ["plan of c"]
     assert [record.subject for record in trace.inputs("b")] == ["input"]
     assert list(trace.inputs("a")) == list(trace.edges("b")) == []
 

@@ -23,7 +23,7 @@ class ConstantDrive(Stateful):
     per nanosecond."""
 
     FIXED: ClassVar[tuple[str, ...]] = ("_divisor", "_speed", "stride")
-    __slots__ = (*FIXED, "_base", "_begin", "_changes", "runs")
+    __slots__ = (*FIXED, "_base", "_begin", "runs")
 
     def __init__(self, speed: Fraction, now: Nanos) -> None:
         """``speed`` in mm/s."""
@@ -32,16 +32,14 @@ class ConstantDrive(Stateful):
         """The most that it moves within a nanosecond."""
         self._base = 0
         self._begin = now
-        self._changes = 0
         self.runs = False
 
     def run(self, runs: bool, now: Nanos) -> None:
         if runs is not self.runs:
             self._base, self._begin, self.runs = self.place(now), now, runs
-            self._changes += 1
 
     def version(self) -> object:
-        return self._changes
+        return self._begin, self.runs
 
     def place(self, now: Nanos) -> int:
         return self._base + (self._speed * (now - self._begin) // self._divisor if self.runs else 0)
@@ -80,23 +78,20 @@ class Workpiece(NamedTuple):
 class Load(Stateful):
     """The workpieces on a belt."""
 
-    __slots__ = ("_changes", "pieces")
+    __slots__ = ("pieces",)
 
     def __init__(self) -> None:
         self.pieces: tuple[Workpiece, ...] = ()
-        self._changes = 0
 
-    def version(self) -> int:
+    def version(self) -> object:
         """A value that changes with every change of the workpieces."""
-        return self._changes
+        return self.pieces
 
     def put(self, piece: Workpiece) -> None:
         self.pieces = (*self.pieces, piece)
-        self._changes += 1
 
     def take(self, piece: Workpiece) -> None:
         self.pieces = tuple(one for one in self.pieces if one != piece)
-        self._changes += 1
 
     def hold(self, piece: Workpiece, front: int) -> None:
         """Let a workpiece stand with its front at ``front``, whatever the belt does."""
@@ -108,7 +103,6 @@ class Load(Stateful):
 
     def _replace(self, piece: Workpiece, other: Workpiece) -> None:
         self.pieces = tuple(other if one == piece else one for one in self.pieces)
-        self._changes += 1
 
     def covering(self, position: int, belt: int, *, of_marks: bool = False) -> Workpiece | None:
         """The workpiece over ``position``, or with a mark there, while the belt is at ``belt``; of several the one put there

@@ -85,19 +85,18 @@ class Zone:
                 f"a zone of {width} imp, hysteresis included, comes again every {float(self.period):g} imp: it must be shorter"
             )
 
-    def _turn(self, place: int) -> int:
+    def _turn(self, place: int, period: Fraction | int) -> int:
         """The last turn whose zone, with hysteresis, begins at or below ``place``."""
-        if self.period is None:
-            return 0
-        return ceil((place - (self.low or 0) + self.hysteresis + Fraction(1, 2)) / self.period) - 1
+        return ceil((place - (self.low or 0) + self.hysteresis + Fraction(1, 2)) / period) - 1
 
-    def _ends(self, turn: int) -> tuple[int, int]:
-        shift = 0 if self.period is None else floor(turn * self.period + Fraction(1, 2))
+    def _ends(self, turn: int, period: Fraction | int) -> tuple[int, int]:
+        shift = floor(turn * period + Fraction(1, 2))
         return (self.low or 0) + shift, (self.high or 0) + shift
 
     def _near(self, place: int) -> tuple[int | None, int | None]:
         """The zone that ``place`` is in, hysteresis included, or else the last one below it."""
-        return (self.low, self.high) if self.period is None else self._ends(self._turn(place))
+        period = self.period
+        return (self.low, self.high) if period is None else self._ends(self._turn(place, period), period)
 
     def on(self, place: int, *, was_on: bool) -> bool:
         low, high = self._near(place)
@@ -114,10 +113,10 @@ class Zone:
             below = high if high is not None and place > high else None
             above = low if low is not None and place < low else None
             return below, above
-        turn = self._turn(place)
+        turn = self._turn(place, self.period)
         if low is not None and place < low:
-            return self._ends(turn - 1)[1], low
-        return high, self._ends(turn + 1)[0]
+            return self._ends(turn - 1, self.period)[1], low
+        return high, self._ends(turn + 1, self.period)[0]
 
 
 class Circuit:

@@ -17,7 +17,7 @@ class Travel(Stateful):
     """
 
     FIXED: ClassVar[tuple[str, ...]] = ("_back", "_forth", "full")
-    __slots__ = (*FIXED, "_begin", "_changes", "_direction", "_place")
+    __slots__ = (*FIXED, "_begin", "_direction", "_place")
 
     def __init__(self, forth: Nanos, back: Nanos, *, is_forth: bool, now: Nanos) -> None:
         self.full = forth * back
@@ -27,7 +27,6 @@ class Travel(Stateful):
         """At `_begin`."""
         self._begin = now
         self._direction = 0
-        self._changes = 0
 
     @property
     def direction(self) -> int:
@@ -41,7 +40,6 @@ class Travel(Stateful):
         self._place = self.place(now)
         self._begin = now
         self._direction = direction
-        self._changes += 1
 
     def _speed(self, direction: int) -> int:
         """Places per nanosecond."""
@@ -54,7 +52,7 @@ class Travel(Stateful):
 
     def version(self) -> object:
         """As `MovingPart.version`."""
-        return self._changes
+        return self._begin, self._direction
 
     def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
         """As `MovingPart.reaches`."""

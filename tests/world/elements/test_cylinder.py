@@ -100,6 +100,19 @@ def test_a_valve_with_two_coils_keeps_its_last_position() -> None:
     assert [time for time, level in edges(world, "clamp.extended") if level] == [212, 1112]
 
 
+def test_the_coils_of_a_valve_can_be_wired_instead() -> None:
+    wires = "".join(f'[[wire]]\nfrom = "a.OUT{n}"\nto = "clamp.{coil}"\n' for n, coil in ((1, "EXTEND"), (2, "RETRACT")))
+    wired = DOUBLE.replace('extend = "a.OUT1"\nretract = "a.OUT2"\n', "")
+    assert wired != DOUBLE
+    found = [World.from_toml(text) for text in (DOUBLE, wired + wires)]
+    for world in found:
+        for at, pin, level in ((0.0, 1, 1), (0.02, 1, 0), (0.5, 2, 1)):
+            world.run(until=at)
+            world.mic488["a"].write(f"OUT{pin}", level)
+        world.run(until=1.0)
+    assert edges(found[0], "clamp.extended") == edges(found[1], "clamp.extended") != []
+
+
 def test_it_can_begin_extended() -> None:
     world = World.from_toml(DOUBLE.replace("stroke", 'start = "extended"\nstroke'))
     world.run(for_=0.1)

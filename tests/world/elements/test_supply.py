@@ -10,7 +10,7 @@ from steptwin.errors import Misuse
 from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
 from steptwin.machine import SECOND
-from steptwin.world.elements.supply import Ramp
+from steptwin.world.elements.supply import SUPPLY, Ramp
 from steptwin.world.reader import WorldError
 
 TEXT = """
@@ -175,6 +175,11 @@ def test_a_supply_that_drops_while_the_fault_of_a_machine_lasts() -> None:
     assert found.read("a.OUT1") == 1
 
 
+def test_all_of_its_voltage_may_be_needed() -> None:
+    found = {one.name: one for one in world(text=TEXT.replace("enough = 18", "enough = 24")).spec.elements_of(SUPPLY)}
+    assert (found["logic"].enough, found["logic"].threshold) == (24.0, 24.0)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -184,6 +189,7 @@ def test_a_supply_that_drops_while_the_fault_of_a_machine_lasts() -> None:
         (('feeds = "b"', 'feeds = "logic"'), "'logic' is an element"),
         (('on = "logic.good"', 'on = "power.good"'), "on: power waits for power, so that it never comes on"),
         (("enough = 18", "enough = 25"), "enough = 25 V is more than volts = 24"),
+        (("enough = 18", "enough = 24.001"), "enough = 24.001 V is more than volts = 24"),
         (("enough = 18", "enogh = 18"), r"\[supply\] has no 'enogh' \(did you mean 'enough'\?\)"),
         (("switched = true\n", ""), "digital inputs of 'logic' are none"),
         (('on = "logic.good"', 'on = "logic.godo"'), "logic.GODO is not an output"),

@@ -166,6 +166,14 @@ def test_mistakes_have_their_places(old: str, new: str, text: str) -> None:
         World.from_toml(TEXT.replace(old, new, 1), name="t.toml")
 
 
+def test_what_conditions_cannot_use_is_not_measured() -> None:
+    """The levels of a driver interface change between events, at moments that nothing tells."""
+    chip = '[[m1486]]\nname = "k"\ninterface = "dual"\n[[wire]]\nfrom = "a.OUT1"\nto = "k.B3"\n'
+    with pytest.raises(WorldError, match="B11"):
+        World.from_toml(chip + TEXT.replace('of = "x.position"', 'of = "k.B11"'))
+    World.from_toml(chip + TEXT.replace('of = "x.position"', 'of = "k.B4"'))
+
+
 def test_what_is_built_later_is_named_as_that() -> None:
     """Two sensors that depend on each other, and a kind that is built after this one."""
     second = TEXT.replace('of = "x.position"', 'of = "next.volts"') + TEXT[TEXT.index("[[transducer]]") :].replace(

@@ -5,12 +5,14 @@ Regenerate with ``python tests/world/faults/test_table.py`` and read the diff.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from steptwin.errors import Misuse
 from steptwin.world.elements import ELEMENTS, fault_kinds
+from steptwin.world.faults import kinds
 from steptwin.world.faults.kinds import rows, shared
 from steptwin.world.faults.table import LARGEST_WHOLE, FaultKind, Layer, Parameter, ParameterForm, check
 
@@ -32,6 +34,30 @@ def kind_lines(kind: FaultKind) -> list[str]:
 def test_kinds_are_the_reviewed_ones() -> None:
     found = [line for kind in KINDS.values() for line in kind_lines(kind)]
     assert found == GOLDEN.read_text(encoding="utf-8").splitlines()
+
+
+def test_kinds_of_an_element_come_and_go_with_it() -> None:
+    kind = next(kind for kind in kinds.KINDS.values() if kind.layer is Layer.PHYSICS)
+    before = list(kinds.KINDS)
+    other = replace(kind, name="other")
+    kinds.add_kinds([other])
+    assert kinds.KINDS["other"] is other
+    kinds.remove_kinds([other])
+    assert list(kinds.KINDS) == before
+
+
+@pytest.mark.parametrize(
+    ("least", "most", "permitted"),
+    [
+        (0.5, 1e6, "numbers 0.5 to 1 000 000"),
+        (-1e6, 999_999.5, "numbers -1 000 000 to 999999.5"),
+        (1e6, None, "numbers 1 000 000 and more"),
+        (0.000001, None, "numbers 0.000001 and more"),
+        (None, None, "numbers"),
+    ],
+)
+def test_ranges_are_written_without_exponents(least: float | None, most: float | None, permitted: str) -> None:
+    assert Parameter("x", ParameterForm.NUMBER, "X.", least, most).permitted == permitted
 
 
 def test_kinds_by_layer() -> None:

@@ -76,9 +76,9 @@ def _read(text: TomlText, row: Row, table: Table) -> AxisSpec:
         text.wrong(
             (*spec.encoder.path, "follows"), "D007", f"follows = {spec.name!r} is its own axis: an encoder is on it anyway"
         )
-    is_known = spec.travel is not None and not text.is_wrong((*path, "start"))
-    if is_known and spec.travel is not None and not spec.travel[0] <= spec.start <= spec.travel[1]:
-        text.wrong((*path, "start"), "D007", f"start = {spec.start:g} is outside travel = {list(spec.travel)}")
+    start, travel = (*path, "start"), spec.travel
+    if travel is not None and not travel[0] <= spec.start <= travel[1] and not text.is_wrong(start):
+        text.wrong(start, "D007", f"start = {spec.start:g} is outside travel = {list(travel)}")
     return spec
 
 

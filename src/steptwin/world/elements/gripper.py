@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from fractions import Fraction
 from math import floor
 from typing import ClassVar
 
@@ -60,7 +59,7 @@ class Gripper(Carrier):
         self._spec = spec
         self.travel = Travel(spec.close_time, spec.open_time, is_forth=False, now=board.kernel.now)
         share = 1 - exact_fraction(spec.width) / exact_fraction(spec.stroke)
-        self._at = floor(share * self.travel.full + Fraction(1, 2))
+        self._at = floor(share * self.travel.full)
         """The place of the jaws at a workpiece."""
         self._is_narrow = False
         """Whether the jaws are closer than a workpiece is wide, or hold one."""
