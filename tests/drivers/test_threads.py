@@ -184,9 +184,11 @@ def test_a_line_that_is_closed_during_an_exchange_ends_it() -> None:
     finish(line.open())
     wire.severed = True
     waited = []
+    waiting: Job[ModbusQuery, bytes] = Job(ModbusQuery(1, ReadRequest(3, 1, 1)), TIMEOUT)  # of a third thread
 
     def close() -> None:
         waited.append(line._engine.in_flight)
+        line._engine.submit(waiting)
         wire.before_read = None
         finish(line.close())
 
@@ -195,6 +197,9 @@ def test_a_line_that_is_closed_during_an_exchange_ends_it() -> None:
         finish(line.exchange(Job(ModbusQuery(1, ReadRequest(3, 0, 1)), TIMEOUT)))
     assert waited == [True]
     assert not line._engine.busy
+    assert waiting.done
+    with pytest.raises(LineLost, match="the line memory was closed"):
+        waiting.result()
 
 
 def test_a_thread_that_waits_for_a_lock_says_so_again_and_again(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -402,3 +402,12 @@ def test_the_shortest_gap() -> None:
     framer = RtuFramer(gap_ns=1)
     framer.feed(b"\x01", 7)
     assert framer.deadline() == 8
+
+
+@pytest.mark.parametrize("count", [rtu.MAX_LOOKS - 1, rtu.MAX_LOOKS, rtu.MAX_LOOKS + 1, 300])
+def test_a_frame_within_the_last_256_bytes_is_found_at_once_behind_noise(count: int) -> None:
+    """At each byte of this noise a request of function 5 might begin; only so many places are looked at if more bytes follow."""
+    frame = with_crc(bytes.fromhex("010300050001"))
+    framer = RtuFramer()
+    assert [found.raw for found in framer.feed(bytes((5,)) * count + frame, 0)] == [frame]
+    assert (framer.unframed, len(framer.held)) == (count, 0)

@@ -68,7 +68,7 @@ class TimedUnits(Stateful):
 
     def busy_until(self, units: Iterable[int]) -> Nanos:
         """The end of the present requests of all ``units``."""
-        return max((self._busy[unit] for unit in units), default=0)
+        return max(self._busy[unit] for unit in units)
 
     def execution(self, units: Iterable[int], arrival: Nanos) -> Nanos:
         """The moment at which the last of ``units`` executes a request that arrives at ``arrival``."""
