@@ -351,3 +351,9 @@ def test_what_arrives_before_an_execution_is_due_is_seen_before_it(new_bank: New
         run(port, 10**9)
     assert seen == [(READ_NS, 0), (10_000_000 + READ_NS, 1), (20_000_000 + READ_NS, 1)]
     assert len(bank.executed) == 2
+
+
+@pytest.mark.parametrize(("function", "units"), [(0, []), (1, [1]), (0x7F, [1]), (0x80, []), (0x83, [])])
+def test_mic_1_functions_that_a_unit_hears(bank: Any, function: int, units: list[int]) -> None:
+    """1 to 127: what no request can have is for nobody."""
+    assert TimedUnits({1: bank}, LineTiming(SerialLine(115200))).addressed(1, function) == units
