@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from motor_rig import INERTIA, LINEAR, at_speed, motor
 
 from steptwin.machine import SECOND
-from steptwin.motion import MotionState, Profile, plan_position, plan_velocity
+from steptwin.motion import MotionState, Profile, Segment, plan_position, plan_velocity
 from steptwin.motion.paths import Circular
 from steptwin.world.course import Build, Course, MechanicalState
 from steptwin.world.motor import StepperMotor, _first_below_0
@@ -165,6 +165,15 @@ def test_parts_of_a_ramp_end_where_the_speed_passes_the_band_and_corners(sign: i
     torques = [0.9, 0.75, 0.7 - 1500 * 0.5 / 26_000, 0.7 - 3500 * 0.5 / 26_000]
     assert [part.use for part in parts] == pytest.approx([need / torque for torque in torques])
     assert parts_of(replace(drive, resonance=None), Profile(0, 0, (ramp,), 0.0), 0)[0].end_s == pytest.approx(6.0)
+
+
+def test_where_the_acceleration_falls_that_of_the_middle_counts() -> None:
+    """From 3000 to 1000 pulses/s² in 2 s, and below the band: one part, in whose middle it is 2000."""
+    drive = replace(motor(((0.0, 1.0), (32_000.0, 1.0)), friction=0.1), resonance=Resonance(9000.0, 9500.0, 10.0, 10.0, 0.05))
+    segment = Segment(2.0, 0.0, 0.0, 1000.0, 1500.0, -1000.0 / 6.0, 1)
+    (part,) = drive.parts(segment, 0.0, 2.0, 1)
+    assert part.speed == pytest.approx(1000.0 + 3000.0 - 500.0)
+    assert part.use == pytest.approx(INERTIA * 2000.0 + 0.1)
 
 
 def test_a_motion_without_end_is_one_part() -> None:

@@ -282,6 +282,7 @@ def test_a_belt_is_longer_than_a_step_of_its_drive() -> None:
     text = TEXT.replace("length = 400.0", "length = 1e-10").replace("at = 300.0", "at = 0.0")
     with pytest.raises(WorldError, match="length = 1e-10 mm: the belt is shorter than one step of its drive, 1e-09 mm"):
         World.from_toml(text)
+    assert World.from_toml(text.replace("1e-10", "1e-9")).read("belt.count") == 0
     world = World.from_toml(TEXT.replace("length = 400.0", "length = 1e300").replace("workpiece = 40.0", "workpiece = 1e-300"))
     world.run(until=1.0)
     assert isnan(world.read("belt.place24"))
