@@ -11,7 +11,7 @@ from asyncua.server.address_space import AddressSpace
 from asyncua.server.server import Server
 from gateway_rig import GatewayWorld
 
-from steptwin.gateways.opcua.addressspace import NAMESPACE_URI, AddressSpaceBuilder
+from steptwin.gateways.opcua.addressspace import NAMESPACE_URI, AddressSpaceBuilder, NodeReference
 from steptwin.gateways.opcua.nodes import NodeMaker
 
 HALL = '[[mic488]]\nname = "one"\n[[m1486]]\nname = "two"\n[[axis]]\nname = "x"\ndrive = "one.M1"\npitch = 5\n'
@@ -26,13 +26,23 @@ async def space_with(*, by_library: bool) -> AddressSpace:
     if by_library:
         for result in await server.iserver.isession.add_nodes(builder.items):
             result.StatusCode.check()
+        for code in await server.iserver.isession.add_references([_item(one, builder) for one in builder.references]):
+            code.check()
     else:
-        NodeMaker(server.iserver.aspace).add(builder.items)
+        maker = NodeMaker(server.iserver.aspace)
+        maker.add(builder.items)
+        maker.refer(builder.references)
         with pytest.raises(AssertionError, match="is there already"):
             NodeMaker(server.iserver.aspace).add(builder.items[:1])
-    for code in await server.iserver.isession.add_references(builder.references):
-        code.check()
     return server.iserver.aspace
+
+
+def _item(one: NodeReference, builder: AddressSpaceBuilder) -> ua.AddReferencesItem:
+    found = ua.AddReferencesItem()
+    found.IsForward = True
+    found.ReferenceTypeId, found.SourceNodeId, found.TargetNodeId = one.kind, one.source, one.target
+    found.TargetNodeClass = next(item.NodeClass for item in builder.items if item.RequestedNewNodeId == one.target)
+    return found
 
 
 def contents(space: AddressSpace) -> dict[ua.NodeId, tuple[dict[Any, Any], list[Any]]]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 from asyncua import ua
 
@@ -55,6 +55,14 @@ class ArrayNode:
         return tuple(f"{self.machine}.{self.path}[{number}]" for number in range(self.count))
 
 
+class NodeReference(NamedTuple):
+    """A forward reference of ``source``."""
+
+    source: ua.NodeId
+    kind: ua.NodeId
+    target: ua.NodeId
+
+
 @dataclass(frozen=True, slots=True)
 class BoundMethod:
     """A method of an object, which is a controller, its program, or one of its axes."""
@@ -77,7 +85,10 @@ class AddressSpaceBuilder:
         self._is_kept = is_kept
         self._shared: dict[object, Any] = {}
         self.items: list[ua.AddNodesItem] = []
-        self.references: list[ua.AddReferencesItem] = []
+        self.references: list[NodeReference] = []
+        """To nodes that several nodes share: methods of types, units, ranges, profiles of motion."""
+        self._properties: set[str] = set()
+        """Paths of those that are shared."""
         self.points: dict[str, tuple[PointNode, ...]] = {}
         """By controller, and of the clock."""
         self.arrays: dict[ua.NodeId, ArrayNode] = {}
@@ -162,13 +173,13 @@ class AddressSpaceBuilder:
     def _axis(self, path: str, kind: str | None) -> None:
         self._object(f"{path}.ParameterSet", node_id(path), "ParameterSet", ua.ObjectIds.BaseObjectType)
         profile = ua.Variant(_MOTION_PROFILES.get(kind or "", _OTHER_PROFILE), ua.VariantType.Int32)
-        self._property(f"{path}.MotionProfile", node_id(path), "MotionProfile", profile, ua.ObjectIds.Int32)
+        self._shared_property(path, "MotionProfile", str(profile.Value), lambda: profile, ua.ObjectIds.Int32)
 
     def _bind(self, part: MachinePart, path: str, kind: str, axis: int | None) -> None:
         """Give an object those methods of its type that its controller takes."""
         for row in methods_of(part, METHODS[kind], axis):
             method = node_id(f"types.{kind}.{row.name}")
-            self.references.append(_component(node_id(path), method))
+            self.references.append(NodeReference(node_id(path), standard(ua.ObjectIds.HasComponent), method))
             self.methods[node_id(path), method] = BoundMethod(row, part, axis)
 
     def _point(self, machine: str, point: GatewayPoint, *, is_of_axis: bool) -> PointNode:
@@ -196,12 +207,14 @@ class AddressSpaceBuilder:
             lambda: _variable(name, point.meaning, ua.Variant(ZEROS[point.type], VARIANTS[point.type]), access=access),
         )
         if has_unit:
-            unit = _unit(point.unit)
-            self._property(f"{path}.EngineeringUnits", node_id(path), "EngineeringUnits", unit, ua.ObjectIds.EUInformation)
-            bounds = None if point.limits is None else value_range(point.limits)
+            unit, limits = point.unit, point.limits
+            self._shared_property(
+                path, "EngineeringUnits", unit, lambda: _extension(engineering_unit(unit)), ua.ObjectIds.EUInformation
+            )
+            bounds = None if limits is None else value_range(limits)
             if bounds is not None:
-                limits = ua.Variant(bounds, ua.VariantType.ExtensionObject)
-                self._property(f"{path}.EURange", node_id(path), "EURange", limits, ua.ObjectIds.Range)
+                text = f"{bounds.Low!r} to {bounds.High!r}"
+                self._shared_property(path, "EURange", text, lambda: _extension(bounds), ua.ObjectIds.Range)
         return PointNode(node_id(path), point)
 
     # ------------------------------------------------------------------ nodes
@@ -222,6 +235,15 @@ class AddressSpaceBuilder:
         item.NodeClass = ua.NodeClass.Variable
         item.NodeAttributes = _variable(name, "", value, data_type=kind, rank=rank)
 
+    def _shared_property(self, owner: str, name: str, text: str, make: Callable[[], ua.Variant], kind: int) -> None:
+        """A property that nodes share for which ``text`` is the same: a fifth of the nodes of a controller would be such ones."""
+        path = f"types.{name}.{text}"
+        if path not in self._properties:
+            self._properties.add(path)
+            self._property(path, node_id(owner), name, make(), kind)
+            return
+        self.references.append(NodeReference(node_id(owner), standard(ua.ObjectIds.HasProperty), node_id(path)))
+
     def _alike(self, key: object, make: Callable[[], Any]) -> Any:
         """The attributes of nodes that differ in nothing else: many controllers are of the same kind."""
         found = self._shared.get(key)
@@ -239,9 +261,8 @@ class AddressSpaceBuilder:
         self.items.append(item)
 
 
-@cache
-def _unit(unit: str) -> ua.Variant:
-    return ua.Variant(engineering_unit(unit), ua.VariantType.ExtensionObject)
+def _extension(value: Any) -> ua.Variant:
+    return ua.Variant(value, ua.VariantType.ExtensionObject)
 
 
 _STANDARD_NAMES = frozenset({"InputArguments", "EngineeringUnits", "EURange"})
@@ -292,14 +313,4 @@ def _argument(one: MethodArgument) -> ua.Argument:
     found.DataType = standard(VARIANTS[one.type].value)
     found.ValueRank = -1
     found.Description = ua.LocalizedText(one.meaning)
-    return found
-
-
-def _component(source: ua.NodeId, target: ua.NodeId) -> ua.AddReferencesItem:
-    found = ua.AddReferencesItem()
-    found.IsForward = True
-    found.ReferenceTypeId = standard(ua.ObjectIds.HasComponent)
-    found.SourceNodeId = source
-    found.TargetNodeClass = ua.NodeClass.Method
-    found.TargetNodeId = target
     return found

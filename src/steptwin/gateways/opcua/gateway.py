@@ -73,9 +73,9 @@ class OpcUaGateway:
         await security.apply(server)
         with _uncollected():
             builder = AddressSpaceBuilder(self._subject.description, registers, is_kept=self._subject.past is not None)
-            NodeMaker(inside.aspace).add(builder.items)
-            for code in await inside.isession.add_references(builder.references):
-                code.check()
+            maker = NodeMaker(inside.aspace)
+            maker.add(builder.items)
+            maker.refer(builder.references)
             self._sampler = Sampler(self._subject, registers, self._spec.interval)
             if self._subject.past is not None:
                 inside.history_manager.set_storage(PastNodes(self._subject.past, builder.nodes()))

@@ -14,6 +14,7 @@ from typing import Any
 from asyncua import ua
 from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
 
+from steptwin.gateways.opcua.addressspace import NodeReference
 from steptwin.gateways.opcua.nodetypes import standard
 
 _TYPES: Mapping[str, ua.VariantType | None] = {
@@ -54,6 +55,11 @@ class NodeMaker:
         """Each after its parent."""
         for item in items:
             self._add(item)
+
+    def refer(self, references: Iterable[NodeReference]) -> None:
+        """Give nodes that are there references to others."""
+        for source, kind, target in references:
+            self._space[source].references.append(self._reference(kind, target, is_forward=True))
 
     def _add(self, item: ua.AddNodesItem) -> None:
         space, node = self._space, item.RequestedNewNodeId

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 
 from asyncua import ua
 from asyncua.server.event_generator import EventGenerator
@@ -54,7 +55,9 @@ class Notifications:
         kind = await server.create_custom_event_type(NAMESPACE, "MachineEventType", ua.ObjectIds.BaseEventType, FIELDS)
         generators = {SERVER: await server.get_event_generator(kind)}
         for part in subject.description.machines:
-            generators[part.name] = await server.get_event_generator(kind, node_id(part.name))
+            event = copy(generators[SERVER].event)  # the library would collect its fields from the type again
+            event.SourceNode, event.SourceName = None, None
+            generators[part.name] = await server.get_event_generator(event, node_id(part.name))
         return cls(subject, subject.follow(Filter(KINDS), MOST_EVENTS), generators)
 
     def close(self) -> None:
