@@ -119,6 +119,7 @@ def test_a_held_jog() -> None:
         assert jog.hold()
         assert wire.moving(2)
         assert not wire.moving(1)
+    assert mic.get("M2_VMAX") == {"M2_VMAX": 25.0}, "that of the jog was another"
     end = jog.ended()
     assert not wire.moving(2)
     assert (end.name, end.unit) == ("M2", "mm")

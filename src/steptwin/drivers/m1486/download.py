@@ -133,8 +133,9 @@ class _Typist:
             await unit.rest()
             while index < len(commands):
                 self._may_ask = allowed[index]
-                if self._may_ask and self._typed and not all(allowed[index + 1 : index + 2]):
-                    await self._empty()  # the last chance
+                is_last_chance = self._may_ask and index + 1 < len(commands) and not allowed[index + 1]
+                if is_last_chance and self._typed:
+                    await self._empty()
                 if commands[index].key == "[":
                     closes = next(n for n in range(index, len(commands)) if commands[n].key == "]")
                     await self._file(commands[index : closes + 1], index)

@@ -187,7 +187,7 @@ class Mic488Part:
             await self._mic.set(name, value)
 
     def effect_of(self, request: steps.Request) -> RawEffect:
-        if request.pdu[:1] and request.pdu[0] in pdu.READS:
+        if request.pdu and request.pdu[0] in pdu.READS:
             return RawEffect.LOOK
         try:
             decoded = pdu.decode_request(request.pdu)
