@@ -145,6 +145,20 @@ def test_the_gain_changes_how_fast_not_whether(kp: float) -> None:
     assert abs(rig.get("ENC_IMP") - 250) <= 4
 
 
+@pytest.mark.parametrize("counts", [60, -60])
+def test_without_gain_a_correction_is_as_slow_as_moves_of_one_pulse(counts: int) -> None:
+    rig = encoder_rig(kp=0.0)
+    rig.set("POS_ABS", 2000.0)
+    rig.wait(1.0)
+    turn(rig, counts)
+    rig.until(1, CORRECTION)
+    fastest = 0.0
+    for _ in range(100):
+        rig.wait(0.005)
+        fastest = max(fastest, abs(rig.velocity()))
+    assert 20.0 < fastest <= 1000.0**0.5  # half of a pulse with ACC 1000, half of it with DEC 1000
+
+
 def test_a_new_command_ends_the_correction() -> None:
     rig = encoder_rig()
     rig.set("POS_ABS", 2000.0)

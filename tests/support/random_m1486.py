@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
 
 from chance import Chance
 
@@ -15,6 +16,7 @@ from steptwin.m1486.eeprom import image_of
 from steptwin.m1486.line import SerialChain
 from steptwin.m1486.lines import DUAL_DAC, INTERFACES, STEP_DIRECTION, Interface
 from steptwin.m1486.migration import differences, findings
+from steptwin.m1486.points import POINTS, live_point
 from steptwin.m1486.present import state_of
 from steptwin.m1486.signals import strobes
 from steptwin.m1486.symbols import uses
@@ -144,6 +146,15 @@ class RandomChips:
             yield f"{self.now} {number} {state_of(chip, self.now)}"
             yield f"{number} {dict(chip.pins())} {chip.deadline()} {chip.is_busy(self.now)} {chip.is_idle()} {chip.memory.file}"
 
+    def points(self) -> Iterator[str]:
+        """All that points of the first chip show now, and when that turns next."""
+        chip, now = self.chips[0], self.now
+        for path in POINTS:
+            live = live_point(chip, path)
+            assert live is not None
+            ahead = live.turns and list(islice(live.turns(now), 3))
+            yield f"{live.point} {live.read and live.read(now)} {ahead} {live.is_kept} {live.version and live.version()}"
+
     def run(self) -> None:
         kinds = (self.type, self.type, self.type, self.type, self.send_file, self.pin, self.pin, self.rare)
         if self.chance.below(6):
@@ -153,7 +164,7 @@ class RandomChips:
             self.wait()
             if len(self.found["happened"]) + len(self.found["motions"]) > MUCH:
                 break
-        self.found["values"] += self.values()
+        self.found["values"] += [*self.values(), *self.points()]
         for number, chip in enumerate(self.chips):
             self.found["values"].append(f"{chip.image.hex()} {chip.snapshot().variant.title} {self.chain.collisions}")
             assert way_u(self.trains[number], self.now) == chip.drive.true_u(self.now)

@@ -57,7 +57,8 @@ def said(chance: Chance, text: str, table: PositionTable) -> list[str]:
 def told(text: str) -> list[str]:
     """Diagnostics of lines, each alone and all together: what follows from a line, may hide what follows from another."""
     lines = [f"MAIN:\nBLINK:\n{line}\nJUMP MAIN\nJUMP BLINK\n" for line in text.splitlines()]
-    return [repr(found) for one in (text, *lines) for found in check(one).diagnostics]
+    found = [repr(found) for one in (text, *lines) for found in check(one).diagnostics]
+    return [*found, *map(repr, parse(text)[0].lines), str(check(text).lines)]
 
 
 def made(chance: Chance, text: str, table: PositionTable) -> list[str]:
