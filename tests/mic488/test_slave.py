@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mic488_rig import OFFSETS, OUT, Rig, coil_pdu, controller, dint_words, read_pdu, real_words, word_pdu, words_pdu
 
+from steptwin.mic488 import slave
 from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.wire import pdu as modbus
 from steptwin.wire.slave import TcpSlavePort
@@ -391,3 +392,25 @@ def test_whatever_bytes_arrive_the_response_belongs_to_the_request(
                 modbus.answer(request, response)
         assert response == expected
         assert not response[0] & 0x80 or response[1] in (ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE)
+
+
+@pytest.mark.parametrize(
+    ("compiler", "first", "second"),
+    [
+        ("compile_registers", word_pdu(10001, 1), word_pdu(10001, 2)),
+        ("compile_registers", words_pdu(10020, 0, 0), words_pdu(10020, 0, 0x4120)),
+        ("compile_registers", words_pdu(0, 0x1234, 1), words_pdu(0, 0x5678, 2)),
+        ("compile_read", read_pdu(3, 10020, 2), read_pdu(3, 10020, 2)),
+        ("compile_coil", coil_pdu(OUT, True), coil_pdu(OUT, True)),
+    ],
+)
+def test_what_is_asked_again_is_not_compiled_again(
+    compiler: str, first: bytes, second: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compiled: list[object] = []
+    compile_it = getattr(slave, compiler)
+    monkeypatch.setattr(slave, compiler, lambda *asked, **options: compiled.append(asked) or compile_it(*asked, **options))
+    rig = Rig()
+    rig.device.slave = slave.Slave("1.70", lenient=False)
+    assert [rig.exception(pdu) for pdu in (first, second, first)] == [0, 0, 0]
+    assert len(compiled) == 1

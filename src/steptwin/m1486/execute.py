@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from steptwin.m1486 import flow_effects, io_effects, motion_effects, numeric_effects
-from steptwin.m1486.commands import TABLE, When, find
+from steptwin.m1486.commands import TABLE, ArgType, When, find, takes_variable
 from steptwin.m1486.effects import CommandHost, Effect, Making, WrongData, refusing
 from steptwin.m1486.ranges import out_of_range
 from steptwin.m1486.syntax import ChipCommand, JumpCondition
 from steptwin.machine import Nanos
+from steptwin.tables import complete
 
 
 class CompiledCommand(NamedTuple):
@@ -20,7 +22,17 @@ class CompiledCommand(NamedTuple):
     is_linked: bool
 
 
-_MAKERS: dict[str, Making] = flow_effects.MAKERS | motion_effects.MAKERS | io_effects.MAKERS | numeric_effects.MAKERS
+_MAKERS: Mapping[str, Making] = complete(
+    "command",
+    # A command with a variable as its number waits in the memory, whatever the number is.
+    [
+        spec.name
+        for spec in TABLE
+        if (spec.when is When.QUEUED and spec.kind is not ArgType.CONDITION) or takes_variable(spec.key)
+    ],
+    "effect",
+    flow_effects.MAKERS | motion_effects.MAKERS | io_effects.MAKERS | numeric_effects.MAKERS,
+)
 
 
 def compile_command(chip: CommandHost, command: ChipCommand, place: int, following: int) -> CompiledCommand:
@@ -49,8 +61,3 @@ def _with_variable(chip: CommandHost, key: str, place: int, following: int) -> E
         return _MAKERS[spec.name].make(chip, number, place, following)(now)
 
     return run
-
-
-_unmade = {spec.name for spec in TABLE if spec.when is When.QUEUED} - _MAKERS.keys() - {"If"}
-if _unmade:
-    raise ValueError(f"commands without an effect: {', '.join(sorted(_unmade))}")
