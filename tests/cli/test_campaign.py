@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
 from campaigns import CAMPAIGN, campaign_file
+from postgres import postgres_server, programs
 from shell import Shell
 
 from steptwin.campaign.campaign import Campaign
+from steptwin.campaign.store import CampaignStore, StoredCase
+from steptwin.coverage.counts import Coverage
 
 
 @pytest.fixture
@@ -65,6 +69,38 @@ def test_a_database_that_fails_has_an_exit_code_of_its_own(shell: Shell, file: P
     told = json.loads(shell.errors)
     assert told["code"] == 3
     assert "out/results.db: file is not a database; the file is damaged, or was never a database: put a copy" in told["error"]
+
+
+def test_a_server_that_goes_away_has_this_exit_code_too_and_the_campaign_goes_on_later(
+    shell: Shell, tmp_path: Path, require_peer: Callable[[str], str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    where = programs()
+    require_peer("postgresql: initdb" if where is None else str(where / "initdb"))
+    assert where is not None
+    add, added = CampaignStore.add, list[int]()
+    with postgres_server(where) as server:
+
+        def add_and_crash(store: CampaignStore, found: Sequence[StoredCase], coverage: Coverage | None = None) -> None:
+            add(store, found, coverage)
+            added.append(len(found))
+            server.crash()
+
+        file = campaign_file(tmp_path, CAMPAIGN.replace("seed = 7", f'seed = 7\ndatabase = "{server.url}"'))
+        run = ("campaign", "run", str(file), "--jobs", "1", "--out", str(tmp_path / "out"))
+        with monkeypatch.context() as patch:
+            patch.setattr(CampaignStore, "add", add_and_crash)
+            shell(*run)
+        told = shell.errors
+        assert (shell.code, len(added)) == (3, 1)
+        assert f"127.0.0.1:{server.port}" in told
+        assert "see that the server runs and can be reached, and run it again: what was written before stays" in told
+        assert "Traceback" not in told
+        shell(*run)
+        assert (shell.code, "see that the server runs" in shell.errors) == (3, True)
+        server.start()
+        assert server.query("select count(*) from campaign_case") == str(added[0])
+        assert shell(*run).startswith("doors: 40 runs")
+        assert shell.code == 1
 
 
 def test_until_failure_ends_with_the_first(shell: Shell, file: Path, tmp_path: Path) -> None:
