@@ -22,7 +22,7 @@ from steptwin.inputfiles import read_bytes
 from steptwin.mic488.datasheet import datasheet_of
 from steptwin.mic488.points import item_of
 from steptwin.mic488.present import ACTIVITIES, axis_status, controller_status
-from steptwin.mic488.registermap import DataType, Register, Space, Type
+from steptwin.mic488.registermap import DataType, Register, Space
 from steptwin.mic488.registers import CONTROLLER_STATUS_TEXTS, register_map
 from steptwin.mic488.status import AxisStatus
 from steptwin.mic488.values import named
@@ -103,8 +103,7 @@ class Mic488Part:
         return self._unit(point) if item is None else item.register.unit(DataType.REAL, self._unit_name(item.register))
 
     def _unit_name(self, register: Register) -> str:
-        axis = register.axis or (register.index if register.type is Type.VALUE else None)
-        return self._mic.axis(axis).unit if axis else "u"
+        return self._mic.axis(register.axis).unit if register.axis else "u"
 
     def _unit(self, path: str) -> str:
         found = self._points.get(path.upper()) or self._pins.get(path.upper())

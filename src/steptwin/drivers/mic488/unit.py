@@ -231,7 +231,7 @@ class Unit:
     def shown(self, item: RegisterItem, value: RegisterValue, data_type: DataType) -> tuple[RegisterValue, str]:
         """A value in the form of ``data_type``, converted into units if these are known, and its unit."""
         register = item.register
-        axis = register.axis or (register.index if register.type is Type.VALUE else None)
+        axis = register.axis
         name = self.unit_name(axis) if axis else "u"
         if register.type is Type.VALUE and data_type is DataType.DINT and axis is not None:
             gear = self.gear(axis)
