@@ -137,6 +137,11 @@ def test_who_uses_the_gateways_and_what_has_been_kept(
     assert part["at_s"][0] == pytest.approx(middle / 2)
     assert part["at_s"][-1] <= middle
     assert ok(studio, "compare_history", run=-1, other=-1) == []
+    moves = [one for one in ok(studio, "history_writes") if one["what"].startswith("move ")]
+    assert [(one["machine"], one["what"], one["outcome"]) for one in moves] == [("table", "move axis = 1, to = 5", "done")]
+    assert moves[0]["source"].endswith(" (engineer)")
+    assert 0 < moves[0]["at_s"] < position["at_s"][-1]
+    assert ok(studio, "history_writes", from_s=0, to_s=moves[0]["at_s"] / 2) == []
     wrong = ask(studio, "history_values", points=["table.M1.place"])["error"]["message"]
     assert wrong == "no point 'table.M1.place' has been kept"
     assert "this is before" in ask(studio, "history_values", points=["table.M1.position"], from_s=5, to_s=1)["error"]["message"]
@@ -191,6 +196,8 @@ def test_the_page_has_them(start_studio: Callable[..., Process], browser: Browse
     show(page, "History")
     until(lambda: kept(process)["values"][-1:] == [5], "the motion has been kept")
     button(page, "Read again").click()
+    written = page.get_by_role("table", name="Writes and commands").get_by_role("row").filter(has_text="move axis = 1, to = 5")
+    expect(written).to_contain_text("done")
     chart = page.get_by_role("img", name="table.M1.position from 0")
     expect(chart.locator("polyline")).to_have_count(1)
     page.get_by_role("searchbox", name="Add a point").fill("table.M1.status")

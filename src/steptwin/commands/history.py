@@ -19,8 +19,6 @@ from steptwin.machine import SECOND
 
 FORMATS = {".csv": "numpy", ".parquet": "pyarrow", ".png": "matplotlib", ".svg": "matplotlib"}
 MOST_LINES = 1000
-WRITTEN = ("write", "command")
-"""Kinds of events."""
 HEAD = ("run", "time", "seconds", "point", "value", "unit")
 
 
@@ -81,6 +79,8 @@ class _Shown:
             self._out(f"{self._past.shown}: nothing has been kept yet")
             return True
         if options.events or options.writes:
+            from steptwin.history.reading import WRITTEN
+
             self._events(WRITTEN if options.writes else None)
             return True
         if not options.points:

@@ -11,11 +11,11 @@ from steptwin.errors import Misuse, Refusal
 from steptwin.eventloop import later
 from steptwin.gateways.contract import OpenGateway
 from steptwin.machine import SECOND
-from steptwin.studio.plantrequests import MOST_POINTS
+from steptwin.studio.plantrequests import MOST_POINTS, MOST_WRITES
 from steptwin.world.historytable import HISTORY
 
 if TYPE_CHECKING:
-    from steptwin.history.reading import HistoryDatabase, KeptRun, PointSeries
+    from steptwin.history.reading import HistoryDatabase, KeptEvent, KeptRun, PointSeries
 
 T = TypeVar("T")
 STEPS = 800
@@ -53,6 +53,9 @@ class WorldPlant:
         self, points: Sequence[str], runs: tuple[int, int], begin_s: float, end_s: float | None
     ) -> Sequence[Mapping[str, object]]:
         return await self._read(lambda past: _compare(past, points, runs, begin_s, end_s))
+
+    async def writes(self, run: int, begin_s: float, end_s: float | None) -> Sequence[Mapping[str, object]]:
+        return await self._read(lambda past: _writes(past, past.run(run), begin_s, end_s))
 
     @property
     def _url(self) -> str | None:
@@ -148,3 +151,20 @@ def _compare(
 def _plain(value: object) -> object:
     """Of numpy: for JSON."""
     return None if value is None or value != value else value if isinstance(value, str) else float(value)  # type: ignore[arg-type]  # noqa: PLR0124
+
+
+def _writes(past: HistoryDatabase, run: KeptRun, begin_s: float, end_s: float | None) -> Sequence[Mapping[str, object]]:
+    from steptwin.history.reading import WRITTEN
+
+    found = past.events(begin_s, end_s, run=run.number, kinds=WRITTEN, most=MOST_WRITES)
+    return [_write(one, (one.time - run.began_ns) / SECOND) for one in found]
+
+
+def _write(event: KeptEvent, at_s: float) -> Mapping[str, object]:
+    kept = event.content
+    if event.kind == "write":
+        source, what = kept["source"], kept["words"]
+    else:
+        fields = ", ".join(f"{name} = {value}" for name, value in kept["fields"].items() if name != "machine")
+        source, what = f"{kept['viewer']} ({kept['role']})", f"{kept['do']} {fields}".rstrip()
+    return {"at_s": at_s, "source": source, "machine": event.machine, "what": what, "outcome": kept["outcome"]}

@@ -62,6 +62,10 @@ class KeptPoint(NamedTuple):
     type: str
 
 
+WRITTEN = ("write", "command")
+"""Kinds of events: what programs have written, and what clients have commanded."""
+
+
 class KeptEvent(NamedTuple):
     run: int
     at: datetime

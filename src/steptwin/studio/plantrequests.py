@@ -45,7 +45,16 @@ class CompareHistory:
     to_s: float | None = None
 
 
-PlantRequest: TypeAlias = ReadGateways | ReadHistory | ReadHistoryValues | CompareHistory
+@dataclass(frozen=True, slots=True)
+class ReadHistoryWrites:
+    """What programs have written and commanded in a stretch of a run."""
+
+    run: int = -1
+    from_s: float = 0.0
+    to_s: float | None = None
+
+
+PlantRequest: TypeAlias = ReadGateways | ReadHistory | ReadHistoryValues | CompareHistory | ReadHistoryWrites
 
 
 class PlantRecords(Protocol):
@@ -67,6 +76,10 @@ class PlantRecords(Protocol):
         self, points: Sequence[str], runs: tuple[int, int], begin_s: float, end_s: float | None
     ) -> Sequence[Mapping[str, object]]:
         """As `_DIFFERENCE`. Raises as `values`."""
+        ...
+
+    async def writes(self, run: int, begin_s: float, end_s: float | None) -> Sequence[Mapping[str, object]]:
+        """As `_WRITE`, the last `MOST_WRITES`. Raises as `values`."""
         ...
 
 
@@ -138,8 +151,23 @@ _DIFFERENCE = members(
     }
 )
 
+_WRITE = members(
+    {
+        "at_s": {**_NUMBER, "description": "Since the begin of the run."},
+        "source": {
+            **_TEXT,
+            "description": "Who it was: an address, the owner of a certificate, a viewer, a client of a gateway, script.",
+        },
+        "machine": {**_TEXT, "description": "The controller, or the line; empty for what is about neither."},
+        "what": {**_TEXT, "description": "What was written or commanded, in words."},
+        "outcome": {**_TEXT, "description": "done, misuse, refusal, failure; empty where there is no answer."},
+    }
+)
+
 MOST_POINTS = 8
 """That are read at once."""
+MOST_WRITES = 200
+"""That are given at once."""
 _RUN_NUMBER = whole(-(2**31), 2**31)
 LONGEST_S = LONGEST_NS / SECOND
 _STRETCH = (
@@ -181,5 +209,13 @@ PLANT = (
             Field("points", NAMES, "Only these; all without.", ()),
             *_STRETCH,
         ),
+    ),
+    RequestRow(
+        "history_writes",
+        ReadHistoryWrites,
+        LOOK,
+        f"What programs have written over lines and clients have commanded in a stretch of a run; the last {MOST_WRITES}.",
+        _list(_WRITE),
+        (Field("run", _RUN_NUMBER, "Number of the run; -1 is the last one.", -1), *_STRETCH),
     ),
 )

@@ -127,6 +127,7 @@ class ViewerSession:
             branch.EndBranch: lambda wanted: hub.branches.end(wanted.branch),
             plant.ReadHistory: lambda _: hub.plant.history(),
             plant.ReadHistoryValues: lambda one: hub.plant.values(one.points, one.run, one.from_s, one.to_s),
+            plant.ReadHistoryWrites: lambda one: hub.plant.writes(one.run, one.from_s, one.to_s),
             plant.CompareHistory: lambda one: hub.plant.compare(one.points, (one.run, one.other), one.from_s, one.to_s),
             campaign.ListCampaigns: lambda _: hub.campaigns.plain(),
             campaign.RunCampaign: lambda wanted: hub.campaigns.run(wanted.campaign),

@@ -1,6 +1,6 @@
 // Made from docs/studio.schema.json by `npm run protocol`; not to be changed by hand.
 
-export type Request = DescribeRequest | ReadRequest | PinsRequest | StateRequest | EncodersRequest | FaultsRequest | FaultKindsRequest | TimeRequest | EndPointsRequest | FollowRequest | UnfollowRequest | SetRequest | PressRequest | ReleaseRequest | WriteRequest | SendRequest | RequestRequest | PowerCycleRequest | TurnRequest | CoupleRequest | FaultRequest | ClearFaultRequest | ExpectRequest | NoteRequest | SeeRequest | EnableRequest | MoveRequest | HomeRequest | JogRequest | StopRequest | ProgramRequest | DownloadRequest | PauseRequest | ResumeRequest | StepRequest | SnapshotRequest | SnapshotsRequest | RestoreRequest | DropSnapshotRequest | SaveRequest | DebugRequest | BreakpointRequest | ClearBreakpointRequest | BreakpointsRequest | StopOnRequest | StepProgramRequest | RunRequest | LookAtRequest | BranchRequest | StackRequest | ValuesRequest | EvaluateRequest | SetValueRequest | ProgramSourceRequest | WhyRequest | HelloRequest | ResyncRequest | WatchRequest | UnwatchRequest | TakeControlRequest | ReleaseControlRequest | RenewRequest | LetGoRequest | StopAllRequest | LookRequest | PastEventsRequest | GoBackRequest | ProgramsRequest | ProgramTextRequest | ProgramMemoryRequest | PortsRequest | ConnectRequest | DisconnectRequest | TrafficRequest | AuditRequest | CalculatorRequest | CalculateRequest | GearRequest | ConfigurationRequest | EditConfigurationRequest | ScanRequest | VerifyRequest | WorkRequest | CancelWorkRequest | RecordingsRequest | SaveRecordingRequest | ViewRecordingRequest | BranchesRequest | StartBranchRequest | EndBranchRequest | DrawingRequest | SaveDrawingRequest | GatewaysRequest | HistoryRequest | HistoryValuesRequest | CompareHistoryRequest | CampaignsRequest | RunCampaignRequest | EndCampaignRequest | SettingsRequest | ShadowRequest | ShadowStateRequest;
+export type Request = DescribeRequest | ReadRequest | PinsRequest | StateRequest | EncodersRequest | FaultsRequest | FaultKindsRequest | TimeRequest | EndPointsRequest | FollowRequest | UnfollowRequest | SetRequest | PressRequest | ReleaseRequest | WriteRequest | SendRequest | RequestRequest | PowerCycleRequest | TurnRequest | CoupleRequest | FaultRequest | ClearFaultRequest | ExpectRequest | NoteRequest | SeeRequest | EnableRequest | MoveRequest | HomeRequest | JogRequest | StopRequest | ProgramRequest | DownloadRequest | PauseRequest | ResumeRequest | StepRequest | SnapshotRequest | SnapshotsRequest | RestoreRequest | DropSnapshotRequest | SaveRequest | DebugRequest | BreakpointRequest | ClearBreakpointRequest | BreakpointsRequest | StopOnRequest | StepProgramRequest | RunRequest | LookAtRequest | BranchRequest | StackRequest | ValuesRequest | EvaluateRequest | SetValueRequest | ProgramSourceRequest | WhyRequest | HelloRequest | ResyncRequest | WatchRequest | UnwatchRequest | TakeControlRequest | ReleaseControlRequest | RenewRequest | LetGoRequest | StopAllRequest | LookRequest | PastEventsRequest | GoBackRequest | ProgramsRequest | ProgramTextRequest | ProgramMemoryRequest | PortsRequest | ConnectRequest | DisconnectRequest | TrafficRequest | AuditRequest | CalculatorRequest | CalculateRequest | GearRequest | ConfigurationRequest | EditConfigurationRequest | ScanRequest | VerifyRequest | WorkRequest | CancelWorkRequest | RecordingsRequest | SaveRecordingRequest | ViewRecordingRequest | BranchesRequest | StartBranchRequest | EndBranchRequest | DrawingRequest | SaveDrawingRequest | GatewaysRequest | HistoryRequest | HistoryValuesRequest | CompareHistoryRequest | HistoryWritesRequest | CampaignsRequest | RunCampaignRequest | EndCampaignRequest | SettingsRequest | ShadowRequest | ShadowStateRequest;
 
 /** Every request has exactly one. */
 export type Answer = {
@@ -1642,6 +1642,20 @@ export type CompareHistoryRequest = {
   to_s?: number | null;
 };
 
+/** What programs have written over lines and clients have commanded in a stretch of a run; the last 200. */
+export type HistoryWritesRequest = {
+  do: "history_writes";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Number of the run; -1 is the last one. */
+  run?: number | null;
+  /** Begin of the stretch, since that of the run. [s] */
+  from_s?: number | null;
+  /** End of the stretch; that of the run without. [s] */
+  to_s?: number | null;
+};
+
 /** The campaigns of this world: files with a table [campaign] in the folder of its description or just below it. */
 export type CampaignsRequest = {
   do: "campaigns";
@@ -2233,6 +2247,19 @@ export type CompareHistoryAnswer = ({
   values: (number | string | null)[];
 })[];
 
+export type HistoryWritesAnswer = {
+  /** Since the begin of the run. */
+  at_s: number;
+  /** Who it was: an address, the owner of a certificate, a viewer, a client of a gateway, script. */
+  source: string;
+  /** The controller, or the line; empty for what is about neither. */
+  machine: string;
+  /** What was written or commanded, in words. */
+  what: string;
+  /** done, misuse, refusal, failure; empty where there is no answer. */
+  outcome: string;
+}[];
+
 export type CampaignsAnswer = ({
   /** Path of its file from the folder of the description. */
   campaign: string;
@@ -2571,6 +2598,7 @@ export interface Requests {
   history: { request: HistoryRequest; answer: HistoryAnswer };
   history_values: { request: HistoryValuesRequest; answer: HistoryValuesAnswer };
   compare_history: { request: CompareHistoryRequest; answer: CompareHistoryAnswer };
+  history_writes: { request: HistoryWritesRequest; answer: HistoryWritesAnswer };
   campaigns: { request: CampaignsRequest; answer: CampaignsAnswer };
   run_campaign: { request: RunCampaignRequest; answer: RunCampaignAnswer };
   end_campaign: { request: EndCampaignRequest; answer: EndCampaignAnswer };
