@@ -69,8 +69,8 @@ class Follows:
         self.changes += len(expected)
 
 
-def run(world: World, inputs: Sequence[tuple[int, ExternalInput]], end: int) -> int:
-    """Run with inputs, each at its moment in ms, until an end. Returns how many changes of points were seen."""
+def check_run(world: World, inputs: Sequence[tuple[int, ExternalInput]], end: int) -> int:
+    """Run with inputs, each at its moment in ms, until an end, comparing after each event. Returns how many points changed."""
     follows = Follows(world)
     for moment, what in sorted(inputs, key=lambda one: one[0]):
         world.run_to(moment * MILLISECOND)
@@ -92,7 +92,7 @@ def test_of_a_chip(name: str, end: int, data: st.DataObject) -> None:
         lambda data: do.Send("chips", data)
     )
     inputs = data.draw(st.lists(st.tuples(st.integers(0, end), sets | sends), max_size=6))
-    run(world, [(0, do.Send("chips", b"t44\r" + text)), *inputs], end)
+    check_run(world, [(0, do.Send("chips", b"t44\r" + text)), *inputs], end)
 
 
 @settings(max_examples=40, deadline=None)
@@ -102,11 +102,11 @@ def test_of_a_mic488(lines: list[str], data: st.DataObject) -> None:
     world = World.from_toml(MIC488, {"m.prg": program.encode()})
     writes = st.sampled_from(WRITES).map(lambda write: do.Write((("m", *write),)))
     pins = st.tuples(st.sampled_from(["IN1", "IN2", "IN9"]), st.sampled_from([0.0, 1.0])).map(lambda pin: do.Set((("m", *pin),)))
-    run(world, data.draw(st.lists(st.tuples(st.integers(0, 900), writes | pins), max_size=6)), 1000)
+    check_run(world, data.draw(st.lists(st.tuples(st.integers(0, 900), writes | pins), max_size=6)), 1000)
 
 
 def test_what_a_calculating_chip_changes_is_seen() -> None:
     """The comparison above has something to compare."""
     world = World.from_toml(CHIP.format(variant="A"))
     program = b"[\r:7\r@1\r+1\r>2\r/3\rT50\rF6400\rR\rC50\rW9\rJ1\r]\r"
-    assert run(world, [(0, do.Send("chips", program))], 500) > 20
+    assert check_run(world, [(0, do.Send("chips", program))], 500) > 20
