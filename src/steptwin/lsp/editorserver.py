@@ -76,7 +76,7 @@ class EditorServer(LanguageServer):
         self.text_document_publish_diagnostics(lsp.PublishDiagnosticsParams(uri, []))
 
     def end(self) -> None:
-        """The client has disconnected: no text is analysed any more."""
+        """The client has disconnected, or will: no text is analysed any more."""
         for timer in self._timers.values():
             timer.cancel()
         self._timers.clear()

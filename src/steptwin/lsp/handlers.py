@@ -87,6 +87,10 @@ def _change(change: lsp.TextDocumentContentChangeEvent) -> TextChange:
     return TextChange(change.text, (start.line, start.character), (end.line, end.character))
 
 
+def _end(server: EditorServer, _: object) -> None:
+    server.end()
+
+
 def _did_close(server: EditorServer, params: lsp.DidCloseTextDocumentParams) -> None:
     others = server.session.affected(params.text_document.uri)[1:]
     server.session.close(params.text_document.uri)
@@ -284,6 +288,8 @@ _LEGEND = lsp.SemanticTokensLegend(TOKEN_TYPES, TOKEN_MODIFIERS)
 HANDLERS: dict[str, tuple[Callable[[EditorServer, Any], Any], Any]] = {
     lsp.INITIALIZE: (_initialize, None),
     lsp.INITIALIZED: (_initialized, None),
+    lsp.SHUTDOWN: (_end, None),
+    lsp.EXIT: (_end, None),
     lsp.TEXT_DOCUMENT_DID_OPEN: (_did_open, None),
     lsp.TEXT_DOCUMENT_DID_CHANGE: (_did_change, None),
     lsp.TEXT_DOCUMENT_DID_CLOSE: (_did_close, None),
