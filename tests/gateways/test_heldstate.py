@@ -17,7 +17,7 @@ from steptwin.gateways.heldstate import HeldState, parts_only
 from steptwin.gateways.sampling import KINDS
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.motion import at_rest
-from steptwin.subject.commands import Advance, ReadState
+from steptwin.subject.commands import Advance, Enable, Move, ReadState
 from steptwin.subject.events import Event
 from steptwin.subject.following import Filter
 from steptwin.subject.payloads import (
@@ -32,6 +32,7 @@ from steptwin.subject.payloads import (
 )
 from steptwin.subject.world import WorldSubject
 from steptwin.world.actions import Bytes
+from steptwin.world.script import PowerCycle, Send
 
 FEEDER = Path(__file__).parents[2] / "examples/worlds/feeder.toml"
 UNTOLD = {"details": ("listens", "input_waiting")}
@@ -40,6 +41,34 @@ UNTOLD = {"details": ("listens", "input_waiting")}
 
 MIC488 = World.from_toml('[[mic488]]\nname = "table"\n')
 PLAN = PlanPayload("2", at_rest(0, 7))
+AXES = ("M1", "M2", "M3", "M4")
+FOLLOWS = """
+[[mic488]]
+name = "table"
+
+[[axis]]
+name = "belt"
+drive = "table.M1"
+pulses_per_unit = 10
+
+[[axis]]
+name = "wheel"
+drive = "table.M2"
+pulses_per_unit = 10
+[axis.encoder]
+follows = "belt"
+"""
+CURRENTS = """
+[[line]]
+name = "chips"
+kind = "m1486"
+timing = "off"
+
+[[m1486]]
+name = "chip"
+line = "chips"
+interface = "{interface}"
+"""
 
 
 @pytest.mark.parametrize(
@@ -48,16 +77,16 @@ PLAN = PlanPayload("2", at_rest(0, 7))
         (EdgePayload("AIN1", 3.5), set()),
         (EdgePayload("M3_EN", 1.0), {"M3"}),
         (EdgePayload("cup.held", 1.0), set()),
-        (PLAN, {"M2", "status"}),
-        (CoordinatePayload("4", 100), {"M4", "status"}),
-        (StatusPayload("homed", "homed", (("axis", 1),)), {"M1", "status", "program", "details"}),
-        (StatusPayload("power-on", "power-on"), {"M1", "M2", "M3", "M4", "status", "program", "details"}),
-        (InputPayload("request", b"1"), {"M1", "M2", "M3", "M4", "status", "program", "details"}),
+        (PLAN, {*AXES, "status"}),
+        (CoordinatePayload("4", 100), {*AXES, "status"}),
+        (StatusPayload("homed", "homed", (("axis", 1),)), {*AXES, "status", "program", "details"}),
+        (StatusPayload("power-on", "power-on"), {*AXES, "status", "program", "details"}),
+        (InputPayload("request", b"1"), {*AXES, "status", "program", "details"}),
         (NotePayload("nothing"), set()),
     ],
 )
 def test_an_event_names_what_is_read_again(payload: Payload, wanted: set[str]) -> None:
-    """An edge brings its level; a new plan may end an error of the controller."""
+    """An edge brings its level; a new plan may end an error of the controller, and may turn encoders of other axes."""
     holder = Holder(MIC488)
     held = holder.held["table"]
     held.take(Event(1, 0, "table", payload))
@@ -123,6 +152,45 @@ def test_the_state_that_is_held_is_the_one_that_is_read(name: str, seed: int) ->
         if steps and chance.below(5) == 0:
             do_from_outside(world, steps.pop(), files)
             holder.check()
+
+
+def test_an_encoder_that_another_axis_turns_goes_with_it() -> None:
+    """The axis of the encoder is switched off."""
+    world = World.from_toml(FOLLOWS)
+    holder = Holder(world)
+    holder.subject.do(Enable("table", 1))
+    holder.subject.do(Move("table", 1, by=400.0))
+    seen = set()
+    for _ in range(30):
+        holder.subject.do(Advance(duration=20 * MILLISECOND))
+        holder.check()
+        state = holder.held["table"].state
+        assert state is not None
+        seen.add(state["axes"][1]["encoder"])
+    assert len(seen) > 5
+
+
+@pytest.mark.parametrize("interface", ["dual", "two"])
+def test_levels_of_a_driver_interface_change_at_rest(interface: str) -> None:
+    """With another waveform, with the default one after a power cycle."""
+    world = World.from_toml(CURRENTS.format(interface=interface))
+    holder = Holder(world)
+    seen = []
+    for what in (b"S\r>3\r", b"N2\r", b"N3\r", b"N7\r"):
+        world.apply_input(Send("chips", what))
+        holder.subject.do(Advance(duration=500 * MILLISECOND))
+        holder.check()
+        seen.append(_pins(holder))
+    world.apply_input(PowerCycle("chip"))
+    holder.check()
+    seen.append(_pins(holder))
+    assert len(set(seen)) > 2
+
+
+def _pins(holder: Holder) -> tuple[tuple[str, float], ...]:
+    state = holder.held["chip"].state
+    assert state is not None
+    return tuple(state["pins"].items())
 
 
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])

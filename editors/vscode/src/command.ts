@@ -1,7 +1,7 @@
 // The command steptwin: that of the setting, of an environment in the workspace, or the one in PATH.
 
 import { existsSync } from "node:fs";
-import { join } from "node:path";
+import { join, resolve } from "node:path";
 import { commands, window, workspace } from "vscode";
 import { isFound } from "./found";
 
@@ -10,7 +10,10 @@ const IN_ENVIRONMENT = process.platform === "win32" ? "Scripts\\steptwin.exe" : 
 export function command(): string {
   const folders = (workspace.workspaceFolders ?? []).map((folder) => folder.uri.fsPath);
   const given = workspace.getConfiguration("steptwin").get("command", "").trim();
-  if (given) return given.replace("${workspaceFolder}", folders[0] ?? "");
+  if (given) {
+    const path = given.replace("${workspaceFolder}", folders[0] ?? "");
+    return /[\\/]/.test(path) ? resolve(folders[0] ?? "", path) : path;
+  }
   return folders.map((folder) => join(folder, ".venv", IN_ENVIRONMENT)).find(existsSync) ?? "steptwin";
 }
 

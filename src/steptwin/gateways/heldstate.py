@@ -48,9 +48,10 @@ class HeldState:
         axes = part.datasheet.axes
         names = [axis.name for axis in axes]
         self._axes = {str(axis.number): axis.name for axis in axes}
-        self._others = (*(name for name in PARTS if name != "pins"), *names)
-        """All parts but pins, which have edges."""
         also = part.datasheet.also_change
+        has_edges = also is not None and not any("pins" in of for of in also.values())
+        self._others = (*(name for name in PARTS if name != "pins" or not has_edges), *names)
+        """All parts, without pins where each has edges."""
         everything = (*PARTS, *names)
         pins = [pin.name for pin in part.datasheet.pins]
         self._also: Mapping[str, tuple[str, ...]] = (

@@ -27,7 +27,12 @@ from steptwin.m1486.variants import Variant
 MOTION_SECTION = "VII.2"
 STARTS = frozenset({"R", ")", "(", "]"})
 """Commands that start a motion, or the file that may; the others of the section on motions set the next motion."""
-_ALSO_CHANGE = {"M1": ("status", "program", "pins", "details"), "LIMIT": ("status", "program"), "SD": ("status", "program")}
+_ALSO_CHANGE = {
+    "M1": ("status", "program", "pins", "details"),
+    WAVEFORM: ("pins",),
+    "LIMIT": ("status", "program"),
+    "SD": ("status", "program"),
+}
 """Signals of the driver are pins without edges, and the counter is a detail."""
 ACTIVE_LOW = frozenset({"JOG", "LIMIT", "SD", "S&D", "DUAL", "BOOST"})
 

@@ -77,11 +77,13 @@ def _pins() -> Iterator[Pin]:
 
 PINS: Mapping[str, Pin] = {pin.name: pin for pin in _pins()}
 """By name."""
+_AXIS_NAMES = tuple(f"M{number}" for number in range(1, AXES + 1))
 _ALSO_CHANGE: Mapping[str, tuple[str, ...]] = {
     **{pin: (f"M{number}",) for number, pin in enumerate(ENABLE_PINS, start=1)},
-    **{f"M{number}": ("status",) for number in range(1, AXES + 1)},
+    **{name: ("status", *(other for other in _AXIS_NAMES if other != name)) for name in _AXIS_NAMES},
     "ERR": ("status",),
 }
+"""An axis may turn the encoder of another one."""
 
 
 def _commands(registers: RegisterMap, units: Sequence[str]) -> Iterator[CommandDescription]:

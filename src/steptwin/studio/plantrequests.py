@@ -47,7 +47,7 @@ class CompareHistory:
 
 @dataclass(frozen=True, slots=True)
 class ReadHistoryWrites:
-    """What programs have written and commanded in a stretch of a run."""
+    """What programs have written and clients have commanded in a stretch of a run."""
 
     run: int = -1
     from_s: float = 0.0

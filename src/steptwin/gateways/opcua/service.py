@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from datetime import UTC, datetime
 from typing import Any
 
@@ -46,7 +47,8 @@ class WatchedNode:
         fresh = data_value(value, self.point.type, sample.at, is_answered=sample.state is not None)
         self.attribute.value = fresh
         for handle, call in list(self.attribute.datachange_callbacks.items()):
-            await call(handle, fresh)
+            with suppress(KeyError):  # a client has just ended this subscription
+                await call(handle, fresh)
 
 
 class WatchedNodes:
