@@ -322,10 +322,14 @@ class Interpreter(Stateful):
                 if several is None or now + several.further * pause > until:
                     following = steps[pc](self, cells)
                     if following < 0:
-                        pc = ~following
-                        self.pc = pc
+                        pc = self.pc = ~following
                         self._check_events(code)
-                        return False
+                        due = self._due_undisturbed(until)
+                        if due is None:
+                            return False
+                        now = self.now = due
+                        self.not_before = 0
+                        continue
                 else:
                     following = several.run(self, cells)
                     pc += several.further
@@ -381,6 +385,12 @@ class Interpreter(Stateful):
         self.due = self.now + self.statement_time
         if self.not_before > self.due and not self._can_interrupt(code):
             self.due = self.not_before
+
+    def _due_undisturbed(self, until: Nanos) -> Nanos | None:
+        """When the next statement is due, mostly after a DELAY; None if something else may happen before, or a hook looks."""
+        if self.acted or self.waiting or self.pending or self._hooks or self.due is None or self.due > until:
+            return None
+        return self.due
 
     def _can_interrupt(self, code: Code) -> bool:
         return not self.handling and any(not code.entries[e].hard for e in self._pending_events())
