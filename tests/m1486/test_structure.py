@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import pytest
+
 from steptwin.m1486.structure import CommandFile, CommandStream, streams
 from steptwin.m1486.syntax import parse
 
@@ -47,6 +49,12 @@ def test_the_latest_label_that_has_arrived_counts() -> None:
 def test_a_reset_ends_open_loops() -> None:
     stream = only_stream("L2\n\\\nE")
     assert (stream.open_loops, stream.lone_ends, stream.loops) == ([0], [2], {})
+
+
+@pytest.mark.parametrize("leaves", ["J", "'", "J2", "'2"])
+def test_loops_are_not_nested_where_a_jump_leaves_one_or_may_do_so(leaves: str) -> None:
+    assert only_stream("[\n@1\nL2\n@3\nR\nE\n@2\nJ1\n]").are_loops_nested
+    assert not only_stream(f"[\nL2\nR\n{leaves}\nE\n@2\nR\n]").are_loops_nested
 
 
 def test_bits_between_a_label_and_what_the_chip_has() -> None:

@@ -432,6 +432,7 @@ def test_wbc_17_encoder_correction_is_off_on_circles_and_on_on_lines() -> None:
         ("DOCIRC n", "A;0;0;1;x\nB;10;0;10;400000\n", "angle = -400000°: must be within ±360000°"),
         ("MOVELIN n", "A;0;0;1;x\nB;5;5;-1;x\n", "the path velocity p3 must be greater than 0"),
         ("n = 2\nMOVEPTP n", "A;0;0;1;x\nB;5;5;-1;x\n", "MOVEPTP 2: the position table has rows 0…1"),
+        ("n = -1\nMOVEPTP n", "A;0;0;1;x\nB;5;5;-1;x\n", "MOVEPTP -1: the position table has rows 0…1"),
         ("n = 0.5\nMOVEPTP n", "A;0;0;1;x\nB;5;5;-1;x\n", "MOVEPTP 0.5: the position table has rows 0…1"),
         ("MOVEPTP n", "A;0;0;1;x\nB;99999999999;5;-1;x\n", "permitted are -21474836.48…21474836.47 imp"),
         ("MOVELIN_REL n", "A;0;0;1;x\nB;99999999999;5;1;x\n", "permitted are -21474836.48…21474836.47 imp"),

@@ -113,6 +113,13 @@ def test_a_crossing_is_the_first_nanosecond_beyond(spring: Spring, direction: in
             assert (response.at(found - 1)[0] - level) * direction < 0
 
 
+@pytest.mark.parametrize("begin", [100 * MS, 250 * MS])
+def test_a_crossing_is_found_where_a_part_of_the_motion_ends(begin: int) -> None:
+    response = Response(Spring(12.0, 0.06), MOVE, 0.0, 0.0)
+    for moment in range(begin - 2, begin + 3):
+        assert response.reaches(response.at(moment)[0], 90 * MS, 1) == moment
+
+
 def test_turns_are_where_the_direction_changes() -> None:
     response = Response(Spring(12.0, 0.06), MOVE, 0.0, 0.0)
     turns = [0, *response.turns(0)]

@@ -345,3 +345,9 @@ def test_distances_are_counted_from_where_the_motion_begins(begin: int) -> None:
         profile = plan_position(MotionState(0, begin, 0.0, 0.0), target, 1e30, 1e30, 1e30)
         assert profile.end is not None
         assert profile.count(profile.end) == target
+
+
+@pytest.mark.parametrize(("distance", "parts"), [(1000, 2), (-1000, 4), (10, 1)])
+def test_a_motion_has_no_parts_that_take_no_time(distance: int, parts: int) -> None:
+    """At its speed already: on and brake, or brake, speed up, on and brake, or brake at once."""
+    assert len(plan_position(MotionState(0, 0, 0.0, 100.0), distance, 500.0, 500.0, 100.0).segments) == parts

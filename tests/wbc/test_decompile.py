@@ -217,6 +217,8 @@ def test_damage_is_named() -> None:
         read_image(good[:16_004] + b"\x01" + good[16_005:])
     with pytest.raises(ImageError, match="1001 commands, permitted are 0…1000"):
         read_image(good[:16_000] + b"\xe9\x03" + good[16_002:])
+    with pytest.raises(ImageError, match="228 positions, permitted are 0…227"):
+        read_image(good[:20_090] + b"\xe4\x00" + good[20_092:])
     with pytest.raises(ImageError, match="after the 14 commands"):
         read_image(good[:15_999] + b"\x01" + good[16_000:])
 

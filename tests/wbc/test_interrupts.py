@@ -69,6 +69,18 @@ def test_wbc_2_interrupts_do_not_nest_and_one_of_each_source_waits() -> None:
     assert rig.i(0) == 1
 
 
+def test_a_handler_that_follows_itself_is_no_further_round_of_a_loop() -> None:
+    """It comes to the same statement in the same state, but nothing waits any more."""
+    rig = started(
+        "CFGINT_IN1 = RIS_FALL\nDELAY 1\nOUT1 = ON\nWAIT 1 = 2\n"
+        "INT_IN1:\nDELAY 0.2\nx = 0\nWHILE x < 1\nx = 1\nENDWHILE\nRETURN\n"
+    )
+    rig.wait(0.1)
+    pulse(rig, "IN1")
+    rig.wait(1)
+    assert rig.out(1)
+
+
 @pytest.mark.parametrize("order", [("IN5", "IN2", "IN4"), ("IN2", "IN4", "IN5"), ("IN4", "IN5", "IN2")])
 def test_wbc_41_interrupts_that_wait_are_served_by_number(order: tuple[str, ...]) -> None:
     handlers = "".join(f"INT_IN{n}:\nn = n * 10\nn = n + {n}\n$I0 = n\nRETURN\n" for n in (4, 5, 2))

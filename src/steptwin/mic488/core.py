@@ -140,8 +140,6 @@ class ControllerCore(Stateful):
         self.events: deque[Mic488Event] = deque(maxlen=EVENTS_KEPT)
         self._edges: list[PinEdge] = []
         self._due: Nanos | None = None
-        self._others: Nanos | None = None
-        """The next deadline of everything except the program, ns."""
         self.inputs = Inputs(config.inputs)
         self.analog_v = [0.0] * ANALOG_INPUTS
         self.outputs = [False] * OUTPUTS
@@ -268,6 +266,7 @@ class ControllerCore(Stateful):
     def _plan_ahead(self, others: Nanos | None, *, lamp: bool) -> None:
         """Find the next deadline, which for all but the program is ``others``, and the ERR ``lamp`` anew."""
         self._others = others
+        """The next deadline of everything except the program, ns."""
         due = self.program.deadline()
         self._due = others if due is None or (others is not None and others < due) else due
         if lamp:

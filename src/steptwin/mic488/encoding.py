@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import struct
 from array import array
+from itertools import count
 
 from steptwin.errors import Misuse
 
@@ -91,4 +92,4 @@ def shortest_real(value: float) -> str:
         words = real_to_words(value)
     except Misuse:
         return f"{value:.9g}"
-    return next((text for n in range(6, 9) if real_to_words(float(text := f"{value:.{n}g}")) == words), f"{value:.9g}")
+    return next(text for n in count(6) if real_to_words(float(text := f"{value:.{n}g}")) == words)

@@ -62,8 +62,6 @@ class PositionControl(Stateful):
     def __init__(self) -> None:
         self.tick_ns: Nanos | None = None
         """The next moment at which the loop runs."""
-        self._ref_motor = 0
-        self._ref_shaft = 0
         self._following = False
         self._shaft = 0
         self._progress_ns: Nanos = 0

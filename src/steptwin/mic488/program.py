@@ -73,18 +73,10 @@ class ProgramControl(Stateful):
         self.banks = ProgramBanks(device.firmware.banks, self.dialect)
         self.interpreter = Interpreter(self, statement_time)
         self.registers = ProgramRegisters()
-        self.program_bank = 0
-        self.position_bank = 0
         self.state = STOPPED
-        self.error = False
-        """A program error is pending; cleared by the next start or stop (MIC-26)."""
-        self.fault: ProgramError | None = None
-        """The last program error; it is kept until the next start."""
         self._program = 0
         self._table = 0
         """Banks of the program that runs, and of its positions."""
-        self._pulses: dict[int, Nanos] = {}
-        """The moment at which PULSE inverts each output (from 0)."""
         self._statuses: tuple[int, ...] = ()
         self.together = False
         """M1 and M2 are on one path, which neither leaves alone."""
@@ -124,8 +116,11 @@ class ProgramControl(Stateful):
         self.position_bank = configured.pos_bank if configured.activate else 0
         self._stop()
         self.error = False
-        self.fault = None
-        self._pulses = {}
+        """A program error is pending; cleared by the next start or stop (MIC-26)."""
+        self.fault: ProgramError | None = None
+        """The last program error; it is kept until the next start."""
+        self._pulses: dict[int, Nanos] = {}
+        """The moment at which PULSE inverts each output (from 0)."""
         self.registers.forget_record()
         self.registers.begin(self.device.config, now)
         if configured.activate:
@@ -136,8 +131,8 @@ class ProgramControl(Stateful):
         if value == RUNNING:
             if self.state is STOPPED:
                 self._start(now)
-            elif self.state is PAUSED:
-                self._resume(now)
+            elif (begun := self.interpreter.paused_at) is not None:
+                self._resume(begun, now)
         elif value == PAUSED:
             self._pause(now)
         elif self.state is not STOPPED:
@@ -193,12 +188,10 @@ class ProgramControl(Stateful):
             self.state = PAUSED
             self.interpreter.pause(now)
 
-    def _resume(self, now: Nanos) -> None:
-        begun = self.interpreter.paused_at
-        if begun is not None:
-            self.registers.ticks = {event: at + now - begun for event, at in self.registers.ticks.items()}
+    def _resume(self, begun: Nanos, now: Nanos) -> None:
+        self.registers.ticks = {event: at + now - begun for event, at in self.registers.ticks.items()}
         self.state = RUNNING
-        self.interpreter.resume(self._code(), now)
+        self.interpreter.resume(self._code(), begun, now)
 
     def _code(self) -> Code:
         return self.banks.programs[self._program].code

@@ -30,7 +30,6 @@ from steptwin.wbc.resting import HORIZON
 
 TIMERS = 16
 TIMER_PERIODS: Mapping[str, Nanos] = MappingProxyType({"TIMA": 10 * MILLISECOND, "TIMB": SECOND})
-_ZEROS = ((0, 0),) * TIMERS
 _TIMER_MOST = int(TIMER.high)
 
 _OF_INPUTS = tuple((number, event.input - 1) for number, event in enumerate(EVENTS) if 0 < event.input <= INPUTS)
@@ -47,16 +46,8 @@ class ProgramRegisters(Stateful):
     __slots__ = ("lin_acc_u", "row_0", "switches", "ticks", "timers", "vision")
 
     def __init__(self) -> None:
-        self.forget_record()
-        self.switches = array("b", bytes(len(EVENTS)))
-        """CFGINT_… by number of the event in `EVENTS`."""
-        self.ticks: dict[int, Nanos] = {}
-        """Next moment of the ticks that are switched on."""
-        self.timers: dict[str, tuple[tuple[int, Nanos], ...]] = dict.fromkeys(TIMER_PERIODS, _ZEROS)
-        """Of each family: the number at a moment, from which it counts on."""
         self.row_0: tuple[float | None, ...] | None = None
         """Row 0 of the position table, which programs can write; None: there is none yet."""
-        self.lin_acc_u: float | None = None
 
     def forget_record(self) -> None:
         self.vision = array("f", bytes(4 * len(VISION)))
@@ -64,11 +55,14 @@ class ProgramRegisters(Stateful):
 
     def begin(self, config: ControllerConfig, now: Nanos) -> None:
         self.switches = array("b", bytes(len(EVENTS)))
+        """CFGINT_… by number of the event in `EVENTS`."""
         for number, of_input in _OF_INPUTS:
             self.switches[number] = config.inputs[of_input].interrupt
-        self.ticks = {}
-        self.timers = dict.fromkeys(TIMER_PERIODS, ((0, now),) * TIMERS)
-        self.lin_acc_u = None
+        self.ticks: dict[int, Nanos] = {}
+        """Next moment of the ticks that are switched on."""
+        self.timers: dict[str, tuple[tuple[int, Nanos], ...]] = dict.fromkeys(TIMER_PERIODS, ((0, now),) * TIMERS)
+        """Of each family: the number at a moment, from which it counts on."""
+        self.lin_acc_u: float | None = None
 
     def timer(self, name: str, number: int, at: Nanos) -> int:
         """Timer ``number`` from 0."""
@@ -176,7 +170,7 @@ def _encoder_stretches(axis: Axis, at: Nanos) -> list[Nanos] | None:
 
 def _motion_stretches(axis: Axis, at: Nanos) -> list[Nanos]:
     end = axis.profile.end
-    return [] if end is None or end <= at else [end - 1]
+    return [] if end is None else [end - 1]
 
 
 def _set_drive(axis: Axis, on: float, now: Nanos) -> bool:

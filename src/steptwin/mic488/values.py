@@ -221,8 +221,6 @@ def _joins(registers: RegisterMap, group: list[RegisterItem], item: RegisterItem
     if group[0].register.space is not space or item.address + item.size - start > _MOST[space]:
         return False
     gap = item.address - end
-    if gap <= 0:
-        return True
     between = registers.pieces(space, end, gap)
     return gap <= BRIDGE[space] and all(p.whole and p.register is not None and p.register.reads for p in between)
 

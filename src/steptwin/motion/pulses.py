@@ -229,7 +229,7 @@ def velocities(profile: Profile, times: PulseTimes) -> Reals:
 
 
 def _evaluate(profile: Profile, times: PulseTimes, *, derivative: bool) -> Reals:
-    n = np.asarray(times, dtype=np.int64) - profile.start
+    n = times - profile.start
     out = np.full(n.shape, 0.0 if derivative else profile.base + profile.final_p)
     begin: float = -inf
     for s, end in zip(profile.segments, profile.ends, strict=True):

@@ -159,11 +159,9 @@ class Interpreter(Stateful):
         self.running = False
         self.paused_at = now
 
-    def resume(self, code: Code, now: Nanos) -> None:
-        """Continue; the end of every wait moves by the length of the pause."""
-        if self.paused_at is None:
-            return
-        begun, self.paused_at = self.paused_at, None
+    def resume(self, code: Code, begun: Nanos, now: Nanos) -> None:
+        """Continue after the pause that has ``begun``; the end of every wait moves by its length."""
+        self.paused_at = None
         later = now - begun
         if self.due is not None:
             self.due += later

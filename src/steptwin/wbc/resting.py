@@ -69,6 +69,6 @@ class RestingLoop(NamedTuple):
                 if stretches is None:
                     return None
                 change = first_change(partial(seen, controller, cells), at, self.period, stretches, at + HORIZON)
-                if change is not None and not 0 <= soonest <= change:
+                if change is not None and (soonest == NEVER or change < soonest):
                     soonest = change
         return soonest
