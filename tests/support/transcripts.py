@@ -25,13 +25,19 @@ from typing import Any
 
 from line_rig import VirtualWire
 
+from steptwin.drivers.blocking import finish
 from steptwin.errors import SteptwinError
 from steptwin.machine import MILLISECOND, Nanos
+from steptwin.subject import commands
+from steptwin.subject.following import filter_of
+from steptwin.world import script
 
 CASE, RESULT = "=== ", "---"
 PAUSE_NS = 20 * MILLISECOND
 """Longer ones are shown, with their moment since the call."""
 MANY = 5
+OF_SUBJECTS = {"command": commands, "steps": script, "filter_of": filter_of, "finish": finish}
+"""What scripts use of subjects."""
 FAULT = re.compile(r"(.+) (\d+) (to .+)")
 
 

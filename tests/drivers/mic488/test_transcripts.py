@@ -10,9 +10,10 @@ from pathlib import Path
 
 import pytest
 from host_rig import Fault, Wire, thread_line
-from transcripts import Bench, Case, cases, regenerate, suspending
+from transcripts import OF_SUBJECTS, Bench, Case, cases, regenerate, suspending
 
 from steptwin import drivers
+from steptwin.mic488.registers import register_map
 from steptwin.wire import pdu
 
 GOLDENS = [Path(__file__).parent / "golden" / name for name in ("transcripts.txt", "random_sessions.txt")]
@@ -37,14 +38,19 @@ def bench(options: str) -> Bench:
     def shown(data: bytes) -> str:
         return data[6:].hex() if wire.tcp else data[:-2].hex()
 
-    names = {name: getattr(drivers, name) for name in drivers.__all__} | {
-        "wire": wire,
-        "mic": mic,
-        "axis": mic.axis,
-        "pdu": pdu,
-        "suspend": suspending(wire),
-        "log": log,
-    }
+    names = (
+        {name: getattr(drivers, name) for name in drivers.__all__}
+        | OF_SUBJECTS
+        | {
+            "wire": wire,
+            "mic": mic,
+            "axis": mic.axis,
+            "pdu": pdu,
+            "register_map": register_map,
+            "suspend": suspending(wire),
+            "log": log,
+        }
+    )
     return Bench(
         wire=wire,
         names=names,
