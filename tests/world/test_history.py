@@ -284,6 +284,8 @@ def test_nothing_watches_the_trace_after_the_end() -> None:
     assert world.trace.watchers != watchers
     history.close()
     assert world.trace.watchers == watchers
+    followers = world.parts.kernel_of["m"].followers
+    assert followers is None or not followers.by_name["m"]
 
 
 @pytest.mark.parametrize(("machines", "most"), [(1, 60), (2, 30), (3, 20), (5, 16)])

@@ -89,14 +89,15 @@ class Zone:
         """The last turn whose zone, with hysteresis, begins at or below ``place``."""
         return ceil((place - (self.low or 0) + self.hysteresis + Fraction(1, 2)) / period) - 1
 
-    def _ends(self, turn: int, period: Fraction | int) -> tuple[int, int]:
-        shift = floor(turn * period + Fraction(1, 2))
+    def _ends(self, way: Fraction | int) -> tuple[int, int]:
+        """The zone, moved by ``way``."""
+        shift = floor(way + Fraction(1, 2))
         return (self.low or 0) + shift, (self.high or 0) + shift
 
     def _near(self, place: int) -> tuple[int | None, int | None]:
         """The zone that ``place`` is in, hysteresis included, or else the last one below it."""
         period = self.period
-        return (self.low, self.high) if period is None else self._ends(self._turn(place, period), period)
+        return (self.low, self.high) if period is None else self._ends(self._turn(place, period) * period)
 
     def on(self, place: int, *, was_on: bool) -> bool:
         low, high = self._near(place)
@@ -115,8 +116,8 @@ class Zone:
             return below, above
         turn = self._turn(place, self.period)
         if low is not None and place < low:
-            return self._ends(turn - 1, self.period)[1], low
-        return high, self._ends(turn + 1, self.period)[0]
+            return self._ends((turn - 1) * self.period)[1], low
+        return high, self._ends((turn + 1) * self.period)[0]
 
 
 class Circuit:

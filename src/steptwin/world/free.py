@@ -109,7 +109,7 @@ class FreeMotion:
         none does."""
         direction, rate = s.direction, self._rate(s.direction)
         slow = detent.catches_below(self.inertia, self.friction + direction * self.load)
-        if abs(self.load) > self.holding or slow == 0.0:
+        if slow == 0.0:
             return []
         way: list[Segment] = []
         if abs(v) > slow:

@@ -336,13 +336,16 @@ class Mechanism(Stateful):
         for one in self._burdens.values():
             self._burden = self._burden.plus(one)
         state = course.at(now)
-        rests = False
-        if self._loose is not None:
-            last, self._changed = self._changed, (state.rotor, before)
-            is_again = last is not None and last[1] == self._carried and 4 * abs(last[0] - state.rotor) <= self.build.period_p
-            rests = is_again and self._loose.settles(course, before, self._carried, now)
+        rests = self._loose is not None and self._settles(self._loose, course, before, now)
         self._renew(self._drive, now, state, rests=rests)
         self._kernel.mark(self.machine)
+
+    def _settles(self, loose: Looseness, course: Course, before: Burden, now: Nanos) -> bool:
+        """Whether a free rotor stands whose load changes from ``before`` where it changed the other way the last time."""
+        rotor = course.at(now).rotor
+        last, self._changed = self._changed, (rotor, before)
+        is_again = last is not None and last[1] == self._carried and 4 * abs(last[0] - rotor) <= self.build.period_p
+        return is_again and loose.settles(course, before, self._carried, now)
 
     def pulls(self, now: Nanos) -> bool:
         """Whether the motor follows its field, or would: it has current, has not stalled, and nothing blocks it."""

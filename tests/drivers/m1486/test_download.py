@@ -17,6 +17,7 @@ from steptwin.drivers.m1486 import (
 )
 from steptwin.drivers.m1486.settings import after_reset
 from steptwin.drivers.m1486.sync import download_to
+from steptwin.drivers.m1486.unit import PATIENCE_NS
 from steptwin.errors import LineFailure, Misuse
 from steptwin.m1486.commands import memory_bits
 from steptwin.m1486.lines import DUAL_DAC
@@ -30,6 +31,13 @@ def test_a_block_that_is_one_command_too_large() -> None:
     with pytest.raises(Misuse, match="the block is larger than the command memory"):
         chip.run_block(["d"] * (most + 1))
     assert chip.run_block(["d"] * most).ok
+
+
+def test_a_file_may_be_typed_for_longer_than_a_request_may_wait() -> None:
+    wire = ChipWire("B")
+    chip_driver(wire).download("t80\n" * 700 + "f64\nr")
+    assert wire.now > PATIENCE_NS
+    assert typed(wire).endswith("f64 r ")
 
 
 def test_a_program_whose_chip_was_recovered_is_not_held_any_more() -> None:

@@ -72,6 +72,13 @@ def test_nobody_is_not_waited_for_long() -> None:
     assert wire.now - begin < SECOND
 
 
+def test_a_chip_is_not_waited_for_once_it_has_answered() -> None:
+    wire = ChipWire("B", tuple(range(16)))
+    begin = wire.now
+    assert len(finish(scan_chips(search_line(wire)))) == 16
+    assert wire.now - begin < SECOND
+
+
 def test_a_chip_whose_buffer_is_full_is_busy() -> None:
     wire = ChipWire("A", (5,))
     wire.send(b"f640000\rr\rf6400\rr\rr\r")

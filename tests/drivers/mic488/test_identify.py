@@ -101,6 +101,7 @@ def test_scanning_finds_who_is_there() -> None:
     begin = wire.now
     assert finish(scan(thread_line(wire), range(1, 9), progress=asked.append)) == [FoundUnit(2, "1.23"), FoundUnit(5, "1.23")]
     assert asked == list(range(1, 9))
+    assert wire.sent[0][1][:-2].hex() == "010213880008"
     assert wire.now - begin < 8 * (SCAN_NS + SECOND // 10)
 
 

@@ -13,7 +13,7 @@ from mic488_rig import loaded
 from steptwin.drivers.kind import DeviceAddress, EndedMotion, FoundDevice, WantedMoves
 from steptwin.drivers.mic488.kind import MIC488_DRIVER, RUNS_ON, of_mic488, unit_of
 from steptwin.drivers.mic488.sync import Mic488
-from steptwin.errors import Misuse, Refusal
+from steptwin.errors import LineFailure, Misuse, Refusal
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND
 from steptwin.mic488.configtext import config_text
@@ -212,7 +212,7 @@ def test_a_controller_as_a_subject(monkeypatch: pytest.MonkeyPatch, tmp_path: Pa
     at_every_address(monkeypatch, wire)
     config = tmp_path / "table.cfg"
     config.write_text(config_text(wire.config, FIRMWARES["1.70"]))
-    address = DeviceAddress("memory", "mic488", 2, 38400, 0.25, "1.70", str(config), (("mm", 100.0),) * 4)
+    address = DeviceAddress("memory", "mic488", 2, 38400, 0.25, "1.70", str(config))
     assert MIC488_DRIVER.line is not None
     assert MIC488_DRIVER.part is not None
     connect, part_of = MIC488_DRIVER.line, MIC488_DRIVER.part
@@ -242,12 +242,17 @@ def test_a_controller_as_a_subject(monkeypatch: pytest.MonkeyPatch, tmp_path: Pa
     assert list(world.mic488) == ["beside"]
     assert world.lines[twin.line].units == (2,)
     assert world.mic488["beside"].device.config.axes == wire.config.axes
+    assert 'firmware = "1.40"' in run_virtual(wire, twin_of(replace(address, variant="1.40"))).text
     # No configuration, and a motion.
-    for changed, message in ((replace(address, config=None), "connect it with config=FILE"), (address, "M2 runs")):
+    scaled = replace(address, config=None, scales=(("mm", 100.0),) * 4)
+    for changed, message in ((scaled, "connect it with config=FILE"), (address, "M2 runs")):
         if changed is address:
             mic.axis(2).move_by(100.0)
         with pytest.raises(Refusal, match=message):
             run_virtual(wire, twin_of(changed))
+    wire.severed = True
+    with pytest.raises(LineFailure, match="within 0.25 s"):
+        run_virtual(wire, twin_of(address))
 
 
 def test_the_slave_address_is_1_if_none_is_given() -> None:
