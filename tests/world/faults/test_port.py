@@ -213,6 +213,8 @@ def test_wrong_unit_is_a_good_frame_of_somebody_else() -> None:
     assert rig.ask() == rtu(9, ANSWER_PDU)
     assert rig.ask() == ANSWER
     assert FaultRig("wrong-unit", line=LineProtocol.TCP).ask() == tcp(1, 2, ANSWER_PDU)
+    assert FaultRig("wrong-unit", units=(247,)).ask(unit=247) == rtu(0, ANSWER_PDU)
+    assert FaultRig("wrong-unit", units=(247,), line=LineProtocol.TCP).ask(unit=247) == tcp(1, 0, ANSWER_PDU)
 
 
 @given(st.integers(0, 2**64))

@@ -30,7 +30,8 @@ if TYPE_CHECKING:
 NEVER_SENT = 0
 """No answer carries this exception code: a slave that must not answer gives it, and the port keeps it."""
 
-_UNITS = {LineProtocol.RTU: 248, LineProtocol.TCP: 256}
+_UNITS = 248
+"""Unit 247 is followed by 0."""
 
 
 def _delay(active: ActiveFault, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
@@ -58,7 +59,7 @@ def _hold_back(active: ActiveFault, exchange: Exchange, unit: int, sent: Altered
 
 def _answer_as(active: ActiveFault, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
     other = active.fault.whole("answers_as")
-    other = (unit + 1) % _UNITS[exchange.line] if other is None else other
+    other = (unit + 1) % _UNITS if other is None else other
     report(active, f"answered as unit {other}: {sent.answer.hex(' ')}")
     return sent._replace(answer=_as_unit(exchange.line, sent.answer, other))
 
