@@ -81,7 +81,7 @@ class Coordinate:
                     at[m] += 1
                 its_v, its_a, its_j = _motion(stretches[at[m]], begin)
                 v, a, j = v + factor * its_v, a + factor * its_a, j + factor * its_j
-            for root in _roots(v, a, j):
+            for root in rests(v, a, j):
                 turn = begin + ceil(root * SECOND) if root * SECOND < end - begin else end
                 if begin < turn < end:
                     yield turn
@@ -100,7 +100,7 @@ def _motion(stretch: DriveStretch, now: Nanos) -> tuple[float, float, float]:
     return stretch.at(now)[1], stretch.a + s * stretch.j, stretch.j
 
 
-def _roots(v: float, a: float, j: float) -> list[float]:
+def rests(v: float, a: float, j: float) -> list[float]:
     """Seconds above 0 at which a velocity with this acceleration and jerk is 0, in order."""
     if j == 0.0:
         found = [] if a == 0.0 else [-v / a]

@@ -251,7 +251,7 @@ def test_a_controller_as_a_subject(monkeypatch: pytest.MonkeyPatch, tmp_path: Pa
         with pytest.raises(Refusal, match=message):
             run_virtual(wire, twin_of(changed))
     wire.severed = True
-    with pytest.raises(LineFailure, match="within 0.25 s"):
+    with pytest.raises(LineFailure, match=r"within 0\.25 s"):
         run_virtual(wire, twin_of(address))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable
-from itertools import pairwise
+from itertools import pairwise, product
 from math import sqrt
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.motion.divisions import profile_of
+from steptwin.world.coordinate import rests
 from steptwin.world.reader import WorldError
 
 TEXT = """
@@ -243,3 +244,15 @@ def test_it_can_be_restored_anywhere(moment_s: float, tmp_path: object) -> None:
 def test_mistakes_have_their_places(old: str, new: str, text: str) -> None:
     with pytest.raises(WorldError, match=f"(?s)w.toml:.*{text}"):
         World.from_toml(TEXT.replace(old, new, 1), name="w.toml")
+
+
+@pytest.mark.parametrize(("v", "a", "j"), product((-3.0, -1.0, 0.0, 1.0, 3.0), repeat=3))
+def test_when_a_velocity_of_constant_jerk_is_0(v: float, a: float, j: float) -> None:
+    """By the formula of the quadratic equation."""
+    if j == 0.0:
+        expected = [] if a == 0.0 else [-v / a]
+    elif a * a < 2.0 * j * v:
+        expected = []
+    else:
+        expected = sorted((-a + sign * sqrt(a * a - 2.0 * j * v)) / j for sign in (1, -1))
+    assert rests(v, a, j) == pytest.approx([root for root in expected if root > 0.0])
