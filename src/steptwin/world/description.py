@@ -103,8 +103,10 @@ def _seed(value: object) -> int:
 def _tables(toml: TomlText, kind: str, also: tuple[str, ...] = ()) -> list[tuple[dict[str, Any], Mapping[str, Any]]]:
     """Values of every ``[[kind]]`` that has all it needs, and the table itself."""
     found: list[tuple[dict[str, Any], Mapping[str, Any]]] = []
+    given = toml.data.get(kind)
+    if given is None:
+        return found
     rows = tables()[kind]
-    given = toml.data.get(kind, [])
     if not isinstance(given, list):
         toml.stands_once(kind)
         given = []

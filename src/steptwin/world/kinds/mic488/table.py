@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any, TypeAlias
 
 from steptwin.errors import Misuse
@@ -85,24 +86,23 @@ INNER_TABLES = (*(f"M{n}" for n in range(1, AXES + 1)), *(f"IN{n}" for n in rang
 
 def read(toml: TomlText, row: Row, table: Mapping[str, Any]) -> Mic488Spec:
     path = row["path"]
-    axes = {n: _config(toml, (*path, f"M{n}"), table, AXIS_KEYS) for n in range(1, AXES + 1) if f"M{n}" in table}
-    inputs = {n: _config(toml, (*path, f"IN{n}"), table, INPUT_KEYS) for n in range(1, INPUTS + 1) if f"IN{n}" in table}
+    axes = {n: _config(toml, (*path, f"M{n}"), table) for n in range(1, AXES + 1) if f"M{n}" in table}
+    inputs = {n: _config(toml, (*path, f"IN{n}"), table) for n in range(1, INPUTS + 1) if f"IN{n}" in table}
     return Mic488Spec(**row, axes=axes, inputs=inputs)
 
 
-def _config(toml: TomlText, path: Path, table: Mapping[str, Any], rows: tuple[ConfigKey, ...]) -> dict[str, Any]:
+def _config(toml: TomlText, path: Path, table: Mapping[str, Any]) -> dict[str, Any]:
     """A table such as ``[mic488.M1]``: keys are attributes of the configuration, choices are numbers or their words."""
-    values = read_table(toml, path, table[str(path[-1])], _config_keys(rows))
+    name = str(path[-1])
+    values = read_table(toml, path, table[name], inner_keys(name))
     return {name: value for name, value in values.items() if value is not None}
 
 
-def _config_keys(rows: tuple[ConfigKey, ...]) -> tuple[Key, ...]:
-    return tuple(Key(row.attribute, ValueReader(_configured(row), _values(row)), row.meaning, None) for row in rows)
-
-
+@cache
 def inner_keys(table: str) -> tuple[Key, ...]:
     """The rows of ``[mic488.M1]`` and of ``[mic488.IN1]``."""
-    return _config_keys(AXIS_KEYS if table.startswith("M") else INPUT_KEYS)
+    rows = AXIS_KEYS if table.startswith("M") else INPUT_KEYS
+    return tuple(Key(row.attribute, ValueReader(_configured(row), _values(row)), row.meaning, None) for row in rows)
 
 
 _SWITCHES = f"IN1 to IN{INPUTS} or 'none', or the number of the vendor's file, 0 for IN1 to {NO_INPUT} for none"
