@@ -30,6 +30,7 @@ from steptwin.m1486.variants import variant
         ("[ :2 ' @1 R . @2 R . ]", [(1,), (2,), (6,), (4,), (5,), (), (7,), (8,), (), (10,)]),
         # With T44 a call in a subroutine is left out, and so is a dot outside of one.
         ("[ T44 '1 R @1 R . ]", [(1,), (2,), (4, 3), (4,), (5,), (6,), (7,), (8,)]),
+        ("[ T40 '1 R @1 R . ]", [(1,), (2,), (4,), (4,), (5,), (6,), (), (8,)]),
         # After a jump out of it, an E belongs to whichever loop is in progress.
         ("[ L2 J1 E @1 L3 E ]", [(1,), (2,), (4,), (2, 6, 4), (5,), (6,), (2, 6, 7), (8,)]),
     ],

@@ -197,6 +197,7 @@ def test_what_is_no_number_is_explained(text: str, message: str, hint: str) -> N
 @pytest.mark.parametrize(
     ("text", "mended"),
     [
+        ("i7180", "i7L80"),
         ("i116", "i1L6"),  # printed so in the manual's example of Subroutine
         ("Fl28O0", "F12800"),
         ("120", "L20"),

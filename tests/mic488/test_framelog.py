@@ -39,6 +39,11 @@ def test_the_manuals_requests() -> None:
     ]
 
 
+def test_a_request_alone_is_put_into_words() -> None:
+    log = FrameLog({1: Mic488Device(IN_MM)})
+    assert log.request(1, bytes.fromhex("05 1771 0000"), tcp=False) == "write OUT2 = OFF"
+
+
 def test_values_follow_data_type() -> None:
     """M1_VMAX = 1000 mm/s by default: as REAL, then, once DATA_TYPE is 1, as DINT in pulses."""
     assert logged("000100000006010327440002", "000200000006010627100001", "000300000006010327440002", tcp=True) == [

@@ -118,6 +118,19 @@ def test_wbc_15_a_frame_that_came_in_pieces_leaves_nothing_of_a_record() -> None
     assert (rig.r(0), rig.r(8)) == (4, 1)
 
 
+def test_wbc_15_a_frame_before_a_record_leaves_it_whole() -> None:
+    rig = programmed(PROGRAM)
+    rig.start()
+    rig.wait(0.1)
+    port = Com1Port(rig.device, RtuSlavePort({1: rig.device}))
+    port.exchange(encode_frame(1, read_pdu(3, 0, 2)) + b"N4 X1 ", rig.now)
+    port.to_send(rig.now)
+    port.exchange(b"Y2 A3\r", rig.now)
+    rig.kernel.deadline()
+    rig.wait(0.1)
+    assert (rig.r(0), rig.r(8)) == (4, 1)
+
+
 @pytest.mark.parametrize(
     ("text", "uses"),
     [

@@ -217,6 +217,11 @@ def test_landing_positions_are_shifted_with_the_grid() -> None:
     before = train.pulse_time(59, 0)
     assert before is not None
     assert forced_stop(train, before, seek, 64).count(10**12) == 67
+    # From 4: 60 and 4 together are a multiple of 64, but no landing position.
+    train = step_train(plan_endless(0, 4, 1, seek), 4, micro)
+    now = train.pulse_time(60, 0)
+    assert now is not None
+    assert forced_stop(train, now, seek, 64).count(10**12) == 68
 
 
 @pytest.mark.parametrize("direction", [1, -1])

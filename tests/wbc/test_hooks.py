@@ -68,6 +68,17 @@ def test_a_wait_that_comes_again_is_told_again() -> None:
     assert again == [(1, 0), (3, 0), (5, 0), (7, 0)]
 
 
+def test_a_wait_that_comes_again_without_a_rest_is_told_again() -> None:
+    rig = programmed("L:\nWAIT TIMA1 > 1\nJUMP L\n")
+    rig.device.program.interpreter.rests = False
+    told, _ = hooked(rig)
+    rig.start()
+    rig.wait(0.05)
+    numbers = [number for _, number in told]
+    assert numbers == [number % 2 for number in range(len(numbers))]
+    assert len(numbers) > 8
+
+
 def test_only_the_chosen_statements_are_told() -> None:
     rig = programmed("a = 1\nb = 2\nc = 3\nd = 4\nWAIT 1 = 2\n")
     some, _ = hooked(rig, 1, 3)

@@ -34,6 +34,7 @@ def found(text: str) -> list[str]:
         ("JUMP 5 LEN", ["LEN CONSTANT READ"]),
         ("MOVEPTP @ 5 LEN", ["LEN CONSTANT READ"]),
         ("MOVEPTP @a @b", ["a POSITION READ", "b POSITION READ"]),
+        ("//!record LEN", []),
         ("SET $R0 = SQRT(LEN", ["$R0 REGISTER WRITE", "SQRT FUNCTION READ", "LEN CONSTANT READ"]),
     ],
 )
