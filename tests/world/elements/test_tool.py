@@ -246,7 +246,7 @@ def test_mistakes_have_their_places(old: str, new: str, text: str) -> None:
         World.from_toml(TEXT.replace(old, new, 1), name="w.toml")
 
 
-@pytest.mark.parametrize(("v", "a", "j"), product((-3.0, -1.0, 0.0, 1.0, 3.0), repeat=3))
+@pytest.mark.parametrize(("v", "a", "j"), [*product((-3.0, -1.0, 0.0, 0.5, 1.0), repeat=3)])
 def test_when_a_velocity_of_constant_jerk_is_0(v: float, a: float, j: float) -> None:
     """By the formula of the quadratic equation."""
     if j == 0.0:
