@@ -16,6 +16,11 @@ def new_bank() -> Callable[[], RegisterBank]:
     return RegisterBank
 
 
+@pytest.fixture
+def bank() -> RegisterBank:
+    return RegisterBank()
+
+
 class Example(NamedTuple):
     """One exchange as bytes and as values."""
 

@@ -44,11 +44,6 @@ def run(until: int, *ports: GatewayPort | TimedRtuSlavePort) -> list[list[tuple[
                 sent.extend(port.to_send(min(dues)))
 
 
-@pytest.fixture
-def bank(new_bank: NewBank) -> Any:
-    return new_bank()
-
-
 def test_mic_32_a_request_takes_the_time_of_the_line_behind_the_gateway(bank: Any) -> None:
     port = TcpGatewayPort(ModbusGateway(TimedUnits({1: bank}, TIMING)))
     assert port.exchange(ask(7), 1000) == b""

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -44,17 +43,6 @@ def over_rtu(port: RtuSlavePort, unit: int, request: ModbusRequest, now: int = 0
     return answer(request, data[1:-2])
 
 
-def over_tcp(port: TcpSlavePort, unit: int, request: ModbusRequest, transaction: int = 7) -> ModbusResponse:
-    (frame,) = mbap.TcpFramer().feed(port.exchange(mbap.encode_frame(transaction, unit, encode_request(request)), 0))
-    assert (frame.transaction, frame.unit) == (transaction, unit)
-    return answer(request, frame.pdu)
-
-
-@pytest.fixture
-def bank(new_bank: NewBank) -> Any:
-    return new_bank()
-
-
 def test_golden_request_gets_a_golden_response(bank: Any) -> None:
     port = RtuSlavePort({1: bank})
     bank.registers[1020:1022] = [0x0000, 0x4120]  # 10.0, low word first
@@ -83,9 +71,10 @@ def test_golden_requests_beyond_the_memory_of_the_bank_are_refused(bank: Any, te
 def test_two_ends_joined(new_bank: NewBank, request_: ModbusRequest) -> None:
     """Both framings and both ways through a port give what the device answers."""
     pdu = encode_request(request_)
-    expected = answer(request_, new_bank().execute(pdu, 0))
+    told = new_bank().execute(pdu, 0)
+    expected = answer(request_, told)
     assert over_rtu(RtuSlavePort({1: new_bank()}), 1, request_) == expected
-    assert over_tcp(TcpSlavePort({1: new_bank()}), 1, request_) == expected
+    assert TcpSlavePort({1: new_bank()}).exchange(mbap.encode_frame(7, 1, pdu), 0) == mbap.encode_frame(7, 1, told)
     dribbled = RtuSlavePort({1: new_bank()})
     replies = [dribbled.exchange(bytes((byte,)), 0) for byte in rtu.encode_frame(1, pdu)]
     assert not any(replies[:-1])
@@ -186,19 +175,6 @@ def test_mic_2_other_broadcasts_are_ignored(bank: Any, body: str) -> None:
     assert port.exchange(hexed(body), 0) == b""
     assert port.deadline() is None
     assert bank.executed == []
-
-
-@pytest.mark.parametrize("is_observed", [False, True])
-def test_mic_1_a_refusal_of_function_0_is_counted_on_tcp(*, is_observed: bool) -> None:
-    """Its exception has the smallest function there is, 80h."""
-
-    class Refusing:
-        def execute(self, pdu: bytes, now: int) -> bytes:
-            return bytes((pdu[0] | 0x80, 1))
-
-    port = TcpSlavePort({1: Refusing()}, on_frame=(lambda now, way, raw: None) if is_observed else None)
-    assert port.exchange(mbap.encode_frame(1, 1, b"\0\0"), 0) == mbap.encode_frame(1, 1, b"\x80\x01")
-    assert (port.requests, port.exceptions, port.lost, port.unframed) == (1, 1, 0, 0)
 
 
 WHOLE = [
@@ -324,49 +300,6 @@ def test_an_observer_sees_every_frame_on_the_line(bank: Any) -> None:
     assert len(seen) == 6
 
 
-def test_an_observer_sees_tcp_frames_with_their_header(bank: Any) -> None:
-    seen: list[tuple[int, FrameDirection, bytes]] = []
-    port = TcpSlavePort({1: bank}, on_frame=lambda now, way, raw: seen.append((now, way, raw)))
-    ask = mbap.encode_frame(3, 1, bytes.fromhex("03 00 05 00 01"))
-    told = port.exchange(ask, 4)
-    assert seen == [(4, FrameDirection.IN, ask), (4, FrameDirection.OUT, told)]
-
-
-def test_tcp_requests_are_answered_in_order_with_their_transactions(bank: Any) -> None:
-    port = TcpSlavePort({1: bank})
-    ask = b"".join(mbap.encode_frame(0xFF00 + n, 1, encode_request(ReadRequest(3, n, 1))) for n in range(30))
-    told = b"".join(mbap.encode_frame(0xFF00 + n, 1, bytes((3, 2, 0, n))) for n in range(30))
-    for size in (1, 7, 12, 13, 1000):
-        assert b"".join(port.exchange(ask[at : at + size], 0) for at in range(0, len(ask), size)) == told
-
-
-@pytest.mark.parametrize("unit", [0, 255, 17])
-def test_mic_23_a_single_device_is_addressed_by_0_and_255_too(bank: Any, unit: int) -> None:
-    assert over_tcp(TcpSlavePort({17: bank}), unit, WriteRegisterRequest(0, 9)) == WriteRegisterRequest(0, 9)
-    assert bank.registers[0] == 9
-
-
-@pytest.mark.parametrize(("units", "asked"), [([1], 2), ([1, 2], 255), ([1, 2], 3)])
-def test_mic_23_any_other_unit_is_refused_as_a_gateway_does(new_bank: NewBank, units: list[int], asked: int) -> None:
-    banks = {unit: new_bank() for unit in units}
-    with pytest.raises(ModbusException) as refusal:
-        over_tcp(TcpSlavePort(banks), asked, WriteRegisterRequest(0, 9))
-    assert refusal.value.code == 0x0B
-    assert not any(bank.executed for bank in banks.values())
-
-
-def test_mic_2_unit_0_on_tcp_is_a_broadcast_where_there_are_several_units(new_bank: NewBank) -> None:
-    banks = {unit: new_bank() for unit in (1, 2)}
-    seen: list[FrameDirection] = []
-    port = TcpSlavePort(banks, on_frame=lambda now, way, raw: seen.append(way))
-    write = bytes.fromhex("06 00 05 00 63")
-    assert port.exchange(mbap.encode_frame(1, 0, write), 4) == b""
-    assert [bank.executed for bank in banks.values()] == [[(4, write)], [(4, write)]]
-    assert port.exchange(mbap.encode_frame(2, 0, bytes.fromhex("03 00 05 00 01")), 5) == b""
-    assert [len(bank.executed) for bank in banks.values()] == [1, 1]
-    assert seen == [FrameDirection.IN, FrameDirection.IN]
-
-
 @pytest.mark.parametrize("line", [None, SerialLine(9600)])
 def test_mic_15_a_pause_above_750_us_inside_a_request_is_reported_once_a_second(bank: Any, line: SerialLine | None) -> None:
     reported: list[tuple[int, int]] = []
@@ -387,40 +320,6 @@ def test_mic_15_a_pause_above_750_us_inside_a_request_is_reported_once_a_second(
     port.exchange(with_crc(bytes.fromhex("02 03 00 05 00 01"))[:4], 10 * 10**9)  # to nobody here
     port.exchange(with_crc(bytes.fromhex("02 03 00 05 00 01"))[4:], 11 * 10**9)
     assert reported == [(1, 750_001), (1, 50_000_000)]
-
-
-@pytest.mark.parametrize("wrong", ["00 01 00 01 00 06 01 03 00 00 00 01", "00 01 00 00 00 01 01 03", "00 01 00 00 01 07 01 03"])
-def test_a_wrong_header_breaks_the_connection_and_good_requests_before_it_are_answered(bank: Any, wrong: str) -> None:
-    good = mbap.encode_frame(1, 1, bytes.fromhex("03 00 05 00 01"))
-    port = TcpSlavePort({1: bank})
-    assert port.exchange(good + bytes.fromhex(wrong), 0) == mbap.encode_frame(1, 1, bytes.fromhex("03 02 00 05"))
-    assert port.broken is not None
-    assert port.exchange(good, 0) == b""
-    assert len(bank.executed) == 1
-    port = TcpSlavePort({1: bank})
-    assert port.exchange(bytes.fromhex(wrong), 0) == b""
-    assert port.broken is not None
-
-
-def test_the_largest_tcp_frame_and_no_larger(bank: Any) -> None:
-    port = TcpSlavePort({1: bank})
-    assert len(port.exchange(mbap.encode_frame(1, 1, bytes(253)), 0)) == 9
-    assert bank.executed == [(0, bytes(253))]
-    port.exchange(bytes.fromhex("00 01 00 00 01 07 01") + bytes(262), 0)
-    assert port.broken == "MBAP length 263 is outside 2 to 262 bytes"
-
-
-tcp_frames = st.builds(mbap.encode_frame, st.integers(0, 0xFFFF), st.integers(0, 2), st.binary(min_size=1, max_size=20))
-
-
-@given(st.lists(tcp_frames), st.lists(st.integers(0, 200), max_size=10))
-def test_tcp_answers_do_not_depend_on_pieces(new_bank: NewBank, sent: list[bytes], places: list[int]) -> None:
-    stream = b"".join(sent)
-    one_by_one = TcpSlavePort({1: new_bank()})
-    expected = b"".join(one_by_one.exchange(frame, 0) for frame in sent)
-    port = TcpSlavePort({1: new_bank()})
-    assert b"".join(port.exchange(stream[a:b], 0) for a, b in pairwise([0, *sorted(places), len(stream)])) == expected
-    assert len(mbap.TcpFramer().feed(expected)) == len(sent)
 
 
 def with_wrong_bit(frame: bytes, bit: int) -> bytes:
@@ -467,15 +366,6 @@ def test_after_anything_and_a_gap_the_port_is_in_step_again(new_bank: NewBank, s
     assert port.exchange(good, now + GAP).endswith(hexed("01 03 02 00 05"))
 
 
-@given(st.lists(st.binary(max_size=300), max_size=6))
-def test_tcp_takes_anything(new_bank: NewBank, stream: list[bytes]) -> None:
-    port = TcpSlavePort({1: new_bank()})
-    answered = b"".join(port.exchange(data, 0) for data in stream)
-    framer = mbap.TcpFramer()
-    framer.feed(answered)
-    assert (framer.broken, framer.held) == (None, b"")
-
-
 pdus = st.one_of(
     st.builds(ReadRequest, st.sampled_from([1, 2, 3]), st.integers(0, 3100), st.integers(1, 120)).map(encode_request),
     st.builds(WriteCoilRequest, st.integers(0, 3100), st.booleans()).map(encode_request),
@@ -509,22 +399,6 @@ def test_a_burst_is_answered_as_its_bytes_one_by_one(
         out += b"".join(sent for _, sent in port.to_send(5 + GAP))
         found.append((out, seen, [[body for _, body in bank.executed] for bank in banks.values()], port.unframed))
     assert found[0] == found[1]
-
-
-@pytest.mark.parametrize(
-    ("unit", "pdu", "exceptions"),
-    [
-        (1, "03 03 FC 00 02", 0),
-        (1, "03 03 FC 00 00", 1),  # no register
-        (1, "00", 1),  # function 80h answers it
-        (9, "03 03 FC 00 02", 1),  # nobody there
-    ],
-)
-def test_requests_and_exceptions_are_counted(new_bank: NewBank, unit: int, pdu: str, exceptions: int) -> None:
-    port = TcpSlavePort({1: new_bank()})
-    response = port.exchange(mbap.encode_frame(5, unit, bytes.fromhex(pdu)), 0)
-    assert (response[7] >= 0x80) is bool(exceptions)
-    assert (port.requests, port.exceptions) == (1, exceptions)
 
 
 @pytest.mark.parametrize(

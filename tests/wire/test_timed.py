@@ -39,11 +39,6 @@ def run(port: TimedRtuSlavePort, until: int) -> list[tuple[int, bytes]]:
         assert after is None or after > deadline
 
 
-@pytest.fixture
-def bank(new_bank: NewBank) -> Any:
-    return new_bank()
-
-
 def test_mic_32_a_response_takes_the_time_of_the_wire(bank: Any) -> None:
     port = TimedRtuSlavePort(TimedUnits({1: bank}, TIMING))
     assert port.exchange(READ, 1000) == b""
