@@ -15,7 +15,7 @@ from steptwin.machine import Drive, Fact, MotionController, Nanos, PinEdge
 from steptwin.world.board import Board
 from steptwin.world.followers import KernelFollower, KernelFollowers
 from steptwin.world.kernelpart import KernelPart, KernelState
-from steptwin.world.order import successors, update_order
+from steptwin.world.order import PartWatches
 from steptwin.world.recordedplans import RecordedPlans
 from steptwin.world.trace import RecordSink, TraceRecord
 from steptwin.world.turns import Dues, Turns
@@ -84,15 +84,10 @@ class Kernel:
         """Of machines and elements whose pins were asked for."""
         self._numbers: dict[str, int] = {}
         """The numbers of the machines, by name."""
-        self._watching: dict[str, list[int]] = {}
-        """The parts that watch a machine, a line or an element, by its name."""
+        self._watches = PartWatches()
+        """Of the parts."""
         self._sources: dict[str, Source] = {}
         """The machines, and the lines and elements with a part that computes their signals."""
-        self._part_names: list[str | None] = []
-        """The line or element whose signals each part computes."""
-        self._drives: dict[int, str] = {}
-        """The machine or element whose input a part drives."""
-        self._watching_all: list[int] = []
         self._machine_turns, self._part_turns = Turns(), Turns()
         """What has to be looked at when the signals settle."""
         self._machine_dues, self._part_dues = Dues(), Dues()
@@ -151,18 +146,10 @@ class Kernel:
         it drives.
         """
         self._join()
-        number = len(self.parts)
-        if drives is not None:
-            self._drives[number] = drives
+        number = self._watches.add(watches, name, drives)
         self.parts.append(part)
-        self._part_names.append(name)
         if name is not None:
             self._sources[name] = Source(self, name)
-        if watches is None:
-            self._watching_all.append(number)
-        else:
-            for watched in dict.fromkeys(watches):
-                self._watching.setdefault(watched, []).append(number)
         if not self.is_blank:
             self._part_turns.add(number)
         self.stale = True
@@ -171,16 +158,12 @@ class Kernel:
 
     def order(self) -> Sequence[int]:
         """The numbers of its parts in the order in which they should be updated (`arrange`); empty if they are in that order."""
-        found = update_order(successors(self._part_names, self._watching, self._drives, self.wires), self._watching_all)
-        return () if found == sorted(found) else found
+        return self._watches.order(self.wires)
 
     def arrange(self, order: Sequence[int]) -> None:
         """Update its parts in another order from now on, before the first moment. ``order``: their present numbers."""
-        new = {old: number for number, old in enumerate(order)}
         self.parts = [self.parts[old] for old in order]
-        self._part_names = [self._part_names[old] for old in order]
-        self._watching = {name: [new[old] for old in those] for name, those in self._watching.items()}
-        self._watching_all = [new[old] for old in self._watching_all]
+        self._watches.arrange(order)
 
     def source(self, name: str) -> Source:
         """The machine, line or element ``name`` as what a value depends on."""
@@ -257,7 +240,7 @@ class Kernel:
             of_machine = self._numbers.get(name)
             if of_machine is not None:
                 self._machine_turns.add(of_machine)
-            for number in self._watching.get(name, ()):
+            for number in self._watches.by_name.get(name, ()):
                 self._part_turns.add(number)
         self.stale = True
         if self.on_change is not None:
@@ -420,7 +403,7 @@ class Kernel:
     def _settle_joined(self) -> None:
         for _ in range(MAX_ROUNDS_PER_INSTANT):
             self.stale = False
-            for number in self._watching_all:
+            for number in self._watches.all:
                 self._part_turns.add(number)
             self._update_parts()
             self._take_edges()
@@ -454,7 +437,7 @@ class Kernel:
                 followers.news |= followers.by_name[name]
             self._machine_dues.put(number, self.machines[name].deadline())
         for number in self._parts_looked_at:
-            of = self._part_names[number]
+            of = self._watches.computes[number]
             if of is not None:
                 self._changed.add(of)
                 if followers is not None and of in followers.by_name:
