@@ -19,6 +19,8 @@ from scenes import (
     axis,
     controller,
     switch,
+    table,
+    wire,
 )
 
 CLOSED = f"""{IN_MM}
@@ -65,30 +67,22 @@ AXIS_SCENES: dict[str, Scene] = {
     "motors": Scene(
         f"""
 {DRIVES}
-{axis("x", "c.M1", PITCH, f"?{TRAVEL}", BACKLASH, INVERTED)}
-[axis.motor]
-{MOTOR}
+{axis("x", "c.M1", PITCH, f"?{TRAVEL}", BACKLASH, INVERTED, MOTOR)}
 ?resonance = [⟨100..300⟩, ⟨400..700⟩]
 
-{axis("y", "c.M2", PITCH)}
-[axis.motor]
-{MOTOR}
+{axis("y", "c.M2", PITCH, MOTOR)}
 resonance = [⟨100..300⟩, ⟨400..700⟩]
 resonance_growth = ⟨20.0..60.0⟩
 ?resonance_fading = ⟨5.0..60.0⟩
 ?vibration = ⟨0.02..0.2⟩
 ?full_steps = ⟨200|400⟩
 
-[[load]]
-name = "m"
-axis = "⟨x|y⟩"
+{table("load", "m", axis="⟨x|y⟩")}
 mass = ⟨0.5..4.0⟩
 ?force = ⟨-60..60⟩
 ?when = "x.position > ⟨5..30⟩"
 
-[[load]]
-name = "n"
-axis = "x"
+{table("load", "n", axis="x")}
 friction_force = ⟨30..300⟩
 ?load = ⟨-0.1..0.1⟩
 of = "⟨x.position|y.position|time⟩"
@@ -111,39 +105,29 @@ points = [[0, ⟨0.0..0.3⟩], [⟨5..30⟩, 1], [⟨40..60⟩, ⟨0.5..2.0⟩]]
     "falls": Scene(
         f"""
 {DRIVES}
-{axis("x", "c.M1", PITCH, f"?{TRAVEL}", BACKLASH)}
-[axis.motor]
-{MOTOR}
+{axis("x", "c.M1", PITCH, f"?{TRAVEL}", BACKLASH, MOTOR)}
 when_off = "free"
 ?overruns = true
 ?detent = ⟨0.01..0.06⟩
 ?hold_current = ⟨0.0..0.6⟩
 ?full_steps = 200
 
-{axis("y", "c.M2", PITCH, INVERTED)}
-[axis.motor]
-{MOTOR}
+{axis("y", "c.M2", PITCH, INVERTED, MOTOR)}
 overruns = true
 ?when_off = "free"; detent = ⟨0.05..0.4⟩; full_steps = 200
 
-[[brake]]
-name = "b"
-axis = "x"
+{table("brake", "b", axis="x")}
 torque = ⟨0.1..0.8⟩
 ?release = "c.OUT1"
 ?release_time = "⟨5..60⟩ ms"
 ?apply_time = "⟨5..60⟩ ms"
 
-[[load]]
-name = "m"
-axis = "x"
+{table("load", "m", axis="x")}
 mass = ⟨0.5..4.0⟩
 force = ⟨-60..60⟩
 when = "c.OUT2"
 
-[[collision]]
-name = "k"
-when = "x.position ⟨>|<⟩ ⟨5..30⟩ and y.position > ⟨2..9⟩"
+{table("collision", "k", when="x.position ⟨>|<⟩ ⟨5..30⟩ and y.position > ⟨2..9⟩")}
 ?effect = "jam"
 ?reset = "c.OUT3"
 
@@ -205,9 +189,7 @@ follows = "⟨x|y⟩"
 {DRIVES}
 {axis("x", "c.M1", BACKLASH, INVERTED)}
 
-[[shaft]]
-name = "s"
-axis = "x"
+{table("shaft", "s", axis="x")}
 ratio = ⟨-0.09..-0.03|0.03..0.09⟩
 ?offset = ⟨-50..400⟩
 [[shaft.cam]]
@@ -221,18 +203,13 @@ from = ⟨270..350⟩
 until = ⟨5..90⟩
 to = "c.IN2"
 
-[[follower]]
-name = "f"
-shaft = "s"
+{table("follower", "f", shaft="s")}
 points = [[⟨0..40⟩, ⟨0..3⟩], [⟨90..120⟩, ⟨5..12⟩], [⟨150..180⟩, ⟨5..12⟩], [⟨200..350⟩, 0]]
 ?unit = "⟨cm|degree⟩"
 {switch("follower", "c.IN3", "above = ⟨3..8⟩", SWITCH)}
 {switch("follower", "c.IN4", "position = ⟨2..4⟩", "width = ⟨0.2..1.0⟩", SWITCH)}
 
-[[transducer]]
-name = "v"
-of = "⟨f.position|s.angle|x.position|c.M1.velocity⟩"
-to = "c.AIN2"
+{table("transducer", "v", of="⟨f.position|s.angle|x.position|c.M1.velocity⟩", to="c.AIN2")}
 points = [[0, ⟨0..2⟩], [⟨3..6⟩, ⟨5..9⟩], [⟨10..90⟩, ⟨0..9⟩]]
 resolution = ⟨0.1..0.8⟩
 
@@ -256,23 +233,16 @@ resolution = ⟨0.1..0.8⟩
 
 {axis("y", "c.M2", INVERTED)}
 
-[[carriage]]
-name = "t"
-axis = "x"
+{table("carriage", "t", axis="x")}
 frequency = ⟨8..30⟩
 ?damping = ⟨0.02..0.3⟩
 {switch("carriage", "c.IN1", "above = ⟨10..30⟩", SWITCH)}
 {switch("carriage", "c.IN2", "position = ⟨10..30⟩", "width = ⟨1..5⟩")}
 
-[[carriage]]
-name = "u"
-axis = "y"
+{table("carriage", "u", axis="y")}
 frequency = ⟨8..30⟩
 
-[[tool]]
-name = "h"
-axis = "x"
-other = "y"
+{table("tool", "h", axis="x", other="y")}
 ?x = [⟨0.3..0.7⟩, ⟨0.3..0.7⟩]
 ?y = [⟨0.3..0.7⟩, ⟨-0.7..-0.3⟩]
 ?x_travel = [⟨-9..-1⟩, ⟨30..60⟩]
@@ -300,27 +270,18 @@ to = "c.IN4"
     "gantries": Scene(
         f"""
 {DRIVES}
-{axis("x", "c.M1", PITCH, INVERTED)}
-[axis.motor]
-{MOTOR}
+{axis("x", "c.M1", PITCH, INVERTED, MOTOR)}
 
-{axis("y", "c.M2", PITCH, "?start = ⟨0.5..2.0⟩")}
-[axis.motor]
-{MOTOR}
+{axis("y", "c.M2", PITCH, "?start = ⟨0.5..2.0⟩", MOTOR)}
 
-[[gantry]]
-name = "g"
-axis = "x"
-other = "y"
+{table("gantry", "g", axis="x", other="y")}
 limit = ⟨2..9⟩
 ?mass = ⟨0.5..9.0⟩
 ?friction_force = ⟨5..60⟩
 ?effect = "⟨report|jam⟩"
 ?reset = "c.OUT1"
 
-[[wire]]
-from = "g.skewed"
-to = "c.IN1"
+{wire("g.skewed", "c.IN1")}
 
 ! kind = "stiff-guides", element = "g", factor = ⟨1..9⟩
 ! kind = "lost-steps", axis = 1, at_s = ⟨0.1..0.9⟩, pulses = ⟨#-600..600⟩
@@ -338,23 +299,15 @@ to = "c.IN1"
     "ways": Scene(
         f"""
 {controller("c", 'program = "p.prg"', 'positions = "p.csv"', "start = true", M1=IN_MM, M2=IN_MM)}
-[[line]]
-name = "chips"
-kind = "m1486"
-[[m1486]]
-name = "k"
-line = "chips"
+{table("line", "chips", kind="m1486")}
+{table("m1486", "k", line="chips")}
 address = 1
-[[m1486]]
-name = "l"
-line = "chips"
+{table("m1486", "l", line="chips")}
 address = 2
 
 {axis("x", "c.M1", PITCH, BACKLASH)}
 
-{axis("y", "c.M2", PITCH, INVERTED)}
-[axis.motor]
-{MOTOR}
+{axis("y", "c.M2", PITCH, INVERTED, MOTOR)}
 
 {axis("u", "k.M1", PITCH, "pulses_per_rev = 12800", BACKLASH)}
 [axis.motor]
@@ -367,20 +320,14 @@ inertia = ⟨0.00001..0.00008⟩
 
 {axis("v", "l.M1", PITCH, "pulses_per_rev = 12800", INVERTED)}
 
-[[tool]]
-name = "h"
-axis = "x"
-other = "y"
+{table("tool", "h", axis="x", other="y")}
 ?x = [⟨0.3..0.7⟩, ⟨-0.7..0.7⟩]
 [[tool.x_switch]]
 above = ⟨2..12⟩
 to = "c.IN1"
 {SWITCH}
 
-[[tool]]
-name = "i"
-axis = "u"
-other = "v"
+{table("tool", "i", axis="u", other="v")}
 ?y_travel = [⟨-90..-20⟩, ⟨20..90⟩]
 [[tool.x_switch]]
 above = ⟨1..9⟩
@@ -391,17 +338,13 @@ width = ⟨0.5..2.0⟩
 period = ⟨4..9⟩
 to = "l.B3"
 
-[[carriage]]
-name = "t"
-axis = "x"
+{table("carriage", "t", axis="x")}
 frequency = ⟨8..30⟩
 [[carriage.switch]]
 above = ⟨2..12⟩
 to = "c.IN3"
 
-[[carriage]]
-name = "s"
-axis = "u"
+{table("carriage", "s", axis="u")}
 frequency = ⟨8..30⟩
 ?damping = ⟨0.02..0.3⟩
 [[carriage.switch]]

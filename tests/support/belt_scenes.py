@@ -2,90 +2,55 @@
 
 from __future__ import annotations
 
-from scenes import DRIVES, INVERTED, OUTPUTS, SOME_PITCH, SWITCH, Scene, axis, controller, switch
+from scenes import DRIVES, INVERTED, OUTPUTS, SOME_PITCH, SWITCH, Scene, axis, controller, sensor, stop, switch, table, wire
 
 BELT_SCENES: dict[str, Scene] = {
     "logic": Scene(
         f"""
 {controller("c")}
 
-[[button]]
-name = "a"
-to = "g1.in1"
+{table("button", "a", to="g1.in1")}
 ?contact = "NC"
 ?bounce = "⟨1..6⟩ ms"; bounces = ⟨#1..5⟩
 
-[[button]]
-name = "b"
-to = "g1.in2"
+{table("button", "b", to="g1.in2")}
 
-[[button]]
-name = "d"
-to = "c.IN1"
-join = "series"
+{table("button", "d", to="c.IN1", join="series")}
 ?contact = "NC"
 
-[[button]]
-name = "e"
-to = "c.IN1"
-join = "series"
-bounce = "⟨1..6⟩ ms"
+{table("button", "e", to="c.IN1", join="series", bounce="⟨1..6⟩ ms")}
 
-[[gate]]
-name = "g1"
-kind = "⟨and|or|nand|nor|xor⟩"
+{table("gate", "g1", kind="⟨and|or|nand|nor|xor⟩")}
 inputs = ⟨#2..4⟩
 
-[[gate]]
-name = "g2"
-kind = "⟨and|or|nand|nor|xor⟩"
+{table("gate", "g2", kind="⟨and|or|nand|nor|xor⟩")}
 inputs = ["c.OUT1", "t1.out", "l1.out"]
 
-[[gate]]
-name = "g3"
-kind = "not"
+{table("gate", "g3", kind="not")}
 inputs = ["⟨g1.out|c.OUT2⟩"]
 
-[[latch]]
-name = "l1"
-set = "⟨g1.out|c.OUT1⟩"
-reset = "⟨c.OUT2|n1.out⟩"
+{table("latch", "l1", set="⟨g1.out|c.OUT1⟩", reset="⟨c.OUT2|n1.out⟩")}
 ?priority = "⟨set|reset⟩"
 
-[[timer]]
-name = "t1"
-kind = "⟨on-delay|off-delay|pulse⟩"
-time = "⟨10..90⟩ ms"
-input = "⟨c.OUT1|g1.out⟩"
+{table("timer", "t1", kind="⟨on-delay|off-delay|pulse⟩", time="⟨10..90⟩ ms", input="⟨c.OUT1|g1.out⟩")}
 
-[[timer]]
-name = "t2"
-kind = "⟨on-delay|off-delay|pulse⟩"
-time = "⟨10..90⟩ ms"
-input = "⟨l1.out|g3.out⟩"
+{table("timer", "t2", kind="⟨on-delay|off-delay|pulse⟩", time="⟨10..90⟩ ms", input="⟨l1.out|g3.out⟩")}
 
-[[counter]]
-name = "n1"
+{table("counter", "n1")}
 preset = ⟨#1..4⟩
 up = "⟨c.OUT1|g1.out|t1.out⟩"
 ?down = "c.OUT2"
 ?reset = "c.OUT3"
 
-[[relay]]
-name = "k1"
-coil = "⟨c.OUT1|g2.out⟩"
+{table("relay", "k1", coil="⟨c.OUT1|g2.out⟩")}
 ?pull_in = "⟨5..30⟩ ms"
 ?drop_out = "⟨5..30⟩ ms"
 
-[[wire]]
-from = "k1.⟨no|nc⟩"
-to = "c.IN2"
+{wire("k1.⟨no|nc⟩", "c.IN2")}
 ?delay = "⟨1..20⟩ ms"
 ?inverted = true
 
-[[wire]]
-from = "n1.out"
-to = "c.IN3"
+{wire("n1.out", "c.IN3")}
 ?delay = "⟨1..20⟩ ms"
 
 ! kind = "⟨welded-contact|open-coil⟩", element = "k1"
@@ -107,9 +72,7 @@ to = "c.IN3"
         f"""
 {controller("c")}
 
-[[cylinder]]
-name = "z"
-extend = "c.OUT1"
+{table("cylinder", "z", extend="c.OUT1")}
 ?stroke = ⟨40..160⟩
 ?extend_time = "⟨50..200⟩ ms"
 ?retract_time = "⟨50..200⟩ ms"
@@ -117,24 +80,15 @@ extend = "c.OUT1"
 {switch("cylinder", "c.IN1", "above = ⟨20..40⟩", SWITCH)}
 {switch("cylinder", "c.IN2", "position = ⟨10..30⟩", "width = ⟨1..6⟩", SWITCH)}
 
-[[cylinder]]
-name = "y"
-valve = "double"
-extend = "c.OUT2"
-retract = "⟨c.OUT3|z.extended⟩"
+{table("cylinder", "y", valve="double", extend="c.OUT2", retract="⟨c.OUT3|z.extended⟩")}
 ?extend_time = "⟨50..200⟩ ms"
 ?retract_time = "⟨50..200⟩ ms"
 ?switching = "⟨5..40⟩ ms"
 ?start = "extended"
 
-[[wire]]
-from = "⟨z|y⟩.⟨extended|retracted⟩"
-to = "c.IN3"
+{wire("⟨z|y⟩.⟨extended|retracted⟩", "c.IN3")}
 
-[[transducer]]
-name = "way"
-of = "⟨z|y⟩.position"
-to = "c.AIN1"
+{table("transducer", "way", of="⟨z|y⟩.position", to="c.AIN1")}
 points = [[0, ⟨0..1⟩], [⟨20..60⟩, ⟨5..8⟩], [100, ⟨2..4⟩]]
 resolution = ⟨0.2..0.8⟩
 
@@ -155,8 +109,7 @@ resolution = ⟨0.2..0.8⟩
         f"""
 {controller("c")}
 
-[[conveyor]]
-name = "p"
+{table("conveyor", "p")}
 length = ⟨150..250⟩
 speed = ⟨200..500⟩
 ?run = "c.OUT1"
@@ -167,39 +120,23 @@ feed = "c.OUT2"
 ?marks = [⟨3..6⟩, ⟨10..15⟩]
 ?mark_width = ⟨1.0..3.0⟩
 next = "q"
-[[conveyor.sensor]]
-at = ⟨40..120⟩
-to = "c.IN1"
+{sensor("⟨40..120⟩", "c.IN1")}
 ?contact = "NC"
 ?bounce = "⟨1..5⟩ ms"
-[[conveyor.sensor]]
-at = ⟨40..140⟩
-to = "⟨c.IN2|t.in⟩"
+{sensor("⟨40..140⟩", "⟨c.IN2|t.in⟩")}
 sees = "⟨mark|workpiece⟩"
-[[conveyor.stop]]
-at = ⟨60..140⟩
-hold = "c.OUT3"
-[[conveyor.stop]]
-at = ⟨60..140⟩
-hold = "⟨c.OUT4|t.out⟩"
+{stop("⟨60..140⟩", "c.OUT3")}
+{stop("⟨60..140⟩", "⟨c.OUT4|t.out⟩")}
 
-[[timer]]
-name = "t"
-kind = "off-delay"
-time = "⟨30..120⟩ ms"
+{table("timer", "t", kind="off-delay", time="⟨30..120⟩ ms")}
 
-[[wire]]
-from = "t.out"
-to = "c.IN5"
+{wire("t.out", "c.IN5")}
 
-[[conveyor]]
-name = "q"
+{table("conveyor", "q")}
 length = ⟨120..200⟩
 speed = ⟨100..500⟩
 ?run = "c.OUT⟨#4..5⟩"
-[[conveyor.sensor]]
-at = ⟨5..90⟩
-to = "c.IN4"
+{sensor("⟨5..90⟩", "c.IN4")}
 join = "⟨parallel|series⟩"
 [[conveyor.stop]]
 at = ⟨20..110⟩
@@ -223,8 +160,7 @@ at = ⟨20..110⟩
 {DRIVES}
 {axis("x", "c.M1", SOME_PITCH, INVERTED, "?start = ⟨0..20⟩")}
 
-[[conveyor]]
-name = "p"
+{table("conveyor", "p")}
 length = ⟨60..120⟩
 axis = "x"
 ?mm_per_unit = ⟨0.5..3.0⟩
@@ -233,33 +169,21 @@ feed = "c.OUT1"
 workpiece = ⟨10..25⟩
 marks = [⟨1..2⟩, ⟨3..4⟩]
 next = "q"
-[[conveyor.sensor]]
-at = ⟨10..40⟩
-to = "c.IN1"
+{sensor("⟨10..40⟩", "c.IN1")}
 sees = "⟨mark|workpiece⟩"
 ?bounce = "⟨1..5⟩ ms"
-[[conveyor.sensor]]
-at = ⟨15..60⟩
-to = "c.IN2"
-[[conveyor.stop]]
-at = ⟨20..60⟩
-hold = "c.OUT2"
+{sensor("⟨15..60⟩", "c.IN2")}
+{stop("⟨20..60⟩", "c.OUT2")}
 
-[[conveyor]]
-name = "q"
+{table("conveyor", "q")}
 length = ⟨30..90⟩
 ?mass = ⟨0.1..2.0⟩
 axis = "x"
 mm_per_unit = ⟨0.5..3.0⟩
-[[conveyor.sensor]]
-at = ⟨5..20⟩
-to = "c.IN3"
+{sensor("⟨5..20⟩", "c.IN3")}
 ?contact = "NC"
 
-[[gripper]]
-name = "jaws"
-close = "c.OUT3"
-pick = "c.OUT2"
+{table("gripper", "jaws", close="c.OUT3", pick="c.OUT2")}
 from = "⟨p|q⟩"
 pick_at = ⟨10..30⟩
 onto = "⟨p|q⟩"
@@ -282,29 +206,21 @@ place = "c.OUT4"
         f"""
 {controller("c")}
 
-[[conveyor]]
-name = "p"
+{table("conveyor", "p")}
 length = ⟨150..250⟩
 speed = ⟨200..500⟩
 ?run = "cup.held"
 feed_every = "⟨90..250⟩ ms"
 workpiece = ⟨20..60⟩
 ?mass = ⟨0.1..2.0⟩
-[[conveyor.stop]]
-at = ⟨100..140⟩
-hold = "c.OUT5"
+{stop("⟨100..140⟩", "c.OUT5")}
 
-[[conveyor]]
-name = "q"
+{table("conveyor", "q")}
 length = ⟨150..250⟩
 speed = ⟨50..500⟩
 ?next = "p"
 
-[[vacuum]]
-name = "cup"
-ejector = "c.OUT1"
-pick = "c.OUT2"
-place = "c.OUT3"
+{table("vacuum", "cup", ejector="c.OUT1", pick="c.OUT2", place="c.OUT3")}
 ?from = "p"
 ?onto = "q"
 ?place_at = ⟨10..90⟩
@@ -313,11 +229,7 @@ place = "c.OUT3"
 ?build_up = "⟨10..90⟩ ms"
 ?release = "⟨10..90⟩ ms"
 
-[[gripper]]
-name = "jaws"
-close = "c.OUT4"
-pick = "⟨c.OUT2|cup.held⟩"
-place = "c.OUT3"
+{table("gripper", "jaws", close="c.OUT4", pick="⟨c.OUT2|cup.held⟩", place="c.OUT3")}
 from = "⟨p|q⟩"
 pick_at = ⟨60..120⟩
 ?onto = "q"
@@ -327,14 +239,9 @@ pick_at = ⟨60..120⟩
 ?close_time = "⟨20..120⟩ ms"
 ?open_time = "⟨20..120⟩ ms"
 
-[[wire]]
-from = "jaws.⟨opened|closed|held⟩"
-to = "c.IN1"
+{wire("jaws.⟨opened|closed|held⟩", "c.IN1")}
 
-[[transducer]]
-name = "air"
-of = "cup.pressure"
-to = "c.AIN1"
+{table("transducer", "air", of="cup.pressure", to="c.AIN1")}
 points = [[0, 1], [⟨20..60⟩, ⟨5..8⟩]]
 resolution = ⟨0.2..0.8⟩
 

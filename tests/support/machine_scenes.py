@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from plant_scenes import CHIP
-from scenes import DRIVES, IN_MM, MOVES, QUICK, Scene, axis, controller, switch
+from scenes import DRIVES, IN_MM, MOVES, QUICK, Scene, axis, controller, switch, table, wire
 
 PROGRAM = """
 COUNT = 0
@@ -72,8 +72,7 @@ MACHINE_SCENES: dict[str, Scene] = {
 {controller("d")}
 {controller("e")}
 
-[[supply]]
-name = "s"
+{table("supply", "s")}
 feeds = ["c", "e"]
 ?on = "d.OUT1"; switched = true
 ?volts = ⟨20..40⟩; enough = ⟨5..19⟩
@@ -82,26 +81,15 @@ feeds = ["c", "e"]
 ?hold_up = "⟨0..60⟩ ms"
 ?fall = "⟨0..90⟩ ms"
 
-[[supply]]
-name = "t"
-feeds = "d"
-rise = "⟨5..60⟩ ms"
-fall = "⟨5..60⟩ ms"
+{table("supply", "t", feeds="d", rise="⟨5..60⟩ ms", fall="⟨5..60⟩ ms")}
 
-[[wire]]
-from = "s.good"
-to = "d.IN1"
+{wire("s.good", "d.IN1")}
 
-[[wire]]
-from = "c.OUT1"
-to = "d.IN2"
+{wire("c.OUT1", "d.IN2")}
 ?delay = "⟨1..20⟩ ms"
 ?inverted = true
 
-[[transducer]]
-name = "v"
-of = "d.M1.position"
-to = "d.AIN1"
+{table("transducer", "v", of="d.M1.position", to="d.AIN1")}
 points = [[0, 0], [⟨10..30⟩, ⟨5..9⟩]]
 ?resolution = ⟨0.1..0.8⟩
 
@@ -134,20 +122,14 @@ amplitude = ⟨1..4⟩
 ?phase = ⟨-90..200⟩
 ?period = "⟨5..30⟩ ms"
 
-[[source]]
-name = "two"
-to = "c.AIN2"
-kind = "ramp"
+{table("source", "two", to="c.AIN2", kind="ramp")}
 begin = ⟨0..9⟩
 end = ⟨0..9⟩
 over = "⟨90..600⟩ ms"
 ?repeat = "⟨100..700⟩ ms"
 ?period = "⟨5..30⟩ ms"
 
-[[source]]
-name = "three"
-to = "d.AIN1"
-kind = "table"
+{table("source", "three", to="d.AIN1", kind="table")}
 points = [[0, ⟨0..9⟩], [⟨0.1..0.3⟩, ⟨0..9⟩], [⟨0.4..0.7⟩, ⟨0..9⟩]]
 ?repeat = "⟨700..900⟩ ms"
 ?period = "⟨5..30⟩ ms"
@@ -207,28 +189,17 @@ value = ⟨0..10⟩
     "programs": Scene(
         f"""
 {PROGRAMMED}
-[[line]]
-name = "chips"
-kind = "m1486"
-[[m1486]]
-name = "k"
-line = "chips"
-program = "p.m1486"
+{table("line", "chips", kind="m1486")}
+{table("m1486", "k", line="chips", program="p.m1486")}
 
-[[wire]]
-from = "c.OUT1"
-to = "c.IN2"
+{wire("c.OUT1", "c.IN2")}
 delay = "⟨1..90⟩ ms"
 ?inverted = true
 
-[[button]]
-name = "b"
-to = "c.IN3"
+{table("button", "b", to="c.IN3")}
 ?bounce = "⟨1..6⟩ ms"
 
-[[wire]]
-from = "c.OUT2"
-to = "k.B1"
+{wire("c.OUT2", "k.B1")}
 
 * c.M1.position > ⟨3..20⟩ and c.OUT4
 * k.position > ⟨#500..3000⟩ or c.program == 1
@@ -249,16 +220,12 @@ to = "k.B1"
     "scripts": Scene(
         f"""
 {DRIVES}
-[[use]]
-name = "left"
-file = "part.toml"
+{table("use", "left", file="part.toml")}
 [use.with]
 drive = "c.M1"
 ?length = ⟨20..40⟩
 
-[[use]]
-name = "right"
-file = "part.toml"
+{table("use", "right", file="part.toml")}
 [use.with]
 drive = "c.M2"
 input = "IN5"
@@ -276,15 +243,12 @@ steps = [{{ expect = "left_x.position < ⟨5..20⟩ and abs(right_x.position - l
 when = "left_x.position - right_x.position ⟨>|<|>=⟩ ⟨-9..9⟩"
 steps = [{{ repeat = ⟨#1..3⟩, steps = [{{ note = "far" }}, {{ press = "left_b", for = "⟨5..60⟩ ms" }}, {{ wait = "9 ms" }}] }}]
 
-[[script]]
-name = "more"
+{table("script", "more")}
 ?at = "⟨30..200⟩ ms"
 ?repeat = ⟨#2..4⟩
 steps = [{{ at = "⟨100..400⟩ ms" }}, {{ until = "c.IN5 or time > ⟨0.3..0.9⟩" }}, {{ set = {{ "c.IN2" = 1 }} }}]
 
-[[script]]
-name = "end"
-at = "⟨700..1400⟩ ms"
+{table("script", "end", at="⟨700..1400⟩ ms")}
 steps = [{{ stop = "it is enough" }}, {{ note = "after the end" }}]
 """,
         MOVES

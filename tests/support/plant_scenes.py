@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
-from scenes import INVERTED, QUICK, SOME_PITCH, Scene, axis, controller, switch
+from scenes import INVERTED, QUICK, SOME_PITCH, Scene, axis, controller, switch, table, wire
 
 CHIP = "[\n@1\nF⟨640|1280|6400⟩\nR\nW⟨#1..90⟩\nB⟨128|640|3200⟩\nR\n+2\nJ1\n.\n]\n"
 
 PLANT_SCENES: dict[str, Scene] = {
     "lines": Scene(
         f"""
-[[line]]
-name = "bus"
+{table("line", "bus")}
 ?baud = ⟨9600|19200|115200⟩
 ?timing = "⟨real|strict⟩"
 ?gap = "⟨2..9⟩ ms"
-[[line]]
-name = "two"
-timing = "⟨real|strict⟩"
+{table("line", "two", timing="⟨real|strict⟩")}
 {controller("c", 'line = "bus"', "unit = ⟨#2..9⟩", '?firmware = "⟨1.40|1.23⟩"', M1=QUICK)}
 {controller("d", 'line = "⟨bus|two⟩"', "unit = ⟨#10..19⟩")}
 {controller("e", 'line = "two"', "unit = ⟨#20..29⟩")}
 
-[[wire]]
-from = "c.OUT1"
-to = "d.IN1"
+{wire("c.OUT1", "d.IN1")}
 
 ! kind = "⟨crc|late|wrong-unit|echo⟩", line = "bus", link = "script", every = ⟨#2..4⟩
 ! kind = "⟨delay|no-answer⟩", line = "two", link = "script", nth = ⟨#1..6⟩
@@ -53,22 +48,15 @@ to = "d.IN1"
     ),
     "chips": Scene(
         f"""
-[[line]]
-name = "chips"
-kind = "m1486"
+{table("line", "chips", kind="m1486")}
 ?baud = ⟨1200|4800⟩
 ?timing = "real"
-[[m1486]]
-name = "c"
-line = "chips"
+{table("m1486", "c", line="chips")}
 address = 3
 ?variant = "⟨A|C|E1⟩"
 ?interface = "⟨dual|two⟩"
 ?statement_time = "⟨0.5..3.0⟩ ms"
-[[m1486]]
-name = "d"
-line = "chips"
-address = "A"
+{table("m1486", "d", line="chips", address="A")}
 ?program = "p.m1486"
 
 {axis("x", "c.M1", SOME_PITCH, "?pulses_per_rev = 12800", INVERTED)}
@@ -78,9 +66,7 @@ address = "A"
 {axis("y", "d.M1", 'kind = "rotary"')}
 {switch("axis", "d.B5", "position = ⟨20..90⟩", "width = ⟨5..20⟩")}
 
-[[wire]]
-from = "d.B3"
-to = "c.B3"
+{wire("d.B3", "c.B3")}
 ?delay = "⟨1..9⟩ ms"
 
 ! kind = "stall", machine = "c", at_s = ⟨0.1..0.9⟩, for_s = ⟨0.02..0.3⟩
@@ -111,21 +97,16 @@ to = "c.B3"
     ),
     "plants": Scene(
         f"""
-[[line]]
-name = "bus"
+{table("line", "bus")}
 ?tcp = "127.0.0.1:⟨#5000..5099⟩"
 ?rtu_tcp = "127.0.0.1:⟨#5100..5199⟩"
 ?pty = "/tmp/⟨one|two⟩"
 ?tls_tcp = "127.0.0.1:8802"; certificate = "c.pem"; key = "k.pem"; trusted = "t"
-[[line]]
-name = "chips"
-kind = "m1486"
+{table("line", "chips", kind="m1486")}
 ?tcp = "127.0.0.1:⟨#5200..5299⟩"
 ?rfc2217 = "127.0.0.1:⟨#5300..5399⟩"
 {controller("c", 'line = "bus"', "unit = 3", "?lenient = true", '?vision = "127.0.0.1:⟨#5400..5499⟩"', "?trigger_keeps = true")}
-[[m1486]]
-name = "k"
-line = "chips"
+{table("m1486", "k", line="chips")}
 ?address = ⟨#1..9⟩
 
 {axis("x", "c.M1")}

@@ -1,6 +1,6 @@
 """What `random_worlds` makes small worlds of: descriptions with gaps, and steps of an operator. See there for the notation.
 
-Here is what several of them have: controllers, axes, switches, motors, and what is done with them.
+Here is what several of them have: tables of controllers and elements, motors, and what is done with them.
 """
 
 from __future__ import annotations
@@ -17,19 +17,37 @@ class Scene(NamedTuple):
     files: Mapping[str, str] = MappingProxyType({})
 
 
+def table(kind: str, name: str, /, *lines: str, **texts: str) -> str:
+    """What a description has of a controller, a line or an element: its keys with a text in quotes, then other lines."""
+    return "\n".join((f"[[{kind}]]", f'name = "{name}"', *(f'{key} = "{text}"' for key, text in texts.items()), *lines))
+
+
 def controller(name: str, *lines: str, **drives: str) -> str:
     """A MIC488, its keys, and those of its drives by their names."""
-    tables = (f"[mic488.{drive}]\n{keys}" for drive, keys in drives.items())
-    return "\n".join((f'[[mic488]]\nname = "{name}"', *lines, *tables))
+    return table("mic488", name, *lines, *(f"[mic488.{drive}]\n{keys}" for drive, keys in drives.items()))
 
 
 def axis(name: str, drive: str, *lines: str) -> str:
-    return "\n".join((f'[[axis]]\nname = "{name}"\ndrive = "{drive}"', *lines))
+    return table("axis", name, *lines, drive=drive)
 
 
 def switch(of: str, to: str, *lines: str) -> str:
     """A switch of an element that moves: of its last one above."""
     return "\n".join((f'[[{of}.switch]]\nto = "{to}"', *lines))
+
+
+def wire(source: str, target: str) -> str:
+    return f'[[wire]]\nfrom = "{source}"\nto = "{target}"'
+
+
+def sensor(at: str, to: str) -> str:
+    """A sensor of the last conveyor above."""
+    return f'[[conveyor.sensor]]\nat = {at}\nto = "{to}"'
+
+
+def stop(at: str, hold: str) -> str:
+    """A stop of the last conveyor above."""
+    return f'[[conveyor.stop]]\nat = {at}\nhold = "{hold}"'
 
 
 QUICK = """acc = ⟨3000..9000⟩
@@ -49,7 +67,8 @@ SOME_PITCH = "?pitch = ⟨4.0..6.0⟩"
 INVERTED = "?inverted = true"
 TRAVEL = "travel = [⟨-12..-2⟩, ⟨35..58⟩]"
 BACKLASH = "?backlash = ⟨0.02..0.4⟩"
-MOTOR = """torque = [[0, ⟨0.7..1.2⟩], [⟨400..600⟩, ⟨0.4..0.7⟩], [⟨900..1400⟩, ⟨0.1..0.3⟩]]
+MOTOR = """[axis.motor]
+torque = [[0, ⟨0.7..1.2⟩], [⟨400..600⟩, ⟨0.4..0.7⟩], [⟨900..1400⟩, ⟨0.1..0.3⟩]]
 inertia = ⟨0.00001..0.00008⟩
 ?mass = ⟨0.5..3.0⟩
 ?friction = ⟨0.01..0.08⟩
