@@ -6,28 +6,23 @@ session and a program, so that their lines before and after a change can be comp
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pytest
-from chance import digest
+from chance import GoldenDigests
 from random_m1486 import said, session
-
-GOLDEN = Path(__file__).parent / "golden" / "random.txt"
-SEEDS = range(48)
 
 
 def seen(seed: int) -> dict[str, list[str]]:
     return session(seed) | {"says": [*said(2 * seed), *said(2 * seed + 1)]}
 
 
-def digests(seed: int) -> str:
-    return f"{seed} " + " ".join(f"{what}={digest(lines)}" for what, lines in seen(seed).items())
+GOLDEN = GoldenDigests(seen, Path(__file__).parent / "golden" / "random.txt", range(48))
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", GOLDEN.seeds)
 def test_chips_send_and_do_what_they_did(seed: int) -> None:
-    assert digests(seed) == GOLDEN.read_text().splitlines()[seed]
+    assert GOLDEN.of(seed) == GOLDEN.recorded(seed)
 
 
 @pytest.mark.parametrize("seed", range(100, 112))
@@ -37,8 +32,4 @@ def test_it_does_not_matter_at_which_moments_they_are_looked_at(seed: int) -> No
 
 
 if __name__ == "__main__":
-    if sys.argv[1:]:
-        for what, lines in seen(int(sys.argv[1])).items():
-            print(f"--- {what}", *lines, sep="\n")
-    else:
-        GOLDEN.write_text("".join(f"{digests(seed)}\n" for seed in SEEDS))
+    GOLDEN.main()

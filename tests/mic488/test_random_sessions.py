@@ -6,16 +6,12 @@ its lines before and after a change can be compared.
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pytest
-from chance import Chance, digest
+from chance import Chance, GoldenDigests
 from random_mic488 import session
 from random_mic488_texts import said, valued
-
-GOLDEN = Path(__file__).parent / "golden" / "random.txt"
-SEEDS = range(48)
 
 
 def seen(seed: int) -> dict[str, list[str]]:
@@ -23,13 +19,12 @@ def seen(seed: int) -> dict[str, list[str]]:
     return session(seed) | {"says": said(chance), "called": valued(chance)}
 
 
-def digests(seed: int) -> str:
-    return f"{seed} " + " ".join(f"{what}={digest(lines)}" for what, lines in seen(seed).items())
+GOLDEN = GoldenDigests(seen, Path(__file__).parent / "golden" / "random.txt", range(48))
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", GOLDEN.seeds)
 def test_it_answers_and_does_what_it_did(seed: int) -> None:
-    assert digests(seed) == GOLDEN.read_text().splitlines()[seed]
+    assert GOLDEN.of(seed) == GOLDEN.recorded(seed)
 
 
 @pytest.mark.parametrize("seed", range(100, 112))
@@ -39,8 +34,4 @@ def test_it_does_not_matter_at_which_moments_it_is_looked_at(seed: int) -> None:
 
 
 if __name__ == "__main__":
-    if sys.argv[1:]:
-        for what, lines in seen(int(sys.argv[1])).items():
-            print(f"--- {what}", *lines, sep="\n")
-    else:
-        GOLDEN.write_text("".join(f"{digests(seed)}\n" for seed in SEEDS))
+    GOLDEN.main()

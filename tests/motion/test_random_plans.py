@@ -7,7 +7,6 @@ count changes, is checked besides.
 
 from __future__ import annotations
 
-import sys
 from collections import Counter
 from collections.abc import Iterator
 from itertools import pairwise
@@ -15,7 +14,7 @@ from math import inf
 from pathlib import Path
 
 import pytest
-from chance import Chance, digest
+from chance import Chance, GoldenDigests
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND
@@ -28,8 +27,6 @@ from steptwin.motion.profile import Profile, Segment
 from steptwin.motion.pulses import positions, pulse_runs, pulse_times, step_times, velocities
 from steptwin.motion.ramps import SpeedCurve, plan_distance, plan_endless, plan_forced_stop
 
-GOLDEN = Path(__file__).parent / "golden" / "random.txt"
-SEEDS = range(16)
 PLANS = 6
 
 
@@ -212,19 +209,13 @@ def seen(seed: int) -> dict[str, list[str]]:
     return plans.found
 
 
-def digests(seed: int) -> str:
-    return f"{seed} " + " ".join(f"{what}={digest(lines)}" for what, lines in seen(seed).items())
+GOLDEN = GoldenDigests(seen, Path(__file__).parent / "golden" / "random.txt", range(16))
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", GOLDEN.seeds)
 def test_plans_are_what_they_were(seed: int) -> None:
-    assert digests(seed) == GOLDEN.read_text().splitlines()[seed]
+    assert GOLDEN.of(seed) == GOLDEN.recorded(seed)
 
 
 if __name__ == "__main__":
-    if sys.argv[1:]:
-        for what, lines in seen(int(sys.argv[1])).items():
-            print(f"--- {what}", *lines, sep="\n")
-    else:
-        GOLDEN.parent.mkdir(exist_ok=True)
-        GOLDEN.write_text("".join(f"{digests(seed)}\n" for seed in SEEDS))
+    GOLDEN.main()

@@ -8,10 +8,12 @@ and places coincide; otherwise they have decimals.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+import sys
+from collections.abc import Callable, Sequence
 from hashlib import blake2b
+from pathlib import Path
 from random import Random
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 T = TypeVar("T")
 
@@ -59,3 +61,26 @@ class Chance:
 
 def digest(lines: list[str]) -> str:
     return blake2b("\n".join(lines).encode(), digest_size=6).hexdigest()
+
+
+class GoldenDigests(NamedTuple):
+    """Digests of what is ``seen`` with each seed, by its kind, and the golden file with a line of them for each seed."""
+
+    seen: Callable[[int], dict[str, list[str]]]
+    file: Path
+    seeds: Sequence[int]
+
+    def of(self, seed: int) -> str:
+        return f"{seed} " + " ".join(f"{what}={digest(lines)}" for what, lines in self.seen(seed).items())
+
+    def recorded(self, seed: int) -> str:
+        return self.file.read_text().splitlines()[seed]
+
+    def main(self) -> None:
+        """Show what is behind the digests of the seed that the command line names; without one, make the file anew."""
+        if sys.argv[1:]:
+            for what, lines in self.seen(int(sys.argv[1])).items():
+                print(f"--- {what}", *lines, sep="\n")
+        else:
+            self.file.parent.mkdir(exist_ok=True)
+            self.file.write_text("".join(f"{self.of(seed)}\n" for seed in self.seeds))

@@ -6,29 +6,19 @@ program, so that its lines before and after a change can be compared.
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pytest
-from chance import digest
+from chance import GoldenDigests
 from random_wbc import seen
 
-GOLDEN = Path(__file__).parent / "golden" / "random.txt"
-SEEDS = range(30)
+GOLDEN = GoldenDigests(seen, Path(__file__).parent / "golden" / "random.txt", range(30))
 
 
-def digests(seed: int) -> str:
-    return f"{seed} " + " ".join(f"{what}={digest(lines)}" for what, lines in seen(seed).items())
-
-
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", GOLDEN.seeds)
 def test_a_program_means_and_does_what_it_did(seed: int) -> None:
-    assert digests(seed) == GOLDEN.read_text().splitlines()[seed]
+    assert GOLDEN.of(seed) == GOLDEN.recorded(seed)
 
 
 if __name__ == "__main__":
-    if sys.argv[1:]:
-        for what, lines in seen(int(sys.argv[1])).items():
-            print(f"--- {what}", *lines, sep="\n")
-    else:
-        GOLDEN.write_text("".join(f"{digests(seed)}\n" for seed in SEEDS))
+    GOLDEN.main()
