@@ -1,13 +1,16 @@
-"""Worlds for tests: three controllers, one with an axis and a button (`small`); runs to export (`mic488_run`, `m1486_run`)."""
+"""Worlds for tests: three controllers, one with an axis and a button (`small`); runs to export (`mic488_run`, `m1486_run`); a
+check that a world can be restored."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from textwrap import dedent
 from typing import NamedTuple
 
 from mic488_rig import EN, OFFSETS, OUT, STOP, VALUES, coil_pdu, real_words, words_pdu
 
 from steptwin.files.export import AxisLane, axis_views
+from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
 from steptwin.m1486.lines import STEP_DIRECTION, Interface
 from steptwin.machine import Nanos
@@ -56,6 +59,18 @@ SMALL = """
 
 def small(more: str = "") -> World:
     return World.from_toml(dedent(SMALL) + dedent(more))
+
+
+def check_it_can_be_restored(world: World, other: World, moment_s: float, end_s: float, folder: Path) -> None:
+    """From a snapshot of a moment and from a session, all goes on as it did. ``other``: a new world of the same description."""
+    world.run(until=moment_s)
+    snapshot = world.snapshot()
+    world.run(until=end_s)
+    other.restore(snapshot)
+    other.run(until=end_s)
+    assert other.trace.digest() == world.trace.digest()
+    save(session_of(world), folder / "s.json")
+    assert load(folder / "s.json").replay().trace.digest() == world.trace.digest()
 
 
 def moved(world: World, position: float) -> World:

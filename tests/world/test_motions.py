@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-import pytest
+from pathlib import Path
 
-from steptwin.files.session import load, save, session_of
+import pytest
+from world_rig import check_it_can_be_restored
+
 from steptwin.files.world import World
 from steptwin.machine import SECOND
 from steptwin.world.reader import WorldError
@@ -114,19 +116,11 @@ def test_wait_for_waits_for_what_is_in_progress() -> None:
 
 
 @pytest.mark.parametrize("moment_s", [0.0, 1.0, 2.0, 4.3])
-def test_it_can_be_restored_anywhere(moment_s: float, tmp_path: object) -> None:
+def test_it_can_be_restored_anywhere(moment_s: float, tmp_path: Path) -> None:
     steps = ('{ home = "a.M1", velocity = -20.0 }', '{ repeat = 3, steps = [{ move = "a.M1", by = 20.0 }, { note = "next" }] }')
     found, other = world(*steps), world(*steps)
-    found.run(until=moment_s)
-    snapshot = found.snapshot()
-    found.run(until=10.0)
+    check_it_can_be_restored(found, other, moment_s, 10.0, tmp_path)
     assert len(notes(found)) == 3
-    other.restore(snapshot)
-    other.run(until=10.0)
-    assert other.trace.digest() == found.trace.digest()
-    place = f"{tmp_path}/s.json"
-    save(session_of(found), place)
-    assert load(place).replay().trace.digest() == found.trace.digest()
 
 
 @pytest.mark.parametrize(

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from math import pi
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from world_rig import check_it_can_be_restored
 
 from steptwin.files.export import axis_views, sort_out
-from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
 from steptwin.machine import SECOND
 from steptwin.world.reader import WorldError
@@ -273,7 +274,7 @@ def test_it_is_where_an_integration_has_it(commands: list[tuple[int, bool]]) -> 
 
 
 @pytest.mark.parametrize("moment_s", [0.0, 0.51, 0.53, 0.6, 0.72, 1.3])
-def test_snapshots_and_sessions_have_it(moment_s: float, tmp_path: object) -> None:
+def test_snapshots_and_sessions_have_it(moment_s: float, tmp_path: Path) -> None:
     text = (
         TEXT
         + BRAKE
@@ -284,17 +285,7 @@ def test_snapshots_and_sessions_have_it(moment_s: float, tmp_path: object) -> No
             '{ wait = "1 s" }, { write = { "a.OUT1" = 1 } }]\n'
         )
     )
-    world = World.from_toml(text)
-    world.run(until=moment_s)
-    snapshot = world.snapshot()
-    world.run(until=2.5)
-    other = World.from_toml(text)
-    other.restore(snapshot)
-    other.run(until=2.5)
-    assert other.trace.digest() == world.trace.digest()
-    place = f"{tmp_path}/s.json"
-    save(session_of(world), place)
-    assert load(place).replay().trace.digest() == world.trace.digest()
+    check_it_can_be_restored(World.from_toml(text), World.from_toml(text), moment_s, 2.5, tmp_path)
 
 
 def test_the_trace_has_the_fall() -> None:

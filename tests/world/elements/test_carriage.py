@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from itertools import pairwise
 from math import pi
+from pathlib import Path
 
 import pytest
+from world_rig import check_it_can_be_restored
 
-from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
 from steptwin.machine import SECOND
 from steptwin.world.reader import WorldError
@@ -181,20 +182,12 @@ def test_mistakes_have_their_places(change: tuple[str, str], message: str) -> No
 
 
 @pytest.mark.parametrize("moment_s", [0.0, 0.05, 0.2, 0.34, 0.6, 3.0])
-def test_it_can_be_restored_anywhere(moment_s: float, tmp_path: object) -> None:
+def test_it_can_be_restored_anywhere(moment_s: float, tmp_path: Path) -> None:
     found, other = world(), world()
     start(found)
     found.fault("slack-belt element=tool share=0.6 from_s=0.3 until_s=0.5")
-    found.run(until=moment_s)
-    snapshot = found.snapshot()
-    found.run(until=4.0)
+    check_it_can_be_restored(found, other, moment_s, 4.0, tmp_path)
     assert len(edges(found, "tool.switch1")) > 4
-    other.restore(snapshot)
-    other.run(until=4.0)
-    assert other.trace.digest() == found.trace.digest()
-    place = f"{tmp_path}/s.json"
-    save(session_of(found), place)
-    assert load(place).replay().trace.digest() == found.trace.digest()
 
 
 def test_collisions_and_sensors_can_be_of_a_carriage() -> None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-import pytest
+from pathlib import Path
 
-from steptwin.files.session import load, save, session_of
+import pytest
+from world_rig import check_it_can_be_restored
+
 from steptwin.files.world import World
 from steptwin.machine import SECOND
 from steptwin.world.reader import WorldError
@@ -151,23 +153,13 @@ def test_a_gantry_has_a_limit_of_skew() -> None:
 
 
 @pytest.mark.parametrize("moment_s", [0.0, 1.0, 3.2, 4.1, 8.0])
-def test_snapshots_and_sessions_have_it(moment_s: float, tmp_path: object) -> None:
+def test_snapshots_and_sessions_have_it(moment_s: float, tmp_path: Path) -> None:
     text = TEXT + (
         '[[script]]\nname = "s"\nsteps = [{ write = { "a.M1_EN" = 1, "b.M1_EN" = 1, "a.M1_POS_ABS" = 200.0 } },'
         '{ write = { "b.M1_POS_ABS" = 200.0 } }, { until = "a.IN1" }, { wait = "1 s" }, { write = { "a.OUT3" = 1 } },'
         '{ write = { "a.M1_POS_ABS" = 20.0 } }]\n'
     )
-    world = World.from_toml(text)
-    world.run(until=moment_s)
-    snapshot = world.snapshot()
-    world.run(until=9.0)
-    other = World.from_toml(text)
-    other.restore(snapshot)
-    other.run(until=9.0)
-    assert other.trace.digest() == world.trace.digest()
-    place = f"{tmp_path}/s.json"
-    save(session_of(world), place)
-    assert load(place).replay().trace.digest() == world.trace.digest()
+    check_it_can_be_restored(World.from_toml(text), World.from_toml(text), moment_s, 9.0, tmp_path)
 
 
 @pytest.mark.parametrize(

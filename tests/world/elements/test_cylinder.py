@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from world_rig import check_it_can_be_restored
 
-from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND
 from steptwin.world.elements.cylinder import CYLINDER
@@ -168,23 +169,13 @@ def test_its_faults() -> None:
 
 
 @pytest.mark.parametrize("moment_s", [0.0, 0.05, 0.15, 0.35, 0.512, 0.7])
-def test_snapshots_and_sessions_have_it(moment_s: float, tmp_path: object) -> None:
+def test_snapshots_and_sessions_have_it(moment_s: float, tmp_path: Path) -> None:
     text = TEXT + (
         '[[fault]]\nkind = "jam"\nelement = "clamp"\nfrom_s = 0.14\nuntil_s = 0.16\n'
         '[[script]]\nname = "s"\nsteps = [{ write = { "a.OUT1" = 1 } }, { until = "clamp.position > 30" }, { wait = "200 ms" },'
         '{ write = { "a.OUT1" = 0 } }, { until = "clamp.retracted" }, { note = "back" }]\n'
     )
-    world = World.from_toml(text)
-    world.run(until=moment_s)
-    snapshot = world.snapshot()
-    world.run(until=1.0)
-    other = World.from_toml(text)
-    other.restore(snapshot)
-    other.run(until=1.0)
-    assert other.trace.digest() == world.trace.digest()
-    place = f"{tmp_path}/s.json"
-    save(session_of(world), place)
-    assert load(place).replay().trace.digest() == world.trace.digest()
+    check_it_can_be_restored(World.from_toml(text), World.from_toml(text), moment_s, 1.0, tmp_path)
 
 
 @pytest.mark.parametrize(

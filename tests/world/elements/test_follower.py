@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-import pytest
+from pathlib import Path
 
-from steptwin.files.session import load, save, session_of
+import pytest
+from world_rig import check_it_can_be_restored
+
 from steptwin.files.world import World
 from steptwin.machine import SECOND
 from steptwin.world.reader import WorldError
@@ -176,21 +178,13 @@ def test_mistakes_have_their_places(change: tuple[str, str], message: str) -> No
 
 
 @pytest.mark.parametrize("moment_s", [0.0, 0.11, 0.4, 0.55, 0.9, 2.0])
-def test_it_can_be_restored_anywhere(moment_s: float, tmp_path: object) -> None:
+def test_it_can_be_restored_anywhere(moment_s: float, tmp_path: Path) -> None:
     found, other = World.from_toml(TEXT), World.from_toml(TEXT)
     start(found)
     found.fault("stuck-follower element=knife from_s=0.5 until_s=0.6")
     found.fault("worn-cam element=knife share=0.95 from_s=0.7")
-    found.run(until=moment_s)
-    snapshot = found.snapshot()
-    found.run(until=3.0)
+    check_it_can_be_restored(found, other, moment_s, 3.0, tmp_path)
     assert len(edges(found, "knife.switch1")) > 4
-    other.restore(snapshot)
-    other.run(until=3.0)
-    assert other.trace.digest() == found.trace.digest()
-    place = f"{tmp_path}/s.json"
-    save(session_of(found), place)
-    assert load(place).replay().trace.digest() == found.trace.digest()
 
 
 def test_switches_of_a_stuck_follower_stay_as_they_are() -> None:

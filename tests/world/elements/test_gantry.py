@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from math import pi, sqrt
+from pathlib import Path
 
 import pytest
+from world_rig import check_it_can_be_restored
 
-from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
 from steptwin.machine import SECOND
 from steptwin.world.elements.gantry import GANTRY as ELEMENT
@@ -211,20 +212,12 @@ def test_mistakes_have_their_places(change: tuple[str, str], message: str) -> No
 
 
 @pytest.mark.parametrize("moment_s", [0.0, 0.1, 0.5, 0.7, 1.5])
-def test_it_can_be_restored_anywhere(moment_s: float, tmp_path: object) -> None:
+def test_it_can_be_restored_anywhere(moment_s: float, tmp_path: Path) -> None:
     found, other = (World.from_toml(text(), overrides={"beam.limit": 1.0}) for _ in range(2))
     start(found, "a", "b")
     found.fault("stall machine=a axis=1 at_s=0.5 for_s=0.3")
     found.fault("stiff-guides element=beam factor=1.5 from_s=0.6")
-    found.run(until=moment_s)
-    snapshot = found.snapshot()
-    found.run(until=5.0)
-    other.restore(snapshot)
-    other.run(until=5.0)
-    assert other.trace.digest() == found.trace.digest()
-    place = f"{tmp_path}/s.json"
-    save(session_of(found), place)
-    assert load(place).replay().trace.digest() == found.trace.digest()
+    check_it_can_be_restored(found, other, moment_s, 5.0, tmp_path)
 
 
 @pytest.mark.parametrize(("old", "new"), [("friction_force = 480.0", "friction_force = 2000.0"), ("mass = 20.0", "mass = 1e6")])

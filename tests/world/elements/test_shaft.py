@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from pathlib import Path
 
 import pytest
+from world_rig import check_it_can_be_restored
 
-from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
 from steptwin.machine import SECOND
 from steptwin.world.reader import WorldError
@@ -166,19 +167,9 @@ def test_a_slipping_coupling_is_restored(moment_s: float) -> None:
 
 
 @pytest.mark.parametrize("moment_s", [0.0, 0.2, 0.7, 1.1])
-def test_snapshots_and_sessions_have_it(moment_s: float, tmp_path: object) -> None:
+def test_snapshots_and_sessions_have_it(moment_s: float, tmp_path: Path) -> None:
     text = TEXT + '[[script]]\nname = "s"\nsteps = [{ write = { "a.M1_EN" = 1, "a.M1_POS_ABS" = 150.0 } }, { until = "a.IN1" }]\n'
-    world = World.from_toml(text)
-    world.run(until=moment_s)
-    snapshot = world.snapshot()
-    world.run(until=2.0)
-    other = World.from_toml(text)
-    other.restore(snapshot)
-    other.run(until=2.0)
-    assert other.trace.digest() == world.trace.digest()
-    place = f"{tmp_path}/s.json"
-    save(session_of(world), place)
-    assert load(place).replay().trace.digest() == world.trace.digest()
+    check_it_can_be_restored(World.from_toml(text), World.from_toml(text), moment_s, 2.0, tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from world_rig import check_it_can_be_restored
 
 from steptwin.files.export import axis_views, write_trace
 from steptwin.files.export.recording import sort_out
-from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.motion.divisions import profile_of
@@ -214,18 +214,10 @@ def test_it_hits_its_frame() -> None:
 
 
 @pytest.mark.parametrize("moment_s", [0.0, 0.3, 0.65, 0.9, 1.5])
-def test_it_can_be_restored_anywhere(moment_s: float, tmp_path: object) -> None:
+def test_it_can_be_restored_anywhere(moment_s: float, tmp_path: Path) -> None:
     found, other = (World.from_toml(TEXT + SCRIPT.format(a=100.0, b=-30.0, later=100)) for _ in range(2))
     found.fault("slipping-belt element=head from_s=0.6 until_s=0.7")
-    found.run(until=moment_s)
-    snapshot = found.snapshot()
-    found.run(until=3.0)
-    other.restore(snapshot)
-    other.run(until=3.0)
-    assert other.trace.digest() == found.trace.digest()
-    place = f"{tmp_path}/s.json"
-    save(session_of(found), place)
-    assert load(place).replay().trace.digest() == found.trace.digest()
+    check_it_can_be_restored(found, other, moment_s, 3.0, tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from itertools import pairwise
 from math import log
+from pathlib import Path
 
 import pytest
+from world_rig import check_it_can_be_restored
 
-from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
 from steptwin.machine import SECOND
 from steptwin.world.reader import WorldError
@@ -125,23 +126,13 @@ def test_a_register_without_a_number_leaves_it_where_it_is() -> None:
 
 
 @pytest.mark.parametrize("moment_s", [0.0, 0.3, 0.7, 1.9])
-def test_snapshots_and_sessions_have_it(moment_s: float, tmp_path: object) -> None:
+def test_snapshots_and_sessions_have_it(moment_s: float, tmp_path: Path) -> None:
     text = TEXT + (
         '[[fault]]\nkind = "drift"\nelement = "gap"\nfrom_s = 0.5\nuntil_s = 0.8\n'
         '[[script]]\nname = "s"\nsteps = [{ write = { "a.M1_EN" = 1, "a.M1_POS_ABS" = 90.0 } }, { until = "a.AIN1 > 5" },'
         '{ wait = "200 ms" }, { write = { "a.M1_POS_ABS" = 10.0 } }]\n'
     )
-    world = World.from_toml(text)
-    world.run(until=moment_s)
-    snapshot = world.snapshot()
-    world.run(until=3.0)
-    other = World.from_toml(text)
-    other.restore(snapshot)
-    other.run(until=3.0)
-    assert other.trace.digest() == world.trace.digest()
-    place = f"{tmp_path}/s.json"
-    save(session_of(world), place)
-    assert load(place).replay().trace.digest() == world.trace.digest()
+    check_it_can_be_restored(World.from_toml(text), World.from_toml(text), moment_s, 3.0, tmp_path)
 
 
 @pytest.mark.parametrize(
