@@ -9,36 +9,17 @@ from itertools import pairwise
 
 import pytest
 from host_rig import INTERVAL, TIMEOUT, Wire, driver, fill, run_virtual, task_line, thread_line
-from line_rig import MemoryChannel, MemoryEndpoint
+from line_rig import MemoryChannel, MemoryEndpoint, in_threads
 
 from steptwin.drivers import LineLost, NoAnswer, Overtaken, Unconfirmed
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.exchange import Job
 from steptwin.drivers.modbus import ModbusQuery, words
 from steptwin.drivers.permission import Permission
-from steptwin.errors import Misuse, SteptwinError
+from steptwin.errors import Misuse
 from steptwin.wire.pdu import ReadRequest, WriteCoilRequest
 
 M1_STOP = WriteCoilRequest(2004, True)
-
-
-def in_threads(*tasks: Callable[[], object]) -> list[Exception]:
-    """Run them at once; what they raised."""
-    raised: list[Exception] = []
-
-    def guarded(task: Callable[[], object]) -> None:
-        try:
-            task()
-        except (AssertionError, SteptwinError) as error:
-            raised.append(error)
-
-    threads = [threading.Thread(target=guarded, args=(task,)) for task in tasks]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join(60)
-        assert not thread.is_alive()
-    return raised
 
 
 def test_threads_share_a_line_and_each_gets_its_own_answers() -> None:

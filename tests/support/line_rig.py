@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import heapq
+import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Coroutine
 from typing import Any, TypeVar
@@ -19,6 +20,7 @@ from steptwin.drivers.m1486 import lines as m1486_lines
 from steptwin.drivers.mic488 import lines as mic488_lines
 from steptwin.drivers.place import LineAddress
 from steptwin.drivers.threads import ThreadLine
+from steptwin.errors import SteptwinError
 from steptwin.machine import MICROSECOND, SECOND
 
 T = TypeVar("T")
@@ -260,3 +262,22 @@ def run_virtual(wire: VirtualWire, main: Coroutine[Any, Any, T]) -> T:
     """Run a coroutine in the time of the wire."""
     with asyncio.Runner(loop_factory=lambda: VirtualLoop(wire.now, is_alone=True)) as runner:
         return runner.run(main)
+
+
+def in_threads(*tasks: Callable[[], object]) -> list[Exception]:
+    """Run them at once; what they raised."""
+    raised: list[Exception] = []
+
+    def guarded(task: Callable[[], object]) -> None:
+        try:
+            task()
+        except (AssertionError, SteptwinError) as error:
+            raised.append(error)
+
+    threads = [threading.Thread(target=guarded, args=(task,)) for task in tasks]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(60)
+        assert not thread.is_alive()
+    return raised

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import socket
-import threading
 from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import pytest
 from chip_rig import BAUD, ChipWire, Fault, chip_line, chip_task_line
-from line_rig import MemoryEndpoint, run_virtual
+from line_rig import MemoryEndpoint, in_threads, run_virtual
 
 from steptwin.drivers import Overtaken
 from steptwin.drivers.blocking import finish
@@ -19,29 +18,10 @@ from steptwin.drivers.m1486 import M1486, AsyncM1486, ChipReason, M1486Line, NoE
 from steptwin.drivers.m1486.identify import SearchLine, end_line, searching, select_all
 from steptwin.drivers.m1486.lines import AsyncM1486Line, ThreadM1486Line, in_words
 from steptwin.drivers.threads import ThreadLine
-from steptwin.errors import Misuse, SteptwinError
+from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, SECOND
 
 KNOWN = {"start_stop": 200, "acceleration": 5000, "velocity": 1000, "profile": 25000, "microstep": 1, "qualification": 1}
-
-
-def in_threads(*tasks: Callable[[], object]) -> list[Exception]:
-    """Run them at once; what they raised."""
-    raised: list[Exception] = []
-
-    def guarded(task: Callable[[], object]) -> None:
-        try:
-            task()
-        except (AssertionError, SteptwinError) as error:
-            raised.append(error)
-
-    threads = [threading.Thread(target=guarded, args=(task,)) for task in tasks]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join(60)
-        assert not thread.is_alive()
-    return raised
 
 
 def test_threads_share_a_line_with_two_chips() -> None:
