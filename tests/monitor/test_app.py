@@ -173,6 +173,7 @@ def test_homing(mic488: Mic488Rig) -> None:
         await screen.press("h")
         await screen.type("-10")
         await screen.until(lambda: mic488.axis(1).status is AxisStatus.REACHED, "it is home")
+        assert mic488.axis(1).position == 0.0
 
     run(mic488, scenario)
 
@@ -192,6 +193,7 @@ def test_a_jog_runs_for_as_long_as_the_key_is_held(mic488: Mic488Rig) -> None:
         await screen.until(lambda: mic488.axis(1).velocity == 0.0, "it has come to rest by itself")
         # A tap comes to rest too, and the other way round.
         there = mic488.axis(1).position
+        assert there >= 10.0
         await screen.press("left")
         await screen.until(lambda: mic488.axis(1).position < there, "it moves")
         await screen.until(lambda: mic488.axis(1).velocity == 0.0, "it rests")
@@ -222,6 +224,7 @@ def test_a_jog_with_the_drive_off_says_why_nothing_moves(mic488: Mic488Rig) -> N
     async def scenario(screen: Screen) -> None:
         await screen.press("right")
         await screen.until(lambda: "M1 of unit 1 is switched off: enable it first" in screen.text("said"), "it is told")
+        assert mic488.axis(1).position == 0.0
 
     run(mic488, scenario)
 
@@ -234,6 +237,8 @@ def test_a_stop_pauses_the_program_that_would_move_the_axes_again(mic488: Mic488
         await screen.press("space")
         await screen.until(lambda: "program paused" in screen.text("head"), "it is paused")
         await screen.until(lambda: screen.text("said") == "all axes stopped; the program is paused", "it is told")
+        await screen.until(lambda: all(mic488.axis(axis).velocity == 0.0 for axis in (1, 2, 3, 4)), "all stand")
+        assert "program paused" in screen.text("head")
 
     run(mic488, scenario)
 
@@ -265,6 +270,7 @@ def test_a_controller_that_comes_later_is_found_with_its_firmware(mic488: Mic488
             mic488.clear_faults()
             await screen.until(lambda: "firmware 1.23" in screen.text("head"), "it is found")
             await screen.until(lambda: screen.cell("registers", "M1_POS_ACT", "address") == "1020 0x03FC", "its map is shown")
+            assert "NOT CONNECTED" not in screen.text("head")
 
     asyncio.run(main())
 
@@ -338,6 +344,7 @@ def test_a_controller_that_comes_back_with_another_firmware_is_shown_with_its_ma
             await screen.until(lambda: f"firmware {then}" in screen.text("head"), "the other one is found")
             await screen.until(lambda: screen.cell("registers", position, "address") == address[then], "its map is shown")
             await screen.until(lambda: screen.cell("registers", position, "value") == "0", "and its registers")
+            assert "NOT CONNECTED" not in screen.text("head")
 
     asyncio.run(main())
 

@@ -122,6 +122,7 @@ def test_the_space_key_stops_from_these_panels_too(studio: Studio, panel: str) -
     until(lambda: studio.at(1) > 1, "the axis moves")
     page.locator("body").press("Space")
     until(lambda: studio.stands(1), "space has stopped it")
+    assert studio.at(1) > 1, "it stands where it was stopped"
 
 
 def test_a_tag_list_is_exported_and_imported(studio: Studio, tmp_path: Path) -> None:

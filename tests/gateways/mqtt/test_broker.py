@@ -196,6 +196,7 @@ def test_the_broker_tells_of_a_gateway_that_is_lost(broker: Mosquitto, tmp_path:
     finally:
         process.kill()
         process.wait()
+    assert process.returncode == -signal.SIGKILL, "it could not say so itself"
     until(lambda: broker.retained(f"{BASE}/online") is False, "its will is published")
 
 
