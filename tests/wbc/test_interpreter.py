@@ -103,6 +103,14 @@ def test_not_a_number_from_a_master_reads_0() -> None:
     assert (rig.r(2), rig.r(4)) == (0.0, -REAL_MAX)
 
 
+def test_a_record_of_unknown_meaning_ends_the_program() -> None:
+    rig = run(f"OUT1 = ON\n//!record FF{'00' * 15}\nOUT2 = ON\n")
+    fault = rig.device.program.fault
+    assert fault is not None
+    assert "unknown instruction" in fault.text
+    assert not rig.out(2)
+
+
 # ---------------------------------------------------------------------- order and time
 
 
