@@ -244,5 +244,8 @@ class Numbering:
         return number
 
     def _cause(self, time: Nanos, machine: str) -> int | None:
-        candidates = [self._last.get(machine), self._last.get(self._line_of.get(machine, "")), self._command]
-        return max((number for found in candidates if found is not None for at, number in [found] if at == time), default=None)
+        cause = 0
+        for found in (self._last.get(machine), self._last.get(self._line_of.get(machine, "")), self._command):
+            if found is not None and found[0] == time and found[1] > cause:
+                cause = found[1]
+        return cause or None

@@ -113,8 +113,10 @@ def _now(plant: Plant, name: str) -> Generator[Kernel]:
 def _set(plant: Plant, step: do.Set) -> None:
     for name, pin, value in step.levels:
         known = plant.input_pin(name, pin, value)
-        with _now(plant, name) as kernel:
-            kernel.set_input(PinName(name, known), value)
+        kernel = plant.touch(name)  # as `_now`, but with hundreds of levels at a moment
+        kernel.set_input(PinName(name, known), value)
+        kernel.mark(name)
+        kernel.settle()
 
 
 def _press(plant: Plant, step: do.Press) -> None:

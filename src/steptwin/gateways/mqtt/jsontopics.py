@@ -62,6 +62,7 @@ class GroupText:
 
     def __init__(self, group: Group, machine: str) -> None:
         self._group = group
+        self._part_of = group.points[0].part
         self._names = [encode(name).decode() for name in group.names(machine)]
         self._part: object = None
         self._values: list[PointValue] = []
@@ -69,7 +70,7 @@ class GroupText:
 
     def changed(self, sample: Sample) -> bytes | None:
         """The group with the moment of ``sample``; None where it is as before."""
-        part = self._group.part(sample)
+        part = None if sample.state is None else self._part_of(sample.state)
         if part is not None and part is self._part:
             return None
         self._part = part
