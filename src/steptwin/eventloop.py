@@ -1,9 +1,9 @@
-"""`steptwin.later.Later` and the event loop: a task whose result is there later, and waiting for a result."""
+"""`steptwin.later.Later` and the event loop: a task whose result is there later, and waiting for a result; tasks without end."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Coroutine
+from collections.abc import Callable, Coroutine
 from typing import Any, TypeVar
 
 from steptwin.errors import LineFailure
@@ -41,3 +41,16 @@ async def result_of(later: Later[T]) -> T:
         later.then(arrived.set)
         await arrived.wait()
     return later.result()
+
+
+def endless(work: Coroutine[Any, Any, None], failed: Callable[[str], None]) -> asyncio.Task[None]:
+    """Run ``work`` as a task that only a cancellation ends; ``failed`` is called with the text of an error that ends it."""
+
+    def ended(task: asyncio.Task[None]) -> None:
+        error = None if task.cancelled() else task.exception()
+        if error is not None:
+            failed(f"internal error, please report it: {type(error).__name__}: {error}")
+
+    task = asyncio.get_running_loop().create_task(work)
+    task.add_done_callback(ended)
+    return task

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from steptwin.access.roles import ROLES, Role
+from steptwin.eventloop import endless
 from steptwin.extras import libraries_of, missing
 from steptwin.gateways.contract import GatewayState, GatewaySubject
 from steptwin.gateways.epics.channels import PvDatabase
@@ -41,6 +42,8 @@ class EpicsGateway:
         self._role = Role.VIEWER
         self._shown = 0
         self._task: asyncio.Task[None] | None = None
+        self._failed: str | None = None
+        """Why nothing is published any more."""
         self._leaving: set[asyncio.Task[None]] = set()
 
     @property
@@ -71,7 +74,12 @@ class EpicsGateway:
             except BaseException:
                 await self.close()
                 raise
-        self._task = asyncio.create_task(self._publish(server, self._sampler))
+
+        def failed(text: str) -> None:
+            self._failed = text
+            notice(f"[gateway.epics]: {text}")
+
+        self._task = endless(self._publish(server, self._sampler), failed)
         return found
 
     async def _open_pv_access(self, records: Mapping[str, Record], address: Address, beacons: Address) -> Mapping[str, object]:
@@ -105,7 +113,8 @@ class EpicsGateway:
     def state(self) -> GatewayState:
         servers = (self._server, self._pv_server)
         clients = tuple(one for server in servers if server is not None for one in server.clients(self._role.title))
-        return GatewayState(is_up=self._server is not None, text="listens", shown=self._shown, clients=clients)
+        is_up = self._server is not None and self._failed is None
+        return GatewayState(is_up=is_up, text=self._failed or "listens", shown=self._shown, clients=clients)
 
     async def close(self) -> None:
         if self._task is not None:

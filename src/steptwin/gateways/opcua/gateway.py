@@ -13,6 +13,7 @@ from asyncua.server.server import Server
 
 from steptwin import __version__
 from steptwin.errors import LineFailure, SteptwinError
+from steptwin.eventloop import endless
 from steptwin.gateways.contract import GatewayState, GatewaySubject
 from steptwin.gateways.opcua.addressspace import NAMESPACE, NAMESPACE_URI, AddressSpaceBuilder
 from steptwin.gateways.opcua.nodes import NodeMaker
@@ -54,6 +55,8 @@ class OpcUaGateway:
         """Where it listens, once it does."""
         self._trouble: str | None = None
         """Why its clients refuse it; None while they do not."""
+        self._failed: str | None = None
+        """Why nothing is published any more."""
 
     async def open(self, *, listen_any: bool, notice: Callable[[str], None]) -> Mapping[str, object]:
         address = self._address or parse_address(self._spec.listen, listen_any=listen_any)
@@ -89,7 +92,12 @@ class OpcUaGateway:
             raise LineFailure(f"cannot listen on {address}: {reason(error)}") from error
         self._security = security
         self._server, self._inside, self._shown = server, inside, sum(map(len, builder.points.values()))
-        self._task = asyncio.create_task(self._publish(service, self._notifications))
+
+        def failed(text: str) -> None:
+            self._failed = text
+            notice(f"[gateway.opcua]: {text}")
+
+        self._task = endless(self._publish(service, self._notifications), failed)
         port = _port(server)
         self._address = Address(address.host, port)
         if security.valid_until is not None and self._guard is None:
@@ -127,8 +135,9 @@ class OpcUaGateway:
 
     def state(self) -> GatewayState:
         clients = () if self._inside is None else tuple(self._inside.clients())
-        is_up = self._server is not None and self._trouble is None
-        return GatewayState(is_up=is_up, text=self._trouble or "listens", shown=self._shown, clients=clients)
+        trouble = self._failed or self._trouble
+        is_up = self._server is not None and trouble is None
+        return GatewayState(is_up=is_up, text=trouble or "listens", shown=self._shown, clients=clients)
 
     async def close(self) -> None:
         if self._guard is not None:
@@ -145,7 +154,7 @@ class OpcUaGateway:
         for one in (self._service, self._sampler, self._notifications):
             if one is not None:
                 one.close()
-        self._task = self._server = self._inside = self._service = self._sampler = self._notifications = None
+        self._task = self._server = self._inside = self._service = self._sampler = self._notifications = self._failed = None
 
 
 make = OpcUaGateway
