@@ -27,12 +27,17 @@ def test_an_error_in_it_is_told_and_shown(table: str, name: str, tmp_path: Path,
         raise KeyError("M9")
 
     async def scene() -> None:
-        await gateway.open(listen_any=False, notice=told.append)
+        is_told = asyncio.Event()
+
+        def notice(text: str) -> None:
+            told.append(text)
+            is_told.set()
+
+        await gateway.open(listen_any=False, notice=notice)
         assert gateway.state()[:2] == (True, "listens")
         monkeypatch.setattr(subject.samples, "see_events", broken)
         async with asyncio.timeout(20):
-            while not told:
-                await asyncio.sleep(0.01)
+            await is_told.wait()
         assert gateway.state()[:2] == (False, "internal error, please report it: KeyError: 'M9'")
         await gateway.close()
 
