@@ -67,7 +67,10 @@ class GatewayPoint:
         return self.shown_in(self.part(state))
 
     def shown_in(self, part: Any) -> PointValue:
-        value = self.of(part)
+        return self.typed(self.of(part))
+
+    def typed(self, value: PointValue) -> PointValue:
+        """``value``, which `of` has given, of its type."""
         if value is None:
             return None
         return bool(value) if self.type is PointType.TRUTH else float(value) if self.type is PointType.NUMBER else value

@@ -49,9 +49,9 @@ class Group:
         return names if self.name or machine == CLOCK else [*names, ANSWERS]
 
     def values(self, sample: Sample) -> list[PointValue]:
-        """In the order of `names`; all unknown where the controller does not answer."""
+        """In the order of `names`, not of their types yet; all unknown where the controller does not answer."""
         part = self.part(sample)
-        found: list[PointValue] = [None if part is None else point.shown_in(part) for point in self.points]
+        found: list[PointValue] = [None if part is None else point.of(part) for point in self.points]
         if not self.name and sample.machine != CLOCK:
             found.append(sample.state is not None)
         return found
@@ -63,6 +63,8 @@ class GroupText:
     def __init__(self, group: Group, machine: str) -> None:
         self._group = group
         self._part_of = group.points[0].part
+        self._typed = [*(point.typed for point in group.points), bool]
+        """What gives each value its type; the last one that of `ANSWERS`."""
         self._names = [encode(name).decode() for name in group.names(machine)]
         self._part: object = None
         self._values: list[PointValue] = []
@@ -79,10 +81,10 @@ class GroupText:
             return None
         self._values = values
         if not before:
-            self._texts = [f"{name}:{_text(value)}" for name, value in zip(self._names, values, strict=True)]
-        for number, (old, new) in enumerate(zip(before, values, strict=False)):
-            if old != new:
-                self._texts[number] = f"{self._names[number]}:{_text(new)}"
+            self._texts = [""] * len(values)
+        for number, new in enumerate(values):
+            if not before or before[number] != new:
+                self._texts[number] = f"{self._names[number]}:{_text(self._typed[number](new))}"
         at = sample.at.isoformat(timespec="milliseconds").replace("+00:00", "Z")
         return f'{{{",".join(self._texts)},"{AT}":"{at}"}}'.encode()
 
