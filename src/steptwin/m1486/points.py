@@ -16,7 +16,6 @@ from steptwin.machine import Nanos
 from steptwin.motion import Profile
 from steptwin.points import LivePoint, TurningPoints, turns_of, turns_of_round
 
-"""The smallest unit, 1/64 of a full step."""
 POSITION_BITS = 24
 FLAGS_UPLOAD = 14
 """The byte with the user flags, which commands set without an event (``T``, ``C``)."""
