@@ -13,7 +13,7 @@ import pytest
 from steptwin import World
 from steptwin.controllerstate import ProgramActivity, StatusLevel, read_state
 from steptwin.datasheet import FactType, plain
-from steptwin.subject.commands import Enable, Move, ReadState
+from steptwin.subject.commands import Advance, Enable, Move, ReadPins, ReadState
 from steptwin.subject.schema import definitions
 from steptwin.subject.world import WorldSubject
 from steptwin.world.script import Send, Set
@@ -118,3 +118,15 @@ def test_a_chip_that_is_shut_down_and_an_axis_at_a_limit_are_warnings() -> None:
     chip, axis = read_state(state(subject, "k")), read_state(state(subject, "m")).axes[0]
     assert (chip.status.level, chip.status.text) == (StatusLevel.WARNING, "shut down")
     assert (axis.status.level, axis.status.text) == (StatusLevel.WARNING, "stopped at limit R")
+
+
+def test_the_pins_that_are_asked_for_are_those_of_the_state() -> None:
+    """Those of a driver interface follow the pulses, between which a chip has nothing to do."""
+    world = World.from_toml(TWO.replace('name = "k"', 'name = "k"\ninterface = "dual"'))
+    subject = WorldSubject(world)
+    subject.do(Send("chips", b"v200\rf64000\rr\r"))
+    world.run(for_=0.5)
+    for _ in range(8):
+        subject.do(Advance(duration=3_100_000))
+        pins = subject.do(ReadPins("k")).value
+        assert pins == {f"k.{pin}": level for pin, level in state(subject, "k")["pins"].items()}

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from steptwin.access.audit import Entry
 from steptwin.errors import LineFailure, SteptwinError
+from steptwin.eventloop import endless
 from steptwin.gateways.contract import GatewayState, GatewaySubject
 from steptwin.gateways.points import registers_by_machine
 from steptwin.history.database import read_url, shown
@@ -41,6 +42,8 @@ class HistoryKeeper:
         self._writer: HistoryWriter | None = None
         self._task: asyncio.Task[None] | None = None
         self._has_room = True
+        self._failed: str | None = None
+        """Why nothing is kept any more."""
 
     async def open(self, *, listen_any: bool, notice: Callable[[str], None]) -> Mapping[str, object]:
         """It listens nowhere, whatever is permitted."""
@@ -60,8 +63,12 @@ class HistoryKeeper:
             self._spool.begin(head)
         except OSError as error:
             raise LineFailure(f"{self._folder}: {reason(error)}") from error
-        self._task = asyncio.create_task(self._keep(self._recorder, self._spool))
+        self._task = endless(self._keep(self._recorder, self._spool), self._fail)
         return {"url": shown(self._url)}
+
+    def _fail(self, text: str) -> None:
+        self._failed = text
+        self._notice(f"history: {text}")
 
     async def _keep(self, recorder: Recorder, spool: Spool) -> None:
         while True:
@@ -106,7 +113,7 @@ class HistoryKeeper:
 
     def state(self) -> GatewayState:
         waiting = 0 if self._spool is None else self._spool.waiting
-        lost = None if self._writer is None else self._writer.lost
+        lost = self._failed or (None if self._writer is None else self._writer.lost)
         text = "writes" if lost is None else lost
         return GatewayState(is_up=lost is None, text=f"{text}; {waiting} bytes wait" if waiting else text)
 

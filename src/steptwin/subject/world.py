@@ -184,7 +184,7 @@ class WorldSubject:
     def _levels(self, name: str) -> Mapping[str, float]:
         machine = self.world.machine(name)
         self.world.touch(name)
-        return machine.pins()
+        return self.world.kind(name).state.pins(machine, self.world.now)
 
     def _state(self, wanted: command.ReadState) -> object:
         machine = self.world.machine(wanted.machine)
