@@ -156,6 +156,7 @@ class StateReader(Generic[M]):
     axis: Callable[[M, AxisDescription, Nanos], StateAxis]
     details: tuple[DetailRow[M], ...] = ()
     pins: Callable[[M, Nanos], Mapping[str, float]] = lambda machine, now: machine.pins()
+    pin: Callable[[M, str, Nanos], float] = lambda machine, name, now: machine.pin(name)
 
     def __call__(self, machine: M, now: Nanos) -> ControllerState:
         sheet = self.datasheet(machine)

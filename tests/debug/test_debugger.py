@@ -377,6 +377,21 @@ def test_whether_an_axis_moves_is_said_once() -> None:
     assert (status("c"), status("m")) == ("at rest", "off, at rest")
 
 
+def test_pins_of_a_driver_interface_are_those_of_the_moment() -> None:
+    """They follow the pulses, between which a chip has nothing to do."""
+    text = '[[m1486]]\nname = "k"\ninterface = "dual"\nprogram = "k.m1486"\n'
+    world = World.from_toml(text, {"k.m1486": b"[\nV200\nF64000\nR\n]\n"})
+    debugger = Debugger(world)
+    world.run(0.5)
+    seen = set()
+    for _ in range(5):
+        world.run(for_=0.0031)
+        pins = {one.name: one.number for one in debugger.scope("k", "Pins").values}
+        assert pins == world.m1486["k"].pins
+        seen.add(tuple(pins.values()))
+    assert len(seen) > 1
+
+
 @pytest.mark.parametrize("scope", ["Variables", "Axes", "Pins", "Registers", "World"])
 @pytest.mark.parametrize("machine", ["m", "c"])
 def test_what_is_shown_can_be_evaluated(machine: str, scope: str) -> None:

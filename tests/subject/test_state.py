@@ -129,4 +129,6 @@ def test_the_pins_that_are_asked_for_are_those_of_the_state() -> None:
     for _ in range(8):
         subject.do(Advance(duration=3_100_000))
         pins = subject.do(ReadPins("k")).value
-        assert pins == {f"k.{pin}": level for pin, level in state(subject, "k")["pins"].items()}
+        levels = state(subject, "k")["pins"]
+        assert pins == {f"k.{pin}": level for pin, level in levels.items()}
+        assert world.m1486["k"].pins == levels == {pin: world.read(f"k.{pin}") for pin in levels}

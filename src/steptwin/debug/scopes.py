@@ -69,7 +69,7 @@ def _pins(world: Plant, machine: str) -> Iterator[ShownValue]:
     kind, device = world.kind(machine), world.machine(machine)
     units = {name: pin.unit for name, pin in kind.pins(device).items()}
     inputs = {*kind.terminals.digital_inputs, *kind.terminals.analog_inputs}
-    for name, level in device.pins().items():
+    for name, level in kind.state.pins(device, world.now).items():
         yield ShownValue(name, f"{number_text(level)} {units.get(name, '')}".rstrip(), level, is_settable=name in inputs)
 
 

@@ -59,6 +59,11 @@ def _pins(chip: M1486Chip, now: Nanos) -> dict[str, float]:
     return levels
 
 
+def _pin(chip: M1486Chip, name: str, now: Nanos) -> float:
+    line = LINE_PINS.get(name)
+    return float(chip.level(line, now)) if line in chip.interface.occupied else chip.pin(name)
+
+
 def _program(chip: M1486Chip, now: Nanos) -> StateProgram:
     following = next_command(chip)
     return StateProgram(
@@ -97,6 +102,6 @@ def _axis(chip: M1486Chip, described: AxisDescription, now: Nanos) -> StateAxis:
 
 
 state_of: StateReader[M1486Chip] = StateReader(
-    datasheet=datasheet, status=_status, program=_program, axis=_axis, pins=_pins, details=DETAILS
+    datasheet=datasheet, status=_status, program=_program, axis=_axis, pins=_pins, pin=_pin, details=DETAILS
 )
 """The position is the sum of the pulses so far, as the point ``position``; `details` have the counter."""

@@ -165,7 +165,8 @@ def _of_machine(kind: AnyKind, machine: MotionController, source: Source, rest: 
     pin = rest.upper()
     if pin in machine.pins():
         unit = kind.pins(machine)[pin].unit
-        return SignalOf((source,), lambda now: machine.pin(pin), unit=unit, check=partial(kind.refuse_taken, machine, pin))
+        read = partial(kind.state.pin, machine, pin)
+        return SignalOf((source,), read, unit=unit, check=partial(kind.refuse_taken, machine, pin))
     point = kind.point(machine, rest) if rest else None
     if point is None:
         raise _unknown([point.path for point in kind.datasheet(machine).points], rest, name, ", and pins")

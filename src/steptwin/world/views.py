@@ -64,7 +64,8 @@ class MachineView:
     @property
     def pins(self) -> Mapping[str, float]:
         """The level of every pin: 0, 1, volts."""
-        return {name: level for name, level in self.state.pins.items() if level is not None}
+        self._touch()
+        return self._plant.kind(self.name).state.pins(self._plant.machines[self.name], self._plant.now)
 
     def set_pin(self, pin: str, value: float) -> None:
         """Set an input from outside: 0, 1, volts. Raises `Misuse`."""
