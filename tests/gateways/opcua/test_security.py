@@ -7,6 +7,12 @@ from pathlib import Path
 
 import pytest
 from asyncua.server.server import Server
+from cryptography.hazmat.primitives.serialization import (
+    BestAvailableEncryption,
+    Encoding,
+    PrivateFormat,
+    load_pem_private_key,
+)
 
 from steptwin.commands.certificate import make_certificate
 from steptwin.errors import Misuse
@@ -54,4 +60,12 @@ def test_a_file_that_is_no_certificate(tmp_path: Path) -> None:
     for name in ("certificate.pem", "key.pem"):
         (tmp_path / name).write_text("text")
     with pytest.raises(Misuse, match=r"\[gateway.opcua\]: certificate.pem, key.pem: "):
+        asyncio.run(security(tmp_path, OWN).apply(Server()))
+
+
+def test_a_key_that_is_encrypted(tmp_path: Path) -> None:
+    _, key = make_certificate(tmp_path, [], 2)
+    own = load_pem_private_key(key.read_bytes(), None)
+    key.write_bytes(own.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, BestAvailableEncryption(b"secret")))
+    with pytest.raises(Misuse, match=r"\[gateway.opcua\]: certificate.pem, key.pem: .*encrypted"):
         asyncio.run(security(tmp_path, OWN).apply(Server()))

@@ -8,9 +8,13 @@ from typing import Any
 
 from asyncua import ua
 from asyncua.server.address_space import AttributeValue
+from asyncua.server.server import Server
 from gateway_rig import GatewayWorld
 
-from steptwin.gateways.opcua.service import WatchedNode, WatchedNodes
+from steptwin.gateways.opcua.addressspace import NAMESPACE_URI, AddressSpaceBuilder, node_id
+from steptwin.gateways.opcua.nodes import NodeMaker
+from steptwin.gateways.opcua.service import NodeService, WatchedNode, WatchedNodes
+from steptwin.gateways.opcua.session import GatewayServer
 from steptwin.gateways.points import GatewayPoint, PointValue, points_of
 from steptwin.gateways.sampling import Sample, Sampler
 from steptwin.world.script import Set
@@ -79,3 +83,40 @@ def test_who_follows_is_told_and_who_reads_gets_the_same_value() -> None:
         asyncio.run(node.notify(sample, value))
     assert rig.notified == [(1, False), (1, False), (1, 0.0), (1, "stopped")]
     assert rig.all_of["program.state"][1].value.Value.Value == "stopped"
+
+
+def test_who_follows_a_variable_is_told_what_it_is_after_somebody_has_read_it() -> None:
+    """It was another value for a moment, in which it was read."""
+    world = GatewayWorld('[[mic488]]\nname = "table"\n')
+    told: list[object] = []
+
+    async def notified(_: int, value: ua.DataValue) -> None:
+        told.append(None if value.Value is None else value.Value.Value)
+
+    async def scene() -> None:
+        server = Server(GatewayServer())
+        await server.init()
+        await server.register_namespace(NAMESPACE_URI)
+        space = server.iserver.aspace
+        builder = AddressSpaceBuilder(world.description, {})
+        maker = NodeMaker(space)
+        maker.add(builder.items)
+        maker.refer(builder.references)
+        service = NodeService(space, world, Sampler(world, {}), builder.points, builder.methods, builder.arrays)
+        await service.refresh_all()
+        node = node_id("table.pins.IN3")
+        attribute = space[node].attributes[ua.AttributeIds.Value]
+        attribute.datachange_callbacks[1] = notified
+        service.watch([node])
+        await service.publish(1.0)
+        world.inner.do(Set((("table", "IN3", 1.0),)))
+        await service.refresh([node])
+        world.inner.do(Set((("table", "IN3", 0.0),)))
+        for _ in range(3):
+            await service.publish(0.2)
+        assert attribute.value is not None
+        assert attribute.value.Value.Value is False
+        service.close()
+
+    asyncio.run(scene())
+    assert told == [False, True, False]

@@ -101,7 +101,7 @@ class OpcUaGateway:
         port = _port(server)
         self._address = Address(address.host, port)
         if security.valid_until is not None and self._guard is None:
-            self._guard = asyncio.create_task(self._watch(listen_any=listen_any, notice=notice))
+            self._guard = endless(self._watch(listen_any=listen_any, notice=notice), failed)
         return {"host": address.host, "port": port, "url": f"opc.tcp://{Address(address.host, port)}/"}
 
     async def _watch(self, *, listen_any: bool, notice: Callable[[str], None]) -> None:

@@ -113,7 +113,7 @@ class Security(UserManager):
                 await server.load_certificate(self._loaded[0], "PEM")
                 await server.load_private_key(self._loaded[1], format="PEM")
                 self.valid_until = load_pem_x509_certificate(self._loaded[0]).not_valid_after_utc
-            except ValueError as error:
+            except (ValueError, TypeError) as error:  # TypeError: a key that is encrypted
                 raise Misuse(f"[gateway.opcua]: {options.certificate}, {options.key}: {error}") from None
         checks = CertificateValidatorOptions.BASIC_VALIDATION | CertificateValidatorOptions.PEER_CLIENT
         trusted: TrustStore | None = None

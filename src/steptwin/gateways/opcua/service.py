@@ -65,6 +65,13 @@ class WatchedNodes:
             group.append(WatchedNode(point, attribute))
         self._state = None
 
+    def forget(self, points: Iterable[GatewayPoint]) -> None:
+        """Whoever follows these has been told values that were read: the next ones are told, whatever they are."""
+        for point in points:
+            for node in self._groups.get(point.group, ()):
+                if node.point is point:
+                    node.shown = _NOTHING
+
     def keep_followed(self) -> bool:
         """Only those that are followed; whether there are any."""
         groups = {name: [node for node in nodes if node.is_followed] for name, nodes in self._groups.items()}
@@ -180,9 +187,12 @@ class NodeService:
     def _is_followed(self, node: ua.NodeId) -> bool:
         return bool(self._space[node].attributes[ua.AttributeIds.Value].datachange_callbacks)
 
-    async def _show(self, sample: Sample, points: Iterable[PointNode]) -> None:
+    async def _show(self, sample: Sample, points: Sequence[PointNode]) -> None:
         for node in points:
             await self._write(sample, node, None if sample.state is None else node.point.read(sample.state))
+        watched = self._watched.get(sample.machine)
+        if watched is not None:
+            watched.forget(node.point for node in points)
 
     async def _write(self, sample: Sample, node: PointNode, value: PointValue) -> None:
         fresh = data_value(value, node.point.type, sample.at, is_answered=sample.state is not None)
