@@ -93,6 +93,23 @@ def test_an_event_names_what_is_read_again(payload: Payload, wanted: set[str]) -
     assert set(held.wanted(is_due=False)) == wanted
 
 
+@pytest.mark.parametrize(
+    ("payload", "wanted"),
+    [
+        (EdgePayload("B3", 1.0), set()),
+        (EdgePayload("N", 7.0), {"pins"}),
+        (EdgePayload("LIMIT", 0.0), {"status", "program"}),
+        (PlanPayload("1", at_rest(0, 7)), {"M1", "status", "program", "pins", "details"}),
+        (StatusPayload("wait", "waits 5 ms"), {"M1", "status", "program", "pins", "details"}),
+    ],
+)
+def test_levels_of_a_driver_interface_have_no_edges(payload: Payload, wanted: set[str]) -> None:
+    """They are read again with a plan, another waveform, and what the chip tells of itself."""
+    held = Holder(World.from_toml(CURRENTS.format(interface="dual"))).held["chip"]
+    held.take(Event(1, 0, "chip", payload))
+    assert set(held.wanted(is_due=False)) == wanted
+
+
 class Holder:
     """Holds the states of the twins of a world, and compares them with what is read."""
 
@@ -167,6 +184,22 @@ def test_an_encoder_that_another_axis_turns_goes_with_it() -> None:
         state = holder.held["table"].state
         assert state is not None
         seen.add(state["axes"][1]["encoder"])
+    assert len(seen) > 5
+
+
+def test_an_encoder_that_an_axis_of_another_controller_turns_goes_with_it() -> None:
+    world = World.from_toml(FOLLOWS.replace('"table.M2"', '"other.M1"') + '[[mic488]]\nname = "other"\n')
+    holder = Holder(world)
+    assert [part.is_turned for part in holder.parts] == [False, True]
+    holder.subject.do(Enable("table", 1))
+    holder.subject.do(Move("table", 1, by=400.0))
+    seen = set()
+    for _ in range(30):
+        holder.subject.do(Advance(duration=20 * MILLISECOND))
+        holder.check()
+        state = holder.held["other"].state
+        assert state is not None
+        seen.add(state["axes"][0]["encoder"])
     assert len(seen) > 5
 
 

@@ -30,7 +30,7 @@ from steptwin.subject.payloads import (
     WritePayload,
 )
 
-ACTIVE = ("running", "waiting")
+BUSY = ("running", "waiting")
 """Programs in these states change what they show without an event."""
 EFFECT_NS: Nanos = SECOND
 """What is sent without an answer may have its effect so long after it, or after the last effect: characters take their time."""
@@ -42,7 +42,7 @@ _SILENT = (NotePayload, PacePayload, ReportPayload, ButtonPayload)
 class HeldState:
     """The state of the twin ``part``; ``state`` is None before the first one has been read."""
 
-    __slots__ = ("_active", "_also", "_axes", "_free", "_levels", "_others", "_stale", "_unsettled", "state")
+    __slots__ = ("_active", "_also", "_axes", "_free", "_levels", "_others", "_stale", "_turned", "_unsettled", "state")
 
     def __init__(self, part: MachinePart) -> None:
         axes = part.datasheet.axes
@@ -64,7 +64,9 @@ class HeldState:
         """Parts that have to be read again."""
         self._free: dict[str, Nanos | None] = {}
         """Until when the load of an axis moves without current; None: without end."""
-        self._active: tuple[str, ...] = ()
+        self._turned = tuple(names) if part.is_turned else ()
+        """Axes whose encoders an axis of another controller may turn, of which events of that one tell."""
+        self._active: tuple[str, ...] = self._turned
         """Parts that change without events."""
         self._unsettled: Nanos = 0
         """Until when what was sent to it may have effects."""
@@ -161,12 +163,12 @@ class HeldState:
         if self.state is None:
             raise AssertionError
         self._stale.clear()
-        active: set[str] = set()
+        active = set(self._turned)
         self._free = {axis: end for axis, end in self._free.items() if end is None or end > now}
         for axis in self.state["axes"]:
             if axis["moving"] or str(axis["number"]) in self._free:
                 active.update((axis["name"], *self._also[axis["name"]]))
-        if self.state["program"]["state"] in ACTIVE:
+        if self.state["program"]["state"] in BUSY:
             active.update(_OF_PROGRAM)
         if now < self._unsettled:
             active.update(self._others)
@@ -180,7 +182,7 @@ def merged(before: State, after: State) -> State:
 
 
 def is_resting(state: State) -> bool:
-    return state["program"]["state"] not in ACTIVE and not any(axis["moving"] for axis in state["axes"])
+    return state["program"]["state"] not in BUSY and not any(axis["moving"] for axis in state["axes"])
 
 
 def parts_only(state: Mapping[str, Any], registers: Mapping[str, float | None]) -> State:

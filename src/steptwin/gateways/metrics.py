@@ -14,6 +14,7 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metri
 from steptwin import __version__
 from steptwin.errors import LineFailure
 from steptwin.gateways.contract import GatewaySubject
+from steptwin.gateways.heldstate import BUSY
 from steptwin.machine import SECOND
 from steptwin.subject import commands as command
 from steptwin.subject.contract import Description
@@ -23,7 +24,6 @@ MetricSample: TypeAlias = tuple[tuple[str, ...], bool | float | None]
 """Values of the labels, and the value; None where it is unknown."""
 
 PREFIX = "steptwin_"
-ACTIVE = ("running", "waiting")
 COUNTED = frozenset({"status", "report", "note", "fault", "input", "button"})
 """Kinds of events that are counted; others are as frequent as motion."""
 MOST_EVENTS = 4096
@@ -99,7 +99,7 @@ class Metrics:
 def _of_controllers(states: Mapping[str, Mapping[str, Any]]) -> list[Metric]:
     statuses = [((name, one["status"]["level"], one["status"]["text"]), True) for name, one in states.items()]
     programs = [
-        ((name,), one["program"]["state"] in ACTIVE) for name, one in states.items() if one["program"]["state"] is not None
+        ((name,), one["program"]["state"] in BUSY) for name, one in states.items() if one["program"]["state"] is not None
     ]
     pins = [((name, pin), level) for name, one in states.items() for pin, level in one["pins"].items()]
     return [

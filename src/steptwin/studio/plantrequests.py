@@ -160,7 +160,7 @@ _WRITE = members(
         },
         "machine": {**_TEXT, "description": "The controller, or the line; empty for what is about neither."},
         "what": {**_TEXT, "description": "What was written or commanded, in words."},
-        "outcome": {**_TEXT, "description": "done, misuse, refusal, failure; empty where there is no answer."},
+        "outcome": {**_TEXT, "description": "done, misuse, refusal, failure, internal; sent or empty where there is no answer."},
     }
 )
 

@@ -45,7 +45,10 @@ def _machine(world: Plant, name: str) -> MachinePart:
     line, unit = (None, None) if on is None else (on[0].name, on[1])
     kind = world.kind(name)
     sheet = kind.datasheet(world.machines[name])
-    return MachinePart(name, sheet, line, unit, controls_of(sheet, kind.control))
+    takes = controls_of(sheet, kind.control)
+    others = (axis.mechanism for axis in world.axes.values() if axis.mechanism.machine != name)
+    is_turned = any(mechanism.turns(name) for mechanism in others)
+    return MachinePart(name, sheet, line, unit, takes, is_turned=is_turned)
 
 
 def _mechanics(world: Plant, name: str) -> MechanicsPart:

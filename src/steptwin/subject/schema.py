@@ -213,6 +213,7 @@ def _description() -> dict[str, object]:
                 "description": "The same for each axis, and with axis null for the whole controller, with their arguments.",
             },
             "real": {"type": "boolean", "description": "A device: it gives samples instead of plans, and may move something."},
+            "turned": {"type": "boolean", "description": "An axis of another controller turns one of its encoders."},
         }
     )
     own: Mapping[str, object] = {

@@ -366,6 +366,10 @@ class Mechanism(Stateful):
             self._simple = False
         self._turn_encoders(now)
 
+    def turns(self, machine: str) -> bool:
+        """Whether it turns an encoder that this machine reads."""
+        return any(encoder.machine == machine for encoder in self._encoders)
+
     def _turn_encoders(self, now: Nanos) -> None:
         course = self._course
         self._due = None

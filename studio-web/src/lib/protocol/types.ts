@@ -435,6 +435,8 @@ export type Description = {
     })[];
     /** A device: it gives samples instead of plans, and may move something. */
     real: boolean;
+    /** An axis of another controller turns one of its encoders. */
+    turned: boolean;
   })[];
   datasheets: ({
     kind: string;
@@ -2256,7 +2258,7 @@ export type HistoryWritesAnswer = {
   machine: string;
   /** What was written or commanded, in words. */
   what: string;
-  /** done, misuse, refusal, failure; empty where there is no answer. */
+  /** done, misuse, refusal, failure, internal; sent or empty where there is no answer. */
   outcome: string;
 }[];
 

@@ -44,6 +44,7 @@ export const t = texts(
     misuse: "wrong",
     refusal: "refused",
     failure: "failed",
+    internal: "error in steptwin",
   },
   {
     title: "Historia",
@@ -88,5 +89,6 @@ export const t = texts(
     misuse: "błędne",
     refusal: "odmowa",
     failure: "niepowodzenie",
+    internal: "błąd w steptwin",
   },
 );
