@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,8 @@ from gateway_rig import GatewayWorld
 
 from steptwin import World
 from steptwin.gateways import make_gateway
+from steptwin.gateways.mqtt.jsonface import JsonFace
+from steptwin.gateways.sampling import Sampler
 from steptwin.history.keeper import HistoryKeeper
 
 HALL = '[[mic488]]\nname = "table"\n'
@@ -44,6 +47,55 @@ def test_an_error_in_it_is_told_and_shown(table: str, name: str, tmp_path: Path,
 
     asyncio.run(scene())
     assert told == [f"[gateway.{name}]: internal error, please report it: KeyError: 'M9'"]
+
+
+@pytest.mark.parametrize("keys", ["", 'sparkplug = { group = "plant", node = "cell" }\n'])
+def test_an_error_in_it_is_told_without_a_broker_too(keys: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    subject = GatewayWorld(HALL)
+    (spec,) = World.from_toml(f'{HALL}[gateway.mqtt]\nbroker = "127.0.0.1:1"\n{keys}').spec.gateways
+    gateway = make_gateway(spec, subject, tmp_path)
+    error = "internal error, please report it: KeyError: 'M9'"
+    is_told = asyncio.Event()
+
+    def notice(text: str) -> None:
+        if text == f"[gateway.mqtt]: {error}":
+            is_told.set()
+
+    def broken(*_: object) -> None:
+        raise KeyError("M9")
+
+    async def scene() -> None:
+        monkeypatch.setattr(subject.samples, "see_events", broken)
+        monkeypatch.setattr(JsonFace, "will", broken)
+        await gateway.open(listen_any=False, notice=notice)
+        async with asyncio.timeout(20):
+            await is_told.wait()
+        assert gateway.state()[:2] == (False, error)
+        await gateway.close()
+
+    asyncio.run(scene())
+
+
+def test_an_error_in_the_reading_of_a_device_ends_what_is_published(monkeypatch: pytest.MonkeyPatch) -> None:
+    subject = GatewayWorld(HALL)
+    (part,) = subject.description.machines
+    real = replace(subject.description, machines=(replace(part, is_real=True),))
+    monkeypatch.setattr(GatewayWorld, "description", real)
+    subject.silence = KeyError("M9")
+    subject.silent.add("table")
+
+    async def scene() -> None:
+        sampler = Sampler(subject, {})
+        sampler.watch(["table"])
+
+        async def sample() -> None:
+            for _ in range(100):
+                await sampler.changed(0.1)
+
+        with pytest.raises(KeyError, match="M9"):
+            await sample()
+
+    asyncio.run(scene())
 
 
 def test_an_error_that_ends_the_history_is_told_and_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,7 +15,7 @@ from tests.conftest import STEPTWIN, until
 
 from steptwin import World
 from steptwin.access.audit import CommandLog
-from steptwin.errors import LineFailure, SteptwinError
+from steptwin.errors import LineFailure
 from steptwin.gateways.contract import PastValues
 from steptwin.gateways.sampling import SharedSamples
 from steptwin.subject import commands as command
@@ -38,7 +38,7 @@ class GatewayWorld:
         self.audit: CommandLog | None = None
         self.samples = SharedSamples(self)
         self.silent: set[str] = set()
-        self.silence: SteptwinError = LineFailure("no answer")
+        self.silence: Exception = LineFailure("no answer")
         self.done: list[command.Command] = []
 
     @property

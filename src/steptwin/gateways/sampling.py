@@ -54,7 +54,8 @@ class Sample:
     state: State | None
     at: datetime
     time: Nanos = 0
-    """When it was read, by the clock of the subject, which may stand; 0 without an answer."""
+    """When it was read last, by the clock of the subject, which may stand; levels that edges have brought are newer. 0 without an
+    answer, and of the `CLOCK`."""
 
 
 class SharedSamples:
@@ -236,6 +237,8 @@ class Sampler:
         self._reading: dict[str, asyncio.Task[None]] = {}
         self._read: list[Sample] = []
         """Samples of devices, whose answers come later."""
+        self._failed: BaseException | None = None
+        """What has ended the reading of a device."""
         self._real = frozenset(part.name for part in subject.description.machines if part.is_real)
         self._shared.join(self)
 
@@ -287,13 +290,17 @@ class Sampler:
     # ------------------------------------------------------------------ samples
 
     async def due(self, within_s: float) -> list[str]:
-        """Controllers that may have changed, some of them if there are many; none if there are none ``within_s``.
+        """Controllers that may have changed, some of them if there are many; none if there are none ``within_s``. Raises an
+        unexpected error of the reading of a device.
+
         Whoever asks takes samples of them and reports it by `taken`."""
         loop = asyncio.get_running_loop()
         end = loop.time() + within_s
         await asyncio.sleep(0)
         while True:
             self._woken.clear()
+            if self._failed is not None:
+                raise self._failed
             self._shared.see_events()
             self._come(self._now())
             if self._ready or self._read or loop.time() >= end:
@@ -338,6 +345,7 @@ class Sampler:
             if name in self._real:
                 if name not in self._reading:
                     self._reading[name] = asyncio.create_task(self._read_device(name))
+                    self._reading[name].add_done_callback(self._has_read)
             elif name in self._last:
                 found.append(await self._shared.recent(name, self._last[name] * TICK_S))
                 self.taken(found[-1])
@@ -353,6 +361,11 @@ class Sampler:
         self._read.append(sample)
         self.taken(sample)
         self.wake()
+
+    def _has_read(self, task: asyncio.Task[None]) -> None:
+        if not task.cancelled() and task.exception() is not None:
+            self._failed = task.exception()
+            self.wake()
 
     async def take(self, machine: str) -> Sample:
         """The present values of a controller, read as a whole, or of the `CLOCK`."""

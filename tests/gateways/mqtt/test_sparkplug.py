@@ -68,7 +68,7 @@ class Rig:
             interval=round(INTERVAL_S * 1000) * MILLISECOND,
             store=store,
         )
-        self.face.start()
+        self.face.start(pytest.fail)
         self.broker = Broker()
         self.session: asyncio.Task[None] | None = None
 

@@ -22,6 +22,7 @@ from paho.mqtt.properties import Properties
 from paho.mqtt.subscribeoptions import SubscribeOptions
 
 from steptwin.errors import Misuse
+from steptwin.eventloop import endless
 from steptwin.system import reason
 from steptwin.world.addresses import Address
 
@@ -112,19 +113,28 @@ class BrokerConnection:
         self._task: asyncio.Task[None] | None = None
         self.lost: str | None = "not connected yet"
         """Why there is no session at present; None while there is one."""
+        self._failed: str | None = None
         # The same for all sessions: the broker then ends the one before, and publishes its will, before this one says anything.
         self._client_id = f"steptwin-{secrets.token_hex(8)}"
 
     def start(self) -> None:
-        self._task = asyncio.create_task(self._run())
+        self._task = endless(self._run(), self.fail)
+
+    def fail(self, text: str) -> None:
+        """An error has ended what its face publishes."""
+        self._failed = text
+        self._notice(f"[gateway.mqtt]: {text}")
+
+    @property
+    def trouble(self) -> str | None:
+        """Why nothing is published; None while it is."""
+        return self._failed or self.lost
 
     async def close(self) -> None:
         self._closing.set()
         if self._task is not None:
             await asyncio.wait((self._task,), timeout=LONGEST_CLOSE_S)
             await _end((self._task,))
-            if not self._task.cancelled():
-                self._task.result()
 
     async def _run(self) -> None:
         loop = asyncio.get_running_loop()

@@ -60,6 +60,8 @@ class MqttGateway:
             topic = f"spBv1.0/{spec.sparkplug.group}/+/{spec.sparkplug.node}/#"
             self._face = self._edge_node(spec.sparkplug, registers, door)
         self._connection = BrokerConnection(broker, self._face, notice)
+        if isinstance(self._face, SparkplugFace):
+            self._face.start(self._connection.fail)
         self._connection.start()
         host, port = broker.address
         url = f"{'mqtt' if broker.tls is None else 'mqtts'}://{broker.address}"
@@ -70,7 +72,7 @@ class MqttGateway:
             raise AssertionError
         rows = rows_of(self._subject.description, registers)
         self._shown = sum(len(metrics) for metrics in rows.values())
-        face = SparkplugFace(
+        return SparkplugFace(
             Namespace(spec.group, spec.node, spec.host),
             rows,
             self._subject,
@@ -79,13 +81,11 @@ class MqttGateway:
             interval=self._spec.interval,
             store=self._spec.store,
         )
-        face.start()
-        return face
 
     def state(self) -> GatewayState:
         """A broker does not tell who reads."""
-        lost = "closed" if self._connection is None else self._connection.lost
-        return GatewayState(is_up=lost is None, text=lost or "connected", shown=self._shown)
+        trouble = "closed" if self._connection is None else self._connection.trouble
+        return GatewayState(is_up=trouble is None, text=trouble or "connected", shown=self._shown)
 
     async def close(self) -> None:
         if self._connection is not None:

@@ -10,13 +10,14 @@ import asyncio
 import contextlib
 import json
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from datetime import UTC, datetime
 from typing import NamedTuple
 
 from aiomqtt import Message
 
 from steptwin.errors import Misuse, SteptwinError
+from steptwin.eventloop import endless
 from steptwin.gateways.clients import GatewayClient
 from steptwin.gateways.contract import GatewaySubject
 from steptwin.gateways.mqtt.connection import BrokerLink, Publication, SessionOver
@@ -117,8 +118,9 @@ class SparkplugFace:
         self._watching: asyncio.Task[None] | None = None
         self._doing: set[asyncio.Task[None]] = set()
 
-    def start(self) -> None:
-        self._watching = asyncio.create_task(self._watch())
+    def start(self, failed: Callable[[str], None]) -> None:
+        """``failed``: as of `endless`."""
+        self._watching = endless(self._watch(), failed)
 
     def close(self) -> None:
         for task in (self._watching, *self._doing):
