@@ -24,7 +24,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from pathlib import Path
 
 from steptwin import World
@@ -39,6 +39,7 @@ ROUND_MS = 10_000
 """Levels begin anew: 0 to 10 V."""
 TICK_S = 0.01
 SETTLE_S = 5.0
+CLIENT_ENDED = "the client of OPC UA has ended: make tests/gateways/clients/node_modules/.steptwin installs it"
 BATCH, BATCHES, PAUSE_S = 200, 50, 0.2
 """At 10 changes of 1000 controllers in a second so many come in the publishing interval of a client, 20 ms."""
 
@@ -142,6 +143,14 @@ def told(title: str, late: list[float], seconds: float) -> None:
     print(f"  {title}: {len(late) / seconds:.0f} changes/s seen, p50 {p50:.0f} ms, p99 {p99:.0f} ms")
 
 
+def wait_for(file: Path, maker: subprocess.Popen[bytes], ended: Callable[[], str]) -> None:
+    """Until there is a file; raises `SystemExit` if the process that makes it has ended."""
+    while not file.exists():
+        if maker.poll() is not None:
+            raise SystemExit(ended())
+        time.sleep(0.1)
+
+
 def measure(gateways: list[str], controllers: int, rate: int, seconds: int) -> None:
     with tempfile.TemporaryDirectory() as name, contextlib.ExitStack() as stack:
         folder = Path(name)
@@ -162,10 +171,7 @@ def measure(gateways: list[str], controllers: int, rate: int, seconds: int) -> N
             )
         stack.callback(server.terminate)
         os.sched_setaffinity(server.pid, {PROCESSORS[-1]})
-        while not (folder / "ready.json").exists():
-            if server.poll() is not None:
-                raise SystemExit((folder / "errors").read_text())
-            time.sleep(0.1)
+        wait_for(folder / "ready.json", server, (folder / "errors").read_text)
         ready = json.loads((folder / "ready.json").read_text())
         clients: list[subprocess.Popen[bytes]] = []
         for point in ready["end_points"]:
@@ -178,8 +184,8 @@ def measure(gateways: list[str], controllers: int, rate: int, seconds: int) -> N
             clients.append(subprocess.Popen(listen, stdout=out))
         for one in clients:
             stack.callback(one.terminate)
-        while "opcua" in gateways and not (folder / "opcua.ready").exists():
-            time.sleep(0.1)
+        if "opcua" in gateways:
+            wait_for(folder / "opcua.ready", clients[0], lambda: CLIENT_ENDED)
         time.sleep(SETTLE_S)
         server.send_signal(signal.SIGUSR1)
         if server.stdout is None:

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from itertools import groupby, pairwise
 from operator import itemgetter
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from line_rig import VirtualWire
@@ -36,8 +37,6 @@ CASE, RESULT = "=== ", "---"
 PAUSE_NS = 20 * MILLISECOND
 """Longer ones are shown, with their moment since the call."""
 MANY = 5
-OF_SUBJECTS = {"command": commands, "steps": script, "filter_of": filter_of, "finish": finish}
-"""What scripts use of subjects."""
 FAULT = re.compile(r"(.+) (\d+) (to .+)")
 
 
@@ -195,6 +194,13 @@ def regenerate(make: Callable[[str], Bench], *goldens: Path) -> None:
         head = golden.read_text(encoding="utf-8").split(CASE)[0]
         written = (f"{CASE}{case.name}\n{case.script}{RESULT}\n{case.transcript(make)}\n" for case in cases(golden))
         golden.write_text(head + "\n".join(written), encoding="utf-8")
+
+
+def names_of(drivers: ModuleType, wire: VirtualWire, log: object) -> dict[str, Any]:
+    """What the scripts of both kinds of devices may use; ``drivers``: the package of a kind."""
+    of_drivers = {name: getattr(drivers, name) for name in drivers.__all__}
+    of_subjects = {"command": commands, "steps": script, "filter_of": filter_of, "finish": finish}
+    return {**of_drivers, **of_subjects, "wire": wire, "suspend": suspending(wire), "log": log}
 
 
 def suspending(wire: VirtualWire) -> Callable[[int, float, str], None]:

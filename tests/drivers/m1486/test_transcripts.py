@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from chip_rig import ChipWire, Fault, chip_line
-from transcripts import OF_SUBJECTS, Bench, Case, cases, regenerate, suspending
+from transcripts import Bench, Case, cases, names_of, regenerate
 
 from steptwin.drivers import m1486
 from steptwin.drivers.m1486 import sync
@@ -34,20 +34,8 @@ def bench(options: str) -> Bench:
         new, seen = wire.happened[seen:], len(wire.happened)
         return [f"{f'{address:X} ' if numbers else ''}{event.text}" for address, event in new if event.code != "upload"]
 
-    names = (
-        {name: getattr(m1486, name) for name in m1486.__all__}
-        | OF_SUBJECTS
-        | {
-            "wire": wire,
-            "chips": chips,
-            "chip": chips[0],
-            "other": chips[-1],
-            "download_to": sync.download_to,
-            "suspend": suspending(wire),
-            "log": log,
-            "told": [],
-        }
-    )
+    own = {"chips": chips, "chip": chips[0], "other": chips[-1], "download_to": sync.download_to, "told": []}
+    names = names_of(m1486, wire, log) | own
     return Bench(
         wire=wire,
         names=names,

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from host_rig import Fault, Wire, thread_line
-from transcripts import OF_SUBJECTS, Bench, Case, cases, regenerate, suspending
+from transcripts import Bench, Case, cases, names_of, regenerate
 
 from steptwin import drivers
 from steptwin.mic488.registers import register_map
@@ -38,19 +38,7 @@ def bench(options: str) -> Bench:
     def shown(data: bytes) -> str:
         return data[6:].hex() if wire.tcp else data[:-2].hex()
 
-    names = (
-        {name: getattr(drivers, name) for name in drivers.__all__}
-        | OF_SUBJECTS
-        | {
-            "wire": wire,
-            "mic": mic,
-            "axis": mic.axis,
-            "pdu": pdu,
-            "register_map": register_map,
-            "suspend": suspending(wire),
-            "log": log,
-        }
-    )
+    names = names_of(drivers, wire, log) | {"mic": mic, "axis": mic.axis, "pdu": pdu, "register_map": register_map}
     return Bench(
         wire=wire,
         names=names,
