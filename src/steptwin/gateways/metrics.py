@@ -98,9 +98,7 @@ class Metrics:
 
 def _of_controllers(states: Mapping[str, Mapping[str, Any]]) -> list[Metric]:
     statuses = [((name, one["status"]["level"], one["status"]["text"]), True) for name, one in states.items()]
-    programs = [
-        ((name,), one["program"]["state"] in BUSY) for name, one in states.items() if one["program"]["state"] is not None
-    ]
+    programs = [((name,), one["program"]["state"] in BUSY) for name, one in states.items() if one["program"]["state"] is not None]
     pins = [((name, pin), level) for name, one in states.items() for pin, level in one["pins"].items()]
     return [
         _gauge("controller_status", "1 for the present status.", ("controller", "level", "text"), statuses),
