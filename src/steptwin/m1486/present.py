@@ -61,7 +61,9 @@ def _pins(chip: M1486Chip, now: Nanos) -> dict[str, float]:
 
 def _pin(chip: M1486Chip, name: str, now: Nanos) -> float:
     line = LINE_PINS.get(name)
-    return float(chip.level(line, now)) if line in chip.interface.occupied else chip.pin(name)
+    if line is None or line not in chip.interface.occupied:
+        return chip.pin(name)
+    return float(chip.level(line, now))
 
 
 def _program(chip: M1486Chip, now: Nanos) -> StateProgram:

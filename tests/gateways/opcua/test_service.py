@@ -115,6 +115,7 @@ def test_who_follows_a_variable_is_told_what_it_is_after_somebody_has_read_it() 
         for _ in range(3):
             await service.publish(0.2)
         assert attribute.value is not None
+        assert attribute.value.Value is not None
         assert attribute.value.Value.Value is False
         service.close()
 
