@@ -139,16 +139,17 @@ class HeldState:
         if self.state is None:
             raise AssertionError
         before = self.state
-        found = {name: part for name, part in parts.items() if name != "axes" and part != before[name]}
+        found = {name: part for name, part in parts.items() if name != "axes" and part != before[name]} if parts else {}
         if parts.get("axes"):
             fresh = {axis["number"]: axis for axis in parts["axes"]}
             axes = [old if fresh.get(old["number"], old) == old else fresh[old["number"]] for old in before["axes"]]
             if any(old is not new for old, new in zip(before["axes"], axes, strict=True)):
                 found["axes"] = axes
         if self._levels:
-            pins = found.get("pins", before["pins"])
-            if any(pins[pin] != level for pin, level in self._levels.items()) and "pins" not in parts:
-                found["pins"] = {**pins, **self._levels}
+            pins = before["pins"]
+            levels = {pin: level for pin, level in self._levels.items() if pins[pin] != level}
+            if levels and "pins" not in parts:
+                found["pins"] = {**pins, **levels}
             self._levels.clear()
         if found:
             self.state = {**before, **found}

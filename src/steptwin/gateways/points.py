@@ -7,7 +7,7 @@ table names follow under ``registers``.
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
 from typing import Any, TypeAlias, cast
@@ -74,6 +74,18 @@ class GatewayPoint:
         if value is None:
             return None
         return bool(value) if self.type is PointType.TRUTH else float(value) if self.type is PointType.NUMBER else value
+
+
+_BY_NAME = ("program", "pins", "details", "registers")
+"""Groups whose values have the names of the points in their part."""
+
+
+def values_of(points: Sequence[GatewayPoint]) -> Callable[[Any], tuple[PointValue, ...]]:
+    """What reads the points of one group in their part, all at once."""
+    if len(points) > 1 and points[0].group in _BY_NAME:
+        return itemgetter(*(point.path[-1] for point in points))
+    reads = [point.of for point in points]
+    return lambda part: tuple([read(part) for read in reads])
 
 
 def points_of(part: MachinePart, description: Description, registers: Iterable[str] = ()) -> tuple[GatewayPoint, ...]:

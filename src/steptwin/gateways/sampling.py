@@ -228,9 +228,11 @@ class Sampler:
         """Of an interval, as long as `TICK_S` each; moments are numbers of slots of the event loop's time."""
         self._last: dict[str, int] = {}
         """Controllers that are looked at, and when each of them was due the last time."""
+        self._phases: dict[str, int] = {}
+        """In which slot of `REST_S` each of them is read as a whole: not all of a thousand at the same moment."""
         self._at: dict[str, int] = {}
         """When each of them is due."""
-        self._calendar: dict[int, list[str]] = {}
+        self._calendar: dict[int, dict[str, None]] = {}
         """The same by moment; entries that `_at` does not confirm are of the past."""
         self._ready: deque[str] = deque()
         self._woken = asyncio.Event()
@@ -257,6 +259,7 @@ class Sampler:
             self._at.pop(name, None)
         for name in wanted - self._last.keys():
             self._last[name] = -self._slots
+            self._phases[name] = crc32(name.encode()) % _REST_SLOTS
             self._plan(name, self._now())
 
     def hasten(self, machine: str) -> None:
@@ -285,7 +288,7 @@ class Sampler:
         planned = self._at.get(machine)
         if planned is None or planned > slot:
             self._at[machine] = slot
-            self._calendar.setdefault(slot, []).append(machine)
+            self._calendar.setdefault(slot, {})[machine] = None
 
     # ------------------------------------------------------------------ samples
 
@@ -335,7 +338,7 @@ class Sampler:
             if name in self._real:
                 slot = last + self._slots * RESTING_INTERVALS
             else:
-                slot += (crc32(name.encode()) - slot) % _REST_SLOTS  # not all of a thousand at the same moment
+                slot += (self._phases[name] - slot) % _REST_SLOTS
         self._plan(name, max(slot, self._now()))
 
     async def changed(self, within_s: float) -> list[Sample]:

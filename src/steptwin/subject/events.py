@@ -197,6 +197,10 @@ def read_event(data: Mapping[str, Any]) -> Event:
     return Event(data["number"], int(data["time_ns"]), data["machine"], _READ[data["kind"]](data), data["cause"])
 
 
+_CAUSES = (StatementPayload, ButtonPayload, InputPayload, FaultPayload)
+"""What can be a cause of what follows at the same moment, besides frames that come in."""
+
+
 class Numbering:
     """Numbers commands and events, and finds causes: what came last to the same machine at the same moment and can be one.
 
@@ -232,9 +236,7 @@ class Numbering:
     def event(self, time: Nanos, machine: str, payload: Payload) -> Event:
         number = self._take()
         event = Event(number, time, machine, payload, self._cause(time, machine))
-        if isinstance(payload, StatementPayload | ButtonPayload | InputPayload | FaultPayload) or (
-            isinstance(payload, FramePayload) and payload.direction == "in"
-        ):
+        if isinstance(payload, _CAUSES) or (isinstance(payload, FramePayload) and payload.direction == "in"):
             self._last[machine] = time, number
         return event
 

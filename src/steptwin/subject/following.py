@@ -23,6 +23,11 @@ class Filter:
     machines: frozenset[str] | None = None
     axes: frozenset[str] | None = None
 
+    @property
+    def is_of_kinds(self) -> bool:
+        """Whether it selects by kinds alone."""
+        return self.machines is None and self.axes is None
+
     def wants(self, event: Event) -> bool:
         if event.kind not in self.kinds or (self.machines is not None and event.machine not in self.machines):
             return False
@@ -93,6 +98,8 @@ class Followers:
         self._on_change = on_change
         self.kinds: frozenset[str] = frozenset()
         """Kinds that at least one follower selects."""
+        self._by_kind: dict[str, list[Following]] = {}
+        """Who selects them."""
 
     def __bool__(self) -> bool:
         return bool(self._all)
@@ -107,8 +114,8 @@ class Followers:
         self._changed()
 
     def publish(self, event: Event) -> None:
-        for following in self._all:
-            if following.filter.wants(event):
+        for following in self._by_kind.get(event.payload.kind, ()):
+            if following.filter.is_of_kinds or following.filter.wants(event):
                 following.add(event)
 
     def remove(self, following: Following) -> None:
@@ -118,4 +125,5 @@ class Followers:
 
     def _changed(self) -> None:
         self.kinds = frozenset().union(*(following.filter.kinds for following in self._all))
+        self._by_kind = {kind: [one for one in self._all if kind in one.filter.kinds] for kind in self.kinds}
         self._on_change()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+from datetime import datetime
 from typing import Any
 
 import pytest
@@ -11,7 +12,7 @@ from gateway_rig import GatewayWorld
 
 from steptwin.errors import Misuse
 from steptwin.gateways.mqtt.homeassistant import discovery
-from steptwin.gateways.mqtt.jsontopics import Group, GroupText, Topics
+from steptwin.gateways.mqtt.jsontopics import ControllerText, Group, Topics
 from steptwin.gateways.sampling import Sample, Sampler
 from steptwin.world.script import Set
 
@@ -56,7 +57,10 @@ def test_a_controller_cannot_be_called_like_a_topic(name: str) -> None:
 
 
 def values(group: Group, taken: Sample) -> dict[str, Any]:
-    return dict(zip(group.names(taken.machine), group.values(taken), strict=True))
+    ((_, payload),) = ControllerText([group], taken.machine).changed(taken)
+    found = json.loads(payload)
+    assert found.pop("at").endswith("Z")
+    return dict(found)
 
 
 def test_values_have_their_types() -> None:
@@ -78,13 +82,14 @@ def test_a_controller_that_is_silent_has_unknown_values() -> None:
         "status_code": None,
         "status_level": None,
     }
-    assert set(found.groups["table"][2].values(taken)) == {None}
+    assert set(values(found.groups["table"][2], taken).values()) == {None}
 
 
 def test_a_payload_has_the_moment_of_its_values() -> None:
     world, found = topics()
     taken = sample(world, "drum")
-    payload = json.loads(GroupText(found.groups["drum"][0], "drum").changed(taken) or b"")
+    payload = json.loads(dict(ControllerText(found.groups["drum"], "drum").changed(taken))["plant/steptwin/hall/drum"])
+    assert datetime.fromisoformat(payload["at"]) == taken.at.replace(microsecond=taken.at.microsecond // 1000 * 1000)
     assert payload["at"].endswith("Z")
     assert payload["status"] == "ok"
 
@@ -92,18 +97,22 @@ def test_a_payload_has_the_moment_of_its_values() -> None:
 def test_a_text_has_the_present_values_after_any_changes() -> None:
     world, found = topics()
     (group,) = (group for group in found.groups["table"] if group.name == "pins")
-    text = GroupText(group, "table")
-    assert text.changed(sample(world, "table")) is not None
-    assert text.changed(sample(world, "table")) is None
+    text = ControllerText(found.groups["table"], "table")
+    assert len(dict(text.changed(sample(world, "table")))) == len(found.groups["table"])
+    assert dict(text.changed(sample(world, "table"))) == {}
     for level in (2.5, 7.0, 0.0):
         world.inner.do(Set((("table", "AIN1", level), ("table", "IN4", float(level > 5.0)))))
         taken = sample(world, "table")
-        payload = json.loads(text.changed(taken) or b"")
-        assert payload.pop("at")
-        assert payload == values(group, taken)
+        ((topic, payload),) = text.changed(taken)
+        shown = json.loads(payload)
+        assert shown.pop("at")
+        assert (topic, shown) == (group.topic, values(group, taken))
+        assert (shown["AIN1"], shown["IN4"]) == (level, level > 5.0)
     world.silent.add("table")
-    silent = json.loads(text.changed(sample(world, "table")) or b"")
-    assert {value for name, value in silent.items() if name != "at"} == {None}
+    silent = dict(text.changed(sample(world, "table")))
+    assert len(silent) == len(found.groups["table"])
+    assert {value for name, value in json.loads(silent[group.topic]).items() if name != "at"} == {None}
+    assert dict(text.changed(sample(world, "table"))) == {}
 
 
 def test_the_description_has_units_and_what_can_be_written() -> None:

@@ -21,7 +21,7 @@ from steptwin.gateways.mqtt.jsontopics import (
     EVENTS,
     INSTANCE,
     ONLINE,
-    GroupText,
+    ControllerText,
     Topics,
     encode,
 )
@@ -52,8 +52,8 @@ class JsonFace:
         self._commands = commands
         self._following = subject.follow(Filter(KINDS), spec.store)
         self._instance = secrets.token_hex(8)
-        self._texts: dict[str, list[tuple[str, GroupText]]] = {}
-        """What has been published in this session, by controller: topics and texts."""
+        self._texts: dict[str, ControllerText] = {}
+        """What has been published in this session, by controller."""
         self._doing: set[asyncio.Task[None]] = set()
         self._others: dict[str, bytes] = {}
         """What is known of whoever uses these topics, until this gateway does."""
@@ -120,12 +120,10 @@ class JsonFace:
         found: list[Publication] = []
         for sample in samples:
             machine = sample.machine
-            if machine not in self._texts:
-                self._texts[machine] = [(group.topic, GroupText(group, machine)) for group in self._topics.groups[machine]]
-            for topic, group in self._texts[machine]:
-                payload = group.changed(sample)
-                if payload is not None:
-                    found.append(Publication(topic, payload, retain=True))
+            text = self._texts.get(machine)
+            if text is None:
+                text = self._texts[machine] = ControllerText(self._topics.groups[machine], machine)
+            found += [Publication(topic, payload, retain=True) for topic, payload in text.changed(sample)]
         await link.publish_all(found)
 
     async def _publish_events(self, link: BrokerLink) -> None:

@@ -7,13 +7,17 @@ table and the name of the subject.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from datetime import datetime
+from itertools import compress, count
+from math import isfinite
+from operator import ne
 from pathlib import PurePath
 from typing import Any
 
 from steptwin.errors import Misuse
-from steptwin.gateways.points import CLOCK, CLOCK_POINTS, GatewayPoint, PointValue, points_of
+from steptwin.gateways.points import CLOCK, CLOCK_POINTS, GatewayPoint, PointValue, points_of, values_of
 from steptwin.gateways.sampling import Sample
 from steptwin.subject.contract import Description
 from steptwin.world.gateways import UNNAMED
@@ -40,53 +44,67 @@ class Group:
     name: str
     points: tuple[GatewayPoint, ...]
 
-    def part(self, sample: Sample) -> object:
-        """What its values are taken from: the same object in two samples between which nothing has changed in it."""
-        return None if sample.state is None else self.points[0].part(sample.state)
-
     def names(self, machine: str) -> list[str]:
         names = [point.path[-1] for point in self.points]
         return names if self.name or machine == CLOCK else [*names, ANSWERS]
-
-    def values(self, sample: Sample) -> list[PointValue]:
-        """In the order of `names`, not of their types yet; all unknown where the controller does not answer."""
-        part = self.part(sample)
-        found: list[PointValue] = [None if part is None else point.of(part) for point in self.points]
-        if not self.name and sample.machine != CLOCK:
-            found.append(sample.state is not None)
-        return found
 
 
 class GroupText:
     """The values of a group that were published last, as JSON: a change of one makes one of them anew."""
 
+    __slots__ = ("_has_answers", "_names", "_read", "_texts", "_typed", "_values", "part", "part_of", "topic")
+
     def __init__(self, group: Group, machine: str) -> None:
-        self._group = group
-        self._part_of = group.points[0].part
+        self.topic = group.topic
+        self.part_of = group.points[0].part
+        """The part of a state that has its values: the same object in two states between which nothing has changed."""
+        self.part: object = None
+        """That of what was published last; None where the controller did not answer."""
+        names = group.names(machine)
+        self._has_answers = len(names) > len(group.points)
+        self._read = values_of(group.points)
         self._typed = [*(point.typed for point in group.points), bool]
         """What gives each value its type; the last one that of `ANSWERS`."""
-        self._names = [encode(name).decode() for name in group.names(machine)]
-        self._part: object = None
-        self._values: list[PointValue] = []
+        self._names = [encode(name).decode() for name in names]
+        self._values: tuple[PointValue, ...] = ()
         self._texts: list[str] = []
 
-    def changed(self, sample: Sample) -> bytes | None:
-        """The group with the moment of ``sample``; None where it is as before."""
-        part = None if sample.state is None else self._part_of(sample.state)
-        if part is not None and part is self._part:
-            return None
-        self._part = part
-        values, before = self._group.values(sample), self._values
+    def changed(self, part: object, moment: datetime) -> bytes | None:
+        """The group with a `part` of a ``moment``, None where the controller does not answer: then all values are unknown. None
+        where they are as before."""
+        self.part = part
+        values = (None,) * (len(self._typed) - 1) if part is None else self._read(part)
+        if self._has_answers:
+            values = (*values, part is not None)
+        before = self._values
         if values == before:
             return None
         self._values = values
-        if not before:
-            self._texts = [""] * len(values)
-        for number, new in enumerate(values):
-            if not before or before[number] != new:
-                self._texts[number] = f"{self._names[number]}:{_text(self._typed[number](new))}"
-        at = sample.at.isoformat(timespec="milliseconds").replace("+00:00", "Z")
+        if before:
+            changed: Iterable[int] = compress(count(), map(ne, values, before))
+        else:
+            self._texts, changed = [""] * len(values), range(len(values))
+        for number in changed:
+            self._texts[number] = f"{self._names[number]}:{_text(self._typed[number](values[number]))}"
+        at = moment.isoformat(timespec="milliseconds").replace("+00:00", "Z")
         return f'{{{",".join(self._texts)},"{AT}":"{at}"}}'.encode()
+
+
+class ControllerText:
+    """All groups of a controller, as they were published last."""
+
+    def __init__(self, groups: Iterable[Group], machine: str) -> None:
+        self._groups = [GroupText(group, machine) for group in groups]
+
+    def changed(self, sample: Sample) -> Iterator[tuple[str, bytes]]:
+        """Topics and payloads of the groups that are not as before."""
+        state = sample.state
+        for group in self._groups:
+            part = None if state is None else group.part_of(state)
+            if part is None or part is not group.part:
+                payload = group.changed(part, sample.at)
+                if payload is not None:
+                    yield group.topic, payload
 
 
 class Topics:
@@ -158,7 +176,9 @@ def _described(group: Group) -> dict[str, object]:
 _ENCODER = json.JSONEncoder(ensure_ascii=False, separators=(",", ":"))
 
 
-_text = _ENCODER.encode
+def _text(value: Any) -> str:
+    """As JSON. Most are numbers, which go through the encoder at four times the cost."""
+    return float.__repr__(value) if type(value) is float and isfinite(value) else _ENCODER.encode(value)
 
 
 def encode(value: Any) -> bytes:
