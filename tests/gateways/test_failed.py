@@ -11,6 +11,7 @@ from gateway_rig import GatewayWorld
 
 from steptwin import World
 from steptwin.gateways import make_gateway
+from steptwin.gateways.epics.controller import EpicsController
 from steptwin.gateways.mqtt.jsonface import JsonFace
 from steptwin.gateways.sampling import Sampler
 from steptwin.history.keeper import HistoryKeeper
@@ -47,6 +48,29 @@ def test_an_error_in_it_is_told_and_shown(table: str, name: str, tmp_path: Path,
 
     asyncio.run(scene())
     assert told == [f"[gateway.{name}]: internal error, please report it: KeyError: 'M9'"]
+
+
+def test_an_error_in_the_look_of_a_client_of_epics_is_told_and_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    subject = GatewayWorld(HALL)
+    (spec,) = World.from_toml(HALL + EPICS).spec.gateways
+    gateway = make_gateway(spec, subject, tmp_path)
+    told: list[str] = []
+
+    async def broken(*_: object) -> None:
+        raise KeyError("M9")
+
+    async def scene() -> None:
+        is_told = asyncio.Event()
+        monkeypatch.setattr(EpicsController, "is_busy", True)
+        monkeypatch.setattr(Sampler, "take", broken)
+        await gateway.open(listen_any=False, notice=lambda text: (told.append(text), is_told.set()))
+        async with asyncio.timeout(20):
+            await is_told.wait()
+        assert gateway.state()[:2] == (False, "internal error, please report it: KeyError: 'M9'")
+        await gateway.close()
+
+    asyncio.run(scene())
+    assert told == ["[gateway.epics]: internal error, please report it: KeyError: 'M9'"]
 
 
 @pytest.mark.parametrize("keys", ["", 'sparkplug = { group = "plant", node = "cell" }\n'])

@@ -14,6 +14,7 @@ from steptwin.gateways.points import CLOCK, CLOCK_POINTS, State
 from steptwin.gateways.sampling import AT_ONCE, MOST_EVENTS, REST_S, TICK_S, Sampler
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.subject import commands as command
+from steptwin.subject.contract import Result
 from steptwin.world.script import Note, Send, Set, Turn
 
 TEXT = '[[mic488]]\nname = "table"\n[[mic488]]\nname = "other"\n'
@@ -284,3 +285,29 @@ def test_a_write_on_a_line_may_change_all_of_its_controllers() -> None:
         assert [state["details"]["S"] for state in gateway.states.values() if state is not None].count(77) == 1
 
     story(act, text=text)
+
+
+def test_a_read_that_ends_after_the_last_gateway_has_left_is_no_sample_for_the_next_one() -> None:
+    async def scene() -> None:
+        world = GatewayWorld(TEXT)
+        answers, do = asyncio.Event(), world.do
+
+        async def slow(wanted: command.Command) -> Result:
+            await answers.wait()
+            return await do(wanted)
+
+        first = Sampler(world, {})
+        await first.take("table")
+        await do(command.Enable("table", 1))
+        world.do = slow  # type: ignore[method-assign]
+        reading = asyncio.create_task(first.present("table"))
+        await asyncio.sleep(0)
+        first.close()
+        answers.set()
+        await reading
+        await do(Set((("table", "IN3", 1.0),)))
+        state = (await Sampler(world, {}).present("table")).state
+        assert state is not None
+        assert state["pins"]["IN3"] == 1.0
+
+    run_virtually(scene())

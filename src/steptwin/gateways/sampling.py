@@ -13,6 +13,7 @@ from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from math import inf
 from typing import TYPE_CHECKING, Any, cast
 from zlib import crc32
 
@@ -157,7 +158,7 @@ class SharedSamples:
         held = self._held.get(machine)
         if held is None or sample.state is None:
             return sample if taken_at >= since else await self.take(machine)
-        if asyncio.get_running_loop().time() - self._whole[machine] > REST_S / 2:
+        if asyncio.get_running_loop().time() - self._whole.get(machine, -inf) > REST_S / 2:
             return await self.take(machine)
         is_due = taken_at < since
         if not is_due and not held.has_news:

@@ -20,7 +20,7 @@ from steptwin.gateways.epics.records import FieldValue
 from steptwin.gateways.leases import JogLeases
 from steptwin.gateways.points import points_of
 from steptwin.gateways.sampling import Sampler
-from steptwin.subject.commands import Command, ReadState
+from steptwin.subject.commands import Command, Enable, ReadState
 from steptwin.subject.contract import Result
 
 
@@ -129,5 +129,34 @@ def test_a_controller_that_does_not_answer_holds_up_no_other() -> None:
         assert looking.done()
         other.look()
         await other.close()
+
+    run_virtually(act())
+
+
+def test_who_asks_while_only_news_are_read_gets_a_whole_sample() -> None:
+    async def act() -> None:
+        world = GatewayWorld(PLAIN)
+        answers, reads, do = asyncio.Event(), asyncio.Queue[tuple[str, ...] | None](), world.do
+
+        async def slow(wanted: Command) -> Result:
+            if isinstance(wanted, ReadState):
+                reads.put_nowait(wanted.parts)
+                if wanted.parts is not None:
+                    await answers.wait()
+            return await do(wanted)
+
+        sampler = Sampler(world, {})
+        table = EpicsController("table", world, sampler, JogLeases(world), Role.ENGINEER)
+        await table.refresh()
+        world.do = slow  # type: ignore[method-assign]
+        await do(Enable("table", 1))
+        table.look()
+        assert await reads.get()
+        asking = asyncio.create_task(table.refresh())
+        await asyncio.sleep(0)
+        answers.set()
+        await asking
+        assert reads.get_nowait() is None
+        await table.close()
 
     run_virtually(act())

@@ -55,6 +55,8 @@ class EpicsController:
         self._on_their_way = 0
         self._sampling: asyncio.Task[None] | None = None
         self._is_asked = False
+        self._is_part = False
+        """Whether the sample that is being taken only has what events have named."""
 
     @property
     def is_wanted(self) -> bool:
@@ -67,7 +69,9 @@ class EpicsController:
     # ------------------------------------------------------------------ values
 
     async def refresh(self) -> None:
-        """Take a sample; those who ask while one is taken get that one."""
+        """Take a sample; those who ask while one is taken get that one, unless it only has what events have named."""
+        while self._sampling is not None and self._is_part:
+            await asyncio.wait((self._sampling,))
         self._is_asked = True
         await asyncio.shield(self.look())
 
@@ -87,12 +91,12 @@ class EpicsController:
             before = self._commands
             # Of a motion the moment counts; a client that asks is given what is so now.
             is_whole = self._is_asked or self.is_busy
-            self._is_asked = False
+            self._is_asked, self._is_part = False, not is_whole
             sample = await (self._sampler.take(self.name) if is_whole else self._sampler.present(self.name))
             self._sampler.taken(sample)
             is_sure = before == self._commands and not self._on_their_way
         finally:
-            self._sampling = None
+            self._sampling, self._is_part = None, False
         for record in self.records:
             await record.take(sample, is_sure=is_sure)
 

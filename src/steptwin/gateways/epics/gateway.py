@@ -44,6 +44,8 @@ class EpicsGateway:
         self._task: asyncio.Task[None] | None = None
         self._failed: str | None = None
         """Why nothing is published any more."""
+        self._error: BaseException | None = None
+        """What a look at a controller has ended with."""
         self._leaving: set[asyncio.Task[None]] = set()
 
     @property
@@ -108,7 +110,13 @@ class EpicsGateway:
             for name in busy:
                 sampler.hasten(name)
             for name in await sampler.due(self._spec.interval / SECOND):
-                self._controllers[name].look()
+                self._controllers[name].look().add_done_callback(self._has_looked)
+            if self._error is not None:
+                raise self._error
+
+    def _has_looked(self, task: asyncio.Task[None]) -> None:
+        if not task.cancelled():
+            self._error = task.exception() or self._error
 
     def state(self) -> GatewayState:
         servers = (self._server, self._pv_server)
