@@ -61,9 +61,14 @@ def test_an_error_in_the_look_of_a_client_of_epics_is_told_and_shown(tmp_path: P
 
     async def scene() -> None:
         is_told = asyncio.Event()
+
+        def notice(text: str) -> None:
+            told.append(text)
+            is_told.set()
+
         monkeypatch.setattr(EpicsController, "is_busy", True)
         monkeypatch.setattr(Sampler, "take", broken)
-        await gateway.open(listen_any=False, notice=lambda text: (told.append(text), is_told.set()))
+        await gateway.open(listen_any=False, notice=notice)
         async with asyncio.timeout(20):
             await is_told.wait()
         assert gateway.state()[:2] == (False, "internal error, please report it: KeyError: 'M9'")
