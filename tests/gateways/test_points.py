@@ -8,7 +8,7 @@ import pytest
 from gateway_rig import GatewayWorld
 
 from steptwin.errors import Misuse
-from steptwin.gateways.points import PointType, PointValue, points_of, registers_by_machine
+from steptwin.gateways.points import GatewayPoint, PointType, PointValue, points_of, registers_by_machine, values_of
 from steptwin.gateways.sampling import Sampler
 from steptwin.subject import commands as command
 from steptwin.world.script import Set, Write
@@ -54,6 +54,23 @@ def test_a_controller_in_motion() -> None:
     # 40 mm/s after 0.1 s with 400 mm/s²: 2 mm, then 20 mm in 0.5 s
     assert found["M1.position"] == pytest.approx(22.0, abs=0.01)
     assert (found["M1.velocity"], found["M1.moving"], found["M1.enabled"]) == (40.0, True, True)
+
+
+@pytest.mark.parametrize(("machine", "registers"), [("table", REGISTERS), ("table", REGISTERS[:1]), ("drum", [])])
+def test_the_points_of_a_group_are_read_at_once(machine: str, registers: list[str]) -> None:
+    world = GatewayWorld(TEXT)
+    world.inner.do(command.Enable("table", 1))
+    world.inner.do(command.Move("table", 1, to=40.0))
+    world.inner.do(command.Advance(duration=600_000_000))
+    part = next(part for part in world.description.machines if part.name == machine)
+    state = asyncio.run(Sampler(world, {machine: registers}).take(machine)).state
+    assert state is not None
+    groups: dict[str, list[GatewayPoint]] = {}
+    for point in points_of(part, world.description, registers):
+        groups.setdefault(point.group, []).append(point)
+    assert {"", "program", "pins", "details"} < set(groups)
+    for points in groups.values():
+        assert values_of(points)(points[0].part(state)) == tuple(point.read(state) for point in points)
 
 
 def test_points_have_type_unit_and_range() -> None:
