@@ -58,6 +58,26 @@ pulses_per_unit = 10
 [axis.encoder]
 follows = "belt"
 """
+FALLS = """
+[[mic488]]
+name = "hoist"
+[mic488.M1]
+enc_resol = 4000
+
+[[axis]]
+name = "z"
+drive = "hoist.M1"
+pitch = 5.0
+[axis.encoder]
+counts_per_rev = 4000
+[axis.motor]
+torque = [[0, 3.0], [1500, 0.2]]
+inertia = 0.00003
+mass = 25.0
+force = 245.0
+friction = 0.05
+when_off = "free"
+"""
 CURRENTS = """
 [[line]]
 name = "chips"
@@ -190,7 +210,7 @@ def test_an_encoder_that_another_axis_turns_goes_with_it() -> None:
 def test_an_encoder_that_an_axis_of_another_controller_turns_goes_with_it() -> None:
     world = World.from_toml(FOLLOWS.replace('"table.M2"', '"other.M1"') + '[[mic488]]\nname = "other"\n')
     holder = Holder(world)
-    assert [part.is_turned for part in holder.parts] == [False, True]
+    assert [part.is_moved for part in holder.parts] == [False, True]
     holder.subject.do(Enable("table", 1))
     holder.subject.do(Move("table", 1, by=400.0))
     seen = set()
@@ -198,6 +218,22 @@ def test_an_encoder_that_an_axis_of_another_controller_turns_goes_with_it() -> N
         holder.subject.do(Advance(duration=20 * MILLISECOND))
         holder.check()
         state = holder.held["other"].state
+        assert state is not None
+        seen.add(state["axes"][0]["encoder"])
+    assert len(seen) > 5
+
+
+def test_an_encoder_on_a_load_without_current_goes_with_it_also_for_who_comes_later() -> None:
+    """The event of its fall came before."""
+    world = World.from_toml(FALLS)
+    world.run(0.3)
+    holder = Holder(world)
+    assert [part.is_moved for part in holder.parts] == [True]
+    seen = set()
+    for _ in range(20):
+        holder.subject.do(Advance(duration=20 * MILLISECOND))
+        holder.check()
+        state = holder.held["hoist"].state
         assert state is not None
         seen.add(state["axes"][0]["encoder"])
     assert len(seen) > 5

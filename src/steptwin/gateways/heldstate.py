@@ -1,7 +1,7 @@
 """The state of a twin, held by what its events say: each names what has changed, and only that is read again.
 
 An edge brings the level of its pin; another event names an axis, or the controller. What changes without events, an axis that
-moves, a load without current, a program that runs, is read whenever a sample is taken. Which further parts may change with a pin
+moves, or whose load may move by itself, a program that runs, is read whenever a sample is taken. Which further parts may change with a pin
 or an axis is in the data sheet (`steptwin.datasheet.Datasheet.also_change`).
 """
 
@@ -13,7 +13,6 @@ from typing import Any
 from steptwin.controllerstate import PARTS
 from steptwin.gateways.points import State
 from steptwin.machine import SECOND, Nanos
-from steptwin.motion.divisions import profile_of
 from steptwin.subject.contract import MachinePart
 from steptwin.subject.events import Event
 from steptwin.subject.payloads import (
@@ -42,7 +41,7 @@ _SILENT = (NotePayload, PacePayload, ReportPayload, ButtonPayload)
 class HeldState:
     """The state of the twin ``part``; ``state`` is None before the first one has been read."""
 
-    __slots__ = ("_active", "_also", "_axes", "_free", "_levels", "_others", "_stale", "_turned", "_unsettled", "state")
+    __slots__ = ("_active", "_also", "_axes", "_levels", "_moved", "_others", "_stale", "_unsettled", "state")
 
     def __init__(self, part: MachinePart) -> None:
         axes = part.datasheet.axes
@@ -62,11 +61,9 @@ class HeldState:
         """New ones of pins."""
         self._stale: set[str] = set()
         """Parts that have to be read again."""
-        self._free: dict[str, Nanos | None] = {}
-        """Until when the load of an axis moves without current; None: without end."""
-        self._turned = tuple(names) if part.is_turned else ()
-        """Axes whose encoders an axis of another controller may turn, of which events of that one tell."""
-        self._active: tuple[str, ...] = self._turned
+        self._moved = tuple(names) if part.is_moved else ()
+        """Axes whose encoders may turn without an event of this controller."""
+        self._active: tuple[str, ...] = self._moved
         """Parts that change without events."""
         self._unsettled: Nanos = 0
         """Until when what was sent to it may have effects."""
@@ -81,14 +78,7 @@ class HeldState:
                     return False
                 self._levels[pin] = level
                 self._stale.update(self._also[pin])
-            case PlanPayload(axis) | CoordinatePayload(axis):
-                self._take_axis(axis)
-            case LoadPayload(axis):
-                self._free.pop(axis, None)
-                self._take_axis(axis)
-            case FreePayload(axis, plan):
-                profile = profile_of(plan)
-                self._free[axis] = profile.end if profile.segments else event.time
+            case PlanPayload(axis) | CoordinatePayload(axis) | LoadPayload(axis) | FreePayload(axis):
                 self._take_axis(axis)
             case StatusPayload() as payload if payload.axis is not None:
                 self._take_axis(payload.axis)
@@ -164,10 +154,9 @@ class HeldState:
         if self.state is None:
             raise AssertionError
         self._stale.clear()
-        active = set(self._turned)
-        self._free = {axis: end for axis, end in self._free.items() if end is None or end > now}
+        active = set(self._moved)
         for axis in self.state["axes"]:
-            if axis["moving"] or str(axis["number"]) in self._free:
+            if axis["moving"]:
                 active.update((axis["name"], *self._also[axis["name"]]))
         if self.state["program"]["state"] in BUSY:
             active.update(_OF_PROGRAM)

@@ -50,8 +50,8 @@ class MachinePart:
     """Its commands for controllers, for each axis, with their arguments."""
     is_real: bool = False
     """Whether it is a device behind a driver: its positions come as samples, and it may move something."""
-    is_turned: bool = False
-    """Whether an axis of another controller turns one of its encoders."""
+    is_moved: bool = False
+    """Whether encoders of it may turn without an event of it: by an axis of another controller, or by a load without current."""
 
     @property
     def controls(self) -> tuple[str, ...]:
@@ -196,7 +196,7 @@ class Description:
                 "controls": part.controls,
                 "takes": plain(part.takes),
                 "real": part.is_real,
-                "turned": part.is_turned,
+                "moved": part.is_moved,
             }
             for part in self.machines
         ]
@@ -222,7 +222,7 @@ def read_description(data: Mapping[str, Any]) -> Description:
             one["unit"],
             tuple(map(_read_control, one["takes"])),
             is_real=one["real"],
-            is_turned=one["turned"],
+            is_moved=one["moved"],
         )
         for one in data["machines"]
     )

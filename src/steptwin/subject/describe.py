@@ -28,9 +28,10 @@ from steptwin.world.wiring import connections, terminal_name
 
 def describe(world: Plant) -> Description:
     """What is in a world."""
+    moved = set().union(*(axis.mechanism.may_turn for axis in world.axes.values()))
     return Description(
         world.spec.name,
-        tuple(_machine(world, name) for name in world.machines),
+        tuple(_machine(world, name, is_moved=name in moved) for name in world.machines),
         tuple(_mechanics(world, name) for name in world.axes),
         tuple(world.parts.buttons),
         tuple(_elements(world)),
@@ -40,15 +41,12 @@ def describe(world: Plant) -> Description:
     )
 
 
-def _machine(world: Plant, name: str) -> MachinePart:
+def _machine(world: Plant, name: str, *, is_moved: bool) -> MachinePart:
     on = world.parts.line_of.get(name)
     line, unit = (None, None) if on is None else (on[0].name, on[1])
     kind = world.kind(name)
     sheet = kind.datasheet(world.machines[name])
-    takes = controls_of(sheet, kind.control)
-    others = (axis.mechanism for axis in world.axes.values() if axis.mechanism.machine != name)
-    is_turned = any(mechanism.turns(name) for mechanism in others)
-    return MachinePart(name, sheet, line, unit, takes, is_turned=is_turned)
+    return MachinePart(name, sheet, line, unit, controls_of(sheet, kind.control), is_moved=is_moved)
 
 
 def _mechanics(world: Plant, name: str) -> MechanicsPart:

@@ -213,7 +213,7 @@ def _description() -> dict[str, object]:
                 "description": "The same for each axis, and with axis null for the whole controller, with their arguments.",
             },
             "real": {"type": "boolean", "description": "A device: it gives samples instead of plans, and may move something."},
-            "turned": {"type": "boolean", "description": "An axis of another controller turns one of its encoders."},
+            "moved": {"type": "boolean", "description": "Encoders of it may turn without an event of it."},
         }
     )
     own: Mapping[str, object] = {

@@ -366,9 +366,10 @@ class Mechanism(Stateful):
             self._simple = False
         self._turn_encoders(now)
 
-    def turns(self, machine: str) -> bool:
-        """Whether it turns an encoder that this machine reads."""
-        return any(encoder.machine == machine for encoder in self._encoders)
+    @property
+    def may_turn(self) -> set[str]:
+        """Machines whose encoders it may turn without an event of theirs."""
+        return {encoder.machine for encoder in self._encoders if self.build.is_free or encoder.machine != self.machine}
 
     def _turn_encoders(self, now: Nanos) -> None:
         course = self._course

@@ -435,8 +435,8 @@ export type Description = {
     })[];
     /** A device: it gives samples instead of plans, and may move something. */
     real: boolean;
-    /** An axis of another controller turns one of its encoders. */
-    turned: boolean;
+    /** Encoders of it may turn without an event of it. */
+    moved: boolean;
   })[];
   datasheets: ({
     kind: string;
