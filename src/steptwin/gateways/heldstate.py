@@ -1,8 +1,8 @@
 """The state of a twin, held by what its events say: each names what has changed, and only that is read again.
 
 An edge brings the level of its pin; another event names an axis, or the controller. What changes without events, an axis that
-moves, or whose load may move by itself, a program that runs, is read whenever a sample is taken. Which further parts may change with a pin
-or an axis is in the data sheet (`steptwin.datasheet.Datasheet.also_change`).
+moves, or whose encoder others turn, a program that runs, is read whenever a sample is taken. Which further parts may change with
+a pin or an axis is in the data sheet (`steptwin.datasheet.Datasheet.also_change`).
 """
 
 from __future__ import annotations
