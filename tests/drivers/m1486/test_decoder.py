@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from steptwin.drivers.m1486.decoder import M1486Decoder
 from steptwin.machine import MILLISECOND
 from steptwin.wire.frameline import FrameLine
@@ -12,13 +14,16 @@ DIRECTIONS = {">": FrameDirection.IN, "<": FrameDirection.OUT, "-": None}
 
 def decoded(*heard: tuple[str, str]) -> list[str]:
     """What a decoder says of characters typed (``>``), come (``<``) and on one wire (``-``), one millisecond after the other,
-    with a silence (``.``) to its end: the millisecond, direction, bytes, link and meaning."""
+    with a silence (``.``) to its end, or of so many milliseconds (``.100``): the millisecond, direction, bytes, link and
+    meaning."""
     frames: list[FrameLine] = []
     decoder = M1486Decoder(frames.append, "A")
     now = 0
     for what, text in heard:
         now += MILLISECOND
-        if what == ".":
+        if what.startswith(".") and what != ".":
+            now += int(what[1:]) * MILLISECOND
+        elif what == ".":
             due = decoder.deadline()
             assert due is not None
             decoder.expire(due - 1)
@@ -71,6 +76,26 @@ def test_an_upload_that_looks_like_an_echo() -> None:
     assert decoded((">", "u2\ru3\r"), ("<", "u\x07"))[2:] == [
         "2 < u U2 position, middle byte = 117",
         "2 < \x07 U3 position, high byte = 7",
+    ]
+
+
+@pytest.mark.parametrize(("silence_ms", "is_echo"), [(97, False), (98, True)])
+def test_what_was_typed_long_ago_is_not_echoed_any_more(silence_ms: int, *, is_echo: bool) -> None:
+    """Function 41 was OFF until then; 100 ms from one byte to the next."""
+    heard = decoded((">", "u1\rt41\r"), ("<", "\x05"), (f".{silence_ms}", ""), (">", "u2\r"), ("<", "u2\r\x07"))
+    assert heard[2] == "2 < \x05 U1 position, low byte = 5"
+    now = 5 + silence_ms
+    as_echo = [rf"{now} < u2← echo of 'u2\r'", f"{now} < \x07 U2 position, middle byte = 7"]
+    assert (heard[4:] == as_echo) is is_echo
+
+
+def test_an_upload_between_the_characters_of_an_echo() -> None:
+    """Its command was typed ahead of the next one, and came back whole."""
+    assert decoded((">", "u16\ru2\r"), ("<", "u16\ru2\x01\r\x07"))[2:] == [
+        r"2 < u16← echo of 'u16\r'",
+        "2 < \x01 U16 production series = 1",
+        r"2 < u2← echo of 'u2\r'",
+        "2 < \x07 U2 position, middle byte = 7",
     ]
 
 

@@ -131,6 +131,31 @@ def test_changes_that_cannot_be_made(change: str, message: str) -> None:
         writing(["VARIABLE=7", change])
 
 
+def test_nothing_is_sent_of_changes_one_of_which_cannot_be_made() -> None:
+    wire = ChipWire(addresses=(7,))
+    chip = ready(wire)
+    before = len(wire.sent)
+    for change in ("V=20001", "VARIABLE=16777216", "Q=3"):
+        with pytest.raises(Misuse, match="takes"):
+            writing(["B6=off", change])(chip)
+    for change in ("B22=on", "FLAG87=on", "F64=on"):
+        with pytest.raises(Misuse, match=f"'{change}': permitted are "):
+            writing(["B6=off", change])
+    assert len(wire.sent) == before
+
+
+def test_m_and_q_change_together() -> None:
+    """M4 goes with Q4 and M8 with Q2, but neither M8 with Q4 nor M4 with Q2."""
+    wire = ChipWire(addresses=(7,))
+    chip = ready(wire)
+    writing(["Q=4"])(chip)
+    writing(["M=8", "Q=2"])(chip)
+    assert (wire.chip.drive.microstep, wire.chip.drive.qualification) == (8, 2)
+    with pytest.raises(Misuse, match="M8 and Q4 do not go together"):
+        writing(["B6=off", "Q=4"])(chip)
+    assert wire.chip.pins()["B6"] == 1
+
+
 # ---------------------------------------------------------------------- programs
 
 

@@ -26,6 +26,7 @@ def inverted(text: str) -> bytes:
     [
         (["u1"], b"\x80", ["80H  U1 position, low byte: 128"]),
         (["u1", "u2"], b"u1\ru2\r\x80\x01", ["80H  U1 position, low byte: 128", "01H  U2 position, middle byte: 1"]),
+        (["u1", "u2"], b"u1\r\x80u2\r\x01", ["80H  U1 position, low byte: 128", "01H  U2 position, middle byte: 1"]),
         (["U20"], b"U20\rB", ["42H  U20 type letter in ASCII: M1486B"]),
         (["u20"], b"u", ["75H  U20 type letter in ASCII: 117"]),
         (["u14"], b"\x89", ["89H  U14 flags 80 to 87: ON 80 83 87"]),
@@ -132,6 +133,19 @@ def test_a_query_that_found_no_room_is_not_waited_for() -> None:
     terminal.type("u1")
     assert terminal.settle(60.0) == 3
     terminal.close()
+
+
+def test_what_found_no_room_is_not_counted_against_later_lines() -> None:
+    """A query that was refused is not answered either."""
+    wire = Wire(u1=b"^^^", u2=b"\x05")
+    told: list[str] = []
+    terminal = ChipTerminal(wire, 4800, None, told.append)
+    terminal.type("u1")
+    assert terminal.settle(60.0) == 3
+    terminal.type("u2")
+    assert terminal.settle(60.0) == 0
+    terminal.close()
+    assert told[3:] == ["05H  U2 position, middle byte: 5"]
 
 
 def test_what_is_no_byte_is_refused_and_the_rest_goes_on() -> None:
@@ -277,6 +291,32 @@ def test_k_does_not_overtake_the_selection_of_its_chip() -> None:
         (700.0, b"k\r"),
         (1000.0, b"v300\r"),
     ]
+
+
+def test_k_drops_what_may_move_and_waits_for_an_eeprom() -> None:
+    """It was typed before; K would be followed by the motion that it shall stop."""
+    scene = Scene((0, "v200"), (0, "f640"), (0, "R"), (0, "c75"), (0, "c70"), (0, " k"), (20, "r"), kind="E1")
+    assert scene.written == [(0.0, b"v200\r"), (0.0, b" k\r"), (500.0, b"f640\r"), (1000.0, b"c70\r"), (1500.0, b"r\r")]
+    told = [text for _, text in scene.shown]
+    assert told == ["R: not sent, because K was typed behind it", "c75: not sent, because K was typed behind it"]
+    assert scene.terminal.settle(0.0) == 0
+
+
+def test_k_is_sent_even_if_lines_that_were_dropped_have_to_be_told() -> None:
+    told: list[str] = []
+
+    def suspend(scene: Scene) -> None:
+        scene.now_s += 3.0
+
+    def stop(scene: Scene) -> None:
+        try:
+            scene.terminal.type("k")
+        except LineFailure as failure:
+            told.append(str(failure))
+
+    scene = Scene((0, "v200"), (0, "r"), (10, suspend), (3100, stop), kind="E1")
+    assert [data for _, data in scene.written] == [b"v200\r", b"k\r"]
+    assert told == ["r: not sent: the program was suspended for 3 s"]
 
 
 def test_a_type_without_eeprom_waits_for_nothing() -> None:

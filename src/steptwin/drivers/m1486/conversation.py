@@ -69,7 +69,8 @@ class ChipConversation:
             seconds = _seconds(rest, line) if rest.strip() else WAIT_S
             terminal = self._verified()
             self._type(terminal, "u20")
-            terminal.settle(seconds)
+            if terminal.settle(seconds):
+                raise Refusal(f"{line!r}: u20 found no room (5EH): the chip moves, waits or is held")
         elif word == "raw":
             self._typed(self._verified(), rest, waits=waits)
         elif line:

@@ -15,7 +15,7 @@ from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection
 
 QUIET_NS: Nanos = 100 * MILLISECOND
-"""Silence that ends a group of bytes from the chips, ns."""
+"""Silence that ends a group of bytes from the chips, ns; an echo does not come after it."""
 MOST_TYPED = 4096
 """Most characters whose echo is expected: far more than an input buffer holds."""
 
@@ -37,6 +37,8 @@ class M1486Decoder:
         self._uploads: deque[tuple[int, int]] = deque()  # numbers, with the count of characters up to their CR
         self._repeated = b""  # received bytes that match the echo so far
         self._repeated_ns: Nanos = 0
+        self._last_ns: Nanos = 0  # of all bytes
+        self._echoes = False  # whether the line before came back whole
 
     def _observe(self, line: FrameLine) -> None:
         upload = re.match(rb"\s*[Uu]\s*(\d+)\s*\r", line.raw) if line.direction is FrameDirection.IN else None
@@ -45,6 +47,9 @@ class M1486Decoder:
         self._sink(line)
 
     def feed(self, data: bytes, now: Nanos, direction: FrameDirection | None) -> None:
+        if direction is FrameDirection.IN and now - self._last_ns >= QUIET_NS and not self._repeated:
+            self._typed.clear()  # typed while function 41 was OFF
+        self._last_ns = now
         for byte in data:
             if direction is FrameDirection.OUT:
                 self._received(byte, now)
@@ -63,7 +68,11 @@ class M1486Decoder:
             self._repeated += bytes((byte,))
             self._repeated_ns = now
             if byte == CR:
+                self._echoes = True
                 self._is_echo()
+            return
+        if self._uploads and self._echoes:
+            self._is_upload(byte, now)  # it comes between the characters of an echo
             return
         self._settle()
         if self._uploads:
@@ -78,6 +87,7 @@ class M1486Decoder:
     def _settle(self) -> None:
         """End the comparison with the characters sent."""
         if self._uploads:
+            self._echoes = False
             for byte in self._repeated:
                 self._is_upload(byte, self._repeated_ns)
             self._repeated = b""

@@ -26,7 +26,7 @@ MOST_ERRORS = 10
 ERASE_MARGIN_S = 0.1
 FULL_PAUSE_NS = 50 * MILLISECOND
 """Pause for the input buffer to empty when characters come back inverted."""
-_MOVES = frozenset("r)(jk'[ie")
+MOVES = frozenset("r)(jk'[ie")
 """Commands that move, or jump to commands sent before."""
 
 
@@ -169,7 +169,7 @@ class _Typist:
             return b""
         if self._typed + len(text) + 1 + len(TYPE_QUERY) + 1 > self._capacity - 3:
             await self._empty()
-        if text[0] in _MOVES:
+        if text[0] in MOVES:
             await begin(unit, text, ChipMotion.BLOCK, self._permission)
         else:
             unit.notes.settings = ChipSettings()

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from itertools import groupby
 from math import isfinite
-from typing import Any
+from typing import Any, NamedTuple
 
 from steptwin.drivers.kind import DeviceAddress, DeviceOverview, ReadValue, ReadValues
+from steptwin.drivers.m1486.settings import COMMANDS, checked_number
 from steptwin.drivers.m1486.sync import M1486
 from steptwin.drivers.typed import changes_of, number_of, shown
 from steptwin.errors import Misuse
+from steptwin.m1486.functions import FUNCTIONS, USER_FLAGS
+from steptwin.m1486.lines import LINES
 from steptwin.m1486.microsteps import UNIT
 
 NAMES = ("POSITION", "COUNTER", "VARIABLE", "FLAGS", "FUNCTIONS", "TYPE", "INTERFACE", "SERIES")
@@ -67,10 +72,11 @@ def _on(states: Mapping[int, bool]) -> str:
 
 def overview(chip: M1486, address: DeviceAddress) -> DeviceOverview:
     found = {name: one.value for name, one in _read(chip, NAMES).items()}
+    position = "unknown" if found["POSITION"] is None else f"{shown(found['POSITION'])} {chip.unit}"
     which = "" if chip.address is None else f", chip {chip.address:X}"
     head = (
         f"{found['TYPE']}{which} at {chip.place}, {found['INTERFACE']}, series {found['SERIES']}",
-        f"position {shown(found['POSITION'])} {chip.unit} ({found['COUNTER']} {UNIT})",
+        f"position {position} ({found['COUNTER']} {UNIT})",
         f"internal variable {found['VARIABLE']}; flags ON: {found['FLAGS']}",
         f"functions ON: {found['FUNCTIONS']}",
     )
@@ -79,45 +85,76 @@ def overview(chip: M1486, address: DeviceAddress) -> DeviceOverview:
     )
 
 
+class _CheckedChange(NamedTuple):
+    """A change of a chip, and its check, which sends nothing."""
+
+    check: Callable[[M1486], object]
+    make: Callable[[M1486], object]
+
+
 def writing(changes: Sequence[str]) -> Callable[[M1486], ReadValues]:
-    """See `steptwin.drivers.kind.DriverKind`. Nothing is read again."""
-    actions = [_action(*change) for change in changes_of(changes, "VARIABLE=7 or B6=off")]
+    """See `steptwin.drivers.kind.DriverKind`. Nothing is read again. Settings one behind the other are made together, so that M
+    and Q may change to others that go together."""
+    wanted: list[_CheckedChange] = []
+    given = changes_of(changes, "VARIABLE=7 or B6=off")
+    for is_setting, group in groupby(given, lambda change: change[0].upper() in _SETTINGS):
+        several = list(group)
+        wanted += [_settings(several)] if is_setting else [_change(*change) for change in several]
 
     def write(chip: M1486) -> ReadValues:
-        for action in actions:
-            action(chip)
+        for change in wanted:
+            change.check(chip)
+        for change in wanted:
+            change.make(chip)
         return {}
 
     return write
 
 
-def _action(name: str, value: str, text: str) -> Callable[[M1486], object]:
+def _settings(given: Sequence[tuple[str, str, str]]) -> _CheckedChange:
+    settings: dict[str, Any] = {_SETTINGS[name.upper()]: _whole(name.upper(), value, text) for name, value, text in given}
+
+    def check(chip: M1486) -> None:
+        for name, number in settings.items():
+            checked_number(COMMANDS[name], number, chip.variant, name)
+        chip.settings.with_(**settings).check()
+
+    return _CheckedChange(check, lambda chip: chip.configure(**settings))
+
+
+def _change(name: str, value: str, text: str) -> _CheckedChange:
     name = name.upper()
     if name == "POSITION":
         position = number_of(value, text)
-        return lambda chip: chip.set_position(position)
-    if name in _SETTINGS or name == "VARIABLE":
-        number = number_of(value, text)
-        if not isfinite(number) or number != int(number):
-            raise Misuse(f"{text!r}: {name} takes whole numbers")
-        if name == "VARIABLE":
-            return lambda chip: chip.set_variable(int(number))
-        setting: dict[str, Any] = {_SETTINGS[name]: int(number)}
-        return lambda chip: chip.configure(**setting)
-    for prefix in ("FLAG", "B", "F"):
+        return _CheckedChange(lambda chip: None, lambda chip: chip.set_position(position))
+    if name == "VARIABLE":
+        number = _whole(name, value, text)
+        return _CheckedChange(
+            lambda chip: checked_number(":", number, chip.variant, "the internal variable"),
+            lambda chip: chip.set_variable(number),
+        )
+    for prefix, permitted, switch in _SWITCHED:
         if name.startswith(prefix) and name[len(prefix) :].isdecimal():
-            return _switch(prefix, int(name[len(prefix) :]), value, text)
+            number = int(name[len(prefix) :])
+            on = _SWITCHES.get(value.upper())
+            if on is None:
+                raise Misuse(f"{text!r}: expected on or off")
+            if number not in permitted:
+                raise Misuse(f"{text!r}: permitted are {prefix}{permitted[0]} to {prefix}{permitted[-1]}")
+            return _CheckedChange(lambda chip: None, partial(switch, number=number, on=on))
     raise Misuse(f"{text!r}: {name} cannot be set: permitted are {SETTABLE}")
 
 
-def _switch(prefix: str, number: int, value: str, text: str) -> Callable[[M1486], object]:
-    on = _SWITCHES.get(value.upper())
-    if on is None:
-        raise Misuse(f"{text!r}: expected on or off")
-    match prefix:
-        case "B":
-            return lambda chip: chip.set_output(number, on)
-        case "FLAG":
-            return lambda chip: chip.set_flag(number, on)
-        case _:
-            return lambda chip: chip.set_function(number, on)
+def _whole(name: str, value: str, text: str) -> int:
+    number = number_of(value, text)
+    if not isfinite(number) or number != int(number):
+        raise Misuse(f"{text!r}: {name} takes whole numbers")
+    return int(number)
+
+
+_SWITCHED: Sequence[tuple[str, Sequence[int], Callable[..., object]]] = (
+    ("FLAG", USER_FLAGS, lambda chip, number, on: chip.set_flag(number, on)),
+    ("B", LINES, lambda chip, number, on: chip.set_output(number, on)),
+    ("F", FUNCTIONS, lambda chip, number, on: chip.set_function(number, on)),
+)
+"""What begins the names of switches, their numbers, and what sets them."""

@@ -8,6 +8,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 
+from steptwin.drivers.m1486.download import MOVES
 from steptwin.drivers.tcp import Channel
 from steptwin.errors import LineFailure, Misuse
 from steptwin.m1486.functions import CARRY, FUNCTIONS, USER_FLAGS
@@ -58,34 +59,41 @@ class TerminalWords:
 
     The bytes carry no type, so their order decides. With function 41 ON the echo of the line comes first; then its end
     inverted, if it took the last places of the input buffer, or 5EH for characters without room; then the bytes requested by
-    ``U``, in their order.
+    ``U``, in their order, which may come before the echo of the next line.
     """
 
     def __init__(self) -> None:
         self._typed: list[bytes] = []
         self._requested: deque[int] = deque()
         self.refused = 0
-        """Number of characters that found no room so far."""
+        """Number of characters that found no room."""
 
     @property
     def is_awaiting(self) -> bool:
         """Whether a requested upload has not arrived yet."""
-        return bool(self._requested)
+        return bool(self._requested) or any(map(_UPLOAD.fullmatch, self._typed))
 
     def typed(self, line: str) -> None:
         """Register a line that was sent, given without its CR."""
-        data = line.encode("latin-1")
-        self._typed.append(data + b"\r")
-        upload = _UPLOAD.fullmatch(data)
-        if upload is not None:
-            self._requested.append(int(upload[1]))
+        self._typed.append(line.encode("latin-1") + b"\r")
 
     def decode(self, data: bytes) -> list[str]:
         """Decode all bytes received between two silences."""
         texts: list[str] = []
         for line in self._typed:
-            data = self._answered(line, data, texts)
+            begin = max(data.find(line), 0)
+            texts += self._requested_or_reported(data[:begin])
+            refused = self.refused
+            data = self._answered(line, data[begin:], texts)
+            upload = _UPLOAD.fullmatch(line)
+            if upload is not None and self.refused == refused:
+                self._requested.append(int(upload[1]))
         self._typed.clear()
+        texts += self._requested_or_reported(data)
+        return texts
+
+    def _requested_or_reported(self, data: bytes) -> list[str]:
+        texts = []
         # More than was asked for: function 57 reports before what is uploaded.
         reports = len(data) - len(self._requested)
         for byte in data:
@@ -152,6 +160,15 @@ def _on(numbers: range | tuple[int, ...], byte: int) -> str:
     return " ".join(str(number) for bit, number in enumerate(numbers[:8]) if byte >> bit & 1) or "none"
 
 
+def _letter(line: str) -> str:
+    return line.strip()[:1].upper()
+
+
+def _may_move(line: str) -> bool:
+    """Whether a command moves, jumps to commands sent before, or lets a program go on (C75)."""
+    return _letter(line).lower() in MOVES or "".join(line.split()).upper() == "C75"
+
+
 class ChipTerminal:
     """A line for typed commands. ``show`` is called with each decoded answer, from a separate thread.
 
@@ -190,7 +207,7 @@ class ChipTerminal:
 
     def type(self, text: str) -> None:
         """Send a line and its CR. Raises `Misuse` for characters outside Latin-1, and the `LineFailure` that has ended the
-        line."""
+        line, or that tells which lines were dropped; only K is sent even so."""
         try:
             text.encode("latin-1")
         except UnicodeEncodeError as error:
@@ -199,14 +216,18 @@ class ChipTerminal:
         if chosen is not None:
             self.selected = chosen[1].upper().replace("G", "")
         with self._changed:
-            self._check()
+            if _letter(text) != "K":
+                self._check()
+            if not self._unsettled:
+                self._words.refused = 0
             self._unsettled += 1
             self._outgoing.append(text)
+            self._check()
 
     def settle(self, timeout_s: float) -> int:
         """Wait until everything typed is sent, all requested uploads have arrived, and the line is silent.
 
-        Returns the number of characters that found no room so far. Raises `LineFailure` at the timeout of an upload.
+        Returns the number of characters of it that found no room. Raises `LineFailure` at the timeout of an upload.
         """
         limit = self._clock() + timeout_s
         with self._changed:
@@ -257,7 +278,7 @@ class ChipTerminal:
     def _drop_waiting(self, seconds: float) -> None:
         """Drop the waiting commands after a suspension, so that nothing moves late."""
         with self._changed:
-            dropped = [line for line in self._outgoing if line.strip()[:1].upper() not in _IMMEDIATE]
+            dropped = [line for line in self._outgoing if _letter(line) not in _IMMEDIATE]
             if dropped:
                 self._outgoing = deque(line for line in self._outgoing if line not in dropped)
                 self._unsettled -= len(dropped)
@@ -275,24 +296,37 @@ class ChipTerminal:
         self._sent += 1
         now = self._clock()
         self._quiet_at = now + self._serial.duration(len(data)) / SECOND + self._quiet_s
-        if text.strip().upper()[:1] not in _IMMEDIATE:
+        if _letter(text) not in _IMMEDIATE:
             self._ready_at = now + self._write_s
 
     def _next(self) -> str | None:
-        """The next line to send. K overtakes lines that wait for an EEPROM, unless another chip must be selected first; X does
-        not wait either."""
+        """The next line to send. K overtakes lines that wait for an EEPROM, unless another chip must be selected first, and
+        those of them that may move are dropped; X does not wait either."""
         waiting = self._outgoing
         for place, line in enumerate(waiting):
-            kind = line.strip().upper()[:1]
-            if kind == "K" or (kind == "X" and place == 0):
-                del waiting[place]
+            letter = _letter(line)
+            if letter == "K":
+                self._overtake(place)
                 return line
-            if kind == "X":
+            if letter == "X" and place == 0:
+                return waiting.popleft()
+            if letter == "X":
                 break
         return waiting.popleft() if waiting and self._clock() >= self._ready_at else None
 
+    def _overtake(self, place: int) -> None:
+        """Remove the K at a place of the waiting lines, and what may move before it."""
+        before, behind = list(self._outgoing)[:place], list(self._outgoing)[place + 1 :]
+        kept = [line for line in before if not _may_move(line)]
+        for line in before:
+            if _may_move(line):
+                self._show(f"{line}: not sent, because K was typed behind it")
+        self._unsettled -= len(before) - len(kept)
+        self._outgoing = deque(kept + behind)
+
     def _show_received(self) -> None:
-        texts = self._words.decode(bytes(self._received))
+        with self._changed:
+            texts = self._words.decode(bytes(self._received))
         self._received.clear()
         for text in texts:
             self._show(text)
