@@ -140,6 +140,20 @@ def test_a_jog_that_was_not_let_go_says_why_it_ended() -> None:
     assert end.position == pytest.approx(wire.position(1) / 100.0)
 
 
+def test_a_jog_that_another_master_has_taken_over_says_so() -> None:
+    """The axis runs on without end, so that nothing is waited for."""
+    wire = Wire()
+    mic = enabled(wire)
+    assert MIC488_DRIVER.jog is not None
+    jog = MIC488_DRIVER.jog(mic, 1, 5.0, 0.4)
+    with jog:
+        driver(wire).set("M1_VEL_ABS", 5.0)
+        assert not jog.hold()
+    end = jog.ended()
+    assert (end.ok, end.reason, end.position) == (False, "redirected by another command", None)
+    assert wire.moving(1)
+
+
 def test_drives_are_switched_on_and_off() -> None:
     wire = Wire()
     mic = enabled(wire, 1, 3)

@@ -182,6 +182,8 @@ class _AxisJog:
 
     def ended(self) -> EndedMotion:
         end = self._jog.end
+        if end is not None and end.reason is Reason.DIVERTED:
+            return _ended(end)  # it goes on with another command, perhaps without end
         rest = self._axis.wait(check=False)
         return _ended(rest if end is None else dataclasses.replace(end, position_u=rest.position_u))
 
