@@ -133,7 +133,6 @@ class RtuMaster:
 
     def start(self, request: ModbusQuery, now: Nanos, *, urgent: bool) -> bytes:
         self._held = b""
-        self._then = None
         # A stop is sent at once; the answer of an earlier stop is equivalent.
         if self._late_answers and not urgent and self._could_be_confused(request, now):
             self._then = request

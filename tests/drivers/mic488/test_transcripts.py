@@ -95,7 +95,7 @@ def bench(patch: pytest.MonkeyPatch, options: str) -> Bench:
     patch.setattr(session, "time", SimpleNamespace(sleep=wire.sleep, monotonic=lambda: wire.now / SECOND))
     address = kinds.DeviceAddress("memory", "mic488", None if units == (1,) else units[0], 38400, 0.3, firmware)
     of_kind = {"kind": MIC488_DRIVER, "address": address, "WantedMoves": kinds.WantedMoves, "told": []}
-    names = names_of(drivers, wire, log) | of_kind | {"session": session, "terminal": MIC488_DRIVER.terminal}
+    names = names_of(drivers, wire, log) | of_kind | {"drivers": drivers, "session": session, "terminal": MIC488_DRIVER.terminal}
     return Bench(
         wire=wire,
         names=names | {"mic": mic, "axis": mic.axis, "pdu": pdu, "register_map": register_map},

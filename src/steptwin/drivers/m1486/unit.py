@@ -75,7 +75,7 @@ class ChipNotes:
     def forget(self) -> None:
         """Forget the state of a chip that was switched off or reset by others."""
         self.settings = ChipSettings()
-        self.functions = sum(function.default << bit for bit, function in enumerate(TABLE)) | 1 << (RETURN - FUNCTIONS.start)
+        self.functions = sum(function.default << bit for bit, function in enumerate(TABLE))
         self.motion = None
         self.uploads = None
         self.is_position_valid = False
@@ -328,6 +328,11 @@ class ChipUnit:
                 self.talk.uploads = None
         return letter
 
+    def _is_stopped(self) -> bool:
+        """Whether this program has stopped its motion, so that its end is near."""
+        motion = self.notes.motion
+        return motion is not None and motion.stops != self.notes.stops
+
     def _is_query_gone(self) -> bool:
         """Whether a query that was not answered in time is to be repeated: the answer may have been lost, or the query with a
         program that wrong data have ended (`should_ask_again`)."""
@@ -375,6 +380,8 @@ class ChipUnit:
                     permission.extend()
                 if self.line.now() >= limit:
                     return talk.arrived.pop(self.address, None)
+                if self._is_stopped() and talk.owes(self.address) == 1 and self.should_ask_again(ASK_AGAIN_NS):
+                    await self.ask()  # its letter may have been taken for that of another chip
         return talk.arrived.pop(self.address)
 
     async def receive_letter(self, patience_ns: Nanos) -> None:

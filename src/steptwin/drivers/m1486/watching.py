@@ -207,12 +207,14 @@ class _Watch:
             await self._search(self._waited_for(), self._unclear.pop(0), 1)
 
     async def _search(self, movers: list[_Mover], at: Nanos, count: int) -> None:
-        """Find the chips that have answered ``count`` times: query one after the other; a chip at rest answers at once."""
+        """Find the chips that have answered ``count`` times: query one after the other; a chip at rest answers at once, and has
+        given all its answers. Several may have stopped at the same moment, by one switch."""
         talk = self._own.talk
         for mover in movers:
             if mover is movers[-1]:
                 self._is_over(mover, at, count)
             elif mover.has_room:
+                owed = mover.owed
                 try:
                     await self._ask(mover)
                 except (LineFailure, Refusal):
@@ -220,8 +222,11 @@ class _Watch:
                 if not talk.letters:
                     await self._own.receive_letter(PEEK_NS + mover.unit.write_ns)
                 if talk.letters:
-                    self._is_over(mover, at, count)
-                    return
+                    self._is_over(mover, at, min(count, owed))
+                    count -= owed
+                    if count <= 0:
+                        return
+                    await self._burst()
 
     def _is_over(self, mover: _Mover, at: Nanos, count: int = 1) -> None:
         mover.motion.over_at = mover.rest_at(at)
