@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import pytest
 from chip_rig import KINDS, ChipWire, Direction, Fault, Kind, chip_line
 
-from steptwin.drivers.m1486.failures import ChipMoveFailed, DoubtfulMove, FileGivenUp
+from steptwin.drivers.m1486.failures import ChipMoveFailed, DoubtfulMove, FileGivenUp, Garbled
 from steptwin.drivers.m1486.motion import ChipReason
 from steptwin.drivers.m1486.sync import M1486
 from steptwin.errors import LineFailure, Refusal, SteptwinError
@@ -34,6 +34,23 @@ class Operation:
 
 def read(chip: M1486) -> None:
     assert chip.counter() == 0
+
+
+def test_a_command_whose_echo_is_always_garbled_is_typed_three_times(monkeypatch: pytest.MonkeyPatch) -> None:
+    wire = ChipWire("B", (7,))
+    chip = M1486(chip_line(wire), 7)
+    chip.open()
+    carry = wire._carry
+
+    def garble(direction: str, data: bytes, now: int) -> None:
+        carry(direction, data.replace(b"v", b"w") if direction == "to host" else data, now)
+
+    monkeypatch.setattr(wire, "_carry", garble)
+    before = len(wire.sent)
+    with pytest.raises(Garbled, match=r"'chip 7: v500' did not come back as it was sent: 'w.*; it was not executed"):
+        chip.configure(velocity=500)
+    assert b"".join(data for _, data in wire.sent[before:]).count(b"v500") == 3
+    assert wire.chip.drive.velocity == 1000
 
 
 OPERATIONS = {

@@ -328,10 +328,12 @@ class ChipUnit:
                 self.talk.uploads = None
         return letter
 
-    def _is_stopped(self) -> bool:
-        """Whether this program has stopped its motion, so that its end is near."""
+    def _is_near_its_end(self) -> bool:
+        """Whether the motion was stopped by this program, or should have ended as computed."""
         motion = self.notes.motion
-        return motion is not None and motion.stops != self.notes.stops
+        if motion is None or motion.stops != self.notes.stops:
+            return motion is not None
+        return motion.duration_s is not None and self.line.now() >= motion.at + round(motion.duration_s * SECOND)
 
     def _is_query_gone(self) -> bool:
         """Whether a query that was not answered in time is to be repeated: the answer may have been lost, or the query with a
@@ -380,7 +382,7 @@ class ChipUnit:
                     permission.extend()
                 if self.line.now() >= limit:
                     return talk.arrived.pop(self.address, None)
-                if self._is_stopped() and talk.owes(self.address) == 1 and self.should_ask_again(ASK_AGAIN_NS):
+                if self._is_near_its_end() and talk.owes(self.address) == 1 and self.should_ask_again(ASK_AGAIN_NS):
                     await self.ask()  # its letter may have been taken for that of another chip
         return talk.arrived.pop(self.address)
 

@@ -55,10 +55,10 @@ async def watch(unit: ChipUnit, motion: ChipMotionCommand, limit: Nanos) -> None
         due = min(_Watch(unit).begins().values(), default=now)
         if due > now:
             await line.sleep(min(due - now, limit - now, 2 * SLICE_NS) / SECOND)
-            continue
-        async with unit.turn():
-            if _is_watched(unit.notes, line.now()):
-                await _Watch(unit).run(limit)
+        else:
+            async with unit.turn():
+                if _is_watched(unit.notes, line.now()):
+                    await _Watch(unit).run(limit)
 
 
 class _Mover:
@@ -145,19 +145,22 @@ class _Watch:
         try:
             await self._ask(mover)
         except (LineFailure, Refusal) as failure:
-            # Only the driver of that chip gets the error.
-            if unit is own:
-                raise
-            if isinstance(failure, Restarted):
-                unit.notes.restarted = failure
-            del self._movers[address]
-            self._given_up.add(address)
+            self._give_up(unit, failure)
             return
         if not self._own.talk.letters:
             await self._own.receive_letter(PEEK_NS + unit.write_ns)
         self._asked_last = mover
         await self._attribute()
         self._asked_last = None
+
+    def _give_up(self, unit: ChipUnit, failure: LineFailure | Refusal) -> None:
+        """Only the driver of that chip gets the error."""
+        if unit is self._own:
+            raise failure
+        if isinstance(failure, Restarted):
+            unit.notes.restarted = failure
+        del self._movers[unit.address]
+        self._given_up.add(unit.address)
 
     async def _ask(self, mover: _Mover) -> None:
         await mover.unit.ask()
@@ -217,12 +220,15 @@ class _Watch:
                 owed = mover.owed
                 try:
                     await self._ask(mover)
+                except Restarted as failure:
+                    self._give_up(mover.unit, failure)
+                    continue
                 except (LineFailure, Refusal):
                     continue
                 if not talk.letters:
                     await self._own.receive_letter(PEEK_NS + mover.unit.write_ns)
                 if talk.letters:
-                    self._is_over(mover, at, min(count, owed))
+                    self._is_over(mover, at, count)
                     count -= owed
                     if count <= 0:
                         return
@@ -230,6 +236,5 @@ class _Watch:
 
     def _is_over(self, mover: _Mover, at: Nanos, count: int = 1) -> None:
         mover.motion.over_at = mover.rest_at(at)
-        mover.unit.notes.is_killed = False
         self._left += max(mover.owed - count, 0)
         mover.owed = 0
