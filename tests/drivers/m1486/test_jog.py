@@ -29,7 +29,8 @@ def ready(kind: str = "B", *, configured: bool = True, **options: Any) -> tuple[
 
 def begun(chip: AsyncM1486, velocity: float) -> AsyncM1486Jog:
     jog = AsyncM1486Jog(chip, velocity)
-    finish(jog.__aenter__())
+    assert jog.reach == 0.0
+    assert finish(jog.__aenter__()) is jog
     return jog
 
 
@@ -75,7 +76,9 @@ def test_v_that_is_not_known_stays_that_of_the_jog() -> None:
     assert wire.true(7) == 60 * STEP
 
 
-@pytest.mark.parametrize(("steps_per_unit", "velocity", "reach"), [(200.0, 2.0, 0.3), (1.0, 20.0, 3.0), (1.0, 16.0, 2.0)])
+@pytest.mark.parametrize(
+    ("steps_per_unit", "velocity", "reach"), [(200.0, 2.0, 0.3), (200.0, 0.5, 0.075), (1.0, 20.0, 3.0), (1.0, 16.0, 2.0)]
+)
 def test_velocity_and_reach_are_in_the_unit_of_the_chip(steps_per_unit: float, velocity: float, reach: float) -> None:
     """200 full steps per unit: 2 units/s are 400 full steps/s. A link is whole steps of M1, rounded; one at least."""
     wire, chip = ready(steps_per_unit=steps_per_unit)

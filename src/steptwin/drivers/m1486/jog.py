@@ -67,7 +67,7 @@ class AsyncM1486Jog:
         await self._chip.configure(velocity=self._velocity)
         grid_u = self._chip.settings.grid_u
         speed_u = self._velocity * FULL_STEP * self._chip.variant.clock
-        self._distance_u = max(1, round(speed_u * LINK_S / grid_u)) * grid_u
+        self._distance_u = round(speed_u * LINK_S / grid_u) * grid_u  # V16, the least, makes 2.4 steps
         self._permission = Permission(self._unit.line.now, BEGIN_NS, begun.is_stopped)
         async with self._unit.turn():
             self._counter = await self._unit.read_number(1)

@@ -64,7 +64,7 @@ class ChipSettings:
         speed = float(FULL_STEP * variant.clock)
         curve = SpeedCurve(s * speed, a * speed * variant.clock, p * speed, min(v, HIGHEST_SPEED[q]) * speed)
         profile = plan_distance(0, 0, distance_u, curve)
-        return 0.0 if profile.end is None else profile.end / SECOND
+        return (profile.end or 0) / SECOND
 
 
 def after_reset(variant: Variant, interface: Interface) -> ChipSettings:
