@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import asyncio
+from contextlib import nullcontext
+from types import SimpleNamespace
+from typing import Any
+
 import pytest
 
 from steptwin.drivers.exchange import LineLost
 from steptwin.drivers.m1486.failures import DoubtfulMove, Garbled, NoEcho, NoRoom, Restarted, unconfirmed
 from steptwin.drivers.m1486.motion import ChipMotion, ChipMotionCommand, ChipMoveEnd, ChipReason
 from steptwin.drivers.m1486.unit import ChipNotes
-from steptwin.drivers.m1486.watching import _is_watched, _Mover, early_ns, end_ns
+from steptwin.drivers.m1486.watching import _is_watched, _Mover, early_ns, end_ns, watch
 from steptwin.machine import SECOND
 
 AT = 50 * SECOND
@@ -116,3 +121,18 @@ def test_a_motion_is_watched_until_300_ms_after_its_time() -> None:
     assert not _is_watched(notes, AT)
     notes.motion = ChipMotionCommand(ChipMotion.ENDLESS, AT, 0)
     assert not _is_watched(notes, AT)
+
+
+def test_a_watch_ends_where_its_time_has_passed_in_a_suspension() -> None:
+    """It has just seen that the motion is not over, then comes the suspension."""
+    motion = ChipMotionCommand(ChipMotion.MOVE, AT, 0, duration_s=10.0)
+    notes = ChipNotes()
+    notes.motion = motion
+    moments = iter([AT + 10_299_999_999])
+    line = SimpleNamespace(
+        now=lambda: next(moments, AT + 60 * SECOND), notes={"m1486 chips": [None], ("m1486", None): notes}, sleep=pytest.fail
+    )
+    unit: Any = SimpleNamespace(line=line, notes=notes, talk=SimpleNamespace(wire_ns=lambda count: count), turn=nullcontext)
+    asyncio.run(watch(unit, motion, AT + 100 * SECOND))
+    assert next(moments, None) is None
+    assert motion.over_at is None

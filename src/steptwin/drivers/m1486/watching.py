@@ -52,7 +52,7 @@ async def watch(unit: ChipUnit, motion: ChipMotionCommand, limit: Nanos) -> None
     watch."""
     line = unit.line
     while _is_watched(unit.notes, now := line.now()) and unit.notes.motion is motion and now < limit:
-        due = min(_Watch(unit).begins().values())
+        due = min(_Watch(unit).begins().values(), default=now)  # none where the program was suspended meanwhile
         if due > now:
             await line.sleep(min(due - now, limit - now, 2 * SLICE_NS) / SECOND)
         else:
