@@ -129,3 +129,20 @@ def test_settings_that_belong_together_stay_together() -> None:
 def test_a_refused_number_changes_nothing() -> None:
     _, states = flow_of("M3\nR")
     assert {s.microstep for s in states[1]} == {1}
+
+
+def test_m_11_a_jump_to_a_label_that_is_missing_is_left_out_where_the_program_may_go_on() -> None:
+    jump = "[\n{first}\nI1H1\n?17\nM4\nJ\nQ4\n@1\nR\n]"
+    _, states = flow_of(jump.format(first="T44"))
+    assert {(s.microstep, s.qualification) for s in states[6]} == {(4, 1)}
+    _, states = flow_of(jump.format(first="T45"))
+    assert 6 not in states
+
+
+def test_m_11_a_call_of_a_label_that_is_missing_is_no_subroutine_where_the_program_may_go_on() -> None:
+    (stream,) = streams(parse("[\nT44\n?17\n'\nM4\n.\n@2\nJ2\n@1\nJ\nM8\n.\n]").program)
+    flow = follow(stream, B, STEP_DIRECTION)
+    keys = [command.key for command in stream.commands]
+    first, second = (index for index, key in enumerate(keys) if key == ".")
+    assert (flow.lone_returns, flow.endless_calls) == ({first}, [])
+    assert second in flow.states

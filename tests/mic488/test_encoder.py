@@ -44,6 +44,14 @@ def test_mechanics_turn_the_shaft_and_give_it_back_without_loss() -> None:
     assert encoder.agrees
 
 
+def test_a_shaft_that_mechanics_have_turned_is_coupled_to_the_drive_where_it_is() -> None:
+    encoder = Encoder(2, 1, Coupling.DRIVE)
+    encoder.follow(Ramp())
+    encoder.couple(Coupling.DRIVE, 999, 3 * SECOND)
+    assert (encoder.turned_by, encoder.shaft(999, 9 * SECOND)) == (Coupling.DRIVE, 60)
+    assert encoder.shaft(1000, 9 * SECOND) == 62
+
+
 def test_an_encoder_that_is_not_built_as_configured_does_not_agree() -> None:
     encoder = Encoder(400, 3200, Coupling.DRIVE)
     encoder.gear(100, 800, 1600, 0)

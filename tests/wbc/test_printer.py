@@ -116,6 +116,11 @@ def test_two_blanks_align_where_others_have_one() -> None:
     text = "#ab  1\n#abc 2\n"
     assert format_text(text) == text
     assert format_text("#ab 1\n#abc 2\n") == "#ab 1\n#abc 2\n"
+    assert format_text("#abc 1\n#ab  2\n") == "#abc 1\n#ab  2\n"
+
+
+def test_a_value_that_touches_its_name_is_moved_with_those_above() -> None:
+    assert format_text("#ab  5\n#pump-5\n") == "#ab   5\n#pump -5\n"
 
 
 @pytest.mark.parametrize("tab", [4, 8])

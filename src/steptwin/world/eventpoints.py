@@ -40,14 +40,14 @@ class EventPoints:
         self._marks_of = (lambda machine: (object(),)) if kind.marks is None else kind.marks.values
         self._machine = machine
         self._groups = dict(groups)
-        self._marks: tuple[object, ...] = ()
-        self._values: dict[int, list[float]] = {}
         self.read(world.now)
 
     def read(self, now: Nanos) -> Mapping[str, float]:
         """The present values, whatever they were before."""
-        self._marks = self._marks_of(self._machine)
-        self._values = {group: [read(now) for read in reads.values()] for group, reads in self._groups.items()}
+        self._marks: tuple[object, ...] = self._marks_of(self._machine)
+        self._values: dict[int, list[float]] = {
+            group: [read(now) for read in reads.values()] for group, reads in self._groups.items()
+        }
         return {
             path: value for group, reads in self._groups.items() for path, value in zip(reads, self._values[group], strict=True)
         }

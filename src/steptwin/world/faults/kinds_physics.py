@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 def _axis(active: ActiveFault) -> int:
-    return active.fault.whole("axis") or 1
+    return int(active.fault.number("axis"))
 
 
 def _stall(active: ActiveFault, machine: FaultyMachine, now: Nanos) -> None:
