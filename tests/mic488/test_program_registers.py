@@ -8,7 +8,7 @@ from mic488_rig import MM, RUNNING, STOPPED, controller, dint_words, programmed,
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.config import AxisConfig
 from steptwin.mic488.encoder import Coupling
-from steptwin.mic488.program_registers import position_p
+from steptwin.mic488.program_registers import ACCESS, position_p
 from steptwin.wbc.real import ProgramFault
 from steptwin.world.wires import PinName, Wire
 
@@ -261,6 +261,19 @@ def test_a_wait_for_the_end_of_a_motion_ends_at_its_next_look() -> None:
     rig.stop(1)
     rig.wait(0.1)
     assert rig.out(2)
+
+
+def test_a_drive_is_said_to_move_up_to_the_last_nanosecond_of_its_motion() -> None:
+    """What is foreseen of M1 is what is read of it: the stretch ends where the value is another in the next nanosecond."""
+    rig = programmed("M1 = ON\nPABS M1 1000\nWAIT 1 = 2\n")
+    rig.start()
+    rig.wait(0.1)
+    register, control = ACCESS["M"], rig.device.program
+    assert register.tendency is not None
+    (end,) = register.tendency(1)(control, rig.now) or ()
+    assert [register.read(1)(control, at) for at in (rig.now, end, end + 1)] == [1, 1, 0]
+    rig.wait(3)
+    assert [at for at in register.tendency(1)(control, rig.now) or () if at > rig.now] == []
 
 
 # ---------------------------------------------------------------------- motion statements

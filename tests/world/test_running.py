@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from steptwin.errors import Misuse
-from steptwin.world.running import SentValues
+from steptwin.world import script as do
+from steptwin.world.running import Script, SentValues
 
 VALUES = st.lists(st.none() | st.booleans() | st.floats(allow_nan=False) | st.binary(max_size=300))
 
@@ -33,3 +34,19 @@ def test_values_come_back_as_they_were_sent(first: list[object], more: list[obje
 def test_what_no_step_gives_is_refused(value: object) -> None:
     with pytest.raises(Misuse, match="the result of a step is None, a truth value, a number or bytes"):
         SentValues().add(value)
+
+
+def test_the_end_of_a_script_in_python_leaves_its_blocks() -> None:
+    left: list[str] = []
+
+    def steps() -> do.Steps:
+        try:
+            yield do.Note("one")
+            yield do.Note("one")
+        finally:
+            left.append("block")
+
+    script = Script(1, "s", steps, is_external=False)
+    assert script.send(None) is not None
+    script.end()
+    assert (script.ended, left) == (True, ["block"])

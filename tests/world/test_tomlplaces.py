@@ -123,6 +123,10 @@ def test_every_place_of_any_text(lines: list[str], end: str) -> None:
     check(text)
 
 
+def test_what_is_before_a_key_that_cannot_be_read_has_its_places() -> None:
+    assert set(find_places('a = 1\n"\\q" = 2\nb = 3\n')) == {("a",)}
+
+
 @given(text=st.text(alphabet="a=[]{}\"'#\n.,1 \\", max_size=40))
 def test_any_characters_are_gone_over_to_an_end(text: str) -> None:
     try:
