@@ -22,5 +22,5 @@ def test_m_21_only_lines_of_the_driver_interface_are_taken(interface: Interface)
 
 def test_a_pin_that_is_taken_is_told_with_those_of_the_interface() -> None:
     (_, dual, _) = INTERFACES
-    with pytest.raises(Misuse, match="^B12 is taken: the Dual DAC interface has B10 to B17$"):
+    with pytest.raises(Misuse, match=r"^B12 is taken: the Dual DAC interface has B10 to B17$"):
         refuse_taken("B12", dual)
