@@ -270,7 +270,7 @@ def test_a_drive_is_said_to_move_up_to_the_last_nanosecond_of_its_motion() -> No
     rig.wait(0.1)
     register, control = ACCESS["M"], rig.device.program
     assert register.tendency is not None
-    (end,) = register.tendency(1)(control, rig.now) or ()
+    (end,) = [*(register.tendency(1)(control, rig.now) or ())]
     assert [register.read(1)(control, at) for at in (rig.now, end, end + 1)] == [1, 1, 0]
     rig.wait(3)
     assert [at for at in register.tendency(1)(control, rig.now) or () if at > rig.now] == []
