@@ -246,12 +246,22 @@ def test_how_far_a_move_of_a_held_jog_goes(acc: float, velocity: float, going: f
     assert held.deadline() == rig.world.now + STOP_NS
 
 
-def test_a_jog_of_a_mic488_that_is_let_go_before_it_moves_puts_vmax_back() -> None:
+def test_a_jog_of_a_mic488_that_is_let_go_before_it_moves_is_stopped_behind_its_move() -> None:
+    """Its first move may still be on the line."""
     rig = mic()
     held = Mic488HeldJog(rig.world.mic488["a"].device, "bus", Jog("a", 1, 10.0))
     held.extend(rig.world.now)
+    assert held.release(rig.world.now) == (do.Write((("a", "M1_VEL_ABS", 0.0), ("a", "M1_VMAX", 40.0))),)
+    assert (held.over, held.deadline(), held.release(rig.world.now)) == ("let go", rig.world.now + STOP_NS, ())
+    assert held.advance(rig.world.now + STOP_NS) == ()
+    assert held.deadline() is None
+
+
+def test_a_jog_of_a_mic488_that_was_never_begun_has_nothing_to_stop() -> None:
+    rig = mic()
+    held = Mic488HeldJog(rig.world.mic488["a"].device, "bus", Jog("a", 1, 10.0))
     assert held.release(rig.world.now) == (do.Write((("a", "M1_VMAX", 40.0),)),)
-    assert (held.over, held.deadline(), held.release(rig.world.now)) == ("let go", None, ())
+    assert (held.over, held.deadline()) == ("let go", None)
 
 
 @pytest.mark.parametrize("ends", ["release", "drop"])

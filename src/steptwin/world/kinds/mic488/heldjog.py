@@ -102,7 +102,8 @@ class Mic488HeldJog:
         if self.over is not None:
             return ()
         self.over = "let go"
-        if self._axis.status is AxisStatus.POSITION:
+        is_on_its_way = self._begun is not None and self._axis.revision == self._revision
+        if self._axis.status is AxisStatus.POSITION or is_on_its_way:  # what is sent now comes behind it
             self._due, self._brakes = now + STOP_NS, True
             return (do.Write((self._value("VEL_ABS", 0.0), *self._put_back())),)
         self._due = now
