@@ -146,6 +146,13 @@ def test_a_real_for_people(value: float, text: str) -> None:
     assert shortest_real(value) == text
 
 
+@pytest.mark.parametrize("bits", ["7FC00000", "FFC00000", "7FD63116", "7F800001", "FFFFFFFF"])
+def test_a_real_that_is_no_number_for_people(bits: str) -> None:
+    """A device may send any of them."""
+    (value,) = struct.unpack(">f", bytes.fromhex(bits))
+    assert shortest_real(value) == "nan"
+
+
 @given(st.floats(width=32, allow_nan=False, allow_infinity=False))
 def test_what_people_read_is_the_same_real(value: float) -> None:
     assert words_to_real(*real_to_words(float(shortest_real(value)))) == value

@@ -88,6 +88,8 @@ def saturated_real(value: float) -> float:
 
 def shortest_real(value: float) -> str:
     """A REAL as text, with the fewest digits (6 to 9) that distinguish it from its neighbours: 10.11 for 10.109999656677246."""
+    if not math.isfinite(value):
+        return f"{value:.9g}"  # a NaN is equal to nothing, not to all that are written so
     try:
         words = real_to_words(value)
     except Misuse:
