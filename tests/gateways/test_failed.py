@@ -148,7 +148,6 @@ def test_an_error_that_ends_the_history_is_told_and_shown(tmp_path: Path, monkey
         async with asyncio.timeout(20):
             await is_told.wait()
         assert keeper.state()[:2] == (False, "internal error, please report it: KeyError: 'M9'")
-        monkeypatch.undo()
         await keeper.close()
 
     asyncio.run(scene())

@@ -32,7 +32,7 @@ from steptwin.subject.payloads import (
 )
 from steptwin.subject.world import WorldSubject
 from steptwin.world.actions import Bytes
-from steptwin.world.script import PowerCycle, Send
+from steptwin.world.script import PowerCycle, Send, Write
 
 FEEDER = Path(__file__).parents[2] / "examples/worlds/feeder.toml"
 UNTOLD = {"details": ("listens", "input_waiting")}
@@ -77,6 +77,27 @@ mass = 25.0
 force = 245.0
 friction = 0.05
 when_off = "free"
+"""
+OVERRUNS = """
+[[mic488]]
+name = "table"
+[mic488.M1]
+enc_resol = 4000
+vel = 20000.0
+acc = 20000.0
+dec = 2000.0
+
+[[axis]]
+name = "x"
+drive = "table.M1"
+pitch = 5.0
+[axis.encoder]
+counts_per_rev = 4000
+[axis.motor]
+torque = [[0, 1.0], [1500, 0.8]]
+inertia = 0.005
+friction = 0.05
+overruns = true
 """
 CURRENTS = """
 [[line]]
@@ -234,6 +255,24 @@ def test_an_encoder_on_a_load_without_current_goes_with_it_also_for_who_comes_la
         holder.subject.do(Advance(duration=20 * MILLISECOND))
         holder.check()
         state = holder.held["hoist"].state
+        assert state is not None
+        seen.add(state["axes"][0]["encoder"])
+    assert len(seen) > 5
+
+
+def test_an_encoder_on_a_load_that_overruns_goes_with_it() -> None:
+    """Its controller has stopped without a ramp, and tells nothing more."""
+    holder = Holder(World.from_toml(OVERRUNS))
+    assert [part.is_moved for part in holder.parts] == [True]
+    holder.subject.do(Enable("table", 1))
+    holder.subject.do(Move("table", 1, by=100000.0))
+    holder.subject.do(Advance(duration=2100 * MILLISECOND))
+    holder.subject.do(Write((("table", "M1_STOP", 1.0),)))
+    seen = set()
+    for _ in range(20):
+        holder.subject.do(Advance(duration=20 * MILLISECOND))
+        holder.check()
+        state = holder.held["table"].state
         assert state is not None
         seen.add(state["axes"][0]["encoder"])
     assert len(seen) > 5

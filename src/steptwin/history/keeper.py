@@ -123,8 +123,9 @@ class HistoryKeeper:
             await asyncio.wait((self._task,))
         if self._recorder is not None and self._spool is not None:
             if self._task is not None:
-                with contextlib.suppress(SteptwinError):
-                    self._put(self._spool, await self._recorder.look())
+                if self._failed is None:
+                    with contextlib.suppress(SteptwinError):
+                        self._put(self._spool, await self._recorder.look())
                 self._put(self._spool, [self._recorder.end()])
             self._recorder.close()
         if self._writer is not None:

@@ -51,7 +51,8 @@ class MachinePart:
     is_real: bool = False
     """Whether it is a device behind a driver: its positions come as samples, and it may move something."""
     is_moved: bool = False
-    """Whether encoders of it may turn without an event of it: by an axis of another controller, or by a load without current."""
+    """Whether encoders of it may turn without an event of it: by an axis of another controller, or by a load that its drive
+    does not hold."""
 
     @property
     def controls(self) -> tuple[str, ...]:

@@ -369,7 +369,7 @@ class Mechanism(Stateful):
     @property
     def may_turn(self) -> set[str]:
         """Machines whose encoders it may turn without an event of theirs."""
-        return {encoder.machine for encoder in self._encoders if self.build.is_free or encoder.machine != self.machine}
+        return {encoder.machine for encoder in self._encoders if self.build.is_loose or encoder.machine != self.machine}
 
     def _turn_encoders(self, now: Nanos) -> None:
         course = self._course
