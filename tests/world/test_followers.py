@@ -145,3 +145,13 @@ def test_two_that_are_due_together_do_not_run_ahead_of_each_other(attentive: boo
     kernel.settle()
     kernel.advance(30)
     assert seen == [(0, 0.0), (10, 1.0), (20, 0.0)]
+
+
+def test_who_wants_to_be_told_before_each_event_is_told_once_of_a_moment() -> None:
+    kernel, leaving = Kernel(), Told()
+    kernel.add("m", Clock())
+    kernel.follow(leaving, ["m"], leaves=True)
+    kernel.advance(5)
+    assert leaving.take() == ([0], [5])
+    kernel.advance(5)
+    assert leaving.take() == ([], [])
