@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 from device_rig import Rig
@@ -372,3 +373,19 @@ def test_writes_of_words_that_stop_are_known(rig: Rig, key: str, value: int, eff
     address = register_map("1.70").of(key).address
     pdu = bytes((6,)) + address.to_bytes(2, "big") + value.to_bytes(2, "big")
     assert part.effect_of(do.Request("bus", 1, pdu, SECOND)).value == effect
+
+
+def test_a_raw_request_that_stops_goes_before_those_that_wait(
+    table: DeviceSubject, rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    unit, asked = rig.mic._driver._unit, list[bool]()
+    ask = unit.ask
+
+    async def noted(request: Any, **options: Any) -> bytes:
+        asked.append(options.get("urgent", False))
+        return await ask(request, **options)
+
+    monkeypatch.setattr(unit, "ask", noted)
+    for pdu in ("0507d4ff00", "0327240002"):  # M1_STOP ON; POS_ACT of M1
+        table.do(do.Request("bus", 1, bytes.fromhex(pdu), SECOND))
+    assert asked == [True, False]

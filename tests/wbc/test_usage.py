@@ -36,3 +36,10 @@ def sides(text: str) -> dict[int, frozenset[int]]:
 )
 def test_sides_to_which_a_program_homes(text: str, expected: dict[int, frozenset[int]]) -> None:
     assert sides(text) == expected
+
+
+def test_an_interrupt_without_label_is_told_once() -> None:
+    found = check("CFGINT_IN1 = RIS\nCFGINT_IN2 = RIS\nDELAY 1\nCFGINT_IN1 = ON\n").diagnostics
+    assert [one.message for one in found if "interrupt" in one.message] == [
+        f"the interrupt of {name} is enabled, but there is no label INT_{name}" for name in ("IN1", "IN2")
+    ]

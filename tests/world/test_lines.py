@@ -122,6 +122,19 @@ def test_answers_of_a_line_with_timing_come_later(kind: str) -> None:
         assert place.take(there.now) == []
 
 
+@pytest.mark.parametrize("timing", ["off", "real"])
+def test_mic_15_a_pause_inside_a_request_is_an_event_with_and_without_timing(timing: str) -> None:
+    there = world(f'timing = "{timing}"')
+    line = there.lines["bus"]
+    line.connect("p", "rtu")
+    frame = rtu(READ_STATUS)
+    line.receive("p", frame[:3], there.now)
+    there.run(for_="10 ms")
+    line.receive("p", frame[3:], there.now)
+    there.run(for_="50 ms")
+    assert [event.code for event in there.mic488["a"].device.events if "pause" in event.code] == ["frame-pause"]
+
+
 def test_traffic_is_counted_for_all_programs_even_those_that_have_gone() -> None:
     there = world()
     bus, chips = there.lines["bus"], there.lines["chips"]

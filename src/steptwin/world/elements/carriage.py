@@ -10,7 +10,7 @@ from typing import ClassVar
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
-from steptwin.motion.elastic import DriveStretch, Response, Spring
+from steptwin.motion.elastic import Response, Spring
 from steptwin.state import Plain, Stateful
 from steptwin.world.drawing import rail
 from steptwin.world.element import Element, NamedSpec, Reference
@@ -50,7 +50,6 @@ class Carriage(Stateful):
         self.axis = axis
         self._spring = Spring(spec.frequency, spec.damping)
         now = axis.kernel.now
-        self._response = Response(self._spring, (DriveStretch(now, float(axis.mechanism.place(now)), 0.0, 0.0, 0.0),), 0.0, 0.0)
         self._response = self._respond(now, float(axis.mechanism.place(now)), 0.0)
         self._version: object = axis.mechanism.version()
 
