@@ -227,6 +227,12 @@ def test_wbc_1_the_stack_keeps_sixteen_and_forgets_the_oldest(between: str) -> N
     )
 
 
+def test_wbc_1_before_the_first_jump_nothing_has_been_forgotten() -> None:
+    rig = run("RETURN\n")
+    assert rig.device.program.fault is not None
+    assert rig.device.program.fault.text == "RETURN without a JUMP"
+
+
 def test_wbc_1_a_stack_that_was_full_once_and_empty_since_has_forgotten_nothing() -> None:
     # Seventeen deep, back to the first of the sixteen, left for good by a last RETURN that finds its place, then one too many.
     rig = run("JUMP SUB\nRETURN\nSUB:\nRETURN\n")
