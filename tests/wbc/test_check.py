@@ -165,3 +165,9 @@ def test_times_with_a_unit_are_repaired_into_seconds(written: str, seconds: str 
         repaired = statement[: found.fix.span.start] + found.fix.text + statement[found.fix.span.end :]
         assert repaired == fixed
         assert [code for code in codes(repaired) if code.startswith("W1")] == []
+
+
+@pytest.mark.parametrize("condition", ["- a b > c", "a > - b c"])
+def test_a_minus_sign_at_the_beginning_of_a_side_calculates_nothing(condition: str) -> None:
+    (found,) = [one for one in check(f"a = 1\nb = 1\nc = 1\nIF {condition}\nENDIF\n").diagnostics if one.code == "W114"]
+    assert found.message == "a minus sign is permitted before numbers only"
