@@ -146,3 +146,8 @@ def test_m_11_a_call_of_a_label_that_is_missing_is_no_subroutine_where_the_progr
     first, second = (index for index, key in enumerate(keys) if key == ".")
     assert (flow.lone_returns, flow.endless_calls) == ({first}, [])
     assert second in flow.states
+
+
+def test_a_function_of_an_unknown_number_may_be_any() -> None:
+    _, states = flow_of("?17\nT\nR")
+    assert {(s.runsign, s.lines_operand, s.register_operand) for s in states[2]} == {(None, None, None)}
