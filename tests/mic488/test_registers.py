@@ -256,6 +256,7 @@ def test_status_texts_follow_the_manual() -> None:
     assert list(values) == [0, 1, 2, 3, 4, 5, 6, 8, 9, 10]
     assert values[4] == "position reached"
     assert list(register_map().named("M_STATUS").values) == [0, 1, 2, 3]
+    assert register_map().named("M_STATUS").section == "3.2, 4.7"
 
 
 # ---------------------------------------------------------------------- units, keys, sections

@@ -122,6 +122,7 @@ def unknown(records: str, rows: str = "") -> list[str]:
         "01 00 01 00 00 FF 00 00 C0 7F F9 F9",  # not a number
         "01 00 01 00 00 FE 00 00 80 3F F9 F8",  # something where no operator stands
         "07 02 01 00 00 00 21 FE 00 00 80 3F",  # unknown condition
+        "07 02 01 00 00 00 3D FF 00 00 C0 7F",  # not a number on the right
         "02 02 01 00 00 00 3D FE 00 00 80 3F 00 00",  # IF without ENDIF
         "03",  # ENDIF without IF
         "05 02 01 00 00 00 3D FE 00 00 80 3F 09 00",  # WHILE beyond the program

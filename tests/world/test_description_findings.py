@@ -134,6 +134,7 @@ name = "other"
         (f"[world]\nseed = {'9' * 400}\n", "w.toml:2:8: error D001: a value of 400 characters that is not text"),
         (f"[world]\nseed = {'9' * 40}\n", "w.toml:2:1: error D001: a whole number of more than 64 bits"),
         (f"[world]\nseed = 0x{'f' * 60}\n", "w.toml:2:1: error D001: a whole number of more than 64 bits"),
+        (AXIS + f"travel = [0, {'9' * 40}]\n", "error D001: a whole number of more than 64 bits"),
         ("[world]\nseed = 1e400\n", "w.toml:2:1: error D003: [world]: seed: inf: permitted are whole numbers"),
         (".".join("a" * 20_000) + " = 1\n", "w.toml:1:65: error D001: a key of more than 32 parts"),
         (TABLE + "[mic488.M1]\nin_kl = 'IN21'\n", "in_kl: 'IN21': permitted: IN1 to IN20 or 'none'"),
