@@ -54,9 +54,11 @@ class Turns:
                     turns.give()
                 super().join(timeout)
 
-        def opened(channel: Channel, baud: int, variant: Variant | None, show: Callable[[str], object]) -> ChipTerminal:
+        def opened(
+            channel: Channel, baud: int, variant: Variant | None, show: Callable[[str], object], *, earlier: int
+        ) -> ChipTerminal:
             taking_turns = TurnChannel(channel, turns)
-            return ChipTerminal(taking_turns, baud, variant, show, clock=lambda: turns._wire.now / SECOND)
+            return ChipTerminal(taking_turns, baud, variant, show, earlier=earlier, clock=lambda: turns._wire.now / SECOND)
 
         patch.setattr(terminal, "threading", SimpleNamespace(Condition=Condition, Thread=Thread))
         patch.setattr(conversation, "ChipTerminal", opened)

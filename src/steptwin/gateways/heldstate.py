@@ -129,7 +129,7 @@ class HeldState:
         if self.state is None:
             raise AssertionError
         before = self.state
-        found = {name: part for name, part in parts.items() if name != "axes" and part != before[name]} if parts else {}
+        found = {name: part for name, part in parts.items() if name != "axes" and part != before[name]}
         if parts.get("axes"):
             fresh = {axis["number"]: axis for axis in parts["axes"]}
             axes = [old if fresh.get(old["number"], old) == old else fresh[old["number"]] for old in before["axes"]]

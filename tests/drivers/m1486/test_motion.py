@@ -13,7 +13,7 @@ from steptwin.drivers.exchange import LineLost
 from steptwin.drivers.m1486.failures import DoubtfulMove, Garbled, NoEcho, NoRoom, Restarted, unconfirmed
 from steptwin.drivers.m1486.motion import ChipMotion, ChipMotionCommand, ChipMoveEnd, ChipReason
 from steptwin.drivers.m1486.unit import ChipNotes
-from steptwin.drivers.m1486.watching import _is_watched, _Mover, early_ns, end_ns, watch
+from steptwin.drivers.m1486.watching import _is_watched, _Mover, early_ns, watch
 from steptwin.machine import SECOND
 
 AT = 50 * SECOND
@@ -25,14 +25,14 @@ def test_a_motion_is_over_after_1_2_times_its_duration_and_a_second(duration_s: 
     over = AT + round((1.2 * duration_s + 1.0) * SECOND)
     assert not motion.is_over(over)
     assert motion.is_over(over + 1)
-    assert end_ns(motion) == AT + round(duration_s * SECOND)
+    assert motion.end == AT + round(duration_s * SECOND)
     assert early_ns(motion) == AT + round((0.98 * duration_s - 0.05) * SECOND)
 
 
 def test_a_motion_without_known_duration_is_never_over_for_certain() -> None:
     motion = ChipMotionCommand(ChipMotion.ENDLESS, AT, 0)
     assert not motion.is_over(AT + 10**9 * SECOND)
-    assert end_ns(motion) == AT
+    assert motion.end == AT
     assert (motion.target_u, motion.spoilt, motion.is_marked, motion.is_unfinished, motion.over_at) == (
         None,
         0,

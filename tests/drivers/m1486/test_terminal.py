@@ -302,6 +302,24 @@ def test_k_drops_what_may_move_and_waits_for_an_eeprom() -> None:
     assert scene.terminal.settle(0.0) == 0
 
 
+def test_k_is_sent_again_when_the_motion_before_it_has_been_written() -> None:
+    """K acts at once, R when it is in the EEPROM (chapter II): half a second later, and a tenth. Nothing is sent meanwhile."""
+    scene = Scene((0, "R"), (100, "k"), (120, "x1"), (130, "v200"), (150, "k"), kind="E1")
+    assert [data for _, data in scene.written] == [b"R\r", b"k\r", b"K\r", b"x1\r", b"k\r", b"v200\r"]
+    assert [at for at, _ in scene.written][:2] == [0.0, 100.0]
+    assert 600.0 <= scene.written[2][0] < 620.0
+    assert [text for _, text in scene.shown] == ["K is sent again when R is in the EEPROM: it moves only then"]
+    assert scene.terminal.settle(0.0) == 0
+
+
+@pytest.mark.parametrize("lines", [((0, "R"), (510, "k")), ((0, "v200"), (100, "k")), ((0, "R"), (10, "x2"), (100, "k"))])
+def test_k_is_sent_once_where_no_motion_of_its_chip_is_being_written(lines: tuple[tuple[float, str], ...]) -> None:
+    scene = Scene(*lines, kind="E1")
+    assert [data for _, data in scene.written].count(b"k\r") == 1
+    assert len(scene.written) == len(lines)
+    assert scene.shown == []
+
+
 def test_k_is_sent_even_if_lines_that_were_dropped_have_to_be_told() -> None:
     told: list[str] = []
 

@@ -10,6 +10,7 @@ from steptwin.drivers.kind import DeviceAddress, Log
 from steptwin.drivers.m1486.failures import NoEcho
 from steptwin.drivers.m1486.lines import line_endpoint
 from steptwin.drivers.m1486.terminal import ChipTerminal, command_of
+from steptwin.drivers.m1486.unit import WAKE_COMMANDS
 from steptwin.drivers.m1486.wake import wake
 from steptwin.drivers.tcp import Channel
 from steptwin.drivers.typed import number_of
@@ -95,7 +96,7 @@ class ChipConversation:
             channel.close()
             raise
         self._is_verified = True
-        return self._opened(channel)
+        return self._opened(channel, earlier=WAKE_COMMANDS - 1)
 
     def _unverified(self) -> ChipTerminal:
         """The line for K, which is sent at once. It begins by selecting all chips, which ends an incomplete command."""
@@ -107,8 +108,8 @@ class ChipConversation:
             self._type(terminal, line)
         return terminal
 
-    def _opened(self, channel: Channel) -> ChipTerminal:
-        self._terminal = ChipTerminal(channel, self._address.baud, self._variant, self._show)
+    def _opened(self, channel: Channel, earlier: int = 0) -> ChipTerminal:
+        self._terminal = ChipTerminal(channel, self._address.baud, self._variant, self._show, earlier=earlier)
         self._terminal.selected = self._first
         return self._terminal
 

@@ -61,6 +61,11 @@ class ChipMotionCommand:
     over_at: Nanos | None = None
     """The time at which its end was detected, ns."""
 
+    @property
+    def end(self) -> Nanos:
+        """When it ends as computed, ns; where that is not known, when it begins."""
+        return self.at + round((self.duration_s or 0.0) * SECOND)
+
     def is_over(self, now: Nanos) -> bool:
         """Whether it must have ended by now, from its computed duration."""
         return self.duration_s is not None and now - self.at > (MARGIN * self.duration_s + MARGIN_S) * SECOND

@@ -23,15 +23,7 @@ USUAL_POINTS = ("counter", "velocity", "variable")
 """Of a twin. Its point ``position`` is not what `POSITION` is: it counts from power-on."""
 ONLY_OF_DRIVER = frozenset({"POSITION", "FLAGS", "FUNCTIONS", "TYPE", "INTERFACE", "SERIES"})
 """What the driver reads and is no point of the data sheet, or in another unit and from another origin."""
-_SETTINGS = {
-    "S": "start_stop",
-    "A": "acceleration",
-    "V": "velocity",
-    "P": "profile",
-    "M": "microstep",
-    "Q": "qualification",
-    "N": "waveform",
-}
+_SETTINGS = {letter.upper(): name for name, letter in COMMANDS.items()}
 _SWITCHES = {"ON": True, "TRUE": True, "1": True, "OFF": False, "FALSE": False, "0": False}
 SETTABLE = "POSITION, VARIABLE, B1…B21, FLAG80…FLAG86, F40…F63, S, A, V, P, M, Q, N"
 
@@ -112,11 +104,12 @@ def writing(changes: Sequence[str]) -> Callable[[M1486], ReadValues]:
 
 
 def _settings(given: Sequence[tuple[str, str, str]]) -> _CheckedChange:
-    settings: dict[str, Any] = {_SETTINGS[name.upper()]: _whole(name.upper(), value, text) for name, value, text in given}
+    numbers = {name.upper(): _whole(name.upper(), value, text) for name, value, text in given}
+    settings: dict[str, Any] = {_SETTINGS[letter]: number for letter, number in numbers.items()}
 
     def check(chip: M1486) -> None:
-        for name, number in settings.items():
-            checked_number(COMMANDS[name], number, chip.variant, name)
+        for letter, number in numbers.items():
+            checked_number(letter.lower(), number, chip.variant, letter)
         chip.settings.with_(**settings).check()
 
     return _CheckedChange(check, lambda chip: chip.configure(**settings))

@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Callable
 
 from steptwin.drivers.m1486.download import MOVES
+from steptwin.drivers.m1486.unit import BEGUN_NS
 from steptwin.drivers.tcp import Channel
 from steptwin.errors import LineFailure, Misuse
 from steptwin.m1486.functions import CARRY, FUNCTIONS, USER_FLAGS
@@ -172,7 +173,8 @@ def _may_move(line: str) -> bool:
 class ChipTerminal:
     """A line for typed commands. ``show`` is called with each decoded answer, from a separate thread.
 
-    ``variant``: for E types the terminal waits after each command until the EEPROM is written.
+    ``variant``: for E types the terminal waits after each command until the EEPROM is written. ``earlier``: commands that were
+    sent before, and may not be written yet.
     """
 
     def __init__(
@@ -182,6 +184,7 @@ class ChipTerminal:
         variant: Variant | None,
         show: Callable[[str], object],
         *,
+        earlier: int = 0,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._clock = clock
@@ -196,7 +199,10 @@ class ChipTerminal:
         self._unsettled = 0  # lines whose echo may be to come
         self._sent = 0  # those of them that have gone out
         self._received = bytearray()
-        self._quiet_at = self._ready_at = 0.0
+        self._quiet_at = 0.0
+        self._ready_at = clock() + earlier * self._write_s
+        self._begun: str | None = None  # the line sent last, if it may move as soon as it is in the EEPROM
+        self._again_at: float | None = None  # when K is sent once more, because the first one came before that motion
         self._failure: LineFailure | None = None
         self._dropped: LineFailure | None = None  # to be raised once
         self._ends = False
@@ -286,8 +292,9 @@ class ChipTerminal:
                 self._changed.notify_all()
 
     def _send(self) -> None:
+        told: list[str] = []
         with self._changed:
-            text = self._next()
+            text = self._next(told)
         if text is None:
             return
         data = (text + "\r").encode("latin-1")
@@ -298,31 +305,43 @@ class ChipTerminal:
         self._quiet_at = now + self._serial.duration(len(data)) / SECOND + self._quiet_s
         if _letter(text) not in _IMMEDIATE:
             self._ready_at = now + self._write_s
+            self._begun = text if _may_move(text) else None
+        elif _letter(text) == "X":
+            self._begun = None  # of another chip
+        for line in told:
+            self._show(line)
 
-    def _next(self) -> str | None:
+    def _next(self, told: list[str]) -> str | None:
         """The next line to send. K overtakes lines that wait for an EEPROM, unless another chip must be selected first, and
-        those of them that may move are dropped; X does not wait either."""
-        waiting = self._outgoing
+        those of them that may move are dropped (``told`` says so); X does not wait either. Until K has been sent again, nothing
+        else is."""
+        waiting, again = self._outgoing, self._again_at
+        if again is not None and self._clock() >= again:
+            self._again_at = None
+            return "K"
         for place, line in enumerate(waiting):
             letter = _letter(line)
             if letter == "K":
-                self._overtake(place)
+                told += self._overtake(place)
                 return line
-            if letter == "X" and place == 0:
-                return waiting.popleft()
             if letter == "X":
+                if place == 0 and again is None:
+                    return waiting.popleft()
                 break
-        return waiting.popleft() if waiting and self._clock() >= self._ready_at else None
+        return waiting.popleft() if waiting and again is None and self._clock() >= self._ready_at else None
 
-    def _overtake(self, place: int) -> None:
-        """Remove the K at a place of the waiting lines, and what may move before it."""
+    def _overtake(self, place: int) -> list[str]:
+        """Remove the K at a place of the waiting lines, and what may move before it. What becomes of that, in words."""
         before, behind = list(self._outgoing)[:place], list(self._outgoing)[place + 1 :]
-        kept = [line for line in before if not _may_move(line)]
-        for line in before:
-            if _may_move(line):
-                self._show(f"{line}: not sent, because K was typed behind it")
-        self._unsettled -= len(before) - len(kept)
-        self._outgoing = deque(kept + behind)
+        dropped = [line for line in before if _may_move(line)]
+        self._outgoing = deque([line for line in before if not _may_move(line)] + behind)
+        self._unsettled -= len(dropped)
+        told = [f"{line}: not sent, because K was typed behind it" for line in dropped]
+        if self._begun is not None and self._again_at is None and self._clock() < self._ready_at:
+            self._again_at = self._ready_at + BEGUN_NS / SECOND
+            self._unsettled += 1
+            told.append(f"K is sent again when {self._begun} is in the EEPROM: it moves only then")
+        return told
 
     def _show_received(self) -> None:
         with self._changed:

@@ -37,6 +37,8 @@ PATIENCE_NS: Nanos = 10 * SECOND
 """A motion is not begun after this time without progress towards it, ns."""
 SLICE_NS: Nanos = 20 * MILLISECOND
 """Waiting for a pending answer is interrupted for stops at this interval, ns."""
+BEGUN_NS: Nanos = 100 * MILLISECOND
+"""An E type has begun a motion so long after its write time, ns."""
 ASK_AGAIN_NS: Nanos = SECOND
 """First interval of further queries of a program that does not end, ns; it doubles each time."""
 _NAMES = {variant.type_letter: variant.name for variant in reversed(VARIANTS)}
@@ -69,6 +71,8 @@ class ChipNotes:
         """Unread uploads of the program that was started last."""
         self.ready_at: Nanos = 0
         """The end of the present EEPROM write, ns."""
+        self.begins_at: Nanos = 0
+        """When the command that may move and was sent last is done: an E type first writes it into its EEPROM, ns."""
         self.asked_at: Nanos = 0
         """The moment of the last query of its type, ns."""
 
@@ -278,15 +282,21 @@ class ChipUnit:
 
         Raises `Overtaken`, `TooLate`; `SentLate` when it was sent too late, and then the motor was stopped.
         """
+        notes, write_ns = self.notes, self.write_ns if stored else 0
         try:
             await self.send(text, once=once, acts=True, permission=permission, retype=retype, stored=stored)
         except (Overtaken, TooLate):
             await self.drop_line()
             raise
         except SentLate:
-            self.notes.is_position_valid = False
+            notes.begins_at = self.line.now() + write_ns
+            notes.is_position_valid = False
             await self.kill(program=program)
             raise
+        except LineFailure:  # it may be there even so
+            notes.begins_at = self.line.now() + write_ns
+            raise
+        notes.begins_at = self.line.now() + write_ns
 
     def _patience(self, answers: bool) -> Nanos:
         """The time to wait for an answer, ns: it may have to wait for the EEPROM; for an unknown type, for all commands of
@@ -331,9 +341,9 @@ class ChipUnit:
     def _is_near_its_end(self) -> bool:
         """Whether the motion was stopped by this program, or should have ended as computed."""
         motion = self.notes.motion
-        if motion is None or motion.stops != self.notes.stops:
-            return motion is not None
-        return motion.duration_s is not None and self.line.now() >= motion.at + round(motion.duration_s * SECOND)
+        if motion is None:
+            return False
+        return motion.stops != self.notes.stops or (motion.duration_s is not None and self.line.now() >= motion.end)
 
     def _is_query_gone(self) -> bool:
         """Whether a query that was not answered in time is to be repeated: the answer may have been lost, or the query with a
@@ -464,11 +474,21 @@ class ChipUnit:
                 await self._exchange(ChipRequest(self.address, "", sort=ChipRequestKind.SELECT))
 
     async def kill(self, *, program: bool = False) -> None:
-        """Send K before all waiting requests; ``program``: and wrong data before it. Raises `Unconfirmed`."""
+        """Send K before all waiting requests; ``program``: and wrong data before it. To an E type that is still writing a command
+        that may move, K is sent again when that is done: the first one comes before the motion. Raises `Unconfirmed`."""
         notes = self.notes
         notes.stops += 1
         notes.is_killed = True
-        text = f"{INVALID_COMMAND.decode()}\rk" if program else "k"
+        await self._send_kill(f"{INVALID_COMMAND.decode()}\rk" if program else "k")
+        begins_at = notes.begins_at
+        rest = begins_at - self.line.now()
+        if rest > 0:
+            await self.line.sleep((rest + BEGUN_NS) / SECOND)
+            if notes.begins_at == begins_at:  # else another motion was asked for after the stop
+                await self._send_kill("k")
+
+    async def _send_kill(self, text: str) -> None:
+        notes = self.notes
         failure: LineFailure | None = None
         for attempt in range(STOP_TRIES):
             if attempt and not self.talk.knows(self.address):

@@ -31,10 +31,6 @@ def early_ns(motion: ChipMotionCommand) -> Nanos:
     return motion.at + round((EARLY * duration_s - EARLY_S) * SECOND)
 
 
-def end_ns(motion: ChipMotionCommand) -> Nanos:
-    return motion.at + round((motion.duration_s or 0.0) * SECOND)
-
-
 def _is_watched(notes: ChipNotes, now: Nanos) -> bool:
     """Whether the chip makes a move with a computed end that has not been detected yet."""
     motion = notes.motion
@@ -43,7 +39,7 @@ def _is_watched(notes: ChipNotes, now: Nanos) -> bool:
         and bool(motion.duration_s)
         and motion.over_at is None
         and motion.stops == notes.stops
-        and now < end_ns(motion) + GRACE_NS
+        and now < motion.end + GRACE_NS
     )
 
 
@@ -77,7 +73,7 @@ class _Mover:
         """Whether its end is expected at that time."""
         if self.motion.stops != self.unit.notes.stops:
             return True
-        return early_ns(self.motion) <= self.rest_at(at) < end_ns(self.motion) + GRACE_NS
+        return early_ns(self.motion) <= self.rest_at(at) < self.motion.end + GRACE_NS
 
     @property
     def has_room(self) -> bool:
@@ -85,7 +81,7 @@ class _Mover:
         return 8 * (self.owed + 2) * (len(TYPE_QUERY) + 1) <= self.unit.variant.input_bits
 
     def is_late(self, now: Nanos) -> bool:
-        return self.rest_at(now) >= end_ns(self.motion) + GRACE_NS
+        return self.rest_at(now) >= self.motion.end + GRACE_NS
 
 
 class _Watch:
@@ -174,7 +170,7 @@ class _Watch:
         while talk.letters:
             at = self._own.line.now()
             count = await self._burst()
-            waited_for = sorted(self._waited_for(), key=lambda mover: end_ns(mover.motion))
+            waited_for = sorted(self._waited_for(), key=lambda mover: mover.motion.end)
             if not waited_for or not count:
                 continue
             if all(mover.is_near(at) and mover.owed == 1 for mover in waited_for):

@@ -47,6 +47,8 @@ class Mic488HeldJog:
         self._begun: Nanos | None = None
         self._brakes = False
         self._revision = self._axis.revision
+        self._before: int | None = None
+        """The revision of the axis when it was last extended: as long as it is the same, that request is on its way."""
         self._due: Nanos | None = None
         self._is_put_back = self._has_same_speed()
 
@@ -82,7 +84,7 @@ class Mic488HeldJog:
             self.over = f"{self._wanted.machine} M{axis.number}: {AXIS_STATUS_TEXTS[axis.status]}"
             self._due = now
             return self.advance(now)
-        self._due = now + STOP_NS
+        self._due, self._before = now + STOP_NS, axis.revision
         set_vmax = () if self._has_same_speed() else (self._value("VMAX", self._speed_p / axis.gear),)
         return (do.Write((*set_vmax, self._value("POS_REL", self._distance(now)))),)
 
@@ -102,8 +104,7 @@ class Mic488HeldJog:
         if self.over is not None:
             return ()
         self.over = "let go"
-        is_on_its_way = self._begun is not None and self._axis.revision == self._revision
-        if self._axis.status is AxisStatus.POSITION or is_on_its_way:  # what is sent now comes behind it
+        if self._axis.status is AxisStatus.POSITION or self._axis.revision == self._before:  # what is sent now comes behind it
             self._due, self._brakes = now + STOP_NS, True
             return (do.Write((self._value("VEL_ABS", 0.0), *self._put_back())),)
         self._due = now
