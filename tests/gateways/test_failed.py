@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from gateway_rig import GatewayWorld
 
 from steptwin import World
 from steptwin.gateways import make_gateway
+from steptwin.gateways.contract import Gateway
 from steptwin.gateways.epics.controller import EpicsController
 from steptwin.gateways.mqtt.jsonface import JsonFace
 from steptwin.gateways.sampling import Sampler
@@ -19,90 +21,73 @@ from steptwin.history.keeper import HistoryKeeper
 HALL = '[[mic488]]\nname = "table"\n'
 OPCUA = '[gateway.opcua]\nlisten = "127.0.0.1:0"\n'
 EPICS = '[gateway.epics]\nprefix = "ST:"\nlisten = "127.0.0.1:0"\nbeacons = "127.0.0.1:1"\n'
+ERROR = "internal error, please report it: KeyError: 'M9'"
+
+
+def broken(*_: object) -> None:
+    raise KeyError("M9")
+
+
+async def broken_later(*_: object) -> None:
+    broken()
+
+
+def told_by(part: Gateway | HistoryKeeper, break_it: Callable[[], None], *, at_first: bool = False) -> list[str]:
+    """The notices until one is about the error, which its state shows, too; it is broken once it is open, or ``at_first``."""
+    told: list[str] = []
+
+    async def scene() -> None:
+        is_told = asyncio.Event()
+
+        def notice(text: str) -> None:
+            told.append(text)
+            if ERROR in text:
+                is_told.set()
+
+        if at_first:
+            break_it()
+        await part.open(listen_any=False, notice=notice)
+        if not at_first:
+            break_it()
+        async with asyncio.timeout(20):
+            await is_told.wait()
+        assert part.state()[:2] == (False, ERROR)
+        await part.close()
+
+    asyncio.run(scene())
+    return told
+
+
+def opened(table: str, subject: GatewayWorld, folder: Path) -> Gateway:
+    (spec,) = World.from_toml(HALL + table).spec.gateways
+    return make_gateway(spec, subject, folder)
 
 
 @pytest.mark.parametrize(("table", "name"), [(OPCUA, "opcua"), (EPICS, "epics")])
 def test_an_error_in_it_is_told_and_shown(table: str, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     subject = GatewayWorld(HALL)
-    (spec,) = World.from_toml(HALL + table).spec.gateways
-    gateway = make_gateway(spec, subject, tmp_path)
-    told: list[str] = []
-
-    def broken() -> None:
-        raise KeyError("M9")
-
-    async def scene() -> None:
-        is_told = asyncio.Event()
-
-        def notice(text: str) -> None:
-            told.append(text)
-            is_told.set()
-
-        await gateway.open(listen_any=False, notice=notice)
-        assert gateway.state()[:2] == (True, "listens")
-        monkeypatch.setattr(subject.samples, "see_events", broken)
-        async with asyncio.timeout(20):
-            await is_told.wait()
-        assert gateway.state()[:2] == (False, "internal error, please report it: KeyError: 'M9'")
-        await gateway.close()
-
-    asyncio.run(scene())
-    assert told == [f"[gateway.{name}]: internal error, please report it: KeyError: 'M9'"]
+    told = told_by(opened(table, subject, tmp_path), lambda: monkeypatch.setattr(subject.samples, "see_events", broken))
+    assert told == [f"[gateway.{name}]: {ERROR}"]
 
 
 def test_an_error_in_the_look_of_a_client_of_epics_is_told_and_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    subject = GatewayWorld(HALL)
-    (spec,) = World.from_toml(HALL + EPICS).spec.gateways
-    gateway = make_gateway(spec, subject, tmp_path)
-    told: list[str] = []
-
-    async def broken(*_: object) -> None:
-        raise KeyError("M9")
-
-    async def scene() -> None:
-        is_told = asyncio.Event()
-
-        def notice(text: str) -> None:
-            told.append(text)
-            is_told.set()
-
+    def break_it() -> None:
         monkeypatch.setattr(EpicsController, "is_busy", True)
-        monkeypatch.setattr(Sampler, "take", broken)
-        await gateway.open(listen_any=False, notice=notice)
-        async with asyncio.timeout(20):
-            await is_told.wait()
-        assert gateway.state()[:2] == (False, "internal error, please report it: KeyError: 'M9'")
-        await gateway.close()
+        monkeypatch.setattr(Sampler, "take", broken_later)
 
-    asyncio.run(scene())
-    assert told == ["[gateway.epics]: internal error, please report it: KeyError: 'M9'"]
+    assert told_by(opened(EPICS, GatewayWorld(HALL), tmp_path), break_it, at_first=True) == [f"[gateway.epics]: {ERROR}"]
 
 
 @pytest.mark.parametrize("keys", ["", 'sparkplug = { group = "plant", node = "cell" }\n'])
 def test_an_error_in_it_is_told_without_a_broker_too(keys: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     subject = GatewayWorld(HALL)
-    (spec,) = World.from_toml(f'{HALL}[gateway.mqtt]\nbroker = "127.0.0.1:1"\n{keys}').spec.gateways
-    gateway = make_gateway(spec, subject, tmp_path)
-    error = "internal error, please report it: KeyError: 'M9'"
-    is_told = asyncio.Event()
 
-    def notice(text: str) -> None:
-        if text == f"[gateway.mqtt]: {error}":
-            is_told.set()
-
-    def broken(*_: object) -> None:
-        raise KeyError("M9")
-
-    async def scene() -> None:
+    def break_it() -> None:
         monkeypatch.setattr(subject.samples, "see_events", broken)
         monkeypatch.setattr(JsonFace, "will", broken)
-        await gateway.open(listen_any=False, notice=notice)
-        async with asyncio.timeout(20):
-            await is_told.wait()
-        assert gateway.state()[:2] == (False, error)
-        await gateway.close()
 
-    asyncio.run(scene())
+    gateway = opened(f'[gateway.mqtt]\nbroker = "127.0.0.1:1"\n{keys}', subject, tmp_path)
+    assert f"[gateway.mqtt]: {ERROR}" in told_by(gateway, break_it, at_first=True)
 
 
 def test_an_error_in_the_reading_of_a_device_ends_what_is_published(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -132,23 +117,4 @@ def test_an_error_that_ends_the_history_is_told_and_shown(tmp_path: Path, monkey
     spec = World.from_toml(HALL + '[history]\ndatabase = "sqlite:///past.sqlite"\n').spec.history
     assert spec is not None
     keeper = HistoryKeeper(spec, subject, tmp_path)
-    told: list[str] = []
-    is_told = asyncio.Event()
-
-    def notice(text: str) -> None:
-        told.append(text)
-        is_told.set()
-
-    def broken() -> None:
-        raise KeyError("M9")
-
-    async def scene() -> None:
-        await keeper.open(listen_any=False, notice=notice)
-        monkeypatch.setattr(subject.samples, "see_events", broken)
-        async with asyncio.timeout(20):
-            await is_told.wait()
-        assert keeper.state()[:2] == (False, "internal error, please report it: KeyError: 'M9'")
-        await keeper.close()
-
-    asyncio.run(scene())
-    assert told[0] == "history: internal error, please report it: KeyError: 'M9'"
+    assert told_by(keeper, lambda: monkeypatch.setattr(subject.samples, "see_events", broken))[0] == f"history: {ERROR}"

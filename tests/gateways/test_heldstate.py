@@ -166,6 +166,17 @@ class Holder:
         found = self.subject.do(ReadState(name))
         return parts_only(found.value, {}), found.time
 
+    def check_moving(self, name: str, axis: int) -> None:
+        """While the encoder of an axis (from 0) turns."""
+        seen = set()
+        for _ in range(20):
+            self.subject.do(Advance(duration=20 * MILLISECOND))
+            self.check()
+            state = self.held[name].state
+            assert state is not None
+            seen.add(state["axes"][axis]["encoder"])
+        assert len(seen) > 5
+
     def check(self) -> None:
         for name in self.held:
             self.subject.world.touch(name)  # as the timer of a running world does
@@ -218,14 +229,7 @@ def test_an_encoder_that_another_axis_turns_goes_with_it() -> None:
     holder = Holder(world)
     holder.subject.do(Enable("table", 1))
     holder.subject.do(Move("table", 1, by=400.0))
-    seen = set()
-    for _ in range(30):
-        holder.subject.do(Advance(duration=20 * MILLISECOND))
-        holder.check()
-        state = holder.held["table"].state
-        assert state is not None
-        seen.add(state["axes"][1]["encoder"])
-    assert len(seen) > 5
+    holder.check_moving("table", axis=1)
 
 
 def test_an_encoder_that_an_axis_of_another_controller_turns_goes_with_it() -> None:
@@ -234,14 +238,7 @@ def test_an_encoder_that_an_axis_of_another_controller_turns_goes_with_it() -> N
     assert [part.is_moved for part in holder.parts] == [False, True]
     holder.subject.do(Enable("table", 1))
     holder.subject.do(Move("table", 1, by=400.0))
-    seen = set()
-    for _ in range(30):
-        holder.subject.do(Advance(duration=20 * MILLISECOND))
-        holder.check()
-        state = holder.held["other"].state
-        assert state is not None
-        seen.add(state["axes"][0]["encoder"])
-    assert len(seen) > 5
+    holder.check_moving("other", axis=0)
 
 
 def test_an_encoder_on_a_load_without_current_goes_with_it_also_for_who_comes_later() -> None:
@@ -250,14 +247,7 @@ def test_an_encoder_on_a_load_without_current_goes_with_it_also_for_who_comes_la
     world.run(0.3)
     holder = Holder(world)
     assert [part.is_moved for part in holder.parts] == [True]
-    seen = set()
-    for _ in range(20):
-        holder.subject.do(Advance(duration=20 * MILLISECOND))
-        holder.check()
-        state = holder.held["hoist"].state
-        assert state is not None
-        seen.add(state["axes"][0]["encoder"])
-    assert len(seen) > 5
+    holder.check_moving("hoist", axis=0)
 
 
 def test_an_encoder_on_a_load_that_overruns_goes_with_it() -> None:
@@ -268,14 +258,7 @@ def test_an_encoder_on_a_load_that_overruns_goes_with_it() -> None:
     holder.subject.do(Move("table", 1, by=100000.0))
     holder.subject.do(Advance(duration=2100 * MILLISECOND))
     holder.subject.do(Write((("table", "M1_STOP", 1.0),)))
-    seen = set()
-    for _ in range(20):
-        holder.subject.do(Advance(duration=20 * MILLISECOND))
-        holder.check()
-        state = holder.held["table"].state
-        assert state is not None
-        seen.add(state["axes"][0]["encoder"])
-    assert len(seen) > 5
+    holder.check_moving("table", axis=0)
 
 
 @pytest.mark.parametrize("interface", ["dual", "two"])

@@ -11,7 +11,13 @@ from pathlib import Path
 
 from tests.conftest import until
 
+from steptwin.debug.debugger import Debugger
+from steptwin.debug.values import Stopped, StopReason
 from steptwin.files.world import World
+from steptwin.machine import MILLISECOND
+
+ENTRY = MILLISECOND - 1
+"""When programs stop at their entry."""
 
 WBC = """\
 n = 0
@@ -69,3 +75,9 @@ def running_twin(folder: Path) -> Generator[None]:
     finally:
         process.terminate()
         process.wait()
+
+
+def started(text: str | None = None, world: str = ONE) -> Debugger:
+    debugger = Debugger(make(world=world) if text is None else make(text, world))
+    assert debugger.run_to_entry() == Stopped(StopReason.ENTRY, ENTRY, "m")
+    return debugger

@@ -75,6 +75,7 @@ class VirtualWire(ABC):
     @abstractmethod
     def _receive(self, data: bytes) -> bytes:
         """Bytes come to the twins; what they answer at once."""
+        raise NotImplementedError
 
     @abstractmethod
     def _spoken(self) -> bytes:

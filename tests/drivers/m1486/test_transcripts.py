@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 from chip_rig import BAUD, ChipWire, Fault, chip_line
+from heard_line import HeardWire
 from line_rig import MemoryEndpoint, at_every_address
 from transcripts import Bench, Case, cases, names_of, regenerate
 from virtual_terminal import Turns
@@ -22,51 +23,19 @@ from steptwin.drivers.m1486 import identify, sync
 from steptwin.drivers.m1486.decoder import M1486Decoder
 from steptwin.drivers.m1486.kind import M1486_DRIVER
 from steptwin.drivers.threads import ThreadLine
-from steptwin.machine import MILLISECOND
 from steptwin.wire.frameline import FrameLine
-from steptwin.wire.slave import FrameDirection
 
 GOLDENS = [Path(__file__).parent / "golden" / name for name in ("transcripts.txt", "random_sessions.txt", "kind.txt")]
 
 
-class HeardWire(ChipWire):
-    """A line at which somebody listens (`steptwin sniff`)."""
-
+class HeardChips(HeardWire, ChipWire):
     def __init__(self, kind: str, addresses: tuple[int, ...]) -> None:
         super().__init__(kind, addresses)
-        self._begun = self.now
-        self._decoder = M1486Decoder(self._take, kind)
-        self._heard: list[str] = []
+        self.listen(lambda sink: M1486Decoder(sink, kind), _shown)
 
-    def _take(self, line: FrameLine) -> None:
-        arrow = ">" if line.direction is FrameDirection.IN else "<"
-        moment = f"{(line.time - self._begun) / MILLISECOND:.9g}"
-        raw = line.raw.decode("latin-1").replace("\r", "←")
-        self._heard.append(" ".join(filter(None, (moment, arrow, raw, line.link, line.meaning))))
 
-    def heard(self) -> list[str]:
-        """What was heard since the last time."""
-        self._expire()
-        new = self._heard[:]
-        self._heard.clear()
-        return new
-
-    def _expire(self) -> None:
-        due = self._decoder.deadline()
-        if due is not None and due <= self.now:
-            self._decoder.expire(due)
-
-    def _receive(self, data: bytes) -> bytes:
-        self._expire()
-        self._decoder.feed(data, self.now, FrameDirection.IN)
-        return super()._receive(data)
-
-    def _step(self) -> list[bytes]:
-        arrived = super()._step()
-        for data in arrived:
-            self._expire()
-            self._decoder.feed(data, self.now, FrameDirection.OUT)
-        return arrived
+def _shown(line: FrameLine) -> str:
+    return " ".join(filter(None, (line.raw.decode("latin-1").replace("\r", "←"), line.link, line.meaning)))
 
 
 def bench(patch: pytest.MonkeyPatch, options: str) -> Bench:
@@ -80,7 +49,7 @@ def bench(patch: pytest.MonkeyPatch, options: str) -> Bench:
     log: list[str] = []
     shown: list[str] = []
     numbers = tuple(int(address) for address in addresses)
-    wire = (HeardWire if is_heard else ChipWire)(kind, numbers or (15,))
+    wire = (HeardChips if is_heard else ChipWire)(kind, numbers or (15,))
     line = chip_line(wire, log.append if "logged" in words else None)
     chips = [sync.M1486(line, number) for number in numbers or (None,)]
     seen = 0
@@ -91,7 +60,7 @@ def bench(patch: pytest.MonkeyPatch, options: str) -> Bench:
         told = [f"{f'{address:X} ' if numbers else ''}{event.text}" for address, event in new if event.code != "upload"]
         told += (f"shown: {text}" for text in shown)
         shown.clear()
-        return told + (wire.heard() if isinstance(wire, HeardWire) else [])
+        return told + (wire.heard() if isinstance(wire, HeardChips) else [])
 
     at_every_address(patch, wire)
     turns = Turns(wire)

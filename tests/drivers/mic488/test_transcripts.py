@@ -11,6 +11,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from heard_line import HeardWire
 from host_rig import Fault, Wire, thread_line
 from line_rig import at_every_address
 from transcripts import Bench, Case, cases, names_of, regenerate
@@ -20,50 +21,17 @@ from steptwin.drivers import kind as kinds
 from steptwin.drivers.mic488 import session
 from steptwin.drivers.mic488.decoder import ModbusDecoder
 from steptwin.drivers.mic488.kind import MIC488_DRIVER
-from steptwin.machine import MILLISECOND, SECOND
+from steptwin.machine import SECOND
 from steptwin.mic488.registers import register_map
 from steptwin.wire import pdu
-from steptwin.wire.frameline import FrameLine
-from steptwin.wire.slave import FrameDirection
 
 GOLDENS = [Path(__file__).parent / "golden" / name for name in ("transcripts.txt", "random_sessions.txt", "kind.txt")]
 
 
-class HeardWire(Wire):
-    """A line at which somebody listens (`steptwin sniff`)."""
-
+class HeardControllers(HeardWire, Wire):
     def __init__(self, tcp: bool, firmware: str, units: tuple[int, ...]) -> None:
         super().__init__(tcp=tcp, firmware=firmware, units=units)
-        self._begun = self.now
-        self._decoder = ModbusDecoder(self._take, firmware, tcp=tcp)
-        self._heard: list[str] = []
-
-    def _take(self, line: FrameLine) -> None:
-        arrow = ">" if line.direction is FrameDirection.IN else "<"
-        self._heard.append(f"{(line.time - self._begun) / MILLISECOND:.9g} {arrow} {line.raw.hex()} {line.meaning}")
-
-    def heard(self) -> list[str]:
-        """What was heard since the last time."""
-        self._expire()
-        new = self._heard[:]
-        self._heard.clear()
-        return new
-
-    def _expire(self) -> None:
-        while (due := self._decoder.deadline()) is not None and due <= self.now:
-            self._decoder.expire(due)
-
-    def _receive(self, data: bytes) -> bytes:
-        self._expire()
-        self._decoder.feed(data, self.now, FrameDirection.IN)
-        return super()._receive(data)
-
-    def _step(self) -> list[bytes]:
-        arrived = super()._step()
-        for data in arrived:
-            self._expire()
-            self._decoder.feed(data, self.now, FrameDirection.OUT)
-        return arrived
+        self.listen(lambda sink: ModbusDecoder(sink, firmware, tcp=tcp), lambda line: f"{line.raw.hex()} {line.meaning}")
 
 
 def bench(patch: pytest.MonkeyPatch, options: str) -> Bench:
@@ -74,7 +42,7 @@ def bench(patch: pytest.MonkeyPatch, options: str) -> Bench:
     words = options.split()
     firmware_of_twin = next((word for word in words if word[0].isdigit()), "1.70")
     units = tuple(int(word[5:]) for word in words if word.startswith("unit=")) or (1,)
-    wire = HeardWire("tcp" in words, firmware_of_twin, units)
+    wire = HeardControllers("tcp" in words, firmware_of_twin, units)
     log: list[str] = []
     config = None if "bare" in words else wire.config
     firmware = None if "bare" in words else wire.twin.firmware.name
