@@ -19,6 +19,9 @@ from steptwin.machine import MILLISECOND
 from steptwin.mic488.configtext import config_text
 from steptwin.mic488.registers import FIRMWARES
 from steptwin.subject.devicetwin import DeviceTwin
+from steptwin.wire.frameline import FrameLine
+from steptwin.wire.rtu import encode_frame
+from steptwin.wire.slave import FrameDirection
 
 ADDRESS = DeviceAddress("memory", "mic488", None, 38400, 0.3, "1.70")
 
@@ -294,3 +297,15 @@ def test_what_it_takes() -> None:
     assert "not documented" in MIC488_DRIVER.cannot_send
     assert MIC488_DRIVER.selection.options == {"unit", "firmware", "config"}
     assert (MIC488_DRIVER.axes, MIC488_DRIVER.baud) == (4, 38400)
+
+
+@pytest.mark.parametrize(("firmware", "name"), [(None, "M_STATUS"), ("1.70", "M_STATUS"), ("1.40", "M_ALL_STATUS")])
+def test_a_listener_names_registers_of_the_firmware_by_default_the_latest(firmware: str | None, name: str) -> None:
+    """Register 10009 has another name since 1.70."""
+    heard: list[FrameLine] = []
+    assert MIC488_DRIVER.decoding is not None
+    decoder = MIC488_DRIVER.decoding.make(heard.append, firmware, False)
+    decoder.feed(encode_frame(1, bytes.fromhex("03 2719 0001")), 5, FrameDirection.IN)
+    decoder.feed(encode_frame(1, bytes.fromhex("03 02 0000")), 10**9, FrameDirection.OUT)
+    decoder.expire(2 * 10**9)
+    assert any(f" {name}" in line.meaning for line in heard), [line.meaning for line in heard]
