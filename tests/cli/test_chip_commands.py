@@ -60,7 +60,7 @@ def test_a_chip_from_the_command_line(serve_m1486: Callable[..., Any], tmp_path:
     assert run("watch", "position", "--count", "1").splitlines()[1].split()[1] == "40"
     assert "is not a value of an M1486: permitted are POSITION" in run("get", "M1_POS_ACT", code=2)
     assert "an M1486 has no enable" in run("enable", "1", code=2)
-    assert "velocity = 30000: M1486B takes 16 to 20 000 step/s" in run("set", "V=30000", code=2)
+    assert "V = 30000: M1486B takes 16 to 20 000 step/s" in run("set", "V=30000", code=2)
 
     program = tmp_path / "toandfro.m1486"
     program.write_text(PROGRAM)
