@@ -284,6 +284,9 @@ class Course:
             self._lay_free(self.free)
             return
         profile = profile_of(self.plan)
+        if self._keeps_distance(profile):
+            self._lay_at_distance(profile)
+            return
         at = profile.start
         for s, end in zip(profile.segments, profile.ends, strict=True):
             until = None if end == inf else profile.start + int(end)
@@ -298,6 +301,30 @@ class Course:
             if not self.blocked and (not self._now.stalled or motor is None or motor.holds()):
                 self._catch(rest)
             self._stand(rest, 1)
+
+    def _keeps_distance(self, profile: Profile) -> bool:
+        """Whether rotor and load are one, keep their distance to the field and meet no stop."""
+        build, (rotor, load, stalled, behind) = self.build, self._state
+        if build.motor is not None or build.play or self.blocked or stalled or rotor != load:
+            return False
+        if self.field(self.begin) - behind != rotor:
+            return False
+        if build.low is None and build.high is None:
+            return True
+        if profile.end is None:
+            return False
+        places = [build.sign * (profile.base + count) + build.zero - behind for count in profile.counts]
+        return (build.low is None or min(places) >= build.low) and (build.high is None or max(places) <= build.high)
+
+    def _lay_at_distance(self, profile: Profile) -> None:
+        """What the pieces are where nothing can come between field, rotor and load: most axes, most of the time."""
+        behind = self._state.behind
+        for begin, direction in profile.legs(self.begin):
+            self._laid.append(CoursePiece(begin, direction * self.build.sign, True, -behind, True, -behind, False, behind))
+        if profile.end is not None:
+            rest = max(profile.end, self.begin)
+            here = self.field(rest) - behind
+            self._laid.append(CoursePiece(rest, 1, False, here, False, here, False, behind))
 
     def _lay_free(self, free: Profile) -> None:
         """The rotor goes with the free motion, the load keeps its distance to it."""

@@ -100,7 +100,7 @@ class Integrated:
 def integrated(moves: list[int], changes: list[tuple[int, int]], end: int) -> Integrated:
     belt = Integrated()
     happens = [(at, 1, way) for at, way in pulses(moves)]
-    happens += [(at * SECOND // 1000, 0, 2 + stop) for at, stop in changes]
+    happens += [(at * SECOND // 1_000_000, 0, 2 + stop) for at, stop in changes]
     happens += [(n * SECOND // 2, 2, 0) for n in range(1, 2 * end + 1)]
     for now, _, what in sorted(happens):
         if now > end * SECOND:
@@ -122,7 +122,7 @@ def twin(moves: list[int], changes: list[tuple[int, int]]) -> World:
         world.at(n * EVERY, lambda target=target: device.write("M1_POS_ABS", float(target)))  # type: ignore[misc]
     for at, stop in changes:
         output = f"OUT{stop + 2}"
-        world.at(at / 1000, lambda output=output: device.write(output, 1 - world.read(f"a.{output}")))  # type: ignore[misc]
+        world.at(at / 1_000_000, lambda output=output: device.write(output, 1 - world.read(f"a.{output}")))  # type: ignore[misc]
     return world
 
 
@@ -135,8 +135,9 @@ def twin(moves: list[int], changes: list[tuple[int, int]]) -> World:
 )
 @example([350, 250, 450, 330], [(0, 1)])
 @example([150, 100, 160, 10], [(0, 0), (9, 0)])
+@example([342, 541, 249], [(1, 1), (6, 1)])
 def test_it_is_where_each_pulse_has_it(moves: list[int], moments: list[tuple[int, int]]) -> None:
-    changes = sorted((997 * at + 3, stop) for at, stop in moments)
+    changes = sorted((997_000 * at + 3_300, stop) for at, stop in moments)  # µs, never at a pulse of constant speed, each 1250 µs
     end = round(len(moves) * EVERY)
     world, expected = twin(moves, changes), integrated(moves, changes, end)
     world.run(until=end)
