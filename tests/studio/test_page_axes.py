@@ -146,6 +146,21 @@ def test_the_jog_pad_jogs_two_axes_with_keys(studio: Studio) -> None:
     assert studio.at(2) == there
 
 
+def test_a_shortcut_of_the_system_ends_a_jog_of_the_pad(studio: Studio) -> None:
+    page = studio.page()
+    enable(page, "M1")
+    page.get_by_role("application", name="Jog pad").focus()
+    page.keyboard.down("ArrowRight")
+    until(lambda: studio.at(1) > 1, "the axis jogs")
+    page.keyboard.down("Meta")
+    until(lambda: studio.stands(1), "the axis stands")
+    there = studio.at(1)
+    page.keyboard.press("ArrowLeft")
+    page.keyboard.up("Meta")
+    assert studio.stands(1)
+    assert studio.at(1) == there
+
+
 def test_space_and_escape_stop_what_somebody_else_moves(studio: Studio) -> None:
     page = studio.page()
     studio.master.enable(1)

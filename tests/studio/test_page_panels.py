@@ -82,6 +82,12 @@ def test_registers_are_found_read_and_written(studio: Studio) -> None:
     expect(page.get_by_role("alert").last).to_contain_text("−1: permitted is more than 0")
     button(page, "Undo writing M1_VMAX").click()
     until(lambda: studio.master.real(studio.master.words(10052, 2)) == 40.0, "it is as before")
+    page.get_by_role("searchbox").fill("AXIS_CTR_MODE")
+    for _ in range(2):
+        page.get_by_label("Write AXIS_CTR_MODE").select_option("1")
+        expect(page.get_by_label("AXIS_CTR_MODE", exact=True)).to_have_text("1 · TRIGGER")
+        button(page, "Undo writing AXIS_CTR_MODE").click()
+        expect(page.get_by_label("AXIS_CTR_MODE", exact=True)).to_have_text("0 · DIRECT")
     studio.master.word(10, 7)
     page.get_by_label("Group").select_option("user")
     expect(page.get_by_label("USER_REGISTER[10]", exact=True)).to_have_text("7")
@@ -118,6 +124,10 @@ def test_time_stands_steps_and_goes_on(studio: Studio) -> None:
     expect(now).to_have_text(seconds_text(stood_ns + 250_000_000))
     assert virtual_time_ns(studio) == stood_ns + 250_000_000
     button(page, "0.1×").click()
+    expect(button(page, "0.1×")).to_have_attribute("aria-pressed", "true")
+    page.get_by_label("Speed of time").fill("0")
+    button(page, "Set speed").click()
+    expect(page.get_by_role("alert").last).to_contain_text("0: permitted is")
     expect(button(page, "0.1×")).to_have_attribute("aria-pressed", "true")
     page.locator("body").press("p")
     page.get_by_label("Condition").fill("table.M1.position > 3 and")

@@ -59,10 +59,10 @@ export class Jogging {
     this.end(axis);
     const velocity = (sign * this.fullOf(axis) * percent) / 100;
     const fields = { machine: axis.machine, axis: axis.number, velocity };
-    const jog = HeldJog.begin(
+    const jog: HeldJog = HeldJog.begin(
       (name, given, within) => this.studio.ask(name, given, within),
       fields,
-      (error) => this.failed(axis, error),
+      (error) => this.failed(axis, jog, error),
     );
     this.held.set(axis.id, jog);
   }
@@ -77,8 +77,9 @@ export class Jogging {
     this.held.clear();
   }
 
-  private failed(axis: AxisModel, error: unknown): void {
-    this.held.delete(axis.id);
+  /** An answer may come late: the axis may have another jog by now, which has to be ended when it is let go. */
+  private failed(axis: AxisModel, jog: HeldJog, error: unknown): void {
+    if (this.held.get(axis.id) === jog) this.held.delete(axis.id);
     this.studio.report(error);
   }
 }
