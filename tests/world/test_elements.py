@@ -208,6 +208,7 @@ class Bare(ElementSpec):
         (BUTTON, {"signals": None}, "element button has a name and lacks its signals"),
         (BUTTON, {"rows": dataclasses.replace(BUTTON.rows, keys=BUTTON.rows.keys[1:])}, "no key becomes name of ButtonSpec"),
         (WIRE, {"signals": lambda part: {}}, "element wire has signals and lacks a name"),
+        (WIRE, {"terminals": ELEMENTS["gate"].terminals}, "element wire has terminals and lacks a name"),
         (WIRE, {"faults": LAMP.faults}, "element wire: fault burnt-out is of the layer element, and its element has a name"),
         (LAMP, {"faults": (KINDS["stall"],)}, "element lamp: fault stall is of the layer element"),
     ],
@@ -227,6 +228,8 @@ def test_a_piece_that_is_left_out_is_an_error_at_import() -> None:
 def test_rows_speak_of_keys_that_there_are() -> None:
     with pytest.raises(IncompleteTable, match=r"\[\[x\]\] has no key b"):
         TableRows(written="[[x]]", keys=(optional(flag, "a", "?"),), need={"a": "b"})
+    with pytest.raises(Misuse, match=r"\[\[x\]\]: two keys have one name"):
+        TableRows(written="[[x]]", keys=(optional(flag, "a", "?"), optional(flag, "a", "!")))
 
 
 def test_a_name_is_registered_once() -> None:

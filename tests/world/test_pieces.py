@@ -449,3 +449,8 @@ def test_without_files_a_description_uses_none() -> None:
 )
 def test_a_file_beside_another(file: str, name: str, found: str) -> None:
     assert beside(file, name) == found
+
+
+def test_a_file_that_is_no_text_is_refused() -> None:
+    with pytest.raises(WorldError, match=r"cannot read parts/station\.toml: it is no UTF-8 text"):
+        World.from_toml(MAIN, {"parts/station.toml": b"\xff\xfe[\0"})

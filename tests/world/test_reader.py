@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 
 from steptwin.diagnostics import Fix, Span
-from steptwin.errors import Misuse
+from steptwin.errors import Misuse, SourceErrors
 from steptwin.machine import SECOND
 from steptwin.world.names import Unknown
-from steptwin.world.reader import MOST_FINDINGS, TomlText, WorldError
+from steptwin.world.reader import FILE_ERRORS, MOST_FINDINGS, TomlText, WorldError
 from steptwin.world.tomlplaces import Path
 from steptwin.world.values import flag, number, pair, pin_name, points, positive_time, text_value, whole, whole_seconds, word
 
@@ -143,3 +143,15 @@ def test_a_reference_that_is_probably_another_has_a_fix() -> None:
     text.wrong_reference(("axis",), Unknown("tabel", "no axis is called 'tabel'", "table"))
     (found,) = text.findings
     assert (found.code, found.message, found.fix) == ("D009", "no axis is called 'tabel'", Fix(Span(8, 13), "table"))
+
+
+def test_errors_of_a_file_are_found_where_it_is_named() -> None:
+    def misspelt() -> None:
+        raise SourceErrors("p.txt:1:1: no such command\n 1 | x")
+
+    text = TomlText("w", '[[a]]\nb = "p.txt"\n')
+    assert text.unless_wrong(("a", 0, "b"), misspelt) is None
+    (found,) = text.findings
+    assert (found.span.start, found.code) == (6, FILE_ERRORS)
+    assert found.message == "a file has errors: p.txt:1:1: no such command"
+    assert text.unless_wrong(("a", 0, "b"), pytest.fail) is None

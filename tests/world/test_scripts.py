@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from textwrap import dedent
 from typing import Any
 
@@ -11,6 +12,7 @@ from world_rig import small
 from steptwin.errors import Misuse, Runaway
 from steptwin.files.world import World
 from steptwin.machine import SECOND
+from steptwin.world import plant
 from steptwin.world import script as do
 from steptwin.world.condition import SignalCondition
 from steptwin.world.kernel import Kernel
@@ -360,3 +362,44 @@ def test_scripts_that_watch_are_resumed_in_their_order_also_where_one_makes_the_
     world = small(text + '[[event]]\nat = "1 s"\nsteps = [{ set = { "a.IN5" = 1 } }]\n')
     world.run(for_="2 s")
     assert [record.value for record in world.trace.events("world")] == ["first", "second", "third"]
+
+
+@pytest.mark.parametrize("begun_before", [True, False])
+def test_a_script_is_not_looked_at_that_another_one_has_called_off_at_the_same_moment(begun_before: bool) -> None:
+    """When it has just begun to wait, and when what it waits for has come true."""
+
+    def other() -> Steps:
+        if not begun_before:
+            yield do.Until("time >= 1")
+        world.unschedule("guest")
+        yield do.Note("called off")
+
+    world = small()
+    if not begun_before:
+        world.start("other", other)
+    world.schedule("guest", (do.Until("time >= 1"), do.Note("guest")))
+    if begun_before:
+        world.start("other", other)
+    world.run(for_="2 s")
+    moment = 0 if begun_before else SECOND
+    assert [(record.time, record.value) for record in world.trace.events("world")] == [(moment, "called off")]
+
+
+def test_conditions_that_are_true_at_once_for_ever_are_a_runaway(monkeypatch: pytest.MonkeyPatch) -> None:
+    """After each of them others have their turn."""
+    monkeypatch.setattr(plant, "MOST_STEPS_PER_INSTANT", 20)
+
+    def often(times: int) -> Steps:
+        yield do.Wait(SECOND)
+        for _ in range(times):
+            yield do.Until("time >= 1")
+
+    for times in (21, 22):
+        world = small()
+        world.script(partial(often, times), "often")
+        if times == 21:
+            world.run(for_=2)
+            assert world.scripts == []
+        else:
+            with pytest.raises(Runaway, match="scripts loop without end at 1000000000 ns"):
+                world.run(for_=2)

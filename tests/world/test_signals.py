@@ -308,6 +308,11 @@ def test_what_cannot_be_read_is_refused_in_a_condition(name: str, message: str) 
         world.run(until=f"{name} > 1", for_=1)
 
 
+def test_what_can_only_be_written_has_no_value() -> None:
+    with pytest.raises(Misuse, match="it can only be written"):
+        World.from_toml(MASTER).read("a.M1_POS_ABS")
+
+
 def test_a_condition_meets_a_count_that_begins_anew() -> None:
     """G+ goes on until Kill; 2²⁴ minimum microsteps are 262 144 steps, after which the counter is at 0 again."""
     world = World.from_toml('[[line]]\nname = "bus"\nkind = "m1486"\n[[m1486]]\nname = "d"\nline = "bus"\naddress = 3\n')

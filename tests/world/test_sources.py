@@ -14,6 +14,7 @@ from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.device import Mic488Device
 from steptwin.world.kernel import Kernel
+from steptwin.world.reader import WorldError
 from steptwin.world.sources import AnalogSource, ConstantWaveform, SineWaveform, TableWaveform, Waveform
 from steptwin.world.trace import TraceRecord
 from steptwin.world.wires import PinName
@@ -159,3 +160,11 @@ def test_a_named_source_is_a_signal_and_has_faults() -> None:
         world.read("source.volts")
     with pytest.raises(Misuse, match="those that can fail are oven"):
         world.fault("drift element=AIN2")
+
+
+@pytest.mark.parametrize(
+    ("kind", "message"), [("ramp", "a ramp needs 'over': how long it takes"), ("table", "a table needs points")]
+)
+def test_what_goes_nowhere_is_refused(kind: str, message: str) -> None:
+    with pytest.raises(WorldError, match=message):
+        World.from_toml(f'[[mic488]]\nname = "c"\n[[source]]\nto = "c.AIN1"\nkind = "{kind}"\n')

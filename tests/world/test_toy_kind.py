@@ -29,7 +29,10 @@ from steptwin.live.world_frames import follow_frames
 from steptwin.subject.commands import Advance, Describe, Home, Move, ReadPins, ReadState
 from steptwin.subject.world import WorldSubject
 from steptwin.wire.frameline import FrameLine
+from steptwin.world.actions import Download, ExternalInput, See, SetVariable
+from steptwin.world.motions import ordered
 from steptwin.world.reader import WorldError
+from steptwin.world.script import Turn
 
 TEXT = """
 [world]
@@ -237,3 +240,30 @@ def test_up_serves_it(tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeyp
     assert "127.0.0.1:" in shown
     assert "M 10" in shown
     assert "past 20" in shown
+
+
+@pytest.mark.parametrize(
+    ("what", "message"),
+    [
+        (Download("t", "", "m 1"), "'t' is a toy, which has no program memory"),
+        (SetVariable("t", "n", 1.0), "'t' is a toy, which has no program whose text is known"),
+        (See("t", 1.0, 0.0, 0.0, 0.0), "'t' is a toy, which has no vision registers"),
+        (Turn("t", 1, 5), "'t' is a toy, which has no encoder"),
+    ],
+)
+def test_what_only_other_controllers_have_is_refused(what: ExternalInput, message: str) -> None:
+    world = World.from_toml(TEXT)
+    with pytest.raises(Misuse) as caught:
+        world.apply_input(what)
+    assert str(caught.value) == message
+
+
+def test_a_command_that_it_does_not_know_is_refused() -> None:
+    with pytest.raises(Misuse) as caught:
+        ordered(World.from_toml(TEXT), Home("t", 1, 1.0))
+    assert str(caught.value) == "'t' is a toy, which has no command home"
+
+
+def test_it_has_no_encoder_that_mechanics_could_turn() -> None:
+    with pytest.raises(WorldError, match="encoder: t is a toy, which reads none"):
+        World.from_toml(TEXT.replace("[[axis.switch]]", "[axis.encoder]\nslip = 0.1\n[[axis.switch]]"))

@@ -106,3 +106,11 @@ def test_a_controller_is_switched_off_and_on() -> None:
     assert world.mic488["a"].program.name == "STOPPED" or world.mic488["a"].program == 0
     world.mic488["a"].set_pin("in7", 1)
     assert world.mic488["a"].pins["IN7"] == 1.0
+
+
+def test_the_state_of_a_controller_is_that_of_the_moment() -> None:
+    world = moved(small(), 25.0)
+    world.run(for_=0.2)
+    state = world.mic488["a"].state
+    assert (state.axes[0].number, state.axes[0].moving, state.axes[1].moving) == (1, True, False)
+    assert state.axes[0].position == world.mic488["a"].axis[1].position == pytest.approx(2.0, abs=0.011)

@@ -198,3 +198,9 @@ def test_a_restored_snapshot_of_another_past_has_its_own_moment() -> None:
     world.restore(early)
     world.run(until=1.0)
     assert hits(world) == [(0.4, "zone: parts touch")]
+
+
+def test_a_controller_with_the_name_of_a_signal_is_no_quantity() -> None:
+    text = TEXT.replace("left.position + 42.5", "idle + 42.5")
+    with pytest.raises(WorldError, match="when: 'idle' is no quantity of a machine or an element"):
+        World.from_toml(f'[[mic488]]\nname = "idle"\n{text}')

@@ -177,3 +177,9 @@ def test_what_is_built_later_is_named_as_that() -> None:
     load = TEXT.replace('of = "x.position"', 'of = "part.kg"') + '[[load]]\nname = "part"\naxis = "x"\nmass = 1.0\n'
     with pytest.raises(WorldError, match=r"\[\[load\]\] 'part' is built later"):
         World.from_toml(load)
+
+
+def test_a_controller_with_the_name_of_a_signal_is_not_measured() -> None:
+    text = TEXT.replace('of = "x.position"', 'of = "time"')
+    with pytest.raises(WorldError, match="of = 'time' is no quantity of what 'a' is joined to"):
+        World.from_toml(f'[[mic488]]\nname = "time"\n{text}')

@@ -209,3 +209,10 @@ def test_the_schema_has_a_table_for_each_kind_with_all_it_takes() -> None:
 @given(st.sampled_from([p for kind in KINDS.values() for p in kind.parameters if p.default is not None]))
 def test_every_default_is_permitted(parameter: Parameter) -> None:
     assert check(parameter, parameter.default, parameter.name) == parameter.default
+
+
+def test_a_parameter_without_a_number_is_misuse_where_one_is_needed() -> None:
+    fault = read("crc unit=1 from_s=2.5")
+    assert (fault.number("unit"), fault.number("from_s")) == (1, 2.5)
+    with pytest.raises(Misuse, match="fault crc: until_s = None is not a number"):
+        fault.number("until_s")
