@@ -18,6 +18,7 @@ from steptwin.mic488.device import Mic488Device
 from steptwin.motion import MotionState, Profile, at_rest, plan_position, plan_velocity
 from steptwin.world.contacts import PositionSwitch, place
 from steptwin.world.kernel import MAX_ROUNDS_PER_INSTANT, Kernel
+from steptwin.world.trace import TraceRecord
 from steptwin.world.wires import PinName, Wire
 
 ENABLE_M1 = bytes.fromhex("06 271E 0001")
@@ -440,3 +441,19 @@ def test_a_machine_that_says_nothing_of_its_edges_is_looked_at() -> None:
         kernel.machines[name].set_pin("A", 1.0, 0)
     kernel.advance(30)
     assert [kernel.machines[name].pin("B") for name in ("a", "b")] == [0.0, 1.0]
+
+
+def test_an_input_that_its_machine_changes_is_recorded_once_and_so_is_what_drives_it_then() -> None:
+    found: list[TraceRecord] = []
+    kernel, relay, target = Kernel(record=found.append), Relay(), PinName("a", "A")
+    kernel.add("a", relay)
+    kernel.drive(target, 1.0)
+    kernel.advance(5)
+    relay.levels["A"] = 0.0
+    relay.edges.append(PinEdge(5, "A", 0.0))
+    relay.changed()
+    kernel.advance(7)
+    for level in (0.0, 1.0):
+        kernel.drive(target, level)
+        kernel.advance(7)
+    assert [(record.time, record.value) for record in found if record.subject == "A"] == [(0, 1.0), (5, 0.0), (7, 1.0)]

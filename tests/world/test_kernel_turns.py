@@ -135,3 +135,11 @@ def test_a_part_is_updated_for_what_it_watches_and_when_it_is_due() -> None:
     kernel.mark()
     kernel.advance(20 * SECOND)
     assert (usual.updates, other.updates, curious.updates) == (24, 4, 25)
+
+
+def test_a_part_that_comes_later_is_told_as_a_change() -> None:
+    told: list[Kernel] = []
+    kernel = Kernel()
+    kernel.on_change = told.append
+    kernel.add_part(Clock(SECOND))
+    assert told == [kernel]

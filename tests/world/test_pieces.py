@@ -454,3 +454,11 @@ def test_a_file_beside_another(file: str, name: str, found: str) -> None:
 def test_a_file_that_is_no_text_is_refused() -> None:
     with pytest.raises(WorldError, match=r"cannot read parts/station\.toml: it is no UTF-8 text"):
         World.from_toml(MAIN, {"parts/station.toml": b"\xff\xfe[\0"})
+
+
+def test_editors_see_errors_of_a_controllers_file_at_the_use() -> None:
+    """They have places of their own in that file, not in the piece that names it."""
+    main = '# two chips\n[[use]]\nname = "left"\nfile = "parts/chip.toml"\n[[mic488]]\nname = "a"\n'
+    files = {"parts/chip.toml": b'[[m1486]]\nname = "chip"\nprogram = "p.txt"\n', "parts/p.txt": b"xx\n"}
+    (found,) = diagnose("m.toml", main, given_files(files)).findings
+    assert (found.span.start, found.message) == (12, "a file has errors: parts/p.txt:1:2: error M105: address expected, found 'x'")
