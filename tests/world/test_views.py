@@ -8,6 +8,7 @@ from world_rig import moved, small
 from steptwin.errors import Misuse
 from steptwin.files.world import World
 from steptwin.mic488.status import AxisStatus
+from steptwin.world import script as do
 
 
 def test_names_that_are_not_there_are_misuse_with_those_that_are() -> None:
@@ -109,8 +110,11 @@ def test_a_controller_is_switched_off_and_on() -> None:
 
 
 def test_the_state_of_a_controller_is_that_of_the_moment() -> None:
+    """Also for a program that looks during a run."""
     world = moved(small(), 25.0)
-    world.run(for_=0.2)
-    state = world.mic488["a"].state
-    assert (state.axes[0].number, state.axes[0].moving, state.axes[1].moving) == (1, True, False)
-    assert state.axes[0].position == world.mic488["a"].axis[1].position == pytest.approx(2.0, abs=0.011)
+    seen = []
+    world.at("200 ms", do.Call(lambda: seen.append(world.mic488["a"].state)))
+    world.run(for_=1)
+    ((one, other, *_),) = [state.axes for state in seen]
+    assert (one.number, one.moving, other.moving) == (1, True, False)
+    assert one.position == pytest.approx(2.0, abs=0.011)
