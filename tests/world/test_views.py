@@ -110,11 +110,11 @@ def test_a_controller_is_switched_off_and_on() -> None:
 
 
 def test_the_state_of_a_controller_is_that_of_the_moment() -> None:
-    """Also for a program that looks during a run."""
+    """Also for a program that looks during a run; the move ends after 1.025 s."""
     world = moved(small(), 25.0)
     seen = []
-    world.at("200 ms", do.Call(lambda: seen.append(world.mic488["a"].state)))
-    world.run(for_=1)
-    ((one, other, *_),) = [state.axes for state in seen]
-    assert (one.number, one.moving, other.moving) == (1, True, False)
-    assert one.position == pytest.approx(2.0, abs=0.011)
+    for moment in ("200 ms", "1100 ms"):
+        world.at(moment, do.Call(lambda: seen.append(world.mic488["a"].state.axes)))
+    world.run(for_=2)
+    assert [(axes[0].moving, axes[1].moving) for axes in seen] == [(True, False), (False, False)]
+    assert [axes[0].position for axes in seen] == [pytest.approx(2.0, abs=0.011), 25.0]
