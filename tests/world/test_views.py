@@ -117,4 +117,5 @@ def test_the_state_of_a_controller_is_that_of_the_moment() -> None:
         world.at(moment, do.Call(lambda: seen.append(world.mic488["a"].state.axes)))
     world.run(for_=2)
     assert [(axes[0].moving, axes[1].moving) for axes in seen] == [(True, False), (False, False)]
+    assert [axes[0].status.text for axes in seen] == ["moving to position", "position reached"]
     assert [axes[0].position for axes in seen] == [pytest.approx(2.0, abs=0.011), 25.0]
