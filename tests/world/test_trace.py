@@ -155,7 +155,8 @@ def test_a_world_of_which_nothing_is_recorded_has_no_digest() -> None:
 
 def test_the_value_of_a_record_is_that_of_its_kind() -> None:
     train = StepTrain(PLAN, GRIDS, (Division(0, 8),))
-    plan, edge, frame = (TraceRecord(1, "a", *given) for given in (("plan", "1", PLAN), ("edge", "IN1", 1.0), ("frame", "l", b"x")))
+    plan, edge = TraceRecord(1, "a", "plan", "1", PLAN), TraceRecord(2, "a", "edge", "IN1", 1.0)
+    frame = TraceRecord(3, "a", "frame", "tcp-1/in", b"x")
     assert (plan.plan(), plan._replace(value=train).plan(), edge.level(), frame.data()) == (PLAN, train, 1.0, b"x")
     for read, kind in ((edge.plan, "plan"), (plan.level, "edge"), (edge.data, "frame")):
         with pytest.raises(TypeError, match=f"a record of kind (plan|edge) with the value .*: expected a {kind}$"):

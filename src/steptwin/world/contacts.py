@@ -182,11 +182,6 @@ class Contact(Stateful):
         circuit.contacts.append(self)
 
     @property
-    def target(self) -> PinName:
-        """The input that it drives."""
-        return self._circuit.target
-
-    @property
     def machine(self) -> str:
         """The subject of its records."""
         return self._circuit.machine

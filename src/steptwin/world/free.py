@@ -121,8 +121,6 @@ class FreeMotion:
         if way and (well - at) * direction <= 0.0:
             left = sqrt(max(v * v - 2.0 * abs(rate) * abs(well - p), 0.0))
             return [ramp(begin_s, p, v, direction * left, abs(rate))]
-        if well == at:
-            return []
         speed, now = (slow, way[0].end_s) if way else (abs(v), begin_s)
         return [*way, ramp(now, at, direction * speed, 0.0, speed * speed / (2.0 * abs(well - at)))]
 

@@ -236,46 +236,35 @@ def next_change(
     its range is on one side, or it is a nanosecond long. Where signals stay equal, as of two cylinders on one valve, that
     has no end: after `MOST_LOOKS` intervals, changes of less than a growing time may be overlooked.
     """
-    return _Search(quantity, moving, at_rest).first(now)
+    search = _Search(quantity, {name: signal.value for name, signal in moving.items()}, at_rest)
+    return search.first(now, merge(*(signal.turns(now) for signal in moving.values())))
 
 
 def change_between(quantity: Quantity, reads: Mapping[str, Callable[[Nanos], float]], begin: Nanos, end: Nanos) -> Nanos | None:
     """As `next_change` of a quantity all of whose signals are read by ``reads``, after ``begin`` and up to ``end``, between which
     none of them turns."""
-    return _Search(quantity, {name: _Read(read) for name, read in reads.items()}, _unknown).between(begin, end)
-
-
-class _Read:
-    __slots__ = ("_read",)
-
-    def __init__(self, read: Callable[[Nanos], float]) -> None:
-        self._read = read
-
-    def value(self, now: Nanos) -> float:
-        return self._read(now)
-
-    def turns(self, now: Nanos) -> Iterator[Nanos]:
-        yield from ()
-
-
-def _unknown(name: str) -> float:
-    raise KeyError(name)
+    nothing: Mapping[str, float] = {}
+    return _Search(quantity, reads, nothing.__getitem__).between(begin, end)
 
 
 class _Search:
-    __slots__ = ("_at_rest", "_looks", "_moving", "_quantity")
+    __slots__ = ("_at_rest", "_looks", "_quantity", "_reads")
 
-    def __init__(self, quantity: Quantity, moving: Mapping[str, MovingSignal], at_rest: Callable[[str], float]) -> None:
+    def __init__(
+        self, quantity: Quantity, reads: Mapping[str, Callable[[Nanos], float]], at_rest: Callable[[str], float]
+    ) -> None:
+        """``reads``: the values of what moves; ``at_rest`` gives those of what does not."""
         self._quantity = quantity
-        self._moving = moving
+        self._reads = reads
         self._at_rest = at_rest
         self._looks = 0
 
-    def first(self, now: Nanos) -> Nanos | None:
+    def first(self, now: Nanos, turns: Iterable[Nanos]) -> Nanos | None:
+        """``turns`` are in order."""
         values = self._values(now)
         side = self._side(values)
         begin = now
-        for end in chain(merge(*(signal.turns(now) for signal in self._moving.values())), (now + FARTHEST_NS,)):
+        for end in chain(turns, (now + FARTHEST_NS,)):
             if end > begin:
                 there = self._values(end)
                 found = self._within(begin, values, end, there, side)
@@ -295,7 +284,7 @@ class _Search:
         return 1 << max(0, -((MOST_LOOKS - self._looks) // LOOKS_MORE))
 
     def _values(self, now: Nanos) -> Mapping[str, float]:
-        return {name: signal.value(now) for name, signal in self._moving.items()}
+        return {name: read(now) for name, read in self._reads.items()}
 
     def _side(self, values: Mapping[str, float]) -> int:
         value = self._quantity.value(lambda name: values[name] if name in values else self._at_rest(name))

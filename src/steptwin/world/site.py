@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from steptwin.errors import Misuse
@@ -37,10 +36,6 @@ class Site:
         """``join`` of each input with contacts."""
 
     # ------------------------------------------------------------------ machines and kernels
-
-    @property
-    def machines(self) -> Mapping[str, MotionController]:
-        return self.parts.machines
 
     def machine(self, name: str) -> MotionController:
         """The machine called ``name``, which is not a line."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
@@ -45,9 +46,9 @@ class CarrierSpec(BoardSpec):
     place_at: float
 
     @property
+    @abstractmethod
     def own_joint(self) -> Joint | None:
         """What its own key joins, besides the places."""
-        return None
 
     @property
     def joints(self) -> Iterable[Joint]:

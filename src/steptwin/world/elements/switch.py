@@ -120,11 +120,8 @@ def put_switch(
 
 def zone_of(spec: SwitchSpec, places: Callable[[float], int], period: Fraction | int | None = None) -> Zone:
     """Where a switch is on. ``places`` gives places of its carriage for units, ``period`` those from zone to zone."""
-    if spec.below is not None:
-        return Zone(None, places(spec.below), places(spec.hysteresis))
-    if spec.above is not None:
-        return Zone(places(spec.above), None, places(spec.hysteresis))
-    if spec.position is None:
-        return Zone(None, None)
-    half = 0.5 * spec.width
-    return Zone(places(spec.position - half), places(spec.position + half), places(spec.hysteresis), period)
+    if spec.position is not None:
+        half = 0.5 * spec.width
+        return Zone(places(spec.position - half), places(spec.position + half), places(spec.hysteresis), period)
+    low, high = (None if end is None else places(end) for end in (spec.above, spec.below))
+    return Zone(low, high, places(spec.hysteresis))

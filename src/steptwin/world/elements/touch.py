@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import ClassVar
 
 from steptwin.machine import Nanos
@@ -41,11 +41,6 @@ class Touch(BoardPart):
     @property
     def watches(self) -> None:
         """The condition may be over anything."""
-
-    @property
-    def axes(self) -> Iterable[str]:
-        """The names of the axes that jam."""
-        return self._axes
 
     def is_moved_by(self, mechanism: Mechanism) -> bool:
         return any(one is mechanism for one in self._axes.values())

@@ -210,9 +210,7 @@ class FaultyMachine(Stateful):
         self._off_until = max(until, self._off_until or 0)
 
     def supply(self, on: bool, now: Nanos) -> None:
-        """Its power supply is on, or off: then nothing answers until it is on again, as after power-on."""
-        if on is not self._unsupplied:
-            return
+        """Its power supply comes on, or goes off: then nothing answers until it is on again, as after power-on."""
         self._unsupplied = not on
         if self._off_until is None:
             self.inner.power_cycle(now) if on else self.inner.power_off(now)
