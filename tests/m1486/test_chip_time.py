@@ -160,6 +160,17 @@ def test_whatever_is_done_at_a_moment_finds_the_chip_there(name: str) -> None:
     bench.run(1.0)
 
 
+def test_a_chip_advances_to_its_next_change_or_to_the_end_of_the_time() -> None:
+    """W50 is done after 50 ms, T2 takes 1 ms; then nothing is to be done."""
+    chip = Bench().chip
+    for end in (SECOND, 2 * SECOND):
+        assert chip.advance_to_change(end) == chip.now == end
+    chip.receive(b"w50\rt2\r", chip.now)
+    begin = chip.now
+    assert chip.advance_to_change(begin + 30 * MILLISECOND) == chip.now == begin + 30 * MILLISECOND
+    assert chip.advance_to_change(begin + SECOND) == chip.now == begin + 50 * MILLISECOND
+
+
 def test_every_event_has_a_known_code() -> None:
     bench = Bench("E1", address=1)
     bench.do("[", "u20", "]", "f64", "r", "w1", "c2", "y", "k", "c75", "\\")

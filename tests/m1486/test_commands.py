@@ -184,3 +184,12 @@ def test_every_row_says_what_it_does_and_where_it_stands() -> None:
     assert all(spec.effect.endswith(".") and spec.section.startswith("VII.") for spec in TABLE)
     assert len({spec.name for spec in TABLE}) == len(TABLE)
     assert all(spec in rows(spec.key) for spec in TABLE)
+
+
+def test_no_two_commands_share_a_letter_and_a_number() -> None:
+    """Where a letter has several rows, all of them say which numbers are theirs."""
+    for key in {spec.key for spec in TABLE}:
+        shared = rows(key)
+        numbers = [number for spec in shared for number in spec.values or ()]
+        assert len(numbers) == len(set(numbers)), key
+        assert len(shared) == 1 or all(spec.values for spec in shared), key

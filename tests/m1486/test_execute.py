@@ -89,3 +89,11 @@ def test_m_19_a_command_takes_its_time(v: Variant) -> None:
         bench.send("[", str(command), "u20", "]")
         bench.finish()
         assert (command, [event.time for event in bench.events("upload")]) == (command, [2 * v.write_ns + each])
+
+
+def test_clear_kill_out_of_the_internal_variable_does_nothing() -> None:
+    """C75 acts when it is received; a program that comes to it was not stopped."""
+    bench = Bench()
+    bench.file(":75", "c", "u4")
+    assert bench.finish() == b"\x4b"
+    assert (bench.wrong, bench.events("clear-kill")) == ([], [])

@@ -313,6 +313,17 @@ def test_m_27_clear_kill_leaves_the_buffer_again() -> None:
     assert bench.events("clear-kill")
 
 
+def test_clear_kill_with_a_zero_before_it_acts_when_it_leaves_the_buffer() -> None:
+    """It is the same number, but M-27 is about three characters."""
+    bench = Bench("A")
+    bench.do("c51")
+    bench.file("w5", "u20")
+    bench.send("k")
+    assert bench.run(1.0) == b""
+    assert bench.send("c075") == b"\x41"
+    assert (bench.wrong, len(bench.events("clear-kill"))) == ([], 1)
+
+
 def test_kill_is_an_event() -> None:
     """Whoever watches or records a chip sees K, whether or not there was a motion to stop."""
     bench = Bench()

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 import pytest
 
+from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND
@@ -277,6 +278,7 @@ def test_names_of_an_m1486_are_its_pins_and_points() -> None:
     names = {name: chip.read(name, world.now) for name in ("b3", "B4", "Variable", "register1", "U20", "lamp")}
     variable = chip.variables(world.now)["variable"]
     assert names == {"b3": 0.0, "B4": 1.0, "Variable": variable, "register1": 0.0, "U20": float(ord("B")), "lamp": None}
+    assert {name: chip.has_name(name) for name in names} == {name: name != "lamp" for name in names}
 
 
 def test_what_a_statement_takes() -> None:
@@ -299,16 +301,16 @@ def test_depth_and_returns_of_a_chip() -> None:
     assert chip.texts["program"].name == "c.m1486"
 
 
-def test_a_chip_without_a_text() -> None:
-    world = World.from_toml('[[line]]\nname = "l"\nkind = "m1486"\n[[m1486]]\nname = "c"\nline = "l"\n')
+@pytest.mark.parametrize("text", [None, "x3\n@1\nf640\nr\n"])
+def test_a_chip_without_a_text_of_its_own(text: str | None) -> None:
+    """The text of a host may be for other chips of the chain."""
+    world = World.from_toml('[[line]]\nname = "l"\nkind = "m1486"\n[[m1486]]\nname = "c"\nline = "l"\naddress = 7\n')
+    if text is not None:
+        world.downloaded["c", "program"] = SourceText("typed", text)
     chip = world.programs["c"]
-    assert (chip.texts, list(chip.statements("program")), chip.labels("program"), chip.stack(0), chip.depth()) == (
-        {},
-        [],
-        {},
-        [],
-        0,
-    )
+    assert [source.text for source in chip.texts.values()] == ([] if text is None else [text])
+    assert (list(chip.statements("program")), chip.labels("program"), chip.after("program")) == ([], {}, {})
+    assert (list(chip.reached("program", [0])), chip.stack(0), chip.depth()) == ([], [], 0)
 
 
 @pytest.mark.parametrize("machine", ["m", "c"])

@@ -199,6 +199,19 @@ def test_what_a_chip_does_not_take(machine: str, text: str, error: type[Exceptio
     assert str(refused.value).startswith(message)
 
 
+@pytest.mark.parametrize("is_off", [True, False])
+def test_a_chip_that_is_shut_down_receives_nothing(is_off: bool) -> None:
+    there = world()
+    chip = there.m1486["drum"].chip
+    if is_off:
+        chip.power_off(0)
+    else:
+        chip.set_pin("SD", 0, 0)
+    with pytest.raises(Refusal, match=r"^drum is .*shut down.*, so it receives nothing$"):
+        there.apply_input(Download("drum", "program", "f640\n"))
+    assert not there.inputs
+
+
 def test_statements_are_those_of_the_present_texts() -> None:
     there = world()
     seen: list[tuple[str, str, object]] = []
@@ -264,6 +277,10 @@ def test_what_a_text_takes_of_the_memory_of_its_place() -> None:
     assert [one["used"] for one in (part, longer)] == [5, 10]
     (wrong,) = texts.memory("c", place, "[\n")
     assert wrong["used"] == 0
+    assert texts.memory("c", place, "[\nhello\n]\n") == []  # no commands
+    assert texts.memory("c", place, "x3\nf64\n") == []  # for another chip
+    (own,) = texts.memory("c", place, "x3\nf64\nxf\nf64\nr\n")
+    assert own["used"] == 5
 
 
 def test_what_positions_take_of_the_memory() -> None:

@@ -24,7 +24,7 @@ from typing import ClassVar
 
 from steptwin.errors import Misuse, TimeReversal
 from steptwin.m1486.core import ChipCore
-from steptwin.m1486.drive import ChipDrive, MotionMode
+from steptwin.m1486.drive import ChipDrive
 from steptwin.m1486.eeprom import unpack
 from steptwin.m1486.functions import OUTPUTS
 from steptwin.m1486.lines import STEP_DIRECTION, Interface
@@ -140,8 +140,8 @@ class M1486Chip(ChipCore):
         return has_left
 
     def _run_program(self, at: Nanos, until: Nanos) -> None:
-        """Run the program until the next other deadline; a single command if the drive or the receiver may depend on it."""
-        if self.drive.motion is not MotionMode.REST or self.receiver.is_stalled:
+        """Run the program until the next other deadline; a single command if the receiver may depend on it."""
+        if self.receiver.is_stalled:
             until = at
         due = self._hardware_deadline()
         self.now = self.program.run(at, until if due is None else max(at, min(until, due - 1)))

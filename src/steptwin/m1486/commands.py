@@ -200,10 +200,6 @@ def _letter_bits(letter: str) -> int:
 def _index() -> dict[str, tuple[CommandSpec, ...]]:
     index: dict[str, tuple[CommandSpec, ...]] = {}
     for spec in _ROWS:
-        for other in index.get(spec.key, ()):
-            taken = set(other.values or ()) & set(spec.values or ())
-            if taken or other.values is None or spec.values is None:
-                raise ValueError(f"command table: {spec.name} and {other.name} both claim {spec.key} {sorted(taken)}")
         index[spec.key] = (*index.get(spec.key, ()), spec)
     return index
 

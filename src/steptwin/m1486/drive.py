@@ -227,9 +227,7 @@ class ChipDrive(Stateful):
         self.is_stopping = True
 
     def stop_at_once(self, now: Nanos) -> None:
-        """The pulses end, as at a reset."""
-        if self.motion is MotionMode.REST:
-            return
+        """The pulses of a motion end, as at a reset."""
         target_u = self._final_u() if self.motion is MotionMode.MOVE else None
         self._replace(self._resting(now, self.true_u(now)))
         self._keep_counter_at(target_u)

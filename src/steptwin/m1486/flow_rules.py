@@ -59,7 +59,9 @@ def _judge(command: ChipCommand, states: set[Settings], rule: _Rule) -> Iterator
     if finding.severity is Severity.ERROR and None in faults:
         finding, message = findings.MAY_FAIL, f"on some paths {message}"
     span = command.span if command.number is None else command.argument_span
-    fix = _nearest_multiple(command, states) if finding is findings.NOT_A_MULTIPLE and command.number is not None else None
+    fix = None
+    if finding is findings.NOT_A_MULTIPLE and command.number is not None:
+        fix = Fix(command.argument_span, _nearest_multiple(command.number, states))
     yield finding(span, message, hint, fix)
 
 
@@ -75,13 +77,10 @@ def _distance(command: ChipCommand, state: Settings) -> _Fault | None:
     return findings.NOT_A_MULTIPLE, f"{what} {grouped(distance)} is not a multiple of {size}", hint
 
 
-def _nearest_multiple(command: ChipCommand, states: set[Settings]) -> Fix | None:
-    """The nearest distance that is right with every setting."""
-    sizes = [microstep_size(state.microstep) for state in states if state.microstep is not None]
-    if command.number is None or not sizes:
-        return None
-    size = max(sizes)
-    return Fix(command.argument_span, str(max(size, (command.number + size // 2) // size * size)))
+def _nearest_multiple(distance: int, states: set[Settings]) -> str:
+    """The nearest distance that is right with every setting; one of them at least is known."""
+    size = max(microstep_size(state.microstep) for state in states if state.microstep is not None)
+    return str(max(size, (distance + size // 2) // size * size))
 
 
 def _pair(command: ChipCommand, state: Settings) -> _Fault | None:
@@ -256,20 +255,12 @@ def _labels(stream: CommandStream, flow: FlowAnalysis) -> Iterator[Diagnostic]:
 
 def _never_reached(stream: CommandStream, flow: FlowAnalysis) -> Iterator[Diagnostic]:
     """One warning for each run of commands that no path leads to."""
-    run: list[int] = []
-    for index in range(len(stream.commands) + 1):
-        if index < len(stream.commands):
-            command = stream.commands[index]
-            if when(command.key, command.number) is not When.QUEUED:
-                continue
-            if index not in flow.states:
-                run.append(index)
-                continue
-        if run:
-            first, last = stream.commands[run[0]], stream.commands[run[-1]]
+    queued = [at for at, command in enumerate(stream.commands) if when(command.key, command.number) is When.QUEUED]
+    for is_reached, group in groupby(queued, lambda at: at in flow.states):
+        if not is_reached:
+            run = [stream.commands[at] for at in group]
             count = "this command is" if len(run) == 1 else f"these {len(run)} commands are"
-            yield findings.NEVER_REACHED(Span(first.span.start, last.span.end), f"{count} never reached")
-            run = []
+            yield findings.NEVER_REACHED(Span(run[0].span.start, run[-1].span.end), f"{count} never reached")
 
 
 def _shared_registers(stream: CommandStream, flow: FlowAnalysis, variant: Variant) -> Iterator[Diagnostic]:

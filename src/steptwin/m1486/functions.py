@@ -65,15 +65,10 @@ _NAMED = (
 )
 
 
-def _table() -> tuple[AuxiliaryFunction, ...]:
-    by_number = {f.number: f for f in _NAMED}
-    if len(by_number) != len(_NAMED) or not set(by_number) <= set(FUNCTIONS):
-        raise ValueError("a function number is defined twice or outside 40 to 63")
-    return tuple(by_number.get(number, AuxiliaryFunction(number)) for number in FUNCTIONS)
-
+_BY_NUMBER = {function.number: function for function in _NAMED}
 
 #: Every function from 40 to 63 in order, reserved ones included.
-TABLE: tuple[AuxiliaryFunction, ...] = _table()
+TABLE: tuple[AuxiliaryFunction, ...] = tuple(_BY_NUMBER.get(number, AuxiliaryFunction(number)) for number in FUNCTIONS)
 
 
 def function(number: int) -> AuxiliaryFunction:

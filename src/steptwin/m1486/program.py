@@ -200,7 +200,6 @@ class ProgramExecution(Stateful):
             self.ready = now + commands * self.statement_ns
             return
         self._burst += commands
-        self.ready = now
         if self._burst >= BURST:
             self.ready = now + BURST_NS
 

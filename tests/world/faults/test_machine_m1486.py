@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import pytest
+
+from steptwin.errors import Misuse
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.encoding import encode
+from steptwin.m1486.lines import DUAL_DAC
 from steptwin.m1486.syntax import parse as parse_m1486
 from steptwin.m1486.variants import variant
 from steptwin.machine import MILLISECOND, SECOND
@@ -61,6 +65,16 @@ def test_a_chip_without_supply_is_deaf() -> None:
         kernel.advance(kernel.now + 700 * MILLISECOND)
         heard.append(b"".join(data for _, data in one.to_send(kernel.now)))
     assert [bool(data) for data in heard] == [True, False, True]
+
+
+def test_a_stuck_pin_of_a_chip_is_low_or_high() -> None:
+    body = M1486Body(M1486Chip(variant("E1"), address=1, interface=DUAL_DAC))
+    for level in (0.0, 1.0):
+        body.check_pin("jog", level)
+    with pytest.raises(Misuse, match=r"^jog = 0.5: a digital input is 0 or 1$"):
+        body.check_pin("jog", 0.5)
+    with pytest.raises(Misuse, match="B10"):
+        body.check_pin("b10", 0.0)  # a line of the driver interface
 
 
 def test_stuck_and_bouncing_pins_of_a_chip_by_either_name() -> None:
