@@ -348,6 +348,19 @@ def test_parts_keep_all_they_have_in_slots_so_that_nothing_is_forgotten(part: St
     assert len(part.copy_state()) == len(slots - fixed)
 
 
+def test_from_event_to_event_a_controller_goes_no_further_than_it_is_asked() -> None:
+    rig = programmed("DELAY 0.5\nOUT1 = ON\nDELAY 0.5\nWAIT 1 = 2\n")
+    rig.start()
+    device = rig.device
+    due = device.deadline()
+    assert due is not None
+    for moment in (due - 1, due - 1, due):
+        assert (device.advance_to_change(moment), device.now) == (moment, moment)
+    while device.deadline() is not None:
+        device.advance_to_change(2 * SECOND)
+    assert (device.advance_to_change(2 * SECOND), device.now) == (2 * SECOND, 2 * SECOND)
+
+
 def test_a_controller_at_rest_has_nothing_to_do() -> None:
     rig = Rig(BUSY)
     rig.enable(1, 2, 3, 4)

@@ -264,14 +264,15 @@ def test_a_reversal_too_late_to_turn_before_the_limit_overruns_and_comes_back(ri
     assert rig.position() == 500.0
 
 
-def test_mic_13_a_shifted_coordinate_shifts_the_way_to_the_soft_limit(rig: Rig) -> None:
-    rig.set("POSLIM_R", 3000.0)
-    rig.set("VEL_ABS", 1000.0)
+@pytest.mark.parametrize(("limit", "sign", "status"), [("POSLIM_R", 1, LIMIT_R), ("POSLIM_L", -1, LIMIT_L)])
+def test_mic_13_a_shifted_coordinate_shifts_the_way_to_the_soft_limit(rig: Rig, limit: str, sign: int, status: int) -> None:
+    rig.set(limit, sign * 3000.0)
+    rig.set("VEL_ABS", sign * 1000.0)
     rig.wait(1.5)
-    rig.set("POS_ACT", 2000.0)
-    rig.until(1, LIMIT_R)
-    assert rig.position() == 3000.0
-    assert rig.device.axes[0].profile.count(rig.now) == 2000
+    rig.set("POS_ACT", sign * 2000.0)
+    rig.until(1, status)
+    assert rig.position() == sign * 3000.0
+    assert rig.device.axes[0].profile.count(rig.now) == sign * 2000
 
 
 def test_mic_13_a_position_move_ends_at_the_same_place_unless_a_limit_is_nearer(rig: Rig) -> None:

@@ -276,6 +276,29 @@ def test_a_drive_is_said_to_move_up_to_the_last_nanosecond_of_its_motion() -> No
     assert [at for at in register.tendency(1)(control, rig.now) or () if at > rig.now] == []
 
 
+@pytest.mark.parametrize(("name", "number", "period"), [("TIMA", 2, 10 * MILLISECOND), ("TIMB", 16, SECOND)])
+def test_a_timer_is_said_to_count_until_it_stops(name: str, number: int, period: int) -> None:
+    rig = started(f"{name}{number} = 999990\nWAIT 1 = 2\n")
+    rig.wait(0.001)
+    register, control = ACCESS[name], rig.device.program
+    assert register.tendency is not None
+    (end,) = [*(register.tendency(number)(control, rig.now) or ())]
+    assert end == rig.now + 9 * period
+    assert [register.read(number)(control, at) for at in (rig.now, end)] == [999_990, 999_999]
+    rig.wait(10)
+    assert [*(register.tendency(number)(control, rig.now) or ())] == []
+
+
+def test_switches_of_interrupts_are_read_back() -> None:
+    rig = started(
+        "CFGINT_IN3 = FALL\nCFGINT_TICK = HIGH\nCFGINT_M2 = HIGH\n$I0 = CFGINT_IN3\n$I1 = CFGINT_IN2\n"
+        "$I2 = CFGINT_TICK\n$I3 = CFGINT_TICK100\n$I4 = CFGINT_M2\n$I5 = CFGINT_M1\nWAIT 1 = 2\n"
+        + "".join(f"INT_{event}:\nRETURN\n" for event in ("IN3", "TICK", "M2"))
+    )
+    rig.wait(0.1)
+    assert [rig.i(number) for number in range(6)] == [2, 0, 4, 0, 4, 0]
+
+
 # ---------------------------------------------------------------------- motion statements
 
 ROWS = "here;10;x;x;x\nboth;30;20;x;x\nline;40;0;25;x\ncircle;50;0;10;360\narc;20;40;10;0\nnothing;x;x;x;x\n"

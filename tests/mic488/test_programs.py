@@ -12,6 +12,7 @@ from mic488_rig import MM, RUNNING, STOPPED, controller, loaded, programmed, sta
 
 from steptwin.errors import Misuse
 from steptwin.mic488.config import ProgramConfig
+from steptwin.wbc.positions import PositionRow, PositionTable
 
 # ---------------------------------------------------------------------- banks and PROGRAM_CTRL
 
@@ -70,6 +71,15 @@ def test_banks_that_are_not_there_or_in_use() -> None:
     rig.start()
     rig.wait(0.01)
     assert rig.state == STOPPED
+
+
+def test_a_position_bank_holds_227_rows() -> None:
+    device = programmed("END\n").device
+    rows = tuple(PositionRow(f"P{number}", (1, None, None, None)) for number in range(228))
+    device.load_positions(0, PositionTable(rows[:227]))
+    with pytest.raises(Misuse, match="^228 positions: a bank holds 227$"):
+        device.load_positions(0, PositionTable(rows))
+    assert len(device.program.banks.positions[0].rows) == 227
 
 
 def test_power_on_starts_what_the_configuration_says() -> None:

@@ -43,6 +43,10 @@ def test_a_wrong_name_gets_near_misses() -> None:
         register_map("1.23").named("M_STATUS")
 
 
+def test_a_map_is_shown_by_its_firmware() -> None:
+    assert repr(register_map("1.23")) == f"<RegisterMap of firmware 1.23: {len([*register_map('1.23')])} registers>"
+
+
 def test_every_address_of_a_register_finds_it() -> None:
     for name in FIRMWARES:
         chart = register_map(name)

@@ -182,6 +182,16 @@ def test_mic_3_lenient_last_values_follow_data_type_and_end_with_the_power() -> 
     assert [rig.word(key) for key in ("M_ENABLE", "M_DISABLE", "M_STOP")] == [0, 0, 0]
 
 
+def test_mic_3_lenient_last_values_are_in_units_of_their_axis() -> None:
+    gears = (100.0, 40.0, 8.0, 2.0)
+    rig = Rig(controller(*(AxisConfig(gear=gear) for gear in gears)), lenient=True)
+    for axis in (1, 2, 3, 4):
+        rig.set("POS_ABS", 2.5, axis)
+    assert [rig.get("POS_ABS", axis) for axis in (1, 2, 3, 4)] == [2.5] * 4
+    rig.use_dint()
+    assert [rig.get("POS_ABS", axis) for axis in (1, 2, 3, 4)] == [2.5 * gear for gear in gears]
+
+
 def test_mic_3_a_refused_write_is_not_remembered() -> None:
     rig = Rig(lenient=True)
     rig.set("POS_ABS", 7.0)

@@ -138,13 +138,8 @@ class IniFile:
 
 def _lines(text: str) -> Iterator[tuple[int, str]]:
     """Start and text of each line, without its end. (``str.splitlines`` knows line ends that INI files do not.)"""
-    place = len(_BYTE_ORDER_MARK) if text.startswith(_BYTE_ORDER_MARK) else 0
-    while place < len(text):
-        line = _LINE.match(text, place)
-        if line is None:
-            return
-        yield place, line.group(1)
-        place = line.end()
+    for line in _LINE.finditer(text, len(_BYTE_ORDER_MARK) if text.startswith(_BYTE_ORDER_MARK) else 0):
+        yield line.start(), line.group(1)
 
 
 def _read(source: SourceText, encoding: str) -> IniFile:

@@ -243,19 +243,13 @@ def _do_arc(plane: _Plane, row: RowValues) -> bool:
     targets_p = plane.motor_p((row[0], row[1]), "DOARC")
     x1, y1 = ((target + axis.offset_p) / axis.gear for target, axis in zip(targets_p, plane.axes, strict=True))
     slack_u = max(1.0 / x.gear, 1.0 / y.gear)
-    return plane.arc(arc_between(x0, y0, x1, y1, _given(row[2]), outward=row[3] == 0.0, slack=slack_u), targets_p)
+    return plane.arc(arc_between(x0, y0, x1, y1, row[2] or 0.0, outward=row[3] == 0.0, slack=slack_u), targets_p)
 
 
 def _circle(row: RowValues, angle_deg: float) -> Arc:
-    """Angles of rows are clockwise."""
-    return circle(_given(row[0]), _given(row[1]), _given(row[2]), -angle_deg / DEGREES_PER_QUARTER)
-
-
-def _given(value: float | None) -> float:
-    """A parameter `row_problem` has looked for."""
-    if value is None:
-        raise ProgramFault("a parameter is missing")
-    return value
+    """Angles of rows are clockwise. `row_problem` has found that nothing is missing."""
+    x, y, radius = (value or 0.0 for value in row[:3])
+    return circle(x, y, radius, -angle_deg / DEGREES_PER_QUARTER)
 
 
 _PATHS: Mapping[str, Callable[[_Plane, RowValues], bool]] = complete(

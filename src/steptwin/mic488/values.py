@@ -258,7 +258,9 @@ def _stops(registers: RegisterMap, request: pdu.ModbusRequest) -> bool:
     return register is not None and register.key == "PROGRAM_CTRL"
 
 
-def _written(registers: RegisterMap, request: pdu.ModbusRequest) -> list[Register | None]:
+def _written(
+    registers: RegisterMap, request: pdu.WriteCoilRequest | pdu.WriteRegisterRequest | pdu.WriteRegistersRequest
+) -> list[Register | None]:
     match request:
         case pdu.WriteCoilRequest(address):
             return [registers.find(Space.COIL, address)]
@@ -266,8 +268,6 @@ def _written(registers: RegisterMap, request: pdu.ModbusRequest) -> list[Registe
             return [registers.find(Space.HOLDING, address)]
         case pdu.WriteRegistersRequest(address, values):
             return [piece.register for piece in registers.pieces(Space.HOLDING, address, len(values))]
-        case _:
-            return [None]
 
 
 def _repeatable(register: Register) -> bool:

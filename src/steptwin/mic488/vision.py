@@ -93,8 +93,6 @@ class Com1Port(Stateful):
     def exchange(self, data: bytes, now: Nanos) -> bytes:
         answer = b""
         if self.modbus is not None:
-            # With line timing frames of earlier pieces are observed while nothing arrives.
-            self._frames.clear()
             answer = self.modbus.exchange(data, now)
             for frame in self._frames:
                 if frame in data:
@@ -122,8 +120,7 @@ class Com1Port(Stateful):
         return None if self.modbus is None else self.modbus.deadline()
 
     def close(self) -> None:
-        if self.modbus is not None:
-            self.modbus.close()
+        """The port has nothing to release."""
 
 
 def uses_vision(program: LoadedProgram) -> bool:
