@@ -351,3 +351,11 @@ def test_distances_are_counted_from_where_the_motion_begins(begin: int) -> None:
 def test_a_motion_has_no_parts_that_take_no_time(distance: int, parts: int) -> None:
     """At its speed already: on and brake, or brake, speed up, on and brake, or brake at once."""
     assert len(plan_position(MotionState(0, 0, 0.0, 100.0), distance, 500.0, 500.0, 100.0).segments) == parts
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_braking_that_ends_beyond_its_target_by_rounding_ends_on_it(sign: int) -> None:
+    """From 100 pulses/s at 500 pulses/s² it takes 10 pulses."""
+    profile = plan_position(MotionState(0, 0, sign * 2e-7, sign * 100.0), sign * 10, 500.0, 500.0, 100.0)
+    (braking,) = profile.segments
+    assert (braking.position(braking.end_s), profile.final_p) == (sign * 10.0, sign * 10.0)

@@ -280,6 +280,19 @@ def test_speeds_and_accelerations_that_are_not_finite_and_positive_are_refused(n
             plan()
 
 
+@pytest.mark.parametrize(
+    ("curve", "ramps"),
+    [
+        (SpeedCurve(100.0, 1e3, 500.0, 900.0), 2),  # linear, then parabolic
+        (SpeedCurve(500.0, 1e3, 500.0, 900.0), 1),  # it begins where the parabola does
+        (SpeedCurve(100.0, 1e3, 900.0, 900.0), 1),
+        (SpeedCurve(500.0, 1e3, 900.0, 500.0), 0),  # it begins at its highest speed
+    ],
+)
+def test_a_ramp_has_no_parts_that_take_no_time(curve: SpeedCurve, ramps: int) -> None:
+    assert len(plan_endless(0, 0, 1, curve).segments) == ramps + 1
+
+
 def test_the_manuals_curve() -> None:
     """P2500 with V12500: linear to 2500 full steps/s, then parabolic."""
     profile = plan_endless(0, 0, 1, curve_of(200, 20_000, 2500, 12_500))

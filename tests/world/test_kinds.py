@@ -80,6 +80,22 @@ def test_a_position_has_unit_and_address() -> None:
     assert [command.code for command in SHEETS["table"].commands if command.code == "M1_POS_ABS"] == ["M1_POS_ABS"]
 
 
+def test_a_configuration_file_as_a_form_has_the_units_of_the_controller() -> None:
+    form = MIC488.configuration_format
+    assert form is not None
+    text = "[Axis1]\nGear=50\nAcc=20\n"
+    assert form.form(text, "m.cfg", SHEETS["table"]).points["M2_ACC"] == 10.0  # at 100 pulses per mm
+    assert form.with_values(text, "m.cfg", {"Axis1.Acc": "30"}) == "[Axis1]\nGear=50\nAcc=30\n"
+    banks = {
+        name: setting.limits
+        for name in ("table", "old")
+        for section in form.form(text, "m.cfg", SHEETS[name]).sections
+        for setting in section.settings
+        if setting.name == "ProgBankToRun"
+    }
+    assert banks == {"table": Limits(0, 5), "old": Limits(0, 7)}
+
+
 def test_addresses_are_those_of_the_firmware() -> None:
     assert SHEETS["table"].point("USER_REG_SAVE").addresses != ()
     assert SHEETS["table"].point("DATA_TYPE").addresses != SHEETS["old"].point("DATA_TYPE").addresses

@@ -185,6 +185,18 @@ def test_frames_in_words() -> None:
     assert [text[15:22].strip() for text in words] == ["p", "p", "q", "q"]
 
 
+def test_frames_of_a_place_that_is_taken_again_are_those_of_its_new_kind() -> None:
+    there = world()
+    words = followed(there, "bus")
+    line = there.lines["bus"]
+    line.receive("p", rtu(READ_STATUS), there.now)
+    line.leave("p")
+    line.receive("q", rtu(READ_STATUS, 2), there.now)
+    line.connect("p", "tcp")
+    line.receive("p", tcp(ON, 2), there.now)
+    assert words[-1].endswith("unit 2: wrote USER_REGISTER 5 = 7")
+
+
 @pytest.mark.parametrize("kind", ["rtu", "tcp"])
 def test_whom_a_request_may_change(kind: str) -> None:
     """Reads change nothing, a write its controller; of all of them one to a unit that is not there, as a broadcast is."""
@@ -298,6 +310,25 @@ def test_writes_are_told_of_places_that_are_there_and_of_those_that_come(kind: s
     line.receive("early", framed(ON), there.now)
     line.receive("late", framed(ON), there.now)
     assert len(told) == 3
+
+
+def test_mic_23_writes_are_told_as_their_place_addresses_them() -> None:
+    """Unit 0 is every controller of a serial line, and over TCP, as 255, the only one."""
+    there = World.from_toml('[[line]]\nname = "bus"\nkind = "modbus"\n[[mic488]]\nname = "a"\nline = "bus"\n')
+    line, told = there.lines["bus"], list[LineWrite]()
+    writes = line_kinds()["modbus"].writes
+    assert writes is not None
+    writes(line, told.append)
+    for place, framed in (("rtu", rtu), ("tcp", tcp)):
+        line.connect(place, place)
+        for unit in (0, 255):
+            line.receive(place, framed(ON, unit), there.now)
+            there.run(for_="50 ms")
+    assert [(one.place, one.words) for one in told] == [
+        ("rtu", "broadcast: write USER_REGISTER 5 = 7"),
+        ("tcp", "unit 0: write USER_REGISTER 5 = 7"),
+        ("tcp", "unit 255: write USER_REGISTER 5 = 7"),
+    ]
 
 
 def test_ports_are_served_by_what_is_put_around_the_controllers_but_not_those_of_scripts() -> None:

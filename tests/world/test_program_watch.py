@@ -54,6 +54,21 @@ def test_delays_registers_outputs_and_the_end() -> None:
     ]
 
 
+def test_what_a_statement_waits_for() -> None:
+    """Axes that are named, the input, and of WAITPOS those that move. That something looks on is no part of a state."""
+    world = World.from_toml(dedent(WORLD), {"first.prg": b"WAIT PosM2 = 9\n"}, name="w.toml")
+    watch = ProgramWatch(world.mic488["t"].device, world.parts.kernel_of["t"], "t")
+    assert watch.copy_state() == ()
+    taken = world.snapshot()
+    world.run(for_=0.1)
+    assert [event.text for event in watch.happened] == ["waits for M2"]
+    world.restore(taken)
+    assert [text for _, code, text, _ in reports("M1 = ON\nPABS M1 20\nWAITPOS\nWAIT IN3 = ON\n", 1.0) if code == "wait"] == [
+        "waits for M1",
+        "waits for IN3",
+    ]
+
+
 def test_motions_and_a_reset() -> None:
     """At 1000 imp/s²: 20 imp in 2·√0.02 s, 52 imp/s after 52 ms. What an axis does by itself is no statement's."""
     program = """\

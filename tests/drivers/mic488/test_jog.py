@@ -70,6 +70,12 @@ def test_a_killed_jog_leaves_an_axis_slower_and_the_next_one_tells() -> None:
         mic.axis(1).jog(10.0).__enter__()
     assert mic.get("M1_VMAX") == {"M1_VMAX": 5.0}
     assert not wire.moving()
+    # VMAX is a REAL: one step of its last place above it is rounding.
+    mic.axis(1).set_ramp(velocity=8)
+    with pytest.raises(NotReady, match="a jog of M1 at 8 mm/s is faster than its VMAX, 8 mm/s"):
+        mic.axis(1).jog(8 + 2.0**-19).__enter__()
+    with mic.axis(1).jog(8 + 2.0**-20) as jog:
+        assert jog.hold()
     mic.axis(1).set_ramp(velocity=10.1)
     with mic.axis(1).jog(-10.1) as jog:
         assert jog.hold()
