@@ -77,7 +77,7 @@ def test_a_position_bank_holds_227_rows() -> None:
     device = programmed("END\n").device
     rows = tuple(PositionRow(f"P{number}", (1, None, None, None)) for number in range(228))
     device.load_positions(0, PositionTable(rows[:227]))
-    with pytest.raises(Misuse, match="^228 positions: a bank holds 227$"):
+    with pytest.raises(Misuse, match=r"^228 positions: a bank holds 227$"):
         device.load_positions(0, PositionTable(rows))
     assert len(device.program.banks.positions[0].rows) == 227
 
