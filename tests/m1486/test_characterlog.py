@@ -115,3 +115,14 @@ def test_characters_without_cr_are_shown_when_they_are_too_many() -> None:
     assert [(line.time, line.raw, line.meaning) for line in lines] == [(2, b"a" * 257, "257 characters without CR")]
     splitter.take(b"r\r", 3)
     assert lines[1].raw == b"r\r"
+
+
+def test_of_bytes_that_never_come_the_last_1000_are_awaited() -> None:
+    log, lines = logged()
+    for byte in (1, 2):
+        log.upload(1, byte)
+    for _ in range(999):
+        log.upload(2, 3)
+    for byte in (1, 2):
+        log.sent(0, byte)
+    assert [line.meaning.split(" ")[0] for line in lines] == ["echo", "U1"]

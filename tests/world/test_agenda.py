@@ -169,3 +169,14 @@ def test_outdated_entries_do_not_pile_up() -> None:
         agenda.wait(script, due)
         assert len(agenda._timed.entries) < 100
     assert (agenda.take_timed(999), agenda.take_timed(999), agenda.take_timed(999)) == (other, script, None)
+
+
+def test_outdated_entries_are_removed_when_they_are_as_many_as_the_others() -> None:
+    agenda: Any = Agenda()
+    scripts, lengths = [Waiter(number) for number in range(65)], []
+    for script in scripts:
+        agenda.wait(script, 1)
+    for moment in range(2, 132):
+        agenda.wait(scripts[0], moment)
+        lengths.append(len(agenda._timed.entries))
+    assert lengths == [*range(66, 195), 65]

@@ -457,3 +457,13 @@ def test_an_input_that_its_machine_changes_is_recorded_once_and_so_is_what_drive
         kernel.drive(target, level)
         kernel.advance(7)
     assert [(record.time, record.value) for record in found if record.subject == "A"] == [(0, 1.0), (5, 0.0), (7, 1.0)]
+
+
+def test_a_snapshot_has_what_a_change_leads_to() -> None:
+    kernel = Kernel()
+    for name in ("a", "b"):
+        kernel.add(name, Relay())
+    kernel.connect(wire("a.B", "b.A"))
+    kernel.settle()
+    kernel.machines["a"].set_pin("A", 1.0, 0)
+    assert kernel.snapshot().levels == {PinName("b", "A"): 0.0}

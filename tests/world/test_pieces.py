@@ -187,18 +187,18 @@ programs = ["a.prg", "../b.prg"]
 [[use]]
 name = "arm"
 file = "parts/arm.toml"
-with = { on = "c", height = "{size}" }
+with = { host = "c", height = "{size}" }
 [[event]]
 when = "arm_x.position > {size}"
 steps = [{ note = "c" }, { move = "c.M1", to = 3 }]
 """,
         "cells/parts/arm.toml": """
 [parameters]
-on = {}
+host = {}
 height = 1
 [[axis]]
 name = "x"
-drive = "{on}.M1"
+drive = "{host}.M1"
 pulses_per_unit = 10
 start = "{height}"
 """,
@@ -213,7 +213,7 @@ start = "{height}"
     assert [name for name, _ in spec.files()][:2] == ["cells/cell.toml", "cells/parts/arm.toml"]
     broken = files | {"cells/parts/arm.toml": files["cells/parts/arm.toml"].replace("height = 1", "")}
     found = wrong(text, broken)
-    assert "cells/cell.toml:11:20: error D004: cells/parts/arm.toml has no parameter 'height'" in found
+    assert "cells/cell.toml:11:22: error D004: cells/parts/arm.toml has no parameter 'height'" in found
     assert "used in m.toml:1" in found
     broken = files | {"cells/parts/arm.toml": files["cells/parts/arm.toml"].replace("_unit = 10", "_unit = -1")}
     assert "cells/parts/arm.toml:8:1: error D003" in (found := wrong(text, broken))

@@ -50,3 +50,13 @@ def test_outdated_moments_are_removed_many_at_once() -> None:
     for moment in range(60):
         dues.put(0, moment)
     assert len(dues._entries) == 60
+
+
+def test_outdated_moments_are_removed_when_they_are_as_many_as_the_others() -> None:
+    dues, lengths = Dues(), []
+    for number in range(65):
+        dues.put(number, 1)
+    for moment in range(2, 132):
+        dues.put(0, moment)
+        lengths.append(len(dues._entries))
+    assert lengths == [*range(66, 195), 65]

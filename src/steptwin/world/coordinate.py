@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from math import ceil, floor, sqrt
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion.elastic import DriveStretch
 from steptwin.points import FARTHEST_NS
-from steptwin.world.elements.axis import BuiltAxis
 from steptwin.world.loadmotion import load_stretches
+
+if TYPE_CHECKING:
+    from steptwin.world.elements.axis import BuiltAxis
 
 PLACES = 10**6
 """Places of a unit: nanometres of a millimetre."""
@@ -67,7 +69,7 @@ class Coordinate:
             for axis, share, its in zip(self._axes, self._shares, self._pulled, strict=True)
             if its.held is None and share
         ]
-        begins = sorted({now, *(stretch.begin for _, stretches in moves for stretch in stretches if stretch.begin > now)})
+        begins = sorted({now, *(max(stretch.begin, now) for _, stretches in moves for stretch in stretches)})
         at = [0] * len(moves)
         for n, begin in enumerate(begins):
             end = begins[n + 1] if n + 1 < len(begins) else now + FARTHEST_NS

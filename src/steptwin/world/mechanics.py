@@ -87,7 +87,6 @@ class Mechanism(Stateful):
         "_due",
         "_falls",
         "_loose",
-        "_lost",
         "_reported",
         "_reported_course",
         "_rest_due",
@@ -116,7 +115,6 @@ class Mechanism(Stateful):
         """The hard stop against which the motor pushes, as reported: 1 upper, -1 lower, 0 neither."""
         self._stop_due: Nanos | None = None
         """When that changes next."""
-        self._lost = 0
         self._blockers: tuple[str, ...] = ()
         """What blocks the rotor."""
         self._brake = 0.0
@@ -263,8 +261,8 @@ class Mechanism(Stateful):
         before, plan = self._course, drive.plan
         if state is None:
             if self._simple:
-                here = self.build.sign * plan.count(now) + self.build.zero - self._lost
-                state = MechanicalState(here, here, behind=self._lost)
+                here = self.build.sign * plan.count(now) + self.build.zero
+                state = MechanicalState(here, here)
             else:
                 state = before.at(now)
                 # After power-off a controller counts from 0 again.
@@ -414,7 +412,6 @@ class Mechanism(Stateful):
             rotor = max(rotor, build.low - build.play)
         if build.high is not None:
             rotor = min(rotor, build.high)
-        self._lost += pulses
         self._simple = False
         behind = self.course(now).field(now) - rotor
         self._renew(self._drive, now, MechanicalState(rotor, min(max(load, rotor), rotor + build.play), stalled, behind))

@@ -202,7 +202,7 @@ class _Instance:
 
     def _refers(self, path: Path, key: str) -> bool:
         """Whether the value of a key names something in the piece."""
-        return len(path) > 1 and (key in self._referring or path[-1] == WITH or key == "clear_fault")
+        return key in self._referring or path[-1] == WITH or key == "clear_fault"
 
     @staticmethod
     def _gives_name(path: Path) -> bool:

@@ -9,6 +9,7 @@ from world_rig import check_it_can_be_restored
 
 from steptwin.files.world import World
 from steptwin.machine import SECOND
+from steptwin.world.elements.follower import FOLLOWER
 from steptwin.world.reader import WorldError
 
 TEXT = """
@@ -217,3 +218,14 @@ def test_a_cam_that_wears_at_rest_changes_switches_at_once() -> None:
     world.clear_fault("worn")
     world.settle_all()
     assert edges(world, "knife.switch1")[-1] == (now, 1)
+
+
+@pytest.mark.parametrize(
+    ("share", "place"), [(1.0, 12_000_000), (0.5, 6_000_000), (0.3333332, 3_999_998), (0.3333333, 4_000_000)]
+)
+def test_its_place_is_the_nearest_also_where_its_cam_is_worn(share: float, place: int) -> None:
+    """It stands at 12 mm. 12 · 0.3333332 mm are 3999998.4 nm, 12 · 0.3333333 mm 3999999.6 nm."""
+    world = World.from_toml(TEXT.replace("offset = 20.0", "offset = 120.0"))
+    world.fault(f"worn-cam element=knife share={share}")
+    world.run(for_=0.1)
+    assert world.parts.built(FOLLOWER)["knife"].place(world.now) == place

@@ -7,6 +7,7 @@ from array import array
 
 import pytest
 from fault_rig import ANSWER, READ, FaultRig, rtu
+from toy import Bare, ToyBody
 
 from steptwin.errors import Misuse
 from steptwin.files.world import World
@@ -16,7 +17,7 @@ from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.status import AxisStatus
 from steptwin.world import script as do
 from steptwin.world.contacts import PositionSwitch, place
-from steptwin.world.faults import Faults, read, rig
+from steptwin.world.faults import Faults, FaultyMachine, read, rig
 from steptwin.world.kernel import Kernel
 from steptwin.world.kinds.mic488.faults import Mic488Body
 from steptwin.world.wires import PinName
@@ -466,3 +467,55 @@ def test_an_edge_that_a_fault_makes_is_recorded_once(kind: str, line: str, pin: 
     world.run(for_=2.0)
     edges = [(record.time, record.value) for record in world.trace.edges("a") if record.subject == pin]
     assert edges == [(SECOND // 2, held), (SECOND, free)]
+
+
+class Heard(Bare):
+    """Tells what it is asked for; it is due every 300 ms, but nothing that others could see changes."""
+
+    __slots__ = ("asked",)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.asked: list[tuple[str, int]] = []
+
+    def advance(self, now: Nanos) -> None:
+        super().advance(now)
+        self.asked.append(("advance", now // MILLISECOND))
+
+    def advance_to_change(self, until: Nanos) -> Nanos:
+        self.asked.append(("look", until))
+        return until
+
+    def deadline(self) -> Nanos:
+        return self.now + 300 * MILLISECOND
+
+    def power_off(self, now: Nanos) -> None:
+        self.asked.append(("off", now // MILLISECOND))
+
+    def power_cycle(self, now: Nanos) -> None:
+        self.asked.append(("on", now // MILLISECOND))
+
+
+def faulty(fault: str) -> tuple[Heard, FaultyMachine]:
+    kernel, faults, inner = Kernel(), Faults(0), Heard()
+    kernel.add("a", inner)
+    machine = rig(kernel, "a", faults, ToyBody())
+    faults.add(read(fault), 0)
+    inner.asked.clear()
+    return inner, machine
+
+
+def test_a_machine_comes_to_the_moment_of_a_fault_before_the_fault_acts() -> None:
+    inner, machine = faulty("supply-drop at_s=1 for_s=0.5")
+    machine.advance(2 * SECOND)
+    assert inner.asked == [("advance", 1000), ("off", 1000), ("advance", 1500), ("on", 1500), ("advance", 2000)]
+
+
+def test_a_machine_looks_ahead_no_further_than_to_a_fault() -> None:
+    inner, machine = faulty("supply-drop at_s=1 for_s=0.5")
+    machine.advance(SECOND // 2)
+    for until in (SECOND - 1, SECOND, 2 * SECOND):
+        assert machine.advance_to_change(until) < SECOND
+    assert all(moment < SECOND for what, moment in inner.asked if what == "look")
+    machine.advance(SECOND - 1)
+    assert machine.advance_to_change(2 * SECOND) == SECOND
