@@ -158,13 +158,9 @@ class Mechanism(Stateful):
         """The course at ``now``, which is the kernel's moment or later. What is looked at in advance changes nothing: a course is
         renewed at the kernel's moment."""
         drive = self._drive
-        if drive.revision != self._revision or (self._loose is not None and self._is_switched(drive, self._kernel.now)):
+        if drive.revision != self._revision or (self._loose is not None and self._loose.is_switched(drive, self._kernel.now)):
             self._renew(drive, self._kernel.now)
         return self._course
-
-    def _is_switched(self, drive: Drive, now: Nanos) -> bool:
-        """Whether the field begins or ceases to hold the rotor, or may."""
-        return self._loose is not None and self._loose.is_switched(drive, now)
 
     def at(self, now: Nanos) -> MechanicalState:
         return self.course(now).at(now)
@@ -188,7 +184,7 @@ class Mechanism(Stateful):
     def update(self, now: Nanos) -> None:
         if not self._simple:
             drive = self._drive
-            if drive.revision != self._revision or self._is_switched(drive, now):
+            if drive.revision != self._revision or (self._loose is not None and self._loose.is_switched(drive, now)):
                 self._renew(drive, now)
                 self._kernel.mark(self.machine)  # switches on it look ahead
             elif self._due is not None and self._due <= now:
