@@ -347,3 +347,27 @@ def test_ports_are_served_by_what_is_put_around_the_controllers_but_not_those_of
     assert [data for _, data in after.take(there.now)] == [tcp(OFF, 9)]
     assert [data for _, data in rtu_after.take(there.now)] == [rtu(OFF, 9)]
     assert scripts.take(there.now) == []  # its master has it
+
+
+def test_the_wire_of_chips_is_restored_with_their_world() -> None:
+    """M-33: a character that begins while another is on the wire is lost and counted."""
+    text = '[[line]]\nname = "chips"\nkind = "m1486"\ntiming = "real"\n' + "".join(
+        f'[[m1486]]\nname = "c{n}"\nline = "chips"\naddress = {n}\n' for n in (1, 2)
+    )
+    there = World.from_toml(text)
+    line = there.lines["chips"]
+    place = line.connect("p")
+    snapshot = there.snapshot()
+
+    def answers() -> tuple[bytes, int]:
+        for chip, after in (("c1", 0), ("c2", MILLISECOND)):
+            there.run_to(there.now + after)
+            there.m1486[chip].chip.receive(b"u20\r", there.now)
+        there.run(for_="100 ms")
+        return b"".join(data for _, data in place.take(there.now)), line.traffic.errors
+
+    first = answers()
+    assert first == (b"B", 1)
+    there.restore(snapshot)
+    assert line.traffic.errors == 0
+    assert answers() == first

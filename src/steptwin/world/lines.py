@@ -347,7 +347,6 @@ class Line(Stateful, ABC):
 
     def set_state(self, plain: Plain) -> None:
         own, places, busy = plain
-        super().set_state(own)
         kept = {name for name, *_ in places}
         for name in [name for name in self.places if name not in kept]:
             self.leave(name)
@@ -356,6 +355,7 @@ class Line(Stateful, ABC):
             place.set_state(state)
             place.port.set_state(faulty)
             self._set_port_state(place, port_state)
+        super().set_state(own)  # at last: who connects may collect what is on the wire
         self._busy = {name: self.places[name] for name in busy}  # in their order, which is that of simultaneous answers
 
     def _port_state(self, place: LineEndPoint) -> Plain:

@@ -70,12 +70,10 @@ class ChipLine(Line):
             super()._came(place, found, pieces)
 
     def _port_state(self, place: LineEndPoint) -> Plain:
-        return self.chain.copy_state(), tuple(place.inner.pending)
+        return tuple(place.inner.pending)
 
     def _set_port_state(self, place: LineEndPoint, state: Plain) -> None:
-        chain, pending = state
-        self.chain.set_state(chain)
-        place.inner.pending = list(pending)
+        place.inner.pending = list(state)
 
 
 def make(spec: LineSpec, members: Sequence[Member], kernel: Kernel, record: RecordSink, faults: Faults) -> ChipLine:
