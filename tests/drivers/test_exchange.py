@@ -306,6 +306,26 @@ def test_an_exchange_of_several_steps_is_paced_and_has_its_time_anew() -> None:
     assert job.result() == "one!"
 
 
+@pytest.mark.parametrize("is_withdrawn", [True, False])
+def test_an_exchange_that_is_not_allowed_any_more_ends_between_its_steps(is_withdrawn: bool) -> None:
+    e = engine()
+    allowed = [True]
+    job = submit(e, "one", permission=Permission(lambda: 0, 1, lambda: not allowed[0]))
+    e.step(0)
+    e.receive(b"one+", 1)
+    if is_withdrawn:
+        e.withdraw(job)
+    else:
+        allowed[0] = False
+    assert e.step(1) == b""
+    assert (e.in_flight, e.busy, e.deadline(), e.discipline.abandoned) == (False, False, None, 1)  # type: ignore[attr-defined]
+    if not is_withdrawn:
+        with pytest.raises(Overtaken, match="'device a: one' was not sent"):
+            job.result()
+    submit(e, "two")
+    assert e.step(2) == b"two"
+
+
 @pytest.mark.parametrize("may_wait", [True, False])
 def test_between_steps_an_urgent_job_passes_where_that_is_possible(may_wait: bool) -> None:
     e = engine()

@@ -241,6 +241,20 @@ def test_an_adapter_that_echoes_is_noticed_at_the_first_read() -> None:
     assert master.receive(stop.rtu_frame, 4) == stop.pdu
 
 
+def test_what_looks_like_a_refusal_in_an_echo_that_is_not_whole_is_none() -> None:
+    """Values of registers with the bytes of an exception."""
+    values = exception(0x10, 2) + b"\0"
+    write = WriteRegistersRequest(1, tuple(int.from_bytes(values[n : n + 2], "big") for n in (0, 2, 4)))
+    master = asked()
+    master.receive(ModbusQuery(1, POSITION).rtu_frame + registers(1, 2), 1)
+    assert master.echo
+    query = ModbusQuery(1, write)
+    master.start(query, 2, urgent=False)
+    for byte in query.rtu_frame:
+        assert master.receive(bytes((byte,)), 3) is None
+    assert master.receive(rtu.encode_frame(1, bytes.fromhex("10 00 01 00 03")), 4) == bytes.fromhex("10 00 01 00 03")
+
+
 def test_without_echo_the_answer_of_a_write_is_its_answer() -> None:
     master = asked(WriteCoilRequest(2004, True))
     assert master.receive(ModbusQuery(1, WriteCoilRequest(2004, True)).rtu_frame, 1) is not None

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import os
 import socket
 import threading
 import time
 from collections.abc import Callable
+from typing import Any, NoReturn, cast
 
 import pytest
 
 from steptwin.drivers import LineLost, tcp
-from steptwin.drivers.place import SerialEndpoint, parse_line_address
+from steptwin.drivers.place import SerialChannel, SerialEndpoint, parse_line_address
 from steptwin.drivers.tcp import SocketChannel, TcpEndpoint, TimedSocketChannel
 from steptwin.errors import Misuse
 from steptwin.wire.line import SerialLine
@@ -153,6 +155,52 @@ def test_a_port_is_read_with_a_time_out() -> None:
         channel.close()
     finally:
         os.close(slave)
+
+
+def test_a_port_that_fails_in_any_way_is_lost() -> None:
+    """Platforms raise different errors. A time-out is never negative."""
+    waited: list[float] = []
+
+    class Port:
+        def write(self, data: bytes, timeout: float) -> NoReturn:
+            raise OSError(errno.EIO, "Input/output error")
+
+        def readinto(self, buffer: bytearray, timeout: float) -> NoReturn:
+            waited.append(timeout)
+            raise ValueError("the device sends nonsense")
+
+    channel: Any = SerialChannel(cast(Any, Port()), "COM3")
+    with pytest.raises(LineLost, match=r"^serial port COM3 was lost: .*input/output error"):
+        channel.write(b"x")
+    for timeout_s in (0.5, -1.0):
+        with pytest.raises(LineLost, match=r"^serial port COM3 was lost: the device sends nonsense"):
+            channel.read(timeout_s)
+    assert waited == [0.5, 0.0]
+
+
+def test_a_socket_with_a_time_out_waits_only_to_read() -> None:
+    """As on Windows: what is sent does not wait, and a time-out is never negative."""
+    waits: list[float] = []
+
+    class Socket:
+        def setsockopt(self, *options: int) -> None: ...
+        def setblocking(self, flag: bool) -> None: ...
+        def settimeout(self, seconds: float) -> None:
+            waits.append(seconds)
+
+        def send(self, data: bytes) -> int:
+            return len(data)
+
+        def recv(self, most: int) -> bytes:
+            return b"x" if waits[-1] else b""
+
+    channel = TimedSocketChannel(cast(Any, Socket()), "tcp://h:1")
+    channel.write(b"ask")
+    assert channel.read(2.5) == b"x"
+    for timeout_s in (0.0, -1.0):
+        with pytest.raises(LineLost):
+            channel.read(timeout_s)
+    assert waits == [0.0, 2.5, 0.0, 0.0]
 
 
 def test_a_port_is_used_by_tasks() -> None:

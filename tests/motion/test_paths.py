@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from steptwin.errors import Misuse
 from steptwin.motion import MotionState, Profile, plan_position, plan_stop
 from steptwin.motion.paths import Arc, ArcProfile, Circular, Straight, arc_between, circle
+from steptwin.motion.profile import cruise
 from steptwin.motion.pulses import positions, pulse_runs, pulse_times, velocities
 
 
@@ -376,3 +377,13 @@ def test_an_axis_along_a_line_that_stops_under_way_stops_with_it() -> None:
     assert profile.position(now) == pytest.approx(course.position(way.position(now)))
     still = Straight(7.5, 0.0).profile(stop, 8, None)
     assert (still.end, still.position(now), still.count(now)) == (now, 7.5, 8)
+
+
+@pytest.mark.parametrize("turn_q", [0.01, -0.01])
+@pytest.mark.parametrize("length", [100.0, 150.0, 250.0, 350.0])
+def test_a_rest_at_the_end_of_a_way_keeps_the_direction_and_takes_its_time(turn_q: float, length: float) -> None:
+    """Half a second at the same place of a circle, in the same half of it as the stretch before."""
+    way = Profile(0, 0, (cruise(0.0, 1.0, 0.0, length), cruise(1.0, 1.5, length, 0.0)), length)
+    before, last = Circular(0.0, 1000.0, 0.3, turn_q).profile(way, 0, None).segments[-2:]
+    assert (before.end_s, last.end_s) == (1.0, 1.5)
+    assert (last.direction, last.half) == (before.direction, before.half)

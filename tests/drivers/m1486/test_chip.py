@@ -14,6 +14,7 @@ from steptwin.drivers.m1486.lines import TALK
 from steptwin.drivers.m1486.talk import INVALID_COMMAND, ChipRequest
 from steptwin.errors import LineFailure, Misuse
 from steptwin.m1486.lines import DUAL_DAC
+from steptwin.m1486.variants import variant
 from steptwin.machine import SECOND
 
 
@@ -40,6 +41,28 @@ def test_another_type_than_expected_is_refused() -> None:
     with pytest.raises(WrongType, match="the chip reports that it is an M1486B, not M1486A"):
         chip_driver(ChipWire("B"), variant="A")
     assert chip_driver(ChipWire("B2x"), variant="B2x").variant.clock == 2
+
+
+def test_a_chip_that_could_not_be_opened_is_what_it_was_before() -> None:
+    """On a line that stays open: a type that was named wrongly is forgotten, one that was found stays."""
+    wire = ChipWire("B", (7,))
+    line = chip_line(wire)
+    with pytest.raises(WrongType):
+        M1486(line, 7, variant="A").open()
+    chip = M1486(line, 7)
+    chip.open()
+    chip.run(1)
+    with pytest.raises(Busy):
+        M1486(line, 7).open()
+    assert chip.variant.name == "B"
+    wire.chip.variant = variant("C")  # another chip in its place
+    chip.stop()
+    wire.sleep(2.0)
+    other = M1486(line, 7)
+    with pytest.raises(WrongType):
+        other.open()
+    other.open()
+    assert other.variant.name == "C"
 
 
 def test_reading() -> None:

@@ -148,6 +148,18 @@ def test_a_command_that_finds_no_room_is_refused(talk: Talk) -> None:
     assert told == "'v500' found no room (5EH): the chip moves, waits or is held. 'wait' before it waits for that"
 
 
+def test_a_wait_that_finds_no_room_is_refused(talk: Talk) -> None:
+    talk("g+")
+    talk("r")
+    for _ in range(20):
+        try:
+            talk("v500")
+        except Refusal:
+            break
+    with pytest.raises(Refusal, match=r"^'wait 5': u20 found no room \(5EH\): the chip moves, waits or is held$"):
+        talk("wait 5")
+
+
 def test_the_line_is_closed_when_its_preparation_is_interrupted(talk: Talk, monkeypatch: pytest.MonkeyPatch) -> None:
     closed = 0
 

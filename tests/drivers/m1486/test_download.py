@@ -13,6 +13,7 @@ from steptwin.drivers.m1486 import (
     ChipMoveFailed,
     ChipReason,
     ChipSettings,
+    FileGivenUp,
     NoRoom,
 )
 from steptwin.drivers.m1486.settings import after_reset
@@ -153,6 +154,19 @@ def test_a_program_is_not_typed_into_a_chip_that_moves() -> None:
     with pytest.raises(Busy):
         chip.download("t80")
     assert "t80" not in typed(wire)
+
+
+def test_a_file_that_cannot_be_given_up_either_is_told() -> None:
+    """The cable comes off while it is typed: then it cannot be reset."""
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+
+    def sever(data: bytes) -> None:
+        wire.severed |= b"f640" in data
+
+    wire.before_each = sever
+    with pytest.raises(FileGivenUp, match=r"could not be typed \(.*f640.*\), and the chip not be reset \(.*\): it still waits"):
+        chip.download("[\nt80\nf640\nr\n]")
 
 
 def test_a_byte_that_came_in_time_is_taken_at_the_end_of_the_time() -> None:

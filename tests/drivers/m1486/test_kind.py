@@ -12,6 +12,7 @@ from line_rig import at_every_address, run_virtual
 from steptwin.drivers.exchange import LineLost
 from steptwin.drivers.kind import DeviceAddress, DeviceMotion, EndedMotion, FoundDevice, WantedMoves
 from steptwin.drivers.m1486 import kind
+from steptwin.drivers.m1486.failures import WrongType
 from steptwin.drivers.m1486.jog import LINK_S
 from steptwin.drivers.m1486.kind import LOST, M1486_DRIVER
 from steptwin.drivers.m1486.sync import M1486
@@ -126,6 +127,20 @@ def test_a_jog_that_others_end_is_not_ok() -> None:
     assert end.reason != "released"
 
 
+def test_a_jog_that_limit_holds_is_not_ok_and_no_error() -> None:
+    """Function 51 OFF: the chip does not answer as long as LIMIT is low. V is not known, so it is not put back."""
+    wire = ChipWire(addresses=(7,))
+    chip = chip_driver(wire, 7)
+    chip.command("c51")
+    assert M1486_DRIVER.jog is not None
+    jog = M1486_DRIVER.jog(chip, 1, 400.0, 0.3)
+    with jog:
+        assert jog.hold()
+        wire.chip.set_pin("LIMIT", 0, wire.now)
+    end = jog.ended()
+    assert (end.ok, end.is_overdue) == (False, True)
+
+
 def test_an_end_that_does_not_come_in_time_is_overdue() -> None:
     wire = ChipWire(addresses=(7,))
     chip = ready(wire)
@@ -212,6 +227,8 @@ def test_a_chip_as_a_subject(monkeypatch: pytest.MonkeyPatch) -> None:
         line = connect("memory", 4800)
         await line.open()
         try:
+            with pytest.raises(WrongType, match="reports that it is an M1486C, not M1486B"):
+                await part_of(replace(ADDRESS, variant="B"), line)
             part = await part_of(replace(ADDRESS, variant=None), line)
             with pytest.raises(Refusal) as refused:
                 await part.twin("beside")

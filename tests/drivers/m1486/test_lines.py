@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from chip_rig import BAUD, ChipWire, Fault, chip_line, chip_task_line
-from line_rig import MemoryEndpoint, in_threads, run_virtual
+from line_rig import MemoryEndpoint, at_every_address, in_threads, run_virtual
 
 from steptwin.drivers import Overtaken
 from steptwin.drivers.blocking import finish
@@ -355,6 +355,22 @@ def test_waiting_for_the_line_is_no_suspension() -> None:
 
     run_virtual(wire, main())
     assert (wire.true(0), wire.true(7)) == (640, 640)
+
+
+@pytest.mark.parametrize("is_shared", [True, False])
+def test_a_driver_for_tasks_closes_the_line_of_its_own_only(monkeypatch: pytest.MonkeyPatch, is_shared: bool) -> None:
+    wire = ChipWire("B", (7,))
+    at_every_address(monkeypatch, wire)
+
+    async def main() -> bool:
+        line = chip_task_line(wire) if is_shared else AsyncM1486Line("memory")
+        async with AsyncM1486(line if is_shared else "memory", 7) as chip:
+            transport = chip.line._transport  # type: ignore[attr-defined]
+        closed = transport.is_closing()
+        await line.close()
+        return bool(closed)
+
+    assert run_virtual(wire, main()) is not is_shared
 
 
 @pytest.mark.parametrize("make", [AsyncM1486Line, ThreadM1486Line, partial(SearchLine, baud=4800)])

@@ -135,6 +135,14 @@ def test_a_query_that_found_no_room_is_not_waited_for() -> None:
     terminal.close()
 
 
+def test_no_upload_is_waited_for_where_a_later_line_found_no_room() -> None:
+    """The chip moves: it neither uploads nor takes more."""
+    scene = Scene((0, "u1"), (10, b"u1\r"), (300, "r"), (310, b"^^"), (600, lambda scene: None))
+    assert scene.terminal.settle(0.0) == 2
+    with pytest.raises(LineFailure, match="no answer to U within 0 s"):
+        Scene((0, "u1"), (10, b"u1\r"), (600, lambda scene: None)).terminal.settle(0.0)
+
+
 def test_what_found_no_room_is_not_counted_against_later_lines() -> None:
     """A query that was refused is not answered either."""
     wire = Wire(u1=b"^^^", u2=b"\x05")

@@ -102,7 +102,9 @@ def test_two_recordings() -> None:
     assert differences(one, recorded(wire)) == []
     slow = [dataclasses.replace(step, at_s=step.at_s + 2.0 * (n == 4)) for n, step in enumerate(one)]
     assert differences(one, slow) == []
-    assert [d.what for d in differences(one, slow, time_s=1.0)] == ["time in s"]
+    (found,) = differences(one, slow, time_s=1.0)
+    assert (found.step, found.line, found.what) == (5, one[4].line, "time in s")
+    assert (found.one, found.two) == (one[4].at_s, slow[4].at_s)
     other = list(one)
     other[2] = SessionStep("wait M1", 0.0, {"M1": {"reason": "stopped at limit R", "position": 7.99}})
     other[3] = SessionStep(one[3].line, 0.0, {"M1_STATUS": 4})

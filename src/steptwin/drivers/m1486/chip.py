@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import Self
 
 from steptwin.drivers.line import DriverLine
-from steptwin.drivers.m1486.failures import PositionUnknown
+from steptwin.drivers.m1486.failures import PositionUnknown, WrongType
 from steptwin.drivers.m1486.lines import BAUD, AsyncM1486Line
 from steptwin.drivers.m1486.settings import COMMANDS, ChipSettings, checked_number
 from steptwin.drivers.m1486.talk import ChipRequest
@@ -103,14 +103,15 @@ class AsyncChip:
         """Open the line, switch on the echo of the chip and determine its type. Raises `NoEcho`, `Busy` while it moves,
         `WrongType`."""
         await self.line.open()
+        notes = self._unit.notes
+        before = notes.variant
         try:
             async with self._unit.turn():
-                if self._unit.notes.variant is None:
-                    self._unit.notes.variant = self._variant
+                if notes.variant is None:
+                    notes.variant = self._variant
                 await self._unit.look()
-        except BaseException:
-            if self._variant is None:
-                self._unit.notes.variant = None
+        except BaseException as error:
+            notes.variant = None if isinstance(error, WrongType) else before
             await self.close()
             raise
 
