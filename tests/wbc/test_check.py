@@ -29,10 +29,11 @@ def test_wbc_4_a_variable_read_above_its_assignment_is_known() -> None:
     assert codes("OUT1 = x\n") == ["W104"]
 
 
-def test_what_is_wrong_with_a_constant_is_told_once() -> None:
+@pytest.mark.parametrize(("value", "code"), [("nothing", "W141"), ("OUT99", "W140"), ("9" * 40, "W122")])
+def test_what_is_wrong_with_a_constant_is_told_once(value: str, code: str) -> None:
     """Not again where it is read or set."""
-    assert codes("#pump nothing\nOUT1 = pump\npump = 3\n") == codes("#pump nothing\n")
-    assert len(codes("#pump nothing\n")) == 1
+    assert codes(f"#pump {value}\n") == [code]
+    assert codes(f"#pump {value}\nOUT1 = pump\npump = 3\n") == [code]
 
 
 def test_wbc_7_short_delays_are_told() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 
 import pytest
@@ -9,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from steptwin.diagnostics import SourceText
+from steptwin.errors import Misuse
 from steptwin.wbc.dialect import MAX_POSITIONS
 from steptwin.wbc.positions import number_text, parse_positions, table_of
 
@@ -99,6 +101,14 @@ real = st.floats(width=32, allow_nan=False, allow_infinity=False)
 def test_values_survive_writing_and_reading(rows: list[tuple[float | None, ...]]) -> None:
     table = table_of([(f"P{n}", row) for n, row in enumerate(rows)])
     assert [row.values for row in parse_positions(table.text)[0].rows] == rows
+
+
+def test_what_no_table_can_hold_is_refused() -> None:
+    for value in (math.inf, -math.inf, math.nan):
+        with pytest.raises(Misuse, match=f"^{value} cannot be written as a number: permitted are finite numbers$"):
+            number_text(value)
+    with pytest.raises(Misuse, match=r"^'my pos' cannot be written after @$"):
+        table_of([("P0", (1, None, None, None)), ("my pos", (1, None, None, None)), ("P0", (1, None, None, None))])
 
 
 @given(real)

@@ -35,6 +35,8 @@ def found(text: str) -> list[str]:
         ("MOVEPTP @ 5 LEN", ["LEN CONSTANT READ"]),
         ("MOVEPTP @a @b", ["a POSITION READ", "b POSITION READ"]),
         ("//!record LEN", []),
+        ("SUB other\nJUMP other", ["other LABEL DEFINE", "other LABEL READ"]),
+        ("//!record " + "0a" * 16, []),
         ("SET $R0 = SQRT(LEN", ["$R0 REGISTER WRITE", "SQRT FUNCTION READ", "LEN CONSTANT READ"]),
     ],
 )

@@ -159,6 +159,23 @@ def test_a_broken_line_hides_no_other() -> None:
     assert [d.code for d in diagnostics] == ["W113", "W127"]
 
 
+def test_a_very_long_line_is_refused_without_looking_for_other_languages() -> None:
+    found = {
+        length: [(d.code, d.message) for d in parse("IF" + " " * (length - len("IF(IN1=1)")) + "(IN1=1)\nJUMP L:\n")[1]]
+        for length in (500, 501)
+    }
+    assert found[500][0] == ("W114", "a condition is written without parentheses")
+    assert found[501][0][0] == "W114"
+    assert found[501][0] != found[500][0]
+    assert [len(diagnostics) for diagnostics in found.values()] == [2, 2]
+
+
+def test_a_comment_that_is_no_record_is_a_comment() -> None:
+    program, diagnostics = parse("//! note\n//!recorded 00\n")
+    assert diagnostics == []
+    assert [(line.statement, line.comment is not None) for line in program.lines] == [(None, True)] * 2
+
+
 def test_lines_are_those_of_the_source() -> None:
     program, _ = parse("M1 = ON\r\n\r\n  // end\x0bM2 = ON\rM3 = ON")
     assert [line.start for line in program.lines] == [0, 9, 11, 28], "a vertical tab ends no line, as in editors"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from steptwin.errors import Misuse
+from steptwin.wbc import findings
 from steptwin.wbc.dialect import DEFAULT, DIALECTS, Dialect, dialect_for
 from steptwin.wbc.events import BY_LABEL, BY_REGISTER, EVENTS
 from steptwin.wbc.findings import FINDINGS
@@ -33,6 +34,12 @@ def test_registers_are_those_of_the_reference() -> None:
 
 def test_statements_are_those_of_the_reference() -> None:
     assert set(STATEMENTS) == set(STATEMENT_WORDS.split())
+
+
+def test_a_code_has_one_meaning() -> None:
+    with pytest.raises(ValueError, match=r"^code W101 is given twice$"):
+        findings._row("W101", "another")
+    assert FINDINGS["W101"] == findings.TRAILING
 
 
 def test_no_name_has_two_meanings() -> None:

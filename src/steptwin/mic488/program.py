@@ -273,13 +273,14 @@ class ProgramControl(Stateful):
             for event in sorted(event for event, at in ticks.items() if at <= now):
                 ticks[event] += EVENTS[event].period
                 interpreter.request_interrupt(code, event, now, now)
-        if interpreter.due is None or interpreter.due > now:
+        due = interpreter.due
+        if due is None or due > now:
             return acted
         for at in (*ticks.values(), *self._pulses.values()):
             until = min(until, at - 1)
         interpreter.acted = False
         try:
-            interpreter.run(code, max(until, now))
+            interpreter.run(code, due, max(until, now))
         except ProgramFault as fault:
             self._fail(str(fault))
         if interpreter.acted:

@@ -231,7 +231,7 @@ def _condition(line: ForeignLine) -> Advice | None:
     if row is None or len(words) < 2 or not row.operands or row.operands[0].kind is not OperandKind.CONDITION:
         return None
     if words[1].text == "(" and words[-1].text == ")":
-        inside = line.text(2, -2).strip() if len(words) > 3 else ""
+        inside = line.text(2, -2)
         fix = inside if line.reads(f"{key} {inside}") else None
         return _over(line, (1, len(words) - 1), "a condition is written without parentheses", f"write {row.usage}", fix)
     for look in (_negation, _unequal, _connected, _calculated, _incomplete):

@@ -15,6 +15,7 @@ from steptwin.tables import complete
 from steptwin.wbc import findings as f
 from steptwin.wbc import steps as s
 from steptwin.wbc.positions import PARAMETERS, PositionRow, PositionTable
+from steptwin.wbc.statements import HALTS, MOTIONS, ROW_MOTIONS
 from steptwin.wire.crc import crc16
 
 SLOTS = 1000
@@ -29,9 +30,16 @@ SIZE = POSITIONS_AT + 4
 SET, IF, ENDIF, ELSE, WHILE, ENDWHILE, WAIT, DELAY, JUMP, RETURN, ENTRY = range(1, 12)
 HOME, WAITPOS, MOVEPTP = 0x0E, 0x15, 0x16
 # WBC-40: by the order of the keywords in the vendor's tool, which fits every operation that was seen in an image.
-INFERRED_MOTIONS = {"VABS": 0x0F, "VREL": 0x10, "PABS": 0x11, "PREL": 0x12}
-INFERRED_HALTS = {"BRAKE": 0x13, "STOP": 0x14}
-INFERRED_ROW_MOTIONS = {"MOVELIN": 0x17, "MOVELIN_REL": 0x18, "MOVETOCIRC": 0x19, "DOCIRC": 0x1A, "DOARC": 0x1B}
+INFERRED_MOTIONS = complete(
+    "motion", MOTIONS - {"HOME"}, "code", {"VABS": 0x0F, "VREL": 0x10, "PABS": 0x11, "PREL": 0x12}
+)
+INFERRED_HALTS = complete("halt", HALTS, "code", {"BRAKE": 0x13, "STOP": 0x14})
+INFERRED_ROW_MOTIONS = complete(
+    "statement with a row",
+    ROW_MOTIONS - {"MOVEPTP"},
+    "code",
+    {"MOVELIN": 0x17, "MOVELIN_REL": 0x18, "MOVETOCIRC": 0x19, "DOCIRC": 0x1A, "DOARC": 0x1B},
+)
 INFERRED_PROGRESET = 0x1C
 
 WHOLE, FRACTION = 0xFE, 0xFF
@@ -160,8 +168,6 @@ class _Record:
         raise _NotEncodable(keyword)
 
     def _inferred(self, keyword: str, codes: Mapping[str, int]) -> int:
-        if keyword not in codes:
-            raise _NotEncodable(keyword)
         return self._infer(keyword, codes[keyword])
 
     def _infer(self, name: str, code: int) -> int:

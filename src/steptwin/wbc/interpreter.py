@@ -230,14 +230,11 @@ class Interpreter(Stateful):
         self.acted = True
         return self.controller
 
-    def run(self, code: Code, until: Nanos) -> None:
-        """Execute statements that are due, and further ones up to ``until`` as long as they concern the program alone.
+    def run(self, code: Code, now: Nanos, until: Nanos) -> None:
+        """Execute what is due at ``now``, and further statements up to ``until`` as long as they concern the program alone.
 
         A `ProgramFault` leaves ``pc`` at its statement.
         """
-        now = self.due
-        if now is None:
-            return
         if self._resting is not None:
             self._settle(self._resting, now)
         self.now = now
@@ -248,9 +245,6 @@ class Interpreter(Stateful):
             event = next((e for e in self._pending_events() if at_end or not code.entries[e].hard), None)
             if event is not None:
                 self._enter(code, event, now)
-        if now < self.not_before:
-            self.due = self.not_before
-            return
         if now != self._moment:
             self._moment = now
             self._spent = 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import cast
 
 from steptwin.diagnostics import Diagnostic, Severity
 from steptwin.nearmiss import NearMiss
@@ -165,12 +166,10 @@ class _Resolver:
             self._report(f.ALWAYS_FAILS.at(node, message, "the program stops here with an error"))
 
     def _comparison(self, node: OperandNode) -> s.StepCondition | None:
-        if not isinstance(node, Relation):
-            return None
-        left, right = self._scope.value(node.left, node.right), self._scope.value(node.right, node.left)
-        if left is None or right is None:
-            return None
-        return s.StepCondition(left, node.comparison, right)
+        relation = cast("Relation", node)  # as the row of the statement says
+        left = self._scope.value(relation.left, relation.right)
+        right = self._scope.value(relation.right, relation.left)
+        return None if left is None or right is None else s.StepCondition(left, relation.comparison, right)
 
     def _command(self, number: int, statement: KeywordStatement) -> s.ProgramStep | None:
         keyword = statement.keyword
@@ -230,9 +229,7 @@ class _Resolver:
         self._report(f.LONG_TIME.at(operand, message, hint, fix=fix))
 
     def _jump(self, number: int, statement: KeywordStatement) -> s.ProgramStep | None:
-        name = statement.operands[0]
-        if not isinstance(name, Identifier):
-            return None
+        name = cast("Identifier", statement.operands[0])  # as the row of the statement says
         target = self._outline.labels.get(name.key)
         if target is not None:
             return s.JumpStep(statement.start, statement.end, target)

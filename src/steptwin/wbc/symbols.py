@@ -66,8 +66,6 @@ def of_statement(statement: StatementNode, scope: ProgramScope) -> Iterator[Use]
                     yield from _value(operand, scope)
         case Broken():
             yield from _broken(statement, scope)
-        case _:
-            return
 
 
 def _use(name: Identifier, kind: SymbolKind, role: SymbolRole = SymbolRole.READ) -> Use:
