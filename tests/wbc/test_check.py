@@ -36,6 +36,10 @@ def test_what_is_wrong_with_a_constant_is_told_once(value: str, code: str) -> No
     assert codes(f"#pump {value}\nOUT1 = pump\npump = 3\n") == [code]
 
 
+def test_a_variable_that_cannot_be_one_is_told_where_it_is_set_only() -> None:
+    assert codes("INT_IN1 = 3\nOUT1 = INT_IN1\n") == ["W103"]
+
+
 def test_wbc_7_short_delays_are_told() -> None:
     assert codes("DELAY 0.009\n") == ["W212"]
     assert codes("DELAY 0.01\n") == []
