@@ -60,6 +60,7 @@ def test_no_name_has_two_meanings() -> None:
         ("CFGINT_IN8", "CFGINT_IN", 8),
         ("XENC1", "XENC", 1),
         ("OUT99", "OUT", 99),
+        ("$I999999999", "$I", 999_999_999),
         ("LIMRM4", "LIMRM", 4),
     ],
 )

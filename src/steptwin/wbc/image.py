@@ -30,9 +30,7 @@ SIZE = POSITIONS_AT + 4
 SET, IF, ENDIF, ELSE, WHILE, ENDWHILE, WAIT, DELAY, JUMP, RETURN, ENTRY = range(1, 12)
 HOME, WAITPOS, MOVEPTP = 0x0E, 0x15, 0x16
 # WBC-40: by the order of the keywords in the vendor's tool, which fits every operation that was seen in an image.
-INFERRED_MOTIONS = complete(
-    "motion", MOTIONS - {"HOME"}, "code", {"VABS": 0x0F, "VREL": 0x10, "PABS": 0x11, "PREL": 0x12}
-)
+INFERRED_MOTIONS = complete("motion", MOTIONS - {"HOME"}, "code", {"VABS": 0x0F, "VREL": 0x10, "PABS": 0x11, "PREL": 0x12})
 INFERRED_HALTS = complete("halt", HALTS, "code", {"BRAKE": 0x13, "STOP": 0x14})
 INFERRED_ROW_MOTIONS = complete(
     "statement with a row",
