@@ -10,6 +10,7 @@ from steptwin.m1486.commands import (
     When,
     argument_bits,
     find,
+    grouped,
     memory_bits,
     permitted_text,
     rows,
@@ -175,6 +176,7 @@ def test_permitted_numbers_in_words() -> None:
     assert permitted_text("M", a) == "1, 2, 4, 8, 16, 32, 64"
     assert permitted_text("X", variant("E1")) == "1 to F"
     assert permitted_text("R", a) == "nothing"
+    assert [grouped(number) for number in (9_999, 10_000)] == ["9999", "10 000"]
     assert permitted_text("C", a) == (
         "1 to 21 (line), 40 to 63 (function), 75 (Clear kill), 80 to 86 (flag), 100 (Clear position counter)"
     )

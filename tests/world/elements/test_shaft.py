@@ -180,6 +180,7 @@ def test_snapshots_and_sessions_have_it(moment_s: float, tmp_path: Path) -> None
         ('axis = "x"', 'axis = "y"', "no axis is called 'y'"),
         ("until = 135", "until = 90", "t.toml:22.*the cam has no width"),
         ("until = 135", "until = 400", "permitted are numbers from 0 to 360"),
+        ("until = 135", "until = 135\nbounces = 3", "t.toml:23.*bounces means nothing without bounce"),
         ('to = "a.IN2"', 'to = "a.IN1"', "a.IN1 is driven already"),
         ("from = 90\nuntil = 135", "from = 0\nuntil = 360", "it must be shorter"),
     ],
