@@ -108,6 +108,24 @@ def test_questions_between_commands_come_when_the_buffer_may_be_full_and_not_bef
         assert held + len(following[0]) + 1 > room
 
 
+@pytest.mark.parametrize(
+    ("steps", "commands"),
+    [(150, "t80 c80 m1 m1"), (49, "[ m1 t80 m1 m1 ]")],
+    ids=["commands", "a file"],
+)
+def test_what_takes_one_of_the_last_places_of_the_buffer_is_followed_by_a_pause(steps: int, commands: str) -> None:
+    """In a loop, where nothing may be asked: 12 characters are all that an A holds while it moves. Characters that come back
+    inverted are no uploads."""
+    wire = ChipWire("A")
+    chip = chip_driver(wire)
+    chip.configure(**KNOWN)  # type: ignore[arg-type]
+    chip.download("\n".join(["l2", f"f{64 * steps}", "r", *commands.split(), "e"]))
+    assert chip._driver._unit.notes.uploads == b""
+    assert chip.wait().ok
+    assert wire.true() == 2 * 64 * steps
+    assert "wrong-data" not in wire.codes()
+
+
 def test_a_program_may_stop_the_motor_at_once() -> None:
     """K is not put behind what waits in the chip."""
     wire = ChipWire("B")

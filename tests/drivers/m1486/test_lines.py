@@ -6,6 +6,7 @@ import asyncio
 import socket
 from collections.abc import Callable
 from functools import partial
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -14,9 +15,19 @@ from line_rig import MemoryEndpoint, at_every_address, in_threads, run_virtual
 
 from steptwin.drivers import Overtaken
 from steptwin.drivers.blocking import finish
-from steptwin.drivers.m1486 import M1486, AsyncM1486, ChipReason, M1486Line, NoEcho, PositionUnknown, Restarted
+from steptwin.drivers.m1486 import (
+    M1486,
+    AsyncM1486,
+    ChipReason,
+    M1486Line,
+    NoEcho,
+    PositionUnknown,
+    Restarted,
+    watching,
+)
 from steptwin.drivers.m1486.identify import SearchLine, end_line, searching, select_all
 from steptwin.drivers.m1486.lines import AsyncM1486Line, ThreadM1486Line, in_words
+from steptwin.drivers.m1486.unit import SLICE_NS
 from steptwin.drivers.threads import ThreadLine
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, SECOND
@@ -323,6 +334,61 @@ def test_an_answer_that_is_lost_is_asked_for_again() -> None:
     assert [chip.wait().reason for chip in chips] == [ChipReason.TARGET] * 2
     assert wire.faults[0].met
     assert [chip.counter() for chip in chips] == [128_000] * 2
+
+
+def test_a_letter_too_many_is_not_that_of_the_next_move() -> None:
+    """A letter comes doubled, when the first of two moves ends; the other one ends a little later."""
+    wire = ChipWire("B", (0, 7))
+    chips = moving(wire, 1000.0, 1100.0)
+    motion = chips[0]._driver._unit.notes.motion
+    assert motion is not None
+    wire.sleep((motion.end - wire.now) / SECOND - 0.02)
+    wire.put(Fault("to host", len("x0|u20|"), "double"))
+    assert [chip.wait(check=False).reason for chip in chips] == [ChipReason.TARGET] * 2
+    assert wire.faults[0].met
+
+
+def test_a_watch_ends_at_its_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It looks every 20 ms: the second watch has its limit at a moment at which the first one looked."""
+    looks: list[int] = []
+    original = watching._Watch._waited_for
+
+    def noted(self: watching._Watch) -> list[watching._Mover]:
+        looks.append(self._own.line.now())
+        return original(self)
+
+    monkeypatch.setattr(watching._Watch, "_waited_for", noted)
+
+    def watched(limit: int | None = None) -> int:
+        wire = ChipWire("B", (0, 7))
+        unit = moving(wire, 1000.0, 1000.0)[0]._driver._unit
+        motion = unit.notes.motion
+        assert motion is not None
+        finish(watching.watch(unit, motion, motion.end if limit is None else limit))
+        return wire.now
+
+    watched()
+    limit = next(one for one, later in pairwise(looks) if later - one == SLICE_NS)
+    assert watched(limit) == limit
+
+
+def test_a_chip_that_was_reset_meanwhile_is_watched_no_more() -> None:
+    """A stop has found out so, while the watch asked another chip."""
+    wire = ChipWire("B", (0, 7))
+    chips = moving(wire, 1000.0, 1000.0)
+    motion, other = chips[0]._driver._unit.notes.motion, chips[1]._driver._unit.notes
+    assert motion is not None
+    wire.sleep((motion.end - wire.now) / SECOND - 0.02)  # both are to be asked now
+    asked: list[bytes] = []
+
+    def forget(data: bytes) -> None:
+        asked.append(data)
+        if data == b"u20":
+            other.forget()
+
+    wire.before_each = forget
+    assert chips[0].wait().reason is ChipReason.TARGET
+    assert b"x7" not in asked
 
 
 def test_trouble_with_one_chip_is_told_to_who_waits_for_it() -> None:

@@ -187,6 +187,12 @@ def test_inverted_characters_tell_that_the_buffer_is_nearly_full() -> None:
     line.say(None, "f")
     with pytest.raises(Garbled):
         line.hear(b"f" + inverted(ord("g")))
+    line = Line()
+    line.say(None, "+1")
+    assert line.hear(b"+1") == SendNext(b"\r", may_wait=False)
+    assert line.hear(inverted(ord("1"))) is None  # it comes behind the echo, after CR was sent
+    assert line.talk.nearly_full
+    assert line.hear(b"\r") == b""
 
 
 def test_5eh_says_that_there_was_no_room() -> None:

@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import Self
 
 from steptwin.drivers.line import DriverLine
-from steptwin.drivers.m1486.failures import PositionUnknown, WrongType
+from steptwin.drivers.m1486.failures import Busy, PositionUnknown, WrongType
 from steptwin.drivers.m1486.lines import BAUD, AsyncM1486Line
 from steptwin.drivers.m1486.settings import COMMANDS, ChipSettings, checked_number
 from steptwin.drivers.m1486.talk import ChipRequest
@@ -111,7 +111,8 @@ class AsyncChip:
                     notes.variant = self._variant
                 await self._unit.look()
         except BaseException as error:
-            notes.variant = None if isinstance(error, WrongType) else before
+            is_known = isinstance(error, Busy) or (self._variant is not None and not isinstance(error, WrongType))
+            notes.variant = before if is_known else None  # else there may be another chip now
             await self.close()
             raise
 

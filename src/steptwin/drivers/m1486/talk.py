@@ -254,7 +254,9 @@ class CharacterTalk:
             if len(self._echoed) == len(self._sent):
                 return self._came_back(request, rest, now)
             return None
-        if self._echoed and byte == ~self._echoed[-1] & 0xFF:
+        # The last character of a line may come back inverted after its CR has been sent.
+        last = self._echoed[-1:] or (self._lines[0][-1:] if self._sent == _END else b"")
+        if last and byte == ~last[0] & 0xFF:
             self.nearly_full = True
             return None
         if byte == NO_ROOM:
