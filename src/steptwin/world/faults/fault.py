@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 
 from steptwin.errors import Misuse
@@ -129,10 +130,8 @@ def read(line: str) -> Fault:
 def _value(parameter: Parameter, text: str) -> object:
     """A number where the text is one; everything else is for `check` to refuse."""
     if parameter.form in (ParameterForm.WHOLE, ParameterForm.NUMBER):
-        try:
+        with suppress(ValueError):
             return int(text, 0) if parameter.form is ParameterForm.WHOLE else float(text)
-        except ValueError:
-            return text
     return text
 
 
