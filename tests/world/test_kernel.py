@@ -176,8 +176,9 @@ def test_a_loop_with_a_delay_oscillates() -> None:
 
 def test_time_cannot_go_back() -> None:
     kernel = Kernel(100)
-    with pytest.raises(TimeReversal):
+    with pytest.raises(TimeReversal) as caught:
         kernel.advance(99)
+    assert caught.value.args == TimeReversal(100, 99).args
 
 
 def test_a_machine_joins_at_the_time_of_the_kernel() -> None:

@@ -371,3 +371,13 @@ def test_the_wire_of_chips_is_restored_with_their_world() -> None:
     there.restore(snapshot)
     assert line.traffic.errors == 0
     assert answers() == first
+
+
+def test_who_has_come_since_is_gone_where_a_line_goes_back() -> None:
+    line = world().lines["bus"]
+    line.connect("first")
+    before = line.copy_state()
+    line.connect("second")
+    line.set_state(before)
+    assert "first" in line.places
+    assert "second" not in line.places

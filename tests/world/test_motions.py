@@ -7,8 +7,11 @@ from pathlib import Path
 import pytest
 from world_rig import check_it_can_be_restored
 
+from steptwin.errors import Misuse
 from steptwin.files.world import World
 from steptwin.machine import SECOND
+from steptwin.world.control import Enable, Home
+from steptwin.world.motions import ordered
 from steptwin.world.reader import WorldError
 from steptwin.world.script import Send
 
@@ -310,3 +313,11 @@ def test_moves_of_a_chip_can_be_restored_anywhere(moment_s: float) -> None:
     other.restore(snapshot)
     other.run(until=5.0)
     assert other.trace.digest() == found.trace.digest()
+
+
+def test_commands_that_a_chip_does_not_know_are_refused() -> None:
+    world = World.from_toml('[[m1486]]\nname = "d"\n')
+    with pytest.raises(Misuse, match="'d' is an M1486, which has no command enable"):
+        ordered(world, Enable("d", 1, True))
+    with pytest.raises(Misuse, match="which does not know its switch: home it with seek"):
+        ordered(world, Home("d", 1, 1.0))

@@ -126,6 +126,7 @@ def test_findings_have_the_place_of_what_holds_them_and_no_more_words_than_anybo
     starts = [4, 4, 0, 10, 16, 10, 0, 0]
     assert [found.span.start for found in text.findings] == starts
     assert [found.span for found in text.findings[-2:]] == [Span(0, 0)] * 2
+    assert [text.line(path) for path in paths] == [2, 2, 1, 1, 4, 3, 1, 1]
     for length, shown in ((400, "x" * 400), (401, f"{'x' * 339}…{'x' * 60}")):
         text.wrong(("q",), "D003", "x" * length)
         assert text.findings[-1].message == shown

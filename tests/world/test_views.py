@@ -26,7 +26,8 @@ def test_names_that_are_not_there_are_misuse_with_those_that_are() -> None:
     with pytest.raises(Misuse, match="M1_POS_AB"):
         world.mic488["a"].write("M1_POS_AB", 1.0)
     assert "d" not in world.mic488
-    assert world.mic488.get("d") is None
+    assert (world.mic488.get("d"), world.mic488.get("d", 3)) == (None, 3)
+    assert world.mic488.get("a") is world.mic488["a"]
     assert [*world.mic488] == ["a", "b", "c"]
 
 

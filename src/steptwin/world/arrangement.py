@@ -6,6 +6,7 @@ import json
 import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 from steptwin.errors import Misuse, Refusal
@@ -84,10 +85,9 @@ def arranged(text: str, places: Sequence[DrawnPlace]) -> str:
 
 
 def _values(default: Mapping[str, Any], text: str) -> Mapping[str, Any] | None:
-    try:
+    with suppress(tomllib.TOMLDecodeError):
         return {**default, **tomllib.loads(text)}
-    except tomllib.TOMLDecodeError:
-        return None
+    return None
 
 
 def _without(lines: Iterable[str]) -> Iterator[str]:

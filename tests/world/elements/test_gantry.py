@@ -239,3 +239,9 @@ def test_its_beam_is_drawn_from_both_ends() -> None:
     assert end.spec.name == "ya"
     half = 1 / 1280
     assert lane == MovedLane("beam", "position", "mm", half, other=("b", "1"), other_per_pulse=-half)
+
+
+def test_there_may_be_several() -> None:
+    others = "".join(CONTROLLER.format(name=name, acc=400.0) for name in "cd")
+    second = GANTRY.replace("beam", "bridge").replace("ya", "yc").replace("yb", "yd").replace("a.OUT3", "c.OUT3")
+    assert list(World.from_toml(text() + others + second).parts.built(ELEMENT)) == ["beam", "bridge"]

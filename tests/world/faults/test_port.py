@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import pytest
 from fault_rig import ANSWER, ANSWER_PDU, READ, REQUEST, FaultRig, crc, rtu, tcp
 from hypothesis import given
@@ -152,7 +154,9 @@ def test_bytes_of_an_m1486_go_wrong_too() -> None:
 def test_a_chip_that_speaks_unasked_is_heard_through_the_faults() -> None:
     port, _ = characters("gap nth=1 for_ms=5")
     calls: list[str] = []
-    port.on_output = lambda: calls.append("output")
+    hook = partial(calls.append, "output")
+    port.on_output = hook
+    assert port.on_output == hook
     assert port.exchange(b"U20\r", 0) == b""
     assert calls == ["output"]
     assert port.deadline() == 5 * MILLISECOND
@@ -438,3 +442,13 @@ def test_a_stream_that_is_no_modbus_tcp_is_broken_behind_the_faults_too() -> Non
     rig.send(b"\0\1\0\1\0\2\1\3")
     rig.arrivals(0.1)
     assert rig.port.broken == "MBAP protocol 1 is not 0"
+
+
+def test_a_request_without_an_answer_has_none_any_more_once_a_later_one_is_answered() -> None:
+    """The first one reads register 99, the last one does not."""
+    rig = FaultRig("supply-drop machine=1 at_s=0 for_s=0.05", "wrong-unit address=99", units=(1, 2))
+    assert rig.ask() == b""
+    assert rig.ask(bytes.fromhex("03 00 05 00 01"), unit=2) == rtu(2, bytes.fromhex("03 02 00 00"))
+    rig.wait(0.1)
+    assert rig.ask(bytes.fromhex("03 00 64 00 01")) == rtu(1, bytes.fromhex("03 02 00 00"))
+    assert rig.ask() != rtu(1, bytes.fromhex("03 04 00 00 00 00"))
