@@ -468,3 +468,18 @@ def test_a_snapshot_has_what_a_change_leads_to() -> None:
     kernel.settle()
     kernel.machines["a"].set_pin("A", 1.0, 0)
     assert kernel.snapshot().levels == {PinName("b", "A"): 0.0}
+
+
+def test_who_looks_at_each_event_is_told_of_each() -> None:
+    """Of a machine alone, whose changes without an event matter."""
+    told: list[Nanos] = []
+    kernel, relay = Kernel(), Relay(10)
+    kernel.add("a", relay)
+    kernel.is_attentive = True
+    for moment, level in ((0, 1.0), (5, 0.0)):
+        kernel.advance(moment)
+        relay.set_pin("A", level, moment)
+    kernel.settle()
+    kernel.on_change = lambda one: told.append(one.now)
+    kernel.advance(40)
+    assert sorted(set(told)) == [10, 15]

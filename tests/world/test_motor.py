@@ -372,3 +372,10 @@ def test_what_is_within_rounding_of_0_is_no_loss_and_what_leads_below_it_is() ->
     # (u - 1)² - 1e-6 begins at 0, and is above it again 2e-3 later.
     assert _first_not_below_0([(1.0 - 1e-6, -2.0, 1.0)], 1.0 - 1e-3, 2.0, slack) == pytest.approx(1.0 + 1e-3)
     assert _first_not_below_0([(1.0, -2.0, 1.0)], 1.0, 2.0, slack) == 1.0
+
+
+def test_what_touches_0_and_falls_is_below_it_from_there_on() -> None:
+    """-u², with no room for rounding, and from 1 on; u² - 1 is below 0 only before 1."""
+    assert _first_below_0((0.0, 0.0, -1.0), 0.0, 2.0, 0.0) == 0.0
+    assert _first_below_0((1.0, 0.0, -1.0), 0.0, 2.0, 0.0) == 1.0
+    assert _first_below_0((-1.0, 0.0, 1.0), 1.0, 2.0, 0.0) is None

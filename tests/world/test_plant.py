@@ -362,8 +362,9 @@ def test_what_was_to_be_done_later_is_done_once_and_may_be_called_off() -> None:
 def test_time_does_not_go_back() -> None:
     world = small()
     world.advance(SECOND)
-    with pytest.raises(TimeReversal):
+    with pytest.raises(TimeReversal) as caught:
         world.advance(SECOND - 1)
+    assert caught.value.args == TimeReversal(SECOND, SECOND - 1).args
     world.advance(SECOND)
 
 

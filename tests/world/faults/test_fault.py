@@ -201,6 +201,9 @@ def test_the_schema_has_a_table_for_each_kind_with_all_it_takes() -> None:
         assert all("type" in one or "const" in one for one in table["properties"].values())
     assert objects["stuck"]["properties"]["pin"]["type"] == "string"
     assert objects["stuck"]["required"] == ["kind", "pin"]
+    assert objects["flip"]["properties"]["direction"]["enum"] == ["in", "out"]
+    words = [(name, p) for name in objects for p in KINDS[name].parameters]
+    assert all(objects[name]["properties"][p.name].get("enum", []) == list(p.words) for name, p in words)
     assert objects["crc"]["properties"]["probability"] == {
         "description": "How probable it is each time.", "type": "number", "minimum": 0, "maximum": 1, "default": 1.0
     }  # fmt: skip

@@ -206,12 +206,10 @@ class FaultyPort(Stateful):
             self._fresh.append((moment, sent.delay, held + sent.answer))
 
     def _request_of(self, raw: bytes) -> bytes | None:
-        """The oldest request that ``raw`` can be the answer to; on RTU older ones get none any more."""
+        """The oldest request that ``raw`` can be the answer to."""
         key = self._key(raw)
-        for place, asked in enumerate(self._asked):
+        for asked in self._asked:
             if self._key(asked) == key:
-                for _ in range(place if self._line is LineProtocol.RTU else 0):
-                    self._asked.popleft()
                 self._asked.remove(asked)
                 return asked
         return None
