@@ -338,9 +338,12 @@ def test_what_is_undone_in_its_own_moment_is_gone_too() -> None:
     world.run(for_=1)
     snapshot = world.snapshot()
     world.apply_input(Set((("m", "IN3", 1.0),)))
+    history.take()
     world.restore(snapshot)
     history.gone_back()
     assert (history.kept_inputs, history.inputs_so_far, len(history)) == (0, 0, 2)
+    assert history.state_at(SECOND).inputs == 0
+    assert go(Past(history), SECOND).machine("m").pins()["IN3"] == 0.0
 
 
 @pytest.mark.parametrize("keep", [True, False])
@@ -357,3 +360,27 @@ def test_a_past_keeps_a_trace_like_its_world_but_no_inputs(keep: bool) -> None:
     assert list(there.inputs) == []
     world.stop_recording()
     assert not Past(history).world.trace.is_recorded
+
+
+def test_what_has_changed_in_what_is_undone_may_have_changed_where_it_goes_on() -> None:
+    world = make()
+    history = History(world)
+    world.run(for_=1)
+    snapshot = world.snapshot()
+    for name in ("IN3", "IN4"):
+        world.apply_input(Set((("m", name, 1.0),)))
+        world.run(for_=1)
+        history.take()
+    world.restore(snapshot)
+    history.gone_back()
+    assert {("m", "IN3"), ("m", "IN4")} <= history._states[-1].changed
+
+
+def test_the_snapshot_that_is_missed_least_may_be_the_first_after_the_oldest(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "MOST_CONTROLLER_STATES", 16)
+    world = make()
+    history = History(world)
+    for moment in (0.001, *range(1, 16)):
+        world.run(until=float(moment))
+        history.take()
+    assert [state.snapshot.now for state in history._states] == [moment * SECOND for moment in range(16)]

@@ -16,7 +16,7 @@ from steptwin.machine import SECOND
 from steptwin.motion import MotionState, Segment, plan_position, plan_velocity
 from steptwin.motion.ramps import SpeedCurve, plan_endless
 from steptwin.world.course import Build, Course, MechanicalState
-from steptwin.world.motor import FASTEST, Burden, StepperMotor, _first_below_0, _first_not_below_0
+from steptwin.world.motor import FASTEST, Burden, StepperMotor, _first_below_0, _first_not_below_0, _roots
 
 # ---------------------------------------------------------------------- thresholds
 
@@ -379,3 +379,17 @@ def test_what_touches_0_and_falls_is_below_it_from_there_on() -> None:
     assert _first_below_0((0.0, 0.0, -1.0), 0.0, 2.0, 0.0) == 0.0
     assert _first_below_0((1.0, 0.0, -1.0), 0.0, 2.0, 0.0) == 1.0
     assert _first_below_0((-1.0, 0.0, 1.0), 1.0, 2.0, 0.0) is None
+
+
+def test_how_deep_it_falls_is_looked_at_where_it_is_lowest() -> None:
+    """u² - u is lowest at 0.5, by 0.25."""
+    assert _first_below_0((0.0, -1.0, 1.0), 0.0, 2.0, 0.24) == 0.0
+    assert _first_below_0((0.0, -1.0, 1.0), 0.0, 2.0, 0.26) is None
+    assert _first_not_below_0([(0.0, 0.0, 0.0)], 0.0, 1.0, 0.0) == 0.0
+
+
+@given(st.floats(1e-12, 1e-6), st.floats(0.01, 10.0), st.sampled_from([1, -1]), st.floats(0.5, 2.0))
+def test_a_root_near_0_is_exact(root: float, other: float, sign: int, scale: float) -> None:
+    """Of scale · (u + root) · (u + other), and of its mirror image."""
+    found = sorted(_roots((scale * root * other, sign * scale * (root + other), scale)), key=abs)
+    assert found == [pytest.approx(-sign * root, rel=1e-9), pytest.approx(-sign * other, rel=1e-9)]

@@ -168,3 +168,9 @@ def test_a_named_source_is_a_signal_and_has_faults() -> None:
 def test_what_goes_nowhere_is_refused(kind: str, message: str) -> None:
     with pytest.raises(WorldError, match=message):
         World.from_toml(f'[[mic488]]\nname = "c"\n[[source]]\nto = "c.AIN1"\nkind = "{kind}"\n')
+
+
+def test_a_ramp_may_be_as_short_as_a_nanosecond() -> None:
+    world = World.from_toml(NAMED.replace('"10 s"', '"0.001 us"'))
+    world.run(for_=0.1)
+    assert world.read("oven.volts") == 10.0

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from steptwin.errors import Misuse
+from steptwin.world.description import read_world
 from steptwin.world.gateways import GATEWAYS
 from steptwin.world.reader import Key
 from steptwin.world.sense import TableRows
@@ -70,6 +71,12 @@ def test_each_key_says_what_it_means_and_what_is_permitted(table: str) -> None:
     for key in written_tables().get(table, steps):
         assert key.meaning, key.name
         assert key.permitted, key.name
+
+
+@pytest.mark.parametrize(("gap", "gap_ns"), [("'0.001 us'", 1), ("1e-6", 1), ("1.5", 1_500_000), ("10000", 10**10)])
+def test_the_gap_of_a_line_may_be_as_short_as_a_nanosecond(gap: str, gap_ns: int) -> None:
+    spec = read_world("w", f'[[line]]\nname = "bus"\ngap = {gap}\n[[mic488]]\nname = "a"\nline = "bus"\n')
+    assert [line.gap for line in spec.lines] == [gap_ns]
 
 
 def test_axes_and_inputs_of_controllers_are_among_the_tables() -> None:

@@ -161,3 +161,16 @@ def test_the_value_of_a_record_is_that_of_its_kind() -> None:
     for read, kind in ((edge.plan, "plan"), (plan.level, "edge"), (edge.data, "frame")):
         with pytest.raises(TypeError, match=f"a record of kind (plan|edge) with the value .*: expected a {kind}$"):
             read()
+
+
+def test_a_kept_trace_that_takes_the_past_of_one_that_was_let_go_has_its_digest() -> None:
+    records = [TraceRecord(t, "a", "edge", "OUT1", float(t % 2)) for t in range(6)]
+    gone, whole, other = Trace(["a"]), Trace(["a"]), Trace(["a"])
+    for record in records[:3]:
+        gone.add(record)
+    gone.let_go()
+    other.rewind(gone.mark())
+    for trace, added in ((whole, records), (other, records[3:])):
+        for record in added:
+            trace.add(record)
+    assert other.digest() == whole.digest()

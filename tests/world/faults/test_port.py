@@ -51,6 +51,19 @@ def test_an_observer_sees_frames_as_without_faults() -> None:
     assert seen == [(FrameDirection.IN, REQUEST), (FrameDirection.OUT, ANSWER)] * 2
 
 
+def test_who_comes_while_there_are_faults_sees_frames_too() -> None:
+    rig = FaultRig("crc nth=1")
+    seen: list[FrameDirection] = []
+    rig.port.watch(lambda now, direction, raw: seen.append(direction))
+    for _ in range(2):
+        rig.ask()
+        rig.faults.clear(rig.now)
+    assert seen == [FrameDirection.IN, FrameDirection.OUT] * 2
+    rig.port.watch(None)
+    rig.ask()
+    assert len(seen) == 4
+
+
 def test_what_is_on_its_way_arrives_after_the_fault_is_gone() -> None:
     rig = FaultRig("delay for_ms=50")
     assert rig.ask() == b""
