@@ -384,3 +384,20 @@ def test_the_snapshot_that_is_missed_least_may_be_the_first_after_the_oldest(mon
         world.run(until=float(moment))
         history.take()
     assert [state.snapshot.now for state in history._states] == [moment * SECOND for moment in range(16)]
+
+
+def test_a_value_that_changes_again_after_it_was_undone_is_noted_again() -> None:
+    world = make()
+    history = History(world)
+    world.run(for_=1)
+    snapshot = world.snapshot()
+    found = []
+    for _ in range(2):
+        world.restore(snapshot)
+        history.gone_back()
+        world.apply_input(Write((("m", "M1_EN", 1.0),)))
+        world.run(for_=1)
+        history.take()
+        found.append(history._states[-1].changed)
+    assert ("m", "M1.enabled") in found[0]
+    assert found[0] <= found[1]

@@ -321,3 +321,14 @@ def test_commands_that_a_chip_does_not_know_are_refused() -> None:
         ordered(world, Enable("d", 1, True))
     with pytest.raises(Misuse, match="which does not know its switch: home it with seek"):
         ordered(world, Home("d", 1, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("pin", "text"),
+    [("B11", "step 1: B11 is taken: the Dual DAC interface"), ("B99", "step 1: seek 'B99': permitted")],
+)
+def test_what_a_chip_cannot_seek_is_told_also_where_it_could_not_now(pin: str, text: str) -> None:
+    """It is on no line."""
+    chip = '[[m1486]]\nname = "d"\ninterface = "dual"\n[[script]]\nname = "s"\n'
+    with pytest.raises(WorldError, match=text):
+        World.from_toml(f'{chip}steps = [{{ home = "d.M1", seek = "-{pin}" }}]\n')

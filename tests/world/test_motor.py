@@ -384,7 +384,7 @@ def test_what_touches_0_and_falls_is_below_it_from_there_on() -> None:
 def test_how_deep_it_falls_is_looked_at_where_it_is_lowest() -> None:
     """u² - u is lowest at 0.5, by 0.25."""
     assert _first_below_0((0.0, -1.0, 1.0), 0.0, 2.0, 0.24) == 0.0
-    assert _first_below_0((0.0, -1.0, 1.0), 0.0, 2.0, 0.26) is None
+    assert _first_below_0((0.0, -1.0, 1.0), 0.0, 2.0, 0.25) is None
     assert _first_not_below_0([(0.0, 0.0, 0.0)], 0.0, 1.0, 0.0) == 0.0
 
 

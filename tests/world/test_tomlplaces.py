@@ -126,6 +126,7 @@ def test_every_place_of_any_text(lines: list[str], end: str) -> None:
 def test_what_is_before_a_key_that_cannot_be_read_has_its_places() -> None:
     assert set(find_places('a = 1\n"\\q" = 2\nb = 3\n')) == {("a",)}
     assert set(find_places("a = 1\nb 2\nc = 3\n")) == {("a",)}
+    assert set(find_places("a = 1\n[b\nc = 3\n")) == {("a",)}
 
 
 @given(text=st.text(alphabet="a=[]{}\"'#\n.,1 \\", max_size=40))

@@ -120,3 +120,14 @@ def test_the_state_of_a_controller_is_that_of_the_moment() -> None:
     assert [(axes[0].moving, axes[1].moving) for axes in seen] == [(True, False), (False, False)]
     assert [axes[0].status.text for axes in seen] == ["moving to position", "position reached"]
     assert [axes[0].position for axes in seen] == [pytest.approx(2.0, abs=0.011), 25.0]
+
+
+def test_pins_are_those_of_the_moment() -> None:
+    """An edge is 20 ms on its wire."""
+    world = small()
+    seen = []
+    world.at("10 ms", do.Write((("a", "OUT1", 1.0),)))
+    for moment in ("29 ms", "31 ms"):
+        world.at(moment, do.Call(lambda: seen.append(world.mic488["b"].pins["IN3"])))
+    world.run(for_=0.1)
+    assert seen == [0.0, 1.0]

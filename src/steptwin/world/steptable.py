@@ -257,4 +257,4 @@ def _step(text: TomlText, path: Path, called: str, table: object) -> Step | None
         return action.make(*(values[key.attribute or key.name] for key in (action.main, *action.others)))
     except Misuse as error:
         text.wrong(path, "D007", f"{called}: {error}")
-        return None
+    return None

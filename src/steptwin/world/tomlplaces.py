@@ -180,8 +180,6 @@ class _Finder:
 
 def _plain(part: str) -> str:
     """A part of a key without its quotes."""
-    if part[0] == "'":
-        return part[1:-1]
     try:
         return tomllib.loads(f"x = {part}")["x"] if "\\" in part else part[1:-1]
     except tomllib.TOMLDecodeError:

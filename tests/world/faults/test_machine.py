@@ -519,3 +519,12 @@ def test_a_machine_looks_ahead_no_further_than_to_a_fault() -> None:
     assert all(moment < SECOND for what, moment in inner.asked if what == "look")
     machine.advance(SECOND - 1)
     assert machine.advance_to_change(2 * SECOND) == SECOND
+
+
+def test_its_kernel_is_told_when_the_supply_of_a_machine_fails() -> None:
+    _, machine = faulty("supply-drop at_s=1 for_s=0.5")
+    told: list[bool] = []
+    machine.changed = lambda: told.append(True)
+    for on in (False, True):
+        machine.supply(on, 0)
+    assert told == [True, True]

@@ -171,8 +171,6 @@ class Supply(BoardPart):
         text = f"{name} is {'on' if self.is_good else 'off'}, with {names}"
         facts = ("supply", name), ("on", self.is_good), ("fed", names)
         kernel.report(kernel.owner(name), "event", "supply", text, *facts)
-        for machine in self._fed:
-            kernel.mark(machine.name)
 
     def deadline(self) -> Nanos | None:
         now = self.board.kernel.now

@@ -33,7 +33,7 @@ def _flip(active: ActiveFault, byte: int, run: Run, report: FaultReporter) -> in
 
 
 def _drop(active: ActiveFault, byte: int, run: Run, report: FaultReporter) -> None:
-    active.left = (active.fault.whole("length") or 1) - 1
+    active.left = int(active.fault.number("length")) - 1
     report(active, f"{byte:02X} is lost" + (f" and {active.left} more" if active.left else ""))
 
 
@@ -52,7 +52,7 @@ def _gap(active: ActiveFault, byte: int, run: Run, report: FaultReporter) -> int
 
 
 def _split(active: ActiveFault, run: Run, count: int, report: FaultReporter) -> list[tuple[Nanos, bytes]]:
-    length = active.fault.whole("length") or 1
+    length = int(active.fault.number("length"))
     report(active, f"{count} bytes in pieces of {length}")
     pause = active.ns("for_ms")
     pieces: list[tuple[Nanos, bytes]] = []
@@ -63,7 +63,7 @@ def _split(active: ActiveFault, run: Run, count: int, report: FaultReporter) -> 
 
 
 def _noise(active: ActiveFault, run: Run, report: FaultReporter) -> None:
-    noise = active.chance.some_bytes(active.fault.whole("length") or 1)
+    noise = active.chance.some_bytes(int(active.fault.number("length")))
     report(active, f"{len(noise)} bytes of noise: {noise.hex(' ')}")
     run.put(noise)
 
