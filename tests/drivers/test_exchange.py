@@ -383,6 +383,17 @@ def test_everybody_is_told_once() -> None:
     assert told == ["one", "two"]
 
 
+def test_of_jobs_that_were_all_told_none_is_due() -> None:
+    e = engine(interval=10 * MILLISECOND)
+    submit(e, "one")
+    e.step(0)
+    e.receive(b"one!", 1)
+    submit(e, "two")
+    assert (e.step(2), e.deadline()) == (b"", 10 * MILLISECOND)
+    e.fail_all(LineLost("gone"))
+    assert e.deadline() is None
+
+
 # ---------------------------------------------------------------------- permissions
 
 

@@ -289,3 +289,14 @@ def test_the_face_for_threads_passes_all_its_arguments_on() -> None:
     talk.start(ChipRequest(None, "t6"), 0, urgent=False)
     assert len(said) == 1
     assert said[0].endswith("t6")
+
+
+def test_half_a_minimum_microstep_is_rounded_and_more_is_no_full_step() -> None:
+    """As long as M is not known: a full step has 64 of them."""
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    chip.move_by(10 + 0.5 / 64)
+    assert chip.wait().ok
+    assert wire.true() == 640
+    with pytest.raises(Misuse, match="which is not a whole full step"):
+        chip.move_by(10 + 0.6 / 64)
