@@ -401,3 +401,16 @@ def test_a_value_that_changes_again_after_it_was_undone_is_noted_again() -> None
         found.append(history._states[-1].changed)
     assert ("m", "M1.enabled") in found[0]
     assert found[0] <= found[1]
+
+
+def test_the_snapshot_that_is_missed_least_may_be_the_last_before_the_newest(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All others are three times as old as the one after them."""
+    monkeypatch.setattr(module, "MOST_CONTROLLER_STATES", 16)
+    world = World.from_toml('[[mic488]]\nname = "m"\n')
+    world.stop_recording()
+    history = History(world)
+    ages = [3**count for count in reversed(range(15))]
+    for age in (*ages, 2 / 3, 0):
+        world.run(until=round((3**14 - age) * 1.5, 3))
+        history.take()
+    assert [(world.now - state.snapshot.now) / SECOND for state in history._states] == [*(1.5 * age for age in ages), 0]

@@ -381,3 +381,14 @@ def test_who_has_come_since_is_gone_where_a_line_goes_back() -> None:
     line.set_state(before)
     assert "first" in line.places
     assert "second" not in line.places
+
+
+def test_a_request_that_comes_while_the_controller_is_busy_is_an_error_of_the_line() -> None:
+    there = world('timing = "real"\nbaud = 9600\n')
+    bus = there.lines["bus"]
+    bus.connect("p", "rtu")
+    for _ in range(2):
+        bus.receive("p", rtu(READ_STATUS), there.now)
+        there.run(for_="1 ms")
+    there.run(for_="200 ms")
+    assert bus.traffic == LineTraffic(requests=2, errors=1)

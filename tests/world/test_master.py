@@ -51,6 +51,7 @@ def test_a_request_without_an_answer_is_given_up_and_what_comes_late_is_nobodys(
     master.answered(b"b", 150)
     master.answered(b"late", 151)
     assert (master.finished, master.unanswered, master.answers) == (2, 1, {1: b"", 2: b"b"})
+    assert master.wanted == frozenset()
     assert master.deadline() is None
 
 

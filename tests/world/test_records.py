@@ -110,3 +110,11 @@ def test_unknown_ones_are_refused(ran: World) -> None:
     for count, last in ((1000, "machine19 and 981 more"), (20, "machine19 and 1 more"), (19, "machine18, world")):
         with pytest.raises(Misuse, match=f"{last}$"):
             read_selection(["other"], [], many[:count])
+
+
+def test_what_a_name_has_belongs_to_it() -> None:
+    selection = Selection(frozenset({"clamp"}))
+    names = ("clamp", "clamp.position", "x.clamp", "clam", "")
+    assert [name for name in names if selection.takes_of(name)] == ["clamp", "clamp.position"]
+    assert selection.takes_of("x", "clamp.position")
+    assert Selection().takes_of("x")

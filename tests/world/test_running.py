@@ -50,3 +50,21 @@ def test_the_end_of_a_script_in_python_leaves_its_blocks() -> None:
     assert script.send(None) is not None
     script.end()
     assert (script.ended, left) == (True, ["block"])
+
+
+def test_a_script_that_was_brought_back_can_be_brought_back_again() -> None:
+    seen: list[object] = []
+
+    def steps() -> do.Steps:
+        seen.append((yield do.Read("x")))
+        seen.append((yield do.Read("y")))
+        yield do.Note("end")
+
+    script = Script(1, "s", steps, is_external=True)
+    for value in (None, 1.0):
+        script.send(value)
+    for _ in range(3):
+        script = Script.at(script.state())
+    seen.clear()
+    assert script.send(2.0) == do.Note("end")
+    assert seen == [2.0]

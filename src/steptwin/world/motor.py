@@ -296,4 +296,4 @@ def _roots(q: Quadratic) -> list[float]:
     if inside <= 0.0:
         return []
     half = -0.5 * (q1 + (sqrt(inside) if q1 >= 0.0 else -sqrt(inside)))
-    return [half / q2] + ([q0 / half] if half != 0.0 else [])
+    return [half / q2, q0 / half]
