@@ -49,6 +49,11 @@ def test_what_stands_after_them_stays() -> None:
     assert {key: value for key, value in tomllib.loads(found).items() if key != "drawing"} == tomllib.loads(TEXT)
 
 
+def test_keys_before_all_tables_stay() -> None:
+    text = "at = [1, 2]\n" + TEXT
+    assert arranged(arranged(text, [DrawnPlace("x", 5, 6)]), []) == text
+
+
 def test_line_ends_stay() -> None:
     assert arranged(TEXT.replace("\n", "\r\n"), [DrawnPlace("x", 1, 2)]).count("\r\n") == TEXT.count("\n") + 4
 

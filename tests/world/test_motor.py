@@ -386,6 +386,8 @@ def test_how_deep_it_falls_is_looked_at_where_it_is_lowest() -> None:
     assert _first_below_0((0.0, -1.0, 1.0), 0.0, 2.0, 0.24) == 0.0
     assert _first_below_0((0.0, -1.0, 1.0), 0.0, 2.0, 0.25) is None
     assert _first_not_below_0([(0.0, 0.0, 0.0)], 0.0, 1.0, 0.0) == 0.0
+    assert _first_not_below_0([(0.0, -1.0, 1.0)], 0.0, 2.0, 0.25) == 0.0
+    assert _first_not_below_0([(0.0, -1.0, 1.0)], 0.0, 2.0, 0.24) == 1.0
 
 
 @given(st.floats(1e-12, 1e-6), st.floats(0.01, 10.0), st.sampled_from([1, -1]), st.floats(0.5, 2.0))
