@@ -6,6 +6,7 @@ import pytest
 from mic488_rig import PAUSED, RUNNING, STOPPED, Rig, controller, programmed, started
 
 from steptwin.mic488.config import InputConfig
+from steptwin.wbc.events import BY_REGISTER, EVENTS
 
 FILTER_S = 0.01
 STATEMENT_S = 0.001
@@ -128,6 +129,26 @@ def test_interrupts_preset_by_the_configuration() -> None:
         rig.pin("IN12", level)
         rig.wait(0.05)
     assert rig.i(0) == 1
+
+
+def test_a_delay_lasts_where_the_interrupt_that_waited_for_the_handler_is_dropped_from_outside() -> None:
+    """As a debugger does that writes CFGINT_IN2, between RETURN and the statement time after it."""
+    rig = started(
+        "CFGINT_IN1 = RIS\nCFGINT_IN2 = RIS\nDELAY 1\nOUT8 = ON\nWAIT IN9 = ON\n"
+        "INT_IN1:\nDELAY 0.2\nRETURN\nINT_IN2:\n$I1 = $I1 + 1\nRETURN\n"
+    )
+    rig.wait(0.1)
+    rig.pin("IN1", 1.0)
+    rig.wait(0.1)
+    rig.pin("IN2", 1.0)
+    rig.wait(0.05)
+    program = rig.device.program
+    while program.interpreter.handling:
+        rig.wait(0.0001)
+    program.set_switch(EVENTS.index(BY_REGISTER["CFGINT_IN2"]), 0, rig.now)
+    rig.wait(2.0)
+    assert rig.i(1) == 0
+    assert [time for time, _ in rig.changes("OUT8")] == [0.003 + 1.0]
 
 
 def test_wbc_2_interrupts_do_not_nest_and_one_of_each_source_waits() -> None:

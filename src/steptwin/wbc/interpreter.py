@@ -245,6 +245,9 @@ class Interpreter(Stateful):
             event = next((e for e in self._pending_events() if at_end or not code.entries[e].hard), None)
             if event is not None:
                 self._enter(code, event, now)
+        if now < self.not_before:  # the interrupt for which a DELAY was looked at again has been dropped meanwhile
+            self.due = self.not_before
+            return
         if now != self._moment:
             self._moment = now
             self._spent = 0

@@ -455,3 +455,13 @@ def test_a_stream_that_is_no_modbus_tcp_is_broken_behind_the_faults_too() -> Non
     rig.send(b"\0\1\0\1\0\2\1\3")
     rig.arrivals(0.1)
     assert rig.port.broken == "MBAP protocol 1 is not 0"
+
+
+def test_a_request_without_an_answer_has_none_any_more_once_a_later_one_is_answered() -> None:
+    """The first one reads register 99, the last one does not."""
+    rig = FaultRig("supply-drop machine=1 at_s=0 for_s=0.05", "wrong-unit address=99", units=(1, 2))
+    assert rig.ask() == b""
+    assert rig.ask(bytes.fromhex("03 00 05 00 01"), unit=2) == rtu(2, bytes.fromhex("03 02 00 00"))
+    rig.wait(0.1)
+    assert rig.ask(bytes.fromhex("03 00 64 00 01")) == rtu(1, bytes.fromhex("03 02 00 00"))
+    assert rig.ask() != rtu(1, bytes.fromhex("03 04 00 00 00 00"))

@@ -206,10 +206,12 @@ class FaultyPort(Stateful):
             self._fresh.append((moment, sent.delay, held + sent.answer))
 
     def _request_of(self, raw: bytes) -> bytes | None:
-        """The oldest request that ``raw`` can be the answer to."""
+        """The oldest request that ``raw`` can be the answer to; on RTU older ones get none any more."""
         key = self._key(raw)
-        for asked in self._asked:
+        for place, asked in enumerate(self._asked):
             if self._key(asked) == key:
+                for _ in range(place if self._line is LineProtocol.RTU else 0):
+                    self._asked.popleft()
                 self._asked.remove(asked)
                 return asked
         return None
