@@ -36,6 +36,14 @@ def test_what_is_wrong_with_a_constant_is_told_once(value: str, code: str) -> No
     assert codes(f"#pump {value}\nOUT1 = pump\npump = 3\n") == [code]
 
 
+def test_a_register_of_later_firmware_is_told_whatever_its_number() -> None:
+    assert codes("$I0 = CFGINT_M9\n", "1.23") == ["W139"]
+
+
+def test_a_constant_that_cannot_be_one_is_no_constant() -> None:
+    assert codes("#SIN 5\n#SIN 6\n") == ["W103", "W103"]
+
+
 def test_a_variable_that_cannot_be_one_is_told_where_it_is_set_only() -> None:
     assert codes("INT_IN1 = 3\nOUT1 = INT_IN1\n") == ["W103"]
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from steptwin.wbc.layout import LayoutCell, aligned, columns_of
+from steptwin.wbc.layout import LayoutCell, aligned, columns_of, indentations
+from steptwin.wbc.syntax import parse
 
 
 def cell(text: str, least: int = 1, *, arranged: bool = True, follows: bool = False) -> LayoutCell:
@@ -36,3 +37,20 @@ def test_nothing_is_aligned_over_a_border() -> None:
     cells = [cell("x "), cell("y "), cell("z "), cell("w ")]
     assert aligned(cells, [False, False, True, False]) == [2, 2, 2, 2]
     assert aligned(cells[:2], [False, True]) == [None, None]
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        (
+            "IF IN1 = 1\nIF IN2 = 1\nOUT1 = ON\nELSE\nOUT2 = ON\nENDIF\nELSE\nOUT3 = ON\nENDIF\n",
+            [0, 4, 8, 4, 8, 4, 0, 4, 0],
+        ),
+        # Below a label in a block: one level more only for what is deeper than the block.
+        ("WHILE 1 = 1\nL:\n    OUT1 = ON\nK:\n    OUT2 = ON\nENDWHILE\n", [0, 0, 4, 0, 4, 0]),
+        ("WHILE 1 = 1\nL:\n     OUT1 = ON\nK:\n    OUT2 = ON\nENDWHILE\n", [0, 0, 8, 0, 4, 0]),
+        ("L:\n OUT1 = ON\n// at the margin\nK:\nOUT2 = ON\n", [0, 4, 0, 0, 0]),
+    ],
+)
+def test_indentation_by_blocks_and_below_labels(text: str, found: list[int]) -> None:
+    assert indentations(parse(text)[0].lines, text.split("\n")[:-1]) == found

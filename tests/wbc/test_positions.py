@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.wbc.dialect import MAX_POSITIONS
-from steptwin.wbc.positions import number_text, parse_positions, table_of
+from steptwin.wbc.positions import PositionRow, number_text, parse_positions, table_of
 
 TEXT = "home;0;0;x;x\r\nTop ; 10,5; -20.25;X;\t7\r\n;1;2;3;4;\r\n\r\n"
 
@@ -80,6 +80,32 @@ NUMBER = "write a number like 20, -70, 20.5 or 20,5, or x to leave the axis alon
 )
 def test_messages_and_hints(text: str, message: str, hint: str) -> None:
     assert [(d.message, d.hint) for d in parse_positions(text)[1]] == [(message, hint)]
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "mended"),
+    [
+        ("A;1;2\nB;1;2;3;4\n", "A;1;2", "A;1;2;x;x\nB;1;2;3;4\n"),
+        ("A;1;2;3;4; ;\nB;1;2;3;4\n", "A;1;2;3;4; ;", "A;1;2;3;4\nB;1;2;3;4\n"),
+        ("A;1;2;3;4;5\nB;1;2;3;4\n", "A;1;2;3;4;5", None),
+        ("A;1;2;3;4\n\nB;1;2;3;4\n", "\n", "A;1;2;3;4\nB;1;2;3;4\n"),
+        ("A;1;2;3;4\nmy pos;1;2;3;4\n", "my pos", "A;1;2;3;4\nmy_pos;1;2;3;4\n"),
+        ("A;1;2;3;4\n a ;1;2;3;4\n", " a ", None),
+        ("A;1;2; 3 4 ;4\n", " 3 4 ", "A;1;2;34;4\n"),
+    ],
+)
+def test_messages_stand_at_what_is_wrong_and_repair_it(text: str, place: str, mended: str | None) -> None:
+    (found,) = parse_positions(text)[1]
+    assert text[found.span.start : found.span.end] == place
+    fix = found.fix
+    assert (None if fix is None else text[: fix.span.start] + fix.text + text[fix.span.end :]) == mended
+
+
+def test_a_row_knows_its_line() -> None:
+    assert [TEXT[row.start : row.end] for row in parse_positions(TEXT)[0].rows] == [
+        line.rstrip() for line in TEXT.split("\r\n")[:3]
+    ]
+    assert PositionRow("A", (1, 2, 3, 4), 5, 6) == PositionRow("A", (1, 2, 3, 4))
 
 
 def test_a_wrong_cell_keeps_its_row() -> None:
