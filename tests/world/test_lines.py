@@ -10,6 +10,7 @@ from steptwin.errors import Misuse, Refusal
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND
 from steptwin.wire.crc import with_crc
+from steptwin.wire.slave import FrameDirection
 from steptwin.world.actions import Download, SetVariable
 from steptwin.world.kinds import line_kinds
 from steptwin.world.lines import SCRIPTS, LineTraffic, LineWrite
@@ -392,3 +393,22 @@ def test_a_request_that_comes_while_the_controller_is_busy_is_an_error_of_the_li
         there.run(for_="1 ms")
     there.run(for_="200 ms")
     assert bus.traffic == LineTraffic(requests=2, errors=1)
+
+
+def test_a_line_that_nobody_follows_any_more_observes_no_frames() -> None:
+    class Frames:
+        def frame(self, now: int, place: str, direction: FrameDirection, data: bytes) -> None:
+            """It needs none."""
+
+        def unframed(self, now: int, place: str, count: int) -> None:
+            """It needs none."""
+
+    there, frames = world(), Frames()
+    there.stop_recording()
+    line = there.lines["bus"]
+    framed = line.connect("p", "rtu").framed
+    assert framed is not None
+    line.follow_frames(frames)
+    assert framed.on_frame is not None
+    line.unfollow_frames(frames)
+    assert framed.on_frame is None

@@ -494,3 +494,11 @@ def test_a_plant_keeps_what_happens_and_what_comes_in_unless_told_otherwise() ->
         assert (found.trace.is_kept, found.keeps_inputs) == (keeps, keeps)
         found.apply_input(do.Set((("a", "IN5", 1.0),)))
         assert [one.what for one in found.inputs] == ([do.Set((("a", "IN5", 1.0),))] if keeps else [])
+
+
+def test_what_has_come_in_is_forgotten_when_nothing_is_recorded_any_more() -> None:
+    world = small()
+    world.press("go")
+    assert len(world.inputs) == 1
+    world.stop_recording()
+    assert list(world.inputs) == []

@@ -209,3 +209,20 @@ class Line:
 def test_when_a_quantity_comes_to_another_side_of_0(text: str, now: int, due: int | None) -> None:
     moving = {"x": Line(1.0, 0.0, []), "y": Line(-1.0, 1000.0, [])}
     assert next_change(parse_expression(text), moving, {"k": 250.0}.__getitem__, now) == due
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("2 mm * 3", 0.006),
+        ("3 * 2 mm", 0.006),
+        ("6 mm / 2", 0.003),
+        ("7 mm % 4 mm", 0.003),
+        ("1 mm + 2 mm", 0.003),
+        ("1 m - 2 mm", 0.998),
+        ("abs(2 mm - 5 mm)", 0.003),
+    ],
+)
+def test_all_numbers_of_a_quantity_come_in_the_unit(text: str, value: float) -> None:
+    found = parse_expression(text).in_unit("m", lambda name: "")
+    assert found.value(lambda name: 0.0) == pytest.approx(value)

@@ -75,6 +75,14 @@ def test_a_cup_that_nothing_closes_has_no_vacuum() -> None:
     assert world.read("a.IN1") == 0
 
 
+def test_less_than_a_kilopascal_takes_its_time_too() -> None:
+    world = World.from_toml(TEXT.replace("80.0", "0.8").replace("60.0", "0.6"))
+    world.press("down")
+    world.mic488["a"].write("OUT1", 1)
+    world.run(until="cup.held")
+    assert world.now == pytest.approx(120 * MILLISECOND, abs=1)
+
+
 BELTS = """
 [[mic488]]
 name = "a"
