@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from world_rig import moved, small
 
@@ -120,6 +122,18 @@ def test_the_state_of_a_controller_is_that_of_the_moment() -> None:
     assert [(axes[0].moving, axes[1].moving) for axes in seen] == [(True, False), (False, False)]
     assert [axes[0].status.text for axes in seen] == ["moving to position", "position reached"]
     assert [axes[0].position for axes in seen] == [pytest.approx(2.0, abs=0.011), 25.0]
+
+
+def test_the_program_is_that_of_the_moment(tmp_path: Path) -> None:
+    """It ends after its DELAY of 0.5 s."""
+    (tmp_path / "end.prg").write_text("DELAY 0.5\nEND\n")
+    (tmp_path / "world.toml").write_text('[[mic488]]\nname = "a"\nprogram = "end.prg"\nstart = true\n')
+    world = World.load(tmp_path / "world.toml")
+    seen = []
+    for moment in ("200 ms", "900 ms"):
+        world.at(moment, do.Call(lambda: seen.append(world.mic488["a"].program)))
+    world.run(for_=2)
+    assert [state.name for state in seen] == ["RUNNING", "STOPPED"]
 
 
 def test_pins_are_those_of_the_moment() -> None:

@@ -457,6 +457,17 @@ def test_a_stream_that_is_no_modbus_tcp_is_broken_behind_the_faults_too() -> Non
     assert rig.port.broken == "MBAP protocol 1 is not 0"
 
 
+def test_requests_that_nobody_answers_are_forgotten() -> None:
+    """They are for a unit that is elsewhere."""
+    rig = FaultRig("wrong-unit address=99")
+    sizes = []
+    for _ in range(3):
+        for _ in range(100):
+            assert rig.ask(unit=3) == b""
+        sizes.append(len(repr(rig.port.copy_state())))
+    assert sizes == [sizes[0]] * 3
+
+
 def test_a_request_without_an_answer_has_none_any_more_once_a_later_one_is_answered() -> None:
     """The first one reads register 99, the last one does not."""
     rig = FaultRig("supply-drop machine=1 at_s=0 for_s=0.05", "wrong-unit address=99", units=(1, 2))
