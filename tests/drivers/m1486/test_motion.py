@@ -12,7 +12,7 @@ import pytest
 from steptwin.drivers.exchange import LineLost
 from steptwin.drivers.m1486.failures import DoubtfulMove, Garbled, NoEcho, NoRoom, Restarted, unconfirmed
 from steptwin.drivers.m1486.motion import ChipMotion, ChipMotionCommand, ChipMoveEnd, ChipReason
-from steptwin.drivers.m1486.unit import ChipNotes
+from steptwin.drivers.m1486.notes import ChipNotes
 from steptwin.drivers.m1486.watching import _is_watched, _Mover, early_ns, watch
 from steptwin.machine import SECOND
 

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 from steptwin.drivers.m1486.failures import Restarted
 from steptwin.drivers.m1486.motion import EARLY, EARLY_S, ChipMotionCommand
+from steptwin.drivers.m1486.notes import ChipNotes
 from steptwin.drivers.m1486.talk import TYPE_QUERY
-from steptwin.drivers.m1486.unit import SLICE_NS, ChipNotes, ChipUnit
+from steptwin.drivers.m1486.unit import SLICE_NS, ChipUnit
 from steptwin.errors import LineFailure, Refusal
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 
