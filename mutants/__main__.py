@@ -1,8 +1,7 @@
 """``make mutants``: small mistakes put into the core, one at a time; do the tests notice?
 
 A random sample. For each mutation the tests run that execute its lines, the fastest first, until one fails: those of the mirrored
-folder, then others. Results are written after each mutation to ``build/mutants/results.md``. Survivors that change nothing a test
-could see are listed in ``mutants/equivalent.toml``, with the reason.
+folder, then others. Results are written after each mutation to ``build/mutants/results.md``.
 """
 
 from __future__ import annotations
@@ -14,7 +13,6 @@ import random
 import signal
 import sys
 import tempfile
-import tomllib
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
@@ -31,10 +29,9 @@ from mutants.trial import Tree
 T = TypeVar("T")
 
 ROOT = Path(__file__).parent.parent
-EQUIVALENT = Path(__file__).with_name("equivalent.toml")
 BUILD = ROOT / "build/mutants"
 RESULTS = BUILD / "results.md"
-COLUMNS = ("folder", "others", "equivalent", "survived")
+COLUMNS = ("folder", "others", "survived")
 
 
 @dataclass(frozen=True)
@@ -62,12 +59,6 @@ def sample(root: Path, places: list[str], seed: int) -> Iterator[Mutant]:
         mutants += [Mutant(path.relative_to(root), mutation, source) for mutation in mutations(source)]
     random.Random(seed).shuffle(mutants)
     return (mutant for mutant in mutants if compiles(mutant.mutation.apply(mutant.source)))
-
-
-def equivalents() -> set[tuple[str, str, str]]:
-    """Module, line before and line after of the mutants that are known to change nothing."""
-    listed = tomllib.loads(EQUIVALENT.read_text()).get("mutant", [])
-    return {(entry["module"], entry["before"], entry["after"]) for entry in listed}
 
 
 def outcome(tree: Tree, reach: Reach, mutant: Mutant) -> str:
@@ -148,9 +139,7 @@ def _recorded(folder: str, file: Path, tree: Tree) -> tuple[str, bool]:
     return folder, tree.record(folder, file)
 
 
-def _tried(reach: Reach, known: set[tuple[str, str, str]], mutant: Mutant, tree: Tree) -> tuple[Mutant, str]:
-    if (str(mutant.module), *mutant.mutation.lines(mutant.source)) in known:
-        return mutant, "equivalent"
+def _tried(reach: Reach, mutant: Mutant, tree: Tree) -> tuple[Mutant, str]:
     return mutant, outcome(tree, reach, mutant)
 
 
@@ -188,7 +177,7 @@ def main() -> None:
             mutants = islice(sample(base.path, places, options.seed), options.n)
             for tree in trees:
                 tree.fork(reach.folders)
-            tasks = [partial(_tried, reach, equivalents(), mutant) for mutant in mutants]
+            tasks = [partial(_tried, reach, mutant) for mutant in mutants]
             for result in workers.each(tasks):
                 results.append(result)
                 print(f"{len(results)}/{len(tasks)} {result[1]}: {result[0]}", flush=True)

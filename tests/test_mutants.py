@@ -7,7 +7,7 @@ import textwrap
 from pathlib import Path
 
 import pytest
-from mutants.__main__ import equivalents, sources
+from mutants.__main__ import sources
 from mutants.mutations import compiles, mutations
 from mutants.reach import CORE, FOLDERS, Reach, digest, folders, imported_files
 from mutants.trial import Tree
@@ -85,18 +85,6 @@ def test_what_is_mutated_is_a_package_a_folder_of_one_or_a_module() -> None:
     assert inside
     assert {path.parent for path in inside} == {ROOT / "src/steptwin/drivers/m1486"}
     assert sources(ROOT, ["wire/nothing.py"]) == []
-
-
-def test_mutants_said_to_be_equivalent_are_still_possible() -> None:
-    """An entry that fits no line any more is to be removed."""
-    listed: dict[str, set[tuple[str, str]]] = {}
-    for module, before, after in equivalents():
-        listed.setdefault(module, set()).add((before, after))
-    stale = []
-    for module, changes in listed.items():
-        source = (ROOT / module).read_text()
-        stale += [f"{module}: {before}" for before, _ in changes - {mutation.lines(source) for mutation in mutations(source)}]
-    assert stale == []
 
 
 FILES = {
