@@ -217,6 +217,8 @@ class Datasheet:
     points: tuple[Point, ...]
     commands: tuple[CommandDescription, ...]
     events: tuple[EventDescription, ...]
+    program_actions: tuple[str, ...] = ()
+    """What can be done with its program on command: ``start``, ``pause``, ``stop``; empty where it has none."""
     details: tuple[Detail, ...] = ()
     """Of its state (`steptwin.controllerstate`)."""
     also_change: Mapping[str, tuple[str, ...]] | None = None
@@ -263,6 +265,7 @@ def read_datasheet(data: Mapping[str, Any]) -> Datasheet:
         "points": tuple(map(_read_point, data["points"])),
         "commands": tuple(map(_read_command, data["commands"])),
         "events": tuple(map(_read_event, data["events"])),
+        "program_actions": tuple(data["program_actions"]),
         "details": tuple(map(_read_detail, data["details"])),
         "also_change": None if data["also_change"] is None else {name: tuple(of) for name, of in data["also_change"].items()},
     }

@@ -157,7 +157,7 @@ def test_devices_are_described_sampled_and_moved(twin: Twin, master: Master, sta
     viewer.wait_for(lambda one: one.events("sample")[-1]["position"] == 100.0, "the chip has moved")
     assert None in [one["position"] for one in viewer.events("sample") if one["machine"] == "m1486-7"]
     assert viewer.ask("set", levels={"mic488.IN1": 1})["error"]["code"] == "refusal"
-    assert viewer.ok("stop_all") == {"machines": ["mic488", "m1486-7"], "failed": {}}
+    assert viewer.ok("stop_all") == {"machines": ["mic488", "m1486-7"], "scripts": []}
 
 
 def test_a_jog_ends_with_its_lease_and_with_the_studio(twin: Twin, master: Master, start_studio: Callable[..., Process]) -> None:

@@ -45,8 +45,8 @@ def test_nothing_but_stops_is_done_before_hello() -> None:
     tab = Tab(Studio())
     assert tab.error("read", points=["time"]) == ("refusal", "read: the first request is hello")
     assert tab.error("move", machine="table", axis=1, to=1)[0] == "refusal"
-    assert tab.ok("stop", machine="table") is None
-    assert tab.ok("stop_all") == {"machines": ["table", "drum"], "failed": {}}
+    assert tab.ok("stop", machine="table") == {"program": "stopped"}
+    assert tab.ok("stop_all") == {"machines": ["table", "drum"], "scripts": []}
     tab.ok("hello")
     assert tab.error("hello")[0] == "misuse"
 
@@ -91,7 +91,7 @@ def test_roles_may_what_their_tokens_say() -> None:
     assert viewer.ok("read", points=["table.M1.position"])[0]["value"] == 0.0
     code, message = viewer.error("enable", machine="table", axis=1)
     assert (code, message) == ("refusal", "enable is for the role operator; hall has the role viewer")
-    assert viewer.ok("stop", machine="table") is None
+    assert viewer.ok("stop", machine="table") == {"program": "stopped"}
     operator.ok("enable", machine="table", axis=1)
     assert operator.error("fault", fault="crc nth=3")[1] == "fault is for the role engineer; piotr has the role operator"
     assert operator.error("audit")[0] == "refusal"
@@ -359,7 +359,7 @@ def test_too_many_requests_are_refused_but_stops_are_done() -> None:
     outcomes = [tab.ask("time").get("error", {}).get("code", "ok") for _ in range(1100)]
     assert outcomes.count("ok") == int(sessions.BURST) - 1
     assert outcomes[-1] == "refusal"
-    assert tab.ok("stop", machine="table") is None
+    assert tab.ok("stop", machine="table") == {"program": "stopped"}
     studio.run(1000)
     tab.ok("time")
 
@@ -395,4 +395,4 @@ def test_control_taken_over_rest_passes_when_nothing_is_asked() -> None:
 def test_a_role_holds_over_rest_too() -> None:
     studio = Studio()
     assert rest(studio.rest(Role.VIEWER), studio, "enable", machine="table", axis=1)["error"]["code"] == "refusal"
-    assert rest(studio.rest(Role.VIEWER), studio, "stop_all")["ok"]["failed"] == {}
+    assert rest(studio.rest(Role.VIEWER), studio, "stop_all")["ok"]["machines"]

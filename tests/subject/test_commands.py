@@ -17,7 +17,8 @@ from steptwin.subject import debugcommands as debug
 from steptwin.subject.commands import COMMANDS, plain_command, read_command
 from steptwin.subject.schema import schema
 from steptwin.world import script as do
-from steptwin.world.actions import ACTIONS, Bytes, Download, Leave, Refused, See, SetVariable
+from steptwin.world.actions import ACTIONS, Bytes, Download, EndScripts, Leave, Refused, See, SetVariable
+from steptwin.world.control import Halt
 from steptwin.world.faults import read as read_fault
 
 SCHEMA = Path(__file__).parents[2] / "docs" / "control.schema.json"
@@ -61,6 +62,7 @@ EXAMPLES: list[tuple[dict[str, Any], command.Command]] = [
     ({"do": "jog", "machine": "a", "axis": 1, "velocity": 5.0}, command.Jog("a", 1, 5.0)),
     ({"do": "stop", "machine": "a"}, command.StopAxes("a")),
     ({"do": "stop", "machine": "a", "axis": 2}, command.StopAxes("a", 2)),
+    ({"do": "stop_all"}, command.StopAll()),
     ({"do": "program", "machine": "a", "action": "start"}, command.ControlProgram("a", "start")),
     (
         {"do": "download", "machine": "a", "place": "program 0", "text": "END\n"},
@@ -117,8 +119,8 @@ def test_every_command_is_among_the_examples() -> None:
 
 def test_every_step_that_is_not_only_for_scripts_is_a_command() -> None:
     # Bytes and Leave belong to the connections of programs, SetVariable to debuggers, ExpectReached to the steps that move,
-    # Refused to scripts of Python.
-    others = {Bytes, Leave, SetVariable, do.ExpectReached, Refused}
+    # Refused to scripts of Python, Halt and EndScripts to the commands that stop.
+    others = {Bytes, Leave, SetVariable, do.ExpectReached, Refused, Halt, EndScripts}
     assert {row.kind for row in COMMANDS.values()} >= set(ACTIONS) - others
 
 

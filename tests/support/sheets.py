@@ -42,4 +42,4 @@ def missing(sheet: Datasheet, other: Datasheet) -> list[str]:
 
 def _name(row: Any) -> str:
     given = plain(row)
-    return str(given.get("path") or given.get("name") or given["code"])
+    return given if isinstance(given, str) else str(given.get("path") or given.get("name") or given["code"])

@@ -34,11 +34,7 @@ def controller() -> World:
         (Move("a", 0, to=1e30), [("M0_POS_ABS", 1e30)]),
         (Home("a", 3, -7.0), [("M3_HOME", -7.0)]),
         (Jog("a", 3, 7.0), [("M3_VEL_ABS", 7.0)]),
-        (StopAxes("a", 3), [("M3_STOP", 1.0)]),
-        (StopAxes("a"), [(f"M{axis}_STOP", 1.0) for axis in (1, 2, 3, 4)]),
-        (ControlProgram("a", "stop"), [("PROGRAM_CTRL", 0.0)]),
         (ControlProgram("a", "start"), [("PROGRAM_CTRL", 1.0)]),
-        (ControlProgram("a", "pause"), [("PROGRAM_CTRL", 2.0)]),
     ],
 )
 def test_registers_that_are_written(command: ControllerCommand, values: list[tuple[str, float]]) -> None:

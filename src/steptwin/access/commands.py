@@ -25,6 +25,7 @@ PERMITS: Mapping[str, Permit] = complete(
         "follow": LOOK,
         "unfollow": LOOK,
         "stop": LOOK,
+        "stop_all": LOOK,
         "set": ACT,
         "press": ACT,
         "release": ACT,

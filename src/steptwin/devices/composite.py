@@ -7,7 +7,8 @@ from dataclasses import replace
 from typing import Any, Protocol
 
 from steptwin.devices.worldpart import WorldPart
-from steptwin.errors import Misuse, Refusal
+from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
+from steptwin.later import start
 from steptwin.machine import Nanos
 from steptwin.nearmiss import NearMiss
 from steptwin.subject import commands as command
@@ -153,6 +154,8 @@ class CompositeSubject:
 
     async def do(self, wanted: Command, /) -> Result:
         match wanted:
+            case command.StopAll():
+                return self.result_of(await self._stop_all())
             case command.Describe() if self._world is None or len(self._parts) > 1:
                 return self.result_of(self.description.plain())
             case command.Time() if self._world is None:
@@ -168,6 +171,28 @@ class CompositeSubject:
                 return self.result_of({pin: level for own in levels for pin, level in own.items()})
             case _:
                 return await self._part_of(wanted).do(wanted)
+
+    async def _stop_all(self) -> object:
+        """Stop all parts at the same time; a failure of one does not affect the others.
+
+        Raises `LineFailure` with the machines that could not be stopped.
+        """
+        stopping = [(part, start(part.do(command.StopAll()))) for part in self._parts]
+        done: dict[str, list[str]] = {"machines": [], "scripts": []}
+        failed: list[str] = []
+        for part, later in stopping:
+            names = [machine.name for machine in part.description.machines]
+            try:
+                stopped: Any = (await later).value
+            except SteptwinError as error:
+                failed.append(f"{', '.join(names)} ({error})")
+            else:
+                done["machines"] += names
+                done["scripts"] += stopped["scripts"] if part is self._world else []
+        if failed:
+            also = f"; stopped: {', '.join(done['machines'])}" if done["machines"] else ""
+            raise LineFailure(f"not stopped: {'; '.join(failed)}{also}")
+        return done
 
     def result_of(self, value: object) -> Result:
         if self._world is not None:

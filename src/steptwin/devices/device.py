@@ -169,6 +169,7 @@ class ConnectedDevice:
         try:
             if self._is_stop(wanted):
                 self._stops += 1
+                self._cut_jogs(wanted)
                 return await self._execute(wanted)
             if self.lost is not None:
                 raise LineFailure(f"{row_of(wanted).name} was not sent: the connection is lost ({self.lost})")
@@ -303,6 +304,12 @@ class ConnectedDevice:
         held.on_end(lambda: self._end_jog(wanted.axis))
         return held
 
+    def _cut_jogs(self, stopped: Command) -> None:
+        """End the jogs that a stop ends, whoever holds them."""
+        axis = stopped.axis if isinstance(stopped, command.StopAxes) else None
+        for held in [held for number, held in self._jogs.items() if axis in (None, number)]:
+            held.cut()
+
     def _end_jog(self, axis: int) -> None:
         self._jogs.pop(axis, None)
         if self._shadow is not None:
@@ -331,7 +338,7 @@ class ConnectedDevice:
 
 def _is_stop(wanted: Command) -> bool:
     match wanted:
-        case command.StopAxes():
+        case command.StopAxes() | command.StopAll():
             return True
         case command.ControlProgram(action=action):
             return action != "start"

@@ -34,7 +34,7 @@ PULSES = 2.0
 LEAST_LAG_NS: Nanos = SECOND // 100
 """By which a command or a poll is uncertain at least."""
 MIRRORED = (
-    *(command.Enable, command.Move, command.Home, command.StopAxes, command.ControlProgram),
+    *(command.Enable, command.Move, command.Home, command.StopAxes, command.StopAll, command.ControlProgram),
     *(steps.Write, steps.Request),
 )
 OF_AXES = (command.Enable, command.Move, command.Home, command.StopAxes)
@@ -221,7 +221,9 @@ class Shadow:
 
 
 def _stops(wanted: Command) -> bool:
-    return isinstance(wanted, command.StopAxes) or (isinstance(wanted, command.ControlProgram) and wanted.action != "start")
+    if isinstance(wanted, command.ControlProgram):
+        return wanted.action != "start"
+    return isinstance(wanted, command.StopAxes | command.StopAll)
 
 
 def _plain(axis: _ComparedAxis, after: Nanos) -> dict[str, object]:

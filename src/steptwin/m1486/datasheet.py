@@ -52,6 +52,7 @@ def datasheet_of(variant: Variant) -> Datasheet:
         points=tuple(POINTS.values()),
         commands=tuple(_command(spec, variant) for spec in TABLE),
         events=tuple(EVENTS.values()),
+        program_actions=("stop",),
         details=tuple(row.detail for row in DETAILS),
         also_change=_ALSO_CHANGE,
     )

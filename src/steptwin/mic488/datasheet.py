@@ -42,6 +42,7 @@ def datasheet_of(firmware: str, scales: tuple[tuple[str, float | None], ...] = D
         points=tuple(points(registers, units)),
         commands=tuple(_commands(registers, units)),
         events=tuple(EVENTS.values()),
+        program_actions=("start", "pause", "stop"),
         details=tuple(row.detail for row in DETAILS),
         also_change=_ALSO_CHANGE,
     )

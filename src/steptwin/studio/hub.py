@@ -13,7 +13,6 @@ from itertools import count
 from steptwin.access.control import Control, Viewer
 from steptwin.access.roles import Role
 from steptwin.errors import Misuse, Refusal, SteptwinError
-from steptwin.later import start
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.studio.branchrequests import Branches
 from steptwin.studio.calculations import Calculations
@@ -315,26 +314,11 @@ class Hub:
             if lease.jog.machine == stopped.machine and stopped.axis in (None, lease.jog.axis):
                 self._end(lease, lease.held.cut)
 
-    async def stop_all(self) -> dict[str, object]:
-        """Stop all machines at the same time; a failure of one does not affect the others."""
-        names = [part.name for part in self.subject.description.machines]
-        stopping = {name: start(self._stand(name)) for name in names}
-        failed = {name: why for name, stopped in stopping.items() if (why := await stopped) is not None}
-        return {"machines": [name for name in names if name not in failed], "failed": failed}
-
-    async def _stand(self, name: str) -> str | None:
-        """Stop a machine: its axes at once, its program, and what that has begun meanwhile. Why it could not be, or None."""
-        why: str | None = None
-        for wanted in (command.StopAxes(name), command.ControlProgram(name, "stop"), command.StopAxes(name)):
-            self._cut(command.StopAxes(name))
-            try:
-                await self.subject.do(wanted)
-            except Refusal as refusal:
-                if type(wanted) is command.StopAxes:  # a machine without a program refuses to stop it
-                    why = str(refusal)
-            except SteptwinError as error:
-                why = str(error)
-        return why
+    async def stop_all(self) -> Result:
+        """Every held jog ends, too."""
+        for lease in list(self._leases.values()):
+            self._end(lease, lease.held.cut)
+        return await self.subject.do(command.StopAll())
 
     def present(self) -> tuple[dict[str, object], int]:
         """The state of the subject for the message hello but its description, and the number of the command that has read it."""

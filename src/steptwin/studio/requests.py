@@ -95,11 +95,6 @@ class LetGo:
 
 
 @dataclass(frozen=True, slots=True)
-class StopAll:
-    """Stops every axis, and every running program."""
-
-
-@dataclass(frozen=True, slots=True)
 class ShowMoment:
     """Shows a moment of the past; None: the present."""
 
@@ -183,7 +178,6 @@ StudioRequest: TypeAlias = (
     | ReleaseControl
     | Renew
     | LetGo
-    | StopAll
     | ShowMoment
     | ReadPastEvents
     | GoBack
@@ -307,18 +301,6 @@ _ROWS = (
     RequestRow("release_control", ReleaseControl, LOOK, "Hold control no more; jogs of this viewer end.", NOTHING),
     RequestRow("renew", Renew, ACT, "A jog goes on for as long as its lease lasts from now.", LEASE, (_LEASE,)),
     RequestRow("let_go", LetGo, LOOK, "A jog ends: its axis stops with its ramp.", NOTHING, (_LEASE,)),
-    RequestRow(
-        "stop_all",
-        StopAll,
-        LOOK,
-        "Stop every axis as stop does, and every program that runs. Needs no control.",
-        members(
-            {
-                "machines": {"type": "array", "items": _TEXT},
-                "failed": {"type": "object", "additionalProperties": _TEXT, "description": "Why, by machine."},
-            }
-        ),
-    ),
     RequestRow(
         "look",
         ShowMoment,

@@ -99,6 +99,7 @@ class ViewerSession:
         self._of_subject: Mapping[object, Callable[[Any, Identity], Awaitable[Result]]] = {
             command.Jog: lambda wanted, _: self._jog(wanted),
             command.StopAxes: lambda wanted, _: hub.stop(wanted),
+            command.StopAll: lambda _wanted, _: hub.stop_all(),
             command.Follow: self._follow,
             command.Unfollow: lambda wanted, _: self._unfollow(wanted),
         }
@@ -108,7 +109,6 @@ class ViewerSession:
         """Of requests that ask the subject, which may answer later."""
         hub = self._hub
         return {
-            ask.StopAll: lambda _: hub.stop_all(),
             ask.ShowMoment: self._look_at,
             ask.GoBack: self._go_back,
             ask.ReadPastEvents: lambda wanted: self._looking.events(wanted.begin, wanted.end, wanted.kinds),

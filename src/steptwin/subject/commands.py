@@ -122,6 +122,11 @@ class Unfollow:
 
 
 @dataclass(frozen=True, slots=True)
+class StopAll:
+    """Stop all controllers, with their programs, and scripts."""
+
+
+@dataclass(frozen=True, slots=True)
 class Pause:
     """Time stands."""
 
@@ -211,6 +216,7 @@ Command: TypeAlias = (
     | Home
     | Jog
     | StopAxes
+    | StopAll
     | ControlProgram
     | Pause
     | Resume
@@ -225,6 +231,9 @@ Command: TypeAlias = (
 
 
 # ---------------------------------------------------------------------- the table
+
+
+STOPPED = "program: what the program does now: running (it goes on), paused, stopped; null where that is not known"
 
 
 _AXIS = Field("axis", whole(1, 64), "The number of an axis.")
@@ -387,9 +396,16 @@ _ROWS = (
     CommandRow(
         "stop",
         StopAxes,
-        "Stop as fast as the controller does, with a ramp or without.",
-        NOTHING,
+        "Stop as fast as the controller does, with a ramp or without. Its program goes on.",
+        STOPPED,
         (MACHINE, Field("axis", whole(1, 64), "The number of an axis; all without.", None)),
+    ),
+    CommandRow(
+        "stop_all",
+        StopAll,
+        "Stop everything: all axes and jogs, programs (paused where the controller can pause one, else ended), and scripts. "
+        "Fails if a controller could not be stopped; the others are.",
+        "machines: the controllers that were stopped; scripts: those that were ended",
     ),
     CommandRow(
         "program",

@@ -36,18 +36,18 @@ def controls_of(sheet: Datasheet, kinds: Iterable[type[Command]]) -> tuple[Contr
         own = [field for field in row.fields if field.name not in ("machine", "axis")]
         axis = next((field for field in row.fields if field.name == "axis"), None)
         if axis is not None:
-            found += [ControlDescription(row.name, each.number, _arguments(own, each)) for each in sheet.axes]
+            found += [ControlDescription(row.name, each.number, _arguments(own, each, sheet)) for each in sheet.axes]
         if axis is None or not axis.is_required:
-            found.append(ControlDescription(row.name, None, _arguments(own, None)))
+            found.append(ControlDescription(row.name, None, _arguments(own, None, sheet)))
     return tuple(found)
 
 
-def _arguments(fields: Iterable[Field], axis: AxisDescription | None) -> tuple[Argument, ...]:
-    return tuple(_argument(field, axis) for field in fields)
+def _arguments(fields: Iterable[Field], axis: AxisDescription | None, sheet: Datasheet) -> tuple[Argument, ...]:
+    return tuple(_argument(field, axis, sheet) for field in fields)
 
 
-def _argument(field: Field, axis: AxisDescription | None) -> Argument:
-    words = field.form.schema.get("enum")
+def _argument(field: Field, axis: AxisDescription | None, sheet: Datasheet) -> Argument:
+    words = list(sheet.program_actions) if field.name == "action" else field.form.schema.get("enum")
     return Argument(
         name=field.name,
         type=_TYPES.get(str(field.form.schema.get("type")), FactType.TEXT.value),

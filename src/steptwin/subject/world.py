@@ -20,8 +20,8 @@ from steptwin.subject.snapshots import Snapshots
 from steptwin.subject.time import advance
 from steptwin.wire.frameline import FrameLine
 from steptwin.world import script as steps
-from steptwin.world.actions import Download, ExternalInput, See
-from steptwin.world.control import ControllerCommand, Jog
+from steptwin.world.actions import Download, EndScripts, ExternalInput, See
+from steptwin.world.control import ControllerCommand, Jog, StopAxes, standstill
 from steptwin.world.elements import failing
 from steptwin.world.faults.kinds import rows
 from steptwin.world.heldjog import HeldJog
@@ -73,6 +73,8 @@ class WorldSubject:
         return {
             **taken,
             **control,
+            command.StopAxes: self._stop,
+            command.StopAll: lambda _: self._stop_all(),
             steps.Request: self._request,
             steps.SetFault: self._set_fault,
             steps.Expect: self._expect,
@@ -145,6 +147,21 @@ class WorldSubject:
             known = ", ".join(command.name_of(one) for one in kind.control)
             raise Refusal(f"{name!r} is {kind.title}, which cannot do {command.name_of(type(wanted))}; it can do {known}")
         self._apply_input(ordered(world, wanted))
+
+    def _stop(self, wanted: StopAxes) -> object:
+        self._control(wanted)
+        state = self.world.kind(wanted.machine).state(self.world.machine(wanted.machine), self.world.now)
+        return {"program": None if state.program.state is None else state.program.state.value}
+
+    def _stop_all(self) -> object:
+        """Scripts first, so that nothing begins behind the stops; axes again after the program, which may have begun a motion."""
+        world = self.world
+        before = {script.name for script in world.scripts}
+        self._apply_input(EndScripts())
+        for name in world.machines:
+            for halt in standstill(name, world.kind(name).datasheet(world.machine(name)).program_actions):
+                self._apply_input(halt)
+        return {"machines": list(world.machines), "scripts": sorted(before - {script.name for script in world.scripts})}
 
     def held_jog(self, wanted: Jog) -> HeldJog:
         """A jog that lasts only while it is extended; it has not started yet. Raises `Misuse` and `Refusal`."""

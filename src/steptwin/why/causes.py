@@ -14,6 +14,7 @@ from steptwin.why.log import Act, CauseLog, Change
 from steptwin.why.sentences import Frames, statement, words_of
 from steptwin.world import script as do
 from steptwin.world.actions import Download, See, SetVariable
+from steptwin.world.control import Halt
 from steptwin.world.elements import ELEMENTS
 from steptwin.world.elements.logic import BoardPart
 from steptwin.world.lines import SCRIPTS
@@ -479,7 +480,7 @@ def _requests(act: Act, line: str, members: Collection[str]) -> bool:
 
 def _changes(act: Act, machine: str) -> bool:
     match act.what:
-        case do.PowerCycle() | do.Turn() | SetVariable() | Download() | See() as what:
+        case do.PowerCycle() | do.Turn() | SetVariable() | Download() | See() | Halt() as what:
             return what.machine == machine
         case do.Write(values):
             return any(name == machine for name, *_ in values)

@@ -11,6 +11,7 @@ from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection
 from steptwin.world import script as do
 from steptwin.world.actions import Bytes, Download, ExternalInput, SetVariable
+from steptwin.world.control import Halt
 from steptwin.world.kinds import line_kinds
 from steptwin.world.lines import LineWords
 from steptwin.world.plant import Plant
@@ -22,6 +23,10 @@ _WORDS: Mapping[type, Callable[[Any], str]] = {
     do.Release: lambda step: f"releases {step.button}",
     do.Write: lambda step: "writes " + ", ".join(f"{machine}.{name} = {value:g}" for machine, name, value in step.values),
     do.PowerCycle: lambda step: f"switches {step.machine} off and on",
+    Halt: lambda given: (
+        f"stops {given.machine}"
+        + (f".M{given.axis}" if given.axis is not None else "" if given.program is None else f"'s program ({given.program})")
+    ),
     do.Turn: lambda step: f"turns the encoder of {step.machine}.M{step.axis} by {step.counts}",
     do.SetFault: lambda step: f"sets the fault {step.fault.name or step.fault.kind.name}",
     do.ClearFault: lambda step: f"clears the fault {step.name}",

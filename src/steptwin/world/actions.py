@@ -11,6 +11,7 @@ from steptwin.errors import Misuse
 from steptwin.tables import complete
 from steptwin.wire.rtu import encode_frame
 from steptwin.world import script as do
+from steptwin.world.control import Halt
 from steptwin.world.kernel import Kernel
 from steptwin.world.kind import lacks
 from steptwin.world.lines import SCRIPTS
@@ -66,13 +67,18 @@ class Leave(NamedTuple):
     place: str
 
 
+class EndScripts(NamedTuple):
+    """Scripts of the description, and texts that are being typed into controllers, end. Buttons that are held are released when
+    their time is over."""
+
+
 class Refused(NamedTuple):
     """A controller could not do what a script from outside commanded; a replay has the command no more."""
 
     text: str
 
 
-ExternalInput: TypeAlias = do.Step | Bytes | See | SetVariable | Download | Leave | Refused
+ExternalInput: TypeAlias = do.Step | Bytes | See | SetVariable | Download | Leave | Refused | Halt | EndScripts
 """An input from outside a world. Recorded with its moment, it can be replayed."""
 
 
@@ -129,9 +135,16 @@ def _release(plant: Plant, step: do.Release) -> None:
     _move_button(plant, step.button, pressed=False)
 
 
+_RELEASE = "release "
+
+
 def _releasing(button: str) -> str:
     """The name of the script that releases a button after a time. Scripts of a description have no blank in their names."""
-    return f"release {button}"
+    return f"{_RELEASE}{button}"
+
+
+def is_release(script: str) -> bool:
+    return script.startswith(_RELEASE)
 
 
 def _move_button(plant: Plant, name: str, *, pressed: bool) -> None:
@@ -157,6 +170,21 @@ def _write(plant: Plant, step: do.Write) -> None:
                 registers.execute(machine, pdu, now)
         kernel.mark(name if on is None else on[0].name)
         kernel.settle()
+
+
+def _halt(plant: Plant, given: Halt) -> None:
+    with _now(plant, given.machine):
+        on = plant.parts.line_of.get(given.machine)
+        if on is not None:
+            line, unit = on
+            line.recall(unit, plant.now)
+        what = {None: "all axes" if given.axis is None else f"axis {given.axis}", "pause": "program, paused"}
+        _record(plant, given.machine, "stop", what.get(given.program, "program"))
+        plant.kind(given.machine).halt(plant.machine(given.machine), given, plant.now)
+
+
+def _end_scripts(plant: Plant, given: EndScripts) -> None:
+    plant.end_scripts()
 
 
 def _request(plant: Plant, step: do.Request) -> None:
@@ -283,5 +311,7 @@ ACTIONS: Mapping[type, Callable[[Plant, Any], None]] = complete(
         SetVariable: _set_variable,
         Leave: _leave,
         Refused: _refused,
+        Halt: _halt,
+        EndScripts: _end_scripts,
     },
 )

@@ -3,6 +3,7 @@ them (`steptwin.world.kind.ControllerKind.control`)."""
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -75,6 +76,24 @@ class ControlProgram:
 
     machine: str
     action: str
+
+
+@dataclass(frozen=True, slots=True)
+class Halt:
+    """Stop a controller at the controller itself, whatever its line does: an axis (None: all of them), or with ``program``
+    ("pause" or "stop") its program and no axis. What scripts and commands have sent it over its line before is dropped."""
+
+    machine: str
+    axis: int | None = None
+    program: str | None = None
+
+
+def standstill(machine: str, program_actions: Collection[str]) -> tuple[Halt, ...]:
+    """Stop everything of a controller whose program takes these actions. A program is paused where that can be done, because its
+    end may switch drives off (MIC-31), and a load would fall; axes are stopped again, because it may have begun a motion."""
+    if not program_actions:
+        return (Halt(machine),)
+    return Halt(machine), Halt(machine, program="pause" if "pause" in program_actions else "stop"), Halt(machine)
 
 
 ControllerCommand: TypeAlias = Enable | Move | Home | Jog | StopAxes | ControlProgram

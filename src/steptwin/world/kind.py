@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from steptwin.diagnostics import Diagnostic, SourceText
     from steptwin.points import LivePoint
     from steptwin.wire.frameline import FrameLine
-    from steptwin.world.control import ControllerCommand, Jog, Seek
+    from steptwin.world.control import ControllerCommand, Halt, Jog, Seek
     from steptwin.world.elements.axis import AxisSpec
     from steptwin.world.faults import AxisLoad, Body, Faults
     from steptwin.world.heldjog import HeldJog
@@ -229,9 +229,11 @@ class ControllerKind(Generic[S, M, V]):
     seek: Callable[[M, str | None, Seek], Step] | None = None
     """The step that begins a seek, of a controller that does not know its switch; arguments and exceptions as those of
     ``control``."""
-    control: Mapping[type[ControllerCommand], Callable[[M, str | None, Any], Step]]
+    control: Mapping[type[ControllerCommand], Callable[[M, str | None, Any], Step | Halt]]
     """The steps by which its master does the commands for controllers that it can do. The text is the name of its line; the
     machine is at the present. Raises `Misuse`, and `Refusal` for what cannot be done now."""
+    halt: Callable[[M, Halt, Nanos], None]
+    """Stop the machine, which is at that moment, at once and without its line."""
     held_jog: Callable[[M, str | None, Jog], HeldJog] | None = None
     """A jog that lasts only while it is extended; arguments and exceptions as those of ``control``."""
     state: StateReader[M]

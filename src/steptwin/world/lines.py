@@ -163,6 +163,9 @@ class Line(Stateful, ABC):
         """Sends the Modbus requests of scripts. Raises `Misuse` for a line without Modbus."""
         raise Misuse(f"line {self.name!r} carries no Modbus: requests need a line of kind modbus")
 
+    def recall(self, unit: int, now: Nanos) -> None:
+        """Drop what scripts have asked of the controller with an address and is not executed yet."""
+
     def serve_by(self, served: Callable[[Mapping[int, SlaveDevice]], Mapping[int, SlaveDevice]]) -> None:
         """Replace the devices that execute external Modbus requests: ``served`` maps those by unit to their wrappers."""
 

@@ -25,12 +25,14 @@ class Master(Stateful):
     """
 
     FIXED: ClassVar[tuple[str, ...]] = ("_pause", "_send")
-    __slots__ = (*FIXED, "_free", "_pending", "_queue", "answers", "asked", "finished", "unanswered", "wanted")
+    __slots__ = (*FIXED, "_asking", "_free", "_pending", "_queue", "answers", "asked", "finished", "unanswered", "wanted")
 
     def __init__(self, send: Callable[[bytes, Nanos], None], pause: Nanos) -> None:
         self._send = send
         self._pause = pause
         self._queue: deque[tuple[bytes, Nanos]] = deque()
+        self._asking: bytes = b""
+        """The request on the line; empty if there is none."""
         self._pending: Nanos | None = None
         """Time-out of the request on the line; None if there is none."""
         self._free: Nanos = 0
@@ -61,14 +63,28 @@ class Master(Stateful):
         if self._pending is not None:
             self._finish(data, moment + self._pause)
 
+    def recall(self, is_meant: Callable[[bytes], bool], now: Nanos) -> bool:
+        """Give up the requests that ``is_meant`` selects: those that wait are not sent.
+
+        Returns whether the request on the line is one of them; the caller keeps it from being executed.
+        """
+        self._queue = deque((b"" if not frame or is_meant(frame) else frame, within) for frame, within in self._queue)
+        is_on_line = self._pending is not None and is_meant(self._asking)
+        if is_on_line:
+            self._give_up(now)
+        return is_on_line
+
     def update(self, now: Nanos) -> None:
         if self._pending is not None and self._pending <= now:
-            self.unanswered = self.finished + 1
-            self._finish(b"", now)
+            self._give_up(now)
         self._go_on(now)
 
     def deadline(self) -> Nanos | None:
         return self._pending if self._pending is not None else self._free if self._queue else None
+
+    def _give_up(self, now: Nanos) -> None:
+        self.unanswered = self.finished + 1
+        self._finish(b"", now)
 
     def _finish(self, answer: bytes, free: Nanos) -> None:
         self.finished += 1
@@ -81,5 +97,9 @@ class Master(Stateful):
     def _go_on(self, now: Nanos) -> None:
         while self._pending is None and self._queue and self._free <= now:
             frame, within = self._queue.popleft()
+            if not frame:  # recalled
+                self._give_up(now)
+                continue
+            self._asking = frame
             self._pending = now + within
             self._send(frame, now)

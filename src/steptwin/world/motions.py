@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 from steptwin.errors import Misuse
 from steptwin.world.control import Home, Seek
 from steptwin.world.kind import AnyKind, MotionEnds, lacks
 
 if TYPE_CHECKING:
-    from steptwin.world.control import ControllerCommand
+    from steptwin.world.control import ControllerCommand, Halt, Move
     from steptwin.world.plant import Plant
     from steptwin.world.script import Step
 
 
-def ordered(plant: Plant, command: ControllerCommand | Seek) -> Step:
-    """The step by which the master of a controller does a command now. Raises `Misuse` and `Refusal`."""
+@overload
+def ordered(plant: Plant, command: Move | Home | Seek) -> Step: ...
+@overload
+def ordered(plant: Plant, command: ControllerCommand) -> Step | Halt: ...
+def ordered(plant: Plant, command: ControllerCommand | Seek) -> Step | Halt:
+    """The step by which the master of a controller does a command now; a stop is done at the controller itself.
+
+    Raises `Misuse` and `Refusal`.
+    """
     name = command.machine
     kind, machine = plant.kind(name), plant.machine(name)
     make = _maker(kind, command)
@@ -28,7 +35,7 @@ def ordered(plant: Plant, command: ControllerCommand | Seek) -> Step:
     return make(machine, None if on is None else on[0].name, command)
 
 
-def _maker(kind: AnyKind, command: ControllerCommand | Seek) -> Callable[[Any, str | None, Any], Step] | None:
+def _maker(kind: AnyKind, command: ControllerCommand | Seek) -> Callable[[Any, str | None, Any], Step | Halt] | None:
     return kind.seek if isinstance(command, Seek) else kind.control.get(type(command))
 
 

@@ -18,7 +18,7 @@ from steptwin.errors import Misuse, Runaway, TimeReversal
 from steptwin.machine import MotionController, Nanos
 from steptwin.nearmiss import NearMiss
 from steptwin.world import script as do
-from steptwin.world.actions import ExternalInput, act
+from steptwin.world.actions import ExternalInput, act, is_release
 from steptwin.world.blueprint import Blueprint, FileContents
 from steptwin.world.build import Keep, build
 from steptwin.world.condition import SignalCondition
@@ -434,6 +434,14 @@ class Plant:
         script = self._scheduled.pop(name, None)
         if script is not None:
             self._scripts.end(script)
+
+    def end_scripts(self) -> None:
+        """End the scripts of the description, and texts that are being typed into controllers; buttons are released in time."""
+        kept = {script for name, script in self._scheduled.items() if is_release(name)}
+        for script in [one for one in self._scripts if not one.is_external and one not in kept]:
+            self.trace.add(TraceRecord(self.now, WORLD, "event", "script-ended", f"script {script.name} was ended"))
+            self._scripts.end(script)
+        self._scheduled = {name: script for name, script in self._scheduled.items() if script in kept}
 
     def go_on(self) -> None:
         """Let a stopped world continue."""

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, get_args
 from steptwin.errors import Misuse, Refusal
 from steptwin.tables import complete
 from steptwin.world import script as do
-from steptwin.world.actions import Bytes, Download, ExternalInput, Leave, Refused, See, SetVariable
-from steptwin.world.control import Seek
+from steptwin.world.actions import Bytes, Download, EndScripts, ExternalInput, Leave, Refused, See, SetVariable
+from steptwin.world.control import Halt, Seek
 from steptwin.world.faults import Fault
 from steptwin.world.motions import motion_ends, ordered
 from steptwin.world.spec import ScriptSpec
@@ -149,6 +149,13 @@ def _power_cycle(plant: Plant, step: do.PowerCycle) -> None:
         raise Misuse(f"{step.machine!r} is switched by its supply {supply!r}: switch that, or let it have a brown-out")
 
 
+def _halt(plant: Plant, given: Halt) -> None:
+    kind = plant.kind(given.machine)
+    axes = len(plant.machine(given.machine).axes)
+    if given.axis is not None and not 1 <= given.axis <= axes:
+        raise Misuse(f"axis = {given.axis}: {given.machine!r} is {kind.title}, which has axes 1 to {axes}")
+
+
 def _turn(plant: Plant, step: do.Turn) -> None:
     plant.encoders(step.machine).check_turn(step.axis, step.counts)
 
@@ -200,11 +207,12 @@ _CHECKS: Mapping[type, Callable[[Plant, Any], None]] = complete(
         do.PowerCycle: _power_cycle,
         do.Turn: _turn,
         do.Couple: _couple,
+        Halt: _halt,
         See: _see,
         SetVariable: _set_variable,
         do.SetFault: _fault,
         do.ClearFault: _clear_fault,
         **dict.fromkeys((do.Wait, do.At, do.Note, do.Stop, do.Read, do.Call, do.Repeat), _nothing),
-        **dict.fromkeys((Bytes, Download, Leave, Refused), _nothing),
+        **dict.fromkeys((Bytes, Download, Leave, Refused, EndScripts), _nothing),
     },
 )

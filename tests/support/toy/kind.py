@@ -16,7 +16,7 @@ from steptwin.points import LivePoint, turns_of
 from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection as Way
 from steptwin.world import script as do
-from steptwin.world.control import Move, StopAxes
+from steptwin.world.control import Halt, Move, StopAxes
 from steptwin.world.faults import AxisLoad, Faults
 from steptwin.world.kernel import Kernel
 from steptwin.world.kind import BuildContext, ControllerKind, LineKind, LineUnit, LinkKind, Member, Terminals
@@ -172,10 +172,6 @@ def _move(toy: Toy, line: str | None, command: Move) -> do.Send:
     return do.Send(line, b"M" + int(number).to_bytes(signed=True))
 
 
-def _stop(toy: Toy, line: str | None, command: StopAxes) -> do.Send:
-    return do.Send(line or "", b"H\0")
-
-
 TOYS = LineKind(
     name="toys",
     meaning="toys",
@@ -207,7 +203,8 @@ TOY: ControllerKind[ToySpec, Toy, ToyView] = ControllerKind(
     pins=lambda toy: {pin.name: pin for pin in DATASHEET.pins},
     datasheet_of=lambda variant: DATASHEET,
     point=_point,
-    control={Move: _move, StopAxes: _stop},
+    control={Move: _move, StopAxes: lambda toy, line, command: Halt(command.machine, command.axis)},
+    halt=lambda toy, wanted, now: toy.halt(now),
     state=StateReader(
         datasheet=lambda toy: DATASHEET,
         status=lambda toy, now: StateStatus(text="off" if toy.is_off else "ok"),

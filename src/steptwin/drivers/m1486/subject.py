@@ -133,6 +133,7 @@ class M1486Part:
             command.Move: self._move,
             command.Jog: self._jog,
             command.StopAxes: self._stop,
+            command.StopAll: lambda _: self._chip.stop_program(),
             command.ControlProgram: self._program,
             steps.Send: self._send,
         }

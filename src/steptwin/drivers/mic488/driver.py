@@ -12,6 +12,7 @@ from typing import Self
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.mic488 import identify, snapshot
 from steptwin.drivers.mic488.axis import AsyncMic488Axis
+from steptwin.drivers.mic488.failures import Unconfirmed
 from steptwin.drivers.mic488.group import trigger
 from steptwin.drivers.mic488.lines import AsyncModbusLine
 from steptwin.drivers.mic488.motion import MotionKind, MoveEnd
@@ -28,6 +29,7 @@ from steptwin.mic488.describe import AxisScale
 from steptwin.mic488.inifile import IniFile
 from steptwin.mic488.registermap import DataType, WriteEffect
 from steptwin.mic488.registers import AXES, DEFAULT_FIRMWARE, INPUTS, OUTPUTS, register_map
+from steptwin.mic488.status import ProgramState
 from steptwin.mic488.values import RegisterValue, named
 from steptwin.wire import pdu
 
@@ -221,6 +223,18 @@ class AsyncMic488:
     async def stop_all(self) -> None:
         """Stop all axes at once, without ramp. A running program continues, and may move them again: see ``program.stop``."""
         await self.stop()
+
+    async def halt(self) -> None:
+        """Stop all axes and pause a running program. Drives stay on and hold their load; ``program.start`` goes on (WBC-9).
+
+        Raises `Unconfirmed` if the program was not paused.
+        """
+        await self.stop()
+        if await self.program.state() is ProgramState.RUNNING:
+            await self.program.pause()
+            await self.stop()  # the program may have begun a motion meanwhile
+            if await self.program.state() is ProgramState.RUNNING:
+                raise Unconfirmed("the program was paused, but runs: another master has started it again")
 
     async def _halt(self, key: str, axes: Sequence[int], what: str) -> None:
         chosen = [check_axis(axis) for axis in axes or ALL_AXES]

@@ -17,7 +17,7 @@ from steptwin.drivers.mic488.program import ProgramState
 from steptwin.drivers.mic488.snapshot import COUNTERS
 from steptwin.drivers.modbus import ModbusQuery
 from steptwin.drivers.subject import DeviceAction, RawEffect, ValueAndUnit
-from steptwin.errors import Misuse, Refusal
+from steptwin.errors import LineFailure, Misuse, Refusal
 from steptwin.inputfiles import read_bytes
 from steptwin.mic488.datasheet import datasheet_of
 from steptwin.mic488.points import item_of
@@ -144,6 +144,7 @@ class Mic488Part:
             command.Home: self._home,
             command.Jog: self._jog,
             command.StopAxes: self._stop,
+            command.StopAll: lambda _: self._mic.halt(),
             command.ControlProgram: self._program,
             command.Encoders: self._encoders,
             steps.Write: self._write,
@@ -167,8 +168,13 @@ class Mic488Part:
     async def _jog(self, wanted: command.Jog) -> None:
         await self._mic.axis(wanted.axis).move_velocity(wanted.velocity)
 
-    async def _stop(self, wanted: command.StopAxes) -> None:
+    async def _stop(self, wanted: command.StopAxes) -> object:
         await (self._mic.stop_all() if wanted.axis is None else self._mic.axis(wanted.axis).stop())
+        try:
+            program = ACTIVITIES.get(await self._mic.program.state())
+        except LineFailure:  # the stop itself was confirmed
+            program = None
+        return {"program": program and program.value}
 
     async def _program(self, wanted: command.ControlProgram) -> None:
         program = self._mic.program

@@ -245,6 +245,7 @@ class Mic488(Blocking):
     disable = blocking(AsyncMic488.disable)
     stop = blocking(AsyncMic488.stop)
     stop_all = blocking(AsyncMic488.stop_all)
+    halt = blocking(AsyncMic488.halt)
     move_together = blocking(AsyncMic488.move_together)
     move_together_by = blocking(AsyncMic488.move_together_by)
     run_together = blocking(AsyncMic488.run_together)

@@ -1,6 +1,6 @@
 // Made from docs/studio.schema.json by `npm run protocol`; not to be changed by hand.
 
-export type Request = DescribeRequest | ReadRequest | PinsRequest | StateRequest | EncodersRequest | FaultsRequest | FaultKindsRequest | TimeRequest | EndPointsRequest | FollowRequest | UnfollowRequest | SetRequest | PressRequest | ReleaseRequest | WriteRequest | SendRequest | RequestRequest | PowerCycleRequest | TurnRequest | CoupleRequest | FaultRequest | ClearFaultRequest | ExpectRequest | NoteRequest | SeeRequest | EnableRequest | MoveRequest | HomeRequest | JogRequest | StopRequest | ProgramRequest | DownloadRequest | PauseRequest | ResumeRequest | StepRequest | SnapshotRequest | SnapshotsRequest | RestoreRequest | DropSnapshotRequest | SaveRequest | DebugRequest | BreakpointRequest | ClearBreakpointRequest | BreakpointsRequest | StopOnRequest | StepProgramRequest | RunRequest | LookAtRequest | BranchRequest | StackRequest | ValuesRequest | EvaluateRequest | SetValueRequest | ProgramSourceRequest | WhyRequest | HelloRequest | ResyncRequest | WatchRequest | UnwatchRequest | TakeControlRequest | ReleaseControlRequest | RenewRequest | LetGoRequest | StopAllRequest | LookRequest | PastEventsRequest | GoBackRequest | ProgramsRequest | ProgramTextRequest | ProgramMemoryRequest | PortsRequest | ConnectRequest | DisconnectRequest | TrafficRequest | AuditRequest | CalculatorRequest | CalculateRequest | GearRequest | ConfigurationRequest | EditConfigurationRequest | ScanRequest | VerifyRequest | WorkRequest | CancelWorkRequest | RecordingsRequest | SaveRecordingRequest | ViewRecordingRequest | BranchesRequest | StartBranchRequest | EndBranchRequest | DrawingRequest | SaveDrawingRequest | GatewaysRequest | HistoryRequest | HistoryValuesRequest | CompareHistoryRequest | HistoryWritesRequest | CampaignsRequest | RunCampaignRequest | EndCampaignRequest | SettingsRequest | ShadowRequest | ShadowStateRequest;
+export type Request = DescribeRequest | ReadRequest | PinsRequest | StateRequest | EncodersRequest | FaultsRequest | FaultKindsRequest | TimeRequest | EndPointsRequest | FollowRequest | UnfollowRequest | SetRequest | PressRequest | ReleaseRequest | WriteRequest | SendRequest | RequestRequest | PowerCycleRequest | TurnRequest | CoupleRequest | FaultRequest | ClearFaultRequest | ExpectRequest | NoteRequest | SeeRequest | EnableRequest | MoveRequest | HomeRequest | JogRequest | StopRequest | StopAllRequest | ProgramRequest | DownloadRequest | PauseRequest | ResumeRequest | StepRequest | SnapshotRequest | SnapshotsRequest | RestoreRequest | DropSnapshotRequest | SaveRequest | DebugRequest | BreakpointRequest | ClearBreakpointRequest | BreakpointsRequest | StopOnRequest | StepProgramRequest | RunRequest | LookAtRequest | BranchRequest | StackRequest | ValuesRequest | EvaluateRequest | SetValueRequest | ProgramSourceRequest | WhyRequest | HelloRequest | ResyncRequest | WatchRequest | UnwatchRequest | TakeControlRequest | ReleaseControlRequest | RenewRequest | LetGoRequest | LookRequest | PastEventsRequest | GoBackRequest | ProgramsRequest | ProgramTextRequest | ProgramMemoryRequest | PortsRequest | ConnectRequest | DisconnectRequest | TrafficRequest | AuditRequest | CalculatorRequest | CalculateRequest | GearRequest | ConfigurationRequest | EditConfigurationRequest | ScanRequest | VerifyRequest | WorkRequest | CancelWorkRequest | RecordingsRequest | SaveRecordingRequest | ViewRecordingRequest | BranchesRequest | StartBranchRequest | EndBranchRequest | DrawingRequest | SaveDrawingRequest | GatewaysRequest | HistoryRequest | HistoryValuesRequest | CompareHistoryRequest | HistoryWritesRequest | CampaignsRequest | RunCampaignRequest | EndCampaignRequest | SettingsRequest | ShadowRequest | ShadowStateRequest;
 
 /** Every request has exactly one. */
 export type Answer = {
@@ -532,6 +532,7 @@ export type Description = {
       severity: "information" | "warning" | "alarm";
       stops_motor: boolean | null;
     })[];
+    program_actions: string[];
     details: ({
       name: string;
       meaning: string;
@@ -912,7 +913,7 @@ export type JogRequest = {
   velocity: number;
 };
 
-/** Stop as fast as the controller does, with a ramp or without. Answer: null. */
+/** Stop as fast as the controller does, with a ramp or without. Its program goes on. Answer: program: what the program does now: running (it goes on), paused, stopped; null where that is not known. */
 export type StopRequest = {
   do: "stop";
   /** Comes back with the answer. */
@@ -922,6 +923,14 @@ export type StopRequest = {
   machine: string;
   /** The number of an axis; all without. */
   axis?: number | null;
+};
+
+/** Stop everything: all axes and jogs, programs (paused where the controller can pause one, else ended), and scripts. Fails if a controller could not be stopped; the others are. Answer: machines: the controllers that were stopped; scripts: those that were ended. */
+export type StopAllRequest = {
+  do: "stop_all";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
 };
 
 /** Start, pause or stop the program of a machine. Answer: null. */
@@ -1282,14 +1291,6 @@ export type LetGoRequest = {
   version?: 1;
   /** The number in the answer to jog. */
   lease: number;
-};
-
-/** Stop every axis as stop does, and every program that runs. Needs no control. */
-export type StopAllRequest = {
-  do: "stop_all";
-  /** Comes back with the answer. */
-  id?: string | number | null;
-  version?: 1;
 };
 
 /** Look at a moment of the past while the world goes on. The message past and values of all watches follow. Until the present is looked at again, state, read, pins, encoders, faults and programs are of that moment, and nothing can be changed but by stop. */
@@ -1756,12 +1757,6 @@ export type RenewAnswer = {
 };
 
 export type LetGoAnswer = null;
-
-export type StopAllAnswer = {
-  machines: string[];
-  /** Why, by machine. */
-  failed: Record<string, string>;
-};
 
 export type LookAnswer = {
   /** Virtual time, as decimal text [ns] */
@@ -2534,6 +2529,7 @@ export interface Requests {
   home: { request: HomeRequest; answer: unknown };
   jog: { request: JogRequest; answer: JogAnswer };
   stop: { request: StopRequest; answer: unknown };
+  stop_all: { request: StopAllRequest; answer: unknown };
   program: { request: ProgramRequest; answer: unknown };
   download: { request: DownloadRequest; answer: unknown };
   pause: { request: PauseRequest; answer: unknown };
@@ -2567,7 +2563,6 @@ export interface Requests {
   release_control: { request: ReleaseControlRequest; answer: ReleaseControlAnswer };
   renew: { request: RenewRequest; answer: RenewAnswer };
   let_go: { request: LetGoRequest; answer: LetGoAnswer };
-  stop_all: { request: StopAllRequest; answer: StopAllAnswer };
   look: { request: LookRequest; answer: LookAnswer };
   past_events: { request: PastEventsRequest; answer: PastEventsAnswer };
   go_back: { request: GoBackRequest; answer: GoBackAnswer };

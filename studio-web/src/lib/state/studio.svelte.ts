@@ -189,14 +189,10 @@ export class Studio {
   /** Nobody needs control for it, and every role may. */
   stopAll(): void {
     this.stops++;
-    this.ask("stop_all", {}).then(
-      ({ failed }) => {
-        const reasons = Object.entries(failed);
-        if (reasons.length)
-          this.show({ text: reasons.map(([name, why]) => `${name}: ${why}`).join("\n"), kind: "error", lang: "en" });
-      },
-      (error: unknown) => this.report(error),
-    );
+    this.ask("stop_all", {}).catch((error: unknown) => {
+      this.report(error);
+      clearTimeout(this.noticeTimer); // something still moves: it stays until it is closed
+    });
   }
 
   /** What a key does with time. Back and on go to where something happened; on from the present is a step of the world. */

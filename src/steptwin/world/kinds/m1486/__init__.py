@@ -61,6 +61,7 @@ M1486: ControllerKind[M1486Spec, M1486Chip, M1486View] = ControllerKind(
     point=points.live_point,
     marks=PointMarks(points.marks, points.mark_of),
     control=control.CONTROL,
+    halt=control.halt,
     motion_ends=control.motion_ends,
     seek=control.seek,
     held_jog=M1486HeldJog,

@@ -13,8 +13,9 @@ from steptwin.m1486.microsteps import FULL_STEP, UNIT
 from steptwin.m1486.present import program_words
 from steptwin.m1486.ranges import out_of_range
 from steptwin.m1486.syntax import ChipCommand
+from steptwin.machine import Nanos
 from steptwin.world import script as do
-from steptwin.world.control import ControllerCommand, Jog, Move, Seek, StopAxes
+from steptwin.world.control import ControllerCommand, Halt, Jog, Move, Seek, StopAxes
 from steptwin.world.kind import MotionEnds
 
 _LINE = re.compile(r"B([1-9][0-9]?)\Z")
@@ -102,6 +103,10 @@ def _jog(chip: M1486Chip, line: str | None, command: Jog) -> do.Send:
 def _stop(chip: M1486Chip, line: str | None, command: StopAxes) -> do.Send:
     """With its ramp. A program goes on after it unless function 51 is off."""
     return _typed(chip, line, command, "k")
+
+
+def halt(chip: M1486Chip, wanted: Halt, now: Nanos) -> None:
+    chip.receive(f"x{chip.address:X}\r{'%' if wanted.program else ''}\rk\r".encode("ascii"), now)
 
 
 CONTROL: Mapping[type[ControllerCommand], Callable[[M1486Chip, str | None, Any], do.Send]] = {

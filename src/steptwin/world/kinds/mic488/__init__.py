@@ -94,6 +94,7 @@ MIC488: ControllerKind[Mic488Spec, Mic488Device, Mic488View] = ControllerKind(
     marks=PointMarks(points.marks),
     motion_ends=control.motion_ends,
     control=control.CONTROL,
+    halt=control.halt,
     held_jog=Mic488HeldJog,
     state=state_of,
     statement=statement_of,

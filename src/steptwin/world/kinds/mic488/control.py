@@ -6,14 +6,17 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from steptwin.errors import Misuse
+from steptwin.machine import Nanos
 from steptwin.mic488.axis import Axis
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.encoding import DINT_MAX, DINT_MIN
 from steptwin.mic488.registers import AXES
+from steptwin.mic488.slave import slave
 from steptwin.mic488.status import AxisStatus
 from steptwin.world import script as do
-from steptwin.world.control import ControllerCommand, ControlProgram, Enable, Home, Jog, Move, Seek, StopAxes
+from steptwin.world.control import ControllerCommand, ControlProgram, Enable, Halt, Home, Jog, Move, Seek, StopAxes
 from steptwin.world.kind import MotionEnds
+from steptwin.world.kinds.mic488.writes import encode_write
 
 PROGRAM = {"stop": 0, "start": 1, "pause": 2}
 """PROGRAM_CTRL by action."""
@@ -56,16 +59,27 @@ def _jog(device: Mic488Device, line: str | None, command: Jog) -> do.Write:
     return _write(command, "VEL_ABS", command.velocity)
 
 
-def _stop(device: Mic488Device, line: str | None, command: StopAxes) -> do.Write:
-    axes = range(1, AXES + 1) if command.axis is None else (command.axis,)
-    return do.Write(tuple((command.machine, f"M{axis}_STOP", 1.0) for axis in axes))
+def _stop(device: Mic488Device, line: str | None, command: StopAxes) -> Halt:
+    return Halt(command.machine, command.axis)
 
 
-def _program(device: Mic488Device, line: str | None, command: ControlProgram) -> do.Write:
+def _program(device: Mic488Device, line: str | None, command: ControlProgram) -> do.Write | Halt:
+    if command.action != "start":
+        return Halt(command.machine, program=command.action)
     return do.Write(((command.machine, "PROGRAM_CTRL", float(PROGRAM[command.action])),))
 
 
-CONTROL: Mapping[type[ControllerCommand], Callable[[Mic488Device, str | None, Any], do.Write]] = {
+def halt(device: Mic488Device, wanted: Halt, now: Nanos) -> None:
+    """By the registers by which a master does it, but where no fault of protocol or line comes between."""
+    axes = range(1, AXES + 1) if wanted.axis is None else (wanted.axis,)
+    stops = tuple((f"M{axis}_STOP", 1.0) for axis in axes)
+    values = stops if wanted.program is None else (("PROGRAM_CTRL", float(PROGRAM[wanted.program])),)
+    device.advance(now)
+    for pdu in encode_write(device, values):
+        slave(device.firmware.name, lenient=False).answer(device, pdu)
+
+
+CONTROL: Mapping[type[ControllerCommand], Callable[[Mic488Device, str | None, Any], do.Write | Halt]] = {
     Enable: _enable,
     Move: _move,
     Home: _home,

@@ -13,7 +13,8 @@ from steptwin.mic488.device import Mic488Device, pause_observer
 from steptwin.mic488.vision import Com1Port, uses_vision
 from steptwin.wire.gateway import ModbusGateway, ScriptPort, TcpGatewayPort
 from steptwin.wire.line import SerialLine
-from steptwin.wire.rtu import BURSTY_GAP_NS, UART_GAP_NS
+from steptwin.wire.pdu import READS
+from steptwin.wire.rtu import BROADCAST, BURSTY_GAP_NS, UART_GAP_NS
 from steptwin.wire.slave import FrameDirection, FrameObserver, RtuSlavePort, SlaveDevice, SlavePort, TcpSlavePort
 from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
 from steptwin.world.faults import Faults
@@ -93,6 +94,11 @@ class ModbusBus(Line):
         # With timing a request takes the line and the controller; faults count requests.
         is_free = self._timed is None and not self._faults.interfere and place.framed is place.inner
         return is_free and place.framed is not None and place.framed.is_lone_read(data)
+
+    def recall(self, unit: int, now: Nanos) -> None:
+        if self._master.recall(lambda frame: frame[0] in (unit, BROADCAST) and frame[1] not in READS, now):
+            self.leave(SCRIPTS)  # what is on its way there is lost with the connection
+        self._master.update(now)  # requests for others go on
 
     def _ask(self, frame: bytes, now: Nanos) -> None:
         self.receive(SCRIPTS, frame, now)
