@@ -43,9 +43,10 @@ class RunnableProgram(Device, Triggerable, Flyable, Stoppable):
         await self._over()
 
     async def stop(self, success: bool = True) -> None:
-        """Ends it, which switches drives and outputs off; with ``success`` who waits for it sees no error."""
+        """With ``success``, end it, which switches drives and outputs off; `complete` sees no error. Without, as when a plan is
+        aborted, pause it and stop all axes: drives hold their load."""
         self._is_stopped = not success
-        await self._mic.program.stop()
+        await (self._mic.program.stop() if success else self._mic.halt())
 
     async def _start(self) -> None:
         state = await self._mic.program.state()
@@ -56,11 +57,11 @@ class RunnableProgram(Device, Triggerable, Flyable, Stoppable):
 
     async def _over(self) -> None:
         while True:
-            if await self._mic.program.state() is ProgramState.STOPPED:
+            if self._is_stopped or await self._mic.program.state() is ProgramState.STOPPED:
                 break
             await asyncio.sleep(PERIOD_S)
         if self._is_stopped:
-            raise RuntimeError(f"{self.name} was stopped")
+            raise RuntimeError(f"{self.name} was stopped; its program is paused")
         code = (await self._mic.status()).controller
         if code is not None and (status := controller_status(code)).level is StatusLevel.ERROR:
             raise Refusal(f"{self._place()}: the program has ended: {status.text}")

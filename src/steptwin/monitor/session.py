@@ -118,13 +118,8 @@ class MonitorSession:
         """
         self._jog = None
         self._ignore_held_key()
-        await self.mic.stop_all()
-        status = self.picture.status
-        if status is None or status.program != ProgramState.RUNNING:
-            return "stopped"
-        await self.mic.program.pause()
-        await self.mic.stop_all()  # the program may have begun another motion meanwhile
-        return "stopped; the program is paused"
+        await self.mic.halt()
+        return "stopped; the program is paused" if await self.mic.program.state() is ProgramState.PAUSED else "stopped"
 
     async def jog(self, axis: int, velocity_u: float) -> str:
         """Handle a jog key, pressed or repeated. The axis runs as long as the key repeats.

@@ -248,13 +248,10 @@ class Mic488Rig(LineRig):
             pytest.skip(f"this test is for firmware {wanted}, {self._device} has {self.driver.firmware}")
 
     def close(self) -> None:
-        """After the test. The axes of a device and its program are stopped."""
+        """After the test. The axes of a device are stopped, and its program is paused: drives hold their load."""
         try:
             if self._live is None and not self._is_twin_only:
-                driver = self.driver
-                if driver.status().program:
-                    driver.program.stop()
-                driver.stop_all()
+                self.driver.halt()
         finally:
             for driver in self._opened:
                 driver.close()

@@ -116,8 +116,8 @@ def test_no_trigger_mode_is_left_when_its_answer_is_lost() -> None:
     assert not wire.moving(1)
 
 
-def test_a_program_that_was_started_too_late_is_stopped_and_said_to_be_so() -> None:
-    """The process is suspended while it writes the frame that starts the program."""
+def test_a_program_that_was_started_too_late_is_paused_and_said_to_be_so() -> None:
+    """The process is suspended while it writes the frame that starts the program. Its end would switch drives off (MIC-31)."""
     wire = Wire()
     mic = driver(wire)
     start = ModbusQuery(1, WriteRegisterRequest(10003, 1)).rtu_frame
@@ -130,7 +130,8 @@ def test_a_program_that_was_started_too_late_is_stopped_and_said_to_be_so() -> N
     wire.before_each = suspend
     with pytest.raises(SentLate, match="was sent more than"):
         mic.program.start()
-    assert wire.sent[-1][1] == ModbusQuery(1, WriteRegisterRequest(10003, 0)).rtu_frame
+    pause, stop = ModbusQuery(1, WriteRegisterRequest(10003, 2)), ModbusQuery(1, WriteRegisterRequest(10016, 15))
+    assert [frame for _, frame in wire.sent[-2:]] == [pause.rtu_frame, stop.rtu_frame]
 
 
 def test_a_trigger_mode_that_cannot_be_left_is_told() -> None:

@@ -27,12 +27,13 @@ class AsyncMic488Program:
 
     async def start(self) -> None:
         """Start the selected program, or continue a paused one. Sent only once: after a lost answer it is unknown whether it
-        runs."""
+        runs. One that began after a suspension of this process is paused, and its axes are stopped."""
         permission = self._unit.permission(*range(1, AXES + 1))
         try:
             await self._unit.write(self._unit.item("PROGRAM_CTRL"), ProgramState.RUNNING, permission=permission)
         except SentLate:
-            await self.stop()
+            await self.pause()
+            await self._unit.stop([*range(1, AXES + 1)], "M_STOP", "stopped")
             raise
 
     async def pause(self) -> None:
