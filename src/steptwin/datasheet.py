@@ -219,6 +219,8 @@ class Datasheet:
     events: tuple[EventDescription, ...]
     program_actions: tuple[str, ...] = ()
     """What can be done with its program on command: ``start``, ``pause``, ``stop``; empty where it has none."""
+    end_switches_off: bool = False
+    """Whether the end of its program switches drives and outputs off."""
     details: tuple[Detail, ...] = ()
     """Of its state (`steptwin.controllerstate`)."""
     also_change: Mapping[str, tuple[str, ...]] | None = None

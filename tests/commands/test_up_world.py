@@ -22,6 +22,7 @@ from steptwin.live.links import Feed
 from steptwin.live.pace import Pace
 from steptwin.live.world_control import WorldControl
 from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.subject.following import filter_of
 from steptwin.wire.crc import with_crc
 from steptwin.world import script as do
 
@@ -122,6 +123,14 @@ STOPPING = """
     repeat = 1000
     steps = [{ wait = "300 ms" }, { note = "tick" }]
 """
+
+
+def test_in_a_studio_a_script_that_stops_is_reported_and_time_goes_on() -> None:
+    live = LiveWorld(World.from_toml(STOPPING))
+    told = live.subject.follow(filter_of(["status"]), 9)
+    live.advance(5 * SECOND)
+    assert (live.now, live.world.stopped) == (5 * SECOND, None)
+    assert [(event.time, event.text) for event in told.take().events] == [(SECOND, "a script would end the run here: enough")]
 
 
 def test_a_script_that_stops_a_live_world_stops_it_for_all() -> None:

@@ -40,7 +40,7 @@ def test_curl(start_studio: Start) -> None:
         answers.append(json.loads(ran.stdout))
     assert [one["point"] for one in answers[0]["ok"]] == ["table.M1.position", "table.M1.status"]
     assert answers[1]["ok"] is None
-    assert answers[3]["ok"] == {"machines": ["table", "drum", "feeder"], "failed": {}}
+    assert answers[3]["ok"] == {"machines": ["table", "drum", "feeder"], "scripts": []}
 
 
 def test_javascript(start_studio: Start) -> None:

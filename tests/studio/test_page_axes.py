@@ -175,7 +175,9 @@ def test_space_and_escape_stop_what_somebody_else_moves(studio: Studio) -> None:
     field.press("Space")
     assert not studio.stands(1)
     field.press("Escape")
-    until(lambda: studio.stands(1), "Escape has stopped it, from within a text")
+    assert not studio.stands(1), "the first Escape leaves the field"
+    page.keyboard.press("Escape")
+    until(lambda: studio.stands(1), "Escape has stopped it")
     studio.master.run(1, 10.0)
     until(lambda: not studio.stands(1), "the axis moves")
     button(page, "Stop all").click()

@@ -70,7 +70,7 @@ def test_keys_are_told(studio: Studio) -> None:
     page = studio.page()
     page.locator("body").press("?")
     dialog = page.get_by_role("dialog", name="Keys")
-    expect(dialog).to_contain_text("Stop all, from everywhere")
+    expect(dialog).to_contain_text("Close what is open, or leave a field")
     expect(dialog).to_contain_text("not an emergency stop")
     expect(dialog).to_contain_text("1 … 9")
     page.keyboard.press("Escape")

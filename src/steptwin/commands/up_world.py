@@ -197,7 +197,7 @@ async def _serve(
         server = Server(cell, display.notice)
         live.share_reads(cell)
         pace = Pace(live, cell, display.notice, has_clients=any(line.is_open for line in world.spec.lines))
-        live.on_stop = server.end
+        live.on_stop = server.end if addition is None else None
         begun, recorder = False, None
         try:
             await _open(server, live, pace, options, addition)

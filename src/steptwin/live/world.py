@@ -107,7 +107,7 @@ class LiveWorld:
         self.companion: Companion | None = None
         """``stale`` is to be set when its deadline has changed."""
         self.on_stop: Callable[[], None] | None = None
-        """Called when a script has stopped the world."""
+        """Called when a script has stopped the world. None: only the script ends, which is reported, and the world goes on."""
         self.run_control: RunControl | None = None
         self.on_break: Callable[[], None] = lambda: None
         """Called where the run control has stopped the world."""
@@ -237,17 +237,22 @@ class LiveWorld:
 
     def _advance(self, now: Nanos) -> None:
         world = self.world
-        while (due := self._due()) is not None and due <= now:
-            world.advance(due)
-            if world.stopped is not None:
-                break
-            self._dues.advance(due)
-            if self.companion is not None:
-                self.companion.advance(due)
-        self.stale = True
-        world.advance(now)
-        if world.stopped is not None and self.on_stop is not None:
-            self.on_stop()
+        while True:
+            while (due := self._due()) is not None and due <= now:
+                world.advance(due)
+                if world.stopped is not None:
+                    break
+                self._dues.advance(due)
+                if self.companion is not None:
+                    self.companion.advance(due)
+            self.stale = True
+            world.advance(now)
+            if world.stopped is None:
+                return
+            if self.on_stop is not None:
+                self.on_stop()
+                return
+            world.pass_stop()
 
     def deadline(self) -> Nanos | None:
         self._next = self._due()

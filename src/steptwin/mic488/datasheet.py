@@ -43,6 +43,7 @@ def datasheet_of(firmware: str, scales: tuple[tuple[str, float | None], ...] = D
         commands=tuple(_commands(registers, units)),
         events=tuple(EVENTS.values()),
         program_actions=("start", "pause", "stop"),
+        end_switches_off=True,  # MIC-31
         details=tuple(row.detail for row in DETAILS),
         also_change=_ALSO_CHANGE,
     )

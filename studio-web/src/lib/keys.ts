@@ -14,11 +14,19 @@ const originOf = (event: KeyboardEvent): EventTarget | null => event.composedPat
 /** So many panels have a key, a digit. */
 export const NUMBERED = 9;
 
-/** What a key means outside of controls: null for nothing. Escape is heard everywhere. */
+/** Whether the focus is in something that Escape leaves: a text, a list that may be open. */
+export const isInField = (event: KeyboardEvent): boolean => {
+  const target = originOf(event);
+  return isInText(target) || (target instanceof Element && target.closest("input, select") !== null);
+};
+
+/** Buttons and pads that jog for as long as they are held are marked while they do. */
+export const isHolding = (): boolean => document.querySelector("[data-held]") !== null;
+
+/** What a key means outside of controls: null for nothing. */
 export type Meaning = "stop" | "live" | "pause" | "back" | "on" | "find" | "help" | { panel: number };
 
 export function meaningOf(event: KeyboardEvent): Meaning | null {
-  if (event.key === "Escape") return "stop";
   if (event.ctrlKey || event.altKey || event.metaKey) return null;
   const target = originOf(event);
   if (event.key === " ") return isOnControl(target) ? null : "stop";

@@ -533,6 +533,7 @@ export type Description = {
       stops_motor: boolean | null;
     })[];
     program_actions: string[];
+    end_switches_off: boolean;
     details: ({
       name: string;
       meaning: string;
