@@ -266,6 +266,26 @@ def test_the_keyboard_is_enough(studio: Studio) -> None:
     expect(page.get_by_text("cell.prg is in table now.")).to_be_visible()
 
 
+def test_escape_closes_what_is_open_and_stops_where_nothing_is(studio: Studio) -> None:
+    page = studio.page(panel="Program")
+    button(page, "Start the program of table").click()
+    until(lambda: studio.master.words(10003)[0] == 1, "it runs")
+    begin(page)
+    for opened in ("Control+Space", "Control+f"):
+        page.keyboard.press(opened)
+        expect(page.locator(".cm-tooltip-autocomplete, .cm-search").first).to_be_visible()
+        page.keyboard.press("Escape")
+        expect(page.locator(".cm-tooltip-autocomplete, .cm-search")).to_have_count(0)
+    page.keyboard.press("Escape")
+    expect(text_of(page)).not_to_be_focused()
+    page.keyboard.press("?")
+    page.keyboard.press("Escape")
+    expect(page.get_by_role("dialog")).to_have_count(0)
+    assert studio.master.words(10003)[0] == 1
+    page.keyboard.press("Escape")
+    until(lambda: studio.master.words(10003)[0] == 2, "it is paused, so that its drives stay on")
+
+
 @pytest.mark.parametrize("language", ["en-US", "pl-PL"])
 def test_axe_finds_nothing_serious(studio: Studio, language: str) -> None:
     page = studio.page(language, panel=None)
