@@ -1,25 +1,19 @@
-"""The demo machine."""
+"""The demo machine: values of its description are overridden as those of any other."""
 
 from __future__ import annotations
 
-import socket
-import tomllib
-from pathlib import Path
-
 import pytest
 
-from steptwin.commands import demo
+from steptwin.commands.demo import demo_world
+from steptwin.commands.up_world import UpOptions
+from steptwin.errors import Misuse
 
 
-def test_what_others_have_is_left_to_them(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(demo, "runtime_directory", lambda: tmp_path)
-    monkeypatch.setattr(demo, "HAS_PTYS", True)
-    (tmp_path / "m1486").symlink_to("/dev/null")
-    with socket.create_server(("127.0.0.1", 0)) as other, socket.create_server(("127.0.0.1", 0)) as closed:
-        taken, free = other.getsockname()[1], closed.getsockname()[1]
-        closed.close()
-        monkeypatch.setattr(demo, "PORTS", (taken, free, taken))
-        described = tomllib.loads(demo.describe_demo())
-    bus, chips = described["line"]
-    assert (bus["tcp"], bus["rtu_tcp"], bus["pty"]) == ("127.0.0.1:0", f"127.0.0.1:{free}", str(tmp_path / "mic488"))
-    assert (chips["tcp"], "pty" in chips) == ("127.0.0.1:0", False)
+def test_values_of_the_demo_machine_can_be_overridden() -> None:
+    world = demo_world(UpOptions(world=None, overrides={"x.start": 9}), free_ports=True)
+    assert world.read("x.position") == 9.0
+
+
+def test_an_override_of_nothing_is_refused() -> None:
+    with pytest.raises(Misuse, match=r"override 'nosuch.thing': there is no 'nosuch'"):
+        demo_world(UpOptions(world=None, overrides={"nosuch.thing": 4}), free_ports=True)

@@ -31,6 +31,7 @@ def demo_world(options: UpOptions, *, free_ports: bool = False) -> World:
         files,
         name=NAME,
         seed=options.seed,
+        overrides=options.overrides,
         keep_inputs=options.records_session,
         state=None if options.state is None else str(options.state),
     )

@@ -63,6 +63,8 @@ export const en = {
   resize: "Size of the panels",
   keysTitle: "Keys",
   keySpace: "Stop all, unless the focus is in a text or on a control",
+  notLoaded: "This panel could not be loaded.",
+  loadAgain: "Load the page again",
   switchesOff: "drives and outputs go off; a hanging load falls",
   keyEscape: "Close what is open, or leave a field; elsewhere, and while anything is jogged: Stop all",
   keyArrows: "Jog pad in focus: jog while held, Shift for full speed",

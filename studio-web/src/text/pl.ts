@@ -66,6 +66,8 @@ export const pl: Record<keyof typeof en, string> = {
   resize: "Rozmiar paneli",
   keysTitle: "Klawisze",
   keySpace: "Zatrzymaj wszystko, o ile fokus nie jest w tekście ani na elemencie obsługi",
+  notLoaded: "Nie udało się wczytać tego panelu.",
+  loadAgain: "Wczytaj stronę ponownie",
   switchesOff: "napędy i wyjścia zostaną wyłączone; wiszący ciężar opadnie",
   keyEscape: "Zamyka, co jest otwarte, albo wychodzi z pola; poza tym i podczas jazdy ręcznej: zatrzymaj wszystko",
   keyArrows: "Fokus na polu ruchu: ruch, dopóki trzymasz; Shift – pełna prędkość",

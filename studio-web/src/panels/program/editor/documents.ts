@@ -22,6 +22,8 @@ export class OpenText implements WorkspaceFile {
   doc: Text;
   view: EditorView | null = null;
   findings: readonly Finding[] = [];
+  /** The version that was checked last. */
+  checked = -1;
   /** What was done to the text in the twin to get the present one. */
   private sinceTwin: ChangeSet;
 
@@ -47,6 +49,11 @@ export class OpenText implements WorkspaceFile {
   /** With the line ends that it has in the twin. */
   get text(): string {
     return this.state.doc.sliceString(0, undefined, this.state.lineBreak);
+  }
+
+  /** Whether `findings` are of the present text. */
+  get isChecked(): boolean {
+    return this.checked === this.version && this.state.doc.eq(this.doc);
   }
 
   get isChanged(): boolean {

@@ -265,6 +265,7 @@ export class ProgramEditor {
   private async published(params: Published): Promise<void> {
     const file = this.find(params.uri);
     if (file === null || (params.version ?? file.version) !== file.version) return;
+    file.checked = file.version;
     file.findings = params.diagnostics.map(({ range, severity, code, message }) => ({
       line: range.start.line + 1,
       column: range.start.character + 1,
