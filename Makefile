@@ -62,7 +62,7 @@ page: $(PAGE)  ## Build the page of the studio
 vsix: $(EXTENSION_STAMP)  ## Build the extension for VS Code: build/steptwin.vsix
 	@$(WEB) vsix $(EXTENSION)
 
-extras: $(DEV_STAMP)  ## Install what pictures, other exports, campaigns, the monitor and the editor server need (as the tests do)
+extras: $(DEV_STAMP)  ## Install what pictures, other exports, campaigns and the editor server need (as the tests do)
 
 lint: $(DEV_STAMP) $(NODE_STAMP)  ## Check style and formatting
 	$(BIN)/ruff check .

@@ -67,7 +67,6 @@ IN_WALL_TIME = (
     "gateways",
     "history",
     "live",
-    "monitor",
     "peers",
     "studio",
     "test_docs_run.py",

@@ -34,7 +34,6 @@ NOT_RUN = {
     ],
     "docs/getting-started.md": ["needs mbpoll; tests/peers/test_readme.py does it"],
     "docs/install.md": ["a clone is what these pages are run in", "needs a package index", "needs a package index"],
-    "docs/monitor.md": ["needs a device and a terminal"],
     "docs/studio.md": [
         "it goes on until Ctrl-C",
         "needs devices",

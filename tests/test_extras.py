@@ -19,7 +19,7 @@ def test_what_is_missing_is_named_with_the_command_that_installs_it() -> None:
         "the studio needs fastapi and uvicorn, which are not installed: "
         "in a clone 'make extras' installs them, elsewhere 'pip install fastapi uvicorn'"
     )
-    assert str(missing("the monitor", ["textual"])).endswith("installs it, elsewhere 'pip install textual'")
+    assert str(missing("the editor server", ["pygls"])).endswith("installs it, elsewhere 'pip install pygls'")
     text = str(missing("it", ["aiomqtt<3", "psycopg[binary]", "numpy"]))
     assert text.startswith("it needs aiomqtt, psycopg and numpy, which are not installed: ")
     assert text.endswith("""elsewhere 'pip install "aiomqtt<3" "psycopg[binary]" numpy'""")
