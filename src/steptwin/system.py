@@ -14,10 +14,17 @@ HAS_EPOLL = hasattr(select, "epoll")
 HAS_PTYS = hasattr(os, "openpty")
 """Pseudo terminals: Linux and macOS."""
 
+HAS_OWNERS = hasattr(os, "fchown")
+"""Files have an owner, a group and permissions: not on Windows."""
+
 READ_FLAGS = (
     os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
 )  # fmt: skip
 """Open for reading: no waiting for the other end of a pipe, not inherited by processes, no translation of line ends."""
+WRITE_FLAGS = os.O_WRONLY | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
+"""Open for writing: not inherited by processes, no translation of line ends."""
+PIPE_FLAGS = WRITE_FLAGS | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0)
+"""Open a pipe or a device for writing: no waiting for the other end."""
 LOCK_FLAGS = READ_FLAGS | os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
 """Make or open a file to lock it, through no symbolic link."""
 
@@ -45,12 +52,19 @@ def is_own(found: os.stat_result) -> bool:
 
 
 def sync_directory(directory: Path) -> None:
-    """Make renames and new names in a directory survive power loss, where a directory can be opened (not on Windows)."""
+    """Make renames and new names in a directory survive power loss, where a directory can be opened (not on Windows) and its file
+    system can do that. Raises `OSError` for a disk that fails."""
     if not hasattr(os, "O_DIRECTORY"):
         return
-    handle = os.open(directory, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        handle = os.open(directory, os.O_RDONLY | os.O_DIRECTORY)
+    except PermissionError:  # names can be made in it, but not be listed
+        return
     try:
         os.fsync(handle)
+    except OSError as error:
+        if error.errno not in {errno.EINVAL, errno.ENOTSUP}:
+            raise
     finally:
         os.close(handle)
 

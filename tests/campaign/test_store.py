@@ -147,7 +147,8 @@ def test_gaps_are_what_is_left() -> None:
 def test_all_cases_as_parquet(tmp_path: Path) -> None:
     parquet = pytest.importorskip("pyarrow.parquet")
     given = [stored(0, m=1.5), stored(1, holds=False), stored(2, m=2.0)]
-    write_cases(lambda: given, tmp_path / "r.parquet")
+    with (tmp_path / "r.parquet").open("wb") as file:
+        write_cases(lambda: given, file)
     rows = parquet.read_table(tmp_path / "r.parquet").to_pylist()
     assert [(row["number"], row["failed"], row["value a"], row["value kind"], row["measure m"]) for row in rows] == [
         (0, False, 0.0, "x", 1.5),

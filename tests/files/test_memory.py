@@ -193,12 +193,13 @@ def test_power_lost_between_any_two_steps(tmp_path: Path, monkeypatch: pytest.Mo
             state.save("unit1", image(saves))
         monkeypatch.undo()
         if stop == 0:
-            (tmp_path / "unit1.tmp").write_bytes(image(saves)[:100])  # before fsync any part may be missing
+            (tmp_path / ".1.unfinished").write_bytes(image(saves)[:100])  # before fsync any part may be missing
     with StateDirectory(tmp_path) as state:
         old = image(saves - 1) if saves > 1 else None
         wanted = {0: [old], 1: [old], 2: [image(saves)]}.get(stop, [image(saves)])
         assert state.load("unit1") in wanted
         assert steps == min(stop, 3)
+        assert [path.name for path in tmp_path.glob(".*")] == []
         state.save("unit1", image(77))
         assert state.load("unit1") == image(77)
 
@@ -210,11 +211,11 @@ def test_the_file_reaches_the_disk_before_its_name_and_the_name_before_save_retu
     real_sync, real_replace = os.fsync, Path.replace
 
     def sync(handle: int) -> None:
-        order.append("fsync " + Path(os.readlink(f"/proc/self/fd/{handle}")).name)
+        order.append("fsync " + Path(os.readlink(f"/proc/self/fd/{handle}")).name.rpartition(".")[2])
         real_sync(handle)
 
     def replace(path: Path, target: Path) -> Path:
-        order.append(f"rename {path.name} {target.name}")
+        order.append(f"rename {path.name.rpartition('.')[2]} {target.name}")
         return real_replace(path, target)
 
     with StateDirectory(tmp_path / "state") as state:
@@ -223,7 +224,7 @@ def test_the_file_reaches_the_disk_before_its_name_and_the_name_before_save_retu
         state.save("unit1", b"1")
         state.save("unit1", b"2")
         state.save("unit1", b"3")
-    assert order == 3 * ["fsync unit1.tmp", "rename unit1.tmp unit1.image", "fsync state"]
+    assert order == 3 * ["fsync unfinished", "rename unfinished unit1.image", "fsync state"]
 
 
 def test_a_full_disk_is_said_and_keeps_the_old_content(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

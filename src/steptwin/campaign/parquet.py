@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from itertools import islice
-from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import pyarrow as pa
 from pyarrow import parquet
@@ -16,7 +15,7 @@ _ROWS = 10_000
 """Of a group."""
 
 
-def write_cases(results: Callable[[], Iterable[StoredCase]], path: Path) -> None:
+def write_cases(results: Callable[[], Iterable[StoredCase]], file: IO[bytes]) -> None:
     """``results`` is called twice: columns have the types of all values in them, which are text where they differ."""
     types: dict[str, Any] = {}
     for row in export_rows(results()):
@@ -27,7 +26,7 @@ def write_cases(results: Callable[[], Iterable[StoredCase]], path: Path) -> None
             types.setdefault(name, None)
     schema = pa.schema([(name, pa.string() if found is None else found) for name, found in types.items()])
     rows = export_rows(results())
-    with parquet.ParquetWriter(path, schema, compression="zstd") as writer:
+    with parquet.ParquetWriter(file, schema, compression="zstd") as writer:
         for group in _groups(rows):
             columns = {name: [_fitting(row.get(name), schema.field(name).type) for row in group] for name in schema.names}
             writer.write_table(pa.table(columns, schema=schema))

@@ -37,6 +37,7 @@ def build(
     from steptwin.diagnostics import Severity, render
     from steptwin.files.programfiles import CompanionFiles, read_program
     from steptwin.files.textfiles import write_bytes
+    from steptwin.files.writing import is_written_directly
     from steptwin.wbc.decompile import IMAGE
     from steptwin.wbc.dialect import dialect_for
     from steptwin.wbc.image import build as build_image
@@ -72,6 +73,7 @@ def build(
             }
         )
         return
+    is_stream = is_written_directly(target)
     if files.found:
-        typer.echo(str(files))
-    typer.echo(f"{target}: {len(executable.steps)} commands, {len(table.rows)} positions")
+        typer.echo(str(files), err=is_stream)
+    typer.echo(f"{target}: {len(executable.steps)} commands, {len(table.rows)} positions", err=is_stream)

@@ -25,13 +25,15 @@ def decompile(
 ) -> None:
     """Turn a compiled image into a program and a position table that build to the same bytes."""
     from steptwin.files.textfiles import write_bytes
+    from steptwin.files.writing import is_written_directly
     from steptwin.inputfiles import read_bytes
     from steptwin.wbc.decompile import decompile as decompile_image
 
     found = decompile_image(read_bytes(file))
     rows = len(found.positions.rows)
     table = positions
-    if table is None and output is not None and rows:
+    is_stream = output is not None and is_written_directly(output)
+    if table is None and output is not None and rows and not is_stream:
         table = output.with_suffix(".csv")
         if table.exists():
             raise Misuse(f"{table} exists already: name the position table with --positions")
@@ -55,7 +57,7 @@ def decompile(
     if output is None:
         typer.echo(found.text, nl=False)
     else:
-        typer.echo(f"{output}: {_summary(found)}")
+        typer.echo(f"{output}: {_summary(found)}", err=is_stream)
     if table is None and rows:
         typer.echo(f"{file} has {rows} positions: write them with --positions", err=True)
 

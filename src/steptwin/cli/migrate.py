@@ -5,6 +5,7 @@ From Python: `steptwin.m1486.migration.findings`, `steptwin.wbc.migration.findin
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -26,8 +27,10 @@ def migrate(
 
     Exit code 1 if errors are left."""
     from steptwin.commands.migrate import migrate as migrate_file
+    from steptwin.files.writing import is_written_directly
 
-    fits, data = migrate_file(file, to, old, output, (lambda _: None) if json else typer.echo)
+    report = partial(typer.echo, err=output is not None and is_written_directly(output))
+    fits, data = migrate_file(file, to, old, output, (lambda _: None) if json else report)
     if json:
         print_json(data)
     if not fits:

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from steptwin.cli.device import Device, Json, LogFrames, complain, find, opened, print_json
-from steptwin.errors import LineFailure, Misuse
+from steptwin.errors import Misuse
 
 
 def record(
@@ -31,8 +31,11 @@ def record(
     from steptwin.drivers.mic488.kind import of_mic488
     from steptwin.drivers.mic488.named import map_of
     from steptwin.drivers.mic488.session import carry_out, steps_of, to_text
+    from steptwin.files.textfiles import check_writable, write_bytes
 
     text = _read(session)
+    if output is not None:
+        check_writable(output)
     with opened(of_mic488(find(device), "record"), observe=False, log_frames=log_frames) as mic:
         try:
             steps = steps_of(text, map_of(mic))
@@ -51,7 +54,7 @@ def record(
             raise
         finally:
             if output is not None and kept[1:]:  # an earlier recording is not given up for none
-                _write(output, kept)
+                write_bytes(output, ("\n".join(kept) + "\n").encode())
 
 
 def diff(
@@ -83,12 +86,3 @@ def _read(path: Path) -> str:
     from steptwin.inputfiles import read_recorded
 
     return read_recorded(path)
-
-
-def _write(path: Path, lines: list[str]) -> None:
-    from steptwin.system import reason
-
-    try:
-        path.write_text("\n".join(lines) + "\n", "utf-8")
-    except OSError as error:
-        raise LineFailure(f"cannot write {path}: {reason(error)}") from error

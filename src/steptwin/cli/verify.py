@@ -13,7 +13,7 @@ from typing import Annotated
 import typer
 
 from steptwin.cli.device import Device, complain, find, kind_of
-from steptwin.errors import LineFailure, Misuse
+from steptwin.errors import Misuse
 
 
 def verify(
@@ -38,10 +38,13 @@ def verify(
     Exit code 1 when an interpretation is refuted. The report can be sent to the project.
     """
     from steptwin import __version__
+    from steptwin.files.textfiles import check_writable, write_bytes
     from steptwin.live.interrupts import FirstInterrupt
     from steptwin.verify.check import CheckOutcome
     from steptwin.verify.run import verify as check
 
+    if json is not None:
+        check_writable(json)
     address = find(device)
     with FirstInterrupt() as interrupt:
         report = check(
@@ -54,7 +57,7 @@ def verify(
             is_cancelled=lambda: interrupt.came,
         )
     if json is not None:
-        _write(json, report.to_json())
+        write_bytes(json, report.to_json().encode())
     typer.echo(report.to_text())
     if report.of(CheckOutcome.REFUTED) or not report.is_complete:
         raise typer.Exit(1)
@@ -72,12 +75,3 @@ def _move(text: str, axes: int) -> tuple[int, float]:
 def _progress(id_: str, number: int, count: int) -> None:
     if sys.stderr.isatty():
         complain(f"{number + 1}/{count} {id_}")
-
-
-def _write(path: Path, text: str) -> None:
-    from steptwin.system import reason
-
-    try:
-        path.write_text(text, "utf-8")
-    except OSError as error:
-        raise LineFailure(f"cannot write {path}: {reason(error)}") from error

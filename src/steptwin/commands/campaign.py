@@ -19,7 +19,7 @@ from steptwin.campaign.summary import percent
 from steptwin.errors import Misuse
 from steptwin.extras import libraries_of, missing
 from steptwin.files.coverage import CoverageReports
-from steptwin.files.textfiles import check_writable
+from steptwin.files.textfiles import check_writable, new_file
 from steptwin.inputfiles import read_recorded
 
 Print = Callable[[str], object]
@@ -178,6 +178,7 @@ def _export(campaign: Campaign, folder: Path, path: Path) -> None:
 
     store = campaign.open_store(folder)
     try:
-        write_cases(store.results, path)
+        with new_file(path) as file:
+            write_cases(store.results, file)
     finally:
         store.close()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import socket
 from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime, timedelta
@@ -13,6 +12,7 @@ from steptwin.access.modbusroles import ROLE_OID, role_value
 from steptwin.access.roles import ROLES
 from steptwin.errors import Misuse
 from steptwin.extras import missing
+from steptwin.files.writing import PRIVATE, new_content
 from steptwin.system import reason
 from steptwin.world.gateways import APPLICATION_URI
 
@@ -46,10 +46,10 @@ def make_certificate(
             raise Misuse(f"{file} is there already; remove it, or name another folder")
     certificate, key = _make(dict.fromkeys([*ALWAYS, socket.gethostname(), *hosts]), days, name, role)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        files[0].write_bytes(certificate)
-        with open(os.open(files[1], os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
+        with new_content(files[1], PRIVATE) as file:
             file.write(key)
+        with new_content(files[0]) as file:
+            file.write(certificate)
     except OSError as error:
         raise Misuse(f"{folder}: {reason(error)}") from error
     return files

@@ -14,7 +14,8 @@ from typing import Any
 from steptwin.durations import duration
 from steptwin.errors import Misuse
 from steptwin.extras import libraries_of, missing
-from steptwin.files.textfiles import check_writable
+from steptwin.files.textfiles import check_writable, new_file
+from steptwin.files.writing import as_text
 from steptwin.machine import SECOND
 
 FORMATS = {".csv": "numpy", ".parquet": "pyarrow", ".png": "matplotlib", ".svg": "matplotlib"}
@@ -190,20 +191,20 @@ class _Shown:
     # ------------------------------------------------------------------ as files
 
     def _export(self, path: Path, found: Sequence[Any]) -> None:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        if path.suffix == ".csv":
-            with path.open("w", encoding="utf-8", newline="") as file:
-                writer = csv.writer(file, lineterminator="\n")
-                writer.writerow(HEAD)
-                writer.writerows(_plain(row) for row in _rows(found))
-        elif path.suffix == ".parquet":
-            from steptwin.history.parquet import write_parquet
+        with new_file(path) as file:
+            if path.suffix == ".csv":
+                with as_text(file) as text:
+                    writer = csv.writer(text, lineterminator="\n")
+                    writer.writerow(HEAD)
+                    writer.writerows(_plain(row) for row in _rows(found))
+            elif path.suffix == ".parquet":
+                from steptwin.history.parquet import write_parquet
 
-            write_parquet(found, path)
-        else:
-            from steptwin.history.picture import draw
+                write_parquet(found, file)
+            else:
+                from steptwin.history.picture import draw
 
-            draw({series.point: [series] for series in found}, path)
+                draw({series.point: [series] for series in found}, file, path.suffix[1:])
         self._out(f"{path}: {sum(map(len, found))} values of {len(found)} points")
 
     def _export_pairs(self, path: Path, points: Iterable[str], one: Any, other: Any) -> None:
@@ -212,10 +213,10 @@ class _Shown:
             for point in points
         }
         if path.suffix in {".png", ".svg"}:
-            path.parent.mkdir(parents=True, exist_ok=True)
             from steptwin.history.picture import draw
 
-            draw(pairs, path)
+            with new_file(path) as file:
+                draw(pairs, file, path.suffix[1:])
             self._out(f"{path}: runs {one.number} (blue) and {other.number} (orange)")
         else:
             self._export(path, [series for pair in pairs.values() for series in pair])

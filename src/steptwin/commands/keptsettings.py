@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from steptwin.errors import Misuse
+from steptwin.files.writing import new_text
 from steptwin.live.directory import private_directory
 from steptwin.system import reason
 
@@ -23,7 +24,7 @@ def keep_settings(machine: str, text: str) -> str:
     try:
         private_directory(path)
         path /= f"{machine}-{datetime.now(UTC):%Y%m%d-%H%M%S-%f}.json"
-        with path.open("x", encoding="utf-8") as file:
+        with new_text(path) as file:
             file.write(text)
     except OSError as error:
         raise Misuse(f"nothing was written: the settings of {machine} cannot be kept in {path}: {reason(error)}") from error

@@ -1,11 +1,9 @@
 """The state directory: non-volatile images, with one owner at a time.
 
-An image is one file. A save writes a temporary file, syncs it, renames it onto the image and syncs the directory: at any moment —
-``kill -9``, power loss, full disk — the old or the new content is there whole. Damage is found by a header with format,
+An image is one file, which a save replaces as a whole (`steptwin.files.writing`). Damage is found by a header with format,
 length and CRC-32; it is an error, never older content passed off as the newest.
 
-Layout: ``<name>.image``, ``<name>.tmp`` (a save in progress), ``owner.lock``. Windows syncs no directories: after
-power loss the content before the last save may be there.
+Layout: ``<name>.image``, ``owner.lock``; what a killed process has left unfinished is removed by the next owner.
 """
 
 from __future__ import annotations
@@ -21,6 +19,7 @@ from typing import Self
 
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.files.ownership import InUse, Ownership
+from steptwin.files.writing import new_content, remove_unfinished
 from steptwin.inputfiles import read_bytes
 from steptwin.system import reason, sync_directory
 
@@ -55,6 +54,7 @@ class StateDirectory:
         try:
             self._make()
             self._lock = Ownership(self.path / _LOCK)
+            remove_unfinished(self.path)
         except InUse as taken:
             raise StateInUse(f"the state directory {self.path} is in use by {taken.owner}") from None
         except OSError as error:
@@ -107,11 +107,9 @@ class StateDirectory:
         """
         path = self._path(name)
         self._check_format(path, self._content(path) or b"")
-        temporary = self.path / f"{name}.tmp"
         try:
-            _write(temporary, _header(data) + data)
-            temporary.replace(path)
-            sync_directory(self.path)
+            with new_content(path) as file:
+                file.write(_header(data) + data)
         except OSError as error:
             raise StateFailure(f"{name} cannot be saved in {self.path}: {reason(error)}") from error
 
@@ -145,10 +143,3 @@ def _header(data: bytes) -> bytes:
 
 def _shown(magic: bytes) -> str:
     return magic.decode("ascii", "backslashreplace")
-
-
-def _write(path: Path, content: bytes) -> None:
-    with path.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())

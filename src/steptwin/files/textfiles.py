@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import os
+from collections.abc import Generator
+from contextlib import contextmanager
 from dataclasses import dataclass
-from errno import EACCES, EINVAL, EISDIR, ENOTDIR
 from pathlib import Path
+from typing import IO
 
 from steptwin.diagnostics import SourceText
-from steptwin.errors import Misuse
+from steptwin.errors import Misuse, SteptwinError
+from steptwin.files.writing import check_content, new_content
 from steptwin.inputfiles import MOST_BYTES, read_bytes, shown
 from steptwin.system import reason
 from steptwin.textcodec import Decoded, decode
@@ -29,20 +31,9 @@ class TextFile:
 def check_writable(path: Path) -> None:
     """Check in advance that a file can be written; missing folders are permitted. Raises `Misuse`."""
     try:
-        place, number = path, EISDIR if path.is_dir() else 0
-        while not number and not place.exists():
-            place = place.parent
-            number = 0 if place.is_dir() or not place.exists() else ENOTDIR
-        if not number and not os.access(place, os.W_OK):
-            number = EACCES
-    except OSError as error:  # a name that is too long
-        number = error.errno or EINVAL
-    except ValueError as error:
-        raise Misuse(f"cannot write {shown(path)}: {error}") from None
-    if number:
-        raise Misuse(f"cannot write {shown(path)}: {reason(OSError(number, ''))}")
-    if path.exists() and not path.is_file():
-        raise Misuse(f"cannot write {path}: it is not a regular file")
+        check_content(path)
+    except (OSError, ValueError) as error:
+        raise Misuse(f"cannot write {shown(path)}: {reason(error)}") from None
 
 
 def check_folder(path: Path) -> None:
@@ -51,14 +42,23 @@ def check_folder(path: Path) -> None:
         raise Misuse(f"cannot write {shown(path)}: there is no folder {shown(path.parent)}")
 
 
-def write_bytes(path: Path, data: bytes) -> None:
-    """Write a file, and make its folders. Raises `Misuse` if that is not possible."""
-    check_writable(path)
+@contextmanager
+def new_file(path: Path) -> Generator[IO[bytes]]:
+    """`new_content` of a file that the user names. Raises `Misuse` if it cannot be written."""
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(data)
+        with new_content(path) as file:
+            yield file
+    except SteptwinError:  # a failed line or database is an `OSError`, too
+        raise
     except OSError as error:
-        raise Misuse(f"cannot write {path}: {reason(error)}") from error
+        raise Misuse(f"cannot write {shown(path)}: {reason(error)}") from error
+
+
+def write_bytes(path: Path, data: bytes) -> None:
+    """Write a file as a whole, and make its folders. Raises `Misuse` if that is not possible."""
+    check_writable(path)
+    with new_file(path) as file:
+        file.write(data)
 
 
 def read_text(path: Path, most: int = MOST_BYTES) -> TextFile:

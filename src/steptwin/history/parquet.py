@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
+from typing import IO
 
 import numpy as np
 import pyarrow as pa
@@ -24,8 +24,8 @@ SCHEMA = pa.schema(
 )
 
 
-def write_parquet(found: Sequence[PointSeries], path: Path) -> None:
-    with parquet.ParquetWriter(path, SCHEMA, compression="zstd") as writer:
+def write_parquet(found: Sequence[PointSeries], file: IO[bytes]) -> None:
+    with parquet.ParquetWriter(file, SCHEMA, compression="zstd") as writer:
         for series in found:
             size = len(series)
             nothing = np.full(size, None, dtype=object)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
+from typing import IO
 
 import numpy as np
 from matplotlib import rc_context
@@ -18,8 +18,10 @@ _WIDTH_IN, _PANEL_IN = 12.0, 1.4
 _COLORS = (POSITION_COLOR, VELOCITY_COLOR)
 
 
-def draw(series: Mapping[str, Sequence[PointSeries]], path: Path) -> None:
-    """For each title one series over the date, or two over the time since their begin. Raises `Misuse` for what is no number."""
+def draw(series: Mapping[str, Sequence[PointSeries]], file: IO[bytes], form: str) -> None:
+    """For each title one series over the date, or two over the time since their begin. ``form`` is png or svg.
+
+    Raises `Misuse` for what is no number."""
     if len(series) > MOST_PANELS:
         raise Misuse(f"{len(series)} points: a picture shows at most {MOST_PANELS}")
     with rc_context(STYLE):
@@ -37,7 +39,7 @@ def draw(series: Mapping[str, Sequence[PointSeries]], path: Path) -> None:
             panels[-1].set_xlabel("s since the begin of the run")
         else:
             panels[-1].set_xlabel("UTC")
-        figure.savefig(path, dpi=120, metadata={"Date": None} if path.suffix == ".svg" else None)
+        figure.savefig(file, format=form, dpi=120, metadata={"Date": None} if form == "svg" else None)
 
 
 def _draw(panel: object, one: PointSeries, color: str, *, since_begin: bool) -> None:

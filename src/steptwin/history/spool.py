@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 from steptwin.errors import Misuse
 from steptwin.files.locks import lock, unlock
+from steptwin.files.writing import new_content
 from steptwin.history.rows import RowBatch, RunHead, read_batch, read_head
 from steptwin.system import reason
 
@@ -83,7 +84,8 @@ class Spool:
 
     def begin(self, head: RunHead) -> None:
         """Batches of this run follow. Raises `OSError`."""
-        (self._folder / f"{head.key}{HEAD}").write_bytes(head.line())
+        with new_content(self._folder / f"{head.key}{HEAD}") as file:
+            file.write(head.line())
         with self._guard:
             self._run = head.key
             self._end_segment()
@@ -98,7 +100,7 @@ class Spool:
                 self._end_segment()
                 path = self._folder / f"{self._next:08d}-{self._run}{ROWS}"
                 self._next += 1
-                self._file = path.open("wb")
+                self._file = path.open("xb")
                 self._segments.append(_Segment(path, 0))
             self._file.write(line)
             self._file.flush()

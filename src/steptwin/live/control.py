@@ -18,6 +18,7 @@ from typing import Protocol, cast
 
 from steptwin.errors import LineFailure, Misuse
 from steptwin.files.ownership import InUse, Ownership
+from steptwin.files.writing import PRIVATE, new_content
 from steptwin.later import start
 from steptwin.live.directory import private_directory, runtime_directory
 from steptwin.subject.commands import Command, Follow, Time, Unfollow
@@ -98,9 +99,8 @@ class ControlEndpoint:
         host, port = server.sockets[0].getsockname()[:2]
         self.listening = Address(host, port)
         said = json.dumps({"name": self.name, "pid": os.getpid(), "host": host, "port": port, "token": self._token})
-        descriptor = os.open(self.announcement, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-        with os.fdopen(descriptor, "w", encoding="utf-8") as file:
-            file.write(said + "\n")
+        with new_content(self.announcement, PRIVATE) as file:
+            file.write(f"{said}\n".encode())
 
     def _conversation(self, token: str = "") -> _Conversation:
         return _Conversation(self._subject, self._clients, token)

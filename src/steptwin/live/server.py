@@ -16,6 +16,7 @@ from typing import Any
 
 from steptwin.access.audit import CommandLog
 from steptwin.errors import LineFailure, Misuse, SteptwinError
+from steptwin.files.writing import new_text
 from steptwin.inputfiles import read_bytes
 from steptwin.live.cell import Cell
 from steptwin.live.clients import Clients
@@ -162,15 +163,12 @@ class Server:
         }
 
     def write_ready_file(self, path: Path) -> None:
-        """Write the `announcement` to a JSON file, atomically; it is removed when the server ends."""
+        """Write the `announcement` to a JSON file; it is removed when the server ends."""
         text = json.dumps(self.announcement(), indent=2) + "\n"
-        fresh = path.with_name(f".{path.name}.{os.getpid()}")
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            fresh.write_text(text, encoding="utf-8")
-            fresh.replace(path)
+            with new_text(path) as file:
+                file.write(text)
         except OSError as error:
-            fresh.unlink(missing_ok=True)
             raise LineFailure(f"cannot write the ready file {path}: {reason(error)}") from error
         self._ready_file = path, text
 

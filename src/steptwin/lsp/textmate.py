@@ -11,6 +11,7 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import TypeAlias
 
+from steptwin.files.textfiles import write_bytes
 from steptwin.m1486.commands import LETTERS, TABLE, ArgType, takes_number
 from steptwin.wbc.registers import PREDEFINED, REGISTERS
 from steptwin.wbc.statements import CLOSING, FUNCTIONS, HALTS, KEYWORDS, MOTIONS, OPENING, ROW_MOTIONS
@@ -146,7 +147,7 @@ def grammar_text(language: str) -> str:
 
 def main(folder: str) -> None:
     for language in GRAMMARS:
-        (Path(folder) / f"{language}.tmLanguage.json").write_text(grammar_text(language), "utf-8")
+        write_bytes(Path(folder) / f"{language}.tmLanguage.json", grammar_text(language).encode())
 
 
 if __name__ == "__main__":

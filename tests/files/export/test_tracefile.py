@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from pathlib import Path
 
@@ -64,18 +65,33 @@ def test_a_file_with_an_end_is_checked_against_its_digest(tmp_path: Path) -> Non
         read_trace(path)
 
 
-def test_a_full_disk_is_told_once_and_the_world_goes_on(tmp_path: Path) -> None:
+def test_a_full_disk_is_told_once_and_the_world_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if not os.access("/dev/full", os.W_OK):
         pytest.skip("there is no /dev/full")
     made, told = world(), []
-    file = TraceFile(made.trace, Path("/dev/full"), axis_views(made), "cell", told.append)
+    with monkeypatch.context() as full:
+        full.setattr(Path, "open", lambda _, *given, **named: open("/dev/full", *given, **named))  # noqa: SIM115
+        file = TraceFile(made.trace, tmp_path / "t.jsonl", axis_views(made), "cell", told.append)
     made.trace.let_go()
     for number in range(3000):
         made.trace.add(_record(number))
     made.run(until=5.0)
-    assert told == ["cannot write /dev/full: no space left on device"]
+    assert told == [f"cannot write {tmp_path / 't.jsonl'}: no space left on device"]
     with pytest.raises(Misuse, match="no space left on device"):
         file.close(made.now)
+
+
+def test_an_earlier_trace_stays_until_the_new_one_has_begun(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made, path = world(), tmp_path / "t.jsonl"
+    path.write_text("the earlier one")
+
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, "")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(Misuse, match="no space left on device"):
+        TraceFile(made.trace, path, axis_views(made), "cell", [].append)
+    assert path.read_text() == "the earlier one"
 
 
 def _record(number: int) -> TraceRecord:

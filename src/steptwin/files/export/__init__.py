@@ -17,7 +17,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
-from typing import NamedTuple
+from typing import IO, NamedTuple
 
 from steptwin.calc import Calculation
 from steptwin.errors import Misuse
@@ -26,10 +26,10 @@ from steptwin.files.export.axes import axis_views, controller_views
 from steptwin.files.export.progress import ShowExport, TimeProgress, bar, unwatched
 from steptwin.files.export.recording import Recording, sort_out
 from steptwin.files.export.records import SavedTrace, read_records, write_records
-from steptwin.files.textfiles import check_writable
+from steptwin.files.textfiles import check_writable, new_file
+from steptwin.files.writing import as_text
 from steptwin.inputfiles import open_regular
 from steptwin.machine import MILLISECOND, Nanos
-from steptwin.system import reason
 from steptwin.world.lanes import AxisLane, AxisViews
 from steptwin.world.trace import Trace
 
@@ -68,7 +68,7 @@ class Exporter(NamedTuple):
     meaning: str
     needs: tuple[str, ...]
     extra: str
-    write: Callable[[Recording, Path, _Options], None] | None
+    write: Callable[[Recording, IO[bytes], _Options], None] | None
     """None: written from the records themselves."""
 
     @property
@@ -76,50 +76,48 @@ class Exporter(NamedTuple):
         return [module for module in self.needs if find_spec(module) is None]
 
 
-def _html(recording: Recording, path: Path, options: _Options) -> None:
+def _html(recording: Recording, file: IO[bytes], options: _Options) -> None:
     from steptwin.files.export.timeline import write_timeline
 
-    with path.open("w", encoding="utf-8") as file:
-        write_timeline(recording, file, options.progress)
+    with as_text(file) as text:
+        write_timeline(recording, text, options.progress)
 
 
-def _vcd(recording: Recording, path: Path, options: _Options) -> None:
+def _vcd(recording: Recording, file: IO[bytes], options: _Options) -> None:
     from steptwin.files.export.vcd import write_vcd
 
-    with path.open("wb") as file:
-        write_vcd(recording, file, options.progress, texts=options.texts)
+    write_vcd(recording, file, options.progress, texts=options.texts)
 
 
-def _pcapng(recording: Recording, path: Path, options: _Options) -> None:
+def _pcapng(recording: Recording, file: IO[bytes], options: _Options) -> None:
     from steptwin.files.export.pcapng import write_pcapng
 
-    with path.open("wb") as file:
-        write_pcapng(recording, file, options.progress)
+    write_pcapng(recording, file, options.progress)
 
 
-def _csv(recording: Recording, path: Path, options: _Options) -> None:
+def _csv(recording: Recording, file: IO[bytes], options: _Options) -> None:
     from steptwin.files.export.tables import write_csv
 
-    with path.open("w", encoding="utf-8") as file:
-        write_csv(recording, file, options.period, options.progress)
+    with as_text(file) as text:
+        write_csv(recording, text, options.period, options.progress)
 
 
-def _parquet(recording: Recording, path: Path, options: _Options) -> None:
+def _parquet(recording: Recording, file: IO[bytes], options: _Options) -> None:
     from steptwin.files.export.tables import write_parquet
 
-    write_parquet(recording, path, options.period, options.progress)
+    write_parquet(recording, file, options.period, options.progress)
 
 
-def _png(recording: Recording, path: Path, options: _Options) -> None:
+def _png(recording: Recording, file: IO[bytes], options: _Options) -> None:
     from steptwin.files.export.plot import write_plot
 
-    write_plot(recording if options.window else recording.to_last_change(), path, "png", options.progress)
+    write_plot(recording if options.window else recording.to_last_change(), file, "png", options.progress)
 
 
-def _svg(recording: Recording, path: Path, options: _Options) -> None:
+def _svg(recording: Recording, file: IO[bytes], options: _Options) -> None:
     from steptwin.files.export.plot import write_plot
 
-    write_plot(recording if options.window else recording.to_last_change(), path, "svg", options.progress)
+    write_plot(recording if options.window else recording.to_last_change(), file, "svg", options.progress)
 
 
 FORMATS: Mapping[str, Exporter] = {
@@ -174,21 +172,12 @@ def write_trace(
     ended = recording.until if ended is None else ended
     for name, path in targets:
         write = FORMATS[name].write
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            unfinished = path.with_name(f".{path.name}.unfinished")
-            try:
-                with watch(path.name, recording.begin, recording.until) as progress:
-                    if write is None:
-                        with unfinished.open("w", encoding="utf-8") as file:
-                            write_records(trace, views, file, progress, title=title, until=ended)
-                    else:
-                        write(recording, unfinished, _Options(period, progress, until is not None, texts))
-                unfinished.replace(path)
-            finally:
-                unfinished.unlink(missing_ok=True)
-        except OSError as error:
-            raise Misuse(f"cannot write {path}: {reason(error)}") from error
+        with new_file(path) as file, watch(path.name, recording.begin, recording.until) as progress:
+            if write is None:
+                with as_text(file) as text:
+                    write_records(trace, views, text, progress, title=title, until=ended)
+            else:
+                write(recording, file, _Options(period, progress, until is not None, texts))
     return [path for _, path in targets]
 
 
@@ -205,7 +194,8 @@ def write_profile(result: Calculation, where: Path | str) -> None:
     check_writable(where)
     from steptwin.files.export.profileplot import write_profile_plot
 
-    write_profile_plot(result, where, form)
+    with new_file(where) as file:
+        write_profile_plot(result, file, form)
 
 
 def check_target(where: Path | str) -> None:

@@ -6,8 +6,7 @@ Curves are polylines of few points, not dense samples, so that a picture of an h
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import IO, TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from matplotlib import rc_context
@@ -69,7 +68,7 @@ class _PlotRow(NamedTuple):
     moments: Sequence[Nanos] = ()
 
 
-def write_plot(recording: Recording, path: Path, form: str, progress: TimeProgress) -> None:
+def write_plot(recording: Recording, file: IO[bytes], form: str, progress: TimeProgress) -> None:
     """``form`` is png or svg."""
     begin, until = recording.begin, recording.until
     moving = [track for track in recording.axes if _moves(track, recording)]
@@ -105,7 +104,7 @@ def write_plot(recording: Recording, path: Path, form: str, progress: TimeProgre
         if any(left_out):
             note = f"not shown: {left_out[0]} axes, {left_out[1]} lanes"
             figure.text(1 - _RIGHT_IN / _WIDTH_IN, 0.12 / figure.get_figheight(), note, ha="right", color=_FRAME)
-        figure.savefig(path, format=form, dpi=150, metadata={"Date": None} if form == "svg" else {"Software": None})
+        figure.savefig(file, format=form, dpi=150, metadata={"Date": None} if form == "svg" else {"Software": None})
     progress(until)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import IO
 
 from matplotlib import rc_context
 from matplotlib.figure import Figure
@@ -13,7 +13,7 @@ from steptwin.files.export.plot import POSITION_COLOR, STYLE, VELOCITY_COLOR
 _SIZE_IN = (8.0, 4.5)
 
 
-def write_profile_plot(result: Calculation, path: Path, form: str) -> None:
+def write_profile_plot(result: Calculation, file: IO[bytes], form: str) -> None:
     """``form`` is png or svg."""
     points = curve(result)
     moments = [point.time_s for point in points]
@@ -31,4 +31,4 @@ def write_profile_plot(result: Calculation, path: Path, form: str) -> None:
             for part in result.parts[1:]:
                 panel.axvline(part.start_s, color="0.8", linewidth=0.8, zorder=0)
         figure.suptitle(f"{result.title}: {result.times['time']:.6g} s")
-        figure.savefig(path, format=form, dpi=150, metadata={"Date": None} if form == "svg" else {"Software": None})
+        figure.savefig(file, format=form, dpi=150, metadata={"Date": None} if form == "svg" else {"Software": None})

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterator
-from pathlib import Path
 from typing import IO, Any, TypeAlias
 
 import numpy as np
@@ -85,7 +84,7 @@ def write_csv(recording: Recording, file: IO[str], period: Nanos, progress: Time
         progress(done)
 
 
-def write_parquet(recording: Recording, path: Path, period: Nanos, progress: TimeProgress) -> None:
+def write_parquet(recording: Recording, file: IO[bytes], period: Nanos, progress: TimeProgress) -> None:
     import pyarrow as pa
     from pyarrow import parquet
 
@@ -94,7 +93,7 @@ def write_parquet(recording: Recording, path: Path, period: Nanos, progress: Tim
         for done, columns in samples(recording, period):
             table = pa.table({name: pa.array(column, from_pandas=True) for name, column in columns.items()})
             if writer is None:
-                writer = parquet.ParquetWriter(path, table.schema, compression="zstd")
+                writer = parquet.ParquetWriter(file, table.schema, compression="zstd")
             writer.write_table(table)
             progress(done)
     finally:

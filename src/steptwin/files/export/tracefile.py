@@ -10,6 +10,7 @@ from typing import IO, TypeAlias
 from steptwin.errors import Misuse
 from steptwin.files.export.axes import AxisViews
 from steptwin.files.export.records import begin_records, end_records, record_line
+from steptwin.files.writing import new_text
 from steptwin.machine import Nanos
 from steptwin.system import reason
 from steptwin.world.trace import Trace, TraceRecord
@@ -62,13 +63,12 @@ class TraceFile:
         self._show = show
         self._failure: str | None = None
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            self._file: IO[str] = path.open("w", buffering=1, encoding="utf-8")  # each line is there at once
+            with new_text(path) as file:
+                file.write(begin_records(trace, views, title))
+                file.writelines(map(record_line, trace))
+            self._file: IO[str] = path.open("a", buffering=1, encoding="utf-8", newline="")  # each line is there at once
         except OSError as error:
             raise Misuse(f"cannot write {path}: {reason(error)}") from error
-        self._write(begin_records(trace, views, title))
-        for record in trace:
-            self._add(record)
         trace.watchers.append(self._add)
 
     def _add(self, record: TraceRecord) -> None:

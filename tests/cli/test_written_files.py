@@ -1,0 +1,154 @@
+"""Every command that writes a file leaves the old one whole, or a new one; links and permissions stay as they are.
+
+What happens at each step of a write has tests in ``test_writing.py``. Here the disk is full, and the folder is protected.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+import stat
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+from campaigns import campaign_file
+from history_rig import RecordedWorld
+from shell import Shell
+
+from steptwin.commands.studio_drawing import WorldArrangement
+from steptwin.errors import SteptwinError
+from steptwin.files.memory import StateDirectory
+from steptwin.files.session import save, session_of
+from steptwin.files.world import World
+from steptwin.world.arrangement import DrawnPlace
+
+OLD = b"[mic488]\n# the old one\n" * 100
+PROGRAM = "if in1=1\nmoveptp 1 2\nendif\nend\n"
+IMAGE_OF = "IF IN1 = 1\nDELAY 5\nENDIF\n"
+CHIP = "[\n@70\nI1H20\nS200\nV800\nA6000\nR\n]\n"
+HALL = """
+[world]
+name = "hall"
+[[mic488]]
+name = "table"
+[mic488.M1]
+unit = "mm"
+gear = 800.0
+[[script]]
+name = "go"
+steps = [{ write = { "table.M1_EN" = 1, "table.M1_POS_ABS" = 1 } }, { wait = "1 s" }]
+"""
+
+
+class Way(NamedTuple):
+    """What writes ``file``. Its arguments are for the command line; a function gets the folder."""
+
+    file: str
+    write: str | Callable[[Path], object]
+    old: bytes = OLD
+
+
+def _arrange(folder: Path) -> object:
+    world = World.load(folder / "w.toml")
+    there = WorldArrangement(world.spec, ["table"], folder / "arranged.toml").save([DrawnPlace("table", 1, 2)])
+    if there["file"] is None:
+        raise OSError(errno.ENOSPC, "")  # the page gets the text instead
+    return there
+
+
+def _save_session(folder: Path) -> None:
+    save(session_of(World.load(folder / "w.toml")), folder / "s.json")
+
+
+def _save_memory(folder: Path) -> None:
+    with StateDirectory(folder) as state:
+        state.save("unit1", b"new")
+
+
+WAYS = [
+    Way("a.prg", "fmt a.prg", PROGRAM.encode()),
+    Way("b.wbc", "build image.prg -o b.wbc"),
+    Way("b.prg", "decompile image.wbc -o b.prg"),
+    Way("b.csv", "decompile image.wbc --positions b.csv"),
+    Way("b.m1486", "migrate chip.m1486 --from B --to A2x -o b.m1486"),
+    Way("flow.svg", "explain image.prg -o flow.svg"),
+    Way("curve.svg", "calc m1486 --distance 1rev --velocity 500 --acceleration 900 -o curve.svg"),
+    *(Way(f"t.{form}", f"run w.toml --trace t.{form}") for form in ("jsonl", "html", "svg")),
+    Way("s.json", "run w.toml --session s.json"),
+    *(Way(f"c.{form}", f"run w.toml --coverage c.{form}") for form in ("info",)),
+    Way("r.jsonl", "replay session.json --trace r.jsonl"),
+    Way("e.csv", "export trace.jsonl -o e.csv"),
+    Way("summary.json", "campaign run doors.toml --runs 1 --jobs 1 --out ."),
+    *(Way(f"h.{form}", f"history h.db table.M1.position -o h.{form}") for form in ("csv", "parquet")),
+    Way("saved.toml", "serve mic488 --save-world saved.toml"),
+    Way("arranged.toml", _arrange, HALL.encode()),
+    Way("s.json", _save_session),
+    Way("unit1.image", _save_memory),
+]
+
+
+@pytest.fixture(scope="module")
+def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What commands read."""
+    folder = tmp_path_factory.mktemp("inputs")
+    (folder / "w.toml").write_text(HALL)
+    (folder / "image.prg").write_text(IMAGE_OF)
+    (folder / "chip.m1486").write_text(CHIP)
+    campaign_file(folder)
+    recorded = RecordedWorld(HALL)
+    recorded.run(0.5)
+    recorded.end()
+    recorded.written("sqlite:///h.db", folder)
+    return folder
+
+
+@pytest.mark.parametrize("way", WAYS, ids=lambda way: f"{way.file}-{way.write if isinstance(way.write, str) else 'call'}")
+def test_the_file_is_the_old_one_or_the_new_one(
+    way: Way, inputs: Path, tmp_path: Path, shell: Shell, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copytree(inputs, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    far, link = tmp_path / "far" / way.file, tmp_path / way.file
+    for needed, command in (
+        ("image.wbc", "build image.prg"),
+        ("session.json", "run w.toml --session session.json"),
+        ("trace.jsonl", "run w.toml --trace trace.jsonl"),
+    ):
+        if isinstance(way.write, str) and needed in way.write:
+            shell(*command.split())
+            assert shell.code == 0, shell.errors
+    far.parent.mkdir()
+    far.write_bytes(way.old)
+    far.chmod(0o640)
+    link.symlink_to(far)
+
+    def fails() -> str:
+        """The reason; nothing if it does not fail."""
+        if isinstance(way.write, str):
+            shell(*way.write.split())
+            return shell.errors if shell.code else ""
+        try:
+            way.write(tmp_path)
+        except (SteptwinError, OSError) as error:
+            return str(error)
+        return ""
+
+    def full(number: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", full)
+        assert "o space left on device" in fails() or way.file == "arranged.toml"
+    assert (far.read_bytes(), os.listdir(far.parent)) == (way.old, [way.file])
+    with monkeypatch.context() as patch:
+        access = os.access
+        patch.setattr(os, "access", lambda path, mode: Path(path) != far.parent and access(path, mode))
+        assert "its folder takes no new file" in fails() or way.file == "arranged.toml"
+    assert (far.read_bytes(), os.listdir(far.parent)) == (way.old, [way.file])
+    fails()
+    assert far.read_bytes() != way.old
+    assert link.is_symlink()
+    assert stat.S_IMODE(far.stat().st_mode) == 0o640
