@@ -203,13 +203,24 @@ def test_events_that_were_missed_are_counted_and_all_values_are_taken_again() ->
     assert len(made.rows("plans", "table.M1.position")) == 2
 
 
-def test_rows_without_room_are_said_in_the_next_batch() -> None:
+def test_a_gap_has_the_number_of_all_lost_rows_and_everything_is_kept_behind_it() -> None:
     made = RecordedWorld(CELL)
-    lost = made.look()
-    made.recorder.lost(lost)
-    made.run(0.1)
-    assert made.batches[-1].events[0].text == f"{len(lost[0])} rows found no room and are missing before this moment"
-    assert made.batches[-1].number == 2
+    lost = 0
+    for level in (1, 0, 1, 0, 1):  # also what was kept at first is lost
+        made.subject.inner.do(Set((("table", "IN2", float(level)),)))
+        made.world.run(for_=0.1)
+        found = made.look(has_room=False)
+        made.recorder.lost(found)
+        lost += sum(map(len, found))
+    assert len(found) == 1 < lost
+    made.recorder.lost(made.look())  # there was room, and then none: what is there again is not counted
+    made.batches.clear()
+    (first,) = made.look()
+    assert [event.text for event in first.events] == [f"{lost} rows found no room and are missing before this moment"]
+    assert {row.point for row in (*first.samples, *first.plans)} == set(range(len(made.heads[0].points)))
+    assert made.rows("samples", "table.pins.IN2")[-1][1] == 1.0
+    made.run(1.0)
+    assert [len(batch.events) for batch in made.batches] == [1]
 
 
 def test_a_controller_that_does_not_answer_is_not_known() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from collections import namedtuple
 from pathlib import Path
 
@@ -45,6 +46,35 @@ def test_rows_as_a_line_and_back(samples: list[SampleRow], plans: list[PlanRow],
     assert made.line().count(b"\n") == 1
     assert read_batch(made.line()) == made
     assert len(made) == len(samples) + len(plans) + len(events)
+
+
+def test_a_line_that_a_full_disk_takes_in_part_is_not_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    spool = Spool(tmp_path / "s")
+    spool.begin(head())
+    assert spool.append(batch(1))
+    file = spool._file
+    assert file is not None
+
+    class Full:
+        """Takes half of what is written, then nothing."""
+
+        taken = False
+
+        def write(self, data: memoryview) -> int:
+            if self.taken:
+                raise OSError(errno.ENOSPC, "")
+            self.taken = True
+            return file.write(data[: len(data) // 2])
+
+        truncate, close = file.truncate, file.close
+
+    monkeypatch.setattr(spool, "_file", Full())
+    with pytest.raises(OSError, match=str(errno.ENOSPC)):
+        spool.append(batch(2))
+    assert spool.append(batch(3))
+    assert take_all(spool) == [("one", 1), ("one", 3)]
+    spool.close()
+    assert not (tmp_path / "s" / module.REFUSED).exists()
 
 
 def test_a_head_as_a_line_and_back() -> None:

@@ -49,8 +49,8 @@ class RecordedWorld:
     def steady_us(self) -> int:
         return self.world.now // 1000 + self.late_us
 
-    def look(self) -> list[RowBatch]:
-        found = asyncio.run(self.recorder.look())
+    def look(self, *, has_room: bool = True) -> list[RowBatch]:
+        found = asyncio.run(self.recorder.look(has_room=has_room))
         self.heads += [one for one in found if isinstance(one, RunHead)]
         batches = [one for one in found if isinstance(one, RowBatch)]
         self.batches += batches

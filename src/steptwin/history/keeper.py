@@ -42,6 +42,8 @@ class HistoryKeeper:
         self._writer: HistoryWriter | None = None
         self._task: asyncio.Task[None] | None = None
         self._has_room = True
+        self._head: RunHead | None = None
+        """Of a run that has begun while there was no room."""
         self._failed: str | None = None
         """Why nothing is kept any more."""
 
@@ -73,7 +75,7 @@ class HistoryKeeper:
     async def _keep(self, recorder: Recorder, spool: Spool) -> None:
         while True:
             try:
-                found = await recorder.look()
+                found = await recorder.look(has_room=spool.has_room())
             except SteptwinError as error:
                 self._notice(f"history: {error}")
             else:
@@ -88,8 +90,13 @@ class HistoryKeeper:
         for one in found:
             try:
                 if isinstance(one, RunHead):
-                    spool.begin(one)
-                elif not spool.append(one):
+                    self._head = one
+                if self._head is not None:
+                    spool.begin(self._head)
+                    self._head = None
+                if isinstance(one, RunHead):
+                    continue
+                if not spool.append(one):
                     lost.append(one)
                 else:
                     self._has_room = True
@@ -125,7 +132,8 @@ class HistoryKeeper:
             if self._task is not None:
                 if self._failed is None:
                     with contextlib.suppress(SteptwinError):
-                        self._put(self._spool, await self._recorder.look())
+                        lost = self._put(self._spool, await self._recorder.look(has_room=self._spool.has_room()))
+                        self._recorder.lost(lost)
                 self._put(self._spool, [self._recorder.end()])
             self._recorder.close()
         if self._writer is not None:

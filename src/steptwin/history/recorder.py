@@ -67,6 +67,16 @@ class WallAndSteady:
     steady_us: Callable[[], int]
 
 
+@dataclass(frozen=True, slots=True)
+class _GapNote:
+    """The batch that says how many rows were lost before it, and has everything again."""
+
+    batch: RowBatch
+    lost: int
+    again: int
+    """Rows of it that are there for this reason only."""
+
+
 class Recorder:
     """Rows of ``subject``."""
 
@@ -102,6 +112,9 @@ class Recorder:
         self._looked_at: tuple[Nanos, int] = 0, 0
         self._steady = 0
         """The steady clock at the last look."""
+        self._lost = 0
+        """Rows that could not be kept, of which no batch tells yet."""
+        self._note: _GapNote | None = None
 
     def _add_machine(self, part: MachinePart, registers: Iterable[str]) -> None:
         points = [point for point in points_of(part, self._subject.description, registers) if point.name not in PASSING]
@@ -177,9 +190,9 @@ class Recorder:
 
     # ------------------------------------------------------------------ looking
 
-    async def look(self) -> list[RunHead | RowBatch]:
+    async def look(self, *, has_room: bool = True) -> list[RunHead | RowBatch]:
         """What has happened since the last look: a batch of the present run; the heads of others that have begun, because time
-        has gone back, and their batches."""
+        has gone back, and their batches. Once there is room after rows were lost, it has their number and everything."""
         clock = await self._sampler.take(CLOCK)
         now, wall = _time(clock), self._clock.wall_us()
         is_set, was = self._is_set(wall)
@@ -208,6 +221,8 @@ class Recorder:
         if is_set:
             await self._go_on(now, wall, new)
             wall = new
+        if self._lost and has_room:
+            await self._end_gap(now, wall)
         self._looked_at = now, wall
         return [*found, *self._full(now, wall)]
 
@@ -226,6 +241,18 @@ class Recorder:
         for (machine, axis), (plan, origin) in self._plans.items():
             there = self._axes[machine, axis]
             self._batch.plans.append(PlanRow(there.point, now, before, plan, origin, there.scale, there.round_p))
+        await self._take_again(now, wall)
+
+    async def _end_gap(self, now: Nanos, wall: int) -> None:
+        """Rows are kept from now on: say how many were not, and keep everything again, because the values of the last ones may be
+        among them."""
+        before = len(self._batch)
+        self._note_loss(now, wall, f"{self._lost} rows found no room and are missing before this moment")
+        await self._take_again(now, wall)
+        self._note = _GapNote(self._batch, self._lost, len(self._batch) - before)
+        self._lost = 0
+
+    async def _take_again(self, now: Nanos, wall: int) -> None:
         self._plans.clear()
         self._last.clear()
         self._take_plans(wall)
@@ -247,9 +274,11 @@ class Recorder:
         self._batch.events.append(EventRow(entry.time, self._clock.wall_us(), 0, machine, COMMAND, None, str(entry), content))
 
     def lost(self, batches: Iterable[RowBatch]) -> None:
-        """These could not be kept: say so in the next one."""
-        rows = sum(map(len, batches))
-        self._note_loss(self._batch.time, self._batch.at_us, f"{rows} rows found no room and are missing before this moment")
+        """These could not be kept: a later one says so."""
+        for batch in batches:
+            self._lost += len(batch)
+            if self._note is not None and batch is self._note.batch:
+                self._lost += self._note.lost - self._note.again
 
     def end(self) -> RowBatch:
         """The last batch of the run, up to the last look."""

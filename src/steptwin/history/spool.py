@@ -10,7 +10,7 @@ import contextlib
 import shutil
 import threading
 from dataclasses import dataclass
-from io import BufferedWriter
+from io import BufferedWriter, FileIO
 from pathlib import Path
 from typing import NamedTuple
 
@@ -68,7 +68,7 @@ class Spool:
         self._next = 1 + max((int(one.path.name.partition("-")[0]) for one in self._segments), default=0)
         self._run = ""
         """The one that is written."""
-        self._file: BufferedWriter | None = None
+        self._file: FileIO | None = None
         """The last segment; None before anything was written."""
         self.more = threading.Event()
         """Set when there is something to take."""
@@ -90,9 +90,16 @@ class Spool:
             self._run = head.key
             self._end_segment()
 
+    def has_room(self) -> bool:
+        """Whether it takes more."""
+        try:
+            return self.waiting <= MOST_BYTES and shutil.disk_usage(self._folder).free >= LEAST_FREE_BYTES
+        except OSError:
+            return False
+
     def append(self, batch: RowBatch) -> bool:
         """Whether there was room. Raises `OSError`."""
-        if self.waiting > MOST_BYTES or shutil.disk_usage(self._folder).free < LEAST_FREE_BYTES:
+        if not self.has_room():
             return False
         line = batch.line()
         with self._guard:
@@ -100,13 +107,24 @@ class Spool:
                 self._end_segment()
                 path = self._folder / f"{self._next:08d}-{self._run}{ROWS}"
                 self._next += 1
-                self._file = path.open("xb")
+                self._file = path.open("xb", buffering=0)
                 self._segments.append(_Segment(path, 0))
-            self._file.write(line)
-            self._file.flush()
+            self._write(self._file, line)
             self._segments[-1].size += len(line)
         self.more.set()
         return True
+
+    def _write(self, file: FileIO, line: bytes) -> None:
+        """Write a line whole, or nothing of it. Raises `OSError`."""
+        left = memoryview(line)
+        try:
+            while left:
+                left = left[file.write(left) :]
+        except OSError:
+            with contextlib.suppress(OSError):
+                file.truncate(self._segments[-1].size)
+            self._end_segment()
+            raise
 
     def _end_segment(self) -> None:
         if self._file is not None:
