@@ -176,6 +176,28 @@ def test_the_own_origin_may_open_a_websocket_and_only_there_is_one(shared: Proce
     assert refused.value.response.status_code == 404
 
 
+@pytest.mark.parametrize(
+    ("request_", "is_answered"),
+    [
+        (b"POST /api/do/read HTTP/1.1\r\nHost: HERE\r\nContent-Length: 9\r\n\r\n{", False),
+        (b"POST /api/do/read HTTP/1.1\r\nHost: HERE\r\nTransfer-Encoding: chunked\r\n\r\n2\r\n{", False),
+        (b"GET / HTTP/1.1\r\nHost: HERE\r\nTransfer-Encoding: chunked\r\n\r\nzz\r\n", True),
+        (b"POST /api/do/read HTTP/1.1\r\nHost: HERE\r\nTransfer-Encoding: chunked\r\n\r\nzz\r\n", True),
+    ],
+)
+def test_a_client_that_goes_away_in_the_middle_is_no_internal_error(shared: Process, request_: bytes, is_answered: bool) -> None:
+    port = shared.end_points["http"]["port"]
+    with socket.create_connection(("127.0.0.1", port)) as client:
+        client.sendall(request_.replace(b"HERE", f"127.0.0.1:{port}".encode()))
+        if is_answered:
+            assert client.recv(100).startswith(b"HTTP/1.1 ")
+        client.shutdown(socket.SHUT_WR)
+        while client.recv(10_000):
+            pass
+    assert httpx.get(f"{shared.url}/api/describe").status_code == 200
+    assert "internal error" not in shared.output + shared.errors
+
+
 def test_the_page_comes_with_its_headers(shared: Process) -> None:
     answer = httpx.get(f"{shared.url}/")
     assert answer.status_code == 200

@@ -67,28 +67,57 @@ class Guard:
             await _refuse_socket(send, receive, 404, Refusal(f"WebSockets are at {' and '.join(self._sockets)}"))
         else:
             try:
-                await self._sockets[scope["path"]](scope, receive, send)
+                await self._sockets[scope["path"]](scope, receive, _sending(send))
+            except _ClientGone:
+                return
             except Exception as error:  # noqa: BLE001  it is reported here only
                 self._on_internal(error)
 
     async def _pass(self, scope: AsgiScope, receive: AsgiReceive, send: AsgiSend) -> None:
         has_begun = False
 
+        sending = _sending(send)
+
         async def guarded(message: Any) -> None:
             nonlocal has_begun
-            if message["type"] == "http.response.start":
-                has_begun = True
-                own = message.get("headers", ())
-                names = {name.lower() for name, _ in own}
-                message = {**message, "headers": [*own, *(header for header in HEADERS if header[0] not in names)]}
-            await send(message)
+            if message["type"] != "http.response.start":
+                await send(message)
+                return
+            has_begun = True
+            own = message.get("headers", ())
+            names = {name.lower() for name, _ in own}
+            await sending({**message, "headers": [*own, *(header for header in HEADERS if header[0] not in names)]})
+
+        async def listening() -> Any:
+            message = await receive()
+            if message["type"] == "http.disconnect":
+                raise _ClientGone
+            return message
 
         try:
-            await self._app(scope, receive, guarded)
+            await self._app(scope, listening, guarded)
+        except _ClientGone:
+            return
         except Exception as error:  # noqa: BLE001  every request gets an answer
             self._on_internal(error)
             if not has_begun:
                 await _refuse(send, receive, 500, error)
+
+
+class _ClientGone(Exception):
+    """The client has ended the connection, or sent what is not HTTP: nobody waits for the answer, and nothing is wrong here."""
+
+
+def _sending(send: AsgiSend) -> AsgiSend:
+    """``send`` of a connection that may have ended; `_ClientGone` then."""
+
+    async def to_client(message: Any) -> None:
+        try:
+            await send(message)
+        except Exception as error:
+            raise _ClientGone from error
+
+    return to_client
 
 
 async def _refuse(send: AsgiSend, receive: AsgiReceive, status: int, error: Exception) -> None:
