@@ -340,7 +340,7 @@ def test_without_a_clock_a_world_can_be_paused_and_slowed_down_too(run: Run) -> 
         ("resume", {"speed": float("nan")}, "speed: nan: expected a number"),
         ("step", {"for_ns": -1}, "for_ns: -1: expected whole nanoseconds from 0 to"),
         ("step", {"until": "nothing > 3"}, "nothing is called 'nothing'"),
-        ("save", {}, "save: file is missing: Absolute path"),
+        ("save", {}, "save: file is missing, expected a text: Absolute path"),
         ("save", {"file": "s.json"}, "file = 's.json': must be the absolute path"),
         ("save", {"file": "/tmp/no session"}, "for a session, name the file NAME.json"),
         ("save", {"file": "/nowhere/at/all/s.json"}, "cannot write /nowhere/at/all/s.json: there is no folder /nowhere/at/all"),

@@ -227,6 +227,7 @@ def test_where_tokens_are_asked_for_they_give_roles(start_studio: Start, tmp_pat
         return httpx.post(f"{studio.url}/api/do/{name}", json=move if name == "enable" else {}, headers=headers).status_code
 
     assert [post("enable", role) for role in (None, "wrong", "viewer", "operator")] == [401, 401, 403, 200]
+    assert [post("power_cycle", role) for role in ("viewer", "engineer")] == [400, 400]  # without a machine
     assert [post("audit", role) for role in ("operator", "engineer")] == [403, 200]
     assert post("stop_all", "viewer") == 200
     assert httpx.get(f"{studio.url}/api/describe").status_code == 401

@@ -395,4 +395,5 @@ def test_control_taken_over_rest_passes_when_nothing_is_asked() -> None:
 def test_a_role_holds_over_rest_too() -> None:
     studio = Studio()
     assert rest(studio.rest(Role.VIEWER), studio, "enable", machine="table", axis=1)["error"]["code"] == "refusal"
+    assert rest(studio.rest(Role.VIEWER), studio, "enable")["error"]["code"] == "misuse"
     assert rest(studio.rest(Role.VIEWER), studio, "stop_all")["ok"]["machines"]

@@ -131,7 +131,7 @@ def test_every_step_that_is_not_only_for_scripts_is_a_command() -> None:
         (7, {}, "no command 7; commands are "),
         ("set", {"level": {"a.IN1": 1}}, "set: no field 'level' (did you mean 'levels'?); fields are levels"),
         ("pause", {"x": 1}, "pause: no field 'x'; fields are none"),
-        ("set", {}, 'set: levels is missing: 0, 1, volts., {"MACHINE.NAME": NUMBER, ...}'),
+        ("set", {}, 'set: levels is missing, expected {"MACHINE.NAME": NUMBER, ...}: 0, 1, volts.'),
         ("set", {"levels": {}}, 'set: levels: {}: expected {"MACHINE.NAME": NUMBER, ...}'),
         ("set", {"levels": {"IN1": 1}}, "set: levels: 'IN1': expected MACHINE.PIN, such as 'table.IN3'"),
         ("set", {"levels": {"a.IN1": "1"}}, "set: levels: '1': expected a number from -1e+300 to 1e+300"),

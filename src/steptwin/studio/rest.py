@@ -152,7 +152,8 @@ class Rest:
         error: Any = answer.get("error")
         if error is None:
             return answer, DONE
-        return answer, FORBIDDEN if session.viewer.role < permit_of(name).role else STATUS[error["code"]]
+        is_role = error["code"] == "refusal" and session.viewer.role < permit_of(name).role
+        return answer, FORBIDDEN if is_role else STATUS[error["code"]]
 
     def _session(self, request: Request) -> ViewerSession:
         """Raises `Refusal` for a missing or wrong token."""

@@ -77,7 +77,7 @@ def read_fields(place: str, fields: Iterable[Field], given: Mapping[str, object]
     for field in fields:
         value = given.get(field.name)
         if value is None and field.is_required:
-            raise Misuse(f"{place}: {field.name} is missing: {field.meaning}, {field.form.what}")
+            raise Misuse(f"{place}: {field.name} is missing, expected {field.form.what}: {field.meaning}")
         if value is None:
             values[field.key] = field.default
             continue

@@ -51,7 +51,7 @@ export const REFUSALS: Readonly<Record<string, string>> = {
   "{text}: a text takes neither NUL nor surrogates": "{text}: tekst nie może mieć NUL ani surogatów",
   "a text takes no surrogates": "tekst nie może mieć surogatów",
   "{place}: no field {name}{hint}; fields are {names}": "{place}: nie ma pola {name}{hint}; pola to {names}",
-  "{place}: {name} is missing: {meaning}, {what}": "{place}: brakuje {name}: {meaning}, {what}",
+  "{place}: {name} is missing, expected {what}: {meaning}": "{place}: brakuje {name}, oczekiwano {what}: {meaning}",
   "{value}: expected {what}": "{value}: oczekiwano {what}",
   "a text": "tekst",
   "true or false": "true lub false",
