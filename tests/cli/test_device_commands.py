@@ -146,9 +146,9 @@ MISTAKES: list[tuple[list[str], int, str]] = [
     (["move", "1=5"], 1, "M1 of unit 1 is switched off: enable it first"),
     (["jog", "1=5"], 2, "no terminal, so no key can end the jog"),
     (["jog", "1=5", "--seconds", "-1"], 2, "--seconds -1: permitted are more than 0"),
-    (["jog", "1=5", "--seconds", "nan"], 2, "--seconds nan: permitted are more than 0"),
+    (["jog", "1=5", "--seconds", "nan"], 2, "--seconds: 'nan' is not a number"),
     (["move", "1=5", "--timeout", "-1"], 2, "a time to wait of -1 s is outside 0 to 1000000 s"),
-    (["home", "1=5", "--timeout", "nan"], 2, "a time to wait of nan s is outside 0 to 1000000 s"),
+    (["home", "1=5", "--timeout", "nan"], 2, "--timeout: 'nan' is not a number"),
     (["watch", "--hz", "0"], 2, "--hz 0: permitted are more than 0"),
     (["watch", "--count", "0"], 2, "--count 0: permitted"),
 ]

@@ -9,7 +9,7 @@ from steptwin.errors import Misuse
 
 
 def test_numbers_are_tied_to_axes() -> None:
-    assert tied(["1=12,5", "m2=-3", "3=0x10"], 4) == {1: 12.5, 2: -3.0, 3: 16.0}
+    assert tied(["1=12,5", "m2=-3", "3=1e1"], 4) == {1: 12.5, 2: -3.0, 3: 10.0}
 
 
 @pytest.mark.parametrize(

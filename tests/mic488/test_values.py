@@ -74,7 +74,7 @@ def test_values_as_people_type_them() -> None:
     assert value_of(output, " ON ") == 1.0
     assert value_of(output, "false") == 0.0
     assert value_of(acc, "12,5") == 12.5
-    assert value_of(acc, "0x10") == 16
+    assert value_of(control, "0x1") == 1
     for register, typed, text in (
         (control, "often", "'often' is not a number, or STOP, START, PAUSE"),
         (output, "up", "'up' is not a number, or on, off"),

@@ -138,6 +138,20 @@ def _constant(text: str, ctx: Any) -> str:
     return text
 
 
+def _process_number(parameter: Any, process: Callable[[Any, Any], Any], is_float: bool, ctx: Any, value: Any) -> Any:
+    """The value of an option, which is a number as everywhere; the library takes others, too. Raises `Misuse`."""
+    if not isinstance(value, str):
+        return process(ctx, value)
+    from steptwin.numerals import read_number
+
+    try:
+        number = read_number(value)
+    except Misuse as error:
+        process(ctx, value)  # what it refuses as well has its usual message
+        raise Misuse(f"{parameter.opts[0]}: {error}") from None
+    return process(ctx, number if is_float else value)
+
+
 class _Commands(TyperGroup):
     """Help in groups, with names of values instead of Python types; messages without the name of a validator."""
 
@@ -146,6 +160,8 @@ class _Commands(TyperGroup):
         for parameter in getattr(command, "params", ()):
             shown = parameter.display_type(ctx).strip("<>") if isinstance(parameter, TyperOption) else ""
             parameter.display_type = partial(_constant, VALUE_NAMES.get(shown, shown))
+            if shown in {"int", "float"}:
+                parameter.process_value = partial(_process_number, parameter, parameter.process_value, shown == "float")
             if isinstance(parameter, TyperArgument) and parameter.metavar is None:
                 parameter.metavar = str(parameter.name).upper()
         return command

@@ -39,15 +39,17 @@ def pin(
     json: Json = False,
 ) -> None:
     """Set inputs of a running twin, press or release its buttons, or show all pins."""
+    from steptwin.numerals import read_number
+
     wanted: dict[str, float] = {}
     for change in changes or []:
         name, equals, value = change.partition("=")
         if not equals:
             raise Misuse(f"{change!r}: expected PIN=VALUE, such as IN3=1 or AIN1=4.2")
         try:
-            wanted[name.strip().upper()] = float(value.replace(",", "."))
-        except ValueError:
-            raise Misuse(f"{change!r}: {value!r} is not a number") from None
+            wanted[name.strip().upper()] = read_number(value)
+        except Misuse as error:
+            raise Misuse(f"{change!r}: {error}") from None
     with selected(twin) as there:
         for command in _changes(there, wanted):
             there.do(command)

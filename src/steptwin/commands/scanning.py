@@ -12,6 +12,7 @@ from steptwin.drivers.kind import AnyDriverKind, DeviceSearch, FoundDevice
 from steptwin.drivers.kinds import DRIVERS, clear_line
 from steptwin.errors import LineFailure, Misuse
 from steptwin.live.twins import address_of
+from steptwin.numerals import read_whole
 
 ANY = "any"
 SearchProgress: TypeAlias = Callable[[str, int, str], AbstractContextManager[Callable[[int], object]]]
@@ -131,9 +132,9 @@ def numbers_of(text: str, option: str, least: int, most: int) -> list[int]:
     numbers: dict[int, None] = {}
     for part in text.split(","):
         first, dash, last = part.strip().partition("-")
-        if not first.isdecimal() or (dash and not last.isdecimal()):
+        begin, end = read_whole(first), read_whole(last or first)
+        if begin is None or end is None or (dash and not last):
             raise Misuse(f"{option} {text}: {part.strip()!r} is neither a number nor a range such as 1-16")
-        begin, end = int(first), int(last or first)
         if not least <= begin <= end <= most:
             raise Misuse(f"{option} {text}: {part.strip()} is outside {least} to {most}")
         numbers |= dict.fromkeys(range(begin, end + 1))

@@ -15,6 +15,7 @@ from steptwin.live.serving import check_line_timing
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.mic488.config import BAUDS
 from steptwin.mic488.registers import firmware as known_firmware
+from steptwin.numerals import read_whole
 from steptwin.wbc.interpreter import STATEMENT_TIME
 from steptwin.world.kinds.mic488.small import mic488_world
 
@@ -75,9 +76,10 @@ def parse_units(text: str) -> list[int]:
     """``1,2,5`` → slave addresses. Raises `Misuse`."""
     units: list[int] = []
     for part in text.split(","):
-        if not part.strip().isdecimal() or not 1 <= int(part) <= 247:
+        unit = read_whole(part.strip())
+        if unit is None or not 1 <= unit <= 247:
             raise Misuse(f"--units {text}: {part.strip()!r} is not a slave address; permitted are 1 to 247, separated by commas")
-        if int(part) in units:
-            raise Misuse(f"--units {text}: {int(part)} is given twice")
-        units.append(int(part))
+        if unit in units:
+            raise Misuse(f"--units {text}: {unit} is given twice")
+        units.append(unit)
     return units

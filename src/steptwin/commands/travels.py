@@ -8,6 +8,7 @@ from typing import NamedTuple
 from steptwin.errors import Misuse
 from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.mic488.registers import AXES, INPUTS
+from steptwin.numerals import read_number, read_whole
 from steptwin.wbc.real import real_text
 from steptwin.world.kinds.mic488.small import AxisSwitches
 
@@ -91,15 +92,14 @@ def parse_travel(text: str) -> list[SwitchTravel]:
     for part in filter(None, map(str.strip, text.split(","))):
         name, _, ends = part.partition("=")
         low, dots, high = ends.partition("..")
-        number = name.strip().upper().removeprefix("M")
+        number = read_whole(name.strip().upper().removeprefix("M"))
         try:
-            low_u, high_u = (float(end) if end.strip() else None for end in (low, high))
-        except ValueError:
-            dots = ""
-            low_u = high_u = None
-        if not dots or not number.isdecimal() or not 1 <= int(number) <= AXES:
+            low_u, high_u = (read_number(end) if end.strip() else None for end in (low, high))
+        except Misuse as error:
+            raise Misuse(f"--travel {part}: {error}") from None
+        if not dots or number is None or not 1 <= number <= AXES:
             raise Misuse(f"--travel {part}: expected Mn=LOW..HIGH, such as M1=-10..250 or M1=-10..")
         if low_u is not None and high_u is not None and low_u >= high_u:
             raise Misuse(f"--travel {part}: {real_text(low_u)} must be below {real_text(high_u)}")
-        travels.append(SwitchTravel(int(number), low_u, high_u))
+        travels.append(SwitchTravel(number, low_u, high_u))
     return travels

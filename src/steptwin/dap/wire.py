@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any, BinaryIO
 
 from steptwin.errors import Misuse
+from steptwin.numerals import read_whole
 
 LONGEST_MESSAGE = 16 << 20
 LONGEST_LINE = 1000
@@ -24,9 +25,9 @@ def read_message(stream: BinaryIO) -> dict[str, Any] | None:
         text = line.strip()
         if text.lower().startswith(_LENGTH):
             number = text[len(_LENGTH) :].strip()
-            if not number.isdigit() or int(number) > LONGEST_MESSAGE:
+            length = read_whole(number.decode("latin-1"))
+            if length is None or length > LONGEST_MESSAGE:
                 raise Misuse(f"Content-Length {number[:40].decode('latin-1')!r}: permitted are 0 to {LONGEST_MESSAGE}")
-            length = int(number)
         elif not text and length is not None:
             break
         elif text and b":" not in text:

@@ -6,15 +6,15 @@ from collections.abc import Sequence
 
 from steptwin.errors import Misuse
 from steptwin.mic488.encoding import shortest_real
+from steptwin.numerals import read_number, read_whole
 
 
 def number_of(value: str, whole: str) -> float:
-    """A number with a point or a comma, or hexadecimal. Raises `Misuse` naming ``whole``."""
-    value = value.strip()
+    """A number as `read_number` reads it. Raises `Misuse` naming ``whole``."""
     try:
-        return int(value, 16) if value.lower().startswith("0x") else float(value.replace(",", "."))
-    except ValueError:
-        raise Misuse(f"{whole!r}: {value!r} is not a number") from None
+        return read_number(value)
+    except Misuse as error:
+        raise Misuse(f"{whole!r}: {error}") from None
 
 
 def shown(value: object) -> str:
@@ -26,11 +26,11 @@ def shown(value: object) -> str:
 
 def axis_of(text: str, axes: int) -> int:
     """``1`` or ``M1`` of so many axes. Raises `Misuse`."""
-    number = text.strip().upper().removeprefix("M")
-    if not number.isdecimal() or not 1 <= int(number) <= axes:
+    number = read_whole(text.strip().upper().removeprefix("M"))
+    if number is None or not 1 <= number <= axes:
         last = "" if axes == 1 else f" to {axes}"
         raise Misuse(f"{text!r} is not an axis: permitted are 1{last}, or M1{last and f' to M{axes}'}")
-    return int(number)
+    return number
 
 
 def tied(texts: Sequence[str], axes: int) -> dict[int, float]:

@@ -13,6 +13,7 @@ from steptwin.files.textfiles import read_text
 from steptwin.inputfiles import read_bytes
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.program_banks import LoadedProgram, load, setup_of
+from steptwin.numerals import read_whole
 from steptwin.wbc.check import CheckedProgram, check
 from steptwin.wbc.decompile import IMAGE, program_of
 from steptwin.wbc.dialect import DEFAULT, Dialect
@@ -45,9 +46,9 @@ def parse_banks(option: str, given: Sequence[str], banks: int) -> dict[int, Path
     files: dict[int, Path] = {}
     for text in given:
         number, equals, name = text.partition("=")
-        if not equals or not number.strip().isdecimal():
-            number, name = "0", text
-        bank = int(number)
+        bank = read_whole(number.strip()) if equals else None
+        if bank is None:
+            bank, name = 0, text
         if not name:
             raise Misuse(f"{option} {text}: expected BANK=FILE, such as 0=machine.prg")
         if bank >= banks:

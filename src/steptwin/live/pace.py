@@ -19,6 +19,7 @@ from steptwin.files.export import axis_views, check_target, write_trace
 from steptwin.files.textfiles import check_folder
 from steptwin.live.cell import Cell
 from steptwin.machine import SECOND, Nanos
+from steptwin.numerals import read_number
 from steptwin.subject import commands as command
 from steptwin.subject import events
 from steptwin.subject.dispatch import Action
@@ -44,7 +45,7 @@ def read_speed(text: str, least: float = SLOWEST) -> float:
     if text == "max":
         return inf
     try:
-        speed = float(text)
+        speed = read_number(text)
     except ValueError:
         speed = -1.0
     if not SLOWEST <= speed <= FASTEST and speed != least:

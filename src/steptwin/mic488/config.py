@@ -13,6 +13,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from math import isfinite
 from types import MappingProxyType
 from typing import Any
 
@@ -366,6 +367,8 @@ class _ConfigReader:
             why = "is not a number" if entry.value else "has no value"
             return self._refuse("C006", entry, key, why, joined if is_number else None)
         value = float(entry.value.replace(",", "."))
+        if not isfinite(value):
+            return self._refuse("C008", entry, key, "is not permitted", key.nearest(value))
         if key.whole and not value.is_integer():
             return self._refuse("C007", entry, key, "is not a whole number", key.nearest(round(value)))
         if not key.permits(value):

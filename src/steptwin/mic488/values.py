@@ -11,6 +11,7 @@ from typing import NamedTuple, TypeAlias
 from steptwin.errors import Misuse
 from steptwin.mic488.encoding import dint_to_words, real_to_words, word_to_int, words_to_dint, words_to_real
 from steptwin.mic488.registermap import DataType, Register, RegisterMap, Space, Type, WriteEffect
+from steptwin.numerals import read_number
 from steptwin.wire import pdu
 
 RegisterValue: TypeAlias = bool | int | float
@@ -110,7 +111,7 @@ def user_item(registers: RegisterMap, number: int, view: UserFormat, count: int 
 
 
 def value_of(register: Register, typed: str) -> float:
-    """What was typed as a number: with a point or a comma, hexadecimal, ``on``, or the name of a value. Raises `Misuse`."""
+    """What was typed as a number, that of a word also hexadecimal, as ``on``, or as the name of a value. Raises `Misuse`."""
     text = typed.strip()
     for number, name in register.values.items():
         if text.lower() == name.lower():
@@ -118,11 +119,11 @@ def value_of(register: Register, typed: str) -> float:
     if register.type is Type.BIT and text.lower() in _SWITCHES:
         return _SWITCHES[text.lower()]
     try:
-        return int(text, 16) if text.lower().startswith("0x") else float(text.replace(",", "."))
-    except ValueError:
+        return read_number(text, or_hexadecimal=register.type in (Type.WORD, Type.MEMORY))
+    except Misuse as error:
         names = ("on", "off") if register.type is Type.BIT else tuple(register.values.values())
         others = f", or {', '.join(names)}" if names else ""
-        raise Misuse(f"{text!r} is not a number{others}") from None
+        raise Misuse(f"{error}{others}") from None
 
 
 # ---------------------------------------------------------------------- values and words

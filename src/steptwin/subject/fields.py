@@ -78,7 +78,7 @@ def read_fields(place: str, fields: Iterable[Field], given: Mapping[str, object]
         value = given.get(field.name)
         if value is None and field.is_required:
             raise Misuse(f"{place}: {field.name} is missing, expected {field.form.what}: {field.meaning}")
-        if value is None:
+        if value is None and (field.name not in given or field.default is None):
             values[field.key] = field.default
             continue
         try:
@@ -186,9 +186,7 @@ def _levels(value: Any) -> tuple[tuple[str, str, float], ...]:
     if not isinstance(value, dict) or not 0 < len(value) <= MOST_ITEMS:
         raise wrong(value, LEVELS.what)
     level = number()
-    return tuple(
-        (*pin_name(check_text(name)), float(one) if isinstance(one, bool) else level.read(one)) for name, one in value.items()
-    )
+    return tuple((*pin_name(check_text(name)), level.read(one)) for name, one in value.items())
 
 
 LEVELS = ValueType(
@@ -197,7 +195,7 @@ LEVELS = ValueType(
         "type": "object",
         "minProperties": 1,
         "maxProperties": MOST_ITEMS,
-        "additionalProperties": {"type": ["number", "boolean"]},
+        "additionalProperties": {"type": "number"},
         "propertyNames": {"pattern": "^[^.]+[.].+$", "maxLength": LONGEST_TEXT},
     },
     _levels,

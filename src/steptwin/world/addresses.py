@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from steptwin.errors import Misuse
+from steptwin.numerals import read_whole
 
 LOOPBACK = "127.0.0.1"
 
@@ -21,18 +22,19 @@ class Address(NamedTuple):
 
 def parse_address(text: str, *, listen_any: bool) -> Address:
     """``HOST:PORT`` (port 0: any free one). Only loopback unless ``listen_any``: Modbus has no authentication."""
-    host, colon, number = text.rpartition(":")
+    host, colon, port = text.rpartition(":")
+    number = read_whole(port)
     host = host.strip("[]")
     if host in ("", "localhost"):
         host = LOOPBACK  # one address: port 0 would be two ports on the two that "localhost" has
-    if not colon or not number.isdecimal() or int(number) > 65535:
+    if not colon or number is None or number > 65535:
         raise Misuse(f"{text!r} is not an address: expected HOST:PORT with a port from 0 to 65535, such as 127.0.0.1:5020")
     if not listen_any and not is_loopback(host):
         raise Misuse(
             f"{host} is not a loopback address: the protocols served here have no authentication, every program that reaches the "
             "port can move the axes; --listen-any permits it"
         )
-    return Address(host, int(number))
+    return Address(host, number)
 
 
 def check_addresses(given: Iterable[str | None], *, listen_any: bool) -> None:

@@ -65,7 +65,7 @@ def test_a_refusal_is_a_result() -> None:
         ("set M1_ACC", "expected set NAME=VALUE"),
         ("set M1_ACC=x", "'set M1_ACC=x': 'x' is not a number"),
         ("set M1_ACC=-5", "M1_ACC = -5 u/s²: permitted > 0"),
-        ("set M1_POS_ABS=nan", "M1_POS_ABS = nan"),
+        ("set M1_POS_ABS=nan", "'nan' is not a number"),
         ("set M1_STATUS=1", "M1_STATUS can only be read"),
         ("sleep", "expected seconds"),
         ("sleep -1", "expected seconds from 0 to 3600"),

@@ -95,7 +95,7 @@ REFUSED = {
     "crc nth=x": "fault (crc): nth = 'x': permitted are whole numbers 1 and more",
     "crc nth=1.5": "fault (crc): nth = '1.5': permitted are whole numbers 1 and more",
     "crc probability=1.5": "fault (crc): probability = 1.5: permitted are numbers 0 to 1",
-    "crc probability=nan": "fault (crc): probability = nan: permitted are numbers 0 to 1",
+    "crc probability=nan": "fault (crc): probability = 'nan': permitted are numbers 0 to 1",
     "crc nth=1 every=2": "fault (crc): nth and every exclude each other",
     "crc address=9-4": "fault (crc): address = '9-4': permitted are numbers or spans N-M 0 to 65535",
     "crc address=1-2-3": "fault (crc): address = '1-2-3': permitted are numbers or spans N-M 0 to 65535",

@@ -25,6 +25,7 @@ from steptwin.errors import Misuse, Refusal
 from steptwin.mic488.registermap import DataType, RegisterMap
 from steptwin.mic488.registers import register_map
 from steptwin.mic488.values import encoded, named, plan, value_of
+from steptwin.numerals import read_number
 from steptwin.wire import pdu
 
 FORM = "expected get NAME..., set NAME=VALUE, sleep SECONDS, wait AXIS... or raw HEX"
@@ -120,7 +121,7 @@ def _set(rest: list[str], registers: RegisterMap) -> Action:
 def _sleep(rest: list[str], registers: RegisterMap) -> Action:
     try:
         (text,) = rest
-        seconds = float(text)
+        seconds = read_number(text)
         if not 0.0 <= seconds <= 3600.0:
             raise ValueError
     except ValueError:

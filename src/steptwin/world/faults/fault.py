@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from steptwin.errors import Misuse
 from steptwin.nearmiss import NearMiss
+from steptwin.numerals import read_integer, read_number
 from steptwin.world.faults.kinds import KINDS
 from steptwin.world.faults.table import FaultKind, FaultValue, Parameter, ParameterForm, RequestEffect, check
 
@@ -130,8 +131,8 @@ def read(line: str) -> Fault:
 def _value(parameter: Parameter, text: str) -> object:
     """A number where the text is one; everything else is for `check` to refuse."""
     if parameter.form in (ParameterForm.WHOLE, ParameterForm.NUMBER):
-        with suppress(ValueError):
-            return int(text, 0) if parameter.form is ParameterForm.WHOLE else float(text)
+        with suppress(Misuse):
+            return read_integer(text) if parameter.form is ParameterForm.WHOLE else read_number(text)
     return text
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias, TypedDict, Unpack
 
 from steptwin.errors import Misuse
+from steptwin.numerals import read_whole
 from steptwin.tables import IncompleteTable
 
 if TYPE_CHECKING:
@@ -392,9 +393,9 @@ def _is_within(parameter: Parameter, value: float) -> bool:
 
 def _span(parameter: Parameter, value: object, where: str) -> tuple[int, int]:
     parts = value if isinstance(value, tuple) else (value, value) if isinstance(value, int) else str(value).split("-")
-    try:
-        first, last = (int(part) for part in parts) if len(parts) > 1 else (int(parts[0]), int(parts[0]))
-    except ValueError:
+    ends = [part if isinstance(part, int) else read_whole(part) for part in parts]
+    first, last = ends[0], ends[-1]
+    if first is None or last is None or len(ends) > 2:
         first, last = 1, 0
     if first > last or not _is_within(parameter, first) or not _is_within(parameter, last):
         raise Misuse(f"{where} = {value!r}: permitted are {parameter.permitted}")

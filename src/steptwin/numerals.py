@@ -1,0 +1,64 @@
+"""Numbers as people type them: one grammar for every way in.
+
+Digits with a point or one comma before the fraction, a sign, an exponent: ``12``, ``-0.5``, ``12,5``, ``1e3``; nothing else:
+no separators of thousands, no ``_``, no digits of other scripts, no ``inf``. What looks like one is refused with what to write.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from math import isfinite
+
+from steptwin.errors import Misuse
+from steptwin.plaintypes import shown
+
+_NUMBER = re.compile(r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+_GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(?:,\d{3})+", re.ASCII)
+"""The comma may be one of thousands, or one before a fraction."""
+_HEXADECIMAL = re.compile(r"0[xX][0-9A-Fa-f]{1,8}", re.ASCII)
+_SEPARATORS = str.maketrans("−", "-", "_' \u00a0\u2009\u202f")
+_LONGEST_WHOLE = 18
+"""Digits; what is read as one has far fewer."""
+
+
+def read_number(text: str, *, or_hexadecimal: bool = False) -> float:
+    """A finite number. ``or_hexadecimal``: also a word as ``0x1F``. Raises `Misuse` with what to write instead."""
+    text = text.strip()
+    if or_hexadecimal and _HEXADECIMAL.fullmatch(text):
+        return float(int(text, 16))
+    if _GROUPED.fullmatch(text):
+        fraction = f" or {float(text.replace(',', '.'))}" if text.count(",") == 1 else ""
+        raise Misuse(f"{shown(text)} has a comma that may separate thousands: write {text.replace(',', '')}{fraction}")
+    if not _NUMBER.fullmatch(text):
+        meant = _meant(text)
+        raise Misuse(f"{shown(text)} is not a number{'' if meant is None else f': write {meant}'}")
+    value = float(text.replace(",", "."))
+    if not isfinite(value):
+        raise Misuse(f"{shown(text)} is too large for a number")
+    return value
+
+
+def read_integer(text: str) -> int:
+    """A whole number with its sign, or a word as ``0x1F``, exactly. Raises `Misuse`."""
+    value = read_number(text, or_hexadecimal=True)
+    if not value.is_integer():
+        raise Misuse(f"{shown(text.strip())} is not a whole number")
+    return int(text) if text.strip().lstrip("+-").isdecimal() else int(value)
+
+
+def _meant(text: str) -> str | None:
+    """The number that is probably meant; None where that is not clear."""
+    if _HEXADECIMAL.fullmatch(text):
+        return str(int(text, 16))
+    plain = unicodedata.normalize("NFKC", text).translate(_SEPARATORS)
+    if plain.count(".") and plain.count(","):
+        last = max(plain.rindex("."), plain.rindex(","))
+        plain = plain[:last].replace(".", "").replace(",", "") + "." + plain[last + 1 :]
+    return plain if len(plain) <= _LONGEST_WHOLE and _NUMBER.fullmatch(plain) else None
+
+
+def read_whole(text: str) -> int | None:
+    """A whole number from 0; None for anything else than decimal digits, and for more than any that is meant."""
+    is_one = text.isascii() and text.isdecimal() and len(text) <= _LONGEST_WHOLE
+    return int(text) if is_one else None
