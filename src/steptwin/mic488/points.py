@@ -41,7 +41,7 @@ EFFECTS: Mapping[registermap.WriteEffect, PointEffect] = complete(
 )
 SPACES: Mapping[str, Space] = {"hr": Space.HOLDING, "co": Space.COIL, "di": Space.INPUT}
 """Prefixes of addresses: ``hr:10020``, ``di:5006``."""
-_ADDRESS = re.compile(r"(?P<space>[a-z]+):(?P<address>\d{1,5})(?::(?P<view>\w+))?", re.IGNORECASE)
+_ADDRESS = re.compile(r"(?P<space>[a-z]+):(?P<address>\d{1,5})(?::(?P<view>\w+))?", re.IGNORECASE | re.ASCII)
 
 
 # ---------------------------------------------------------------------- short names

@@ -22,7 +22,7 @@ BRIDGE = {Space.HOLDING: 16, Space.COIL: 256, Space.INPUT: 256}
 _MOST = {Space.HOLDING: pdu.MAX_REGISTERS, Space.COIL: pdu.MAX_BITS, Space.INPUT: pdu.MAX_BITS}
 _READS = {Space.HOLDING: pdu.READ_HOLDING_REGISTERS, Space.COIL: pdu.READ_COILS, Space.INPUT: pdu.READ_DISCRETE_INPUTS}
 _SPACES = {space: number for number, space in enumerate(Space)}
-_NAME = re.compile(r"(?P<name>\w+?)(?:\[(?P<cell>\d{1,5})\])?(?::(?P<view>\w+))?\Z")
+_NAME = re.compile(r"(?P<name>\w+?)(?:\[(?P<cell>\d{1,5})\])?(?::(?P<view>\w+))?\Z", re.ASCII)
 _SWITCHES = {"on": 1.0, "true": 1.0, "off": 0.0, "false": 0.0}
 FORM = "expected NAME, or USER_REGISTER[N] with :int, :dint or :real behind it if it is no WORD"
 

@@ -142,7 +142,7 @@ if len(ROWS) != len(REGISTERS):
 ROW_0 = frozenset({"PTPM", "CIRCX", "CIRCY", "CIRCR", "CIRCA", "LINX", "LINY", "LINVEL"})
 """Families that are the parameters of row 0 of the position table."""
 
-_NUMBERED = re.compile(r"(\$?[A-Z_]+?)([0-9]+)$")
+_NUMBERED = re.compile(r"(\$?[A-Z_]+?)([0-9]{1,9})$")
 
 
 def parts(key: str) -> tuple[RegisterRow, int] | None:

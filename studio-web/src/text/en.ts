@@ -55,6 +55,7 @@ export const en = {
   velocity: "{axis} velocity",
   status: "{axis} status",
   notANumber: "{text} is no number",
+  thousands: "{text}: the comma may separate thousands: write {whole} or {fraction}",
   outOfRange: "{value}: permitted is {range}",
   rangeFrom: "{low} and more",
   rangeAbove: "more than {low}",

@@ -58,6 +58,7 @@ export const pl: Record<keyof typeof en, string> = {
   velocity: "Prędkość {axis}",
   status: "Stan {axis}",
   notANumber: "{text} nie jest liczbą",
+  thousands: "{text}: przecinek może oddzielać tysiące: napisz {whole} albo {fraction}",
   outOfRange: "{value}: dozwolone {range}",
   rangeFrom: "{low} i więcej",
   rangeAbove: "więcej niż {low}",

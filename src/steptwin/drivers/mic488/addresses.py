@@ -24,7 +24,9 @@ FORM = "expected ADDRESS, or hr:, co: or di: before it and :word, :int, :dint, :
 MOST = 1000
 MOST_READ = 120
 """The most registers in one request. A frame carries 125; this is even, for 32-bit values."""
-_ADDRESS = re.compile(r"(?:(?P<space>[a-z]+):)?(?P<first>\d{1,5})(?:-(?P<last>\d{1,5}))?(?::(?P<form>\w+))?", re.IGNORECASE)
+_ADDRESS = re.compile(
+    r"(?:(?P<space>[a-z]+):)?(?P<first>\d{1,5})(?:-(?P<last>\d{1,5}))?(?::(?P<form>\w+))?", re.IGNORECASE | re.ASCII
+)
 
 
 class ValueAddress(NamedTuple):

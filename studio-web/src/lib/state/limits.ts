@@ -1,6 +1,6 @@
 import { t } from "../../text";
 import type { Point } from "./model";
-import { readNumber, shortNumber, wholeNumber } from "./numbers";
+import { hasThousands, readNumber, shortNumber, wholeNumber } from "./numbers";
 
 export type Limits = NonNullable<Point["limits"]>;
 
@@ -18,10 +18,17 @@ export function isWithin(value: number, { low, high, is_low_excluded }: Limits):
   return high === null || value <= high;
 }
 
+/** Why a text is not a number; one whose comma may separate thousands with what to write. */
+export function whyNoNumber(text: string): string {
+  const plain = text.trim();
+  if (!hasThousands(plain)) return t("notANumber", { text: plain || "“”" });
+  return t("thousands", { text: plain, whole: plain.replaceAll(",", ""), fraction: plain.replace(",", ".").replaceAll(",", "") });
+}
+
 /** The number in a text, or why it cannot be taken. */
 export function checkedNumber(text: string, limits: Limits | null): { value: number } | { wrong: string } {
   const value = readNumber(text);
-  if (value === null) return { wrong: t("notANumber", { text: text.trim() || "“”" }) };
+  if (value === null) return { wrong: whyNoNumber(text) };
   if (limits !== null && !isWithin(value, limits)) {
     return { wrong: t("outOfRange", { value: shortNumber(value), range: rangeWords(limits) }) };
   }

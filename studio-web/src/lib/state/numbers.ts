@@ -17,10 +17,17 @@ export function wholeNumber(value: number): string {
   return Math.abs(value) < 1e6 ? digits : digits.replace(/\B(?=(\d{3})+$)/g, "\u202f");
 }
 
-/** What somebody typed: point or comma, either minus. Null where it is no number. */
+/** What somebody typed: point or comma, either minus. Null where it is no number, and where a comma may separate thousands. */
 export function readNumber(text: string): number | null {
-  const plain = text.trim().replace(",", ".").replace("−", "-");
-  return /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i.test(plain) ? Number(plain) : null;
+  const plain = text.trim().replace("−", "-");
+  if (hasThousands(plain) || !/^[+-]?(\d+[.,]?\d*|[.,]\d+)(e[+-]?\d+)?$/i.test(plain)) return null;
+  const value = Number(plain.replace(",", "."));
+  return Number.isFinite(value) ? value : null;
+}
+
+/** Whether 1,000 is 1000 or 1.0 is not clear. */
+export function hasThousands(text: string): boolean {
+  return /^[+−-]?[1-9]\d{0,2}(,\d{3})+$/.test(text.trim());
 }
 
 export function shownTime(time_ns: bigint, decimals = 3): string {
