@@ -697,7 +697,7 @@ export type SetRequest = {
   id?: string | number | null;
   version?: 1;
   /** 0, 1, volts. */
-  levels: Record<string, number | boolean>;
+  levels: Record<string, number>;
 };
 
 /** Press a button. Answer: null. */
@@ -729,7 +729,7 @@ export type WriteRequest = {
   id?: string | number | null;
   version?: 1;
   /** Registers by MACHINE.REGISTER. [units of the data sheet] */
-  values: Record<string, number | boolean>;
+  values: Record<string, number>;
 };
 
 /** Characters go to a line. Answer: null. */

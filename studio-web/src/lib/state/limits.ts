@@ -22,7 +22,11 @@ export function isWithin(value: number, { low, high, is_low_excluded }: Limits):
 export function whyNoNumber(text: string): string {
   const plain = text.trim();
   if (!hasThousands(plain)) return t("notANumber", { text: plain || "“”" });
-  return t("thousands", { text: plain, whole: plain.replaceAll(",", ""), fraction: plain.replace(",", ".").replaceAll(",", "") });
+  return t("thousands", {
+    text: plain,
+    whole: plain.replaceAll(",", ""),
+    fraction: plain.replace(",", ".").replaceAll(",", ""),
+  });
 }
 
 /** The number in a text, or why it cannot be taken. */

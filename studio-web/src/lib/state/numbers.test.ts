@@ -14,9 +14,12 @@ test.each([
   expect(readNumber(text)).toBe(value);
 });
 
-test.each(["1,000", "-12,345", "1,000,000", "1_000", "1 000", "0x10", "１２", "1e999", "inf", ""])("%s is none", (text) => {
-  expect(readNumber(text)).toBeNull();
-});
+test.each(["1,000", "-12,345", "1,000,000", "1_000", "1 000", "0x10", "１２", "1e999", "inf", ""])(
+  "%s is none",
+  (text) => {
+    expect(readNumber(text)).toBeNull();
+  },
+);
 
 test("a comma that may separate thousands is told with what to write", () => {
   expect(whyNoNumber("1,000")).toContain("1000");
