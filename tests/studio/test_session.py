@@ -53,7 +53,10 @@ def test_nothing_but_stops_is_done_before_hello() -> None:
 
 def test_a_wrong_token_is_refused_and_the_connection_is_to_be_cut_off() -> None:
     tab = Tab(Studio(tokens=True))
-    assert tab.error("hello") == ("refusal", "no token: open the address with the token that the studio printed")
+    assert tab.error("hello") == (
+        "refusal",
+        "no token: it is in the address that the studio prints on a terminal, and in its file of tokens",
+    )
     assert tab.session.is_refused
     tab = Tab(Studio(tokens=True))
     assert tab.error("hello", token="engineer-012345678") == ("refusal", "wrong token")

@@ -1,9 +1,9 @@
-"""Tokens grant roles. Without tokens, all clients have the same role."""
+"""Tokens grant roles; clients without a token have one role, or are not admitted."""
 
 from __future__ import annotations
 
 import hmac
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from steptwin.access.roles import ROLES, Role
@@ -22,20 +22,32 @@ class Token:
     text: str
 
 
-class AccessGate:
-    """Admits clients with one of the ``tokens``; without tokens, all clients with the role ``open_to``."""
+def _always() -> bool:
+    return True
 
-    def __init__(self, tokens: Iterable[Token] = (), *, open_to: Role | None = None) -> None:
+
+class AccessGate:
+    """Admits clients with one of the ``tokens``. Clients without a token have the role ``open_to``, while ``is_open`` says so."""
+
+    def __init__(
+        self, tokens: Iterable[Token] = (), *, open_to: Role | None = None, is_open: Callable[[], bool] = _always
+    ) -> None:
         self._tokens = tuple(tokens)
         self._open_to = open_to
+        self._is_open = is_open
 
     @property
     def asks(self) -> bool:
-        """Whether a token is required."""
-        return self._open_to is None
+        """Whether a token is required at present."""
+        return self._open_to is None or not self._is_open()
+
+    @property
+    def has_tokens(self) -> bool:
+        """Whether there is a token that a client can give."""
+        return bool(self._tokens)
 
     def enter(self, given: str | None) -> tuple[Role, str | None]:
-        """The role, and the name of the token. Raises `Refusal`."""
+        """The role, and the name of the token; None without one. Raises `Refusal`."""
         found: Token | None = None
         data = (given or "").encode("utf-8", "replace")
         for token in self._tokens:  # all of them, against timing attacks
@@ -43,9 +55,11 @@ class AccessGate:
                 found = token
         if found is not None:
             return found.role, found.name
-        if self._open_to is not None:
-            return self._open_to, None
-        raise Refusal("no token: open the address with the token that the studio printed" if not given else "wrong token")
+        if given and self._tokens:
+            raise Refusal("wrong token")
+        if self._open_to is None or self.asks:
+            raise Refusal("no token: it is in the address that the studio prints on a terminal, and in its file of tokens")
+        return self._open_to, None
 
 
 def read_tokens(text: str, place: str) -> tuple[Token, ...]:

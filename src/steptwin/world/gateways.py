@@ -272,7 +272,7 @@ _KINDS: Mapping[str, _GatewayReader] = {
                 optional(text_value, "certificate", "file with the certificate of this client, PEM"),
                 optional(text_value, "key", "file with its key, PEM"),
                 optional(text_value, "tokens", "file with lines ROLE NAME TOKEN; commands have a token"),
-                optional(word(*ROLES), "role", "role of commands without a token"),
+                optional(word(*ROLES), "role", "role of commands without a token; viewer without"),
                 optional(
                     word("homeassistant"), "discovery", "announces the topics to this program, which then shows them by itself"
                 ),

@@ -20,8 +20,8 @@ export const REFUSALS: Readonly<Record<string, string>> = {
     "{host} nie jest nazwą tego studia; osiąga się je jako {names}",
   "Origin {origin} is another site; only pages of this studio may ask it":
     "{origin} to inna strona; pytać mogą tylko strony tego studia",
-  "no token: open the address with the token that the studio printed":
-    "brak tokenu: otwórz adres z tokenem, który wypisało studio",
+  "no token: it is in the address that the studio prints on a terminal, and in its file of tokens":
+    "brak tokenu: jest w adresie, który studio wypisuje w terminalu, i w jego pliku tokenów",
   "wrong token": "zły token",
   "{place}: no tokens: expected lines ROLE NAME TOKEN": "{place}: brak tokenów: oczekiwano linii ROLA NAZWA TOKEN",
   "{place}: {#count} words: expected ROLE NAME TOKEN": "{place}: słów {#count}: oczekiwano ROLA NAZWA TOKEN",

@@ -16,6 +16,7 @@ from mosquitto import Mosquitto, Subscription
 from pymodbus.client import ModbusTcpClient
 from tests.conftest import STEPTWIN, until
 from tls_files import Authority
+from tokens import tokens_file
 
 WORLD = """
     [world]
@@ -35,6 +36,7 @@ WORLD = """
     broker = "127.0.0.1:{port}"
     interval = "20ms"
     registers = ["table.USER_REGISTER[5]"]
+    role = "engineer"
 """
 BASE = "steptwin/plant"
 
@@ -218,8 +220,8 @@ def test_two_worlds_do_not_share_topics(broker: Mosquitto, tmp_path: Path) -> No
 
 
 def test_roles_by_token(broker: Mosquitto, tmp_path: Path) -> None:
-    (tmp_path / "tokens").write_text("operator press 0123456789abcdef\n")
-    with served(WORLD.format(port=broker.port) + 'tokens = "tokens"\n', tmp_path):
+    tokens_file(tmp_path, "operator press 0123456789abcdef\n")
+    with served(WORLD.replace('role = "engineer"', 'tokens = "tokens"').format(port=broker.port), tmp_path):
         online(broker)
         with broker.subscribe("me/answers") as answers:
             ask = Requests(broker, answers)
@@ -263,9 +265,9 @@ def test_tls_with_certificates_and_a_password(require_peer: Callable[[str], str]
 
 def test_commands_over_a_broker_are_in_the_audit_log(broker: Mosquitto, tmp_path: Path) -> None:
     """Who, from where, what and its outcome; who looks is not recorded."""
-    (tmp_path / "tokens").write_text("operator anna letmein-0123456789\nviewer screen lookonly-0123456789\n")
-    keys = 'tokens = "tokens"\n'
-    with served(WORLD.format(port=broker.port) + keys, tmp_path, "--audit", "audit.jsonl"):
+    tokens_file(tmp_path, "operator anna letmein-0123456789\nviewer screen lookonly-0123456789\n")
+    text = WORLD.replace('role = "engineer"', 'tokens = "tokens"').format(port=broker.port)
+    with served(text, tmp_path, "--audit", "audit.jsonl"):
         online(broker)
         with broker.subscribe("me/answers") as answers:
             ask = Requests(broker, answers)
@@ -343,7 +345,7 @@ def test_a_bridge_shows_a_device(broker: Mosquitto, tmp_path: Path) -> None:
     with running(tmp_path, *device) as points:
         (tmp_path / "cell.toml").write_text(
             f'[[device]]\nname = "table"\naddress = "127.0.0.1:{points["tcp"]["port"]},kind=mic488"\n'
-            f'[gateway.mqtt]\nbroker = "127.0.0.1:{broker.port}"\ninterval = "20ms"\n'
+            f'[gateway.mqtt]\nbroker = "127.0.0.1:{broker.port}"\ninterval = "20ms"\nrole = "operator"\n'
         )
         with running(tmp_path, "bridge", "cell.toml") as bridge:
             base = "steptwin/cell"

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from gateway_rig import GatewayWorld
+from tokens import tokens_file
 
 from steptwin.access.audit import Audit
 from steptwin.errors import Misuse
@@ -27,11 +28,11 @@ def mqtt(keys: str = "") -> MqttSpec:
 
 
 class Rig:
-    def __init__(self, folder: Path, keys: str = "", *, is_local: bool = True) -> None:
+    def __init__(self, folder: Path, keys: str = 'role = "engineer"') -> None:
         self.world = GatewayWorld(WORLD)
         self.now = 0.0
-        (folder / "tokens").write_text(f"operator press {OPERATOR}\n")
-        door = Doorkeeper(mqtt(keys), folder, is_local=is_local)
+        tokens_file(folder, f"operator press {OPERATOR}\n")
+        door = Doorkeeper(mqtt(keys), folder)
         self.commands = JsonCommands(self.world, door, lambda: self.now)
 
     def ask(self, payload: Any, *, retained: bool = False, sender: object = "me") -> Any:
@@ -109,17 +110,16 @@ def test_a_request_that_comes_again_while_it_is_done_is_not_done_again(tmp_path:
 
 
 @pytest.mark.parametrize(
-    ("keys", "is_local", "role"),
+    ("keys", "role"),
     [
-        ("", True, "engineer"),
-        ("", False, "viewer"),
-        ('tokens = "tokens"', True, "viewer"),
-        ('role = "operator"', False, "operator"),
-        ('role = "operator"\ntokens = "tokens"', True, "operator"),
+        ("", "viewer"),
+        ('tokens = "tokens"', "viewer"),
+        ('role = "engineer"', "engineer"),
+        ('role = "operator"\ntokens = "tokens"', "operator"),
     ],
 )
-def test_the_role_of_those_without_a_token(keys: str, is_local: bool, role: str, tmp_path: Path) -> None:
-    rig = Rig(tmp_path, keys, is_local=is_local)
+def test_the_role_of_those_without_a_token(keys: str, role: str, tmp_path: Path) -> None:
+    rig = Rig(tmp_path, keys)
     taken = [name for name, request in REQUESTS.items() if "ok" in rig.ask(request)]
     assert taken == list(REQUESTS)[: ["viewer", "operator", "engineer"].index(role) + 1]
 
@@ -167,4 +167,4 @@ def test_retained_commands_are_refused(tmp_path: Path) -> None:
 
 def test_a_file_of_tokens_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(Misuse, match="no-tokens"):
-        Doorkeeper(mqtt('tokens = "no-tokens"'), tmp_path, is_local=True)
+        Doorkeeper(mqtt('tokens = "no-tokens"'), tmp_path)

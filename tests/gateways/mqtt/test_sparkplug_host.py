@@ -29,6 +29,7 @@ WORLD = """
     broker = "127.0.0.1:{port}"
     interval = "20ms"
     registers = ["table.USER_REGISTER[5]"]
+    role = "engineer"
     sparkplug = {{ group = "plant", node = "hall"{host} }}
 """
 NODE = {"node": "hall"}
@@ -133,7 +134,7 @@ def test_commands_that_are_refused(host: Host, broker: Mosquitto, tmp_path: Path
     def told(text: str) -> None:
         until(lambda: text in (host.value("Commands/Result") or ""), f"{text!r} is told")
 
-    with served(WORLD.format(port=broker.port, host="") + 'role = "viewer"\n', tmp_path):
+    with served(WORLD.replace('role = "engineer"', "").format(port=broker.port, host=""), tmp_path):
         until(lambda: host.is_alive("feed"), "all are born")
         host.write("M1/Commands/Enable", "Boolean", True)
         told("M1/Commands/Enable: enable is for the role operator")

@@ -12,6 +12,7 @@ from gateway_rig import served
 from node_client import NodeClient
 from pymodbus.client import ModbusTcpClient
 from tests.conftest import until
+from tokens import tokens_file
 
 from steptwin.commands.certificate import make_certificate
 
@@ -199,7 +200,7 @@ SECURE = """
 
 def test_encrypted_connections_with_roles(stranger: NodeClient, tmp_path: Path) -> None:
     make_certificate(tmp_path / "own", [], 2)
-    (tmp_path / "tokens").write_text("viewer screen 0123456789abcdef\noperator press 0123456789abcdeF\n")
+    tokens_file(tmp_path, "viewer screen 0123456789abcdef\noperator press 0123456789abcdeF\n")
     with served(WORLD + SECURE, tmp_path) as points:
         where = {"url": points["opcua"]["url"], "folder": str(tmp_path / "client")}
         secure = {"mode": "SignAndEncrypt", "policy": "Basic256Sha256", **where}

@@ -13,6 +13,7 @@ from cryptography.hazmat.primitives.serialization import (
     PrivateFormat,
     load_pem_private_key,
 )
+from tokens import tokens_file
 
 from steptwin.commands.certificate import make_certificate
 from steptwin.errors import Misuse
@@ -30,7 +31,7 @@ def security(folder: Path, keys: str, *, is_local: bool = True) -> Security:
 
 
 def test_others_need_security_and_tokens(tmp_path: Path) -> None:
-    (tmp_path / "tokens").write_text("viewer screen 0123456789abcdef\n")
+    tokens_file(tmp_path, "viewer screen 0123456789abcdef\n")
     for keys in ("", 'tokens = "tokens"\n', f'security = "encrypt"\n{OWN}'):
         with pytest.raises(Misuse, match="others can reach this address"):
             security(tmp_path, keys, is_local=False)

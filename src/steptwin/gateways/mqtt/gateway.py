@@ -25,7 +25,7 @@ from steptwin.inputfiles import read_bytes
 from steptwin.machine import SECOND
 from steptwin.system import reason
 from steptwin.textcodec import decode
-from steptwin.world.addresses import is_loopback, parse_address
+from steptwin.world.addresses import parse_address
 from steptwin.world.gateways import MqttSpec, SparkplugSpec
 
 
@@ -47,7 +47,7 @@ class MqttGateway:
         """The broker need not be there yet: it is looked for until the gateway is closed."""
         spec = self._spec
         broker = broker_of(spec, self._folder)
-        door = Doorkeeper(spec, self._folder, is_local=is_loopback(broker.address.host))
+        door = Doorkeeper(spec, self._folder)
         registers = registers_by_machine("[gateway.mqtt]", spec.registers, self._subject.description)
         self._sampler = Sampler(self._subject, registers, spec.interval)
         if spec.sparkplug is None:

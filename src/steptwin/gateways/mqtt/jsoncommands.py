@@ -10,16 +10,15 @@ from pathlib import Path
 from typing import Any
 
 from steptwin.access.roles import ROLES, Role
-from steptwin.access.tokens import AccessGate, read_tokens
+from steptwin.access.tokens import AccessGate
 from steptwin.errors import Misuse, Refusal
+from steptwin.files.tokenfiles import tokens_in
 from steptwin.gateways.clients import GatewayClient
 from steptwin.gateways.contract import GatewaySubject
 from steptwin.gateways.leases import JogLeases
-from steptwin.inputfiles import read_bytes
 from steptwin.subject.commands import Command, Jog, StopAxes, row_of
 from steptwin.subject.contract import Result
 from steptwin.subject.dispatch import Message, failure, read_message, respond
-from steptwin.textcodec import decode
 from steptwin.world.gateways import MqttSpec
 
 COMMANDS = (
@@ -40,14 +39,13 @@ MOST_KEPT = 1000
 class Doorkeeper:
     """Clients by their tokens."""
 
-    def __init__(self, spec: MqttSpec, folder: Path, *, is_local: bool) -> None:
+    def __init__(self, spec: MqttSpec, folder: Path) -> None:
         """Raises `Misuse` for a file of tokens that cannot be used."""
         self._gate: AccessGate | None = None
         if spec.tokens is not None:
-            text = decode(read_bytes(folder / spec.tokens), spec.tokens).text
-            self._gate = AccessGate(read_tokens(text, spec.tokens))
-        open_to = Role.ENGINEER if is_local and spec.tokens is None else Role.VIEWER
-        self.anybody = GatewayClient("a client without token", open_to if spec.role is None else ROLES[spec.role], PROTOCOL)
+            self._gate = AccessGate(tokens_in(folder / spec.tokens))
+        role = Role.VIEWER if spec.role is None else ROLES[spec.role]  # whoever reaches the broker is not known, also on loopback
+        self.anybody = GatewayClient("a client without token", role, PROTOCOL)
 
     def admit(self, token: object) -> GatewayClient:
         """Raises `Refusal` for a token that is wrong."""

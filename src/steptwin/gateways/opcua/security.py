@@ -16,12 +16,12 @@ from cryptography.hazmat.primitives.serialization import load_pem_private_key
 from cryptography.x509 import load_pem_x509_certificate
 
 from steptwin.access.roles import Role
-from steptwin.access.tokens import AccessGate, read_tokens
+from steptwin.access.tokens import AccessGate
 from steptwin.errors import Misuse, Refusal
+from steptwin.files.tokenfiles import tokens_in
 from steptwin.gateways.clients import GatewayClient
 from steptwin.gateways.opcua.session import GatewayUser
 from steptwin.inputfiles import read_bytes
-from steptwin.textcodec import decode
 from steptwin.world.gateways import OpcUaSpec
 
 _SIGNED = (
@@ -57,11 +57,8 @@ class Security(UserManager):
             raise Misuse("[gateway.opcua]: others can reach this address: give security = 'encrypt', certificate, key and tokens")
         if options.security != "none" and options.certificate is None:
             raise Misuse(f"[gateway.opcua]: security = {options.security!r} needs certificate and key: see steptwin certificate")
-        tokens = () if options.tokens is None else read_tokens(self._text(options.tokens), options.tokens)
+        tokens = () if options.tokens is None else tokens_in(folder / options.tokens)
         self._gate = AccessGate(tokens, open_to=None if tokens else Role.ENGINEER)
-
-    def _text(self, name: str) -> str:
-        return decode(read_bytes(self._folder / name), name).text
 
     @property
     def policies(self) -> Sequence[ua.SecurityPolicyType]:
