@@ -17,6 +17,7 @@ from steptwin.campaign.report.comparison import REPORT
 from steptwin.commands.studio_processes import ChildProcesses, Process, last_words
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.eventloop import later
+from steptwin.files.ownfolder import place_in
 from steptwin.files.textfiles import read_text
 from steptwin.inputfiles import MOST_DESCRIPTION_BYTES, read_recorded
 
@@ -74,6 +75,7 @@ class FolderCampaigns:
 
     async def run(self, campaign: str) -> None:
         known = await later(asyncio.to_thread(self._campaign, campaign))
+        place_in(self._folder, str(known.results))
         if (running := self._present()) is not None:
             raise Refusal(f"{running} runs: one campaign at a time")
         self._errors.pop(campaign, None)

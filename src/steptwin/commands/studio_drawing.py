@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from steptwin.errors import Misuse
+from steptwin.files.ownfolder import place_in
 from steptwin.files.textfiles import read_text, write_bytes
 from steptwin.world.arrangement import OTHERS, DrawnPlace, arranged
 from steptwin.world.spec import WorldSpec
@@ -36,7 +37,7 @@ class WorldArrangement:
         now = read_text(self._file)  # it may have been changed since
         text = arranged(now.source.text, places)
         try:
-            write_bytes(self._file, now.to_bytes(text))
+            write_bytes(place_in(self._file.parent, self._file.name), now.to_bytes(text))
         except Misuse:
             return {"file": None, "name": name, "text": text}
         finally:

@@ -15,8 +15,9 @@ from steptwin.commands.studio_processes import ChildProcesses, Process, last_wor
 from steptwin.errors import Misuse, Refusal
 from steptwin.eventloop import later
 from steptwin.files import session as sessions
-from steptwin.files.beginning import SESSION_SUFFIX
+from steptwin.files.beginning import SESSION_SUFFIX, is_session
 from steptwin.files.export import FORMATS
+from steptwin.files.ownfolder import place_in
 from steptwin.files.savedsessions import SavedSession, path_of, read_saved, saved_sessions
 from steptwin.live.cell import Cell
 from steptwin.live.world import MOST_INPUT_BYTES, MOST_INPUTS, LiveWorld
@@ -57,9 +58,17 @@ class WorldRecordings:
         }
 
     async def save(self, name: str | None) -> Mapping[str, object]:
-        path = path_of(self._folder, name or f"{self._stem}-{datetime.now(UTC):%Y%m%d-%H%M%S}")
+        path = place_in(self._folder, path_of(self._folder, name or f"{self._stem}-{datetime.now(UTC):%Y%m%d-%H%M%S}").name)
         self._cell.enter()
         return _plain(await later(asyncio.to_thread(_save, self._live.session(), path)))
+
+    def place(self, file: str) -> str:
+        path = place_in(self._folder, file)
+        if path.exists():
+            if not is_session(path):
+                raise Refusal(f"{path} is there already: give another name")
+            read_saved(path)  # whatever else is there is not overwritten
+        return str(path)
 
     async def view(self, name: str) -> str:
         path = self._saved(name)

@@ -46,6 +46,11 @@ class Recordings(Protocol):
         """Raises `Misuse`, and `Refusal` where there is a file of that name."""
         ...
 
+    def place(self, file: str) -> str:
+        """The absolute path at which the request ``save`` may write ``file``; a session may be there already. Raises `Misuse`
+        for a place outside of the folder of the world, `Refusal` for another file."""
+        ...
+
     async def view(self, name: str) -> str:
         """The address of the page. Raises `Misuse`, `Refusal`."""
         ...

@@ -100,6 +100,7 @@ class ViewerSession:
             command.Jog: lambda wanted, _: self._jog(wanted),
             command.StopAxes: lambda wanted, _: hub.stop(wanted),
             command.StopAll: lambda _wanted, _: hub.stop_all(),
+            command.Save: lambda wanted, _: hub.subject.do(command.Save(hub.recordings.place(wanted.file))),
             command.Follow: self._follow,
             command.Unfollow: lambda wanted, _: self._unfollow(wanted),
         }

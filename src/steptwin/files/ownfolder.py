@@ -1,0 +1,27 @@
+"""The one folder in which clients of a service may have files written. Their user may not be the one whose files these are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from steptwin.errors import Misuse
+from steptwin.inputfiles import shown
+from steptwin.system import reason
+
+
+def place_in(folder: Path, name: str) -> Path:
+    """The path of the file ``name`` in ``folder`` or below it; ``name`` may be absolute.
+
+    Raises `Misuse` for a place elsewhere, also one that a link leads to, and for a file that is a link or has a second name.
+    """
+    path = folder / name
+    try:
+        is_within = path.parent.resolve().is_relative_to(folder.resolve())
+        is_link = path.is_symlink() or (path.is_file() and path.stat().st_nlink > 1)
+    except (OSError, RuntimeError) as error:  # RuntimeError: links in a circle
+        raise Misuse(f"cannot write {shown(path)}: {reason(error)}") from None
+    if not is_within or path.name in ("", ".."):
+        raise Misuse(f"cannot write {shown(path)}: requests write into {folder} only")
+    if is_link:
+        raise Misuse(f"cannot write {shown(path)}: it is a link, and requests write through none")
+    return path
