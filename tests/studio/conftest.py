@@ -73,7 +73,10 @@ def studio_world() -> StudioWorld:
 
 
 class Process:
-    """``steptwin studio`` on free ports, with a small world, ``--demo`` with the demo machine; ``--itself`` without a file."""
+    """``steptwin studio`` on free ports, with a small world, ``--demo`` with the demo machine; ``--itself`` without a file.
+
+    It asks for a token ``--with-token``, and where it has to.
+    """
 
     def __init__(self, directory: Path, served: StudioWorld, *options: str) -> None:
         self.directory = directory
@@ -83,13 +86,16 @@ class Process:
         shutil.copy(FOLDER / "demo.prg", directory)
         for name, text in served.files.items():
             (directory / name).write_text(text)
-        self.environment = {**os.environ, "XDG_RUNTIME_DIR": str(directory), "TERM": "dumb"}
+        own = {"XDG_RUNTIME_DIR": str(directory), "TERM": "dumb"}
+        self.environment = {"XDG_STATE_HOME": str(directory / "state"), **os.environ, **own}
         self._opened = ExitStack()
         self._err = (directory / "err").open("w+")
         self._out = (directory / "out").open("w+")
         given = [] if "--itself" in options else [str(world)]
         http = [] if "--http" in options else ["--http", "127.0.0.1:0"]
-        rest = [option for option in options if option not in ("--demo", "--itself")]
+        rest = [option for option in options if option not in ("--demo", "--itself", "--with-token")]
+        if not {"--with-token", "--tokens", "0.0.0.0:0", "[::]:0"} & {*options}:
+            rest.append("--open-to-local-users")
         self.process = subprocess.Popen(
             [STEPTWIN, "studio", *given, *http, "--no-browser", "--ready-file", str(self.ready_file), *rest],
             stdout=self._out,
@@ -111,6 +117,12 @@ class Process:
     @property
     def output(self) -> str:
         return (self.directory / "out").read_text()
+
+    @property
+    def token(self) -> str:
+        """Of an engineer, in the file of the user."""
+        lines = (Path(self.environment["XDG_STATE_HOME"]) / "steptwin/tokens").read_text().splitlines()
+        return next(line.split()[2] for line in lines if line.startswith("engineer "))
 
     @property
     def url(self) -> str:

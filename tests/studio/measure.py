@@ -93,6 +93,7 @@ def main() -> None:
         (folder / "demo.prg").write_bytes((FOLDER / "demo.prg").read_bytes())
         ready = folder / "ready.json"
         command = ["steptwin", "studio", str(folder / "demo.toml"), "--http", "127.0.0.1:0", "--no-browser"]
+        command.append("--open-to-local-users")
         environment = {**os.environ, "XDG_RUNTIME_DIR": name, "TERM": "dumb"}
         with subprocess.Popen(
             [sys.executable, "-m", *command, "--ready-file", str(ready)], stdout=subprocess.DEVNULL, env=environment

@@ -79,6 +79,7 @@ def studio(text: str) -> Generator[str]:
         (folder / "demo.prg").write_bytes((FOLDER / "demo.prg").read_bytes())
         ready = folder / "ready.json"
         command = ["-m", "steptwin", "studio", str(folder / "world.toml"), "--http", "127.0.0.1:0", "--no-browser"]
+        command.append("--open-to-local-users")
         environment = {**os.environ, "XDG_RUNTIME_DIR": name, "TERM": "dumb"}
         arguments = [sys.executable, *command, "--ready-file", str(ready)]
         with subprocess.Popen(arguments, stdout=subprocess.DEVNULL, env=environment) as process:

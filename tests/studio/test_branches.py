@@ -14,6 +14,7 @@ from playwright.sync_api import expect
 from studio_page import Studio, button, serious, show
 from tests.conftest import until
 from tests.studio.conftest import Process, StudioWorld
+from tokens import tokens_file
 
 WORLD = """
     [world]
@@ -116,7 +117,7 @@ def answers(url: str) -> bool:
 
 
 def test_roles_and_the_most_branches(start_studio: Callable[..., Process], tmp_path: Path) -> None:
-    (tmp_path / "tokens").write_text(TOKENS)
+    tokens_file(tmp_path, TOKENS)
     studio = start_studio("--tokens", str(tmp_path / "tokens"))
     viewer, operator = "viewer-01234567890", "operator-0123456789"
     refused = ask(studio.url, "start_branch", viewer)["error"]["message"]
@@ -133,7 +134,7 @@ def test_roles_and_the_most_branches(start_studio: Callable[..., Process], tmp_p
 
 
 def test_there_is_none_where_others_can_reach_the_studio(start_studio: Callable[..., Process], tmp_path: Path) -> None:
-    (tmp_path / "tokens").write_text(TOKENS)
+    tokens_file(tmp_path, TOKENS)
     studio = start_studio("--http", "0.0.0.0:0", "--remote", "--tokens", str(tmp_path / "tokens"))
     url = f"http://127.0.0.1:{studio.end_points['http']['port']}"
     assert "from the computer of the studio only" in ask(url, "start_branch", "operator-0123456789")["error"]["message"]

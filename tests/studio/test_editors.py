@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from tests.studio.conftest import Process
+from tokens import tokens_file
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 Start = Callable[..., Process]
@@ -89,8 +90,7 @@ def test_files_of_the_machine_are_not_read(start_studio: Start) -> None:
 
 
 def test_who_has_no_token_is_refused(start_studio: Start, tmp_path_factory: pytest.TempPathFactory) -> None:
-    tokens = tmp_path_factory.mktemp("tokens") / "tokens"
-    tokens.write_text("viewer hall viewer-0123456789\n")
+    tokens = tokens_file(tmp_path_factory.mktemp("tokens"), "viewer hall viewer-0123456789\n")
     studio = start_studio("--tokens", str(tokens))
     for hello in ('{"do": "hello"}', '{"do": "hello", "token": "viewer-0123456780"}', '{"do": "describe"}', "nonsense", "[]"):
         socket = studio.connect("/editor")

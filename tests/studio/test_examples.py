@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -41,6 +42,17 @@ def test_curl(start_studio: Start) -> None:
     assert [one["point"] for one in answers[0]["ok"]] == ["table.M1.position", "table.M1.status"]
     assert answers[1]["ok"] is None
     assert answers[3]["ok"] == {"machines": ["table", "drum", "feeder"], "scripts": []}
+
+
+def test_curl_with_the_token(start_studio: Start, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    if shutil.which("curl") is None:
+        pytest.skip("curl is missing")
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / ".local/state"))
+    studio = start_studio("--with-token")
+    script = block("sh", "token=").replace(DEMO, studio.url)
+    environment = {**os.environ, "HOME": str(tmp_path)}
+    ran = subprocess.run(script, shell=True, capture_output=True, text=True, check=True, env=environment)
+    assert json.loads(ran.stdout)["ok"][0]["point"] == "table.M1.position"
 
 
 def test_javascript(start_studio: Start) -> None:

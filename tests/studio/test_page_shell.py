@@ -38,6 +38,28 @@ def test_two_people_and_one_control(studio: Studio) -> None:
     assert studio.master.status(2) == 1
 
 
+def test_a_page_without_the_right_token_says_so_and_takes_one(start_studio: Callable[..., Process], browser: Browser) -> None:
+    process = start_studio("--with-token")
+    page = browser.new_page()
+    page.goto(f"{process.url}/#token=wrong-0123456789abcdef")
+    status, field = page.get_by_role("status").first, page.get_by_label("Token of this studio")
+    expect(status).to_contain_text("wrong token")
+    with page.expect_response("**/api/do/stop_all") as stopped:
+        page.get_by_role("button", name="Stop all").click()
+    assert stopped.value.ok
+    field.press_sequentially("p1")  # keys of the page, outside of fields
+    field.fill("")
+    field.press("Enter")
+    expect(status).to_contain_text("no token")
+    field.fill(process.token)
+    button(page, "Give token").click()
+    expect(page.get_by_label("M1 position", exact=True)).to_be_visible()
+    expect(field).to_have_count(0)
+    page.reload()
+    expect(page.get_by_label("M1 position", exact=True)).to_be_visible()
+    page.close()
+
+
 def test_panes_are_remembered(studio: Studio) -> None:
     page = studio.page()
     button(page, "Open beside").click()

@@ -2,23 +2,35 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import os
 from collections.abc import Callable, Iterator
+from dataclasses import replace
+from http.client import HTTPConnection
 from pathlib import Path
+from queue import Queue
 from typing import Any
+from urllib.request import url2pathname
 
-import httpx
 import pytest
 from tests.studio.conftest import WORLD, Process, StudioWorld
+from websockets.exceptions import ConnectionClosed
 
+from steptwin.access.roles import Role
+from steptwin.access.tokens import Token
+from steptwin.commands.openpage import OpenedPage
+from steptwin.commands.owntokens import own_tokens
+from steptwin.commands.studio import DEFAULT, AccessInfo
 from steptwin.commands.studio_drawing import WorldArrangement
+from steptwin.errors import Misuse
+from steptwin.studio.rest import NO_TOKEN
+from steptwin.studio.viewers import REFUSED as CLOSED
 from steptwin.world.arrangement import DrawnPlace
 from steptwin.world.description import read_world
 
-CAMPAIGN = (
-    '[campaign]\nname = "doors"\nworld = "hall.toml"\nruns = 1\n[[property]]\nname = "n"\nnever = "table.IN1"\n'
-)
+CAMPAIGN = '[campaign]\nname = "doors"\nworld = "hall.toml"\nruns = 1\n[[property]]\nname = "n"\nnever = "table.IN1"\n'
 
 
 class Folder:
@@ -38,19 +50,32 @@ class Folder:
         (own / "doors.toml").write_text(CAMPAIGN)
         (own / "doors.results").symlink_to(base)
         self.base = base
-        self.process = Process(own, StudioWorld(), "--trace", "ring 100").wait_until_ready()
+        self.process = Process(own, StudioWorld(), "--trace", "ring 100", "--with-token").wait_until_ready()
 
     def over_rest(self, name: str, /, **fields: object) -> Any:
-        return httpx.post(f"{self.process.url}/api/do/{name}", json=fields, timeout=60).json()
+        return json.loads(post(self.process, name, self.process.token, **fields)[1])
 
     def over_websocket(self, name: str, /, **fields: object) -> Any:
         socket = self.process.connect()
-        socket.send('{"do": "hello", "id": 0}')
+        socket.send(json.dumps({"do": "hello", "token": self.process.token, "id": 0}))
         socket.send(json.dumps({"do": name, "id": 1, **fields}))
         while (answer := json.loads(socket.recv(60))).get("id") != 1:
             pass
         socket.close()
         return answer
+
+
+def request(process: Process, method: str, path: str, token: str | None, body: str | None = None) -> tuple[int, str]:
+    """Status and text of the answer. A client of httpx for each of hundreds of requests would take seconds."""
+    connection = HTTPConnection("127.0.0.1", process.end_points["http"]["port"], timeout=60)
+    with contextlib.closing(connection):
+        connection.request(method, path, body, {} if token is None else {"authorization": f"Bearer {token}"})
+        answer = connection.getresponse()
+        return answer.status, answer.read().decode()
+
+
+def post(process: Process, name: str, token: str | None, /, **fields: object) -> tuple[int, str]:
+    return request(process, "POST", f"/api/do/{name}", token, json.dumps(fields))
 
 
 @pytest.fixture(scope="module")
@@ -122,3 +147,176 @@ def test_a_description_that_is_a_link_is_not_written(tmp_path: Path) -> None:
     ]
     assert [one["file"] for one in saved] == [None, str(real)]
     assert real.read_text() == saved[0]["text"] == saved[1]["text"] != WORLD
+
+
+# ---------------------------------------------------------------------- ways in
+
+
+class Visitor:
+    """Somebody at a studio, with a token or without. Each way in says whether it let the visitor in."""
+
+    def __init__(self, process: Process, token: str | None) -> None:
+        self._process = process
+        self._token = token
+
+    def get(self, path: str) -> bool:
+        return request(self._process, "GET", path, self._token)[0] != NO_TOKEN
+
+    def post(self, name: str, **fields: object) -> bool:
+        return post(self._process, name, self._token, **fields)[0] != NO_TOKEN
+
+    def hello(self, path: str) -> bool:
+        """Who is not let in is told why, and the connection is closed."""
+        socket = self._process.connect(path)
+        token = {} if self._token is None else {"token": self._token}
+        socket.send(json.dumps({"do": "hello", **token}))
+        if "error" not in json.loads(socket.recv(60)):
+            socket.close()
+            return True
+        with pytest.raises(ConnectionClosed):
+            socket.recv(60)
+        assert socket.close_code == CLOSED
+        return False
+
+    def stop_before_hello(self, name: str, **fields: object) -> bool:
+        socket = self._process.connect()
+        socket.send(json.dumps({"do": name, **fields}))
+        answer = json.loads(socket.recv(60))
+        socket.close()
+        return "error" not in answer
+
+
+PUBLIC: dict[str, Callable[[Visitor], bool]] = {
+    "page": lambda visitor: visitor.get("/"),
+    "openapi": lambda visitor: visitor.get("/openapi.json"),
+    "POST stop": lambda visitor: visitor.post("stop", machine="table"),
+    "POST stop_all": lambda visitor: visitor.post("stop_all"),
+    "stop before hello": lambda visitor: visitor.stop_before_hello("stop", machine="table"),
+    "stop_all before hello": lambda visitor: visitor.stop_before_hello("stop_all"),
+}
+"""The same for everybody who has steptwin; and stops, which are always possible."""
+OF_THE_WORLD: dict[str, Callable[[Visitor], bool]] = {
+    "GET describe": lambda visitor: visitor.get("/api/describe"),
+    "GET state": lambda visitor: visitor.get("/api/state"),
+    "GET points": lambda visitor: visitor.get("/api/points?names=time"),
+    "GET recordings": lambda visitor: visitor.get("/api/recordings/none.json"),
+    "POST read": lambda visitor: visitor.post("read", points=["time"]),
+    "POST resume": lambda visitor: visitor.post("resume"),
+    "POST save": lambda visitor: visitor.post("save", file="../elsewhere.json"),
+    "WebSocket": lambda visitor: visitor.hello("/ws"),
+    "editor": lambda visitor: visitor.hello("/editor"),
+}
+OF_DEVICES: dict[str, Callable[[Visitor], bool]] = {
+    "POST connect": lambda visitor: visitor.post("connect", address=""),
+    "POST scan": lambda visitor: visitor.post("scan", kind="none"),
+    "POST verify": lambda visitor: visitor.post("verify"),
+    "POST work": lambda visitor: visitor.post("work"),
+}
+NOBODY, WRONG, RIGHT = "no token", "a wrong token", "the token"
+LET_IN = {
+    "demo": {NOBODY, RIGHT},
+    "own file": {RIGHT},
+    "demo with a device": {RIGHT},
+    "others reach it": {RIGHT},
+}
+"""Who may look at a world, by studio. What reaches a device needs the token everywhere."""
+
+
+@pytest.fixture(scope="module")
+def studios(folder: Folder, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str], Process]]:
+    """Gives one of each, by its name in `LET_IN`."""
+    found = {"own file": folder.process}
+
+    def find(name: str) -> Process:
+        if name not in found:
+            options = ("--http", "0.0.0.0:0", "--remote") if name == "others reach it" else ("--itself", "--with-token")
+            process = found[name] = Process(tmp_path_factory.mktemp("studio"), StudioWorld(), *options).wait_until_ready()
+            if name == "demo with a device":
+                device = f"127.0.0.1:{folder.process.end_points['tcp']['port']}"
+                assert '"ok": {"machine": "real"}' in post(process, "connect", process.token, address=device, name="real")[1]
+        return found[name]
+
+    yield find
+    del found["own file"]
+    try:
+        for process in found.values():
+            process.end()
+    finally:
+        for process in found.values():
+            process.close()
+
+
+@pytest.mark.parametrize("who", [NOBODY, WRONG, RIGHT])
+@pytest.mark.parametrize("name", LET_IN)
+def test_who_is_let_in(studios: Callable[[str], Process], name: str, who: str) -> None:
+    studio = studios(name)
+    visitor = Visitor(studio, {NOBODY: None, WRONG: "wrong-0123456789abcdef", RIGHT: studio.token}[who])
+    expected = {
+        **dict.fromkeys(PUBLIC, True),
+        **dict.fromkeys(OF_THE_WORLD, who in LET_IN[name]),
+        **dict.fromkeys(OF_DEVICES, who == RIGHT),
+    }
+    assert {way: enter(visitor) for way, enter in {**PUBLIC, **OF_THE_WORLD, **OF_DEVICES}.items()} == expected
+
+
+def test_all_requests_are_behind_the_same_door(folder: Folder) -> None:
+    """Also those that are not in the tables above."""
+    paths = json.loads(request(folder.process, "GET", "/openapi.json", None)[1])["paths"]
+    assert len(paths) > 80
+    asked = [(method.upper(), path) for path, methods in paths.items() for method in methods]
+    let_in = {path for method, path in asked if request(folder.process, method, path, None, "{}")[0] != NO_TOKEN}
+    assert let_in == {"/api/do/stop", "/api/do/stop_all"}
+
+
+# ---------------------------------------------------------------------- the token
+
+
+def test_the_token_is_in_a_file_and_nowhere_else(folder: Folder) -> None:
+    """It is the same after a restart; neither output nor ready file nor command line has it."""
+    process = folder.process
+    path = Path(process.environment["XDG_STATE_HOME"]) / "steptwin/tokens"
+    assert path.stat().st_mode & 0o777 == 0o600
+    assert f"{process.url}/ (tokens: {path})" in process.output
+    shown = [process.output, process.ready_file.read_text(), Path(f"/proc/{process.process.pid}/cmdline").read_text()]
+    texts = [line.split()[2] for line in path.read_text().splitlines() if not line.startswith("#")]
+    assert len({*texts}) == 3
+    assert not any(text in one for text in texts for one in shown)
+
+
+def test_own_tokens_are_made_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    path, made = own_tokens()
+    assert [token.role for token in made] == [Role.ENGINEER, Role.OPERATOR, Role.VIEWER]
+    assert own_tokens() == (path, made)
+    assert [one.name for one in path.parent.iterdir()] == ["tokens"]
+    path.chmod(0o644)
+    with pytest.raises(Misuse, match=f"chmod 600 {path}"):
+        own_tokens()
+    monkeypatch.setenv("XDG_STATE_HOME", str(path))
+    with pytest.raises(Misuse, match=r"cannot be kept in .* give --tokens FILE, or --open-to-local-users"):
+        own_tokens()
+
+
+def test_a_terminal_shows_the_address_with_the_token(monkeypatch: pytest.MonkeyPatch) -> None:
+    token = Token(Role.ENGINEER, "anna", "anna-0123456789abcdef")
+    access = AccessInfo(DEFAULT, None, (token,), Path("tokens"), Role.ENGINEER, is_demo=False)
+    url = "http://127.0.0.1:8488/"
+    for is_terminal, text in ((True, f"{url}#token={token.text}"), (False, f"{url} (tokens: tokens)")):
+        monkeypatch.setattr("sys.stdout", io.StringIO())
+        monkeypatch.setattr("sys.stdout.isatty", lambda is_terminal=is_terminal: is_terminal)
+        assert access.place(url) == text
+    assert replace(access, is_demo=True).place(url) == url
+
+
+def test_the_browser_gets_the_token_in_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is handed over on no command line, and the file goes with the studio."""
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    opened: Queue[str] = Queue()
+    monkeypatch.setattr("webbrowser.open", opened.put)
+    page = OpenedPage("http://127.0.0.1:8488/#token=a&b", is_secret=True, port=8488)
+    path = Path(url2pathname(opened.get(timeout=60).removeprefix("file://")))
+    assert path.stat().st_mode & 0o777 == 0o600
+    assert path.parent.stat().st_mode & 0o777 == 0o700
+    assert 'content="0; url=http://127.0.0.1:8488/#token=a&amp;b"' in path.read_text()
+    page.close()
+    assert not path.exists()

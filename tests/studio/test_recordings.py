@@ -17,6 +17,7 @@ from playwright.sync_api import Browser, Page, expect
 from studio_page import Studio, button
 from tests.conftest import STEPTWIN, until
 from tests.studio.conftest import Process
+from tokens import tokens_file
 
 TOKENS = "operator piotr operator-0123456789\nviewer hall viewer-01234567890\n"
 
@@ -100,7 +101,7 @@ def test_a_file_that_is_no_session_is_not_given_away(start_studio: Callable[...,
 
 
 def test_an_operator_saves_and_a_viewer_looks(start_studio: Callable[..., Process], tmp_path: Path) -> None:
-    (tmp_path / "tokens").write_text(TOKENS)
+    tokens_file(tmp_path, TOKENS)
     studio = start_studio("--tokens", str(tmp_path / "tokens"))
     viewer, operator = "viewer-01234567890", "operator-0123456789"
     refused = ask(studio, "save_recording", viewer, name="mine")["error"]["message"]

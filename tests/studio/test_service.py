@@ -23,6 +23,7 @@ from tests.conftest import until
 from tests.peers.conftest import Master
 from tests.studio.conftest import Process, StudioWorld
 from tests.support.studio_rig import check_answer, check_message
+from tokens import tokens_file
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection
 
@@ -213,7 +214,7 @@ def test_the_page_comes_with_its_headers(shared: Process) -> None:
 
 def tokens(directory: Path) -> dict[str, str]:
     text = {role: f"{role}-0123456789abcdef" for role in ("viewer", "operator", "engineer")}
-    (directory / "tokens").write_text("".join(f"{role} {role} {token}\n" for role, token in text.items()))
+    tokens_file(directory, "".join(f"{role} {role} {token}\n" for role, token in text.items()))
     return text
 
 
@@ -257,9 +258,8 @@ def test_others_reach_it_only_where_that_is_permitted_and_with_a_token(start_stu
     port = studio.end_points["http"]["port"]
     url = f"http://127.0.0.1:{port}"
     assert httpx.get(f"{url}/api/describe").status_code == 401
-    (line,) = [line for line in studio.output.splitlines() if "#token=" in line]
-    token = line.partition("#token=")[2].split(" ")[0]
-    assert "(engineer, engineer)" in line
+    token = studio.token
+    assert token not in studio.output
     answer = httpx.get(f"{url}/api/describe", headers={"authorization": f"Bearer {token}"})
     assert answer.status_code == 200
     assert httpx.get(f"{url}/", headers={"host": f"evil.example:{port}"}).status_code == 403
@@ -273,15 +273,17 @@ def test_others_reach_it_only_where_that_is_permitted_and_with_a_token(start_stu
         (("--remote",), "--remote permits an --http address that others can reach, but 127.0.0.1:8488 is none"),
         (("--certificate", "c.pem"), "--certificate and --key go together"),
         (("--tokens", "/nowhere/tokens"), "/nowhere/tokens"),
+        (("--http", "0.0.0.0:0", "--remote", "--open-to-local-users"), "--open-to-local-users is for an --http address of this"),
+        (("--tokens", "t", "--open-to-local-users"), "--open-to-local-users and --tokens exclude each other"),
         (("--view",), "--view shows one session (.json)"),
         (("--view", "machine.toml"), "machine.toml: --view shows a session (.json)"),
         (("--view", "s.json", "--speed", "2"), "--speed is not for a session that is only looked at"),
     ],
 )
-def test_options_that_do_not_go_together_are_named(options: tuple[str, ...], message: str) -> None:
+def test_options_that_do_not_go_together_are_named(options: tuple[str, ...], message: str, tmp_path: Path) -> None:
     from tests.conftest import run_command
 
-    ran = run_command(["studio", *options], dict(os.environ))
+    ran = run_command(["studio", *options], {**os.environ, "XDG_STATE_HOME": str(tmp_path)})
     assert ran.returncode == 2, ran.stderr
     assert message in ran.stderr
 
@@ -480,8 +482,7 @@ def test_a_recorded_session_is_shown_and_nobody_changes_it(start_studio: Start, 
     world.apply_input(Set((("table", "IN3", 1.0),)))
     world.run(for_="3s")
     save(session_of(world), tmp_path / "s.json")
-    tokens = tmp_path / "tokens"
-    tokens.write_text("engineer anna anna-0123456789abcdef\n")
+    tokens = tokens_file(tmp_path, "engineer anna anna-0123456789abcdef\n")
     studio = start_studio("--itself", str(tmp_path / "s.json"), "--view", "--tokens", str(tokens))
     assert list(studio.end_points) == ["http"]
     seen = page(studio, token="anna-0123456789abcdef")

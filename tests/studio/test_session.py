@@ -8,9 +8,10 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from tests.support.studio_rig import ENGINEER, OPERATOR, VIEWER, Studio, Tab, check_message
+from tests.support.studio_rig import ENGINEER, OPERATOR, TOKENS, VIEWER, Studio, Tab, check_message
 
 from steptwin.access.roles import Role
+from steptwin.access.tokens import AccessGate
 from steptwin.machine import MILLISECOND
 from steptwin.studio import session as sessions
 from steptwin.studio.hub import MOST_VIEWERS
@@ -61,6 +62,30 @@ def test_a_wrong_token_is_refused_and_the_connection_is_to_be_cut_off() -> None:
     tab = Tab(Studio(tokens=True))
     assert tab.error("hello", token="engineer-012345678") == ("refusal", "wrong token")
     assert tab.session.is_refused
+
+
+def test_who_has_no_token_is_asked_for_one_when_a_device_comes() -> None:
+    """As in the demo: until then only what reaches devices needs it."""
+    has_device = False
+    gate = AccessGate(TOKENS, open_to=Role.ENGINEER, is_open=lambda: not has_device)
+    studio = Studio(gate=gate)
+    stranger, owner, script = studio.open(), studio.open(token=ENGINEER), studio.rest()
+    asked = ["connect", "scan", "verify", "work", "cancel_work"]
+    assert {*stranger.newest("hello")["with_token"]} == {*asked}
+    assert owner.newest("hello")["with_token"] == []
+    assert {*asked} - {*stranger.newest("hello")["may"]} == {*asked}
+    assert stranger.error("scan") == ("refusal", "scan needs the token of this studio, which is in its file of tokens")
+    assert owner.error("scan") == ("misuse", "there are no lines here")
+    stranger.ok("enable", machine="table", axis=1)
+    has_device = True
+    assert (stranger.session.is_refused, owner.session.is_refused) == (True, False)
+    assert stranger.error("move", machine="table", axis=1, to=1)[1].startswith("no token")
+    assert stranger.ok("stop", machine="table") is None
+    assert "no token" in str(script.receive('{"do": "state", "machine": "table"}', 0).result())
+    owner.ok("state", machine="table")
+    assert Tab(studio).error("hello", token="wrong-0123456789") == ("refusal", "wrong token")
+    has_device = False
+    stranger.ok("move", machine="table", axis=1, to=1)
 
 
 def test_resync_gives_the_whole_state_and_counts_from_there() -> None:

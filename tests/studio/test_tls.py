@@ -6,7 +6,6 @@ The certificate is made by openssl, for this computer.
 from __future__ import annotations
 
 import json
-import re
 import socket
 import ssl
 import subprocess
@@ -38,7 +37,7 @@ def options(certificate: tuple[Path, Path]) -> tuple[str, ...]:
 
 def token_of(studio: Process) -> str:
     """Of the engineer, as the studio prints it."""
-    return re.findall(r"#token=(\S+) \(engineer, engineer\)", studio.output)[0]
+    return studio.token
 
 
 def curl(program: str, *arguments: str) -> tuple[int, str]:
@@ -141,7 +140,7 @@ def test_files_that_are_no_certificate_are_named(certificate: tuple[Path, Path],
     (tmp_path / "rubbish.pem").write_text("rubbish\n")
     files = {"certificate": certificate[0], "key": certificate[1], broken: tmp_path / "rubbish.pem"}
     given = [part for name, path in files.items() for part in (f"--{name}", str(path))]
-    ran = run_command(["studio", "--http", "127.0.0.1:0", "--no-browser", *given], {})
+    ran = run_command(["studio", "--http", "127.0.0.1:0", "--no-browser", *given], {"XDG_STATE_HOME": str(tmp_path)})
     assert ran.returncode != 0
     assert "cannot use the certificate" in ran.stderr
     assert "Traceback" not in ran.stderr

@@ -124,6 +124,7 @@ class Studio:
         text: str = WORLD,
         *,
         tokens: bool = False,
+        gate: AccessGate | None = None,
         files: Mapping[str, bytes] | None = None,
         lookback: Callable[[Studio], KeptPast] | None = None,
     ) -> None:
@@ -132,7 +133,7 @@ class Studio:
         self.jogs = WorldJogs(self.subject)
         self.speed = 1.0
         self.errors: list[Exception] = []
-        gate = AccessGate(TOKENS) if tokens else AccessGate(open_to=Role.ENGINEER)
+        gate = gate or (AccessGate(TOKENS) if tokens else AccessGate(open_to=Role.ENGINEER))
         around = Surroundings(
             moment=lambda: PresentMoment(self.world.now, running=True, speed=self.speed),
             gate=gate,

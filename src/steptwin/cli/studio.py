@@ -33,8 +33,16 @@ class PageOptions(OptionGroup):
     key: Annotated[Path | None, typer.Option(metavar="FILE", help="TLS: its key (PEM).")] = None
     tokens: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Lines ROLE NAME TOKEN; roles are viewer, operator, engineer. Default: new tokens."),
+        typer.Option(
+            metavar="FILE",
+            help="Lines ROLE NAME TOKEN; roles are viewer, operator, engineer. Nobody else may read it. "
+            "Default: a file of this user, made by the first studio.",
+        ),
     ] = None
+    open_to_local_users: Annotated[
+        bool,
+        typer.Option("--open-to-local-users", help="Ask for no token: every user of this computer is engineer."),
+    ] = False
     audit: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Append every command and its user to a file of JSON lines.")
     ] = None
@@ -71,7 +79,8 @@ def studio(
     """Show a world or devices in a browser, until Ctrl-C.
 
     The lines of a world are open as with 'steptwin up', for any other program. The page can move axes, so only this computer
-    reaches it unless another address is permitted.
+    reaches it unless another address is permitted, and a token is asked for, which is in the printed address. The demo
+    machine asks for one only where a device is connected.
     """
     try:
         from steptwin.commands.studio import StudioOptions
@@ -94,6 +103,7 @@ def studio(
         certificate=page.certificate,
         key=page.key,
         tokens=page.tokens,
+        open_to_local_users=page.open_to_local_users,
         audit=page.audit,
         browser=page.browser,
         devices=tuple(page.device or ()),

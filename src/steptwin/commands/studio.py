@@ -4,13 +4,9 @@
 from __future__ import annotations
 
 import asyncio
-import os
-import secrets
 import socket
 import sys
-import threading
 import time
-import webbrowser
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -22,10 +18,12 @@ from steptwin import __version__
 from steptwin.access.audit import Audit
 from steptwin.access.origin import Origins
 from steptwin.access.roles import Role
-from steptwin.access.tokens import AccessGate, Token, read_tokens
+from steptwin.access.tokens import AccessGate, Token
 from steptwin.commands.auditfile import AuditFile, wall_clock
 from steptwin.commands.demo import demo_world
 from steptwin.commands.keptsettings import keep_settings, state_directory
+from steptwin.commands.openpage import OpenedPage, has_desktop
+from steptwin.commands.owntokens import new_tokens, own_tokens
 from steptwin.commands.recorded import recorded
 from steptwin.commands.studio_branches import BranchStart, WorldBranches
 from steptwin.commands.studio_campaigns import FolderCampaigns
@@ -42,9 +40,10 @@ from steptwin.devices.worldpart import WorldPart
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.files.beginning import is_session
+from steptwin.files.export.tracefile import read_kept
+from steptwin.files.tokenfiles import tokens_in
 from steptwin.files.world import World
 from steptwin.httpservice import Tls, listen
-from steptwin.inputfiles import read_bytes
 from steptwin.live.lookback import Lookback
 from steptwin.live.ports import serial_ports, twin_ports
 from steptwin.live.server import EndPoint, Server
@@ -56,7 +55,6 @@ from steptwin.studio.surroundings import PresentMoment, Surroundings
 from steptwin.studio.work import DeviceWork
 from steptwin.subject.events import Numbering
 from steptwin.subject.jogs import WorldJogs
-from steptwin.textcodec import decode
 from steptwin.world.addresses import Address, is_loopback, parse_address
 from steptwin.world.blueprint import Blueprint
 from steptwin.world.description import read_world
@@ -78,12 +76,16 @@ class StudioOptions:
     certificate: Path | None = None
     key: Path | None = None
     tokens: Path | None = None
+    open_to_local_users: bool = False
+    """Whether no token is asked for, at an address of this computer."""
     audit: Path | None = None
     browser: bool = True
     devices: Sequence[str] = ()
     """Addresses of devices. With them there is no demo machine."""
     view: bool = False
     """Whether a session is shown as it was, and everybody has the role viewer."""
+    is_demo: bool = False
+    """Whether no file of the user is behind it: only what reaches a device needs a token."""
 
     @property
     def highest(self) -> Role:
@@ -96,14 +98,15 @@ def studio(own: StudioOptions, options: UpOptions) -> bool:
 
     Raises `Misuse` or another `SteptwinError` with a text for the user.
     """
+    if own.view and (options.world is None or own.devices):
+        raise Misuse("--view shows one session (.json), and no device: name its file")
+    own = replace(own, is_demo=options.world is None and not own.devices and not _keeps_files(own, options))
     entrance = _entrance(own)
     with ExitStack() as stack:
         audit = Audit(wall_clock) if own.audit is None else Audit(wall_clock, stack.enter_context(AuditFile(own.audit)).add)
         listening = stack.enter_context(listen(entrance.address, is_fixed=own.http is not None))
         page = _Page(own, entrance, listening, audit)
-        if own.view:
-            if options.world is None or own.devices:
-                raise Misuse("--view shows one session (.json), and no device: name its file")
+        if own.view and options.world is not None:
             world, history = recorded(options.world, lambda text: sys.stderr.write(f"{text}\n"))
             stack.enter_context(world)
             opening = partial(page.open, beside=options, history=history)
@@ -134,22 +137,41 @@ def studio_of_branch(start: BranchStart) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class _AccessInfo:
+class AccessInfo:
     """The address of the studio, and its tokens."""
 
     address: Address
     tls: Tls | None
     tokens: tuple[Token, ...]
+    """The one of the highest role first; without any, nobody needs one."""
+    file: Path | None
+    """That of the tokens."""
     highest: Role
+    is_demo: bool
 
     @property
-    def gate(self) -> AccessGate:
-        if not self.tokens:
-            return AccessGate(open_to=self.highest)
-        return AccessGate(replace(token, role=min(token.role, self.highest)) for token in self.tokens)
+    def asks(self) -> bool:
+        """Whether a token is needed for more than devices."""
+        return bool(self.tokens) and not self.is_demo
+
+    def gate(self, has_devices: Callable[[], bool]) -> AccessGate:
+        """The demo machine is open to all users of this computer, until a device is connected."""
+        tokens = [replace(token, role=min(token.role, self.highest)) for token in self.tokens]
+        open_to = None if self.asks else self.highest
+        return AccessGate(tokens, open_to=open_to, is_open=lambda: not tokens or not has_devices())
+
+    def place(self, url: str) -> str:
+        """For people; a token only for those who sit at the terminal."""
+        if not self.asks:
+            return url
+        if not sys.stdout.isatty():
+            return f"{url} (tokens: {self.file})"
+        if is_loopback(self.address.host):
+            return f"{url}#token={self.tokens[0].text}"
+        return "  ".join(f"{url}#token={token.text} ({token.name}, {token.role.title})" for token in self.tokens)
 
 
-def _entrance(own: StudioOptions) -> _AccessInfo:
+def _entrance(own: StudioOptions) -> AccessInfo:
     """Raises `Misuse` for options that do not go together."""
     if (own.certificate is None) is not (own.key is None):
         raise Misuse("--certificate and --key go together: both or none")
@@ -163,18 +185,38 @@ def _entrance(own: StudioOptions) -> _AccessInfo:
         )
     if own.remote and is_local:
         raise Misuse(f"--remote permits an --http address that others can reach, but {address} is none; such as 0.0.0.0:8488")
-    if own.tokens is not None:
-        tokens = read_tokens(decode(read_bytes(own.tokens), str(own.tokens)).text, str(own.tokens))
-    else:
-        roles = [] if is_local else [role for role in reversed(Role) if role <= own.highest]
-        tokens = tuple(Token(role, role.title, secrets.token_urlsafe(24)) for role in roles)
-    return _AccessInfo(address, tls, tokens, own.highest)
+    if own.open_to_local_users and not is_local:
+        raise Misuse(f"--open-to-local-users is for an --http address of this computer; {address} is reached by others")
+    if own.open_to_local_users and own.tokens is not None:
+        raise Misuse("--open-to-local-users and --tokens exclude each other")
+    is_demo = own.is_demo and is_local and own.tokens is None
+    file, tokens = (None, ()) if own.open_to_local_users else _tokens(own.tokens, is_demo=is_demo)
+    tokens = tuple(sorted(tokens, key=lambda token: token.role, reverse=True))
+    return AccessInfo(address, tls, tokens, file, own.highest, is_demo)
+
+
+def _tokens(file: Path | None, *, is_demo: bool) -> tuple[Path | None, tuple[Token, ...]]:
+    """Those of a file, or of this user. Raises `Misuse`."""
+    if file is not None:
+        return file, tokens_in(file)
+    try:
+        return own_tokens()
+    except Misuse:
+        if is_demo:  # it runs also where nothing can be kept; devices cannot be connected then
+            return None, new_tokens()
+        raise
+
+
+def _keeps_files(own: StudioOptions, options: UpOptions) -> bool:
+    """Whether what happens is written into files that the user has named."""
+    traced = options.trace is not None and isinstance(read_kept(options.trace), Path)
+    return traced or any((own.audit, options.state, options.session, options.coverage))
 
 
 class _Page:
     """The page of a world that is about to run, of devices, or of both."""
 
-    def __init__(self, own: StudioOptions, entrance: _AccessInfo, listening: socket.socket, audit: Audit) -> None:
+    def __init__(self, own: StudioOptions, entrance: AccessInfo, listening: socket.socket, audit: Audit) -> None:
         self._own = own
         self._entrance = entrance
         self._listening = listening
@@ -225,9 +267,16 @@ class _Page:
         folder = state_directory() / "recordings" if beside.world is None else beside.world.absolute().parent
         stem = live.world.spec.name if beside.world is None else beside.world.stem
         may_view = is_loopback(self._entrance.address.host)
-        recordings = WorldRecordings(live, server.cell, folder, stem, beside.session, may_view=may_view)
+        access = self._access_of_views() if may_view else None
+        recordings = WorldRecordings(live, server.cell, folder, stem, beside.session, access)
         server.join(recordings)
         return recordings
+
+    def _access_of_views(self) -> Sequence[str]:
+        """Options by which a view takes the same tokens as this studio."""
+        if not self._entrance.asks:
+            return ("--open-to-local-users",)
+        return () if self._own.tokens is None else ("--tokens", str(self._own.tokens))
 
     def _branch_options(self) -> StudioOptions | None:
         """How the page of a branch is served: as this one, at a free port; None where others can reach this one."""
@@ -263,7 +312,7 @@ class _Page:
         work = DeviceWork(LineWork(), report)
         around = surroundings(
             moment=moment,
-            gate=self._entrance.gate,
+            gate=self._entrance.gate(lambda: subject.has_devices),
             audit=self._audit,
             program=__version__,
             connections=connections,
@@ -286,12 +335,16 @@ class _Page:
         service.start()
         url = f"{'http' if entrance.tls is None else 'https'}://{Address(_reached(host), port)}/"
         details = {"host": host, "port": port, "url": url}
-        server.join(_Links(service, work, connections), EndPoint("http", _place(url, entrance.tokens), "studio", details))
+        links = _Links(service, work, connections)
+        server.join(links, EndPoint("http", entrance.place(url), "studio", details))
         if self._own.http is None and port != DEFAULT.port:
             server.notice(f"port {DEFAULT.port} is taken: the studio is at {url}")
         if self._own.browser and has_desktop():
-            token = f"#token={entrance.tokens[0].text}" if entrance.tokens else ""
-            threading.Thread(target=webbrowser.open, args=(url + token,), name="browser", daemon=True).start()
+            secret = f"#token={entrance.tokens[0].text}" if entrance.asks else ""
+            try:
+                links.opened = OpenedPage(url + secret, is_secret=entrance.asks, port=port)
+            except Misuse as error:
+                server.notice(str(error))
 
 
 def _arrangement(live: LiveWorld, path: Path | None) -> WorldArrangement:
@@ -306,15 +359,19 @@ def _campaigns(path: Path | None) -> FolderCampaigns | None:
     return None if path is None or is_session(path) else FolderCampaigns(path)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class _Links:
     """Of viewers and of devices: when viewers have gone, jogs end, and then devices can be left."""
 
     service: StudioService
     work: DeviceWork
     connections: DeviceConnections
+    opened: OpenedPage | None = None
+    """In the browser of the desktop."""
 
     async def close(self) -> None:
+        if self.opened is not None:
+            self.opened.close()
         await self.service.close()
         await self.work.close()
         await self.connections.close()
@@ -344,15 +401,3 @@ def _ports() -> Sequence[Mapping[str, object]]:
 def _reached(host: str) -> str:
     """An address at which a server that listens on all of them is reached."""
     return socket.gethostname() if host in ANY else host
-
-
-def _place(url: str, tokens: Sequence[Token]) -> str:
-    """For people; with tokens one address for each."""
-    return url if not tokens else "  ".join(f"{url}#token={token.text} ({token.name}, {token.role.title})" for token in tokens)
-
-
-def has_desktop() -> bool:
-    """Whether it runs in a terminal of a desktop with a browser."""
-    if not sys.stdout.isatty() or os.environ.get("SSH_CONNECTION"):
-        return False
-    return sys.platform in ("win32", "darwin") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

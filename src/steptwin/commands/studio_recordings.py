@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -31,17 +31,19 @@ MOST_VIEWS = 4
 class WorldRecordings:
     """See `steptwin.studio.recordingrequests.Recordings`. A `Link` of the server.
 
-    ``folder``: where sessions are saved; ``stem``: how their names begin; ``may_view``: whether views can be opened, which are
-    served at a loopback address.
+    ``folder``: where sessions are saved; ``stem``: how their names begin; ``access``: options of views about tokens. Views are
+    served at a loopback address; None: they cannot be reached, so there are none.
     """
 
-    def __init__(self, live: LiveWorld, cell: Cell, folder: Path, stem: str, file: Path | None, *, may_view: bool) -> None:
+    def __init__(
+        self, live: LiveWorld, cell: Cell, folder: Path, stem: str, file: Path | None, access: Sequence[str] | None
+    ) -> None:
         self._live = live
         self._cell = cell
         self._folder = folder
         self._stem = stem
         self._file = file
-        self._may_view = may_view
+        self._access = access
         self._processes = _Processes()
 
     # ------------------------------------------------------------------ requests
@@ -72,9 +74,9 @@ class WorldRecordings:
 
     async def view(self, name: str) -> str:
         path = self._saved(name)
-        if not self._may_view:
+        if self._access is None:
             raise Refusal(f"a view is reached from the computer of the studio only: start it with steptwin studio {path} --view")
-        return await later(asyncio.to_thread(self._processes.view, path))
+        return await later(asyncio.to_thread(self._processes.view, path, self._access))
 
     async def file(self, name: str) -> str:
         stem, _, form = name.rpartition(".")
@@ -157,7 +159,7 @@ class _Processes(ChildProcesses):
             raise Refusal(f"{path.name} as {form}: {last_words(errors)}")
         return target
 
-    def view(self, path: Path) -> str:
+    def view(self, path: Path, access: Sequence[str]) -> str:
         """The address of a view, which may be running already; the oldest of too many ends. Raises `LineFailure`."""
         with self.turn:
             process, url = self._views.get(path, (None, ""))
@@ -167,7 +169,7 @@ class _Processes(ChildProcesses):
                 self.end(self._views.pop(next(iter(self._views)))[0])
             ready = self.folder / f"{path.stem}.ready.json"
             ready.unlink(missing_ok=True)
-            options = ("--view", "--no-browser", "--http", "127.0.0.1:0", "--ready-file", str(ready))
+            options = ("--view", "--no-browser", "--http", "127.0.0.1:0", "--ready-file", str(ready), *access)
             process = self.start("steptwin", "studio", str(path), *options)
             url = self.url(process, ready, f"the view of {path.name}")
             self._views[path] = process, url

@@ -73,6 +73,10 @@ class CompositeSubject:
         self._gone |= {machine.name for machine in part.description.machines}
         self._describe()
 
+    @property
+    def has_devices(self) -> bool:
+        return any(part is not self._world for part in self._parts)
+
     def _describe(self) -> None:
         all_of = [part.description for part in self._parts]
         self._of_machine = {machine.name: part for part in self._parts for machine in part.description.machines}

@@ -80,6 +80,7 @@ _ROWS = (
                 "name": _TEXT,
                 "role": {"enum": list(ROLES)},
                 "may": {**_MAY, "description": "Names of requests that can be done here by this role."},
+                "with_token": {**_MAY, "description": "Names of requests for which this viewer would have to give a token."},
                 "control": CONTROL,
                 "viewers": {**_COUNT, "description": "How many there are."},
                 "leases": LEASES,

@@ -22,7 +22,7 @@ from steptwin.later import start
 from steptwin.machine import Nanos
 from steptwin.studio.hub import Hub
 from steptwin.studio.requests import ALL, OF_CONNECTION, permit_of
-from steptwin.studio.session import ViewerSession
+from steptwin.studio.session import STOPS, ViewerSession
 from steptwin.subject.dispatch import LONGEST_REQUEST, Message, failure
 from steptwin.subject.schema import definitions, request_schema
 
@@ -45,7 +45,7 @@ MOST_POINTS = 1000
 
 
 class Rest:
-    """The routes. All requests with the same token belong to one viewer; without tokens all requests belong to one viewer."""
+    """The routes. All requests with the same token belong to one viewer, and so do all without a token."""
 
     def __init__(self, hub: Hub, clock: Callable[[], Nanos]) -> None:
         self._hub = hub
@@ -145,23 +145,30 @@ class Rest:
     async def _ask(self, request: Request, name: str, fields: Mapping[str, object]) -> tuple[Message, int]:
         """The answer, and its status."""
         try:
-            session = self._session(request)
+            session = self._session(request, name)
         except Refusal as error:
             return failure(error), NO_TOKEN
         answer = await result_of(session.receive(json.dumps({**fields, "do": name}), self._clock()))
         error: Any = answer.get("error")
         if error is None:
             return answer, DONE
+        if name in session.with_token:
+            return answer, NO_TOKEN
         is_role = error["code"] == "refusal" and session.viewer.role < permit_of(name).role
         return answer, FORBIDDEN if is_role else STATUS[error["code"]]
 
-    def _session(self, request: Request) -> ViewerSession:
-        """Raises `Refusal` for a missing or wrong token."""
-        role, name = self._hub.around.gate.enter(_bearer(request))
+    def _session(self, request: Request, wanted: str) -> ViewerSession:
+        """Raises `Refusal` for a missing or wrong token; a stop needs none."""
+        try:
+            role, name = self._hub.around.gate.enter(_bearer(request))
+        except Refusal:
+            if wanted not in STOPS:
+                raise
+            role, name = Role.VIEWER, None
         found = self._sessions.get((role, name))
         if found is None:
             viewer = Viewer(self._hub.number(), name or "REST", role)
-            found = self._sessions[role, name] = ViewerSession(self._hub, viewer.name, entered=viewer)
+            found = self._sessions[role, name] = ViewerSession(self._hub, viewer.name, entered=viewer, has_token=name is not None)
         return found
 
 
@@ -302,8 +309,8 @@ def _extra(*, body: Mapping[str, object] | None = None, parameters: list[dict[st
     return found
 
 
-def describe_api(app: FastAPI, *, asks: bool) -> None:
-    """Has ``app`` describe itself with the schemas of the tables; ``asks``: a token is needed."""
+def describe_api(app: FastAPI, *, has_tokens: bool) -> None:
+    """Has ``app`` describe itself with the schemas of the tables; ``has_tokens``: a token can be given."""
     from fastapi.openapi.utils import get_openapi
 
     def openapi() -> dict[str, Any]:
@@ -311,7 +318,7 @@ def describe_api(app: FastAPI, *, asks: bool) -> None:
             found = get_openapi(title="steptwin studio", version=__version__, routes=app.routes)
             schemas = {_named(name): _local(one) for name, one in definitions().items()}
             found.setdefault("components", {})["schemas"] = schemas
-            if asks:
+            if has_tokens:
                 found["components"]["securitySchemes"] = {"token": {"type": "http", "scheme": "bearer"}}
                 found["security"] = [{"token": []}]
             app.openapi_schema = found

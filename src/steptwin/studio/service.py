@@ -83,6 +83,6 @@ def make_app(hub: Hub, clock: Callable[[], int]) -> FastAPI:
     """What is behind the guard."""
     app = FastAPI(title="steptwin studio", version=__version__, docs_url=None, redoc_url=None)
     Rest(hub, clock).add_to(app)
-    describe_api(app, asks=hub.around.gate.asks)
+    describe_api(app, has_tokens=hub.around.gate.has_tokens)
     add_page(app)
     return app

@@ -29,7 +29,7 @@ from steptwin.studio.hub import Hub
 from steptwin.studio.looking import OF_A_MOMENT, Looking
 from steptwin.studio.messages import VERSION
 from steptwin.studio.programs import ProgramTexts
-from steptwin.studio.requests import IN_THE_PAST, OF_CONNECTION, REQUESTS, check_name, permit_of, read_request
+from steptwin.studio.requests import IN_THE_PAST, OF_CONNECTION, REQUESTS, WITH_TOKEN, check_name, permit_of, read_request
 from steptwin.studio.streams import Batch, StreamPosition
 from steptwin.studio.watches import Watched
 from steptwin.subject import commands as command
@@ -65,9 +65,12 @@ class Wanted(NamedTuple):
 
 
 class ViewerSession:
-    """The session of a connection, or of a client of REST (``is_rest``), whose viewer ``entered`` exists from the beginning."""
+    """The session of a connection, or of a client of REST (``is_rest``), whose viewer ``entered`` exists from the beginning.
 
-    def __init__(self, hub: Hub, peer: str, *, entered: Viewer | None = None) -> None:
+    ``has_token``: whether that client has given a token.
+    """
+
+    def __init__(self, hub: Hub, peer: str, *, entered: Viewer | None = None, has_token: bool = False) -> None:
         self._hub = hub
         self._peer = peer
         self.is_rest = entered is not None
@@ -75,8 +78,9 @@ class ViewerSession:
         """Before its hello: a viewer with the lowest role that is not listed."""
         self.has_entered = self.is_rest
         """Whether it has sent hello."""
-        self.is_refused = False
-        """Whether the connection must be closed because of a wrong token."""
+        self._has_token = has_token
+        self._is_refused = False
+        """Whether it has given a wrong token."""
         self._limit = RateLimit(RATE, BURST)
         self._stops = RateLimit(RATE, BURST)
         self._seq = count()
@@ -162,6 +166,18 @@ class ViewerSession:
         }
         return complete("request", [row.kind for row in REQUESTS.values() if row.kind not in self._asking], "action", actions)
 
+    @property
+    def is_refused(self) -> bool:
+        """Whether the connection must be closed for want of a token, which may be asked for only since it was opened."""
+        return self._is_refused or (self.has_entered and not self._has_token and self._hub.around.gate.asks)
+
+    @property
+    def with_token(self) -> list[str]:
+        """Names of requests for which this viewer would have to give a token."""
+        if self._has_token or not self._hub.around.gate.has_tokens:
+            return []
+        return [name for name in REQUESTS if name in WITH_TOKEN]
+
     # ------------------------------------------------------------------ requests
 
     def receive(self, text: str, now: Nanos) -> Later[Message]:
@@ -227,6 +243,10 @@ class ViewerSession:
         name = wanted.name
         if not self.has_entered and name not in STOPS and name != "hello":
             raise Refusal(f"{name}: the first request is hello")
+        if self.is_refused and name not in STOPS:
+            self._hub.around.gate.enter(None)
+        if name in self.with_token:
+            raise Refusal(f"{name} needs the token of this studio, which is in its file of tokens")
         if self.is_rest and name in OF_CONNECTION:
             raise Refusal(f"{name} is about a connection: ask it over the WebSocket")
         permit = permit_of(name)
@@ -270,8 +290,9 @@ class ViewerSession:
         try:
             role, of_token = self._hub.around.gate.enter(wanted.token)
         except Refusal:
-            self.is_refused = True
+            self._is_refused = True
             raise
+        self._has_token = of_token is not None
         name = (wanted.name or of_token or f"viewer {self.viewer.number}")[:LONGEST_NAME]
         viewer = Viewer(self.viewer.number, name, role)
         self._hub.join(viewer)
@@ -409,8 +430,13 @@ class ViewerSession:
             return list(self._looking.take(self._watches).items())
         return [(one.number, one.take(now)) for one in self._watches.values() if one.is_due(now)]
 
+    def _may(self) -> list[str]:
+        """Names of requests that this viewer may use here."""
+        needing = self.with_token
+        return [name for name in self._hub.may(self.viewer.role) if name not in needing]
+
     def _past(self) -> str:
-        may = [name for name in self._hub.may(self.viewer.role) if name in IN_THE_PAST or not permit_of(name).control]
+        may = [name for name in self._may() if name in IN_THE_PAST or not permit_of(name).control]
         return json.dumps({"seq": next(self._seq), "past": self._looking.message(may)}, separators=(",", ":"))
 
     def _events(self, now: Nanos) -> str:
@@ -444,7 +470,8 @@ class ViewerSession:
             "viewer": viewer.number,
             "name": viewer.name,
             "role": viewer.role.title,
-            "may": hub.may(viewer.role),
+            "may": self._may(),
+            "with_token": self.with_token,
             "control": hub.holder(),
             "viewers": len(hub.viewers),
             "leases": hub.leases(),

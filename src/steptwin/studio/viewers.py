@@ -152,6 +152,9 @@ class ViewerConnection:
                 self._writer.abort()
             return
         self._has_room.set()
+        if self._session.is_refused:  # since there is a device, a token is needed
+            self._writer.abort()
+            return
         try:
             texts = self._session.take(now)
         except Exception as error:  # noqa: BLE001  it is reported here only

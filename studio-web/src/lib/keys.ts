@@ -1,7 +1,8 @@
 /** What has the keys of the keyboard for itself. */
 const CONTROLS =
   'button, input, select, textarea, a[href], summary, [contenteditable="true"], [role="button"], [role="slider"], [role="tab"], [role="separator"], [role="switch"], [role="listbox"], [role="grid"]';
-const TEXTS = 'textarea, [contenteditable="true"], input:not([type]), input[type="text"], input[type="search"]';
+const TEXTS =
+  'textarea, [contenteditable="true"], input:not([type]), input[type="text"], input[type="search"], input[type="password"]';
 
 export const isOnControl = (target: EventTarget | null): boolean =>
   target instanceof Element && target.closest(CONTROLS) !== null;

@@ -3,6 +3,10 @@ export const en = {
   reconnecting: "no connection to the studio: trying again",
   silent: "the studio does not answer",
   refused: "the studio did not accept this page: {why}",
+  token: "Token of this studio",
+  giveToken: "Give token",
+  whereToken:
+    "It is in the file tokens in ~/.local/state/steptwin of whoever started the studio, and in the address on the terminal, but for the demo.",
   deviceLost: "the device does not answer: {why}",
   live: "live",
   paused: "paused",

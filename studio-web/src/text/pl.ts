@@ -5,6 +5,10 @@ export const pl: Record<keyof typeof en, string> = {
   reconnecting: "brak połączenia ze studiem: ponawianie",
   silent: "studio nie odpowiada",
   refused: "studio nie przyjęło tej strony: {why}",
+  token: "Token tego studia",
+  giveToken: "Podaj token",
+  whereToken:
+    "Jest w pliku tokens w ~/.local/state/steptwin osoby, która uruchomiła studio, i (poza demonstracją) w adresie w terminalu.",
   deviceLost: "urządzenie nie odpowiada: {why}",
   live: "na żywo",
   paused: "pauza",

@@ -23,6 +23,8 @@ export const REFUSALS: Readonly<Record<string, string>> = {
   "no token: it is in the address that the studio prints on a terminal, and in its file of tokens":
     "brak tokenu: jest w adresie, który studio wypisuje w terminalu, i w jego pliku tokenów",
   "wrong token": "zły token",
+  "{name} needs the token of this studio, which is in its file of tokens":
+    "{name} wymaga tokenu tego studia, który jest w jego pliku tokenów",
   "{place}: no tokens: expected lines ROLE NAME TOKEN": "{place}: brak tokenów: oczekiwano linii ROLA NAZWA TOKEN",
   "{place}: {#count} words: expected ROLE NAME TOKEN": "{place}: słów {#count}: oczekiwano ROLA NAZWA TOKEN",
   "{place}: no role {role}; roles are {names}": "{place}: nie ma roli {role}; role to {names}",

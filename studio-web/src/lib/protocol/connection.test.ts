@@ -14,7 +14,7 @@ class Server {
 
   open = (_url: string, events: LinkEvents) => {
     this.links.push(events);
-    return { send: (text: string) => void this.sent.push(JSON.parse(text)), close: () => events.closed() };
+    return { send: (text: string) => void this.sent.push(JSON.parse(text)), close: () => events.closed(1000) };
   };
 
   last(name: string): Record<string, unknown> {
@@ -143,7 +143,7 @@ test("the whole state can be asked for, once at a time, and tells whether the co
     { seq: 1, viewers: 2 },
   ]);
   expect(pushed).toEqual([{ seq: 1, viewers: 2 }]);
-  server.link.closed();
+  server.link.closed(1006);
   alarm.goOff(100);
   server.link.opened();
   server.greet();
@@ -163,19 +163,19 @@ test("what was pushed before the whole state in the same batch is part of it", (
 test("a lost connection fails what waits, and is tried again at growing distances", async () => {
   server.greet();
   const asked = connection.request("time", {});
-  server.link.closed();
+  server.link.closed(1006);
   await expect(asked).rejects.toMatchObject({ code: "closed" });
   await expect(connection.request("time", {})).rejects.toMatchObject({ code: "closed" });
   expect(states).toEqual(["open", "connecting"]);
   for (const ms of [100, 250, 500, 1000, 2000, 4000, 4000]) {
     alarm.goOff(ms);
-    server.link.closed();
+    server.link.closed(1006);
   }
   alarm.goOff(4000);
   server.link.opened();
   server.greet();
   expect(states.at(-1)).toBe("open");
-  server.link.closed();
+  server.link.closed(1006);
   alarm.goOff(100);
 });
 
@@ -190,9 +190,28 @@ test("a connection over which nothing comes is silent, and given up in the end",
   expect(states.at(-1)).toBe("connecting");
 });
 
-test("a page that is not accepted is told why", async () => {
+test("a page without the right token is told why, and knocks no more until it has another one", async () => {
   server.link.messages([{ id: 1, error: { code: "refusal", message: "wrong token" } }]);
   await Promise.resolve();
   await Promise.resolve();
   expect(states).toEqual(["refused"]);
+  server.link.closed(4401);
+  expect(states).toEqual(["refused"]);
+  expect(server.links).toHaveLength(1);
+  expect([...alarm.waiting.values()]).toEqual([]);
+  connection.renew();
+  expect(states).toEqual(["refused", "connecting"]);
+  server.link.opened();
+  server.greet();
+  expect(states.at(-1)).toBe("open");
+});
+
+test("a page that is there greets again over a new connection", () => {
+  server.greet();
+  connection.renew();
+  alarm.goOff(100);
+  server.link.opened();
+  server.greet();
+  expect(server.links).toHaveLength(2);
+  expect(states).toEqual(["open", "connecting", "open"]);
 });

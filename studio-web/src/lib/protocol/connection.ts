@@ -24,7 +24,8 @@ export interface ConnectionEvents {
   state(state: ConnectionState, why: string): void;
 }
 
-/** `silent`: the connection is there, and nothing comes over it. `refused`: hello was answered with an error. */
+/** `silent`: the connection is there, and nothing comes over it. `refused`: hello was answered with an error, for want of the right
+ * token until `renew`. */
 export type ConnectionState = "connecting" | "open" | "silent" | "refused";
 
 export interface Timers {
@@ -37,6 +38,8 @@ const ANSWER_MS = 5000;
 /** The clock comes once a second. */
 const SILENT_MS = 2500;
 const GIVE_UP_MS = 8000;
+/** The code with which the studio closes a connection that gives no token, or a wrong one. */
+const NO_TOKEN = 4401;
 
 interface Waiting {
   done(value: unknown): void;
@@ -69,8 +72,18 @@ export class Connection {
     this.link = this.openLink(this.url, {
       opened: () => this.opened(),
       messages: (messages) => this.received(messages),
-      closed: () => this.closed(),
+      closed: (code) => this.closed(code),
     });
+  }
+
+  /** Greets the studio anew, such as with another token. */
+  renew(): void {
+    if (this.link !== null) {
+      this.link.close();
+    } else if (this.stateNow === "refused") {
+      this.enter("connecting");
+      this.open();
+    }
   }
 
   /** Done when the answer is there; rejected with a `RequestError`. `id` is one from `newId`, for requests that are referred to. */
@@ -115,7 +128,7 @@ export class Connection {
     });
   }
 
-  private closed(): void {
+  private closed(code: number): void {
     this.isOpen = false;
     this.link = null;
     this.timers.clear(this.watchdog);
@@ -124,6 +137,7 @@ export class Connection {
       "the connection was lost before the answer came; whether it was done is not known",
     );
     for (const [id, waiting] of this.waiting) this.reject(id, waiting, error);
+    if (code === NO_TOKEN) return; // it would be refused again
     this.enter("connecting");
     const wait = BACK_OFF_MS[Math.min(this.attempts++, BACK_OFF_MS.length - 1)] as number;
     this.timers.set(() => this.open(), wait);

@@ -8,7 +8,8 @@ export interface LinkEvents {
   opened(): void;
   /** In the order in which they came. */
   messages(messages: readonly unknown[]): void;
-  closed(): void;
+  /** `code`: that of the WebSocket; 0 where there was none. */
+  closed(code: number): void;
 }
 
 export type OpenLink = (url: string, events: LinkEvents) => Link;
@@ -17,7 +18,7 @@ export type OpenLink = (url: string, events: LinkEvents) => Link;
 export type ToWorker = { open: string } | { send: string } | { taken: true } | { close: true };
 
 /** What the worker tells the page. */
-export type FromWorker = { opened: true } | { messages: unknown[] } | { closed: true };
+export type FromWorker = { opened: true } | { messages: unknown[] } | { closed: number };
 
 /** A WebSocket in a worker: messages are received and read there, so that the page stays free for keys. */
 export const openInWorker: OpenLink = (url, events) => {
@@ -31,12 +32,12 @@ export const openInWorker: OpenLink = (url, events) => {
       events.opened();
     } else {
       worker.terminate();
-      events.closed();
+      events.closed(data.closed);
     }
   };
   worker.onerror = () => {
     worker.terminate();
-    events.closed();
+    events.closed(0);
   };
   tell({ open: url });
   return { send: (text) => tell({ send: text }), close: () => tell({ close: true }) };

@@ -11,7 +11,7 @@ function open(url: string): void {
   socket = new WebSocket(url);
   socket.onopen = () => tell({ opened: true });
   socket.onmessage = ({ data }) => batches.add(JSON.parse(data as string));
-  socket.onclose = () => tell({ closed: true });
+  socket.onclose = ({ code }) => tell({ closed: code });
 }
 
 self.onmessage = ({ data }: MessageEvent<ToWorker>) => {

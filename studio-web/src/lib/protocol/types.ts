@@ -2369,6 +2369,8 @@ export type HelloMessage = {
     role: "viewer" | "operator" | "engineer";
     /** Names of requests that can be done here by this role. */
     may: string[];
+    /** Names of requests for which this viewer would have to give a token. */
+    with_token: string[];
     control: {
       viewer: number;
       name: string;

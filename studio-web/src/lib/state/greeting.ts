@@ -13,8 +13,10 @@ export function greetingOf(): Fields<"hello"> {
   return { token: sessionStorage.getItem(TOKEN), lang: language() };
 }
 
+/** The token from now on; none where it is empty. */
 export function giveToken(token: string): void {
-  sessionStorage.setItem(TOKEN, token);
+  if (token) sessionStorage.setItem(TOKEN, token);
+  else sessionStorage.removeItem(TOKEN);
 }
 
 /** The address of another studio that takes the same token. */

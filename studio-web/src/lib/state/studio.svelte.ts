@@ -8,6 +8,7 @@ import {
   type RequestName,
 } from "../protocol/connection";
 import { openInWorker } from "../protocol/link";
+import { stopAllOverHttp } from "../stop";
 import type { Pushed, Requests, SubjectEvent } from "../protocol/types";
 import { AxisState } from "./axis.svelte";
 import { WorldClock, type Pace } from "./clock";
@@ -126,6 +127,11 @@ export class Studio {
     this.connection.open();
   }
 
+  /** Says hello again, with the token that the page has now. */
+  renew(): void {
+    this.connection.renew();
+  }
+
   /** The moment that is shown: the present, or one that is looked at. Virtual time. [ns] */
   now(): bigint {
     return this.lookback.moment ?? this.present();
@@ -147,6 +153,11 @@ export class Studio {
   /** Whether the role of this viewer permits a request, and the studio can do it here and now. */
   may(name: RequestName): boolean {
     return (this.lookback.past ?? this.hello)?.may.includes(name) ?? false;
+  }
+
+  /** Whether a request is possible only after a token has been given. */
+  needsToken(name: RequestName): boolean {
+    return this.hello?.with_token.includes(name) ?? false;
   }
 
   machine(name: string): MachineModel | undefined {
@@ -189,7 +200,8 @@ export class Studio {
   /** Nobody needs control for it, and every role may. */
   stopAll(): void {
     this.stops++;
-    this.ask("stop_all", {}).catch((error: unknown) => {
+    const asked = this.link === "refused" ? stopAllOverHttp() : this.ask("stop_all", {});
+    asked.catch((error: unknown) => {
       this.report(error);
       clearTimeout(this.noticeTimer); // something still moves: it stays until it is closed
     });

@@ -5,6 +5,8 @@ export const t = texts(
     title: "Devices",
     explained:
       "A device is connected by its address. Nothing moves by it. Before the first write its settings are kept in a file.",
+    needToken:
+      "Devices need the token of this studio, also in a demo: whoever reaches this page could move them otherwise.",
     address: "Address of the device",
     example: "/dev/ttyUSB0,unit=1 or 192.168.0.9:502",
     name: "Name (may stay empty)",
@@ -74,6 +76,8 @@ export const t = texts(
     title: "Urządzenia",
     explained:
       "Urządzenie łączy się przez adres. Nic się przy tym nie rusza. Przed pierwszym zapisem ustawienia trafiają do pliku.",
+    needToken:
+      "Urządzenia wymagają tokenu tego studia, także w demonstracji: inaczej ruszać nimi mógłby każdy, kto otworzy tę stronę.",
     address: "Adres urządzenia",
     example: "/dev/ttyUSB0,unit=1 lub 192.168.0.9:502",
     name: "Nazwa (może być pusta)",
