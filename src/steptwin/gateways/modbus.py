@@ -7,11 +7,13 @@ does not permit 01. Nothing is repeated that moves.
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, cast
 
 from steptwin.access.modbusroles import permit_of
+from steptwin.access.notices import ClientNotices
 from steptwin.access.roles import ROLES, Role
 from steptwin.errors import LineFailure, Misuse, SteptwinError
 from steptwin.gateways.clients import GatewayClient, NotPermitted, address_text
@@ -83,7 +85,7 @@ class MasterGateway:
         self._units = _by_unit(spec, self._subject)
         address = parse_address(spec.listen, listen_any=listen_any)
         self._role = ROLES[spec.role] if spec.role else Role.ENGINEER if is_loopback(address.host) else Role.VIEWER
-        self._notice = notice
+        self._notices = ClientNotices(notice, time.monotonic_ns)
         try:
             self._server = await asyncio.start_server(self._welcome, *address, limit=READ_BYTES)
         except OSError as error:
@@ -93,7 +95,7 @@ class MasterGateway:
     async def _welcome(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         task = cast("asyncio.Task[None]", asyncio.current_task())
         if len(self._masters) >= MOST_MASTERS:
-            self._notice(f"more than {MOST_MASTERS} masters at once are turned away")
+            self._notices.say("", f"more than {MOST_MASTERS} masters at once are turned away")
             writer.transport.abort()
             return
         self._masters[task] = writer
@@ -113,7 +115,8 @@ class MasterGateway:
         return [self._units[unit]] if unit in self._units else []
 
     def made_no_sense(self, client: GatewayClient, why: str) -> None:
-        self._notice(f"{client}: {why}; its connection is closed")
+        host = client.place.rpartition(":")[0]
+        self._notices.say(host, f"{client}: {why}; its connection is closed")
 
     async def ask(self, client: GatewayClient, part: MachinePart, pdu: bytes) -> bytes:
         """The answer of a device, or an exception."""

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import socket
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from steptwin.access.notices import ClientNotices
 from steptwin.world.addresses import Address
 
 BACKLOG = 1024
@@ -41,16 +43,24 @@ class Clients:
     most: int = 65536
     notice: Callable[[str], None] = _unnoticed
     present: set[Client] = field(default_factory=set)
+    _notices: ClientNotices = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._notices = ClientNotices(self.notice, time.monotonic_ns)
 
     def have_room(self) -> bool:
         """Whether one more client may connect; if not, a notice is given."""
         if len(self.present) < self.most:
             return True
-        self.notice(f"more than {self.most} clients at once are turned away")
+        self.tell("", f"more than {self.most} clients at once are turned away")
         return False
 
     def made_no_sense(self, peer: Address, why: str) -> None:
-        self.notice(f"client {peer}: {why}; its connection is closed")
+        self.tell(peer.host, f"client {peer}: {why}; its connection is closed")
+
+    def tell(self, host: str, text: str) -> None:
+        """Give a notice about a client at ``host``, or about all of them, unless there have been too many."""
+        self._notices.say(host, text)
 
 
 def listening(address: Address) -> socket.socket:

@@ -140,7 +140,7 @@ class EpollListener:
         except (BlockingIOError, ConnectionAbortedError):
             return
         except OSError as error:
-            self._clients.notice(f"no client is accepted on {self._address} for {RETRY_S:g} s: {reason(error)}")
+            self._clients.tell("", f"no client is accepted on {self._address} for {RETRY_S:g} s: {reason(error)}")
             descriptors().forget(self._listening.fileno())
             self._retry = asyncio.get_running_loop().call_later(RETRY_S, self._listen)
 

@@ -121,7 +121,7 @@ class TlsPort:
     def __init__(self, port: Port, client: TlsClient, opening: LinkArguments) -> None:
         self._port = port
         self._client = client
-        self._notice = opening.clients.notice
+        self._clients = opening.clients
         self._audit = opening.audit
         self._line = opening.line_name
         self._requests = TcpFramer()
@@ -138,7 +138,8 @@ class TlsPort:
     def _answer(self, request: bytes, now: Nanos) -> bytes:
         function = request[7]
         if not may_ask(self._client.role, function):
-            self._notice(f"client {self._client}: a request with function {function} is refused")
+            host = self._client.place.rpartition(":")[0]
+            self._clients.tell(host, f"client {self._client}: a request with function {function} is refused")
             self._note(request, "refusal")
             return tcp_response(request, exception_pdu(function, ILLEGAL_FUNCTION))
         if self._audit is None or function in READS:
