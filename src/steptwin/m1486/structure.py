@@ -6,6 +6,7 @@ Facts only; `steptwin.m1486.check` judges them.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from steptwin.m1486.commands import When, memory_bits, when
@@ -111,7 +112,7 @@ def streams(program: ParsedProgram) -> list[CommandStream]:
     commands = program.all_commands
     addresses = sorted({c.number for c in commands if c.key == "X" and c.number is not None})
     if not addresses:
-        return [_stream(None, [c for c in commands if c.key != "XG"])]
+        return [stream_of(None, [c for c in commands if c.key != "XG"])]
     received: dict[int, list[ChipCommand]] = {address: [] for address in addresses}
     listening: int | None = None
     for command in commands:
@@ -120,10 +121,11 @@ def streams(program: ParsedProgram) -> list[CommandStream]:
             continue
         for address in addresses if listening is None else (listening,):
             received[address].append(command)
-    return [_stream(address, taken) for address, taken in received.items()]
+    return [stream_of(address, taken) for address, taken in received.items()]
 
 
-def _stream(address: int | None, commands: list[ChipCommand]) -> CommandStream:
+def stream_of(address: int | None, commands: Sequence[ChipCommand]) -> CommandStream:
+    """The structure of commands that one chip gets, without ``X``."""
     stream = CommandStream(address, tuple(commands))
     _measure(stream)
     _find_files(stream)

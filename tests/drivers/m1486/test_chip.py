@@ -23,8 +23,7 @@ from steptwin.machine import SECOND
 )
 def test_the_type_is_found(kind: str, title: str) -> None:
     chip = chip_driver(ChipWire(kind, interface=DUAL_DAC))
-    status = chip.status()
-    assert (chip.variant.title, status.type, status.interface, status.series) == (title, title, "Dual DAC", 1)
+    assert (chip.variant.title, chip.status().type, chip.interface(), chip.byte(16)) == (title, title, DUAL_DAC, 1)
 
 
 @pytest.mark.parametrize("kind", ["B", "E1", "E2"])
@@ -34,7 +33,7 @@ def test_a_chip_that_echoes_already_is_known_again_by_the_next_program(kind: str
     for _ in range(3):
         chip = M1486(chip_line(wire), 1)
         chip.open()
-        assert (chip.variant.name, chip.status().series) == (kind, 1)
+        assert (chip.variant.name, chip.byte(16)) == (kind, 1)
 
 
 def test_another_type_than_expected_is_refused() -> None:
@@ -97,14 +96,12 @@ def test_switches() -> None:
 
 WAKING = {
     # Chip, address asked for: what is typed until it is known whether it echoes, with "|" for CR.
-    "alone": ("B", 15, None, "t41|t41|t41|"),
-    "addressed": ("B", 7, 7, "xg|xg|t41|x7|t41|t41|t41|"),
-    "an E type, which is given its time": ("E1", 7, 7, "xg|xg|t41|x7|xg|xg|t41|x7|t41|t41|t41|"),
-    "another chip echoes, this one is not there": (
-        "B", 7, 5, "xg|xg|t41|x5|t41|t41|t41|xg|xg|t41|x5|t41|t41|t41|xg|xg|",
-    ),
-    "nobody is there": ("B", None, 7, "xg|xg|t41|x7|xg|xg|t41|x7|xg|xg|"),
-    "nobody is there, without address": ("B", None, None, "t41|t41|t41|t41|t41|t41|"),
+    "alone": ("B", 15, None, "xg|xg|xg|xg|xg|t41|xg|x1|"),
+    "addressed": ("B", 7, 7, "xg|xg|x7|x7|xg|xg|t41|x7|x7|x7|"),
+    "an E type, which is given its time": ("E1", 7, 7, "xg|xg|x7|x7|xg|xg|t41|x7|x7|xg|xg|t41|x7|x7|x7|"),
+    "another chip echoes, this one is not there": ("B", 7, 5, "xg|xg|x5|x5|xg|xg|t41|x5|x5|xg|xg|t41|x5|x5|xg|xg|"),
+    "nobody is there": ("B", None, 7, "xg|xg|x7|x7|xg|xg|t41|x7|x7|xg|xg|t41|x7|x7|xg|xg|"),
+    "nobody is there, without address": ("B", None, None, "xg|xg|xg|xg|xg|t41|xg|xg|xg|t41|xg|xg|xg|"),
 }  # fmt: skip
 
 
@@ -140,38 +137,46 @@ def test_after_an_ordinary_session_no_letter_is_expected_and_a_stray_one_counts(
     assert wire.sent[0][1] == INVALID_COMMAND
 
 
-def test_the_functions_of_a_chip_are_found_when_it_is_opened() -> None:
+def test_the_functions_of_an_e_type_are_found_when_it_is_opened() -> None:
     """One from each of the three bytes that tell of them; reports (57) are switched off, for they look like answers."""
-    wire = ChipWire("B")
+    wire = ChipWire("E1")
     first = chip_driver(wire)
     for number in (42, 51, 60):
         first.set_function(number, not first.functions()[number])
+    expected = first.functions()
     chip = chip_driver(wire)
     notes = chip._driver._unit.notes
-    expected = first.functions()
     assert [number for number, on in expected.items() if on] == [41, 42, *(48, 49, 50), *range(52, 56), 60]
     assert {number: notes.function(number) for number in expected} == expected
     wire.chain.receive(b"t57\r", wire.now)
-    wire.sleep(1.0)
+    wire.sleep(2.0)
     wire.unread = b""
     reporting = chip_driver(wire)
     assert reporting._driver._unit.notes.function(57) is False
     assert reporting.functions() == expected
 
 
-def test_the_status_has_each_number_in_its_place() -> None:
-    """Counter and variable of 24 bits, flags, functions: no byte is that of its neighbour."""
+def test_the_status_has_each_number_that_was_read_in_its_place() -> None:
+    """Counter and variable of 24 bits, flags, functions: no byte is that of its neighbour. A command that may change them makes
+    them unknown."""
     wire = ChipWire("B", interface=DUAL_DAC)
     chip = chip_driver(wire, steps_per_unit=2.0, unit="mm", origin_u=128)
     wire.chip.drive.set_counter(0x0A0B0C, wire.now)
     wire.chip.unit.variable = 0x1D2E3F
     wire.chip.unit.flags[0] = wire.chip.unit.flags[6] = True
+    nothing = chip.status()
+    assert (nothing.position, nothing.variable, nothing.flags, nothing.functions, nothing.series) == (None,) * 5
+    chip.counter(), chip.variable(), chip.flags(), chip.functions()
     status = chip.status()
     assert (status.counter_u, status.variable, status.unit, status.is_position_valid) == (0x0A0B0C, 0x1D2E3F, "mm", True)
     assert status.position == (0x0A0B0C - 128) / 128
-    assert [number for number, on in status.flags.items() if on] == [80, 86]
-    assert [number for number, on in status.functions.items() if on] == [41, *range(48, 56)]
+    assert [number for number, on in (status.flags or {}).items() if on] == [80, 86]
+    assert [number for number, on in (status.functions or {}).items() if on] == [41, *range(48, 56)]
     assert (chip.flags(), chip.functions()) == (status.flags, status.functions)
+    chip.configure(velocity=500)
+    assert chip.known() == status
+    chip.set_flag(80, False)
+    assert chip.status() == nothing
 
 
 def test_an_output_whose_number_was_cut_short_by_a_semicolon_is_in_doubt() -> None:

@@ -64,8 +64,6 @@ def test_a_program_that_is_ended_is_recovered_unless_the_chip_does_so_itself(fun
         chip.set_function(51, function)
     chip.download("[\n@3\nF640\nR\nJ3\n]")
     wire.sleep(1.0)
-    if function is None:
-        chip._driver._unit.notes.functions = None
     wire.sent.clear()
     chip.stop_program()
     assert ("c75" in typed(wire).split()) is is_recovered

@@ -177,10 +177,36 @@ def test_a_chip_held_by_kill_is_recovered() -> None:
 def test_a_move_that_is_late_is_overdue() -> None:
     wire = ChipWire("B")
     chip = chip_driver(wire)
+    chip.configure(**KNOWN)
     chip.move_by(5000.0)
     end = chip.wait(1.0, check=False)
     assert (end.reason, end.position) == (ChipReason.OVERDUE, None)
     assert chip.wait().reason is ChipReason.TARGET
+
+
+def test_a_target_is_reached_only_where_that_is_known() -> None:
+    """The counter shows it also where LIMIT has ended a move (M-16), so it says nothing: the time does, if it is known and the
+    chip was asked before it was up."""
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    ends = []
+    for is_known, pause_s in ((False, 0.0), (True, 0.0), (True, 5.0)):
+        if is_known:
+            chip.configure(**KNOWN)
+        chip.move_by(1000.0)
+        wire.sleep(pause_s)
+        ends.append(chip.wait())
+    assert [end.ok for end in ends] == [True] * 3
+    assert [str(end).partition(" (")[0] for end in ends] == [
+        "the chip: came to rest at 1000 step, target 1000 step",
+        "the chip: target reached at 2000 step",
+        "the chip: came to rest at 3000 step, target 3000 step",
+    ]
+    chip.move_by(1000.0)
+    wire.sleep(1.5)
+    wire.chip.drive.set_counter(640, wire.now)
+    end = chip.wait(check=False)
+    assert (end.ok, str(end)) == (False, "the chip: redirected at 10 step, target 4000 step")
 
 
 def test_a_move_of_nothing_is_over_at_once_and_types_nothing() -> None:

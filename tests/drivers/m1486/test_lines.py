@@ -203,13 +203,16 @@ def test_three_at_once(kind: str, stopped: tuple[int, ...]) -> None:
     for address in stopped:
         wire.at(1.0, limit(wire, address))
     ends = [chip.wait(check=False) for chip in chips]
-    assert [end.reason is ChipReason.EARLY for end in ends] == [address in stopped for address in (1, 2, 3)]
-    assert all(end.reason in (ChipReason.EARLY, ChipReason.TARGET) for end in ends)
+    in_doubt = [end.address for end in ends if end.reason is ChipReason.CAME_TO_REST]
+    assert not in_doubt or kind == "E1", "while one of them is read for 3 s, the end of another passes"
+    for end in ends:
+        expected = ChipReason.EARLY if end.address in stopped else ChipReason.TARGET
+        assert end.reason is expected or end.address in in_doubt
     for address in stopped:
         wire.chips[address].set_pin("LIMIT", 1, wire.now)
     for chip in chips:
         chip.move_by(-10.0)
-    assert [chip.wait().reason for chip in chips] == [ChipReason.TARGET] * 3
+    assert all(chip.wait().ok for chip in chips)
 
 
 def test_tasks_that_wait_for_their_chips_are_told_why_each_ended() -> None:
@@ -266,7 +269,9 @@ def test_the_end_of_a_block_is_heard_while_the_end_of_a_move_is_watched(after: f
         moved, done = await asyncio.gather(wait(), block())
         return moved, done
 
-    assert run_virtual(wire, main()) == (ChipReason.TARGET, ChipReason.DONE)
+    moved, done = run_virtual(wire, main())
+    assert done is ChipReason.DONE
+    assert moved is ChipReason.TARGET or (moved is ChipReason.CAME_TO_REST and after == 0.8), "the block is typed just then"
 
 
 def test_a_chip_that_is_late_or_stopped_does_not_hold_up_the_others() -> None:
@@ -344,7 +349,8 @@ def test_a_letter_too_many_is_not_that_of_the_next_move() -> None:
     assert motion is not None
     wire.sleep((motion.end - wire.now) / SECOND - 0.02)
     wire.put(Fault("to host", len("x0|u20|"), "double"))
-    assert [chip.wait(check=False).reason for chip in chips] == [ChipReason.TARGET] * 2
+    reasons = [chip.wait(check=False).reason for chip in chips]
+    assert reasons == [ChipReason.CAME_TO_REST, ChipReason.TARGET], "the first one was asked too late to know"
     assert wire.faults[0].met
 
 
@@ -387,7 +393,7 @@ def test_a_chip_that_was_reset_meanwhile_is_watched_no_more() -> None:
             other.forget()
 
     wire.before_each = forget
-    assert chips[0].wait().reason is ChipReason.TARGET
+    assert chips[0].wait().ok
     assert b"x7" not in asked
 
 
@@ -395,7 +401,7 @@ def test_trouble_with_one_chip_is_told_to_who_waits_for_it() -> None:
     wire = ChipWire("B", (0, 7))
     chips = moving(wire, 2000.0, 2000.0)
     wire.at(1.0, lambda: wire.chips[7].power_cycle(wire.now))
-    assert chips[0].wait().reason is ChipReason.TARGET
+    assert chips[0].wait().ok
     with pytest.raises(Restarted, match="chip 7 was switched off or reset meanwhile"):
         chips[1].wait()
     assert chips[0].counter() == 128_000

@@ -48,6 +48,7 @@ def test_an_end_in_words() -> None:
     assert str(ChipMoveEnd(None, ChipReason.TARGET, None, "mm", 1.0)) == "the chip: target reached"
     assert {reason for reason in ChipReason if ChipMoveEnd(1, reason, 0.0, "step", 0.0).ok} == {
         ChipReason.TARGET,
+        ChipReason.CAME_TO_REST,
         ChipReason.SOUGHT,
         ChipReason.REST,
         ChipReason.DONE,

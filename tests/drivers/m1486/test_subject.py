@@ -51,6 +51,7 @@ def test_the_state_of_an_m1486_is_known_at_rest(drum: DeviceSubject, rig: Rig) -
     """Every upload that a state has is that of the twin; levels are unknown, because reading them takes the internal variable."""
     twin = WorldSubject(rig.world)
     drum.do(do.Send("chips", b"t41\r"))
+    drum.read("drum.counter", "drum.variable", *(f"drum.U{number}" for number in (14, 17, 18, 19)))
     found, there = (read_state(subject.do(command.ReadState("drum")).value) for subject in (drum, twin))
     known = ("counter", "counter_valid", "variable", "flags_on", "functions_on")
     assert {name: value for name, value in found.details.items() if value is not None} == {n: there.details[n] for n in known}
@@ -66,7 +67,9 @@ def test_the_state_of_an_m1486_is_known_at_rest(drum: DeviceSubject, rig: Rig) -
     assert {found.status.text, found.axes[0].status.text, found.program.text} == {"is at rest"}
     rig.time.sleep(60.0)
     found = read_state(drum.do(command.ReadState("drum")).value)
-    assert (found.axes[0].position, found.axes[0].velocity, found.axes[0].moving) == (5000.0, 0.0, False)
+    assert (found.axes[0].position, found.axes[0].velocity, found.axes[0].moving) == (None, 0.0, False), "not read yet"
+    drum.read("drum.counter")
+    assert read_state(drum.do(command.ReadState("drum")).value).axes[0].position == 5000.0
 
 
 def test_an_m1486_jogs_and_stops(drum: DeviceSubject, rig: Rig) -> None:
@@ -122,6 +125,7 @@ def test_of_an_m1486_only_what_was_asked_for_is_followed(drum: DeviceSubject, ri
     assert found == [[["sample", "sample"], ["status"]], [["sample"], ["status"]]], "where it stood, not known, where it stands"
     samples.close()
     frames = WorldSubject(rig.world).follow(filter_of(["frame"]), 99)
+    drum.do(do.Send("chips", b"t80\r"))
     states.take()
     rig.time.sleep(1.0)
     states.take()
@@ -136,11 +140,12 @@ def test_an_m1486_that_begins_to_move_while_it_is_looked_at(
     """It was at rest when it was asked, and its counter is not to be had any more."""
     following = drum.follow(filter_of(), 9)
     following.take()
+    drum.do(do.Send("chips", b"t80\r"))
 
-    async def moves() -> int:
+    async def moves(*numbers: int) -> int:
         raise Busy("it moves")
 
-    monkeypatch.setattr(rig.chip._driver, "counter", moves)
+    monkeypatch.setattr(rig.chip._driver._unit, "read", moves)
     rig.time.sleep(1.0)
     assert [event.text for event in following.take().events] == ["axis 1: the position is not known"]
 
@@ -189,14 +194,16 @@ def test_an_m1486_takes_no_requests_of_modbus(rig: Rig) -> None:
     assert M1486Part(rig.chip._driver).effect_of(do.Request("chips", 3, b"\x03", 1)) is RawEffect.WRITE
 
 
-def test_a_value_is_not_known_of_an_m1486_that_begins_to_move(rig: Rig) -> None:
+def test_a_value_is_not_known_of_an_m1486_that_begins_to_move(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
     """It was at rest when it was asked."""
 
-    async def busy() -> float:
+    part = M1486Part(rig.chip._driver)
+    assert finish(part.values(["variable"])) == {"variable": (0.0, "")}
+
+    async def busy(*numbers: int) -> int:
         raise Busy("it moves")
 
-    part = M1486Part(rig.chip._driver)
-    part._readers["COUNTER"] = busy
+    monkeypatch.setattr(rig.chip._driver._unit, "read", busy)
     assert finish(part.values(["counter", "variable"])) == {"counter": (None, part.unit_of("counter")), "variable": (0.0, "")}
 
 

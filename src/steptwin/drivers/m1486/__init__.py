@@ -17,7 +17,9 @@ from steptwin.drivers.m1486.failures import (
     NoEcho,
     NoRoom,
     PositionUnknown,
+    ProgramLost,
     Restarted,
+    SeveralChips,
     WrongType,
 )
 from steptwin.drivers.m1486.lines import AsyncM1486Line
@@ -42,6 +44,8 @@ __all__ = [
     "NoEcho",
     "NoRoom",
     "PositionUnknown",
+    "ProgramLost",
     "Restarted",
+    "SeveralChips",
     "WrongType",
 ]

@@ -11,12 +11,13 @@ from typing import Self
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.m1486.failures import Busy, PositionUnknown, WrongType
 from steptwin.drivers.m1486.lines import BAUD, AsyncM1486Line
+from steptwin.drivers.m1486.notes import FUNCTION_BYTES
 from steptwin.drivers.m1486.settings import COMMANDS, ChipSettings, checked_number
 from steptwin.drivers.m1486.talk import ChipRequest
 from steptwin.drivers.m1486.unit import ChipUnit
 from steptwin.errors import Misuse
 from steptwin.m1486.functions import CARRY, FUNCTIONS, LIMITOFF, REPORT, RETURN, USER_FLAGS
-from steptwin.m1486.lines import LINES
+from steptwin.m1486.lines import LINES, Interface
 from steptwin.m1486.microsteps import FULL_STEP
 from steptwin.m1486.variants import Variant
 from steptwin.m1486.variants import variant as variant_named
@@ -29,19 +30,24 @@ LARGEST = 16_000_000
 
 @dataclass(frozen=True, slots=True)
 class ChipStatus:
-    """The state of a chip at rest."""
+    """What is known of a chip at rest; None: not read since the last command that may have changed it."""
 
     type: str
-    interface: str
-    series: int
-    counter_u: int
+    interface: str | None
+    series: int | None
+    counter_u: int | None
     """The position counter, in minimum microsteps."""
-    position: float
+    position: float | None
     unit: str
     is_position_valid: bool
-    variable: int
-    flags: dict[int, bool]
-    functions: dict[int, bool]
+    variable: int | None
+    flags: dict[int, bool] | None
+    functions: dict[int, bool] | None
+
+
+def _flags(byte: int) -> dict[int, bool]:
+    """Flags 80 to 87, as U14 sends them."""
+    return {number: bool(byte >> bit & 1) for bit, number in enumerate((*USER_FLAGS, CARRY))}
 
 
 class AsyncChip:
@@ -100,21 +106,34 @@ class AsyncChip:
     # ------------------------------------------------------------------ opening
 
     async def open(self) -> None:
-        """Open the line, switch on the echo of the chip and determine its type. Raises `NoEcho`, `Busy` while it moves,
-        `WrongType`."""
+        """Open the line, switch on the echo of the chip and determine its type. Without an address it also finds out whether the
+        chip is the only one.
+
+        Raises `NoEcho`, `Busy` while it moves, `SeveralChips`, `WrongType`.
+        """
         await self.line.open()
         notes = self._unit.notes
         before = notes.variant
         try:
             async with self._unit.turn():
-                if notes.variant is None:
-                    notes.variant = self._variant
+                self._take_type()
                 await self._unit.look()
         except BaseException as error:
             is_known = isinstance(error, Busy) or (self._variant is not None and not isinstance(error, WrongType))
             notes.variant = before if is_known else None  # else there may be another chip now
             await self.close()
             raise
+
+    def _take_type(self) -> None:
+        """Take the type that was named. Raises `Misuse` where another one is known; one for 24 MHz answers like that for 12 MHz,
+        so the clock that was named counts."""
+        notes, named = self._unit.notes, self._variant
+        known = notes.variant
+        if named is None or named is known:
+            return
+        if known is not None and known.type_letter != named.type_letter:
+            raise Misuse(f"{self.line.place}: {self._unit.name} is known as an {known.title}, not an {named.title}")
+        notes.variant = named
 
     async def open_line(self) -> None:
         """Open the line only: sufficient for `stop` and `stop_program` of a moving chip, which does not respond."""
@@ -193,34 +212,51 @@ class AsyncChip:
         """Flags 80 to 87."""
         async with self._unit.turn():
             (byte,) = await self._unit.read(14)
-        return {number: bool(byte >> bit & 1) for bit, number in enumerate((*USER_FLAGS, CARRY))}
+        return _flags(byte)
 
     async def functions(self) -> dict[int, bool]:
         """Functions 40 to 63."""
         async with self._unit.turn():
-            word = int.from_bytes(bytes(await self._unit.read(17, 18, 19)), "little")
-        self._unit.notes.functions = word
-        return {number: bool(word >> bit & 1) for bit, number in enumerate(FUNCTIONS)}
+            await self._unit.read(*FUNCTION_BYTES)
+        return self._functions()
+
+    def _functions(self) -> dict[int, bool]:
+        return {number: bool(self._unit.notes.function(number)) for number in FUNCTIONS}
 
     async def status(self) -> ChipStatus:
-        """Read all uploads. Raises `Busy` while the chip moves."""
+        """Ask the chip whether it is at rest, and return what is known of it: each byte that was read since the last command that
+        may have changed it, and None for the others.
+
+        The chip stores one command for that. `counter`, `variable`, `flags`, `functions` and `byte` read; for each byte the chip
+        stores two commands, which overwrite the oldest ones in its command memory. Raises `Busy` while the chip moves.
+        """
         async with self._unit.turn():
-            found = await self._unit.read(1, 2, 3, 4, 5, 6, 14, 15, 16, 17, 18, 19)
-        (flags, mode, series), functions = found[6:9], int.from_bytes(bytes(found[9:]), "little")
-        counter = int.from_bytes(bytes(found[:3]), "little")
-        interface = self._unit.notes.interface
+            await self._unit.rest()
+        return self.known()
+
+    def known(self) -> ChipStatus:
+        """What is known of the chip, as `status` returns it. Nothing is sent."""
+        notes = self._unit.notes
+        counter, flags, is_valid = notes.reading(1), notes.readings.get(14), notes.is_position_valid
         return ChipStatus(
             type=self.variant.title,
-            interface=f"mode {mode}" if interface is None else interface.title,
-            series=series,
+            interface=None if notes.interface is None else notes.interface.title,
+            series=notes.readings.get(16),
             counter_u=counter,
-            position=self._shown(counter),
+            position=None if counter is None else self._shown(counter),
             unit=self.unit,
-            is_position_valid=self._unit.notes.is_position_valid,
-            variable=int.from_bytes(bytes(found[3:6]), "little"),
-            flags={number: bool(flags >> bit & 1) for bit, number in enumerate((*USER_FLAGS, CARRY))},
-            functions={number: bool(functions >> bit & 1) for bit, number in enumerate(FUNCTIONS)},
+            is_position_valid=is_valid,
+            variable=notes.reading(4),
+            flags=None if flags is None else _flags(flags),
+            functions=self._functions() if notes.readings.keys() >= set(FUNCTION_BYTES) else None,
         )
+
+    async def interface(self) -> Interface | None:
+        """The driver interface, which pins select; it is read once. None for a number that no interface has."""
+        async with self._unit.turn():
+            if self._unit.notes.interface is None:
+                await self._unit.rest()
+            return await self._unit.find_interface()
 
     async def is_busy(self) -> bool:
         """Whether the chip moves, waits or runs its program."""
@@ -273,16 +309,19 @@ class AsyncChip:
             await self._unit.rest()
             self._unit.notes.is_position_valid = False
             await self._unit.send(f"={counter}" if counter else "c100")
+            self._unit.notes.note_counter(counter)
             self._unit.notes.is_position_valid = True
 
     async def set_output(self, line: int, on: bool) -> None:
         """Set B1 to B21 high or low."""
         if line not in LINES:
             raise Misuse(f"no line {line}: lines are {LINES[0]} to {LINES[-1]}")
-        interface = self._unit.notes.interface
-        if interface is not None and line in interface.occupied:
-            raise Misuse(f"B{line} belongs to the {interface.title} interface")
-        await self._switch(line, on)
+        async with self._unit.turn():
+            await self._unit.rest()
+            interface = await self._unit.find_interface()
+            if interface is not None and line in interface.occupied:
+                raise Misuse(f"B{line} belongs to the {interface.title} interface")
+            await self._send_switch(line, on)
 
     async def set_flag(self, flag: int, on: bool) -> None:
         """Set user flag 80 to 86."""
@@ -306,7 +345,10 @@ class AsyncChip:
     async def _switch(self, number: int, on: bool) -> None:
         async with self._unit.turn():
             await self._unit.rest()
-            await self._unit.send(f"{'t' if on else 'c'}{number}", acts=True)
+            await self._send_switch(number, on)
+
+    async def _send_switch(self, number: int, on: bool) -> None:
+        await self._unit.send(f"{'t' if on else 'c'}{number}", acts=True)
 
     async def set_variable(self, number: int) -> None:
         """Set the internal variable, 0 to 2^24 − 1."""

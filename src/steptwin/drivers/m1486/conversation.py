@@ -96,7 +96,7 @@ class ChipConversation:
             channel.close()
             raise
         self._is_verified = True
-        return self._opened(channel, earlier=WAKE_COMMANDS - 1)
+        return self._opened(channel, earlier=WAKE_COMMANDS)
 
     def _unverified(self) -> ChipTerminal:
         """The line for K, which is sent at once. It begins by selecting all chips, which ends an incomplete command."""

@@ -13,7 +13,8 @@ from steptwin.drivers.m1486.talk import TYPE_QUERY
 from steptwin.drivers.m1486.unit import ChipUnit
 from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Misuse, Refusal
-from steptwin.m1486.lines import STEP_DIRECTION, Interface
+from steptwin.m1486.check import check
+from steptwin.m1486.lines import INTERFACES, STEP_DIRECTION, Interface
 from steptwin.m1486.syntax import ChipCommand, JumpCondition, ParsedProgram
 from steptwin.m1486.variants import Store, Variant
 from steptwin.machine import MILLISECOND, SECOND
@@ -32,8 +33,6 @@ MOVES = frozenset("r)(jk'[ie")
 
 def checked_program(text: str, variant: Variant, interface: Interface, name: str = "program") -> ParsedProgram:
     """The parsed program. Raises `Misuse` with its errors."""
-    from steptwin.m1486.check import check
-
     checked = check(text, variant, interface)
     if not checked.is_sound:
         errors = [d for d in checked.diagnostics if d.severity is Severity.ERROR]
@@ -92,7 +91,8 @@ async def send_program(
     if other is not None:
         kinds = f"{first.name} is an {first.variant.title}, {other.name} an {other.variant.title}"
         raise Misuse(f"{name} is not sent: {kinds}; a program is checked for one type: send each its own")
-    program = checked_program(text, first.variant, first.notes.interface or STEP_DIRECTION, name)
+    permission: Permission | None = first.permission()
+    program = checked_program(text, first.variant, await _interface(first, text, permission), name)
     found = parts(program)
     for address, commands in found:
         if address not in units:
@@ -108,18 +108,33 @@ async def send_program(
             progress(done + count, total)
 
     for address, commands in found:
-        uploaded += await _Typist(units[address], report).type(commands)
+        unit = units[address]
+        if permission is None or unit is not first:
+            permission = unit.permission()
+        uploaded += await _Typist(unit, report, permission).type(commands)
+        permission = None
         done += len(commands)
     return uploaded
+
+
+async def _interface(unit: ChipUnit, text: str, permission: Permission | None) -> Interface:
+    """The driver interface to check a program for. The chip is asked only where it makes a difference."""
+    if unit.notes.interface is None:
+        sound = [check(text, unit.variant, interface).is_sound for interface in INTERFACES]
+        if any(sound) and not all(sound):
+            async with unit.turn(permission):
+                await unit.rest()
+                await unit.find_interface()
+    return unit.notes.interface or STEP_DIRECTION
 
 
 class _Typist:
     """Sends commands to one chip."""
 
-    def __init__(self, unit: ChipUnit, report: Callable[[int], object]) -> None:
+    def __init__(self, unit: ChipUnit, report: Callable[[int], object], permission: Permission) -> None:
         self._unit = unit
         self._report = report
-        self._permission = unit.permission()
+        self._permission = permission
         self._capacity = unit.variant.input_bits // 8
         self._typed = 0  # characters that may lie in the input buffer
         self._may_ask = True  # see `probes`
@@ -169,6 +184,7 @@ class _Typist:
             return b""
         if self._typed + len(text) + 1 + len(TYPE_QUERY) + 1 > self._capacity - 3:
             await self._empty()
+        unit.notes.sent.note(text, unit.stored_bits)
         if text[0] in MOVES:
             await begin(unit, text, ChipMotion.BLOCK, self._permission)
         else:
@@ -204,11 +220,13 @@ async def type_file(unit: ChipUnit, lines: Sequence[str], permission: Permission
     """
     try:
         for count, line in enumerate(lines[:-1], start=1):
+            unit.notes.sent.note(line, unit.stored_bits)
             await unit.send(line, once=True, retype=count == 1)
             if unit.talk.nearly_full:
                 await unit.line.sleep(FULL_PAUSE_NS / SECOND)
             permission.extend()
             report(count)
+        unit.notes.sent.note(lines[-1], unit.stored_bits)
         await begin(unit, lines[-1], ChipMotion.BLOCK, permission, retype=False)
     except (DoubtfulMove, SentLate):
         raise
@@ -236,8 +254,9 @@ async def begin(
     target_u: int | None = None,
     duration_s: float | None = None,
     retype: bool = True,
+    label: int | None = None,
 ) -> None:
-    """Send a command that begins a motion, once."""
+    """Send a command that begins a motion, once. ``label``: where it starts a program."""
     notes = unit.notes
     stops = notes.stops  # a command that is sent too late is stopped before it is noted
 
@@ -247,7 +266,7 @@ async def begin(
             unit.talk.uploads = notes.uploads = bytearray()
         # An E type executes a command after it has written it to its EEPROM.
         notes.motion = ChipMotionCommand(
-            kind, unit.line.now() + unit.write_ns, stops, target_u, duration_s, unit.talk.spoilt.get(unit.address, 0)
+            kind, unit.line.now() + unit.write_ns, stops, target_u, duration_s, unit.talk.spoilt.get(unit.address, 0), label=label
         )
 
     notes.motion = None

@@ -8,7 +8,7 @@ from math import isfinite
 from steptwin.drivers.line import check_wait
 from steptwin.drivers.m1486.chip import LARGEST, AsyncChip
 from steptwin.drivers.m1486.download import DownloadProgress, begin, reset, send_program, type_file
-from steptwin.drivers.m1486.failures import Busy, ChipMoveFailed
+from steptwin.drivers.m1486.failures import Busy, ChipMoveFailed, ProgramLost
 from steptwin.drivers.m1486.motion import UNKNOWN_S, ChipMotion, ChipMotionCommand, ChipMoveEnd
 from steptwin.drivers.m1486.settings import COMMANDS, checked_number
 from steptwin.drivers.m1486.unit import SLICE_NS
@@ -18,11 +18,13 @@ from steptwin.errors import LineFailure, Misuse
 from steptwin.m1486.commands import memory_bits
 from steptwin.m1486.functions import FUNCTIONS, RECOVER
 from steptwin.m1486.unit import MASK
-from steptwin.m1486.variants import Store
+from steptwin.m1486.variants import Store, Variant
 from steptwin.machine import SECOND
 
 MARK = "u15"
 """The last command of a block: uploads the driver interface, a byte that is not a type letter."""
+START_BITS = sum(map(memory_bits, ":JU"))
+"""What `AsyncM1486.start_program` stores: the label, the jump and the question whether it runs."""
 _TYPED = frozenset("abdfghmnpqsv:+-*/<>=tcw!?oz")
 """Commands that may be sent alone: they move nothing, do not jump and are not answered."""
 
@@ -103,13 +105,36 @@ class AsyncM1486(AsyncChip):
             await begin(self._unit, ")" if direction > 0 else "(", ChipMotion.SEEK, permission)
 
     async def start_program(self, label: int) -> None:
-        """Start the program in the command memory at a label. Its number is passed in the internal variable, as of `seek`."""
+        """Start the program in the command memory at a label. Its number is passed in the internal variable, as of `seek`.
+
+        It is known where a program leads that was downloaded on this line. Raises `Misuse` where its end can be reached from the
+        label: behind it the chip would execute what was sent since, and with that the J that starts it, again and again (M-12).
+        Raises `ProgramLost` where what was sent since has overwritten it, and for a chip that is at rest at once, as without the
+        label.
+        """
         checked_number("j", label, self.variant, "the label")
-        permission = self._unit.permission()
-        async with self._unit.turn(permission):
-            await self._unit.rest()
-            await self._unit.send(f":{label}")
-            await begin(self._unit, "j", ChipMotion.BLOCK, permission)
+        unit = self._unit
+        permission = unit.permission()
+        part = unit.notes.sent.part(label, unit.variant, unit.notes.interface)
+        if part is not None and part.has_end:
+            raise Misuse(
+                f"label {label}: the end of the program can be reached from it; there the chip goes on with what was sent since, "
+                "in the end with the J that starts it, again and again (M-12). End it with a loop, such as @9 W1000 J9, or run "
+                "it once with download or run_block"
+            )
+        async with unit.turn(permission):
+            await unit.rest()
+            spare = None if part is None else unit.spare_bits(part.begins_at)
+            if spare is not None and spare < START_BITS:
+                raise ProgramLost(f"{self.line.place}: label {label} is not started: {_lost(spare, unit.variant)}")
+            await unit.send(f":{label}")
+            await begin(unit, "j", ChipMotion.BLOCK, permission, label=label)
+            if not await unit.runs_at_once():
+                unit.notes.motion = None
+                raise ProgramLost(
+                    f"{self.line.place}: {unit.name} is at rest: it has no label {label}, or its program has come to its end at "
+                    "once; each command that was sent has overwritten the oldest one in its memory"
+                )
 
     async def stop(self) -> None:
         """Brake with the ramp (K). It precedes all waiting requests; moves that wait for the line are not begun.
@@ -258,6 +283,7 @@ class AsyncM1486(AsyncChip):
         async with unit.turn():
             if not force:
                 await unit.rest()
+                await unit.find_interface()
             await reset(unit)
 
     async def download(self, text: str, *, progress: DownloadProgress | None = None, name: str = "program") -> bytes:
@@ -268,6 +294,15 @@ class AsyncM1486(AsyncChip):
         errors of the checker, `NoRoom`, `FileGivenUp`.
         """
         return await send_program({self.address: self._unit, None: self._unit}, text, progress=progress, name=name)
+
+
+def _lost(spare_bits: int, variant: Variant) -> str:
+    size = f"the {variant.memory_bits} bits of the command memory"
+    if spare_bits < 0:
+        return (
+            f"what was sent since the program, questions too, has filled {size} and overwritten its beginning: download it anew"
+        )
+    return f"the program and what was sent since fill {size} but for {spare_bits}; a start takes {START_BITS}: download it anew"
 
 
 async def download_to(

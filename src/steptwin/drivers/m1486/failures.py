@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 from steptwin.drivers.mic488.failures import Unconfirmed
@@ -24,12 +25,28 @@ class Busy(Refusal):
     """The chip moves, waits or runs its program; nothing that moves was sent."""
 
 
+class SeveralChips(Refusal):
+    """A chip was not named on a line that has several. ``addresses``: those that are known."""
+
+    def __init__(self, place: str, addresses: Collection[int]) -> None:
+        self.addresses = tuple(sorted(addresses))
+        which = f" ({', '.join(f'{address:X}' for address in self.addresses)})" if len(self.addresses) > 1 else ""
+        super().__init__(
+            f"{place}: several chips{which} answer: all of them would do what is sent without an address; name one, as chip=7 "
+            "in the address of the device or as the address of the driver"
+        )
+
+
 class PositionUnknown(Refusal):
     """The position counter does not show the position of the motor."""
 
 
 class WrongType(Refusal):
     """Another type of chip responds than expected."""
+
+
+class ProgramLost(Refusal):
+    """A program is not, or no longer, in the command memory of a chip."""
 
 
 class ChipMoveFailed(Refusal):

@@ -111,6 +111,7 @@ def _clear(place: str, baud: int) -> None:
 
 
 def _ended(end: ChipMoveEnd) -> EndedMotion:
+    target = [] if end.target is None else [f"target {end.target:g} {end.unit}"]
     return EndedMotion(
         1,
         chip_name(end.address),
@@ -119,7 +120,7 @@ def _ended(end: ChipMoveEnd) -> EndedMotion:
         end.position,
         end.unit,
         end.after_s,
-        end.detail,
+        "; ".join(filter(None, (*target, end.detail))),
         is_overdue=end.reason is ChipReason.OVERDUE,
     )
 

@@ -26,8 +26,9 @@ class ChipReason(enum.Enum):
     REST = "at rest"
     DONE = "commands done"
     STOPPED = "stopped"
+    CAME_TO_REST = "came to rest"
     EARLY = "ended early (LIMIT, or Kill from another program)"
-    DIVERTED = "stopped elsewhere than its target"
+    DIVERTED = "redirected"
     CUT = "cut short"
     LIMIT = "stopped without a command (LIMIT, or Kill from another program)"
     OVERDUE = "not done yet"
@@ -60,6 +61,10 @@ class ChipMotionCommand:
     """Whether that upload is missing although the chip is at rest."""
     over_at: Nanos | None = None
     """The time at which its end was detected, ns."""
+    asked_at: Nanos | None = None
+    """The time at which the chip was asked first whether it has ended, ns."""
+    label: int | None = None
+    """The label at which a program was started. It has no end: behind it lies the J that starts it."""
 
     @property
     def end(self) -> Nanos:
@@ -73,7 +78,8 @@ class ChipMotionCommand:
 
 @dataclass(frozen=True, slots=True)
 class ChipMoveEnd:
-    """The end of a motion. ``position`` is in ``unit``, None if unknown. ``ok``: it ended as intended."""
+    """The end of a motion. ``position`` is in ``unit``, None if unknown. ``ok``: nothing is known against it, the end that was
+    intended."""
 
     address: int | None
     reason: ChipReason
@@ -82,11 +88,17 @@ class ChipMoveEnd:
     after_s: float
     detail: str = ""
     cause: Exception | None = None
+    target: float | None = None
+    """Where the motion was to end, if that is not known to be ``position``."""
 
     @property
     def ok(self) -> bool:
-        return self.reason in (ChipReason.TARGET, ChipReason.SOUGHT, ChipReason.REST, ChipReason.DONE)
+        return self.reason in _INTENDED
 
     def __str__(self) -> str:
         where = "" if self.position is None else f" at {self.position:g} {self.unit}"
-        return f"{chip_name(self.address)}: {self.reason.value}{where}{f' ({self.detail})' if self.detail else ''}"
+        target = "" if self.target is None else f", target {self.target:g} {self.unit}"
+        return f"{chip_name(self.address)}: {self.reason.value}{where}{target}{f' ({self.detail})' if self.detail else ''}"
+
+
+_INTENDED = (ChipReason.TARGET, ChipReason.CAME_TO_REST, ChipReason.SOUGHT, ChipReason.REST, ChipReason.DONE)

@@ -16,6 +16,7 @@ from steptwin.errors import Misuse
 from steptwin.m1486.functions import FUNCTIONS, USER_FLAGS
 from steptwin.m1486.lines import LINES
 from steptwin.m1486.microsteps import UNIT
+from steptwin.m1486.variants import Store
 
 NAMES = ("POSITION", "COUNTER", "VARIABLE", "FLAGS", "FUNCTIONS", "TYPE", "INTERFACE", "SERIES")
 USUAL = ("POSITION", "VARIABLE", "FLAGS")
@@ -38,18 +39,26 @@ def reading(names: Sequence[str]) -> Callable[[M1486], ReadValues]:
 
 
 def _read(chip: M1486, wanted: Sequence[str]) -> ReadValues:
-    status = chip.status()
-    known = {
-        "POSITION": ReadValue(status.position if status.is_position_valid else None, status.unit),
-        "COUNTER": ReadValue(status.counter_u, UNIT),
-        "VARIABLE": ReadValue(status.variable),
-        "FLAGS": ReadValue(_on(status.flags)),
-        "FUNCTIONS": ReadValue(_on(status.functions)),
-        "TYPE": ReadValue(status.type),
-        "INTERFACE": ReadValue(status.interface),
-        "SERIES": ReadValue(status.series),
+    """Only what is wanted: what is read takes command memory."""
+    if "POSITION" in wanted or "COUNTER" in wanted:
+        chip.counter()
+    known = chip.known()
+    readers: dict[str, Callable[[], ReadValue]] = {
+        "POSITION": lambda: ReadValue(known.position if known.is_position_valid else None, known.unit),
+        "COUNTER": lambda: ReadValue(known.counter_u, UNIT),
+        "VARIABLE": lambda: ReadValue(chip.variable()),
+        "FLAGS": lambda: ReadValue(_on(chip.flags())),
+        "FUNCTIONS": lambda: ReadValue(_on(chip.functions())),
+        "TYPE": lambda: ReadValue(known.type),
+        "INTERFACE": lambda: ReadValue(_interface(chip)),
+        "SERIES": lambda: ReadValue(chip.byte(16)),
     }
-    return {name: known[name] for name in wanted}
+    return {name: readers[name]() for name in wanted}
+
+
+def _interface(chip: M1486) -> str | None:
+    found = chip.interface()
+    return None if found is None else found.title
 
 
 def followed(names: Sequence[str], variant: str | None) -> Sequence[str] | None:
@@ -63,17 +72,25 @@ def _on(states: Mapping[int, bool]) -> str:
 
 
 def overview(chip: M1486, address: DeviceAddress) -> DeviceOverview:
-    found = {name: one.value for name, one in _read(chip, NAMES).items()}
+    """A type that has its program in the same memory as what is typed is only asked for its position."""
+    names = NAMES if chip.variant.store is Store.EEPROM else ("POSITION", "COUNTER", "TYPE")
+    found: dict[str, Any] = dict.fromkeys(NAMES) | {name: one.value for name, one in _read(chip, names).items()}
     position = "unknown" if found["POSITION"] is None else f"{shown(found['POSITION'])} {chip.unit}"
     which = "" if chip.address is None else f", chip {chip.address:X}"
-    head = (
-        f"{found['TYPE']}{which} at {chip.place}, {found['INTERFACE']}, series {found['SERIES']}",
-        f"position {position} ({found['COUNTER']} {UNIT})",
-        f"internal variable {found['VARIABLE']}; flags ON: {found['FLAGS']}",
-        f"functions ON: {found['FUNCTIONS']}",
-    )
+    head = [f"{found['TYPE']}{which} at {chip.place}", f"position {position} ({found['COUNTER']} {UNIT})"]
+    if names is NAMES:
+        head[0] += f", {found['INTERFACE']}, series {found['SERIES']}"
+        head += [
+            f"internal variable {found['VARIABLE']}; flags ON: {found['FLAGS']}",
+            f"functions ON: {found['FUNCTIONS']}",
+        ]
+    else:
+        head.append(
+            f"not read, because questions overwrite a program in the {chip.variant.memory_bits} bits of the command memory: "
+            f"{', '.join(name.lower() for name in NAMES if name not in names)}; 'steptwin get NAME' reads them"
+        )
     return DeviceOverview(
-        {"device": chip.place, "chip": chip.address} | {name.lower(): value for name, value in found.items()}, head
+        {"device": chip.place, "chip": chip.address} | {name.lower(): value for name, value in found.items()}, tuple(head)
     )
 
 

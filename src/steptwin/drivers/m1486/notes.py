@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from steptwin.drivers.m1486.failures import Restarted
 from steptwin.drivers.m1486.motion import ChipMotionCommand
+from steptwin.drivers.m1486.sentcommands import SentCommands
 from steptwin.drivers.m1486.settings import ChipSettings
 from steptwin.m1486.functions import FUNCTIONS, TABLE
 from steptwin.m1486.lines import Interface
 from steptwin.m1486.variants import Variant
 from steptwin.machine import Nanos
+
+FUNCTION_BYTES = (17, 18, 19)
+"""The numbers of ``U`` for functions 40 to 63."""
+_CHANGES_NOTHING_READABLE = frozenset("uxavspmqnfbgh")
+"""Commands after which a chip at rest still is, and uploads what it did before."""
 
 
 class ChipNotes:
@@ -17,8 +25,12 @@ class ChipNotes:
     def __init__(self) -> None:
         self.variant: Variant | None = None
         self.interface: Interface | None = None
-        self.functions: int | None = None
-        """Functions 40 to 63, the lowest number in the lowest bit."""
+        self._functions: dict[int, bool] = {}  # those that are known
+        self.readings: dict[int, int] = {}
+        """Bytes by their numbers of ``U``, as they were read since the last command that may change them."""
+        self.is_at_rest = False
+        """Whether the chip has answered since the last command that takes time. Its pins may have begun something meanwhile."""
+        self.sent = SentCommands()
         self.settings = ChipSettings()
         self.motion: ChipMotionCommand | None = None
         self.is_position_valid = True
@@ -42,15 +54,42 @@ class ChipNotes:
     def forget(self) -> None:
         """Forget the state of a chip that was switched off or reset by others."""
         self.settings = ChipSettings()
-        self.functions = sum(function.default << bit for bit, function in enumerate(TABLE))
+        self._functions = {function.number: function.default for function in TABLE}
+        self.readings = {}
+        self.is_at_rest = False
+        self.sent = SentCommands()
         self.motion = None
         self.uploads = None
         self.is_position_valid = False
 
     def function(self, number: int) -> bool | None:
-        return None if self.functions is None else bool(self.functions >> (number - FUNCTIONS.start) & 1)
+        """Whether a function is ON; None if unknown."""
+        return self._functions.get(number)
 
     def note_function(self, number: int, *, on: bool) -> None:
-        if self.functions is not None:
-            bit = 1 << (number - FUNCTIONS.start)
-            self.functions = self.functions | bit if on else self.functions & ~bit
+        self._functions[number] = on
+
+    def note_command(self, text: str) -> None:
+        """Note a command that is sent: what it may change is not known any more."""
+        if text[0] not in _CHANGES_NOTHING_READABLE:
+            self.readings.clear()
+            self.is_at_rest = False
+
+    def note_readings(self, numbers: Sequence[int], found: Sequence[int]) -> None:
+        """Note bytes that were read, by their numbers of ``U``."""
+        self.readings.update(zip(numbers, found, strict=True))
+        for number, byte in zip(numbers, found, strict=True):
+            if number in FUNCTION_BYTES:
+                first = FUNCTIONS[8 * FUNCTION_BYTES.index(number)]
+                self._functions.update((first + bit, bool(byte >> bit & 1)) for bit in range(8))
+
+    def reading(self, first: int) -> int | None:
+        """The 24 bits from byte ``first`` on; None if they are not known."""
+        numbers = range(first, first + 3)
+        if not self.readings.keys() >= set(numbers):
+            return None
+        return int.from_bytes(bytes(self.readings[number] for number in numbers), "little")
+
+    def note_counter(self, counter_u: int) -> None:
+        """Note the position counter that was set."""
+        self.note_readings((1, 2, 3), counter_u.to_bytes(3, "little"))

@@ -6,17 +6,17 @@ A chip responds only at rest (M-28); while it moves, its values are unknown.
 from __future__ import annotations
 
 import json
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
-from functools import partial
 
 from steptwin.controllerstate import ControllerState, DetailValue, ProgramActivity, StateAxis, StateProgram, StateStatus
 from steptwin.datasheet import Datasheet
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.m1486.chip import ChipStatus
 from steptwin.drivers.m1486.driver import AsyncM1486
-from steptwin.drivers.m1486.failures import Busy, PositionUnknown
+from steptwin.drivers.m1486.failures import Busy
 from steptwin.drivers.m1486.jog import AsyncM1486Jog
+from steptwin.drivers.m1486.notes import FUNCTION_BYTES
 from steptwin.drivers.m1486.talk import ChipRequest
 from steptwin.drivers.subject import DeviceAction, RawEffect, ValueAndUnit
 from steptwin.errors import Misuse, Refusal
@@ -29,6 +29,8 @@ from steptwin.subject.payloads import Payload, SamplePayload, StatusPayload
 from steptwin.world import script as steps
 
 AXIS = 1
+COUNTER = (1, 2, 3)
+"""The bytes of the position counter, by the numbers of ``U``."""
 FORMAT = "steptwin M1486 settings 1"
 BUSY = StatusPayload("busy", "moves, waits or runs its program")
 AT_REST = StatusPayload("at-rest", "is at rest")
@@ -45,8 +47,7 @@ class M1486Part:
         self._paths = [*(point.path for point in self.datasheet.points), *(pin.name for pin in self.datasheet.pins)]
         self._units = {point.path.upper(): point.unit for point in self.datasheet.points}
         self._units |= {pin.name.upper(): pin.unit for pin in self.datasheet.pins}
-        self._readers: dict[str, Callable[[], Awaitable[float]]] = {"COUNTER": chip.counter, "VARIABLE": chip.variable}
-        self._readers |= {f"U{number}": partial(chip.byte, number) for number in UPLOADS}
+        self._bytes = {"COUNTER": COUNTER, "VARIABLE": (4, 5, 6)} | {f"U{number}": (number,) for number in UPLOADS}
         self._was_busy: bool | None = None
         self._shown: SamplePayload | None = None
 
@@ -61,15 +62,35 @@ class M1486Part:
     answers_in_motion = False
 
     async def reconnect(self) -> None:
-        await self._chip.is_busy()
+        await self._is_busy()
+
+    async def _is_busy(self) -> bool:
+        """Whether it moves, waits or runs its program. A chip at rest stays so until something is sent to it: then it only has to
+        echo, which takes no command memory."""
+        unit = self._chip._unit
+        async with unit.turn():
+            if unit.notes.is_at_rest:
+                await unit.greet()
+                return not unit.notes.is_at_rest
+            if not unit.talk.owes(unit.address) and not unit.has_room_for_questions(1):
+                return True
+            return await unit.query_type() is None
+
+    async def _read(self, numbers: Sequence[int]) -> int | None:
+        """Bytes as a number; each is read once after a command, and none for which a program would be overwritten."""
+        unit = self._chip._unit
+        async with unit.turn():
+            if not (unit.notes.readings.keys() >= set(numbers) or unit.has_room_for_questions(2 * len(numbers) + 1)):
+                return None
+            return int.from_bytes(bytes(await unit.reading(*numbers)), "little")
 
     # ------------------------------------------------------------------ points
 
     async def values(self, points: Sequence[str]) -> Mapping[str, ValueAndUnit]:
-        """Counter, variable and uploads are known at rest. Levels of lines are unknown, because reading them would overwrite
-        the internal variable, which a program may need."""
+        """Counter, variable and uploads are known at rest: they are read once after each command. Levels of lines are unknown,
+        because reading them would overwrite the internal variable, which a program may need."""
         units = {point: self.unit_of(point) for point in points}
-        if await self._chip.is_busy():  # asked once: it does not answer any of them
+        if await self._is_busy():  # asked once: it does not answer any of them
             return {point: (None, unit) for point, unit in units.items()}
         return {point: (await self._value(point.upper()), unit) for point, unit in units.items()}
 
@@ -83,28 +104,26 @@ class M1486Part:
         """At rest."""
         if path in ("MOVING", "VELOCITY"):
             return 0.0
-        reader = self._readers.get(path)
-        if reader is None:
+        numbers = self._bytes.get(path)
+        if numbers is None:
             return None
         try:
-            return float(await reader())
+            found = await self._read(numbers)
         except Busy:
             return None
+        return None if found is None else float(found)
 
     async def state(self) -> ControllerState:
         """While it moves, waits or runs its program, only that is known."""
         sheet = self.datasheet
-        try:
-            status = await self._chip.status()
-        except Busy:
-            status = None
+        status = None if await self._is_busy() else self._chip.known()
         words = AT_REST.words if status is not None else BUSY.words
         (described,) = sheet.axes
         present = StateAxis(
             number=described.number,
             name=described.name,
             unit=described.unit,
-            position=None if status is None else status.position,
+            position=None if status is None or not status.is_position_valid else status.position,
             velocity=None if status is None else 0.0,
             moving=None if status is None else False,
             enabled=None,
@@ -179,7 +198,7 @@ class M1486Part:
 
     async def look(self, kinds: frozenset[str]) -> list[Payload]:
         """While a chip is busy, its position is not known; nor is it after a motion that was stopped."""
-        busy = await self._chip.is_busy()
+        busy = await self._is_busy()
         found: list[Payload] = []
         if busy is not self._was_busy and self._was_busy is not None and "status" in kinds:
             found.append(BUSY if busy else AT_REST)
@@ -194,12 +213,14 @@ class M1486Part:
     async def _sample(self, *, busy: bool) -> SamplePayload:
         if busy:
             return self.unknown()[0]
-        try:
-            return SamplePayload(str(AXIS), await self._chip.position(), self._chip.unit, 0.0)
-        except PositionUnknown:
-            return SamplePayload(str(AXIS), None, self._chip.unit, 0.0)
-        except Busy:  # it has begun to move meanwhile
-            return self.unknown()[0]
+        position = None
+        if self._chip.known().is_position_valid:
+            try:
+                await self._read(COUNTER)
+            except Busy:  # it has begun to move meanwhile
+                return self.unknown()[0]
+            position = self._chip.known().position
+        return SamplePayload(str(AXIS), position, self._chip.unit, 0.0)
 
     def unknown(self) -> list[SamplePayload]:
         return [SamplePayload(str(AXIS), None, self._chip.unit)]
@@ -218,7 +239,10 @@ class M1486Part:
 
     async def settings_text(self) -> str:
         """What can be read of the chip: S, A, V and other settings cannot, so only those are known that this driver has made."""
-        status = asdict(await self._chip.status())
+        if not await self._is_busy():
+            for numbers in (COUNTER, (4, 5, 6), (14,), (15,), (16,), FUNCTION_BYTES):
+                await self._read(numbers)
+        status = asdict(self._chip.known())
         return json.dumps({"format": FORMAT, **status, "settings": asdict(self._chip.settings)}, indent=2)
 
 
@@ -230,6 +254,10 @@ def _details(status: ChipStatus | None) -> dict[str, DetailValue]:
         "counter": status.counter_u,
         "counter_valid": status.is_position_valid,
         "variable": status.variable,
-        "flags_on": tuple(number for number, on in status.flags.items() if on),
-        "functions_on": tuple(number for number, on in status.functions.items() if on),
+        "flags_on": _on(status.flags),
+        "functions_on": _on(status.functions),
     }
+
+
+def _on(states: Mapping[int, bool] | None) -> tuple[int, ...] | None:
+    return None if states is None else tuple(number for number, on in states.items() if on)

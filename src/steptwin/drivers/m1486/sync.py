@@ -11,7 +11,7 @@ from typing import Self
 
 from steptwin.drivers.blocking import Blocking, blocking, finish
 from steptwin.drivers.line import DriverLine
-from steptwin.drivers.m1486.chip import TIMEOUT_S
+from steptwin.drivers.m1486.chip import TIMEOUT_S, ChipStatus
 from steptwin.drivers.m1486.download import DownloadProgress
 from steptwin.drivers.m1486.driver import AsyncM1486
 from steptwin.drivers.m1486.driver import download_to as async_download_to
@@ -131,6 +131,10 @@ class M1486(Blocking):
         """The settings of the chip as far as drivers on this line have made them."""
         return self._driver.settings
 
+    def known(self) -> ChipStatus:
+        """What is known of the chip, as `status` returns it. Nothing is sent."""
+        return self._driver.known()
+
     def download(self, text: str, *, progress: DownloadProgress | None = None, name: str = "program") -> bytes:
         """Send a program to the chip; see `AsyncM1486.download`."""
         return finish(self._driver.download(text, progress=progress, name=name))
@@ -153,6 +157,8 @@ class M1486(Blocking):
     flags = blocking(AsyncM1486.flags)
     functions = blocking(AsyncM1486.functions)
     status = blocking(AsyncM1486.status)
+    interface = blocking(AsyncM1486.interface)
+    byte = blocking(AsyncM1486.byte)
     is_busy = blocking(AsyncM1486.is_busy)
     inputs = blocking(AsyncM1486.inputs)
     configure = blocking(AsyncM1486.configure)

@@ -10,12 +10,16 @@ Commands are sent in lower case, so that no echo looks like a type letter that w
 from __future__ import annotations
 
 import enum
+from collections import Counter
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 
 from steptwin.drivers.exchange import SendNext
 from steptwin.drivers.m1486.failures import Garbled, NoRoom
 from steptwin.errors import Misuse
 from steptwin.m1486.receiver import CR, EMPTY, NO_ROOM, THREE_FREE
+from steptwin.m1486.structure import stored_bits
+from steptwin.m1486.syntax import parse_line
 from steptwin.m1486.variants import VARIANTS
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.wire.line import SerialLine
@@ -45,6 +49,7 @@ class ChipRequestKind(enum.Enum):
     LETTER = "nothing is sent: several chips are to send their type letters"
     UPLOAD = "nothing is sent: a program uploads"
     BLIND = "sent to chips that do not echo yet; no answer is expected"
+    PROBE = "sent as it is, and everything that comes back is collected"
 
 
 _SILENT = (ChipRequestKind.LISTEN, ChipRequestKind.LETTER, ChipRequestKind.UPLOAD)
@@ -101,6 +106,8 @@ class CharacterTalk:
         self._serial = serial
         self._place = place
         self._on_bytes = on_bytes
+        self._stored: Counter[int | None] = Counter()  # bits of commands for one chip
+        self._stored_by_all = 0  # bits of commands sent while several may listen
         self.reset()
 
     def reset(self) -> None:
@@ -109,6 +116,8 @@ class CharacterTalk:
         self.selected: int | None = ALL
         """The selected chip; None: all, as after power-up."""
         self.echoing: set[int | None] = set()
+        self.only: int | None = None
+        """The address of the chip that is addressed without one; None until it was found."""
         self.owed: dict[int | None, int] = {}
         self.arrived: dict[int | None, int] = {}
         """Pending letters that arrived between exchanges."""
@@ -141,6 +150,15 @@ class CharacterTalk:
     def wire_ns(self, characters: int) -> Nanos:
         """The time that characters take on the line, ns."""
         return self._serial.duration(characters)
+
+    def note_stored(self, address: int | None, text: str) -> None:
+        """Count a command that a chip has stored."""
+        self._stored[address] += _bits(text)
+
+    def stored_bits(self, address: int | None) -> int:
+        """The bits of command memory that a chip has filled since the line was made, at most: commands sent to it, each time that
+        they were sent."""
+        return self._stored[address] + self._stored_by_all
 
     def knows(self, address: int | None) -> bool:
         return address in self.echoing
@@ -181,11 +199,13 @@ class CharacterTalk:
         match request.sort:
             case ChipRequestKind.LISTEN | ChipRequestKind.LETTER | ChipRequestKind.UPLOAD:
                 return self._put(b"", now)
-            case ChipRequestKind.BLIND:
+            case ChipRequestKind.BLIND | ChipRequestKind.PROBE:
                 # Its first line spoils characters that may precede it, and is sent twice.
                 request.committed = True
                 self.selected = ALL
                 self.dirty = False
+                if request.sort is ChipRequestKind.BLIND:
+                    self._stored_by_all += sum(map(_bits, request.text.split("\r")))
                 return self._put(text, now)
             case ChipRequestKind.KILL:
                 request.committed = True
@@ -217,6 +237,9 @@ class CharacterTalk:
             self._on_bytes(now, FrameDirection.OUT, data)
         request = self._request
         if request is None or request.sort is ChipRequestKind.BLIND:
+            return None
+        if request.sort is ChipRequestKind.PROBE:
+            self._echoed += data
             return None
         for place, byte in enumerate(data):
             outcome = self._take(request, byte, data[place + 1 :], now)
@@ -303,7 +326,9 @@ class CharacterTalk:
             if not all(byte == ~self._echoed[-1] & 0xFF or self._uploaded(byte) for byte in rest):
                 raise self._garbled(request, self._echoed + rest, now)
             self.nearly_full |= bool(rest)
-            request.committed |= len(self._lines) == 1 and request.sort is ChipRequestKind.LINE
+            if len(self._lines) == 1 and request.sort is ChipRequestKind.LINE:
+                request.committed = True
+                self.note_stored(request.address, request.text)
             return SendNext(self._put(_END, now), may_wait=False)
         return self._line_taken(request, rest, now)
 
@@ -348,7 +373,7 @@ class CharacterTalk:
 
     def _give_up(self, now: Nanos) -> None:
         request = self._request
-        if request is not None and request.sort is not ChipRequestKind.BLIND:
+        if request is not None and request.sort not in (ChipRequestKind.BLIND, ChipRequestKind.PROBE):
             self.dirty = True
             if request.text == TYPE_QUERY and request.committed:
                 self.surplus += 1
@@ -364,12 +389,13 @@ class CharacterTalk:
         if request is not None and not self._expects_nothing(request):
             self._give_up(now)
             return received
-        return self._done(b"")
+        self._done(b"")
+        return received if request is not None and request.sort is ChipRequestKind.PROBE else b""
 
     def _expects_nothing(self, request: ChipRequest) -> bool:
         """Whether nothing is wrong with the line if nothing came: no echo is missing."""
         awaits_answer = request.committed and request.answers and not self._sent and not self._lines
-        return request.sort in (*_SILENT, ChipRequestKind.BLIND) or awaits_answer
+        return request.sort in (*_SILENT, ChipRequestKind.BLIND, ChipRequestKind.PROBE) or awaits_answer
 
     def stray(self, data: bytes, now: Nanos) -> None:
         if self._on_bytes is not None and data:
@@ -379,6 +405,13 @@ class CharacterTalk:
                 self.dirty = True  # the echo of characters that now precede the next command
         if now < self._busy_until:
             self.free_ns = min(now + QUIET_NS, self._busy_until)
+
+
+@lru_cache
+def _bits(text: str) -> int:
+    """The bits of command memory that a line takes."""
+    command = parse_line(text)[0].command
+    return 0 if command is None else stored_bits(command)
 
 
 def chip_name(address: int | None) -> str:

@@ -10,27 +10,30 @@ from contextlib import AbstractAsyncContextManager, suppress
 
 from steptwin.drivers.exchange import Job, NoAnswer, Overtaken, SentLate, TooLate
 from steptwin.drivers.line import DriverLine
-from steptwin.drivers.m1486.failures import Busy, Garbled, NoEcho, Restarted, WrongType, unconfirmed
+from steptwin.drivers.m1486.failures import Busy, Garbled, NoEcho, Restarted, SeveralChips, WrongType, unconfirmed
+from steptwin.drivers.m1486.linecount import find_chips
 from steptwin.drivers.m1486.lines import TALK
 from steptwin.drivers.m1486.motion import ChipMotion
-from steptwin.drivers.m1486.notes import ChipNotes
+from steptwin.drivers.m1486.notes import FUNCTION_BYTES, ChipNotes
 from steptwin.drivers.m1486.talk import INVALID_COMMAND, TYPE_QUERY, CharacterTalk, ChipRequest, ChipRequestKind, chip_name
 from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Misuse
+from steptwin.m1486.commands import memory_bits
 from steptwin.m1486.functions import RECOVER, REPORT, RETURN
-from steptwin.m1486.lines import INTERFACES
+from steptwin.m1486.lines import INTERFACES, Interface
 from steptwin.m1486.ranges import out_of_range
 from steptwin.m1486.syntax import parse_line
-from steptwin.m1486.variants import VARIANTS, Variant
+from steptwin.m1486.variants import VARIANTS, Store, Variant
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 
 TRIES = 3
 STOP_TRIES = 5
 """Number of attempts for a stop."""
-PAUSES_NS: tuple[Nanos, ...] = (40 * MILLISECOND, 1300 * MILLISECOND)
-"""Time for the execution of ``t41``, ns; the second is for chips that write commands into an EEPROM."""
-WAKE_COMMANDS = 5
-"""Number of commands that `ChipUnit.wake` sends without errors, and a query."""
+PAUSES_NS: tuple[Nanos, ...] = (0, 40 * MILLISECOND, 1300 * MILLISECOND)
+"""Time for the execution of ``t41``, ns: first without it, for a chip that echoes already; the last is for chips that write
+commands into an EEPROM."""
+WAKE_COMMANDS = 2
+"""Number of commands that `ChipUnit.wake` sends at most, and that a chip stores."""
 SELECT_ALL = "xg\rxg\r"
 """Selects all chips. The first line may end the rest of another command."""
 PATIENCE_NS: Nanos = 10 * SECOND
@@ -42,8 +45,8 @@ BEGUN_NS: Nanos = 100 * MILLISECOND
 ASK_AGAIN_NS: Nanos = SECOND
 """First interval of further queries of a program that does not end, ns; it doubles each time."""
 _NAMES = {variant.type_letter: variant.name for variant in reversed(VARIANTS)}
-_STATUS_BYTES = (15, 17, 18, 19, 20)
-"""Interface, functions 40 to 63 and type letter, by the numbers of ``U``."""
+RUNS_NS: Nanos = 60 * MILLISECOND
+"""The time in which a chip at rest answers, with adapters that delay bytes, ns."""
 READINGS = 4
 """Number of attempts to read the same value twice."""
 
@@ -65,6 +68,11 @@ class ChipUnit:
     @property
     def name(self) -> str:
         return chip_name(self.address)
+
+    @property
+    def _pin_address(self) -> int | None:
+        """The address that the pins select; None for the only chip before it was found."""
+        return self.talk.only if self.address is None else self.address
 
     @property
     def place(self) -> str:
@@ -115,40 +123,43 @@ class ChipUnit:
         with suppress(NoAnswer):
             await self._exchange(ChipRequest(self.address, text, sort=ChipRequestKind.BLIND), timeout_ns=pause_ns, urgent=urgent)
 
-    async def wake(self) -> None:
-        """Switch on the echo of the chip and select it. Raises `NoEcho`."""
+    async def wake(self, before: str = "") -> None:
+        """Select the chip and have it echo, which verifies the selection. ``before`` is sent first. Raises `NoEcho`.
+
+        A chip that echoes already stores nothing of that: ``t41`` is sent only to one that does not.
+        """
         failure: LineFailure | None = None
-        rest = ""
-        for pause in PAUSES_NS:
+        for attempt, pause in enumerate(PAUSES_NS):
             try:
-                if self.address is not None:
-                    # All chips have to echo, so that the echo verifies the selection.
-                    await self._blind(f"{rest}{SELECT_ALL}t{RETURN}\r", pause)
-                    rest = ""
-                    await self._exchange(ChipRequest(self.address, "", sort=ChipRequestKind.SELECT))
-                await self._blind_echo(rest, pause)
-                await self._exchange(ChipRequest(self.address, f"t{RETURN}", acts=False))
+                await self._verify_echo(f"{before}{SELECT_ALL}" + (f"t{RETURN}\r" if attempt else ""), pause)
             except (NoAnswer, Garbled) as error:
                 failure = error
                 # What was not echoed lacks only its CR. To spoil it would end a program that runs (M-11).
-                rest = "\r" if isinstance(error, NoAnswer) else ""
+                before = "\r" if isinstance(error, NoAnswer) else ""
                 continue
-            self.talk.echoing.add(self.address)
-            self.notes.was_awake = True
-            self._written()
+            if attempt:
+                self._written()
             return
         # A chip that is missing must not leave the others without selection.
-        await self._blind(rest if self.address is None else f"{rest}{SELECT_ALL}", PAUSES_NS[0])
+        await self._blind(f"{before}{SELECT_ALL}", PAUSES_NS[1])
+        self.talk.only = None
         raise NoEcho(self.place, self.name, failure) from failure
 
-    async def _blind_echo(self, rest: str, pause: Nanos) -> None:
-        """Switch the echo on, with the selection as it is."""
-        selected = self.talk.selected
-        await self._blind(rest + 2 * f"t{RETURN}\r", pause)
-        self.talk.selected = selected
+    async def _verify_echo(self, text: str, pause: Nanos) -> None:
+        """Send ``text``, which selects all chips, and select this one. Nothing of that is stored. Raises `NoAnswer`, `Garbled`.
+
+        The selection is sent three times: once without looking, so that only this chip listens and echoes; once to be echoed,
+        although the rest of a garbled line may precede it; and once behind a line that was echoed to its end.
+        """
+        address = self._pin_address
+        select = "xg" if address is None else f"x{address:x}"
+        await self._blind(text if address is None else f"{text}{select}\r", pause)
+        await self._exchange(ChipRequest(self.address, select, acts=False))
+        self.talk.echoing.add(self.address)
+        self.notes.was_awake = True
 
     async def _ready(self) -> None:
-        """Wait until the chip echoes and its EEPROM is free."""
+        """Wait until the chip echoes, is the only one where it has no address, and its EEPROM is free."""
         restarted, self.notes.restarted = self.notes.restarted, None
         if restarted is not None:
             raise restarted
@@ -158,32 +169,56 @@ class ChipUnit:
         if not self.talk.knows(self.address):
             await self._wake_again()
             await self._ready()
+        elif self.address is None and self.talk.only is None:
+            await self._find_the_only_one()
 
     async def _wake_again(self) -> None:
         """Raises `Restarted` for a chip that does not echo any more: its settings are lost. (The line may also have failed.)"""
         known = self.notes.was_awake
         if known and await self._still_echoes():
             return
-        await self.wake()
+        await self.wake("\r" if known else "")
         if known:
             self.notes.forget()
             raise Restarted(self.place, self.name)
 
     async def _still_echoes(self) -> bool:
-        if self.address is not None:
-            # The selection has no echo if the chip selected before is off.
-            await self._blind(SELECT_ALL, PAUSES_NS[0])
         for _ in range(TRIES):
             try:
-                await self._exchange(ChipRequest(self.address, f"t{RETURN}", acts=False))
+                await self._verify_echo(SELECT_ALL, PAUSES_NS[1])
             except Garbled:
                 continue
             except NoAnswer:
                 return False
-            self.talk.echoing.add(self.address)
-            self._written()
             return True
         return False
+
+    async def _find_the_only_one(self) -> None:
+        """Find the chip that is addressed without an address, and select it, so that no other one can hear anything. The chip
+        stores one command. Raises `SeveralChips`; `LineFailure` where the line does not show how many there are."""
+        for _ in range(TRIES):
+            found = await find_chips(self._probe)
+            self.talk.note_stored(None, TYPE_QUERY)
+            if len(found.addresses) > 1 or found.letters > 1:
+                self.talk.forget(None)
+                raise SeveralChips(self.place, found.addresses)
+            if len(found.addresses) == 1:
+                (address,) = found.addresses
+                await self._exchange(ChipRequest(address, "", sort=ChipRequestKind.SELECT))
+                self.talk.only = address
+                if not found.letters:
+                    self.talk.owed[None] = 1
+                    self.notes.asked_at = self.line.now()
+                return
+        self.talk.forget(None)
+        raise LineFailure(f"{self.place}: the answers do not show how many chips there are: name the address of the chip")
+
+    async def _probe(self, text: str, patience_ns: Nanos) -> bytes:
+        """Send ``text``, and return everything that comes back within ``patience_ns`` after it."""
+        try:
+            return await self._exchange(ChipRequest(None, text, sort=ChipRequestKind.PROBE), timeout_ns=patience_ns)
+        except NoAnswer as silence:
+            return silence.received
 
     def _written(self) -> None:
         """Register a command in the memory. While the type is unknown, no more is sent than the input buffer holds."""
@@ -208,6 +243,7 @@ class ChipUnit:
         tries = 0
         while True:
             await self._ready()
+            self.notes.note_command(text)
             request = ChipRequest(self.address, text, answers=answers, acts=once or acts)
             try:
                 answer = await self._exchange(request, permission=permission, timeout_ns=self._patience(answers))
@@ -218,8 +254,8 @@ class ChipUnit:
                 if tries == TRIES or (request.committed and once) or (request.commented and request.acts) or not retype:
                     raise
                 continue
-            if stored:
-                self._written()
+            if stored and not answers:
+                self._written()  # a command that was answered is in the EEPROM
             return answer
 
     async def act(
@@ -255,9 +291,9 @@ class ChipUnit:
 
     def _patience(self, answers: bool) -> Nanos:
         """The time to wait for an answer, ns: it may have to wait for the EEPROM; for an unknown type, for all commands of
-        `wake`."""
+        `wake`, and for one more question."""
         variant = self.notes.variant
-        write_ns = WAKE_COMMANDS * max(one.write_ns for one in VARIANTS) if variant is None else variant.write_ns
+        write_ns = (WAKE_COMMANDS + 2) * max(one.write_ns for one in VARIANTS) if variant is None else variant.write_ns
         return self.timeout_ns + write_ns if answers else self.timeout_ns
 
     def checked(self, text: str) -> str:
@@ -287,11 +323,26 @@ class ChipUnit:
             await self.ask()
             letter = await self._listen(self._patience(True))
         if letter is not None:
-            await self._receive_rest()
-            self.notes.is_killed = False
-            if self.talk.uploads is self.notes.uploads:
-                self.talk.uploads = None
+            await self._note_rest()
         return letter
+
+    async def _note_rest(self) -> None:
+        """Register that the chip has answered."""
+        await self._receive_rest()
+        self.notes.is_killed = False
+        self.notes.is_at_rest = True
+        if self.talk.uploads is self.notes.uploads:
+            self.talk.uploads = None
+
+    async def runs_at_once(self) -> bool:
+        """Whether the chip, which was at rest, is busy with what it was just sent: a question that follows is not answered."""
+        for _ in range(2):  # a program may upload what looks like a letter
+            if not self.talk.owes(self.address):
+                await self.ask()
+            if await self._listen(RUNS_NS + self.write_ns) is None:
+                return True
+        await self._note_rest()
+        return False
 
     def _is_near_its_end(self) -> bool:
         """Whether the motion was stopped by this program, or should have ended as computed."""
@@ -316,7 +367,8 @@ class ChipUnit:
         """
         owed = self.talk.owes(self.address)
         most = self.variant.input_bits // (8 * (len(TYPE_QUERY) + 1)) - 1
-        return 0 < owed < most and self.line.now() >= self.notes.asked_at + (interval_ns << owed - 1)
+        is_due = 0 < owed < most and self.line.now() >= self.notes.asked_at + (interval_ns << owed - 1)
+        return is_due and self.has_room_for_questions(1)
 
     async def _receive_rest(self) -> None:
         """Receive the second letter of a chip that was asked twice, so that it is not taken for the next answer."""
@@ -332,7 +384,10 @@ class ChipUnit:
         """Request the type letter, which the chip sends when it has executed all commands."""
         self.talk.arrived.pop(self.address, None)
         await self.send(TYPE_QUERY)
-        self.notes.asked_at = self.line.now()
+        notes = self.notes
+        notes.asked_at = self.line.now()
+        if notes.motion is not None and notes.motion.asked_at is None:
+            notes.motion.asked_at = notes.asked_at
 
     async def _listen(self, patience_ns: Nanos, permission: Permission | None = None) -> int | None:
         """Wait for a pending letter, in slices that stops can interrupt."""
@@ -365,19 +420,21 @@ class ChipUnit:
         """The shared state of the other chips on the line."""
         return [self.line.notes[("m1486", address)] for address in self.line.notes["m1486 chips"] if address != self.address]
 
-    async def rest(self) -> None:
-        """Check that the chip is at rest. Raises `Busy` if it is not, `WrongType` if it has another type."""
+    async def rest(self) -> int:
+        """Check that the chip is at rest; returns its type letter. Raises `Busy` if it is not, `WrongType` if it has another
+        type."""
         letter = await self.query_type()
         if letter is None:
             raise Busy(f"{self.place}: {self.name} {self.why_busy()}")
         notes = self.notes
         if notes.variant is None or letter == notes.variant.type_letter:
-            return
+            return letter
         (letter,) = await self.read(20, rests=True)
         if letter != notes.variant.type_letter:
             raise WrongType(
                 f"{self.place}: {self.name} reports that it is an M1486{_NAMES.get(letter, '?')}, not {notes.variant.title}"
             )
+        return letter
 
     def why_busy(self) -> str:
         if self.notes.is_killed and self.notes.function(RECOVER) is False:
@@ -397,9 +454,13 @@ class ChipUnit:
         for _ in range(READINGS):
             found = tuple([(await self.send(f"u{number}", answers=True))[0] for number in numbers])
             if found == before:
+                self.notes.note_readings(numbers, found)
                 return found
             before = found
-        raise LineFailure(f"{self.place}: {self.name}: what U{' U'.join(map(str, numbers))} sends differs at every reading")
+        raise self._differs(*numbers)
+
+    def _differs(self, *numbers: int) -> LineFailure:
+        return LineFailure(f"{self.place}: {self.name}: what U{' U'.join(map(str, numbers))} sends differs at every reading")
 
     async def read_number(self, first: int, *, rests: bool = False) -> int:
         """Read 24 bits from byte ``first`` on."""
@@ -407,18 +468,72 @@ class ChipUnit:
         return low | middle << 8 | high << 16
 
     async def look(self) -> None:
-        """Read type, interface and functions of the chip, unless known."""
-        await self.rest()
-        code, *functions, letter = await self.read(*_STATUS_BYTES, rests=True)
-        if letter not in _NAMES:
-            await self.send(f"c{REPORT}")  # function 57 reports an empty input buffer before each answer
-            code, *functions, letter = await self.read(*_STATUS_BYTES, rests=True)
+        """Find the type of the chip, and of an E type its functions, which a stop depends on. Nothing else is asked, because each
+        question takes a place in the command memory, in which other types have their program."""
+        notes = self.notes
+        letter = await self.rest()
+        for again in range(READINGS):
+            before = letter
+            (letter,) = await self.send(TYPE_QUERY, answers=True)
+            if letter not in _NAMES and not again:
+                # Function 57 reports an empty input buffer before each answer, which is still to come.
+                self.talk.surplus += 1
+                await self._receive_rest()
+                await self.send(f"c{REPORT}")
+                await self.line.sleep((RUNS_NS + max(one.write_ns for one in VARIANTS)) / SECOND)
+            elif letter == before:
+                break
+        else:
+            raise self._differs(20)
         if letter not in _NAMES:
             raise WrongType(f"{self.place}: {self.name} reports the type letter {letter:02X}H, which no M1486 has")
-        if self.notes.variant is None:
-            self.notes.variant = next(variant for variant in VARIANTS if variant.type_letter == letter)
-        self.notes.interface = next((interface for interface in INTERFACES if interface.code == code), None)
-        self.notes.functions = int.from_bytes(bytes(functions), "little")
+        if notes.variant is None:
+            notes.variant = next(variant for variant in VARIANTS if variant.type_letter == letter)
+        if notes.variant.store is Store.EEPROM:
+            await self.read(*FUNCTION_BYTES, rests=True)
+
+    async def find_interface(self) -> Interface | None:
+        """The driver interface, which pins select; None for a number that no interface has. The chip is at rest."""
+        notes = self.notes
+        if notes.interface is None:
+            (code,) = await self.read(15, rests=True)
+            notes.interface = next((interface for interface in INTERFACES if interface.code == code), None)
+        return notes.interface
+
+    async def reading(self, *numbers: int) -> tuple[int, ...]:
+        """Bytes as they were read since the last command; others are read now. Raises `Busy`."""
+        known = self.notes.readings
+        if not (self.notes.is_at_rest and known.keys() >= set(numbers)):
+            await self.read(*numbers)
+        return tuple(known[number] for number in numbers)
+
+    async def greet(self) -> None:
+        """Check by its echo that the chip is still there; it stores nothing. Raises `Restarted`, `LineFailure`."""
+        await self._ready()
+        try:
+            await self._exchange(ChipRequest(self.address, f"x{self._pin_address:x}", acts=False))
+        except (Garbled, NoAnswer):
+            self.talk.forget(self.address)
+            await self._ready()
+
+    # ------------------------------------------------------------------ the command memory
+
+    @property
+    def stored_bits(self) -> int:
+        """The bits of commands that were sent to the chip since the line was made."""
+        return self.talk.stored_bits(self.address)
+
+    def spare_bits(self, begins_at: int | None = None) -> int | None:
+        """The bits that can still be sent before a downloaded program is overwritten, negative if it is; None where no program
+        is known. ``begins_at``: the bits that had been sent before its first command, by default of the oldest."""
+        size = self.variant.memory_bits
+        begins_at = self.notes.sent.begins_at(self.stored_bits - size) if begins_at is None else begins_at
+        return None if begins_at is None else size - (self.stored_bits - begins_at)
+
+    def has_room_for_questions(self, count: int) -> bool:
+        """Whether so many questions overwrite no program that is known."""
+        spare = self.spare_bits()
+        return spare is None or spare >= count * memory_bits("U")
 
     # ------------------------------------------------------------------ stopping
 
@@ -456,7 +571,7 @@ class ChipUnit:
             self.talk.echoing.add(self.address)
             return
         select = "" if self.address is None else f"x{self.address:x}\r"
-        await self._blind(2 * f"{select}{text}\r", PAUSES_NS[0], urgent=True)
+        await self._blind(2 * f"{select}{text}\r", PAUSES_NS[1], urgent=True)
         try:
             await self.wake()
             notes.forget()

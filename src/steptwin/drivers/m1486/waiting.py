@@ -9,7 +9,10 @@ from steptwin.drivers.m1486.motion import MARGIN, MARGIN_S, UNKNOWN_S, ChipMotio
 from steptwin.drivers.m1486.unit import ASK_AGAIN_NS, SLICE_NS, ChipUnit
 from steptwin.drivers.m1486.watching import early_ns, watch
 from steptwin.errors import LineFailure, Misuse
-from steptwin.machine import SECOND, Nanos
+from steptwin.machine import MILLISECOND, SECOND, Nanos
+
+ANSWERED_NS: Nanos = 40 * MILLISECOND
+"""A chip that takes longer to answer moved when it was asked, ns; adapters delay the answer of one at rest."""
 
 
 async def wait_for(
@@ -24,9 +27,12 @@ async def wait_for(
     motion = notes.motion
     begin = unit.line.now()
 
-    def ended(reason: ChipReason, position: float | None, detail: str, cause: Exception | None = None) -> ChipMoveEnd:
+    def ended(
+        reason: ChipReason, position: float | None, detail: str, cause: Exception | None = None, target_u: int | None = None
+    ) -> ChipMoveEnd:
         seconds = (unit.line.now() - begin) / SECOND
-        return ChipMoveEnd(unit.address, reason, position, unit_name, seconds, detail, cause)
+        target = None if target_u is None else shown(target_u)
+        return ChipMoveEnd(unit.address, reason, position, unit_name, seconds, detail, cause, target)
 
     limit = begin + round((_time_out_s(unit, motion) if timeout_s is None else timeout_s) * SECOND)
     try:
@@ -44,6 +50,8 @@ async def wait_for(
                 if letter is None:
                     is_stopped = motion is not None and motion.stops != notes.stops
                     return ended(ChipReason.STOPPED if is_stopped else ChipReason.OVERDUE, None, unit.why_busy())
+                if motion is not None and motion.label is not None and await unit.runs_at_once():
+                    return ended(ChipReason.OVERDUE, None, f"its end leads to the J behind it, and to label {motion.label} again")
             over_at = unit.line.now() - unit.write_ns if motion is None or motion.over_at is None else motion.over_at
             counter = await unit.read_number(1, rests=True)
             notes.motion = None
@@ -51,10 +59,12 @@ async def wait_for(
         if check:
             raise
         return ended(ChipReason.COMMUNICATION, None, str(failure), failure)
-    reason, detail = _reason(unit, motion, counter, over_at, lambda place: f"{shown(place):g} {unit_name}")
+    reason, detail = _reason(unit, motion, counter, over_at)
     if motion is not None and motion.kind is ChipMotion.MOVE and reason in (ChipReason.EARLY, ChipReason.STOPPED):
         notes.is_position_valid = False  # M-16
-    return ended(reason, shown(counter) if notes.is_position_valid else None, detail)
+    is_in_doubt = motion is not None and reason in (ChipReason.CAME_TO_REST, ChipReason.DIVERTED)
+    target_u = motion.target_u if motion is not None and is_in_doubt else None
+    return ended(reason, shown(counter) if notes.is_position_valid else None, detail, target_u=target_u)
 
 
 async def _end_of_block(unit: ChipUnit, limit: Nanos) -> None:
@@ -79,9 +89,7 @@ def _time_out_s(unit: ChipUnit, motion: ChipMotionCommand | None) -> float:
 _ENDS = {ChipMotion.ENDLESS: ChipReason.LIMIT, ChipMotion.SEEK: ChipReason.SOUGHT}
 
 
-def _reason(
-    unit: ChipUnit, motion: ChipMotionCommand | None, counter: int, over_at: Nanos, text_of: Callable[[int], str]
-) -> tuple[ChipReason, str]:
+def _reason(unit: ChipUnit, motion: ChipMotionCommand | None, counter: int, over_at: Nanos) -> tuple[ChipReason, str]:
     """The reason of the end, and details. ``over_at``: the time at which the end was detected."""
     if motion is None:
         return ChipReason.REST, ""
@@ -89,14 +97,26 @@ def _reason(
         return ChipReason.STOPPED, ""
     if motion.kind is ChipMotion.BLOCK:
         if unit.talk.spoilt.get(unit.address, 0) != motion.spoilt:
-            return ChipReason.CUT, "by trouble on the line"
+            return ChipReason.CUT, "by the driver: what drops a command that did not come back as it was sent ends a program, too"
         if motion.is_unfinished:
             return ChipReason.CUT, "a command was wrong data when it was executed, or its end was not received"
         return ChipReason.DONE, ""
     if motion.kind in _ENDS:
         return _ENDS[motion.kind], ""
     if motion.target_u is not None and counter != motion.target_u:
-        return ChipReason.DIVERTED, f"the target was {text_of(motion.target_u)}"
-    if motion.duration_s is not None and over_at < early_ns(motion):
-        return ChipReason.EARLY, f"after at most {(over_at - motion.at) / SECOND:.2f} s of {motion.duration_s:.2f} s"
+        return ChipReason.DIVERTED, ""
+    return _end_of_move(motion, over_at)
+
+
+def _end_of_move(motion: ChipMotionCommand, over_at: Nanos) -> tuple[ChipReason, str]:
+    """The reason of the end of a move whose counter shows the target, as it does after a stop, too (M-16): only one that still
+    moved shortly before its computed end is known to have reached it."""
+    duration_s = motion.duration_s
+    if duration_s is None:
+        return ChipReason.CAME_TO_REST, "its duration is not known without all settings, so LIMIT may have ended it"
+    if over_at < early_ns(motion):
+        return ChipReason.EARLY, f"after at most {(over_at - motion.at) / SECOND:.2f} s of {duration_s:.2f} s"
+    asked_at = over_at if motion.asked_at is None else motion.asked_at
+    if duration_s > 0.0 and asked_at > early_ns(motion) and over_at - asked_at < ANSWERED_NS:
+        return ChipReason.CAME_TO_REST, "it was asked only at its computed end, so LIMIT may have ended it before"
     return ChipReason.TARGET, ""
