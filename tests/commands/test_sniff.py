@@ -10,12 +10,14 @@ from pathlib import Path
 
 import pytest
 from shell import Shell
+from typer.testing import CliRunner
 
+from steptwin.cli import app
 from steptwin.commands.sniff import sniff
 from steptwin.drivers.kind import Decoder
 from steptwin.drivers.m1486.decoder import M1486Decoder
 from steptwin.drivers.mic488.decoder import ModbusDecoder
-from steptwin.drivers.place import parse_line_address
+from steptwin.drivers.place import LineAddress, parse_line_address
 from steptwin.errors import LineFailure, Misuse
 from steptwin.wire.frameline import FrameLine
 from steptwin.world.addresses import Address
@@ -160,3 +162,18 @@ def test_options_of_another_language_and_unknown_languages(
     ):
         shell("sniff", "/dev/none", *options)
         assert (shell.code, problem in shell.errors) == (2, True)
+
+
+def test_tcp_is_the_raw_line_of_an_m1486(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """As in every other command; so a pseudo terminal stands in it, too."""
+    places: list[bool] = []
+
+    async def taken(place: LineAddress, decoder: object, **options: object) -> None:
+        places.append(place.framed)
+        assert options["pty"] == tmp_path / "tty"
+
+    monkeypatch.setattr("steptwin.commands.sniff.sniff", taken)
+    for language in ("m1486", "modbus"):
+        done = CliRunner().invoke(app, ["sniff", "tcp://127.0.0.1:1", "--pty", str(tmp_path / "tty"), "--language", language])
+        assert done.exit_code == 0, done.output
+    assert places == [False, True]

@@ -129,7 +129,7 @@ NOT_FIXED = {
     "W213": "what is read instead depends on what it is for",
     "W215": "the position table is a file",
     UNUSED_ROW: "without it all later rows have other numbers",
-    **dict.fromkeys(("M112", "M114", "M126", "M201", "M210", "M211", "M212", "M213", "M221", "M222"), _WAY),
+    **dict.fromkeys(("M112", "M114", "M126", "M201", "M210", "M211", "M212", "M213", "M221", "M222", "M223"), _WAY),
     **dict.fromkeys(("M121", "M133", "M134", "M203", "M204", "M205", "M215", "M217", "M218", "M219", "M220"), _WAY),
     "C004": "the file is not text",
     **dict.fromkeys(("C009", "C010"), _WAY),

@@ -319,7 +319,7 @@ def test_m_17_jumps_to_labels_that_are_not_there() -> None:
     assert codes("J1\n@1") == ["M121", "M206"]
     assert codes("[\nJ1\n@1\n]") == []
     assert codes("@1\nI1H1\nR\nJ1") == []
-    assert codes("[\n@1\nR\n]\nJ1") == []
+    assert codes("[\n@1\nR\n]\nJ1") == ["M223"]
     assert codes("@1\n\\\nJ1") == ["M206", "M120"]  # a reset forgets labels
 
 
@@ -489,3 +489,31 @@ def test_where_the_counter_passes_0_is_found_through_all_loops(body: list[Any]) 
     source = SourceText("", text)
     passed = {source.position(one.span.start)[0] for one in check(text, B, DUAL_DAC).diagnostics if one.code == "M221"}
     assert passed == walk.passed
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("[\nw1\nj6\n@5\nf6400\nr\nw100\n@6\n]\nj5", ["M223"]),
+        ("[\nw1\nj6\n@5\nf6400\nr\nj5\n@6\n]\nj5", []),
+        ("[\nj6\n@5\nf6400\nr\ni1l6\nj5\n@6\n]\nj5", ["M223"]),
+        ("@5\nf6400\nr\nj5", []),
+    ],
+)
+def test_a_j_behind_a_file_that_comes_to_its_end_starts_it_again_and_again(text: str, expected: list[str]) -> None:
+    assert codes(text) == expected
+
+
+@pytest.mark.parametrize(
+    ("line", "fixed"),
+    [("F\xa0640", "F 640"), ("F640\xa0", "F640 "), ("\u202fF\xa06\u202f400", " F 6 400"), ("R\xa0 ; x", "R  ; x")],
+)
+def test_blanks_of_a_text_system_are_named_and_replaced(line: str, fixed: str) -> None:
+    """As copies of the manual's own text have them."""
+    (found,) = check(line).diagnostics
+    assert found.code == "M101"
+    assert found.fix is not None
+    assert ("no-break space (U+" in found.message, "which is no blank to the chip" in found.message) == (True, True)
+    start, end = found.fix.span.start, found.fix.span.end
+    assert line[:start] + found.fix.text + line[end:] == fixed
+    assert "M101" not in codes(fixed)

@@ -66,15 +66,20 @@ class Script(threading.Thread):
 
     def run(self) -> None:
         line = b""
+        listens = True
         try:
             while data := os.read(self._port, 64):
                 for byte in data:
                     if byte != 0x0D:
                         line += bytes((byte,))
-                        os.write(self._port, bytes((byte,)))
+                        if listens:
+                            os.write(self._port, bytes((byte,)))
                         continue
                     self.lines.append(line)
-                    os.write(self._port, b"\r" + self._answers.get(line, b""))
+                    if listens:
+                        os.write(self._port, b"\r" + self._answers.get(line, b""))
+                    if line[:1] == b"x":
+                        listens = line in (b"xf", b"xg")  # open address pins
                     line = b""
         except OSError:
             pass

@@ -6,7 +6,8 @@ From Python: `steptwin.commands.sniff.sniff`.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,7 +18,7 @@ from steptwin.cli.device import complain
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
-    from steptwin.drivers.kind import Decoder
+    from steptwin.drivers.kind import Decoding
     from steptwin.wire.frameline import FrameLine
 
 
@@ -46,10 +47,13 @@ def sniff(
     from steptwin.drivers.place import parse_line_address
     from steptwin.world.addresses import parse_address
 
+    decoding = _decoding(language, {"firmware": firmware, "variant": variant})
     place = parse_line_address(address, baud)
+    if not decoding.framed_tcp:
+        place = replace(place, framed=False)
     where = None if listen is None else parse_address(listen, listen_any=False)
     show = _print_json if json else _print
-    decoder = _decoder(show, language, {"firmware": firmware, "variant": variant}, tcp=place.framed)
+    decoder = decoding.make(show, variant or firmware, place.framed)
 
     async def main() -> None:
         await run(place, decoder, listen=where, pty=pty, ready=complain)
@@ -58,7 +62,8 @@ def sniff(
         asyncio.run(main())
 
 
-def _decoder(show: Callable[[FrameLine], None], protocol: str, variants: Mapping[str, str | None], *, tcp: bool) -> Decoder:
+def _decoding(protocol: str, variants: Mapping[str, str | None]) -> Decoding:
+    """What decodes a protocol. Raises `Misuse` also for a variant of another kind of controller."""
     from steptwin.drivers.kinds import DRIVERS
 
     known = {kind.decoding.protocol: (kind, kind.decoding) for kind in DRIVERS.values() if kind.decoding is not None}
@@ -68,7 +73,7 @@ def _decoder(show: Callable[[FrameLine], None], protocol: str, variants: Mapping
     for option, value in variants.items():
         if value is not None and option != kind.selection.variant:
             raise Misuse(f"--{option} is not for {kind.title}")
-    return decoding.make(show, variants.get(kind.selection.variant), tcp)
+    return decoding
 
 
 def _print(frame: FrameLine) -> None:

@@ -212,6 +212,8 @@ class Decoding:
     make: Callable[[Callable[[FrameLine], None], str | None, bool], Decoder]
     """A decoder that gives its lines to the function. The text is the variant (None: the usual one), the flag says whether the
     frames are those of Modbus TCP. Raises `Misuse`."""
+    framed_tcp: bool = True
+    """Whether ``tcp://`` carries the frames of Modbus TCP, not the bytes of the line."""
 
 
 class FoundDevice(NamedTuple):

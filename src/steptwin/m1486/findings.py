@@ -82,6 +82,9 @@ POSITION_PASSED = _F(
     "M221", "position counter passed its end", "It has 24 bits without a sign; G and H count from what it shows."
 )
 ENDS_IN_FINE_STEPS = _F("M222", "ends in fine steps at high speed", "The rest of the distance is made in steps of M at S (M-39).")
+STARTED_AGAIN = _F(
+    "M223", "file started again at its end", "Behind a file lies what was sent since, also the J that starts it (M-12)."
+)
 
 TABLE: tuple[ChipFinding, ...] = tuple(value for value in list(globals().values()) if isinstance(value, ChipFinding))
 

@@ -17,6 +17,7 @@ from steptwin.m1486.microsteps import HIGHEST_SPEED, PAIRS, low_range_limit, mic
 from steptwin.m1486.registers import GENERAL
 from steptwin.m1486.structure import CommandStream, written_label
 from steptwin.m1486.structure_rules import label_problem
+from steptwin.m1486.successors import flow_of
 from steptwin.m1486.syntax import ChipCommand
 from steptwin.m1486.variants import Variant
 
@@ -46,6 +47,7 @@ def flow_rules(stream: CommandStream, variant: Variant, interface: Interface) ->
     yield from _calls(stream, flow)
     yield from _labels(stream, flow)
     yield from _never_reached(stream, flow)
+    yield from _started_again(stream, variant, interface)
     yield from _shared_registers(stream, flow, variant)
 
 
@@ -261,6 +263,20 @@ def _never_reached(stream: CommandStream, flow: FlowAnalysis) -> Iterator[Diagno
             run = [stream.commands[at] for at in group]
             count = "this command is" if len(run) == 1 else f"these {len(run)} commands are"
             yield findings.NEVER_REACHED(Span(run[0].span.start, run[-1].span.end), f"{count} never reached")
+
+
+def _started_again(stream: CommandStream, variant: Variant, interface: Interface) -> Iterator[Diagnostic]:
+    """A J behind a file that starts it at a label from which the file comes to its end, and so to this J again."""
+    for index, command in enumerate(stream.commands):
+        if command.key != "J" or stream.in_file[index] is not None or not stream.files:
+            continue
+        label = written_label(command)
+        target = None if label is None else stream.resolve(index, label)
+        if target is None or stream.in_file[target] is None:
+            continue
+        if index in flow_of(stream, variant, interface).reached((target,)):
+            message = f"the file comes to its end from label {label} and finds this J behind it, again and again"
+            yield findings.STARTED_AGAIN(command.span, message, "end it with a loop, such as @9 W1000 J9, which wrong data end")
 
 
 def _shared_registers(stream: CommandStream, flow: FlowAnalysis, variant: Variant) -> Iterator[Diagnostic]:

@@ -8,6 +8,7 @@ is permitted is for `steptwin.m1486.commands.find`.
 from __future__ import annotations
 
 import re
+import unicodedata
 from dataclasses import dataclass, field
 from typing import NamedTuple, NoReturn
 
@@ -139,6 +140,8 @@ def parse_line(text: str, offset: int = 0) -> ParsedLine:
     reader = _LineReader(body, offset)
     commands: list[ChipCommand] = []
     try:
+        if not body.isascii():
+            _no_other_blank(reader)
         while reader.left:
             commands.append(_command(reader))
             _end_of_command(reader, commands[-1])
@@ -210,6 +213,19 @@ class _LineReader:
     ) -> NoReturn:
         self.error(finding, span, message, hint, fix)
         raise _BrokenLine
+
+
+def _no_other_blank(reader: _LineReader) -> None:
+    """Blanks of a text system, as a copy of the manual's own text has them, are characters like others to the chip."""
+    found = [at for at, char in enumerate(reader.chars) if char.isspace() and char not in _BLANKS]
+    if found:
+        first = reader.chars[found[0]]
+        name = unicodedata.name(first, "a control character").lower()
+        span = reader.span(found[0], found[-1] + 1)
+        fixed = "".join(" " if char.isspace() else char for char in reader.chars[found[0] : found[-1] + 1])
+        reader.give_up(
+            findings.UNKNOWN_COMMAND, span, f"{name} (U+{ord(first):04X}), which is no blank to the chip", None, Fix(span, fixed)
+        )
 
 
 def _command(reader: _LineReader) -> ChipCommand:

@@ -48,6 +48,7 @@ OF_M1486: dict[str, str] = _spread(
         "M-27 M-45": "K stops what runs, and needs a full buffer to tell",
         "M-33": "needs several chips that send at the same moment",
         "M-37": _POWER,
+        "M-46": "nothing sets them",
         "M-44": "wrong data have no answer that tells them from a command",
     }
 )

@@ -9,7 +9,7 @@ from chip_rig import ChipWire, typed
 from line_rig import MemoryChannel, at_every_address
 
 from steptwin.drivers.kind import DeviceAddress
-from steptwin.drivers.m1486 import conversation
+from steptwin.drivers.m1486 import conversation, terminal
 from steptwin.drivers.m1486.kind import M1486_DRIVER
 from steptwin.errors import LineFailure, Misuse, Refusal
 
@@ -79,7 +79,7 @@ def test_a_wait_asks_for_the_type_letter(talk: Talk) -> None:
 def test_a_wait_ends_with_its_time(talk: Talk) -> None:
     talk("u20")
     talk.wire.severed = True
-    with pytest.raises(LineFailure, match=r"no answer to U within 0.2 s"):
+    with pytest.raises(LineFailure, match=r"chip 7 neither echoes nor answers within 0.2 s"):
         talk("wait 0.2")
 
 
@@ -176,3 +176,26 @@ def test_the_line_is_closed_when_its_preparation_is_interrupted(talk: Talk, monk
     with pytest.raises(KeyboardInterrupt):
         talk("v500")
     assert closed == 1
+
+
+def test_without_a_chip_all_are_selected_whoever_was_selected_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another program has left one selected that is not there."""
+    wire = ChipWire(addresses=(3, 7))
+    at_every_address(monkeypatch, wire)
+    wire.chain.receive(b"xb\r", wire.now)
+    talk = Talk(wire, ALL)
+    talk.conversation.greet()
+    assert talk("x7") == []
+    assert talk("u20") == ["42H  U20 type letter in ASCII: M1486B"]
+    assert typed(wire).startswith("xg xg ")
+    talk.conversation.close()
+
+
+def test_a_chip_that_is_not_there_is_told_soon(talk: Talk, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its selection by X was never verified."""
+    monkeypatch.setattr(terminal, "SILENT_S", 0.5)
+    talk("x5")
+    with pytest.raises(LineFailure, match=r"chip 5 neither echoes nor answers within 0\.5 s: it is not there"):
+        talk("u20")
+    with pytest.raises(LineFailure, match="chip 5 neither"):
+        talk("wait")

@@ -141,3 +141,20 @@ def test_only_what_was_typed_last_is_compared_with_the_echo() -> None:
         "3 < 5 echo of '5'",
     ]
     assert decoded((">", "+" + "5" * 4095), ("<", "+"), (".", ""))[-1] == "2 < + echo of '+'"
+
+
+def test_what_function_57_reports_is_no_upload() -> None:
+    """7FH and 7EH are no letters of a type; other bytes may be the same, so it counts whether reports were seen or switched."""
+    assert decoded((">", "u20\r"), ("<", "u20\r\x7fB"), (">", "u1\r"), ("<", "u1\r\x7f\x7f"), (">", "c57\ru1\r"), ("<", "\x7f"))[
+        2:
+    ] == [
+        "2 < \x7f line the input buffer is empty",
+        "2 < B U20 type letter in ASCII = 66",
+        "3 > u1← U1  Upload 1",
+        r"4 < u1← echo of 'u1\r'",
+        "4 < \x7f line the input buffer is empty",
+        "4 < \x7f U1 position, low byte = 127",
+        "5 > c57← C57  Function off 57",
+        "5 > u1← U1  Upload 1",
+        "6 < \x7f U1 position, low byte = 127",
+    ]

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from chip_rig import ChipWire, chip_line
 
+from steptwin import drivers
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.exchange import LineFailure
 from steptwin.drivers.m1486 import AsyncM1486
@@ -36,6 +37,24 @@ def begun(chip: AsyncM1486, velocity: float) -> AsyncM1486Jog:
 
 def end(jog: AsyncM1486Jog) -> None:
     finish(jog.__aexit__(None, None, None))
+
+
+def test_both_drivers_jog_under_the_names_of_the_mic488() -> None:
+    """As they are imported."""
+    wire, waiting = ready()
+    assert isinstance(waiting, drivers.AsyncM1486)
+    jog = waiting.jog(400.0)
+    assert isinstance(jog, drivers.AsyncM1486Jog)
+    finish(jog.__aenter__())
+    end(jog)
+    with drivers.M1486(chip_line(wire), 7) as chip:
+        chip.configure(**SETTINGS)  # type: ignore[arg-type]
+        with chip.jog(-400.0) as held:
+            assert isinstance(held, drivers.M1486Jog)
+            assert held.hold()
+            assert (held.reach, held.end) == (60.0, None)
+        assert held.end == "released"
+    assert wire.true(7) == -60 * STEP
 
 
 @pytest.mark.parametrize("velocity", [400.0, -400.0])

@@ -22,14 +22,16 @@ from steptwin.drivers.m1486.failures import (
     SeveralChips,
     WrongType,
 )
+from steptwin.drivers.m1486.jog import AsyncM1486Jog
 from steptwin.drivers.m1486.lines import AsyncM1486Line
 from steptwin.drivers.m1486.motion import ChipMoveEnd, ChipReason
 from steptwin.drivers.m1486.settings import ChipSettings
-from steptwin.drivers.m1486.sync import M1486, M1486Line
+from steptwin.drivers.m1486.sync import M1486, M1486Jog, M1486Line
 
 __all__ = [
     "M1486",
     "AsyncM1486",
+    "AsyncM1486Jog",
     "AsyncM1486Line",
     "Busy",
     "ChipMoveEnd",
@@ -40,6 +42,7 @@ __all__ = [
     "DoubtfulMove",
     "FileGivenUp",
     "Garbled",
+    "M1486Jog",
     "M1486Line",
     "NoEcho",
     "NoRoom",

@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable
 
 from steptwin.m1486.characterlog import REPORTS, CharacterLog, LineSplitter
-from steptwin.m1486.receiver import CR
+from steptwin.m1486.receiver import CR, EMPTY, THREE_FREE
 from steptwin.m1486.registers import UPLOADS
 from steptwin.m1486.variants import variant
 from steptwin.machine import MILLISECOND, Nanos
@@ -16,6 +16,9 @@ from steptwin.wire.slave import FrameDirection
 
 QUIET_NS: Nanos = 100 * MILLISECOND
 """Silence that ends a group of bytes from the chips, ns; an echo does not come after it."""
+_TYPE = 20
+"""The number of ``U`` for the type letter."""
+_SWITCH = re.compile(rb"\s*([TtCc])\s*57\s*\r")
 MOST_TYPED = 4096
 """Most characters whose echo is expected: far more than an input buffer holds."""
 
@@ -39,11 +42,16 @@ class M1486Decoder:
         self._repeated_ns: Nanos = 0
         self._last_ns: Nanos = 0  # of all bytes
         self._echoes = False  # whether the line before came back whole
+        self._reports = False  # whether function 57 seems to be ON
+        self._is_reported = False  # whether a report has come since the last upload
 
     def _observe(self, line: FrameLine) -> None:
         upload = re.match(rb"\s*[Uu]\s*(\d+)\s*\r", line.raw) if line.direction is FrameDirection.IN else None
         if upload is not None:
             self._uploads.append((int(upload[1]), self._count))
+        switch = _SWITCH.match(line.raw) if line.direction is FrameDirection.IN else None
+        if switch is not None:
+            self._reports = switch[1] in b"Tt"
         self._sink(line)
 
     def feed(self, data: bytes, now: Nanos, direction: FrameDirection | None) -> None:
@@ -59,7 +67,18 @@ class M1486Decoder:
                 self._count += 1
             self._lines.take(bytes((byte,)), now)
 
+    def _is_report(self, byte: int) -> bool:
+        """Whether a byte is a report of function 57, which comes before what is uploaded; 7FH may be either."""
+        if byte not in (EMPTY, THREE_FREE) or self._is_reported or not self._uploads:
+            return False
+        self._reports |= self._uploads[0][0] == _TYPE  # no letter of a type
+        self._is_reported = self._reports
+        return self._reports
+
     def _received(self, byte: int, now: Nanos) -> None:
+        if self._is_report(byte):
+            self._log.sent(now, byte)
+            return
         if not self._uploads and byte in self._typed:
             while byte != self._typed[0]:
                 self._typed.popleft()  # typed before function 41 was ON
@@ -103,6 +122,7 @@ class M1486Decoder:
             self._log.sent(now, byte)
             return
         number, count = self._uploads.popleft()
+        self._is_reported = False
         while len(self._typed) > self._count - count:
             self._typed.popleft()  # an echo would have come before
         meaning = f"U{number} {UPLOADS.get(number, 'reserved')} = {byte}"

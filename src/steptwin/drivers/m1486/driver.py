@@ -9,6 +9,7 @@ from steptwin.drivers.line import check_wait
 from steptwin.drivers.m1486.chip import LARGEST, AsyncChip
 from steptwin.drivers.m1486.download import DownloadProgress, begin, reset, send_program, type_file
 from steptwin.drivers.m1486.failures import Busy, ChipMoveFailed, ProgramLost
+from steptwin.drivers.m1486.jog import AsyncM1486Jog
 from steptwin.drivers.m1486.motion import UNKNOWN_S, ChipMotion, ChipMotionCommand, ChipMoveEnd
 from steptwin.drivers.m1486.settings import COMMANDS, checked_number
 from steptwin.drivers.m1486.unit import SLICE_NS
@@ -89,6 +90,11 @@ class AsyncM1486(AsyncChip):
             await self._unit.rest()
             await self._unit.send("g+" if direction > 0 else "g-")
             await begin(self._unit, "r", ChipMotion.ENDLESS, permission)
+
+    def jog(self, velocity: float) -> AsyncM1486Jog:
+        """A jog at a velocity (units/s), as long as it is held: ``async with chip.jog(5.0) as jog: while pressed(): await
+        jog.hold()``. See `AsyncM1486Jog`."""
+        return AsyncM1486Jog(self, velocity)
 
     async def seek(self, direction: int, line: int) -> None:
         """Begin to move at start/stop speed until a line has its end level: low for B1–3, 8–11, 16–19, else high.

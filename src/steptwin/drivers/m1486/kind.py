@@ -242,7 +242,9 @@ M1486_DRIVER: DriverKind[M1486] = DriverKind(
     search=DeviceSearch(bauds=CHIP_BAUDS, numbers=16, title="M1486 chip", form="X", find=_find, disturbs=False, leave=_leave),
     clear=_clear,
     decoding=Decoding(
-        protocol="m1486", make=lambda sink, kind, tcp: M1486Decoder(sink, DEFAULT_VARIANT.name if kind is None else kind)
+        protocol="m1486",
+        framed_tcp=False,
+        make=lambda sink, kind, tcp: M1486Decoder(sink, DEFAULT_VARIANT.name if kind is None else kind),
     ),
     opened=opened,
     info=named.overview,

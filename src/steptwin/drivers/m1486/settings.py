@@ -80,5 +80,6 @@ def checked_number(letter: str, number: float, variant: Variant, what: str) -> i
     key = letter.upper()
     if not isfinite(number) or number != int(number) or find(key, int(number), variant) is None:
         (spec,) = rows(key)
-        raise Misuse(f"{what} = {number:.15g}: {variant.title} takes {range_text(spec, variant, named=False)}")
+        doubled = f", which it doubles ({variant.clock * 12} MHz)" if variant.clock > 1 and spec.unit == "step/s" else ""
+        raise Misuse(f"{what} = {number:.15g}: {variant.title} takes {range_text(spec, variant, named=False)}{doubled}")
     return int(number)

@@ -232,7 +232,7 @@ class M1486Part:
 
     def held_jog(self, wanted: command.Jog) -> AsyncM1486Jog:
         self._check_axis(wanted.axis)
-        return AsyncM1486Jog(self._chip, wanted.velocity)
+        return self._chip.jog(wanted.velocity)
 
     async def twin(self, name: str) -> DeviceTwin:
         raise Refusal(f"{self.line.place}: no twin beside an M1486, whose position is unknown while it moves (M-28)")

@@ -63,6 +63,11 @@ class M1486Jog(Blocking):
         """Why the motor has stopped; None while it runs."""
         return self._driver.end
 
+    @property
+    def reach(self) -> float:
+        """The longest distance that the motor moves after the last `hold`, in the unit of the chip."""
+        return self._driver.reach
+
     hold = blocking(AsyncM1486Jog.hold)
 
     def __enter__(self) -> Self:
@@ -141,7 +146,7 @@ class M1486(Blocking):
 
     def jog(self, velocity: float) -> M1486Jog:
         """Run at a velocity (units/s) while it is held: a dead-man's switch. See `AsyncM1486Jog`."""
-        return M1486Jog(AsyncM1486Jog(self._driver, velocity))
+        return M1486Jog(self._driver.jog(velocity))
 
     def subject(self, name: str = "m1486", *, period_s: float = PERIOD_S) -> DeviceSubject:
         """The open device with the commands, points and events of a twin. It is polled for events while there are followers, at

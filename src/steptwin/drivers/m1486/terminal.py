@@ -27,6 +27,8 @@ HELD_UP_S = 2.0
 """A step of the thread that takes longer means that the program was suspended."""
 QUIET_S = 0.1
 """Silence that ends a group of received bytes. Adapters may delay them by 16 ms and more."""
+SILENT_S = 3.0
+"""The wait for a chip that does not echo what is typed."""
 _ROOM = {
     NO_ROOM: "no room in the input buffer: a character is lost",
     EMPTY: "the input buffer is empty",
@@ -68,6 +70,8 @@ class TerminalWords:
         self._requested: deque[int] = deque()
         self.refused = 0
         """Number of characters that found no room."""
+        self.is_silent = False
+        """Whether nothing at all has come back of the line typed last."""
 
     @property
     def is_awaiting(self) -> bool:
@@ -85,6 +89,7 @@ class TerminalWords:
             begin = max(data.find(line), 0)
             texts += self._requested_or_reported(data[:begin])
             refused = self.refused
+            self.is_silent = not data
             data = self._answered(line, data[begin:], texts)
             upload = _UPLOAD.fullmatch(line)
             if upload is not None and self.refused == refused:
@@ -235,18 +240,26 @@ class ChipTerminal:
 
         Returns the number of characters of it that found no room. Raises `LineFailure` at the timeout of an upload.
         """
-        limit = self._clock() + timeout_s
+        begin = self._clock()
         with self._changed:
             while self._unsettled or self._words.is_awaiting:
                 self._check()
                 if not self._unsettled and self._words.refused:
                     break
+                if not self._unsettled and self._words.is_silent:
+                    timeout_s = min(timeout_s, SILENT_S + self._write_s)
+                limit = begin + timeout_s
                 if not self._changed.wait(max(limit - self._clock(), 0.0)) and self._clock() >= limit:
-                    raise LineFailure(
-                        f"no answer to U within {timeout_s:g} s: the chip moves, waits, runs a program or is not there"
-                    )
+                    raise LineFailure(self._no_answer(timeout_s))
             self._check()
             return self._words.refused
+
+    def _no_answer(self, timeout_s: float) -> str:
+        chip = f"chip {self.selected}" if self.selected else "the chip"
+        if self._words.is_silent:
+            doubt = "it is not there, or it moves and its echo (function 41) is OFF"
+            return f"{chip} neither echoes nor answers within {timeout_s:g} s: {doubt}"
+        return f"no answer to U within {timeout_s:g} s: {chip} moves, waits or runs a program"
 
     def close(self) -> None:
         self._ends = True
