@@ -96,7 +96,7 @@ def test_switches() -> None:
 
 WAKING = {
     # Chip, address asked for: what is typed until it is known whether it echoes, with "|" for CR.
-    "alone": ("B", 15, None, "xg|xg|xg|xg|xg|t41|xg|x1|"),
+    "alone": ("B", 15, None, f"xg|xg|xg|xg|xg|t41|xg|{''.join(f'x{n:x}|' for n in range(1, 16))}xg|x1|"),
     "addressed": ("B", 7, 7, "xg|xg|x7|x7|xg|xg|t41|x7|x7|x7|"),
     "an E type, which is given its time": ("E1", 7, 7, "xg|xg|x7|x7|xg|xg|t41|x7|x7|xg|xg|t41|x7|x7|x7|"),
     "another chip echoes, this one is not there": ("B", 7, 5, "xg|xg|x5|x5|xg|xg|t41|x5|x5|xg|xg|t41|x5|x5|xg|xg|"),
@@ -137,7 +137,7 @@ def test_after_an_ordinary_session_no_letter_is_expected_and_a_stray_one_counts(
     assert wire.sent[0][1] == INVALID_COMMAND
 
 
-def test_the_functions_of_an_e_type_are_found_when_it_is_opened() -> None:
+def test_of_the_functions_those_are_found_that_a_stop_depends_on() -> None:
     """One from each of the three bytes that tell of them; reports (57) are switched off, for they look like answers."""
     wire = ChipWire("E1")
     first = chip_driver(wire)
@@ -147,12 +147,14 @@ def test_the_functions_of_an_e_type_are_found_when_it_is_opened() -> None:
     chip = chip_driver(wire)
     notes = chip._driver._unit.notes
     assert [number for number, on in expected.items() if on] == [41, 42, *(48, 49, 50), *range(52, 56), 60]
-    assert {number: notes.function(number) for number in expected} == expected
+    known = {number: on for number, on in expected.items() if number < 48}
+    assert {number: notes.function(number) for number in expected} == dict.fromkeys(expected) | known
     wire.chain.receive(b"t57\r", wire.now)
     wire.sleep(2.0)
     wire.unread = b""
     reporting = chip_driver(wire)
-    assert reporting._driver._unit.notes.function(57) is False
+    assert reporting._driver._unit.notes.function(57) is None
+    assert not wire.chip.unit.on(57)
     assert reporting.functions() == expected
 
 

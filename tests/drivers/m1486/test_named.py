@@ -102,7 +102,7 @@ def test_switches(text: str, on: bool) -> None:
 def test_numbers() -> None:
     wire = ChipWire(addresses=(7,))
     chip = ready(wire)
-    settings = ["S=300", "A=6000", "V=0x3E8", "P=20000", "M=8", "Q=2", "N=3"]
+    settings = ["S=300", "A=6000", "V=1000", "P=20000", "M=8", "Q=2", "N=3"]
     writing(["POSITION=1,5", "variable=300", *settings])(chip)
     drive = wire.chip.drive
     assert (chip.position(), chip.variable()) == (1.5, 300)
@@ -116,8 +116,8 @@ def test_numbers() -> None:
     [
         ("V=1.5", "'V=1.5': V takes whole numbers"),
         ("VARIABLE=0.5", "VARIABLE takes whole numbers"),
-        ("V=inf", "'V=inf': V takes whole numbers"),
-        ("VARIABLE=nan", "'VARIABLE=nan': VARIABLE takes whole numbers"),
+        ("V=inf", "'V=inf': 'inf' is not a number"),
+        ("VARIABLE=nan", "'VARIABLE=nan': 'nan' is not a number"),
         ("V=x", "'V=x': 'x' is not a number"),
         ("B6=maybe", "'B6=maybe': expected on or off"),
         ("X=1", r"'X=1': X cannot be set: permitted are POSITION, VARIABLE, B1…B21"),

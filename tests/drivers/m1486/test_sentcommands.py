@@ -132,11 +132,11 @@ def test_what_opening_and_status_store(kind: str) -> None:
         return 8 * ((wire.chip.memory.write - before) % wire.chip.memory.span)
 
     chip = M1486(chip_line(wire), 7)
-    assert stored(chip.open) == 16 + 2 * 16
-    assert stored(M1486(chip_line(wire), 7).open) == 2 * 16
-    assert stored(M1486(chip_line(wire)).open) == 3 * 16
+    assert stored(chip.open) == 16 + 4 * 16
+    assert stored(M1486(chip_line(wire), 7).open) == 4 * 16
+    assert stored(M1486(chip_line(wire)).open) == 5 * 16
     assert stored(chip.status) == stored(chip.is_busy) == 16
-    assert chip._driver._unit.stored_bits == 16 + 2 * 16 + 2 * 16
+    assert chip._driver._unit.stored_bits == 16 + 4 * 16 + 2 * 16
 
 
 def test_a_reset_or_another_download_replaces_a_program() -> None:

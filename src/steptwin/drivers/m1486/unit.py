@@ -23,7 +23,7 @@ from steptwin.m1486.functions import RECOVER, REPORT, RETURN
 from steptwin.m1486.lines import INTERFACES, Interface
 from steptwin.m1486.ranges import out_of_range
 from steptwin.m1486.syntax import parse_line
-from steptwin.m1486.variants import VARIANTS, Store, Variant
+from steptwin.m1486.variants import VARIANTS, Variant
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 
 TRIES = 3
@@ -468,8 +468,8 @@ class ChipUnit:
         return low | middle << 8 | high << 16
 
     async def look(self) -> None:
-        """Find the type of the chip, and of an E type its functions, which a stop depends on. Nothing else is asked, because each
-        question takes a place in the command memory, in which other types have their program."""
+        """Find the type of the chip, and functions 40 to 47: what a stop ends depends on 44. Nothing else is asked, because each
+        question takes a place in the command memory, in which most types have their program."""
         notes = self.notes
         letter = await self.rest()
         for again in range(READINGS):
@@ -489,8 +489,7 @@ class ChipUnit:
             raise WrongType(f"{self.place}: {self.name} reports the type letter {letter:02X}H, which no M1486 has")
         if notes.variant is None:
             notes.variant = next(variant for variant in VARIANTS if variant.type_letter == letter)
-        if notes.variant.store is Store.EEPROM:
-            await self.read(*FUNCTION_BYTES, rests=True)
+        await self.read(FUNCTION_BYTES[0], rests=True)
 
     async def find_interface(self) -> Interface | None:
         """The driver interface, which pins select; None for a number that no interface has. The chip is at rest."""
