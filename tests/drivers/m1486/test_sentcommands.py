@@ -86,9 +86,11 @@ def spare_bits(wire: ChipWire) -> int:
     return 8 * (memory.size - memory.age(memory.labels[5])) if 5 in memory.labels else -1
 
 
-def test_a_program_that_another_process_has_downloaded_is_looked_for_behind_j() -> None:
-    """Nothing is known of it: so it counts what the chip does."""
-    wire = ChipWire("B")
+@pytest.mark.parametrize("is_timed", [True, False])
+def test_a_program_that_another_process_has_downloaded_is_looked_for_behind_j(is_timed: bool) -> None:
+    """Nothing is known of it: so it counts what the chip does. Where characters take no time, a question sent at once is
+    dropped with the wrong data."""
+    wire = ChipWire("B", is_timed=is_timed)
     first = chip_driver(wire)
     first.download(ENDLESS)
     first.wait()
@@ -104,6 +106,19 @@ def test_a_program_that_another_process_has_downloaded_is_looked_for_behind_j() 
     with pytest.raises(ProgramLost, match="the chip is at rest: it has no label 5"):
         third.start_program(5)
     assert third.wait().reason is ChipReason.REST
+
+
+def test_a_program_without_end_that_comes_to_rest_was_ended() -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    chip.download(ENDLESS)
+    chip.wait()
+    chip.start_program(5)
+    wire.sleep(1.0)
+    wire.chain.receive(b"%\r", wire.now)
+    wire.sleep(3.0)
+    end = chip.wait(20.0, check=False)
+    assert (end.ok, end.reason) == (False, ChipReason.CUT)
 
 
 def test_the_end_of_a_program_that_is_not_known_is_not_taken_for_the_end_of_the_motion() -> None:

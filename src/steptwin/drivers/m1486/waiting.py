@@ -98,6 +98,8 @@ def _reason(unit: ChipUnit, motion: ChipMotionCommand | None, counter: int, over
     if motion.kind is ChipMotion.BLOCK:
         if unit.talk.spoilt.get(unit.address, 0) != motion.spoilt:
             return ChipReason.CUT, "by the driver: what drops a command that did not come back as it was sent ends a program, too"
+        if motion.label is not None:
+            return ChipReason.CUT, "a program that is started at a label has no end: wrong data or another program have ended it"
         if motion.is_unfinished:
             return ChipReason.CUT, "a command was wrong data when it was executed, or its end was not received"
         return ChipReason.DONE, ""
