@@ -32,6 +32,9 @@ class LeasedJog:
         """Raises `Misuse`, `Refusal`, `LineFailure`."""
         self._until = self._clock() + self.lasts_ns
         await self._jog.__aenter__()
+        if self._jog.end is not None:
+            await self._jog.__aexit__(None, None, None)
+            raise Refusal(f"the jog was not begun: {self._jog.end}")
         self._until = self._clock() + self.lasts_ns
         self._running = asyncio.get_running_loop().create_task(self._run())
 

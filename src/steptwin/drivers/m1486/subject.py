@@ -124,7 +124,7 @@ class M1486Part:
 
     # ------------------------------------------------------------------ commands
 
-    def effect_of(self, request: steps.Request) -> RawEffect:
+    def effect_of(self, wanted: steps.Request | steps.Write) -> RawEffect:
         """It takes none."""
         return RawEffect.WRITE
 

@@ -10,7 +10,7 @@ import asyncio
 import contextlib
 import json
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Coroutine, Iterable, Iterator, Mapping
 from datetime import UTC, datetime
 from typing import NamedTuple
 
@@ -311,7 +311,9 @@ class SparkplugFace:
                 self._host.clear()
 
     async def _do_all(self, name: str | None, metrics: Iterable[SparkplugMetric]) -> None:
+        """All are begun at once, in their order: a stop does not wait for the motion before it."""
         rows = self._devices[name].rows
+        begun: list[Coroutine[None, None, None]] = []
         for metric in metrics:
             row = next((row for row in rows if row.name == metric.name), None) or next(
                 (row for row in rows if metric.name is None and row.alias == metric.alias), None
@@ -320,7 +322,8 @@ class SparkplugFace:
                 self._wants_rebirth |= metric.value is True
                 self._news.set()
             elif name is not None and row is not None and row.command is not None:
-                await self._do(name, row, metric)
+                begun.append(self._do(name, row, metric))
+        await asyncio.gather(*begun)
 
     async def _do(self, name: str, row: MetricRow, metric: SparkplugMetric) -> None:
         try:

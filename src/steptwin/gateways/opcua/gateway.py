@@ -16,6 +16,7 @@ from steptwin.errors import LineFailure, SteptwinError
 from steptwin.eventloop import endless
 from steptwin.gateways.contract import GatewayState, GatewaySubject
 from steptwin.gateways.opcua.addressspace import NAMESPACE, NAMESPACE_URI, AddressSpaceBuilder
+from steptwin.gateways.opcua.connections import ListeningServer
 from steptwin.gateways.opcua.nodes import NodeMaker
 from steptwin.gateways.opcua.notifications import Notifications
 from steptwin.gateways.opcua.past import PastNodes
@@ -65,7 +66,7 @@ class OpcUaGateway:
         logging.getLogger("asyncua").addHandler(logging.NullHandler())
         logging.getLogger("asyncua").propagate = False
         inside = GatewayServer(user_manager=security)
-        server = Server(inside)
+        server = ListeningServer(inside)
         server.set_endpoint(f"opc.tcp://{address}/")
         server.set_server_name(f"steptwin {self._subject.description.name}")
         await server.init()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Awaitable, Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
@@ -130,7 +131,8 @@ class GatewaySession(InternalSession):
         return result
 
     async def write(self, params: ua.WriteParameters) -> list[ua.StatusCode]:
-        return [await _code(self._write(one)) for one in params.NodesToWrite]
+        """As `call`."""
+        return await asyncio.gather(*(_code(self._write(one)) for one in params.NodesToWrite))
 
     async def _write(self, one: ua.WriteValue) -> None:
         if one.AttributeId != ua.AttributeIds.Value:
@@ -144,7 +146,8 @@ class GatewaySession(InternalSession):
         await self._service.write(self._client, one.NodeId, one.Value.Value)
 
     async def call(self, params: list[ua.CallMethodRequest]) -> list[ua.CallMethodResult]:
-        return [await self._call(one) for one in params]
+        """All are begun at once, in their order: a stop does not wait for the motion before it."""
+        return await asyncio.gather(*(self._call(one) for one in params))
 
     async def _call(self, one: ua.CallMethodRequest) -> ua.CallMethodResult:
         result = ua.CallMethodResult()
