@@ -167,7 +167,10 @@ class Nodes:
             "home": (axis, "Axis", "Home", number),
             "program": ("table.program", "Program", "Start"),
         }
-        await self._call(self._one, *calls[what])
+        calling = asyncio.create_task(self._call(self._one, *calls[what]))
+        async with asyncio.timeout(SILENCE_S / 10.0):  # the session is answered while the command waits
+            assert await self._one.get_node(ua.ObjectIds.Server_ServerStatus_State).read_value() == ua.ServerState.Running
+        await calling
 
     async def stop(self, what: str) -> None:
         """By the same client where it is a controller, otherwise by the other one."""

@@ -16,6 +16,8 @@ from steptwin.access.roles import Role
 from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
 from steptwin.gateways.clients import GatewayClient, NotPermitted, address_text
 from steptwin.gateways.contract import ClientState
+from steptwin.gateways.opcua.indexranges import part_of
+from steptwin.gateways.opcua.limits import AT_ONCE, MOST_READ
 from steptwin.gateways.opcua.nodetypes import status
 from steptwin.gateways.opcua.subscriptions import MonitoredItems, Publish, packing
 
@@ -61,6 +63,10 @@ class SessionRequests(Protocol):
         self, client: GatewayClient, session: object, node: ua.NodeId, method: ua.NodeId, given: Sequence[ua.Variant]
     ) -> None:
         """As `write`."""
+        ...
+
+    async def history(self, params: ua.HistoryReadParameters, one: ua.HistoryReadValueId) -> ua.HistoryReadResult:
+        """The past of one node. Raises `ua.UaStatusCodeError`."""
         ...
 
     def leave(self, session: object) -> None:
@@ -115,20 +121,26 @@ class GatewaySession(InternalSession):
         return ClientState(client.name, address_text(self.name), client.role.title, tuple(dict.fromkeys(names)))
 
     async def read(self, params: ua.ReadParameters) -> list[ua.DataValue]:
-        await self._service.refresh(one.NodeId for one in params.NodesToRead if one.AttributeId == ua.AttributeIds.Value)
-        return await super().read(params)
+        wanted = params.NodesToRead
+        if len(wanted) > MOST_READ:
+            raise ua.UaStatusCodeError(ua.StatusCodes.BadTooManyOperations)
+        await self._service.refresh(one.NodeId for one in wanted if one.AttributeId == ua.AttributeIds.Value)
+        found: list[ua.DataValue] = []
+        for first in range(0, len(wanted), AT_ONCE):
+            found += await super().read(replace(params, NodesToRead=wanted[first : first + AT_ONCE]))
+            await asyncio.sleep(0)  # others are not held up
+        return [part_of(value, one.IndexRange) for one, value in zip(wanted, found, strict=True)]
 
     async def history_read(self, params: ua.HistoryReadParameters) -> list[ua.HistoryReadResult]:
-        """Node by node: the library lets one that has no history fail the whole request."""
-        return [await self._history(replace(params, NodesToRead=[one])) for one in params.NodesToRead]
+        return [await self._history(params, one) for one in params.NodesToRead]
 
-    async def _history(self, params: ua.HistoryReadParameters) -> ua.HistoryReadResult:
+    async def _history(self, params: ua.HistoryReadParameters, one: ua.HistoryReadValueId) -> ua.HistoryReadResult:
         try:
-            (result,) = await super().history_read(params)
+            return await self._service.history(params, one)
         except ua.UaStatusCodeError as error:
             result = ua.HistoryReadResult()
             result.StatusCode = ua.StatusCode(error.code)
-        return result
+            return result
 
     async def write(self, params: ua.WriteParameters) -> list[ua.StatusCode]:
         """As `call`."""
@@ -141,7 +153,8 @@ class GatewaySession(InternalSession):
             raise ua.UaStatusCodeError(ua.StatusCodes.BadIndexRangeInvalid)
         if one.Value.Value is None:
             raise ua.UaStatusCodeError(ua.StatusCodes.BadTypeMismatch)
-        if one.Value.SourceTimestamp is not None or one.Value.ServerTimestamp is not None:
+        has_status = one.Value.StatusCode is not None and one.Value.StatusCode.value != ua.StatusCodes.Good
+        if has_status or one.Value.SourceTimestamp is not None or one.Value.ServerTimestamp is not None:
             raise ua.UaStatusCodeError(ua.StatusCodes.BadWriteNotSupported)
         await self._service.write(self._client, one.NodeId, one.Value.Value)
 
@@ -178,7 +191,7 @@ class GatewaySession(InternalSession):
         wanted = [one.ItemToMonitor.NodeId for one in params.ItemsToCreate]
         await self._service.refresh(wanted)
         results = await super().create_monitored_items(params)
-        self._service.watch(wanted)
+        self._service.watch(node for node, result in zip(wanted, results, strict=True) if result.StatusCode.is_good())
         return results
 
 
