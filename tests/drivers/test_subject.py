@@ -393,6 +393,7 @@ def test_writes_of_registers_that_stop_are_known(rig: Rig, values: dict[str, flo
 
 def test_a_stop_between_the_values_of_a_write_refuses_the_rest(table: DeviceSubject, rig: Rig) -> None:
     unit = rig.mic._driver._unit
+    rig.mic.axis(1).enable()
     inner = unit.write
 
     async def write(item: Any, value: Any, **options: Any) -> None:

@@ -284,9 +284,10 @@ class AsyncMic488:
         """
         await self.set_all((name, value))
 
-    async def set_all(self, *values: tuple[str, float]) -> None:
+    async def set_all(self, *values: tuple[str, float], is_sure: bool = False) -> None:
         """`set` one after the other. Names are checked before the first is written. A stop of an axis meanwhile refuses what may
-        move it and has not been written."""
+        move it and has not been written. ``is_sure``: a motion that the controller would ignore, because its drive is off, is not
+        written but raises `NotReady`."""
         unit = self._unit
         chosen: list[tuple[RegisterItem, float, tuple[int, ...], Permission | None]] = []
         for name, value in values:
@@ -296,7 +297,12 @@ class AsyncMic488:
             moved = _moved_by(item)
             chosen.append((item, value, moved, unit.permission(*moved) if moved else None))
         for item, value, moved, permission in chosen:
-            data_type = DataType.REAL if unit.is_stop(item, value) else (await unit.control()).data_type
+            data_type = DataType.REAL
+            if not unit.is_stop(item, value):
+                control = await unit.control()
+                data_type = control.data_type
+                if is_sure and item.register.axis in moved and not control.triggered and value:
+                    unit.check_enabled(control, *moved)
             async with unit.stopping_if_late(*moved):
                 await unit.write(item, unit.travelling(item, value, data_type), data_type=data_type, permission=permission)
 

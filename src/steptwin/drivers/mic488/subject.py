@@ -185,7 +185,7 @@ class Mic488Part:
 
     async def _write(self, wanted: steps.Write) -> None:
         """Write registers one after the other."""
-        await self._mic.set_all(*((name, value) for _, name, value in wanted.values))
+        await self._mic.set_all(*((name, value) for _, name, value in wanted.values), is_sure=True)
 
     def effect_of(self, wanted: steps.Request | steps.Write) -> RawEffect:
         if isinstance(wanted, steps.Write):

@@ -313,10 +313,14 @@ class Unit:
                 f"unit {self.number} is in TRIGGER mode (AXIS_CTR_MODE = 1), in which a motion waits for its trigger: set "
                 "AXIS_CTR_MODE to 0",
             )
-        for axis in axes:
-            if control.axes[axis - 1] == AxisStatus.OFF:  # MIC-8
-                raise NotReady(self.place, f"M{axis} of unit {self.number} is switched off: enable it first (M{axis}_EN = 1)")
+        self.check_enabled(control, *axes)
         return control
+
+    def check_enabled(self, control: ControlRegisters, *axes: int) -> None:
+        """Raises `NotReady` for an axis that would ignore a motion because its drive is off (MIC-8)."""
+        for axis in axes:
+            if control.axes[axis - 1] == AxisStatus.OFF:
+                raise NotReady(self.place, f"M{axis} of unit {self.number} is switched off: enable it first (M{axis}_EN = 1)")
 
     def lock(self) -> AbstractAsyncContextManager[object]:
         """A lock for exchanges that no other motion command may interrupt."""
