@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -75,6 +75,11 @@ class GatewayClient:
             if subject.audit is not None and (isinstance(wanted, StopAxes) or PERMITS[row_of(wanted).name] != LOOK):
                 fields = plain_command(wanted)
                 subject.audit(self, str(fields.pop("do")), fields, outcome)
+
+    def refused(self, subject: GatewaySubject, do: str, fields: Mapping[str, object], why: str = "misuse") -> None:
+        """Record what never became a command: ``do`` says what was asked for."""
+        if subject.audit is not None:
+            subject.audit(self, do, fields, why)
 
     def check(self, wanted: Command) -> None:
         """Raises `NotPermitted`."""

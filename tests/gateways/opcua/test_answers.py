@@ -15,6 +15,7 @@ from gateway_rig import GatewayWorld
 from virtual_loop import run_virtually
 
 from steptwin.gateways.contract import PastValue
+from steptwin.gateways.opcua.addressspace import node_id
 from steptwin.gateways.opcua.gateway import OpcUaGateway
 from steptwin.gateways.opcua.limits import MOST_READ
 from steptwin.world.description import read_world
@@ -248,7 +249,25 @@ async def check_one_read_has_an_upper_bound(client: Client, world: GatewayWorld)
         await client.uaclient.read(ua.ReadParameters(NodesToRead=[one] * (MOST_READ + 1)))
 
 
+async def check_what_the_gateway_refuses_is_in_the_audit_log(client: Client, world: GatewayWorld) -> None:
+    logged: list[tuple[object, ...]] = []
+    world.audit = lambda who, do, fields, outcome: logged.append((do, fields.get("value"), fields.get("code"), outcome))
+    for value in (99.0, float("nan"), "text"):
+        with pytest.raises(ua.UaStatusCodeError):
+            await node(client, VOLTS).write_attribute(ua.AttributeIds.Value, ua.DataValue(ua.Variant(value)))
+    with pytest.raises(ua.uaerrors.BadArgumentsMissing):
+        await node(client, "M1").call_method(node_id("types.Axis.MoveTo"))
+    world.audit = None
+    assert logged == [
+        ("write", "99.0", "BadOutOfRange", "misuse"),
+        ("write", "nan", "BadOutOfRange", "misuse"),
+        ("write", "text", "BadTypeMismatch", "misuse"),
+        ("call", None, "BadArgumentsMissing", "misuse"),
+    ]
+
+
 CHECKS = (
+    check_what_the_gateway_refuses_is_in_the_audit_log,
     check_a_dead_band_keeps_quiet,
     check_filters_that_are_not_supported_are_refused,
     check_parts_of_an_array,

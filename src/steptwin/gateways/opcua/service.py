@@ -265,6 +265,9 @@ class NodeService:
         if isinstance(wanted, StopAxes):
             self._leases.stopped(wanted)
 
+    def refused(self, client: GatewayClient, do: str, fields: Mapping[str, object]) -> None:
+        client.refused(self._subject, do, fields)
+
     def leave(self, session: object) -> None:
         self._leases.drop(session)
 

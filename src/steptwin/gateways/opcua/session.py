@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable, Iterable, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -67,6 +67,10 @@ class SessionRequests(Protocol):
 
     async def history(self, params: ua.HistoryReadParameters, one: ua.HistoryReadValueId) -> ua.HistoryReadResult:
         """The past of one node. Raises `ua.UaStatusCodeError`."""
+        ...
+
+    def refused(self, client: GatewayClient, do: str, fields: Mapping[str, object]) -> None:
+        """A write or call that is no command."""
         ...
 
     def leave(self, session: object) -> None:
@@ -144,7 +148,7 @@ class GatewaySession(InternalSession):
 
     async def write(self, params: ua.WriteParameters) -> list[ua.StatusCode]:
         """As `call`."""
-        return await asyncio.gather(*(_code(self._write(one)) for one in params.NodesToWrite))
+        return await asyncio.gather(*(self._code(self._write(one), "write", one) for one in params.NodesToWrite))
 
     async def _write(self, one: ua.WriteValue) -> None:
         if one.AttributeId != ua.AttributeIds.Value:
@@ -164,8 +168,21 @@ class GatewaySession(InternalSession):
 
     async def _call(self, one: ua.CallMethodRequest) -> ua.CallMethodResult:
         result = ua.CallMethodResult()
-        result.StatusCode = await _code(self._service.call(self._client, self, one.ObjectId, one.MethodId, one.InputArguments))
+        calling = self._service.call(self._client, self, one.ObjectId, one.MethodId, one.InputArguments)
+        result.StatusCode = await self._code(calling, "call", one)
         return result
+
+    async def _code(self, action: Awaitable[None], do: str, asked: ua.WriteValue | ua.CallMethodRequest) -> ua.StatusCode:
+        """The status code of what is done. What the gateway itself refuses is in the audit log, too."""
+        try:
+            await action
+        except ua.UaStatusCodeError as error:
+            code = ua.StatusCode(error.code)
+            self._service.refused(self._client, do, {**_asked(asked), "code": code.name})
+            return code
+        except SteptwinError as error:
+            return status(next(code for kind, code in CODES if isinstance(error, kind)))
+        return ua.StatusCode()
 
     async def close_session(self, delete_subs: bool = True) -> None:
         self._service.leave(self)
@@ -195,12 +212,10 @@ class GatewaySession(InternalSession):
         return results
 
 
-async def _code(action: Awaitable[None]) -> ua.StatusCode:
-    """The status code of what is done."""
-    try:
-        await action
-    except ua.UaStatusCodeError as error:
-        return ua.StatusCode(error.code)
-    except SteptwinError as error:
-        return status(next(code for kind, code in CODES if isinstance(error, kind)))
-    return ua.StatusCode()
+def _asked(asked: ua.WriteValue | ua.CallMethodRequest) -> dict[str, object]:
+    """What a client wants, as fields of the audit log."""
+    if isinstance(asked, ua.WriteValue):
+        value = None if asked.Value.Value is None else asked.Value.Value.Value
+        return {"node": asked.NodeId.to_string(), "value": str(value)}
+    given = [str(one.Value) for one in asked.InputArguments]
+    return {"object": asked.ObjectId.to_string(), "method": asked.MethodId.to_string(), "arguments": ", ".join(given)}
