@@ -70,8 +70,10 @@ def test_the_other_direction_and_other_clients_need_not_wait() -> None:
     async def story() -> None:
         rig = Rig()
         for wanted, owner in ((FORWARDS, "session"), (BACKWARDS, "session"), (BACKWARDS, "another")):
+            before = rig.position
             await rig.leases.jog(owner, ME, wanted, LEASE_S)
             await rig.wait(0.2)
+            assert rig.position != before
             rig.stop()
             await rig.wait(0.2)
         rig.leases.close()
