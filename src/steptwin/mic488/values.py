@@ -246,7 +246,7 @@ def repeatable(registers: RegisterMap, request: pdu.ModbusRequest) -> bool:
 
 def moves(registers: RegisterMap, request: pdu.ModbusRequest) -> bool:
     """Whether a request may start a motion, as far as it can be decoded."""
-    if isinstance(request, pdu.ReadRequest) or _stops(registers, request):
+    if isinstance(request, pdu.ReadRequest) or halted(registers, request):
         return False
     return any(
         register is None or register.effect in (WriteEffect.MOVE, WriteEffect.ADD) for register in _written(registers, request)
