@@ -203,8 +203,8 @@ def jog(
 ) -> None:
     """Jog an axis until a key is pressed. It is a dead-man's switch: if this command dies, the axis stops by itself.
 
-    An M1486 makes one short move after the other, of 0.15 s at the velocity given (full steps/s) and its ramps, whatever --hold
-    is. E types, which write every command into their EEPROM, are not jogged.
+    An M1486 makes one short move after the other, of 0.15 s at the velocity given (full steps/s), whatever --hold is. E types,
+    which write every command into their EEPROM, are not jogged, nor is anything on a line below 1200 bit/s.
     """
     from steptwin.drivers.typed import tied
 

@@ -138,6 +138,11 @@ class CharacterTalk:
             return 0
         return self._serial.duration(2 * len(request.text) + 16)
 
+    @property
+    def baud(self) -> int:
+        """The rate of the line, bit/s."""
+        return self._serial.baud
+
     def wire_ns(self, characters: int) -> Nanos:
         """The time that characters take on the line, ns."""
         return self._serial.duration(characters)

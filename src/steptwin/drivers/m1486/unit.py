@@ -90,10 +90,11 @@ class ChipUnit:
         """Hold the line for exchanges that belong together. Waiting for it extends ``permission``."""
         return self.line.lock("m1486 turn", None if permission is None else permission.extend)
 
-    def permission(self) -> Permission:
+    def permission(self, patience_ns: Nanos | None = None) -> Permission:
         """Permission for a motion requested now. It ends with a stop of the chip, or after too long without progress."""
         before = self.notes.stops
-        patience_ns = max(PATIENCE_NS, 4 * TRIES * self.timeout_ns)
+        if patience_ns is None:
+            patience_ns = max(PATIENCE_NS, 4 * TRIES * self.timeout_ns)
         return Permission(self.line.now, patience_ns, lambda: self.notes.stops != before)
 
     # ------------------------------------------------------------------ exchanges
