@@ -15,9 +15,9 @@ from steptwin.m1486.syntax import ChipCommand
 from steptwin.m1486.variants import SLOWEST_JOG, Store
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.motion.ramps import longest_within
-from steptwin.world import script as do
 from steptwin.world.control import Jog
 from steptwin.world.heldjog import REST_NS, STOP_NS, Given
+from steptwin.world.kinds.m1486.control import typed
 
 LINK_NS: Nanos = 100 * MILLISECOND
 """A move takes at most this, unless a single microstep takes longer."""
@@ -112,4 +112,4 @@ class M1486HeldJog:
         return self._typed(*before, f"{'f' if self._direction > 0 else 'b'}{self._distance_u}", "r")
 
     def _typed(self, *texts: str) -> Given:
-        return (do.Send(self._line, "".join(f"{text}\r" for text in (f"x{self._chip.address:X}", *texts)).encode("ascii")),)
+        return (typed(self._chip, self._line, *texts),)
