@@ -13,6 +13,7 @@ from steptwin.drivers.m1486.talk import TYPE_QUERY
 from steptwin.drivers.m1486.unit import ChipUnit
 from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Misuse, Refusal
+from steptwin.m1486.functions import CONTINUE
 from steptwin.m1486.lines import STEP_DIRECTION, Interface
 from steptwin.m1486.syntax import ChipCommand, JumpCondition, ParsedProgram
 from steptwin.m1486.variants import Store, Variant
@@ -94,6 +95,9 @@ async def send_program(
         raise Misuse(f"{name} is not sent: {kinds}; a program is checked for one type: send each its own")
     program = checked_program(text, first.variant, first.notes.interface or STEP_DIRECTION, name)
     found = parts(program)
+    for address, commands in found:
+        if address in units and any((command.key, command.number) == ("T", CONTINUE) for command in commands):
+            units[address].notes.note_function(CONTINUE, on=True)  # wrong data do not end it any more
     for address, commands in found:
         if address not in units:
             if address is None:
@@ -252,7 +256,7 @@ async def begin(
 
     notes.motion = None
     try:
-        await unit.act(text, permission, once=True, retype=retype, program=kind is ChipMotion.BLOCK)
+        await unit.act(text, permission, once=True, retype=retype)
     except SentLate:
         register_motion(None, None)
         raise

@@ -156,9 +156,9 @@ class M1486Part:
         full_steps = abs(wanted.velocity) * self._chip.scale_u / FULL_STEP
         await self._chip.run(1 if wanted.velocity > 0.0 else -1, full_steps)
 
-    async def _stop(self, wanted: command.StopAxes) -> None:
+    async def _stop(self, wanted: command.StopAxes) -> object:
         self._check_axis(wanted.axis)
-        await self._chip.stop()
+        return {"program": ProgramActivity.STOPPED.value if await self._chip.stop() else None}
 
     async def _program(self, wanted: command.ControlProgram) -> None:
         if wanted.action != "stop":

@@ -87,7 +87,7 @@ class ChipRequest:
         return self.acts and (self.committed or self.commented)
 
     def __str__(self) -> str:
-        return f"{chip_name(self.address)}: {self.text.strip() or 'select'}"
+        return f"{chip_name(self.address)}: {' '.join(self.text.split()) or 'select'}"
 
 
 ByteObserver = Callable[[Nanos, FrameDirection, bytes], object]
