@@ -14,6 +14,7 @@ from steptwin.files.world import World
 from steptwin.machine import SECOND, Nanos
 from steptwin.subject import commands as command
 from steptwin.subject.following import filter_of
+from steptwin.subject.payloads import StatusPayload
 from steptwin.subject.world import WorldSubject
 from steptwin.world.actions import Download
 from steptwin.world.control import Seek
@@ -105,5 +106,6 @@ def _by_command(family: str, asked: str, way: str, delay_s: float) -> tuple[Nano
     stopped_at = world.now
     world.advance(stopped_at + round(QUIET_S * SECOND))
     world.settle_all()
-    begun = [event.time for event in followed.take().events if event.payload.code in BEGINS]
+    events = followed.take().events
+    begun = [event.time for event in events if isinstance(event.payload, StatusPayload) and event.payload.code in BEGINS]
     return stopped_at, begun, world.read("drum.moving") == 0.0
