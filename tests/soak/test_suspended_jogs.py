@@ -135,9 +135,8 @@ def _run(folder: Path, number: int, trials: int) -> list[str]:
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGSTOP")
 def test_none_of_the_axes_that_were_jogged_moves_again(tmp_path: Path) -> None:
     trials = scaled(1000)
-    lines = min(len(LINES), trials) if trials >= len(LINES) else 3
-    chosen = range(len(LINES)) if lines == len(LINES) else (0, 2, 3)
-    with ThreadPoolExecutor(lines) as pool:
-        found = pool.map(lambda number: _run(tmp_path, number, -(-trials // lines)), chosen)
+    chosen = range(len(LINES)) if trials >= 10 * len(LINES) else (0, 2, 3)
+    with ThreadPoolExecutor(len(chosen)) as pool:
+        found = pool.map(lambda number: _run(tmp_path, number, -(-trials // len(chosen))), chosen)
         wrong = [one for of_line in found for one in of_line]
     assert not wrong, "\n".join(wrong)

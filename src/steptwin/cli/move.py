@@ -64,11 +64,12 @@ def stop(
     axes: Axes = None,
     device: Device = None,
     program: Annotated[
-        bool, typer.Option("--program", help="End the program too, which switches drives and outputs off.")
+        bool, typer.Option("--program", help="End the program too, which switches drives and outputs of a MIC488 off.")
     ] = False,
     log_frames: LogFrames = False,
 ) -> None:
-    """Stop axes at once, without ramp; an M1486 with its ramp. A program that runs may move them again: see --program."""
+    """Stop axes at once, without ramp; an M1486 with its ramp, and its program. The program of a MIC488 may move them again: see
+    --program."""
     address = find(device)
     kind = kind_of(address)
     with other_kinds_named(kind, address):
