@@ -25,7 +25,9 @@ class Device:
         self.is_read = asyncio.Event()
         self.is_asked = asyncio.Event()
 
-    def effect_of(self, request: steps.Request) -> RawEffect:
+    def effect_of(self, request: steps.Request | steps.Write) -> RawEffect:
+        if isinstance(request, steps.Write):
+            return RawEffect.WRITE
         return {3: RawEffect.LOOK, 5: RawEffect.STOP}.get(request.pdu[0], RawEffect.WRITE)
 
     async def settings_text(self) -> str:

@@ -13,6 +13,7 @@ from host_rig import Wire, async_driver, driver, run_virtual, task_line
 from mic488_rig import loaded
 
 from steptwin.drivers.blocking import finish
+from steptwin.drivers.exchange import Overtaken
 from steptwin.drivers.m1486.subject import M1486Part
 from steptwin.drivers.mic488.subject import Mic488Part
 from steptwin.drivers.mic488.sync import Mic488
@@ -375,17 +376,46 @@ def test_writes_of_words_that_stop_are_known(rig: Rig, key: str, value: int, eff
     assert part.effect_of(do.Request("bus", 1, pdu, SECOND)).value == effect
 
 
+@pytest.mark.parametrize(
+    ("values", "effect"),
+    [
+        ({"M1_STOP": 1}, "stop"),
+        ({"M_STOP": 3, "PROGRAM_CTRL": 2}, "stop"),
+        ({"M_STOP": 0}, "write"),
+        ({"M1_STOP": 1, "M2_POS_ABS": 5.0}, "write"),
+        ({"OUT1": 1}, "write"),
+    ],
+)
+def test_writes_of_registers_that_stop_are_known(rig: Rig, values: dict[str, float], effect: str) -> None:
+    part = Mic488Part(rig.mic._driver)
+    assert part.effect_of(do.Write(tuple(("table", name, value) for name, value in values.items()))).value == effect
+
+
+def test_a_stop_between_the_values_of_a_write_refuses_the_rest(table: DeviceSubject, rig: Rig) -> None:
+    unit = rig.mic._driver._unit
+    rig.mic.axis(1).enable()
+    inner = unit.write
+
+    async def write(item: Any, value: Any, **options: Any) -> None:
+        await inner(item, value, **options)
+        unit.notes.stops[1] += 1  # another client stops M1 meanwhile
+
+    unit.write = write  # type: ignore[method-assign]
+    with pytest.raises(Overtaken, match="a stop was requested meanwhile"):
+        table.do(do.Write((("table", "OUT1", 1.0), ("table", "M1_POS_ABS", 5.0))))
+
+
 def test_a_raw_request_that_stops_goes_before_those_that_wait(
     table: DeviceSubject, rig: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     unit, asked = rig.mic._driver._unit, list[bool]()
-    ask = unit.ask
+    exchange = unit._exchange
 
-    async def noted(request: Any, **options: Any) -> bytes:
-        asked.append(options.get("urgent", False))
-        return await ask(request, **options)
+    async def noted(query: Any, urgent: bool, *rest: Any) -> bytes:
+        asked.append(urgent)
+        return await exchange(query, urgent, *rest)
 
-    monkeypatch.setattr(unit, "ask", noted)
+    monkeypatch.setattr(unit, "_exchange", noted)
     for pdu in ("0507d4ff00", "0327240002"):  # M1_STOP ON; POS_ACT of M1
         table.do(do.Request("bus", 1, bytes.fromhex(pdu), SECOND))
     assert asked == [True, False]

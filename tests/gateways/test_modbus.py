@@ -9,9 +9,12 @@ from pathlib import Path
 from typing import Any, cast
 
 import pytest
+from bridge_rig import BridgeRig
 from gateway_rig import GatewayWorld
 
+from steptwin.access.roles import Role
 from steptwin.errors import LineFailure, Misuse, Refusal
+from steptwin.gateways.clients import GatewayClient
 from steptwin.gateways.devicefile import read_device_file
 from steptwin.gateways.modbus import MOST_READS, MasterGateway
 from steptwin.subject.contract import Description, LinePart, Result
@@ -122,13 +125,35 @@ def test_what_could_not_be_done(run: Any, error: Exception, code: str) -> None:
     assert played(run, play) == frame(1, 1, f"86{code}")
 
 
-@pytest.mark.parametrize(("pdu", "exception"), [("2b0e0100", "ab01"), ("0300000000", "8303")])
+@pytest.mark.parametrize(
+    ("pdu", "exception"),
+    [("2b0e0100", "ab01"), ("0300000000", "8303")],
+)
 def test_what_is_no_request_of_the_device_is_not_sent(run: Any, pdu: str, exception: str) -> None:
     async def play(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, devices: Devices) -> tuple[bytes, int]:
         writer.write(frame(1, 1, pdu))
         return await reader.readexactly(9), len(devices.asked)
 
     assert played(run, play) == (frame(1, 1, exception), 0)
+
+
+@pytest.mark.parametrize("request_", ["03ffff0002", "01ffff07d0", "02ffff0009", "03ffdc007d", "10ffff00020400000000"])
+def test_what_runs_past_the_last_address_is_answered_as_by_the_device(run: Any, request_: str) -> None:
+    async def scene() -> tuple[str, str]:
+        rig = BridgeRig()
+        await rig.open()
+        gateway = MasterGateway(spec(), rig.subject, Path())
+        (part,) = rig.subject.description.machines
+        asked = bytes.fromhex(request_)
+        found = (
+            await gateway.ask(GatewayClient("master", Role.ENGINEER), part, asked),
+            rig.device.execute(asked, rig.cell.enter()),
+        )
+        await rig.close()
+        return found[0].hex(), found[1].hex()
+
+    answer, expected = run(scene())
+    assert answer == expected == f"{int(request_[:2], 16) | 0x80:02x}02"
 
 
 def test_a_viewer_reads(run: Any) -> None:

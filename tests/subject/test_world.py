@@ -97,7 +97,7 @@ def test_a_description_survives_json_and_names_points_that_can_be_read() -> None
     assert read_description(json.loads(json.dumps(description.plain()))) == description
     assert {part.name: part.controls for part in description.machines} == {
         "table": ("enable", "move", "home", "jog", "stop", "program"),
-        "drum": ("move", "jog", "stop"),
+        "drum": ("move", "jog", "stop", "program"),
     }
     takes = {(one.command, part.name, one.axis): one.arguments for part in description.machines for one in part.takes}
     (velocity,) = takes["jog", "table", 2]

@@ -8,7 +8,7 @@ from steptwin.errors import Misuse, Refusal
 from steptwin.files.world import World
 from steptwin.machine import SECOND
 from steptwin.world import script as do
-from steptwin.world.control import ControllerCommand, ControlProgram, Enable, Home, Jog, Move, Seek, StopAxes
+from steptwin.world.control import ControllerCommand, ControlProgram, Enable, Halt, Home, Jog, Move, Seek, StopAxes
 from steptwin.world.kind import MotionEnds
 from steptwin.world.kinds.m1486 import control as m1486
 from steptwin.world.kinds.mic488 import control as mic488
@@ -92,8 +92,6 @@ def chips(*texts: str, variant: str = "A") -> World:
         (Move("c", 1, by=-64.0), "xA\rb64\rr\r"),
         (Jog("c", 1, 6400.0), "xA\rv100\rg+\rr\r"),
         (Jog("c", 1, -1024.0), "xA\rv16\rg-\rr\r"),
-        (StopAxes("c"), "xA\rk\r"),
-        (StopAxes("c", 1), "xA\rk\r"),
     ],
 )
 def test_characters_that_are_typed(command: ControllerCommand, text: str) -> None:
@@ -132,7 +130,16 @@ def test_what_a_chip_does_not_take(command: ControllerCommand, kind: type[Except
         m1486.CONTROL[type(command)](chip, "chips", command)
     assert str(error.value).startswith(text)
     with pytest.raises(Refusal, match="c is on no line, so no commands can be sent to it"):
-        m1486.CONTROL[StopAxes](chip, None, StopAxes("c"))
+        m1486.CONTROL[Jog](chip, None, Jog("c", 1, 6400.0))
+
+
+def test_a_chip_is_stopped_at_itself_and_its_program_cannot_be_started() -> None:
+    chip = chips().m1486["c"].chip
+    assert m1486.CONTROL[StopAxes](chip, None, StopAxes("c")) == Halt("c")
+    assert m1486.CONTROL[ControlProgram](chip, None, ControlProgram("c", "stop")) == Halt("c", program="stop")
+    for action in ("start", "pause"):
+        with pytest.raises(Refusal, match=f"c: an M1486 has no command to {action} its program: only stop can be done"):
+            m1486.CONTROL[ControlProgram](chip, None, ControlProgram("c", action))
 
 
 @pytest.mark.parametrize(("to", "is_taken"), [(80.0, True), (112.0, False), (64.0, False)])

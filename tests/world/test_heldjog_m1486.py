@@ -13,8 +13,10 @@ from steptwin.subject.commands import Jog, StopAxes
 from steptwin.world import script as do
 from steptwin.world.kinds.m1486.heldjog import M1486HeldJog
 
+SLOW = f"{TIMED}\nbaud = 1200"
 
-@pytest.mark.parametrize("timing", ["", TIMED])
+
+@pytest.mark.parametrize("timing", ["", TIMED, SLOW])
 @pytest.mark.parametrize("velocity", [64.0 * 20, 64.0 * 640, -64.0 * 4000])
 @pytest.mark.parametrize("renewals", [0, 1, 7])
 def test_an_m1486_stands_in_time_after_the_last_renewal(velocity: float, renewals: int, timing: str) -> None:
@@ -67,6 +69,8 @@ def test_an_m1486_that_was_killed_is_not_jogged_on() -> None:
 def test_what_cannot_be_jogged_is_refused() -> None:
     with pytest.raises(Refusal, match="EEPROM"):
         chip("E1").begin(Jog("drum", 1, 6400.0))
+    with pytest.raises(Refusal, match="drum: a jog needs a line of at least 1200 bit/s; this one has 300 bit/s"):
+        chip(timing=f"{TIMED}\nbaud = 300").begin(Jog("drum", 1, 6400.0))
     rig = chip()
     rig.subject.do(Jog("drum", 1, 6400.0))
     rig.run(50)

@@ -21,7 +21,7 @@ class DrivenAxis(Protocol):
 
     async def wait(self) -> object: ...
 
-    async def stop(self) -> None: ...
+    async def stop(self) -> object: ...
 
 
 class AwaitedMotion:
@@ -31,7 +31,7 @@ class AwaitedMotion:
         self._axis = axis
         self._show = show
         self._stops = 0
-        self._halting: set[asyncio.Task[None]] = set()
+        self._halting: set[asyncio.Task[object]] = set()
         self.was_stopped = False
         """Whether `stop` has ended the last motion."""
 

@@ -64,11 +64,12 @@ def stop(
     axes: Axes = None,
     device: Device = None,
     program: Annotated[
-        bool, typer.Option("--program", help="End the program too, which switches drives and outputs off.")
+        bool, typer.Option("--program", help="End the program too, which switches drives and outputs of a MIC488 off.")
     ] = False,
     log_frames: LogFrames = False,
 ) -> None:
-    """Stop axes at once, without ramp; an M1486 with its ramp. A program that runs may move them again: see --program."""
+    """Stop axes at once, without ramp; an M1486 with its ramp, and its program. The program of a MIC488 may move them again: see
+    --program."""
     address = find(device)
     kind = kind_of(address)
     with other_kinds_named(kind, address):
@@ -203,8 +204,8 @@ def jog(
 ) -> None:
     """Jog an axis until a key is pressed. It is a dead-man's switch: if this command dies, the axis stops by itself.
 
-    An M1486 makes one short move after the other, of 0.15 s at the velocity given (full steps/s) and its ramps, whatever --hold
-    is. E types, which write every command into their EEPROM, are not jogged.
+    An M1486 makes one short move after the other, of 0.15 s at the velocity given (full steps/s), whatever --hold is. E types,
+    which write every command into their EEPROM, are not jogged, nor is anything on a line below 1200 bit/s.
     """
     from steptwin.drivers.typed import tied
 

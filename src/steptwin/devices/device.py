@@ -1,6 +1,8 @@
 """A device behind its driver as a part of a subject: polled for watched values, reconnected after its line was lost.
 
-Nothing that moves is repeated or kept for later: while the line is lost, and behind a stop, commands are refused.
+Nothing that moves is repeated or kept for later: while the line is lost, commands are refused. After a stop has been
+acknowledged, nothing begins that was asked for before: what waits when a stop arrives, and what arrives before its
+acknowledgement, is refused. So the order in which requests of several clients are read after a pause does not matter.
 """
 
 from __future__ import annotations
@@ -67,6 +69,8 @@ class ConnectedDevice:
         """Points, and when they were read last."""
         self._turn = asyncio.Lock()
         self._stops = 0
+        self._stopping = 0
+        """Stops that have not been acknowledged yet."""
         self._waiting = 0
         self._is_kept = False
         self._jogs: dict[int, LeasedJog] = {}
@@ -168,9 +172,7 @@ class ConnectedDevice:
     async def _done(self, wanted: Command) -> Result:
         try:
             if self._is_stop(wanted):
-                self._stops += 1
-                self._cut_jogs(wanted)
-                return await self._execute(wanted)
+                return await self._stop(wanted)
             if self.lost is not None:
                 raise LineFailure(f"{row_of(wanted).name} was not sent: the connection is lost ({self.lost})")
             if type(wanted) in LOOKS or self._effect_of(wanted) is RawEffect.LOOK:
@@ -179,15 +181,25 @@ class ConnectedDevice:
         finally:
             self._wanted.set()  # what it has changed is looked at soon
 
+    async def _stop(self, wanted: Command) -> Result:
+        self._stops += 1
+        self._stopping += 1
+        try:
+            self._cut_jogs(wanted)
+            return await self._execute(wanted)
+        finally:
+            self._stopping -= 1
+
     def _is_stop(self, wanted: Command) -> bool:
         return _is_stop(wanted) or self._effect_of(wanted) is RawEffect.STOP
 
     def _effect_of(self, wanted: Command) -> RawEffect | None:
-        """Of a raw request."""
-        return self._device.effect_of(wanted) if isinstance(wanted, steps.Request) else None
+        """The effect of a raw request or of a write of registers; None of other commands."""
+        return self._device.effect_of(wanted) if isinstance(wanted, steps.Request | steps.Write) else None
 
     async def _in_turn(self, wanted: Command) -> Result:
         """One after the other, in the order in which they came."""
+        self._refuse_while_stopping(wanted)
         stops, asked = self._stops, self._around.clock()
         if self._waiting >= MOST_WAITING:
             raise Refusal(f"{row_of(wanted).name} was not sent: {MOST_WAITING} commands wait already")
@@ -215,6 +227,10 @@ class ConnectedDevice:
         if self._shadow is not None:
             self._shadow.did(wanted, begun, self._around.clock())
         return result
+
+    def _refuse_while_stopping(self, wanted: Command) -> None:
+        if self._stopping:
+            raise Refusal(f"{row_of(wanted).name} was not sent: a stop is being executed; repeat it after that")
 
     def _refuse_late(self, wanted: Command, stops: int, asked: Nanos) -> None:
         """Refuse what a stop has overtaken, and what was asked for too long ago."""
@@ -281,6 +297,7 @@ class ConnectedDevice:
     async def _begin_jog(self, wanted: command.Jog) -> LeasedJog:
         if self.lost is not None:
             raise LineFailure(f"jog was not sent: the connection is lost ({self.lost})")
+        self._refuse_while_stopping(wanted)
         jog = self._device.held_jog(wanted)
         stops = self._stops
         turn = self._jog_turns.setdefault(wanted.axis, asyncio.Lock())

@@ -32,6 +32,9 @@ class LeasedJog:
         """Raises `Misuse`, `Refusal`, `LineFailure`."""
         self._until = self._clock() + self.lasts_ns
         await self._jog.__aenter__()
+        if self._jog.end is not None:
+            await self._jog.__aexit__(None, None, None)
+            raise Refusal(f"the jog was not begun: {self._jog.end}")
         self._until = self._clock() + self.lasts_ns
         self._running = asyncio.get_running_loop().create_task(self._run())
 
@@ -72,9 +75,12 @@ class LeasedJog:
     # ------------------------------------------------------------------ as `Held`
 
     def extend(self) -> None:
+        now = self._clock()
+        if now > self._until:  # whoever renews it was away, or this process: what waited meanwhile extends nothing
+            self._end("lapsed")
         if self.over is not None:
             raise Refusal(f"the jog has ended: {self.over}")
-        self._until = self._clock() + self.lasts_ns
+        self._until = now + self.lasts_ns
 
     def release(self) -> None:
         self._end("let go")

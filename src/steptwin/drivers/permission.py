@@ -3,13 +3,19 @@
 A program can be suspended at any moment, by a debugger, SIGSTOP, the sleep of a laptop or a lack of memory, and continue
 hours later. A person at the machine does not expect a motion then. So a motion has a permission that expires; it is checked
 against the clock immediately before sending.
+
+A held jog has one permission from before its first motion to its end, of the hold time: each answer of the device that belongs
+to the motion extends it, and nothing else. A process that was away for longer finds it expired, for good (ADR 12).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from steptwin.machine import Nanos
+from steptwin.machine import MILLISECOND, Nanos
+
+HOLD_NS: Nanos = 400 * MILLISECOND
+"""The usual hold time of a jog: so long after the last answer of the device that belongs to its motion nothing more is begun."""
 
 
 def never() -> bool:
@@ -38,11 +44,10 @@ class Permission:
             self._has_expired = True
         return self._has_expired
 
-    def extend(self, since: Nanos | None = None) -> None:
-        """Extend the permission, because the request makes progress (at ``since``, by default now). An expired one stays
-        expired."""
-        now = self._clock()
+    def extend(self) -> None:
+        """Extend the permission, because the request makes progress. An expired one stays expired."""
+        now = self._clock()  # once: the program may be suspended between two looks
         if now > self._until:
             self._has_expired = True
         elif not self._has_expired:
-            self._until = (now if since is None else since) + self.patience_ns
+            self._until = now + self.patience_ns

@@ -41,7 +41,7 @@ ValueAndUnit: TypeAlias = tuple[float | None, str]
 
 
 class RawEffect(Enum):
-    """What a raw request does."""
+    """What a raw request, or a write of registers, does."""
 
     LOOK = "look"
     WRITE = "write"
@@ -88,8 +88,9 @@ class DevicePart(Protocol):
         """The unit of a point. Raises `Misuse` for an unknown point."""
         ...
 
-    def effect_of(self, request: steps.Request) -> RawEffect:
-        """Of a raw request, of which nothing else is known."""
+    def effect_of(self, wanted: steps.Request | steps.Write) -> RawEffect:
+        """What a raw request, of which nothing else is known, or a write of registers does. Raises `Misuse` for an unknown
+        register."""
         ...
 
     def actions(self) -> Mapping[type, DeviceAction]:

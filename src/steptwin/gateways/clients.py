@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -10,10 +10,13 @@ from steptwin.access.commands import PERMITS
 from steptwin.access.roles import LOOK, Role
 from steptwin.errors import Refusal, SteptwinError
 from steptwin.gateways.contract import GatewaySubject
-from steptwin.subject.commands import Command, StopAxes, plain_command, row_of
+from steptwin.subject.commands import Command, Home, Move, StopAxes, plain_command, row_of
 from steptwin.subject.contract import Result
 from steptwin.subject.dispatch import code_of
+from steptwin.subject.following import Filter
+from steptwin.subject.payloads import StatusPayload
 from steptwin.tracing import span
+from steptwin.world.script import Write
 
 
 def address_text(address: object) -> str:
@@ -23,6 +26,20 @@ def address_text(address: object) -> str:
 
 class NotPermitted(Refusal):
     """The role of a client is not high enough."""
+
+
+class Ignored(Refusal):
+    """The controller has accepted a command and does nothing, because its drive is off."""
+
+
+MOST_EVENTS = 256
+"""Of one command that are looked at."""
+IGNORED = "ignored: not enabled"
+"""Its outcome in the audit log."""
+NOT_ENABLED = "drive-off"
+"""The event of a controller that ignores a command (`steptwin.datasheet.Datasheet.events`)."""
+MOVING = (Move, Home, Write)
+"""Commands that a controller may ignore; a jog is refused, and devices are asked by their drivers first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +58,7 @@ class GatewayClient:
         """Raises `NotPermitted`, `Misuse`, `Refusal` and `LineFailure`."""
         with self.noted(subject, wanted):
             self.check(wanted)
-            return await subject.do(wanted)
+            return await _done(subject, wanted)
 
     @contextmanager
     def noted(self, subject: GatewaySubject, wanted: Command) -> Generator[None]:
@@ -52,12 +69,17 @@ class GatewayClient:
                 yield
             outcome = "done"
         except SteptwinError as error:
-            outcome = code_of(error)
+            outcome = IGNORED if isinstance(error, Ignored) else code_of(error)
             raise
         finally:
             if subject.audit is not None and (isinstance(wanted, StopAxes) or PERMITS[row_of(wanted).name] != LOOK):
                 fields = plain_command(wanted)
                 subject.audit(self, str(fields.pop("do")), fields, outcome)
+
+    def refused(self, subject: GatewaySubject, do: str, fields: Mapping[str, object], why: str = "misuse") -> None:
+        """Record what never became a command: ``do`` says what was asked for."""
+        if subject.audit is not None:
+            subject.audit(self, do, fields, why)
 
     def check(self, wanted: Command) -> None:
         """Raises `NotPermitted`."""
@@ -68,3 +90,19 @@ class GatewayClient:
         """Raises `NotPermitted` for what ``name`` stands for."""
         if self.role < needed:
             raise NotPermitted(f"{name} is for the role {needed.title}; {self.name} has the role {self.role.title}")
+
+
+async def _done(subject: GatewaySubject, wanted: Command) -> Result:
+    """Raises `Ignored` for what a controller has not done although it has accepted it."""
+    if not isinstance(wanted, MOVING):
+        return await subject.do(wanted)
+    following = subject.follow(Filter(frozenset({"status"})), MOST_EVENTS)
+    try:
+        result = await subject.do(wanted)
+        for event in following.take().events:
+            # What was due before has happened before it; a world does it at once.
+            if event.number > result.number and isinstance(event.payload, StatusPayload) and event.payload.code == NOT_ENABLED:
+                raise Ignored(f"{event.machine}: {event.text}: switch its drive on first")
+        return result
+    finally:
+        following.close()

@@ -1,9 +1,13 @@
-"""Jogs by clients of gateways: each lasts for the time given with every call, and ends when its client is lost."""
+"""Jogs by clients of gateways: each lasts for the time given with every call, and ends when its client is lost.
+
+A call that comes while a button is held is not distinguishable from a new one. So a jog that has ended by itself or by a stop is
+not begun again in its direction until its client has not called for the time of its lease.
+"""
 
 from __future__ import annotations
 
 import asyncio
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 
 from steptwin.errors import Misuse, Refusal, SteptwinError
@@ -58,21 +62,45 @@ class JogLeases:
             if lease.wanted == wanted:
                 lease.until = until
                 return
+        elif lease is not None and lease.owner is owner and lease.wanted.velocity * wanted.velocity > 0.0:
+            lease.until = until
+            over = f"{wanted.machine} axis {wanted.axis}: the jog has ended: {lease.held.over}"
+            raise Refusal(f"{over}; it can be begun again {lease_s:g} s after its last call")
+        if lease is not None:
             self._end(lease)
         held = await self._subject.begin_jog(wanted)
         lease = self._leases[place] = _Lease(owner, wanted, held, until)
         lease.task = asyncio.create_task(self._hold(lease))
 
     async def _hold(self, lease: _Lease) -> None:
+        """Until it is over and its client has let go."""
         loop = asyncio.get_running_loop()
-        while lease.held.over is None and (left := lease.until - loop.time()) > 0:
-            await asyncio.sleep(min(left, lease.held.lasts_ns / SECOND / RENEWALS))
+        while (left := lease.until - loop.time()) > 0:
+            await asyncio.sleep(left if lease.held.over is not None else min(left, lease.held.lasts_ns / SECOND / RENEWALS))
             if lease.held.over is None and loop.time() < lease.until:
-                try:
+                with suppress(SteptwinError):  # it has ended
                     lease.held.extend()
-                except SteptwinError:  # it has ended
-                    break
         self._end(lease)
+
+    def extend(self, owner: object, wanted: Jog, lease_s: float) -> None:
+        """Let a jog go on from now on. Raises `Refusal` if it has ended."""
+        lease = self._leases.get((wanted.machine, wanted.axis))
+        if lease is None or lease.owner is not owner or lease.wanted != wanted or lease.held.over is not None:
+            raise Refusal(f"{wanted.machine} axis {wanted.axis}: the jog has ended")
+        lease.until = asyncio.get_running_loop().time() + lease_s
+
+    def released(self, machine: str, axis: int) -> None:
+        """The client has let go of a jog that had ended: it may be begun again."""
+        lease = self._leases.get((machine, axis))
+        if lease is not None and lease.held.over is not None:
+            self._end(lease)
+
+    def replaced(self, machine: str, axis: int) -> None:
+        """Another command has taken the axis."""
+        lease = self._leases.get((machine, axis))
+        if lease is not None:
+            lease.held.cut()
+            self._end(lease)
 
     def _end(self, lease: _Lease) -> None:
         """Let go of the axis, which brakes."""
@@ -89,7 +117,6 @@ class JogLeases:
         for (machine, axis), lease in list(self._leases.items()):
             if machine == wanted.machine and wanted.axis in (None, axis):
                 lease.held.cut()
-                self._end(lease)
 
     def drop(self, owner: object) -> None:
         """A client has gone."""

@@ -26,6 +26,7 @@ from steptwin.wire.mbap import HEADER_BYTES, TcpFramer
 from steptwin.wire.pdu import (
     DEVICE_BUSY,
     GATEWAY_TARGET_FAILED,
+    ILLEGAL_DATA_ADDRESS,
     ILLEGAL_FUNCTION,
     READS,
     WRITES,
@@ -135,6 +136,8 @@ class MasterGateway:
             return exception_pdu(function, ILLEGAL_FUNCTION)
         except LineFailure:
             return exception_pdu(function, GATEWAY_TARGET_FAILED)
+        except Misuse:  # it is not sent, because no device has registers there
+            return exception_pdu(function, ILLEGAL_DATA_ADDRESS)
         except SteptwinError:  # overtaken by a stop, or too late
             return exception_pdu(function, DEVICE_BUSY)
 

@@ -194,6 +194,12 @@ class M1486Chip(ChipCore):
         self.uart.receive(data, now)
         self._settle()
 
+    def halt(self, now: Nanos) -> None:
+        self.advance(now)
+        if not self.is_shut_down:
+            super().halt(now)
+            self._settle()
+
     def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
         """Characters that have left by ``now``, each with the moment of its end."""
         self.advance(now)

@@ -178,6 +178,22 @@ class ChipCore(Stateful):
         self.event("kill", "Kill", now)
         self.motor.kill(now)
 
+    def halt(self, now: Nanos) -> None:
+        """A stop of its world: the motor goes down its ramp, and nothing else of what it was given before is executed.
+
+        As wrong data and Kill in one burst that overtakes what is on the line, in the input buffer and in an EEPROM. It works
+        with function 44 ON, too, and with 51 OFF it does not hold the commands behind it. A file that is being received does not
+        run.
+        """
+        self.receiver.discard(self.uart.take_arriving(), now)
+        if self.memory.file is FileState.OPEN:
+            self.memory.refuse_file()
+        elif self.memory.file is FileState.CLOSED:
+            self.memory.enable()  # what an EEPROM is being written with is passed over, too
+        self.motor.kill(now)
+        self.program.abandon(now)
+        self.program.is_killed = False
+
     def clear_kill(self, now: Nanos) -> None:
         self.event("clear-kill", "Clear kill", now)
         self.program.is_killed = False

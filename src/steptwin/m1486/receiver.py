@@ -34,6 +34,8 @@ _HEX = "0123456789ABCDEF"
 _CLEAR_KILL = f"C{CLEAR_KILL}"
 #: Characters of a line that are examined as they arrive; the longest command that acts then has three.
 _MOST_SEEN = 4
+#: Stands for the beginning of a line that was dropped: no command begins so.
+_DROPPED = "%"
 #: Lines that are read only once.
 _LINES_KEPT = 4096
 
@@ -105,6 +107,17 @@ class Receiver(Stateful):
         self.busy_until: Nanos | None = None
         #: Characters that arrive meanwhile are lost.
         self.is_deaf = False
+
+    def discard(self, arriving: bytes, now: Nanos) -> None:
+        """Execute nothing of what is in the buffer or ``arriving``, but K and X, so that the same chips listen as without it. The
+        rest of a line that has begun is dropped when it comes."""
+        for byte in arriving:
+            self.character(byte, now)
+        self._buffer.clear()
+        self._lines = 0
+        if self._seen and not self._acts_when_received():
+            self._begin_line()
+            self._seen, self._skips_line = _DROPPED, True
 
     @property
     def waiting(self) -> int:

@@ -74,6 +74,12 @@ class Uart(Stateful):
             return self._arriving.popleft()[1]
         return None
 
+    def take_arriving(self) -> bytes:
+        """Remove and return the characters that are on their way to the chip."""
+        arriving = bytes(byte for _, byte in self._arriving)
+        self._arriving.clear()
+        return arriving
+
     def leave(self, now: Nanos) -> bool:
         """Characters whose time is over by ``now`` have been sent; True if there are any."""
         if not self._leaving or self._leaving[0][0] > now:

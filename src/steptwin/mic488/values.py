@@ -11,6 +11,8 @@ from typing import NamedTuple, TypeAlias
 from steptwin.errors import Misuse
 from steptwin.mic488.encoding import dint_to_words, real_to_words, word_to_int, words_to_dint, words_to_real
 from steptwin.mic488.registermap import DataType, Register, RegisterMap, Space, Type, WriteEffect
+from steptwin.mic488.registers import AXES
+from steptwin.mic488.status import ProgramState
 from steptwin.numerals import read_number
 from steptwin.wire import pdu
 
@@ -244,11 +246,29 @@ def repeatable(registers: RegisterMap, request: pdu.ModbusRequest) -> bool:
 
 def moves(registers: RegisterMap, request: pdu.ModbusRequest) -> bool:
     """Whether a request may start a motion, as far as it can be decoded."""
-    if isinstance(request, pdu.ReadRequest) or _stops(registers, request):
+    if isinstance(request, pdu.ReadRequest) or halted(registers, request):
         return False
     return any(
         register is None or register.effect in (WriteEffect.MOVE, WriteEffect.ADD) for register in _written(registers, request)
     )
+
+
+def halted(registers: RegisterMap, request: pdu.ModbusRequest) -> tuple[int, ...]:
+    """The axes whose motions a write ends: a stop, the end of a jog, a program that stops or pauses."""
+    match request:
+        case pdu.WriteCoilRequest(address=address, on=on):
+            register = registers.find(Space.COIL, address)
+            keys = ("STOP",) if on else ("JOG_PLUS", "JOG_MINUS")
+            return () if register is None or register.axis is None or register.key not in keys else (register.axis,)
+        case pdu.WriteRegisterRequest(address=address, value=value):
+            register = registers.find(Space.HOLDING, address)
+            key = "" if register is None else register.key
+            all_axes = range(1, AXES + 1)
+            if key == "M_STOP":
+                return tuple(axis for axis in all_axes if value & 1 << axis - 1)
+            return tuple(all_axes) if key == "PROGRAM_CTRL" and value != ProgramState.RUNNING else ()
+        case _:
+            return ()
 
 
 def _stops(registers: RegisterMap, request: pdu.ModbusRequest) -> bool:

@@ -12,7 +12,7 @@ from math import ceil, inf, sqrt
 from typing import NamedTuple
 
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
+from steptwin.machine import SECOND, Nanos
 from steptwin.motion.planner import FARTHEST_P, MotionState, refuse_range
 from steptwin.motion.profile import Profile, Segment, at_rest, cruise
 
@@ -67,6 +67,19 @@ def plan_distance(now: Nanos, begin: int, target: float, curve: SpeedCurve) -> P
         t += part.duration
     segments += _falling(rise, sign, t, distance)
     return Profile(now, begin, tuple(segments), sign * distance)
+
+
+def longest_within(duration: Nanos, grid: int, curve: SpeedCurve) -> int:
+    """The longest distance (u) from rest to rest, in whole ``grid``, that is over within ``duration``; one ``grid`` at least.
+
+    Errors as `plan_distance`.
+    """
+    low, high = 1, max(1, round(curve.top * duration / SECOND) // grid)
+    while low < high:
+        middle = (low + high + 1) // 2
+        is_in_time = (plan_distance(0, 0, middle * grid, curve).end or 0) <= duration
+        low, high = (middle, high) if is_in_time else (low, middle - 1)
+    return low * grid
 
 
 def plan_endless(now: Nanos, begin: int, direction: int, curve: SpeedCurve) -> Profile:

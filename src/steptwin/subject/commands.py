@@ -396,7 +396,7 @@ _ROWS = (
     CommandRow(
         "stop",
         StopAxes,
-        "Stop as fast as the controller does, with a ramp or without. Its program goes on.",
+        "Stop as fast as the controller does, with a ramp or without. The program of a MIC488 goes on.",
         STOPPED,
         (MACHINE, Field("axis", whole(1, 64), "The number of an axis; all without.", None)),
     ),

@@ -143,6 +143,11 @@ def _releasing(button: str) -> str:
     return f"{_RELEASE}{button}"
 
 
+def _downloading(machine: str) -> str:
+    """The name of the script that types a text into a controller."""
+    return f"download {machine}"
+
+
 def is_release(script: str) -> bool:
     return script.startswith(_RELEASE)
 
@@ -180,6 +185,7 @@ def _halt(plant: Plant, given: Halt) -> None:
             line.recall(unit, plant.now)
         what = {None: "all axes" if given.axis is None else f"axis {given.axis}", "pause": "program, paused"}
         _record(plant, given.machine, "stop", what.get(given.program, "program"))
+        plant.unschedule(_downloading(given.machine))
         plant.kind(given.machine).halt(plant.machine(given.machine), given, plant.now)
 
 
@@ -226,7 +232,7 @@ def _download(plant: Plant, given: Download) -> None:
         _record(plant, given.machine, "download", given.place)
         plant.downloaded[given.machine, given.place] = source
     if found.typed:
-        plant.schedule(f"download {given.machine}", found.typed)
+        plant.schedule(_downloading(given.machine), found.typed)
 
 
 def _set_variable(plant: Plant, given: SetVariable) -> None:

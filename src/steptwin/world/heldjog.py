@@ -1,8 +1,8 @@
 """A jog that lasts only while it is extended, like a dead man's switch; each kind of controller implements it.
 
 The controller never gets an endless motion, but repeated bounded ones, each of which ends by itself. An axis that still moves
-`STOP_NS` after the last extension is stopped. It is therefore at rest at most 300 ms of virtual time after that extension,
-even if the operator's program has failed.
+`STOP_NS` after the last extension is stopped. It is therefore at rest at most `REST_NS` of virtual time after that extension,
+even if the operator's program has failed. That is within the hold time of the drivers (ADR 12).
 """
 
 from __future__ import annotations
@@ -13,8 +13,9 @@ from typing import Protocol, TypeAlias
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.world import script as do
 
+REST_NS: Nanos = 300 * MILLISECOND
 STOP_NS: Nanos = 270 * MILLISECOND
-"""What is left of 300 ms is for the stop to get over a line."""
+"""What is left of `REST_NS` is for the stop to get over a line."""
 
 Given: TypeAlias = Sequence[do.Write | do.Send]
 """What goes to the controller at the present moment."""

@@ -256,6 +256,8 @@ export const REFUSALS: Readonly<Record<string, string>> = {
   "name = {name}: a machine is called that already": "name = {name}: tak nazywa się już inna maszyna",
   "{name} was not sent: {#most} commands wait already": "{name} nie wysłano: czeka już {#most} poleceń",
   "{name} was not sent: a stop was requested meanwhile": "{name} nie wysłano: w tym czasie zażądano stopu",
+  "{name} was not sent: a stop is being executed; repeat it after that":
+    "{name} nie wysłano: właśnie wykonywany jest stop; proszę powtórzyć po nim",
   "{name} was not sent: it has waited more than {#limit} s; repeat it":
     "{name} nie wysłano: czekało dłużej niż {#limit} s; powtórz",
   "{name} was not sent: the connection is lost ({why})": "{name} nie wysłano: połączenie jest utracone ({why})",
@@ -266,6 +268,7 @@ export const REFUSALS: Readonly<Record<string, string>> = {
   "{name}: no twin beside an M1486, whose position is unknown while it moves (M-28)":
     "{name}: obok M1486 nie ma bliźniaka, bo w ruchu jego pozycja jest nieznana (M-28)",
   "{name} axis {axis} is jogged already": "{name}: oś {axis} już jedzie ręcznie",
+  "the jog was not begun: {why}": "jazdy ręcznej nie rozpoczęto: {why}",
   "jog was not begun: a stop was requested meanwhile": "jazdy ręcznej nie rozpoczęto: w tym czasie zażądano stopu",
   "period_s = {#value}: permitted are {#low} to {#high} s": "period_s = {#value}: dozwolone {#low} do {#high} s",
   "{name} is not possible for this device ({place}); possible are {names}":

@@ -348,6 +348,7 @@ def test_a_stop_that_is_not_echoed_right_is_said_five_times_before_it_is_tried_b
     wire = ChipWire("B")
     chip = chip_driver(wire)
     chip.run(1)
+    wire.sleep(0.1)  # then K is enough
     wire.before_each = lambda data: wire.put(Fault("to host", 0, "flip 0"))
     wire.sent.clear()
     with pytest.raises(Unconfirmed):
@@ -365,7 +366,7 @@ def test_a_stop_goes_before_what_waits_for_the_line() -> None:
     line._engine.submit(Job(ChipRequest(None, "u1", answers=True), SECOND))
     wire.sent.clear()
     chip.stop()
-    assert wire.sent[0][1] == b"k\r"
+    assert wire.sent[0][1] == b"%\rk\r"
 
 
 @pytest.mark.parametrize(("timeout_s", "patience_s"), [(0.5, 10.0), (0.8, 10.0), (1.0, 12.0), (2.0, 24.0)])

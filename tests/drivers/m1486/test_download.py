@@ -47,13 +47,19 @@ def test_a_program_whose_chip_was_recovered_is_not_held_any_more() -> None:
     chip.set_function(51, False)
     chip.download("[\n@3\nF64000\nR\nJ3\n]")
     wire.sleep(0.3)
-    chip.stop()
+    wire.send(b"k\r")  # of another master: the program goes on behind C75
     wire.sleep(1.0)
+    chip._driver._unit.notes.is_killed = True
     with pytest.raises(Busy, match="is held by Kill because its function 51 is OFF"):
         chip.counter()
     chip.recover()
     with pytest.raises(Busy, match="is not done with a block of commands"):
         chip.counter()
+    # A stop of ours ends it: nothing is left to be recovered.
+    chip.stop()
+    chip.recover()
+    wire.sleep(1.0)
+    assert not wire.moving()
 
 
 @pytest.mark.parametrize(("function", "is_recovered"), [(True, False), (False, True), (None, True)])

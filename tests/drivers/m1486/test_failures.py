@@ -151,7 +151,7 @@ def test_a_chip_that_cannot_be_told_to_stop_is_told_with_the_first_cause() -> No
     wire.severed = True
     with pytest.raises(Unconfirmed) as caught:
         chip.stop()
-    assert "(memory: no answer to 'chip 7: k' within 0.5 s" in str(caught.value)
+    assert "(memory: no answer to 'chip 7: % k' within 0.5 s" in str(caught.value)
     assert "does not echo" not in str(caught.value)
     assert "does not echo" in str(caught.value.__cause__)
 
@@ -247,7 +247,7 @@ def test_a_move_that_was_sent_too_late_leaves_the_position_unknown() -> None:
     suspending(wire)(18, 1000.0, "sending")
     with pytest.raises(SentLate):
         chip.move_by(100.0)
-    assert typed(wire).endswith("r k ")
+    assert typed(wire).endswith("r % k ")
     wire.sleep(5.0)
     with pytest.raises(PositionUnknown):
         chip.position()

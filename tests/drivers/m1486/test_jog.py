@@ -12,8 +12,10 @@ from steptwin import drivers
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.exchange import LineFailure
 from steptwin.drivers.m1486 import AsyncM1486
-from steptwin.drivers.m1486.jog import LINK_S, AsyncM1486Jog
+from steptwin.drivers.m1486.jog import LINK_S, NOT_HELD, AsyncM1486Jog
+from steptwin.drivers.m1486.settings import ChipSettings
 from steptwin.errors import Misuse, Refusal
+from steptwin.wire.line import SerialLine
 
 STEP = 64
 SETTINGS = {"start_stop": 200, "acceleration": 5000, "velocity": 1500, "profile": 25000, "microstep": 1, "qualification": 1}
@@ -165,6 +167,42 @@ def test_a_stop_between_the_distance_and_its_move_ends_the_jog() -> None:
     assert wire.true(7) == 60 * STEP
 
 
+@pytest.mark.parametrize(("away_s", "runs_on"), [(0.2, True), (0.41, False)])
+def test_a_jog_that_is_held_too_late_has_ended(away_s: float, *, runs_on: bool) -> None:
+    """0.4 s after the echo of its R; the letter that tells its end counts when it is asked for in time."""
+    wire, chip = ready()
+    jog = begun(chip, 400.0)
+    assert finish(jog.hold())
+    wire.sleep(away_s)
+    assert finish(jog.hold()) is runs_on
+    assert jog.end == (None if runs_on else NOT_HELD)
+    end(jog)
+    assert wire.true(7) == (2 + runs_on) * 60 * STEP
+
+
+@pytest.mark.parametrize(("acceleration", "steps"), [(5000, 128), (500, 57)])
+def test_a_move_with_slow_ramps_is_shorter(acceleration: int, steps: int) -> None:
+    """Within 0.25 s: S · 0.25 s and A · (0.125 s)²."""
+    _, chip = ready()
+    finish(chip.configure(acceleration=acceleration))
+    jog = begun(chip, 2000.0)
+    assert jog.reach == steps
+    assert finish(jog.hold())
+    end(jog)
+
+
+def test_ramps_that_are_slower_than_known_end_a_jog() -> None:
+    """What is not known is taken as at power-up, A 5000; with A 500 such a move takes longer than the hold time."""
+    wire, chip = ready()
+    finish(chip.configure(acceleration=500))
+    chip._unit.notes.settings = ChipSettings(microstep=1)
+    jog = begun(chip, 2000.0)
+    assert jog.reach == 128
+    assert not finish(jog.hold())
+    assert jog.end == NOT_HELD
+    assert wire.true(7) == 128 * STEP
+
+
 def test_a_jog_is_held_inside_its_with_block() -> None:
     wire, chip = ready()
     with pytest.raises(Misuse, match="a jog is held inside its with block"):
@@ -192,6 +230,9 @@ def test_what_cannot_be_jogged() -> None:
     with pytest.raises(Misuse, match="velocity = 20001: M1486B takes 16 to 20 000 step/s"):
         begun(chip, 20001.0)
     assert wire.true(7) == 0
+    chip._unit.talk._serial = SerialLine(600)
+    with pytest.raises(Refusal, match="a jog needs a line of at least 1200 bit/s: with 600 bit/s the commands"):
+        AsyncM1486Jog(chip, 400.0)
     _, eeprom = ready("E1", configured=False)
     with pytest.raises(Refusal, match="M1486E1 writes every command into its EEPROM, so it is not jogged"):
         AsyncM1486Jog(eeprom, 400.0)

@@ -14,7 +14,7 @@ from steptwin.drivers.kind import DeviceAddress, DeviceMotion, EndedMotion, Foun
 from steptwin.drivers.m1486 import kind
 from steptwin.drivers.m1486.failures import WrongType
 from steptwin.drivers.m1486.jog import LINK_S
-from steptwin.drivers.m1486.kind import LOST, M1486_DRIVER
+from steptwin.drivers.m1486.kind import GOES_ON, LOST, M1486_DRIVER
 from steptwin.drivers.m1486.sync import M1486
 from steptwin.errors import Misuse, Refusal
 from steptwin.machine import Nanos
@@ -161,7 +161,7 @@ def test_a_stop_sends_k_without_any_question(monkeypatch: pytest.MonkeyPatch, *,
     at_every_address(monkeypatch, wire)
     del wire.sent[:]
     log: list[str] = []
-    assert M1486_DRIVER.stop(ADDRESS, log.append, (), program) is None
+    assert M1486_DRIVER.stop(ADDRESS, log.append, (), program) == (None if program else GOES_ON)
     wire.sleep(2.0)
     assert not wire.moving()
     assert "u" not in typed(wire).partition("k")[0]

@@ -310,13 +310,16 @@ def test_k_drops_what_may_move_and_waits_for_an_eeprom() -> None:
     assert scene.terminal.settle(0.0) == 0
 
 
-def test_k_is_sent_again_when_the_motion_before_it_has_been_written() -> None:
-    """K acts at once, R when it is in the EEPROM (chapter II): half a second later, and a tenth. Nothing is sent meanwhile."""
+def test_wrong_data_before_k_drop_the_motion_that_is_being_written() -> None:
+    """K acts at once, R when it is in the EEPROM (chapter II), half a second later: with % behind it not at all, unless function
+    44 is ON. So K is sent again a tenth of a second after that. Nothing is sent meanwhile."""
     scene = Scene((0, "R"), (100, "k"), (120, "x1"), (130, "v200"), (150, "k"), kind="E1")
-    assert [data for _, data in scene.written] == [b"R\r", b"k\r", b"K\r", b"x1\r", b"k\r", b"v200\r"]
+    assert [data for _, data in scene.written] == [b"R\r", b"%\rk\r", b"K\r", b"x1\r", b"k\r", b"v200\r"]
     assert [at for at, _ in scene.written][:2] == [0.0, 100.0]
     assert 600.0 <= scene.written[2][0] < 620.0
-    assert [text for _, text in scene.shown] == ["K is sent again when R is in the EEPROM: it moves only then"]
+    assert [text for _, text in scene.shown] == [
+        "% is sent before it, which drops R, and K again: with function 44 ON it moves even so"
+    ]
     assert scene.terminal.settle(0.0) == 0
 
 

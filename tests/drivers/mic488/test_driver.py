@@ -275,7 +275,7 @@ def test_a_running_program_is_paused_before_what_waits_and_ended_by_a_stop() -> 
     mic.program.pause()
     mic.program.stop()
     assert asked == [(ProgramState.PAUSED, True, None), (ProgramState.STOPPED, True, 5)]
-    assert unit.notes.stops[1:] == [count + 1 for count in stops[1:]], "motions asked for before are not begun after it"
+    assert unit.notes.stops[1:] == [count + 2 for count in stops[1:]], "motions asked for before either are not begun after it"
     assert twin.program.state == ProgramState.STOPPED
     wire.severed = True
     with pytest.raises(Unconfirmed, match="the program could not be stopped: the controller cannot be reached"):

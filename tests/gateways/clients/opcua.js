@@ -56,8 +56,9 @@ const actions = {
     const found = await session.call({ objectId: object, methodId: method, inputArguments: given.map(variant) });
     return found.statusCode.name;
   },
-  async history({ node, start, end }) {
-    const found = await session.readHistoryValue(node, new Date(start), new Date(end));
+  async history({ node, start, end, most = 0 }) {
+    const options = { numValuesPerNode: most, returnBounds: false };
+    const found = await session.readHistoryValue(node, new Date(start), new Date(end), options);
     const values = found.historyData?.dataValues ?? [];
     const plainest = (one) => [one.sourceTimestamp.toISOString(), one.value?.value ?? null, one.statusCode.name];
     return { status: found.statusCode.name, more: !!found.continuationPoint?.length, values: values.map(plainest) };

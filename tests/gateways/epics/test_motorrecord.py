@@ -363,3 +363,28 @@ def test_commands_are_in_the_audit_log() -> None:
         assert found == [(me, "move", "done"), (me, "move", "misuse"), (other, "jog", "done")]
 
     check(act)
+
+
+def test_velocities_stay_within_vmax() -> None:
+    async def act(rig: MotorRig) -> None:
+        (most,) = rig.get("VMAX")
+        assert float(most) > 0.0
+        for value in (2.0 * float(most), 1e9):
+            for name in ("VELO", "JVEL", "HVEL"):
+                await rig.put(name, value)
+        assert rig.get("VELO", "JVEL", "HVEL") == [most] * 3
+        await rig.put("VELO", 5.0)
+        assert rig.get("VELO") == [5.0]
+
+    check(act)
+
+
+def test_a_bit_of_the_status_is_that_of_the_drive() -> None:
+    async def act(rig: MotorRig) -> None:
+        found = []
+        for on in (1, 0, 1):
+            await rig.put("CNEN", on)
+            found.append((*rig.get("CNEN"), int(rig.get("MSTA")[0]) & 0x20))
+        assert found == [(1, 0x20), (0, 0), (1, 0x20)]
+
+    check(act)

@@ -6,6 +6,7 @@ import pytest
 from motorrecord_rig import ME, OTHER, MotorRig, check
 
 from steptwin.errors import Misuse, Refusal
+from steptwin.subject.commands import StopAxes
 
 
 @pytest.mark.parametrize(("button", "sign"), [("JOGF", 1), ("JOGR", -1)])
@@ -143,3 +144,21 @@ def test_with_move_each_motion_ends_with_a_pause() -> None:
 
 
 # ---------------------------------------------------------------------- SET, FOFF, DIR
+
+
+def test_a_jog_that_another_gateway_has_stopped_does_not_go_on() -> None:
+    async def act(rig: MotorRig) -> None:
+        put = await rig.begin("JOGF", 1)
+        await rig.until(lambda: float(rig.get("RBV")[0]) > 5.0)
+        rig.world.inner.do(StopAxes("table"))
+        await rig.tick()
+        begin = float(rig.get("RBV")[0])
+        await rig.over(put)
+        await rig.stands()
+        assert rig.get("RBV", "JOGF") == [begin, 0]
+        put = await rig.begin("JOGF", 1)  # a new press
+        await rig.until(lambda: float(rig.get("RBV")[0]) > begin + 5.0)
+        await rig.put("JOGF", 0)
+        await rig.over(put)
+
+    check(act)

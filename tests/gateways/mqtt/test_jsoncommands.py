@@ -168,3 +168,13 @@ def test_retained_commands_are_refused(tmp_path: Path) -> None:
 def test_a_file_of_tokens_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(Misuse, match="no-tokens"):
         Doorkeeper(mqtt('tokens = "no-tokens"'), tmp_path)
+
+
+def test_what_is_no_command_is_in_the_audit_log(tmp_path: Path) -> None:
+    rig = Rig(tmp_path)
+    logged: list[tuple[str, str]] = []
+    rig.world.audit = lambda who, do, fields, outcome: logged.append((do, outcome))
+    for wrong in ({"to": "NaN"}, {"too": 5.0}, {"axis": None}):
+        rig.ask({"do": "move", "machine": "table", "axis": 1, **wrong})
+    rig.ask({"do": "fly"})
+    assert logged == [("move", "misuse")] * 3 + [("fly", "misuse")]

@@ -235,7 +235,15 @@ def test_it_leaves_when_its_host_does() -> None:
 def test_bdseq_goes_from_0_to_255_and_round() -> None:
     async def act() -> Rig:
         rig = Rig()
-        wills = [decode_payload(rig.face.will().payload).metrics[0].value for _ in range(257)]
+        wills = []
+        for _ in range(257):
+            for _ in range(3):  # the broker cannot be reached twice
+                will = decode_payload(rig.face.will().payload).metrics[0].value
+            wills.append(will)
+            session = asyncio.create_task(rig.face.run(rig.broker))
+            await asyncio.sleep(0)
+            session.cancel()
+            await asyncio.wait((session,))
         assert wills == [*range(256), 0]
         return rig
 
@@ -310,8 +318,37 @@ def test_a_command_by_name_or_alias_and_none_that_is_retained() -> None:
         rig.message("spBv1.0/plant/DCMD/hall/table", encode_payload(SparkplugPayload(metrics=(enable, by_alias))))
         await rig.tick()
         assert [one for one in rig.world.done if isinstance(one, command.Enable)] == [command.Enable("table", 1)]
-        assert noted == [("anybody (MQTT, Sparkplug B)", "enable", "done")]
+        who = "anybody (MQTT, Sparkplug B)"
+        assert sorted(noted) == [(who, "enable", "done"), (who, "write", "misuse")]
         assert "None: expected true or false" in str(rig.metrics("Commands/Result")[-1].value)
+        return rig
+
+    story(act)
+
+
+def test_every_command_has_a_result() -> None:
+    wanted = {
+        "M1/position": (5.0, "it can only be read"),
+        "M9/nothing": (5.0, "the device has no metric of that name"),
+        "pins/AIN1": (-1.0, "-1.0: permitted are numbers from 0 to 10"),
+        "M1/Commands/MoveTo": (5.0, "position command ignored: M1 is not enabled: switch its drive on first"),
+    }
+
+    async def act() -> Rig:
+        rig = Rig()
+        await rig.tick()
+        await rig.connect()
+        logged: list[str] = []
+        rig.world.audit = lambda who, do, fields, outcome: logged.append(f"{fields.get('metric', do)}: {outcome}")
+        for name, (value, _) in wanted.items():
+            metric = SparkplugMetric(name=name, type=SparkplugType.DOUBLE, value=value)
+            rig.message("spBv1.0/plant/DCMD/hall/table", encode_payload(SparkplugPayload(metrics=(metric,))))
+            await rig.tick()
+        results = [str(one.value) for one in rig.metrics("Commands/Result")]
+        for result, (name, (_, why)) in zip(results, wanted.items(), strict=True):
+            assert result.startswith(f"{name}: ")
+            assert why in result
+        assert logged == [*(f"{name}: misuse" for name in list(wanted)[:3]), "move: ignored: not enabled"]
         return rig
 
     story(act)

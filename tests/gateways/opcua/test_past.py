@@ -39,9 +39,9 @@ def test_a_client_reads_what_was(require_peer: Callable[[str], str], tmp_path: P
             assert not master.write_coil(2000, True, device_id=1).isError()  # M1_EN
             assert not master.write_registers(1012, [0, 400], device_id=1).isError()
 
-        def read(node: str, start: datetime = begin, end: datetime | None = None) -> dict[str, Any]:
+        def read(node: str, start: datetime = begin, end: datetime | None = None, most: int = 0) -> dict[str, Any]:
             end = end or datetime.now(UTC) + timedelta(seconds=1)
-            return client("history", node=node, start=start.isoformat(), end=end.isoformat())
+            return client("history", node=node, start=start.isoformat(), end=end.isoformat(), most=most)
 
         until(lambda: len(read(ENABLED)["values"]) == 2, "the edge has been kept")
         assert client("read", node=POSITION, attribute="AccessLevel")["value"] & HISTORY_READ
@@ -49,6 +49,8 @@ def test_a_client_reads_what_was(require_peer: Callable[[str], str], tmp_path: P
         assert (found["status"], found["more"]) == ("Good", False)
         assert [value for _, value, _ in found["values"]] == [False, True]
         assert {code for _, _, code in found["values"]} == {"Good"}
+        page = read(ENABLED, most=1)
+        assert (page["status"], page["more"], [value for _, value, _ in page["values"]]) == ("Good", True, [False])
         moments = [moment for moment, _, _ in found["values"]]
         assert moments == sorted(moments)
         backwards = read(ENABLED, datetime.now(UTC) + timedelta(seconds=1), begin)

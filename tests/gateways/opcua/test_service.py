@@ -102,7 +102,7 @@ def test_who_follows_a_variable_is_told_what_it_is_after_somebody_has_read_it() 
         maker = NodeMaker(space)
         maker.add(builder.items)
         maker.refer(builder.references)
-        service = NodeService(space, world, Sampler(world, {}), builder.points, builder.methods, builder.arrays)
+        service = NodeService(space, world, Sampler(world, {}), builder.points, builder.methods, builder.arrays, None)
         await service.refresh_all()
         node = node_id("table.pins.IN3")
         attribute = space[node].attributes[ua.AttributeIds.Value]

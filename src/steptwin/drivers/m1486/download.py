@@ -14,6 +14,7 @@ from steptwin.drivers.m1486.unit import ChipUnit
 from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Misuse, Refusal
 from steptwin.m1486.check import check
+from steptwin.m1486.functions import CONTINUE
 from steptwin.m1486.lines import INTERFACES, STEP_DIRECTION, Interface
 from steptwin.m1486.syntax import ChipCommand, JumpCondition, ParsedProgram
 from steptwin.m1486.variants import Store, Variant
@@ -94,6 +95,9 @@ async def send_program(
     permission: Permission | None = first.permission()
     program = checked_program(text, first.variant, await _interface(first, text, permission), name)
     found = parts(program)
+    for address, commands in found:
+        if address in units and any((command.key, command.number) == ("T", CONTINUE) for command in commands):
+            units[address].notes.note_function(CONTINUE, on=True)  # wrong data do not end it any more
     for address, commands in found:
         if address not in units:
             if address is None:
@@ -271,7 +275,7 @@ async def begin(
 
     notes.motion = None
     try:
-        await unit.act(text, permission, once=True, retype=retype, program=kind is ChipMotion.BLOCK)
+        await unit.act(text, permission, once=True, retype=retype)
     except SentLate:
         register_motion(None, None)
         raise

@@ -142,22 +142,26 @@ class AsyncM1486(AsyncChip):
                     "once; each command that was sent has overwritten the oldest one in its memory"
                 )
 
-    async def stop(self) -> None:
-        """Brake with the ramp (K). It precedes all waiting requests; moves that wait for the line are not begun.
+    async def stop(self) -> bool:
+        """Brake with the ramp, and end a program: nothing begins any more that was asked for before, also if this process dies
+        now. It precedes all waiting requests; moves that wait for the line are not begun.
 
-        A program continues after it unless function 51 is OFF: `stop_program` ends it. Raises `steptwin.drivers.Unconfirmed`.
+        A motion that has begun is ended by K, everything else by wrong data and K in one burst. Returns whether a program that
+        ran has ended: False where function 44 is ON or not known (`open_line`). Then the burst is sent twice, because an E type
+        may still be writing a motion into its EEPROM, and a program may go on: `stop_program` finds out. Raises
+        `steptwin.drivers.Unconfirmed`.
         """
         notes = self._unit.notes
         motion = notes.motion
         if motion is not None and motion.kind in (ChipMotion.MOVE, ChipMotion.BLOCK) and not motion.is_over(self.line.now()):
             notes.is_position_valid = False
-        await self._unit.kill()
+        return await self._unit.kill()
 
     async def recover(self) -> None:
         """Continue what Kill has stopped (C75), if function 51 is OFF. A program may move the motor at once."""
         permission = self._unit.permission()
         async with self._unit.turn(permission):
-            await self._unit.act("c75", permission, stored=False, program=True)
+            await self._unit.act("c75", permission, stored=False)
             self._unit.notes.is_killed = False
 
     async def stop_program(self, timeout_s: float = 10.0) -> None:
@@ -174,7 +178,7 @@ class AsyncM1486(AsyncChip):
         async with unit.turn(permission):
             unit.talk.settle(unit.address)  # questions went with the program
             if notes.function(RECOVER) is not True:
-                await unit.act("c75", permission, stored=False, program=True)
+                await unit.act("c75", permission, stored=False)
             notes.is_killed = False
             notes.motion = None
             if await unit.query_type(round(timeout_s * SECOND)) is None:

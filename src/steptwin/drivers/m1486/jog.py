@@ -2,6 +2,9 @@
 
 G+ and G- are never used: nothing ends them. No move is cut short, because Kill makes the position counter wrong (M-16). If the
 program dies or the line is cut, the chip completes its present move and gets no further one.
+
+No move is begun later than the hold time after the last answer of the chip that belongs to the move before: the echo of its R, or
+the letter that tells its end. So a program that was suspended for longer begins none (ADR 12).
 """
 
 from __future__ import annotations
@@ -9,25 +12,30 @@ from __future__ import annotations
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from steptwin.drivers.exchange import Overtaken, TooLate
+from steptwin.drivers.exchange import Overtaken, SentLate, TooLate
 from steptwin.drivers.m1486.download import begin
 from steptwin.drivers.m1486.motion import ChipMotion
-from steptwin.drivers.permission import Permission
+from steptwin.drivers.permission import HOLD_NS, Permission
 from steptwin.errors import Misuse, Refusal, SteptwinError
+from steptwin.m1486.lines import STEP_DIRECTION
 from steptwin.m1486.microsteps import FULL_STEP
 from steptwin.m1486.unit import MASK
-from steptwin.m1486.variants import Store
-from steptwin.machine import SECOND, Nanos
+from steptwin.m1486.variants import SLOWEST_JOG, Store
+from steptwin.machine import MILLISECOND, SECOND, Nanos
 
 if TYPE_CHECKING:
     from steptwin.drivers.m1486.driver import AsyncM1486
 
 LINK_S = 0.15
 """A move is as long as the velocity of the jog makes in this time; it lasts longer by its ramps."""
-BEGIN_NS: Nanos = SECOND
-"""A move is begun at most so long after the last sign of the one before it: a program that was suspended begins none."""
+MOST_NS: Nanos = 250 * MILLISECOND
+"""A move with slow ramps is shorter: its end has to be known, and the next one begun, within the hold time."""
+PREPARING = 100
+"""Most characters on the line until the first move begins."""
 RELEASED = "released"
 """The end of a jog that was held no longer."""
+NOT_HELD = f"not held within {HOLD_NS / SECOND:g} s of the last answer: the program was suspended, or the line is slow"
+"""The end of a jog that was held too late."""
 PATIENCE_NS: Nanos = 2 * SECOND
 """A move that lasts longer is not one of a jog: LIMIT or Kill holds the chip."""
 
@@ -38,7 +46,7 @@ class AsyncM1486Jog:
     `hold` waits for the end of the present move and begins the next one; False when the motor was stopped otherwise: see
     `end`. After the last `hold` the motor moves `reach` at most. V is that of the jog while it lasts, and is put back where it
     was known. Raises `Misuse` for a velocity that V cannot have, `Refusal` for E types, which write every command into their
-    EEPROM.
+    EEPROM, and for a line slower than 1200 bit/s.
     """
 
     def __init__(self, chip: AsyncM1486, velocity: float) -> None:
@@ -47,14 +55,19 @@ class AsyncM1486Jog:
         if chip.variant.store is Store.EEPROM:
             raise Refusal(f"{chip.variant.title} writes every command into its EEPROM, so it is not jogged")
         self._chip = chip
-        self._unit = chip._unit
+        self._unit = unit = chip._unit
+        if unit.talk.baud < SLOWEST_JOG:
+            raise Refusal(
+                f"{unit.place}: a jog needs a line of at least {SLOWEST_JOG} bit/s: with {unit.talk.baud} bit/s the commands of "
+                f"the next move take longer than the {HOLD_NS / SECOND:g} s within which it has to begin"
+            )
         self._direction = 1 if velocity > 0.0 else -1
         self._velocity = round(abs(velocity) * chip.scale_u / (FULL_STEP * chip.variant.clock))
         self._before = chip.settings.velocity
         self._distance_u = 0
         self._counter: int  # after the present move
         self._permission: Permission | None = None
-        """For the next move; it ends with a stop, or when the program was suspended."""
+        """For the next move: one for the whole jog."""
         self.end: str | None = None
 
     @property
@@ -63,34 +76,50 @@ class AsyncM1486Jog:
         return self._distance_u / self._chip.scale_u
 
     async def __aenter__(self) -> Self:
-        begun = self._unit.permission()
-        await self._chip.configure(velocity=self._velocity)
-        grid_u = self._chip.settings.grid_u
-        speed_u = self._velocity * FULL_STEP * self._chip.variant.clock
-        self._distance_u = round(speed_u * LINK_S / grid_u) * grid_u  # V16, the least, makes 2.4 steps
-        self._permission = Permission(self._unit.line.now, BEGIN_NS, begun.is_stopped)
-        async with self._unit.turn():
-            self._counter = await self._unit.read_number(1)
-            await self._go(begun)
+        unit, chip = self._unit, self._chip
+        # A jog begins at once or not at all.
+        begun = unit.permission(HOLD_NS + 2 * unit.timeout_ns + unit.talk.wire_ns(PREPARING))
+        await chip.configure(velocity=self._velocity)
+        self._distance_u = self._link_u()
+        async with unit.turn():
+            self._counter = await unit.read_number(1)
+            permission = Permission(unit.line.now, HOLD_NS, begun.is_stopped)
+            if begun.has_expired():
+                raise TooLate(f"{unit.name}: jog", begun.patience_ns)
+            await self._go(permission)
+        self._permission = permission
         return self
+
+    def _link_u(self) -> int:
+        chip = self._chip
+        grid_u = chip.settings.grid_u
+        speed_u = self._velocity * FULL_STEP * chip.variant.clock
+        longest_u = chip.settings.longest_u(MOST_NS, chip.variant, self._unit.notes.interface or STEP_DIRECTION)
+        return min(round(speed_u * LINK_S / grid_u) * grid_u, longest_u)  # V16, the least, makes 2.4 steps
 
     async def hold(self) -> bool:
         """See the class. Raises `LineFailure`; the motor then stops by itself."""
-        if self._permission is None:
+        permission = self._permission
+        if permission is None:
             raise Misuse("a jog is held inside its with block")
         if self.end is not None:
             return False
-        permission = Permission(self._unit.line.now, BEGIN_NS, self._permission.is_stopped)
         async with self._unit.turn():
-            if await self._unit.query_type(PATIENCE_NS, permission) is None:
+            if await self._unit.query_type(PATIENCE_NS) is None:
                 self.end = f"the chip {self._unit.why_busy()}"
-            elif permission.is_stopped():
+                return False
+            permission.extend()  # the move has ended
+            if permission.is_stopped():
                 self.end = "stopped"
+            elif permission.has_expired():
+                self.end = NOT_HELD
             else:
                 try:
                     await self._go(permission)
-                except (Overtaken, TooLate) as refusal:
-                    self.end = str(refusal)
+                except TooLate:
+                    self.end = NOT_HELD
+                except (Overtaken, SentLate) as failure:
+                    self.end = str(failure)
         return self.end is None
 
     async def _go(self, permission: Permission) -> None:
@@ -99,6 +128,7 @@ class AsyncM1486Jog:
         await self._unit.send(f"{'f' if way_u > 0 else 'b'}{self._distance_u}")
         duration_s = self._chip.settings.travel_s(way_u, self._chip.variant)
         await begin(self._unit, "r", ChipMotion.MOVE, permission, target_u=self._counter, duration_s=duration_s)
+        permission.extend()  # the move has begun
 
     async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         """Wait for the end of the present move, and put V back."""

@@ -42,6 +42,7 @@ from steptwin.machine import SECOND
 
 LOST = "; the chip has counted the whole move, so its position is wrong: home the axis, or set POSITION"
 """After Kill in a move (M-16)."""
+GOES_ON = "a program goes on if function 44 is ON, which is not known: --program makes sure that it has ended"
 _SOUGHT = re.compile(r"([+-])B(\d{1,2})", re.IGNORECASE)
 
 
@@ -213,14 +214,16 @@ def _wait(chip: M1486, axes: Collection[int], timeout_s: float | None) -> Sequen
 
 
 def _stop(address: DeviceAddress, log: Log | None, axes: Collection[int], program: bool) -> str | None:
-    """Send K without any preceding query: a chip does not respond while it moves."""
+    """Stop without any preceding query: a chip does not respond while it moves. So its functions are not known."""
     chip = _driver(address, log)
     chip.open_line()
     try:
-        (chip.stop_program if program else chip.stop)()
+        if program:
+            chip.stop_program()
+            return None
+        return None if chip.stop() else GOES_ON
     finally:
         chip.close()
-    return None
 
 
 M1486_DRIVER: DriverKind[M1486] = DriverKind(

@@ -15,8 +15,8 @@ from steptwin.m1486.flow import defaults
 from steptwin.m1486.lines import Interface
 from steptwin.m1486.microsteps import FULL_STEP, HIGHEST_SPEED, PAIRS, microstep_size
 from steptwin.m1486.variants import Variant
-from steptwin.machine import SECOND
-from steptwin.motion.ramps import SpeedCurve, plan_distance
+from steptwin.machine import SECOND, Nanos
+from steptwin.motion.ramps import SpeedCurve, longest_within, plan_distance
 
 COMMANDS = {
     "start_stop": "s",
@@ -58,13 +58,23 @@ class ChipSettings:
 
     def travel_s(self, distance_u: int, variant: Variant) -> float | None:
         """The duration of a move, s; None if a setting is unknown."""
+        curve = self._curve(variant)
+        return None if curve is None else (plan_distance(0, 0, distance_u, curve).end or 0) / SECOND
+
+    def longest_u(self, duration: Nanos, variant: Variant, interface: Interface) -> int:
+        """The longest distance of a move that is over within ``duration``, in minimum microsteps; one microstep at least.
+        Settings that are unknown are taken as those of power-up."""
+        known = {name: value for name in COMMANDS if (value := getattr(self, name)) is not None}
+        curve = replace(after_reset(variant, interface), **known)._curve(variant)
+        return self.grid_u if curve is None else longest_within(duration, self.grid_u, curve)
+
+    def _curve(self, variant: Variant) -> SpeedCurve | None:
+        """None if a setting is unknown."""
         s, a, v, p, q = self.start_stop, self.acceleration, self.velocity, self.profile, self.qualification
         if s is None or a is None or v is None or p is None or q is None:
             return None
         speed = float(FULL_STEP * variant.clock)
-        curve = SpeedCurve(s * speed, a * speed * variant.clock, p * speed, min(v, HIGHEST_SPEED[q]) * speed)
-        profile = plan_distance(0, 0, distance_u, curve)
-        return (profile.end or 0) / SECOND
+        return SpeedCurve(s * speed, a * speed * variant.clock, p * speed, min(v, HIGHEST_SPEED[q]) * speed)
 
 
 def after_reset(variant: Variant, interface: Interface) -> ChipSettings:

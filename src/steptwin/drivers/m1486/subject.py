@@ -143,7 +143,7 @@ class M1486Part:
 
     # ------------------------------------------------------------------ commands
 
-    def effect_of(self, request: steps.Request) -> RawEffect:
+    def effect_of(self, wanted: steps.Request | steps.Write) -> RawEffect:
         """It takes none."""
         return RawEffect.WRITE
 
@@ -175,9 +175,9 @@ class M1486Part:
         full_steps = abs(wanted.velocity) * self._chip.scale_u / FULL_STEP
         await self._chip.run(1 if wanted.velocity > 0.0 else -1, full_steps)
 
-    async def _stop(self, wanted: command.StopAxes) -> None:
+    async def _stop(self, wanted: command.StopAxes) -> object:
         self._check_axis(wanted.axis)
-        await self._chip.stop()
+        return {"program": ProgramActivity.STOPPED.value if await self._chip.stop() else None}
 
     async def _program(self, wanted: command.ControlProgram) -> None:
         if wanted.action != "stop":

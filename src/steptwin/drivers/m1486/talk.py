@@ -92,7 +92,7 @@ class ChipRequest:
         return self.acts and (self.committed or self.commented)
 
     def __str__(self) -> str:
-        return f"{chip_name(self.address)}: {self.text.strip() or 'select'}"
+        return f"{chip_name(self.address)}: {' '.join(self.text.split()) or 'select'}"
 
 
 ByteObserver = Callable[[Nanos, FrameDirection, bytes], object]
@@ -146,6 +146,11 @@ class CharacterTalk:
         if request.sort in _SILENT:
             return 0
         return self._serial.duration(2 * len(request.text) + 16)
+
+    @property
+    def baud(self) -> int:
+        """The rate of the line, bit/s."""
+        return self._serial.baud
 
     def wire_ns(self, characters: int) -> Nanos:
         """The time that characters take on the line, ns."""

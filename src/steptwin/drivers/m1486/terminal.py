@@ -307,13 +307,16 @@ class ChipTerminal:
     def _send(self) -> None:
         told: list[str] = []
         with self._changed:
-            text = self._next(told)
+            was_due, text = self._again_at, self._next(told)
+            is_dropping = was_due is None and self._again_at is not None
         if text is None:
             return
-        data = (text + "\r").encode("latin-1")
-        self._words.typed(text)
+        lines = ["%", text] if is_dropping else [text]
+        data = "".join(f"{line}\r" for line in lines).encode("latin-1")
+        for line in lines:
+            self._words.typed(line)
         self._channel.write(data)
-        self._sent += 1
+        self._sent += len(lines)
         now = self._clock()
         self._quiet_at = now + self._serial.duration(len(data)) / SECOND + self._quiet_s
         if _letter(text) not in _IMMEDIATE:
@@ -326,8 +329,8 @@ class ChipTerminal:
 
     def _next(self, told: list[str]) -> str | None:
         """The next line to send. K overtakes lines that wait for an EEPROM, unless another chip must be selected first, and
-        those of them that may move are dropped (``told`` says so); X does not wait either. Until K has been sent again, nothing
-        else is."""
+        those of them that may move are dropped (``told`` says so); X does not wait either. A motion that is being written into
+        the EEPROM is dropped by wrong data before K, and until K has been sent again, nothing else is."""
         waiting, again = self._outgoing, self._again_at
         if again is not None and self._clock() >= again:
             self._again_at = None
@@ -352,8 +355,8 @@ class ChipTerminal:
         told = [f"{line}: not sent, because K was typed behind it" for line in dropped]
         if self._begun is not None and self._again_at is None and self._clock() < self._ready_at:
             self._again_at = self._ready_at + BEGUN_NS / SECOND
-            self._unsettled += 1
-            told.append(f"K is sent again when {self._begun} is in the EEPROM: it moves only then")
+            self._unsettled += 2
+            told.append(f"% is sent before it, which drops {self._begun}, and K again: with function 44 ON it moves even so")
         return told
 
     def _show_received(self) -> None:

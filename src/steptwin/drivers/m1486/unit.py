@@ -19,7 +19,7 @@ from steptwin.drivers.m1486.talk import INVALID_COMMAND, TYPE_QUERY, CharacterTa
 from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Misuse
 from steptwin.m1486.commands import memory_bits
-from steptwin.m1486.functions import RECOVER, REPORT, RETURN
+from steptwin.m1486.functions import CONTINUE, RECOVER, REPORT, RETURN
 from steptwin.m1486.lines import INTERFACES, Interface
 from steptwin.m1486.ranges import out_of_range
 from steptwin.m1486.syntax import parse_line
@@ -41,7 +41,12 @@ PATIENCE_NS: Nanos = 10 * SECOND
 SLICE_NS: Nanos = 20 * MILLISECOND
 """Waiting for a pending answer is interrupted for stops at this interval, ns."""
 BEGUN_NS: Nanos = 100 * MILLISECOND
-"""An E type has begun a motion so long after its write time, ns."""
+"""A chip has begun a motion so long after its command was sent, and, of an E type, written, ns."""
+STOP = f"{INVALID_COMMAND.decode()}\rk"
+"""Wrong data and Kill in one burst (M-11, M-27). The wrong data lie behind everything that the chip has received. They drop
+what of it has not begun when they are read, at the latest after the motion that Kill ends: also what is being written into an
+EEPROM."""
+LONGEST_WRITE_NS: Nanos = max(variant.write_ns for variant in VARIANTS)
 ASK_AGAIN_NS: Nanos = SECOND
 """First interval of further queries of a program that does not end, ns; it doubles each time."""
 _NAMES = {variant.type_letter: variant.name for variant in reversed(VARIANTS)}
@@ -100,10 +105,11 @@ class ChipUnit:
         """Hold the line for exchanges that belong together. Waiting for it extends ``permission``."""
         return self.line.lock("m1486 turn", None if permission is None else permission.extend)
 
-    def permission(self) -> Permission:
+    def permission(self, patience_ns: Nanos | None = None) -> Permission:
         """Permission for a motion requested now. It ends with a stop of the chip, or after too long without progress."""
         before = self.notes.stops
-        patience_ns = max(PATIENCE_NS, 4 * TRIES * self.timeout_ns)
+        if patience_ns is None:
+            patience_ns = max(PATIENCE_NS, 4 * TRIES * self.timeout_ns)
         return Permission(self.line.now, patience_ns, lambda: self.notes.stops != before)
 
     # ------------------------------------------------------------------ exchanges
@@ -268,10 +274,8 @@ class ChipUnit:
         once: bool = False,
         retype: bool = True,
         stored: bool = True,
-        program: bool = False,
     ) -> None:
-        """Send a command that may move the motor, as `send`; ``program``: it starts a program. If the permission has ended, the
-        chip drops it.
+        """Send a command that may move the motor, as `send`. If the permission has ended, the chip drops it.
 
         Raises `Overtaken`, `TooLate`; `SentLate` when it was sent too late, and then the motor was stopped.
         """
@@ -284,7 +288,7 @@ class ChipUnit:
         except SentLate:
             notes.begins_at = self.line.now() + write_ns
             notes.is_position_valid = False
-            await self.kill(program=program)
+            await self.kill()
             raise
         except LineFailure:  # it may be there even so
             notes.begins_at = self.line.now() + write_ns
@@ -295,7 +299,7 @@ class ChipUnit:
         """The time to wait for an answer, ns: it may have to wait for the EEPROM; for an unknown type, for all commands of
         `wake`, and for one more question."""
         variant = self.notes.variant
-        write_ns = (WAKE_COMMANDS + 2) * max(one.write_ns for one in VARIANTS) if variant is None else variant.write_ns
+        write_ns = (WAKE_COMMANDS + 2) * LONGEST_WRITE_NS if variant is None else variant.write_ns
         return self.timeout_ns + write_ns if answers else self.timeout_ns
 
     def checked(self, text: str) -> str:
@@ -405,7 +409,9 @@ class ChipUnit:
                     permission.extend()
                 if self.line.now() >= limit:
                     return talk.arrived.pop(self.address, None)
-                if self._is_near_its_end() and talk.owes(self.address) == 1 and self.should_ask_again(ASK_AGAIN_NS):
+                if not talk.owes(self.address):  # a stop has dropped the question
+                    await self.ask()
+                elif self._is_near_its_end() and talk.owes(self.address) == 1 and self.should_ask_again(ASK_AGAIN_NS):
                     await self.ask()  # its letter may have been taken for that of another chip
         return talk.arrived.pop(self.address)
 
@@ -545,19 +551,35 @@ class ChipUnit:
             with suppress(NoAnswer, Garbled):
                 await self._exchange(ChipRequest(self.address, "", sort=ChipRequestKind.SELECT))
 
-    async def kill(self, *, program: bool = False) -> None:
-        """Send K before all waiting requests; ``program``: and wrong data before it. To an E type that is still writing a command
-        that may move, K is sent again when that is done: the first one comes before the motion. Raises `Unconfirmed`."""
+    async def kill(self, *, program: bool = False) -> bool:
+        """Stop before all waiting requests, so that nothing begins that was asked for before.
+
+        K is enough for a motion of this line that has begun, because the chip was at rest before it; everything else, and with
+        ``program`` in any case, is ended by `STOP`. Where wrong data may end nothing (function 44 is ON or not known), it is sent
+        again when what may lie in an EEPROM has begun, and only that confirms the stop. Returns whether a program that ran
+        has ended; where it is not known, False. Raises `Unconfirmed`.
+        """
         notes = self.notes
         notes.stops += 1
         notes.is_killed = True
-        await self._send_kill(f"{INVALID_COMMAND.decode()}\rk" if program else "k")
-        begins_at = notes.begins_at
-        rest = begins_at - self.line.now()
-        if rest > 0:
-            await self.line.sleep((rest + BEGUN_NS) / SECOND)
-            if notes.begins_at == begins_at:  # else another motion was asked for after the stop
-                await self._send_kill("k")
+        if not program and self._has_begun():
+            await self._send_kill("k")
+            return True
+        await self._send_kill(STOP)
+        if notes.function(CONTINUE) is False:
+            self.talk.settle(self.address)  # questions went with the program
+            return True
+        write_ns = LONGEST_WRITE_NS if notes.variant is None else notes.variant.write_ns
+        await self.line.sleep((write_ns + BEGUN_NS) / SECOND)
+        notes.stops += 1
+        await self._send_kill(STOP)
+        return False
+
+    def _has_begun(self) -> bool:
+        """Whether all that the chip may have to do is a motion, which has begun."""
+        motion = self.notes.motion
+        is_known = motion is not None and motion.kind is not ChipMotion.BLOCK
+        return is_known and self.line.now() >= self.notes.begins_at + BEGUN_NS
 
     async def _send_kill(self, text: str) -> None:
         notes = self.notes

@@ -17,10 +17,11 @@ from steptwin.drivers.mic488.group import trigger
 from steptwin.drivers.mic488.lines import AsyncModbusLine
 from steptwin.drivers.mic488.motion import MotionKind, MoveEnd
 from steptwin.drivers.mic488.program import AsyncMic488Program
-from steptwin.drivers.mic488.unit import Unit, axis_mask, check_axis
+from steptwin.drivers.mic488.unit import ALL_AXES, Unit, axis_mask, check_axis
 from steptwin.drivers.mic488.user import AsyncUserRegisters
 from steptwin.drivers.mic488.waiting import wait_for
 from steptwin.drivers.modbus import ModbusQuery, check_unit, words
+from steptwin.drivers.permission import Permission
 from steptwin.errors import Misuse
 from steptwin.inputfiles import read_bytes
 from steptwin.machine import SECOND
@@ -30,12 +31,11 @@ from steptwin.mic488.inifile import IniFile
 from steptwin.mic488.registermap import DataType, WriteEffect
 from steptwin.mic488.registers import AXES, DEFAULT_FIRMWARE, INPUTS, OUTPUTS, register_map
 from steptwin.mic488.status import ProgramState
-from steptwin.mic488.values import RegisterValue, named
+from steptwin.mic488.values import RegisterItem, RegisterValue, halted, named
 from steptwin.wire import pdu
 
 TIMEOUT_S = 0.3
 TRIES = 3
-ALL_AXES = tuple(range(1, AXES + 1))
 
 _log = logging.getLogger(__name__)
 
@@ -282,23 +282,48 @@ class AsyncMic488:
 
         Registers that act on every write are sent only once.
         """
+        await self.set_all((name, value))
+
+    async def set_all(self, *values: tuple[str, float], is_sure: bool = False) -> None:
+        """`set` one after the other. Names are checked before the first is written. A stop of an axis meanwhile refuses what may
+        move it and has not been written. ``is_sure``: a motion that the controller would ignore, because its drive is off, is not
+        written but raises `NotReady`."""
         unit = self._unit
-        item = named(unit.registers, name)
-        axis = item.register.axis
-        moved = () if item.register.effect not in (WriteEffect.MOVE, WriteEffect.ADD) else ALL_AXES if axis is None else (axis,)
-        permission = unit.permission(*moved) if moved else None
-        data_type = (await unit.control()).data_type
-        async with unit.stopping_if_late(*moved):
-            await unit.write(item, unit.travelling(item, value, data_type), data_type=data_type, permission=permission)
+        chosen: list[tuple[RegisterItem, float, tuple[int, ...], Permission | None]] = []
+        for name, value in values:
+            item = named(unit.registers, name)
+            if not item.register.accepts:
+                raise Misuse(f"{name} can only be read")
+            moved = _moved_by(item)
+            chosen.append((item, value, moved, unit.permission(*moved) if moved else None))
+        for item, value, moved, permission in chosen:
+            data_type = DataType.REAL
+            if not unit.is_stop(item, value):
+                control = await unit.control()
+                data_type = control.data_type
+                if is_sure and item.register.axis in moved and not control.triggered and value:
+                    unit.check_enabled(control, *moved)
+            async with unit.stopping_if_late(*moved):
+                await unit.write(item, unit.travelling(item, value, data_type), data_type=data_type, permission=permission)
+
+    def is_stop(self, name: str, value: float) -> bool:
+        """Whether `set` with these ends a motion. Such a write precedes all waiting requests. Raises `Misuse` for an unknown
+        name."""
+        return self._unit.is_stop(named(self._unit.registers, name), value)
 
     async def registers(self, address: int, count: int) -> tuple[int, ...]:
         """Raw holding registers."""
         return words(await self._unit.look(pdu.READ_HOLDING_REGISTERS, address, count))
 
-    async def request(self, request: pdu.ModbusRequest, *, urgent: bool = False) -> pdu.ModbusResponse:
+    async def request(self, request: pdu.ModbusRequest) -> pdu.ModbusResponse:
         """Send any request and return its answer. A write is sent only once, unless its registers are known to permit
-        repetition. ``urgent``: before those that wait."""
-        return pdu.answer(request, await self._unit.ask(request, urgent=urgent))
+        repetition. What ends a motion precedes all waiting requests; another write that waits when a stop is requested is not
+        sent: what it would begin is not known."""
+        unit = self._unit
+        if isinstance(request, pdu.ReadRequest) or halted(unit.registers, request):
+            return pdu.answer(request, await unit.ask(request))
+        async with unit.stopping_if_late(*ALL_AXES):
+            return pdu.answer(request, await unit.ask(request, permission=unit.permission(*ALL_AXES)))
 
     # ------------------------------------------------------------------ snapshots
 
@@ -316,3 +341,11 @@ class AsyncMic488:
         if dry_run:
             return await snapshot.changes(self._unit, kept, counters=counters, outputs=outputs)
         return await snapshot.put_back(self._unit, kept, counters=counters, outputs=outputs)
+
+
+def _moved_by(item: RegisterItem) -> tuple[int, ...]:
+    """The axes that a write may move."""
+    register = item.register
+    if register.effect not in (WriteEffect.MOVE, WriteEffect.ADD):
+        return ()
+    return ALL_AXES if register.axis is None else (register.axis,)

@@ -22,12 +22,12 @@ from steptwin.drivers.mic488.failures import NotReady, Unconfirmed
 from steptwin.drivers.mic488.motion import MotionKind, MoveEnd, Reason, end_of, status_text
 from steptwin.drivers.mic488.unit import ControlRegisters, Unit
 from steptwin.drivers.mic488.waiting import dynamics
-from steptwin.drivers.permission import Permission
+from steptwin.drivers.permission import HOLD_NS, Permission
 from steptwin.errors import LineFailure, Misuse, SteptwinError
 from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.status import AxisStatus
 
-HOLD_S = 0.4
+HOLD_S = HOLD_NS / SECOND
 """Time an axis continues after the last `hold` before it brakes, s."""
 HOLD_RANGE_S = (0.2, 2.0)
 SINGLE = 2.0**-23
@@ -95,10 +95,11 @@ class AsyncMic488Jog:
             if vmax != speed:
                 self._vmax_u = vmax
                 await unit.set_axis("VMAX", axis, speed, control.data_type)
+        permission = Permission(unit.line.now, round(self._hold_s * SECOND), begin.is_stopped)
         try:
             await self._move(control, begin)
-            self._permission = Permission(unit.line.now, round(self._hold_s * SECOND), begin.is_stopped)
-            self._permission.extend(self._held_ns)
+            permission.extend()
+            self._permission = permission
         except Overtaken:
             self._held_ns, self._permission = unit.line.now(), begin
             self._stopped(Reason.STOPPED, "by this program")
@@ -126,7 +127,7 @@ class AsyncMic488Jog:
                 self._judge(control.axes[self._axis - 1])
                 if self.end is None:
                     await self._move(control, permission)
-                    permission.extend(self._held_ns)
+                    permission.extend()
             except Overtaken:
                 self._stopped(Reason.STOPPED, "by this program")
             except (TooLate, SentLate):

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from steptwin.drivers.exchange import SentLate
 from steptwin.drivers.mic488.failures import unconfirmed
-from steptwin.drivers.mic488.unit import URGENT_TRIES, Unit
+from steptwin.drivers.mic488.unit import ALL_AXES, URGENT_TRIES, Unit
 from steptwin.errors import LineFailure
-from steptwin.mic488.registers import AXES
 from steptwin.mic488.status import ProgramState
 
 
@@ -28,12 +27,12 @@ class AsyncMic488Program:
     async def start(self) -> None:
         """Start the selected program, or continue a paused one. Sent only once: after a lost answer it is unknown whether it
         runs. One that began after a suspension of this process is paused, and its axes are stopped."""
-        permission = self._unit.permission(*range(1, AXES + 1))
+        permission = self._unit.permission(*ALL_AXES)
         try:
             await self._unit.write(self._unit.item("PROGRAM_CTRL"), ProgramState.RUNNING, permission=permission)
         except SentLate:
             await self.pause()
-            await self._unit.stop([*range(1, AXES + 1)], "M_STOP", "stopped")
+            await self._unit.stop(ALL_AXES, "M_STOP", "stopped")
             raise
 
     async def pause(self) -> None:
@@ -42,8 +41,6 @@ class AsyncMic488Program:
     async def stop(self) -> None:
         """End the program, which switches drives and outputs off (MIC-31). It precedes all waiting requests."""
         unit = self._unit
-        for axis in range(1, AXES + 1):
-            unit.notes.stops[axis] += 1
         try:
             await unit.write(unit.item("PROGRAM_CTRL"), ProgramState.STOPPED, urgent=True, most_attempts=URGENT_TRIES)
         except LineFailure as failure:

@@ -25,7 +25,7 @@ from steptwin.mic488.present import ACTIVITIES, axis_status, controller_status
 from steptwin.mic488.registermap import DataType, Register, Space
 from steptwin.mic488.registers import CONTROLLER_STATUS_TEXTS, register_map
 from steptwin.mic488.status import AxisStatus
-from steptwin.mic488.values import named
+from steptwin.mic488.values import halted, named
 from steptwin.nearmiss import NearMiss
 from steptwin.subject import commands as command
 from steptwin.subject.devicetwin import DeviceTwin
@@ -184,35 +184,20 @@ class Mic488Part:
         return [{"axis": n, "counts": await self._mic.axis(n).encoder(), "turned_by": None} for n in ALL_AXES]
 
     async def _write(self, wanted: steps.Write) -> None:
-        """Write registers one after the other; names are checked before the first is written."""
-        for _, name, _ in wanted.values:
-            if not named(self._registers, name).register.accepts:
-                raise Misuse(f"{name} can only be read")
-        for _, name, value in wanted.values:
-            await self._mic.set(name, value)
+        """Write registers one after the other."""
+        await self._mic.set_all(*((name, value) for _, name, value in wanted.values), is_sure=True)
 
-    def effect_of(self, request: steps.Request) -> RawEffect:
-        if request.pdu and request.pdu[0] in pdu.READS:
+    def effect_of(self, wanted: steps.Request | steps.Write) -> RawEffect:
+        if isinstance(wanted, steps.Write):
+            is_stop = all(self._mic.is_stop(name, value) for _, name, value in wanted.values)
+            return RawEffect.STOP if is_stop else RawEffect.WRITE
+        if wanted.pdu and wanted.pdu[0] in pdu.READS:
             return RawEffect.LOOK
         try:
-            decoded = pdu.decode_request(request.pdu)
+            is_stop = bool(halted(self._registers, pdu.decode_request(wanted.pdu)))
         except pdu.ModbusException:
-            return RawEffect.WRITE
-        return RawEffect.STOP if self._stops(decoded) else RawEffect.WRITE
-
-    def _stops(self, request: pdu.ModbusRequest) -> bool:
-        """Whether it stops axes or a program, or ends a jog."""
-        match request:
-            case pdu.WriteCoilRequest(address=address, on=on):
-                register = self._registers.find(Space.COIL, address)
-                return register is not None and register.key in (("STOP",) if on else ("JOG_PLUS", "JOG_MINUS"))
-            case pdu.WriteRegisterRequest(address=address, value=value):
-                register = self._registers.find(Space.HOLDING, address)
-                return register is not None and (
-                    register.key == "M_STOP" or (register.key == "PROGRAM_CTRL" and value != ProgramState.RUNNING)
-                )
-            case _:
-                return False
+            is_stop = False
+        return RawEffect.STOP if is_stop else RawEffect.WRITE
 
     async def _request(self, wanted: steps.Request) -> object:
         if wanted.unit != self.address:
@@ -222,7 +207,7 @@ class Mic488Part:
         except pdu.ModbusException as error:
             raise Misuse(f"pdu = {wanted.pdu.hex()}: {error.detail or error}") from None
         try:
-            answer = await self._mic.request(request, urgent=self.effect_of(wanted) is RawEffect.STOP)
+            answer = await self._mic.request(request)
             return {"pdu": pdu.encode_response(answer).hex()}
         except ModbusRefusal as refused:
             return {"pdu": pdu.exception_pdu(wanted.pdu[0], refused.code).hex()}

@@ -29,6 +29,7 @@ from steptwin.mic488.values import (
     UserFormat,
     encoded,
     encoded_words,
+    halted,
     moves,
     plan,
     repeatable,
@@ -36,6 +37,7 @@ from steptwin.mic488.values import (
 )
 from steptwin.wire import pdu
 
+ALL_AXES = tuple(range(1, AXES + 1))
 QUERIES_KEPT = 256
 URGENT_TRIES = 5
 """Number of attempts for a stop."""
@@ -137,11 +139,18 @@ class Unit:
         timeout_ns: Nanos | None = None,
         most_attempts: int | None = None,
     ) -> bytes:
-        """Send a request and return the answer PDU. Raises `ModbusRefusal` or a `LineFailure`."""
+        """Send a request and return the answer PDU. Raises `ModbusRefusal` or a `LineFailure`.
+
+        What may begin a motion, and has no ``permission``, is not sent after a stop of any axis. What ends a motion is urgent and
+        counts as a stop of its axes.
+        """
         if most_attempts is None:
             most_attempts = self.tries if repeatable(self.registers, request) else 1
+        for axis in halted(self.registers, request):
+            urgent = True
+            self.notes.stops[axis] += 1
         if permission is None and moves(self.registers, request):
-            permission = self.permission()
+            permission = self.permission(*ALL_AXES)
         return await self._exchange(
             ModbusQuery(self.number, request, self.wording.request), urgent, permission, timeout_ns, most_attempts
         )
@@ -209,6 +218,13 @@ class Unit:
         axis = item.register.axis
         request = encoded(item, value, data_type, self.unit_name(axis) if axis else "u")
         await self.ask(request, urgent=urgent, permission=permission, timeout_ns=timeout_ns, most_attempts=most_attempts)
+
+    def is_stop(self, item: RegisterItem, value: RegisterValue) -> bool:
+        """Whether writing ``value`` ends a motion."""
+        register = item.register
+        if register.type not in (Type.BIT, Type.WORD) or not register.accepts or not register.permits(value):
+            return False
+        return bool(halted(self.registers, encoded(item, value, DataType.REAL)))
 
     async def read_user(self, number: int, view: UserFormat, count: int) -> list[RegisterValue]:
         """Read ``count`` user registers from ``number`` on, as ``view``."""
@@ -297,10 +313,14 @@ class Unit:
                 f"unit {self.number} is in TRIGGER mode (AXIS_CTR_MODE = 1), in which a motion waits for its trigger: set "
                 "AXIS_CTR_MODE to 0",
             )
-        for axis in axes:
-            if control.axes[axis - 1] == AxisStatus.OFF:  # MIC-8
-                raise NotReady(self.place, f"M{axis} of unit {self.number} is switched off: enable it first (M{axis}_EN = 1)")
+        self.check_enabled(control, *axes)
         return control
+
+    def check_enabled(self, control: ControlRegisters, *axes: int) -> None:
+        """Raises `NotReady` for an axis that would ignore a motion because its drive is off (MIC-8)."""
+        for axis in axes:
+            if control.axes[axis - 1] == AxisStatus.OFF:
+                raise NotReady(self.place, f"M{axis} of unit {self.number} is switched off: enable it first (M{axis}_EN = 1)")
 
     def lock(self) -> AbstractAsyncContextManager[object]:
         """A lock for exchanges that no other motion command may interrupt."""

@@ -132,9 +132,14 @@ class EpicsController:
                 record.stopped(wanted.axis)
 
     async def jog(self, owner: object, who: Putter, wanted: Jog) -> None:
-        """Begin it, or let it go on. Raises `SteptwinError`."""
+        """Begin it. Raises `SteptwinError`."""
         client = self.client(who)
+        self._leases.released(wanted.machine, wanted.axis)
         await self._guarded(lambda: self._leases.jog(owner, client, wanted, JOG_LEASE_S))
+
+    def extend_jog(self, owner: object, wanted: Jog) -> None:
+        """Let it go on. Raises `Refusal` if it has ended."""
+        self._leases.extend(owner, wanted, JOG_LEASE_S)
 
     def end_jog(self, owner: object) -> None:
         self._commands += 1
@@ -142,7 +147,7 @@ class EpicsController:
 
     def replace_jog(self, axis: int) -> None:
         """Another command has taken the axis."""
-        self._leases.stopped(StopAxes(self.name, axis))
+        self._leases.replaced(self.name, axis)
 
     async def _guarded(self, act: Callable[[], Awaitable[None]]) -> None:
         self._commands += 1

@@ -108,6 +108,8 @@ class StatusBit:
     DIRECTION = 1 << 0
     DONE = 1 << 1
     PLUS_LIMIT = 1 << 2
+    POSITION = 1 << 5
+    """The drive is on (EA_POSITION), which CNEN shows."""
     PRESENT = 1 << 8
     """An encoder."""
     PROBLEM = 1 << 9

@@ -107,7 +107,17 @@ async def _put_spmg(record: PutTarget, who: Putter, name: str, value: FieldValue
 
 async def _put_ramp(record: PutTarget, who: Putter, name: str, value: FieldValue) -> None:
     velocity, seconds = float(record.values["VELO"]), float(record.values["ACCL"])
-    await record.write_ramp(who, *((float(value), seconds) if name == "VELO" else (velocity, float(value))))
+    await record.write_ramp(who, *((_within(record, value), seconds) if name == "VELO" else (velocity, float(value))))
+
+
+async def _put_speed(record: PutTarget, who: Putter, name: str, value: FieldValue) -> None:
+    await put_setting(record, who, name, _within(record, value))
+
+
+def _within(record: PutTarget, value: FieldValue) -> float:
+    """A velocity, brought into VBAS to VMAX as ``range_check`` of motorRecord.cc does; VMAX 0: no upper bound."""
+    low, high = float(record.values["VBAS"]), float(record.values["VMAX"])
+    return min(max(float(value), low), high or math.inf)
 
 
 async def _put_limit(record: PutTarget, who: Putter, name: str, value: FieldValue) -> None:
@@ -136,6 +146,7 @@ PUTS: dict[str, Callable[[PutTarget, Putter, str, FieldValue], Awaitable[None]]]
     "STOP": _put_stop,
     "SPMG": _put_spmg,
     **dict.fromkeys(("VELO", "ACCL"), _put_ramp),
+    **dict.fromkeys(("JVEL", "HVEL"), _put_speed),
     **dict.fromkeys(("HLM", "LLM", "DHLM", "DLLM"), _put_limit),
     "OFF": _put_offset,
     "DIR": _put_direction,

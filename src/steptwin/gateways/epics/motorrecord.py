@@ -35,7 +35,7 @@ class MotorRecord(MotorState):
             self._take(sample.state["axes"][self._index], sample.time, is_sure=is_sure)
         self._show_alarm()
         if self._motion is not None and self._jog is not None:
-            await self._look_after_jog()
+            self._look_after_jog()
         await self.show()
 
     # ------------------------------------------------------------------ puts
@@ -148,16 +148,16 @@ class MotorRecord(MotorState):
         there = self._number("DRBV") + margin
         return self._has_limits and (there > self._number("DHLM") if velocity > 0.0 else there < self._number("DLLM"))
 
-    async def _look_after_jog(self) -> None:
+    def _look_after_jog(self) -> None:
         if self._jog is None:
             return
-        who, wanted = self._jog
+        _, wanted = self._jog
         if self._runs_out(wanted.velocity):
             self.values["LVIO"] = 1
             self._end_jog()
             return
         try:
-            await self._controller.jog(self, who, wanted)
+            self._controller.extend_jog(self, wanted)
         except SteptwinError:
             self._end_jog()
 

@@ -173,6 +173,7 @@ class MotorState(MotorCoordinates):
             (StatusBit.DONE, not moves),
             (StatusBit.MOVING, moves),
             (StatusBit.PLUS_LIMIT, high),
+            (StatusBit.POSITION, bool(state["enabled"])),
             (StatusBit.MINUS_LIMIT, low),
             (StatusBit.PROBLEM, level == StatusLevel.ERROR.value),
             (StatusBit.PRESENT, state["encoder"] is not None),

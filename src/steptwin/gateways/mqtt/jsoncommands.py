@@ -95,7 +95,17 @@ class JsonCommands:
             if key in self._kept:
                 return self._kept[key][1]
             self._kept[key] = self._clock(), None
-        answer = await respond(lambda wanted, _: self._do(client, wanted, lease), json.dumps(message).encode(), _ignore)
+        is_command = False
+
+        async def do(wanted: Command, _: object) -> Result:
+            nonlocal is_command
+            is_command = True
+            return await self._do(client, wanted, lease)
+
+        answer = await respond(do, json.dumps(message).encode(), _ignore)
+        if not is_command:
+            fields = {name: value for name, value in message.items() if name != "do"}
+            client.refused(self._subject, str(message["do"]), fields)
         if key is not None:
             self._kept[key] = self._clock(), answer
         return answer

@@ -10,7 +10,7 @@ import asyncio
 import contextlib
 import json
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Coroutine, Iterable, Iterator, Mapping
 from datetime import UTC, datetime
 from typing import NamedTuple
 
@@ -33,6 +33,7 @@ from steptwin.gateways.mqtt.sparkplugmetrics import BDSEQ, DROPPED, REBIRTH, RES
 from steptwin.gateways.points import CLOCK, GatewayPoint, State
 from steptwin.gateways.sampling import Sample, Sampler
 from steptwin.machine import SECOND, Nanos
+from steptwin.subject.commands import Command
 
 AT_MOST = 500
 """Metrics in one message."""
@@ -105,7 +106,9 @@ class SparkplugFace:
         self._changes: deque[_Change] = deque(maxlen=store)
         self._dropped = 0
         self._clock_at = 0.0
-        self._bdseq = -1
+        self._bdseq = 0
+        self._has_session = False
+        """Whether a session has had this number."""
         self._seq = 0
         self._is_born = False
         self._host = asyncio.Event()
@@ -167,8 +170,10 @@ class SparkplugFace:
     # ------------------------------------------------------------------ the session
 
     def will(self) -> Publication:
-        """bdSeq is another one with every connection (tck-id-topics-nbirth-bdseq-increment)."""
-        self._bdseq = (self._bdseq + 1) % COUNTED
+        """bdSeq is the next one with every session (tck-id-topics-nbirth-bdseq-increment), not with each try to connect."""
+        if self._has_session:
+            self._bdseq = (self._bdseq + 1) % COUNTED
+        self._has_session = False
         return self._death()
 
     def _death(self) -> Publication:
@@ -179,6 +184,7 @@ class SparkplugFace:
         return SparkplugMetric(name=BDSEQ, timestamp=_now(), type=SparkplugType.INT64, value=self._bdseq)
 
     async def run(self, link: BrokerLink) -> None:
+        self._has_session = True
         await link.subscribe(self._topic("NCMD"), retained=False)
         await link.subscribe(self._topic("DCMD", "+"), retained=False)
         self._host_at = -1
@@ -311,7 +317,9 @@ class SparkplugFace:
                 self._host.clear()
 
     async def _do_all(self, name: str | None, metrics: Iterable[SparkplugMetric]) -> None:
+        """All are begun at once, in their order: a stop does not wait for the motion before it."""
         rows = self._devices[name].rows
+        begun: list[Coroutine[None, None, None]] = []
         for metric in metrics:
             row = next((row for row in rows if row.name == metric.name), None) or next(
                 (row for row in rows if metric.name is None and row.alias == metric.alias), None
@@ -319,23 +327,40 @@ class SparkplugFace:
             if name is None and row is not None and row.name == REBIRTH:
                 self._wants_rebirth |= metric.value is True
                 self._news.set()
-            elif name is not None and row is not None and row.command is not None:
-                await self._do(name, row, metric)
+            elif name is not None:
+                begun.append(self._do(name, row, metric))
+        await asyncio.gather(*begun)
 
-    async def _do(self, name: str, row: MetricRow, metric: SparkplugMetric) -> None:
+    async def _do(self, name: str, row: MetricRow | None, metric: SparkplugMetric) -> None:
+        called = row.name if row is not None else metric.name or f"alias {metric.alias}"
         try:
-            if metric.is_historical or row.command is None:
-                raise Misuse("a command is not historical")
-            await self._anybody.do(self._subject, row.command(metric.value))
-            result = f"{row.name}: done"
+            wanted = _command(row, metric)
+        except Misuse as error:
+            self._anybody.refused(self._subject, "write", {"machine": name, "metric": called, "value": str(metric.value)})
+            self._tell(name, f"{called}: {error}")
+            return
+        try:
+            await self._anybody.do(self._subject, wanted)
+            result = f"{called}: done"
         except SteptwinError as error:
-            result = f"{row.name}: {error}"
+            result = f"{called}: {error}"
         self._tell(name, result)
 
     def _tell(self, name: str | None, result: str) -> None:
         for one in self._devices[name].rows:
             if one.name == RESULT:
                 self._change(name, one, result, _now())
+
+
+def _command(row: MetricRow | None, metric: SparkplugMetric) -> Command:
+    """Raises `Misuse`."""
+    if row is None:
+        raise Misuse("the device has no metric of that name")
+    if row.command is None:
+        raise Misuse("it can only be read")
+    if metric.is_historical:
+        raise Misuse("a command is not historical")
+    return row.command(metric.value)
 
 
 def _together(changes: list[_Change], begin: int) -> list[_Change]:

@@ -163,5 +163,12 @@ def _number(value: SparkplugValue, kind: PointType, limits: Limits | None) -> fl
     low = None if limits is None else limits.low
     high = None if limits is None else limits.high
     if (low is not None and value < low) or (high is not None and value > high):
-        raise Misuse(f"{value!r}: permitted are numbers from {low} to {high}")
+        raise Misuse(f"{value!r}: permitted are numbers {_range(low, high)}")
     return float(value)
+
+
+def _range(low: float | None, high: float | None) -> str:
+    """At least one end is known."""
+    if low is None:
+        return f"up to {high}"
+    return f"from {low}" if high is None else f"from {low} to {high}"

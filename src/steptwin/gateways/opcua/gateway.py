@@ -16,6 +16,8 @@ from steptwin.errors import LineFailure, SteptwinError
 from steptwin.eventloop import endless
 from steptwin.gateways.contract import GatewayState, GatewaySubject
 from steptwin.gateways.opcua.addressspace import NAMESPACE, NAMESPACE_URI, AddressSpaceBuilder
+from steptwin.gateways.opcua.connections import ListeningServer
+from steptwin.gateways.opcua.limits import tell_limits
 from steptwin.gateways.opcua.nodes import NodeMaker
 from steptwin.gateways.opcua.notifications import Notifications
 from steptwin.gateways.opcua.past import PastNodes
@@ -65,10 +67,11 @@ class OpcUaGateway:
         logging.getLogger("asyncua").addHandler(logging.NullHandler())
         logging.getLogger("asyncua").propagate = False
         inside = GatewayServer(user_manager=security)
-        server = Server(inside)
+        server = ListeningServer(inside)
         server.set_endpoint(f"opc.tcp://{address}/")
         server.set_server_name(f"steptwin {self._subject.description.name}")
         await server.init()
+        await tell_limits(inside.aspace)
         await server.set_application_uri(APPLICATION_URI)
         await server.set_build_info(PRODUCT_URI, "steptwin", "steptwin", __version__, "", security.began)
         if await server.register_namespace(NAMESPACE_URI) != NAMESPACE:
@@ -80,9 +83,10 @@ class OpcUaGateway:
             maker.add(builder.items)
             maker.refer(builder.references)
             self._sampler = Sampler(self._subject, registers, self._spec.interval)
-            if self._subject.past is not None:
-                inside.history_manager.set_storage(PastNodes(self._subject.past, builder.nodes()))
-            service = NodeService(inside.aspace, self._subject, self._sampler, builder.points, builder.methods, builder.arrays)
+            past = None if self._subject.past is None else PastNodes(self._subject.past, builder.nodes())
+            service = NodeService(
+                inside.aspace, self._subject, self._sampler, builder.points, builder.methods, builder.arrays, past
+            )
             inside.service = self._service = service
             await service.refresh_all()
         self._notifications = await Notifications.open(server, self._subject)

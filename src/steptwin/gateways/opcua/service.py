@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from datetime import UTC, datetime
@@ -16,7 +17,9 @@ from steptwin.gateways.clients import GatewayClient
 from steptwin.gateways.contract import GatewaySubject
 from steptwin.gateways.leases import JogLeases
 from steptwin.gateways.opcua.addressspace import ArrayNode, BoundMethod, PointNode
+from steptwin.gateways.opcua.limits import AT_ONCE
 from steptwin.gateways.opcua.nodetypes import data_value, number_of, status
+from steptwin.gateways.opcua.past import PastNodes
 from steptwin.gateways.points import GatewayPoint, PointValue, State
 from steptwin.gateways.sampling import Sample, Sampler
 from steptwin.subject.commands import Jog, ReadPoints, StopAxes
@@ -109,6 +112,7 @@ class NodeService:
         points: Mapping[str, Sequence[PointNode]],
         methods: Mapping[tuple[ua.NodeId, ua.NodeId], BoundMethod],
         arrays: Mapping[ua.NodeId, ArrayNode],
+        past: PastNodes | None,
     ) -> None:
         self._space = space
         self._subject = subject
@@ -116,6 +120,7 @@ class NodeService:
         self._points = points
         self._methods = methods
         self._arrays = arrays
+        self._past = past
         self._watched_arrays: dict[ua.NodeId, int] = {}
         """What has been subscribed to, and publications until it is read again."""
         self._of_node = {node.id: (machine, node) for machine, nodes in points.items() for node in nodes}
@@ -188,8 +193,10 @@ class NodeService:
         return bool(self._space[node].attributes[ua.AttributeIds.Value].datachange_callbacks)
 
     async def _show(self, sample: Sample, points: Sequence[PointNode]) -> None:
-        for node in points:
+        for number, node in enumerate(points, 1):
             await self._write(sample, node, None if sample.state is None else node.point.read(sample.state))
+            if number % AT_ONCE == 0:
+                await asyncio.sleep(0)
         watched = self._watched.get(sample.machine)
         if watched is not None:
             watched.forget(node.point for node in points)
@@ -209,6 +216,11 @@ class NodeService:
             words = [int(one["value"] or 0) & 0xFFFF for one in found]
             fresh = ua.DataValue(ua.Variant(words, ua.VariantType.UInt16, is_array=True), SourceTimestamp=at)
         await self._space.write_attribute_value(node, ua.AttributeIds.Value, fresh)
+
+    async def history(self, params: ua.HistoryReadParameters, one: ua.HistoryReadValueId) -> ua.HistoryReadResult:
+        if self._past is None:
+            raise ua.UaStatusCodeError(ua.StatusCodes.BadHistoryOperationUnsupported)
+        return await self._past.read(params.HistoryReadDetails, one, release=params.ReleaseContinuationPoints)
 
     # ------------------------------------------------------------------ commands
 
@@ -252,6 +264,9 @@ class NodeService:
         await client.do(self._subject, wanted)
         if isinstance(wanted, StopAxes):
             self._leases.stopped(wanted)
+
+    def refused(self, client: GatewayClient, do: str, fields: Mapping[str, object]) -> None:
+        client.refused(self._subject, do, fields)
 
     def leave(self, session: object) -> None:
         self._leases.drop(session)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Iterable, Sequence
+import asyncio
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -15,6 +16,8 @@ from steptwin.access.roles import Role
 from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
 from steptwin.gateways.clients import GatewayClient, NotPermitted, address_text
 from steptwin.gateways.contract import ClientState
+from steptwin.gateways.opcua.indexranges import part_of
+from steptwin.gateways.opcua.limits import AT_ONCE, MOST_READ
 from steptwin.gateways.opcua.nodetypes import status
 from steptwin.gateways.opcua.subscriptions import MonitoredItems, Publish, packing
 
@@ -60,6 +63,14 @@ class SessionRequests(Protocol):
         self, client: GatewayClient, session: object, node: ua.NodeId, method: ua.NodeId, given: Sequence[ua.Variant]
     ) -> None:
         """As `write`."""
+        ...
+
+    async def history(self, params: ua.HistoryReadParameters, one: ua.HistoryReadValueId) -> ua.HistoryReadResult:
+        """The past of one node. Raises `ua.UaStatusCodeError`."""
+        ...
+
+    def refused(self, client: GatewayClient, do: str, fields: Mapping[str, object]) -> None:
+        """A write or call that is no command."""
         ...
 
     def leave(self, session: object) -> None:
@@ -114,23 +125,30 @@ class GatewaySession(InternalSession):
         return ClientState(client.name, address_text(self.name), client.role.title, tuple(dict.fromkeys(names)))
 
     async def read(self, params: ua.ReadParameters) -> list[ua.DataValue]:
-        await self._service.refresh(one.NodeId for one in params.NodesToRead if one.AttributeId == ua.AttributeIds.Value)
-        return await super().read(params)
+        wanted = params.NodesToRead
+        if len(wanted) > MOST_READ:
+            raise ua.UaStatusCodeError(ua.StatusCodes.BadTooManyOperations)
+        await self._service.refresh(one.NodeId for one in wanted if one.AttributeId == ua.AttributeIds.Value)
+        found: list[ua.DataValue] = []
+        for first in range(0, len(wanted), AT_ONCE):
+            found += await super().read(replace(params, NodesToRead=wanted[first : first + AT_ONCE]))
+            await asyncio.sleep(0)  # others are not held up
+        return [part_of(value, one.IndexRange) for one, value in zip(wanted, found, strict=True)]
 
     async def history_read(self, params: ua.HistoryReadParameters) -> list[ua.HistoryReadResult]:
-        """Node by node: the library lets one that has no history fail the whole request."""
-        return [await self._history(replace(params, NodesToRead=[one])) for one in params.NodesToRead]
+        return [await self._history(params, one) for one in params.NodesToRead]
 
-    async def _history(self, params: ua.HistoryReadParameters) -> ua.HistoryReadResult:
+    async def _history(self, params: ua.HistoryReadParameters, one: ua.HistoryReadValueId) -> ua.HistoryReadResult:
         try:
-            (result,) = await super().history_read(params)
+            return await self._service.history(params, one)
         except ua.UaStatusCodeError as error:
             result = ua.HistoryReadResult()
             result.StatusCode = ua.StatusCode(error.code)
-        return result
+            return result
 
     async def write(self, params: ua.WriteParameters) -> list[ua.StatusCode]:
-        return [await _code(self._write(one)) for one in params.NodesToWrite]
+        """As `call`."""
+        return await asyncio.gather(*(self._code(self._write(one), "write", one) for one in params.NodesToWrite))
 
     async def _write(self, one: ua.WriteValue) -> None:
         if one.AttributeId != ua.AttributeIds.Value:
@@ -139,17 +157,32 @@ class GatewaySession(InternalSession):
             raise ua.UaStatusCodeError(ua.StatusCodes.BadIndexRangeInvalid)
         if one.Value.Value is None:
             raise ua.UaStatusCodeError(ua.StatusCodes.BadTypeMismatch)
-        if one.Value.SourceTimestamp is not None or one.Value.ServerTimestamp is not None:
+        has_status = one.Value.StatusCode is not None and one.Value.StatusCode.value != ua.StatusCodes.Good
+        if has_status or one.Value.SourceTimestamp is not None or one.Value.ServerTimestamp is not None:
             raise ua.UaStatusCodeError(ua.StatusCodes.BadWriteNotSupported)
         await self._service.write(self._client, one.NodeId, one.Value.Value)
 
     async def call(self, params: list[ua.CallMethodRequest]) -> list[ua.CallMethodResult]:
-        return [await self._call(one) for one in params]
+        """All are begun at once, in their order: a stop does not wait for the motion before it."""
+        return await asyncio.gather(*(self._call(one) for one in params))
 
     async def _call(self, one: ua.CallMethodRequest) -> ua.CallMethodResult:
         result = ua.CallMethodResult()
-        result.StatusCode = await _code(self._service.call(self._client, self, one.ObjectId, one.MethodId, one.InputArguments))
+        calling = self._service.call(self._client, self, one.ObjectId, one.MethodId, one.InputArguments)
+        result.StatusCode = await self._code(calling, "call", one)
         return result
+
+    async def _code(self, action: Awaitable[None], do: str, asked: ua.WriteValue | ua.CallMethodRequest) -> ua.StatusCode:
+        """The status code of what is done. What the gateway itself refuses is in the audit log, too."""
+        try:
+            await action
+        except ua.UaStatusCodeError as error:
+            code = ua.StatusCode(error.code)
+            self._service.refused(self._client, do, {**_asked(asked), "code": code.name})
+            return code
+        except SteptwinError as error:
+            return status(next(code for kind, code in CODES if isinstance(error, kind)))
+        return ua.StatusCode()
 
     async def close_session(self, delete_subs: bool = True) -> None:
         self._service.leave(self)
@@ -175,16 +208,14 @@ class GatewaySession(InternalSession):
         wanted = [one.ItemToMonitor.NodeId for one in params.ItemsToCreate]
         await self._service.refresh(wanted)
         results = await super().create_monitored_items(params)
-        self._service.watch(wanted)
+        self._service.watch(node for node, result in zip(wanted, results, strict=True) if result.StatusCode.is_good())
         return results
 
 
-async def _code(action: Awaitable[None]) -> ua.StatusCode:
-    """The status code of what is done."""
-    try:
-        await action
-    except ua.UaStatusCodeError as error:
-        return ua.StatusCode(error.code)
-    except SteptwinError as error:
-        return status(next(code for kind, code in CODES if isinstance(error, kind)))
-    return ua.StatusCode()
+def _asked(asked: ua.WriteValue | ua.CallMethodRequest) -> dict[str, object]:
+    """What a client wants, as fields of the audit log."""
+    if isinstance(asked, ua.WriteValue):
+        value = None if asked.Value.Value is None else asked.Value.Value.Value
+        return {"node": asked.NodeId.to_string(), "value": str(value)}
+    given = [str(one.Value) for one in asked.InputArguments]
+    return {"object": asked.ObjectId.to_string(), "method": asked.MethodId.to_string(), "arguments": ", ".join(given)}

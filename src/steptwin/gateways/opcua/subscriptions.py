@@ -6,8 +6,10 @@ notification costs. Values here are never changed, so nothing is copied, and the
 
 from __future__ import annotations
 
+import asyncio
 import struct
 from collections.abc import Callable, Coroutine
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
@@ -17,7 +19,10 @@ from asyncua.server.internal_subscription import InternalSubscription
 from asyncua.server.monitored_item_service import MonitoredItemService
 from asyncua.ua.ua_binary import struct_to_binary
 
-from steptwin.gateways.opcua.nodetypes import standard
+from steptwin.gateways.opcua.filters import EVERY_CHANGE, ChangeFilter, change_filter, differs
+from steptwin.gateways.opcua.indexranges import check_range, part_of
+from steptwin.gateways.opcua.limits import AT_ONCE
+from steptwin.gateways.opcua.nodetypes import standard, status
 
 _TYPE = standard(ua.ObjectIds.DataChangeNotification_Encoding_DefaultBinary)
 _EPOCH = datetime(1601, 1, 1, tzinfo=UTC)
@@ -47,6 +52,51 @@ class MonitoredItems(MonitoredItemService):
         self._on_end = on_end
         self._notified: dict[int, ua.DataValue] = {}
         """By handle: what the client knows."""
+        self._filters: dict[int, ChangeFilter] = {}
+        """By item, other than every change."""
+
+    async def create_monitored_items(self, params: ua.CreateMonitoredItemsParameters) -> list[ua.MonitoredItemCreateResult]:
+        results: list[ua.MonitoredItemCreateResult] = []
+        for item in params.ItemsToCreate:
+            results.append(await self._create(params, item))
+            if len(results) % AT_ONCE == 0:
+                await asyncio.sleep(0)
+        return results
+
+    async def _create(
+        self, params: ua.CreateMonitoredItemsParameters, item: ua.MonitoredItemCreateRequest
+    ) -> ua.MonitoredItemCreateResult:
+        try:
+            check_range(item.ItemToMonitor.IndexRange)
+            what = change_filter(self.aspace, item.ItemToMonitor, item.RequestedParameters.Filter)
+        except ua.UaStatusCodeError as error:
+            refused = ua.MonitoredItemCreateResult()
+            refused.StatusCode = ua.StatusCode(error.code)
+            return refused
+        (result,) = await super().create_monitored_items(replace(params, ItemsToCreate=[item]))
+        if result.StatusCode.is_good() and what != EVERY_CHANGE:
+            self._filters[result.MonitoredItemId] = what
+        return result
+
+    def modify_monitored_items(self, params: ua.ModifyMonitoredItemsParameters) -> list[ua.MonitoredItemModifyResult]:
+        return [self._modify(params, item) for item in params.ItemsToModify]
+
+    def _modify(
+        self, params: ua.ModifyMonitoredItemsParameters, item: ua.MonitoredItemModifyRequest
+    ) -> ua.MonitoredItemModifyResult:
+        known = self._monitored_items.get(item.MonitoredItemId)
+        refused = ua.MonitoredItemModifyResult()
+        if known is None or known.read_value_id is None:
+            refused.StatusCode = status(ua.StatusCodes.BadMonitoredItemIdInvalid)
+            return refused
+        try:
+            what = change_filter(self.aspace, known.read_value_id, item.RequestedParameters.Filter)
+        except ua.UaStatusCodeError as error:
+            refused.StatusCode = ua.StatusCode(error.code)
+            return refused
+        (result,) = super().modify_monitored_items(replace(params, ItemsToModify=[item]))
+        self._filters[item.MonitoredItemId] = what
+        return result
 
     async def datachange_callback(self, handle: int, value: ua.DataValue, error: ua.StatusCode | None = None) -> None:
         if error is not None:
@@ -57,8 +107,10 @@ class MonitoredItems(MonitoredItemService):
         if item.mode == ua.MonitoringMode.Disabled:
             self._notified.pop(handle, None)
             return
+        if item.read_value_id is not None and item.read_value_id.IndexRange:
+            value = part_of(value, item.read_value_id.IndexRange)
         before = self._notified.get(handle)
-        if before is not None and not _differs(before, value, item.filter):
+        if before is not None and not differs(before, value, self._filters.get(identity, EVERY_CHANGE)):
             return
         self._notified[handle] = value
         notification = ua.MonitoredItemNotification(item.client_handle or 0, value)
@@ -68,28 +120,10 @@ class MonitoredItems(MonitoredItemService):
         codes = super().delete_monitored_items(ids)
         for handle in self._notified.keys() - self._monitored_datachange.keys():
             del self._notified[handle]
+        for identity in self._filters.keys() - self._monitored_items.keys():
+            del self._filters[identity]
         self._on_end()
         return codes
-
-
-def _differs(before: ua.DataValue, value: ua.DataValue, what: Any) -> bool:
-    """Whether a client that has the filter ``what`` is told (OPC 10000-4, 7.22.2)."""
-    if before.StatusCode != value.StatusCode:
-        return True
-    is_filter = isinstance(what, ua.DataChangeFilter)
-    trigger = what.Trigger if is_filter else ua.DataChangeTrigger.StatusValue
-    if trigger == ua.DataChangeTrigger.Status:
-        return False
-    if trigger == ua.DataChangeTrigger.StatusValueTimestamp and before.SourceTimestamp != value.SourceTimestamp:
-        return True
-    old = None if before.Value is None else before.Value.Value
-    new = None if value.Value is None else value.Value.Value
-    if old == new:
-        return False
-    is_band = is_filter and what.DeadbandType == ua.DeadbandType.Absolute
-    if is_band and isinstance(old, int | float) and isinstance(new, int | float):
-        return abs(new - old) > float(what.DeadbandValue)
-    return True
 
 
 def packing(publish: Publish) -> Publish:

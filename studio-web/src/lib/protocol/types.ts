@@ -914,7 +914,7 @@ export type JogRequest = {
   velocity: number;
 };
 
-/** Stop as fast as the controller does, with a ramp or without. Its program goes on. Answer: program: what the program does now: running (it goes on), paused, stopped; null where that is not known. */
+/** Stop as fast as the controller does, with a ramp or without. The program of a MIC488 goes on. Answer: program: what the program does now: running (it goes on), paused, stopped; null where that is not known. */
 export type StopRequest = {
   do: "stop";
   /** Comes back with the answer. */

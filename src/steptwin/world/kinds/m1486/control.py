@@ -9,13 +9,14 @@ from typing import Any
 from steptwin.errors import Misuse, Refusal
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.lines import LINES, SEEK_ENDS_LOW
+from steptwin.m1486.memory import FileState
 from steptwin.m1486.microsteps import FULL_STEP, UNIT
 from steptwin.m1486.present import program_words
 from steptwin.m1486.ranges import out_of_range
 from steptwin.m1486.syntax import ChipCommand
 from steptwin.machine import Nanos
 from steptwin.world import script as do
-from steptwin.world.control import ControllerCommand, Halt, Jog, Move, Seek, StopAxes
+from steptwin.world.control import ControllerCommand, ControlProgram, Halt, Jog, Move, Seek, StopAxes
 from steptwin.world.kind import MotionEnds
 
 _LINE = re.compile(r"B([1-9][0-9]?)\Z")
@@ -39,13 +40,19 @@ def _line_number(pin: str) -> int:
     return int(found[1])
 
 
+def typed(chip: M1486Chip, line: str, *texts: str) -> do.Send:
+    """Commands for this chip alone: it is selected by its address. A file that a stop has ended is closed before."""
+    closing = ["]"] if chip.memory.file is FileState.REFUSED else []
+    return do.Send(line, "".join(f"{text}\r" for text in (f"x{chip.address:X}", *closing, *texts)).encode("ascii"))
+
+
 def _typed(chip: M1486Chip, line: str | None, command: Any, *texts: str) -> do.Send:
-    """Commands for this chip alone: it is selected by its address. Raises `Refusal` where nothing can be typed."""
+    """Raises `Refusal` where nothing can be typed."""
     if command.axis not in (None, 1):
         raise Misuse(f"{command.machine}: no axis {command.axis}: an M1486 has one, 1")
     if line is None:
         raise Refusal(f"{command.machine} is on no line, so no commands can be sent to it")
-    return do.Send(line, "".join(f"{text}\r" for text in (f"x{chip.address:X}", *texts)).encode("ascii"))
+    return typed(chip, line, *texts)
 
 
 def _refuse_busy(chip: M1486Chip, name: str) -> None:
@@ -100,18 +107,26 @@ def _jog(chip: M1486Chip, line: str | None, command: Jog) -> do.Send:
     return _typed(chip, line, command, velocity, "g+" if command.velocity > 0 else "g-", "r")
 
 
-def _stop(chip: M1486Chip, line: str | None, command: StopAxes) -> do.Send:
-    """With its ramp. A program goes on after it unless function 51 is off."""
-    return _typed(chip, line, command, "k")
+def _stop(chip: M1486Chip, line: str | None, command: StopAxes) -> Halt:
+    return Halt(command.machine, command.axis)
+
+
+def _program(chip: M1486Chip, line: str | None, command: ControlProgram) -> Halt:
+    if command.action != "stop":
+        raise Refusal(f"{command.machine}: an M1486 has no command to {command.action} its program: only stop can be done")
+    return Halt(command.machine, program=command.action)
 
 
 def halt(chip: M1486Chip, wanted: Halt, now: Nanos) -> None:
-    chip.receive(f"x{chip.address:X}\r{'%' if wanted.program else ''}\rk\r".encode("ascii"), now)
+    """Every stop ends motion and program: the memory has one row of commands, whether they were typed or belong to a program, and
+    the chip has no pause."""
+    chip.halt(now)
 
 
-CONTROL: Mapping[type[ControllerCommand], Callable[[M1486Chip, str | None, Any], do.Send]] = {
+CONTROL: Mapping[type[ControllerCommand], Callable[[M1486Chip, str | None, Any], do.Send | Halt]] = {
     Move: _move,
     Jog: _jog,
     StopAxes: _stop,
+    ControlProgram: _program,
 }
 """It has no enable, its home is a line that is not known (`seek`), and programs begin at labels: characters go to its line."""

@@ -12,15 +12,17 @@ from steptwin.m1486.microsteps import FULL_STEP, UNIT
 from steptwin.m1486.present import program_words
 from steptwin.m1486.ranges import out_of_range
 from steptwin.m1486.syntax import ChipCommand
-from steptwin.m1486.variants import Store
+from steptwin.m1486.variants import SLOWEST_JOG, Store
 from steptwin.machine import MILLISECOND, SECOND, Nanos
-from steptwin.motion.ramps import plan_distance
-from steptwin.world import script as do
+from steptwin.motion.ramps import longest_within
 from steptwin.world.control import Jog
-from steptwin.world.heldjog import STOP_NS, Given
+from steptwin.world.heldjog import REST_NS, STOP_NS, Given
+from steptwin.world.kinds.m1486.control import typed
 
 LINK_NS: Nanos = 100 * MILLISECOND
 """A move takes at most this, unless a single microstep takes longer."""
+TYPED = 12
+"""Characters that are typed for a move."""
 LOOK_NS: Nanos = MILLISECOND
 """How often a chip that is not yet at rest is looked at."""
 PATIENCE_NS: Nanos = 2 * SECOND
@@ -30,8 +32,6 @@ PATIENCE_NS: Nanos = 2 * SECOND
 class M1486HeldJog:
     """See `steptwin.world.heldjog.HeldJog`. Raises `Misuse` for a velocity, `Refusal` for a chip that cannot be jogged now."""
 
-    lasts_ns: Nanos = STOP_NS - LINK_NS
-
     def __init__(self, chip: M1486Chip, line: str | None, wanted: Jog) -> None:
         name = wanted.machine
         if wanted.axis != 1:
@@ -40,8 +40,11 @@ class M1486HeldJog:
             raise Refusal(f"{name} is on no line, so no commands can be sent to it")
         if chip.variant.store is Store.EEPROM:
             raise Refusal(f"{name}: {chip.variant.title} writes every command into its EEPROM, so it is not jogged")
+        if chip.is_timed and chip.uart.baud < SLOWEST_JOG:
+            raise Refusal(f"{name}: a jog needs a line of at least {SLOWEST_JOG} bit/s; this one has {chip.uart.baud} bit/s")
         if not chip.is_idle():
             raise Refusal(f"{name} is not at rest ({program_words(chip, chip.now)}): wait, or stop it")
+        self.lasts_ns: Nanos = min(STOP_NS, REST_NS - TYPED * chip.uart.character_ns) - LINK_NS
         self._chip = chip
         self._line = line
         self._direction = 1 if wanted.velocity > 0.0 else -1
@@ -62,12 +65,7 @@ class M1486HeldJog:
         drive = self._chip.drive
         settings = drive.start_stop, drive.acceleration, drive.profile_speed, self._velocity
         curve = speed_curve(settings, drive.qualification, self._chip.variant.clock)
-        low, high = 1, max(1, round(curve.top * LINK_NS / SECOND) // drive.grid_u)
-        while low < high:  # the longest that is over in time
-            middle = (low + high + 1) // 2
-            end = plan_distance(0, 0, middle * drive.grid_u, curve).end or 0
-            low, high = (middle, high) if end <= LINK_NS else (low, middle - 1)
-        return low * drive.grid_u
+        return longest_within(LINK_NS, drive.grid_u, curve)
 
     # ------------------------------------------------------------------ as `HeldJog`
 
@@ -114,4 +112,4 @@ class M1486HeldJog:
         return self._typed(*before, f"{'f' if self._direction > 0 else 'b'}{self._distance_u}", "r")
 
     def _typed(self, *texts: str) -> Given:
-        return (do.Send(self._line, "".join(f"{text}\r" for text in (f"x{self._chip.address:X}", *texts)).encode("ascii")),)
+        return (typed(self._chip, self._line, *texts),)

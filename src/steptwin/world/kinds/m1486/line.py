@@ -58,6 +58,10 @@ class ChipLine(Line):
             self._commands += data.count(b"\r")
         return super().exchange(place, found, data, now)
 
+    def recall(self, unit: int, now: Nanos) -> None:
+        """What a fault holds up of it comes to the chips at once, where a stop drops it."""
+        self.places[SCRIPTS].port.hasten(now)
+
     @property
     def traffic(self) -> LineTraffic:
         return LineTraffic(self._commands, self.chain.collisions)

@@ -1,0 +1,80 @@
+"""Filters of monitored items (OPC 10000-4, 7.22): what is supported, and the status codes of what is not."""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import Any, NamedTuple
+
+from asyncua import ua
+from asyncua.server.address_space import AddressSpace
+from asyncua.ua import uaprotocol_auto
+
+_CHANGES = (ua.DataChangeFilter, uaprotocol_auto.DataChangeFilter)
+"""The class that the library exports, and the one that it decodes."""
+_NUMBERS = range(ua.ObjectIds.SByte, ua.ObjectIds.Double + 1)
+"""Types of numbers; the types of variants have the same numbers (OPC 10000-6, 5.1.2)."""
+
+
+class ChangeFilter(NamedTuple):
+    """When a client is notified. ``band``: an absolute dead band, 0 without one."""
+
+    trigger: Any = ua.DataChangeTrigger.StatusValue
+    band: float = 0.0
+
+
+EVERY_CHANGE = ChangeFilter()
+
+
+def change_filter(space: AddressSpace, item: ua.ReadValueId, wanted: Any) -> ChangeFilter:
+    """The filter ``wanted`` for the attribute of ``item``; none for events, which the library filters. Raises
+    `ua.UaStatusCodeError` for one that is not supported, not valid, or not for this attribute or type."""
+    is_none = wanted is None or (isinstance(wanted, ua.ExtensionObject) and wanted.TypeId == ua.NodeId())
+    if item.AttributeId == ua.AttributeIds.EventNotifier:
+        if is_none:
+            raise ua.UaStatusCodeError(ua.StatusCodes.BadEventFilterInvalid)
+        if not isinstance(wanted, ua.EventFilter):
+            raise ua.UaStatusCodeError(ua.StatusCodes.BadFilterNotAllowed)
+        return EVERY_CHANGE
+    if is_none:
+        return EVERY_CHANGE
+    if isinstance(wanted, ua.EventFilter):
+        raise ua.UaStatusCodeError(ua.StatusCodes.BadFilterNotAllowed)
+    if not isinstance(wanted, _CHANGES):
+        raise ua.UaStatusCodeError(ua.StatusCodes.BadMonitoredItemFilterUnsupported)
+    if wanted.DeadbandType == ua.DeadbandType.None_:
+        return ChangeFilter(wanted.Trigger)
+    if wanted.DeadbandType == ua.DeadbandType.Percent:
+        raise ua.UaStatusCodeError(ua.StatusCodes.BadMonitoredItemFilterUnsupported)
+    band = float(wanted.DeadbandValue)
+    if wanted.DeadbandType != ua.DeadbandType.Absolute or not isfinite(band) or band < 0.0:
+        raise ua.UaStatusCodeError(ua.StatusCodes.BadDeadbandFilterInvalid)
+    if item.AttributeId != ua.AttributeIds.Value or not _is_number(space, item.NodeId):
+        raise ua.UaStatusCodeError(ua.StatusCodes.BadFilterNotAllowed)
+    return ChangeFilter(wanted.Trigger, band)
+
+
+def _is_number(space: AddressSpace, node: Any) -> bool:
+    value = space.read_attribute_value(node, ua.AttributeIds.Value).Value
+    if value is not None and value.VariantType != ua.VariantType.Null:
+        return value.VariantType.value in _NUMBERS
+    kind = space.read_attribute_value(node, ua.AttributeIds.DataType).Value
+    return kind is not None and kind.Value.NamespaceIndex == 0 and kind.Value.Identifier in _NUMBERS
+
+
+def differs(before: ua.DataValue, value: ua.DataValue, what: ChangeFilter) -> bool:
+    """Whether a client that has the filter ``what`` is told (OPC 10000-4, 7.22.2)."""
+    if before.StatusCode != value.StatusCode:
+        return True
+    if what.trigger == ua.DataChangeTrigger.Status:
+        return False
+    if what.trigger == ua.DataChangeTrigger.StatusValueTimestamp and before.SourceTimestamp != value.SourceTimestamp:
+        return True
+    old = None if before.Value is None else before.Value.Value
+    new = None if value.Value is None else value.Value.Value
+    if old == new:
+        return False
+    if not what.band or old is None or new is None:
+        return True
+    if isinstance(old, list) and isinstance(new, list):
+        return len(old) != len(new) or any(abs(one - other) > what.band for one, other in zip(old, new, strict=True))
+    return bool(abs(new - old) > what.band)
