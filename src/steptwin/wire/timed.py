@@ -32,7 +32,7 @@ class LineTiming:
 
     ``turnaround_ns`` passes between the request and the first character of the response; it cannot be shorter than the
     gap that ends the request, which is its default. ``interval_ns`` is the least time between two requests executed.
-    ``strict``: a pause above 750 µs inside a frame ends it, so that the device drops it (MIC-15).
+    ``strict``: a pause above 750 µs inside a frame drops the burst, as the device does (MIC-15).
     """
 
     line: SerialLine
@@ -91,7 +91,7 @@ class TimedRtuSlavePort(SlavePort):
     """As `steptwin.wire.slave.RtuSlavePort`, with line timing. Responses leave when their last character would have.
 
     Call `to_send` at every `deadline`: a request is executed at the moment of the call that finds it due. ``gap_ns`` is the
-    silence after which noise is discarded; with strict timing 750 µs.
+    silence that ends a burst; with strict timing 750 µs.
     """
 
     broken = None
@@ -122,10 +122,7 @@ class TimedRtuSlavePort(SlavePort):
         super().__init__(on_frame)
         self._units = units
         timing = units.timing
-        if timing.strict:
-            self._framer = rtu.RtuFramer(units.devices, rtu.UART_GAP_NS, rtu.UART_GAP_NS)
-        else:
-            self._framer = rtu.RtuFramer(units.devices, gap_ns)
+        self._framer = rtu.StrictRtuFramer(units.devices) if timing.strict else rtu.RtuFramer(units.devices, gap_ns)
         self._incoming = CharacterClock(timing.line)
         self._outgoing = CharacterClock(timing.line)
         self._arriving: deque[tuple[Nanos, rtu.RtuFrame]] = deque()  # each frame with the moment of its last character
@@ -190,7 +187,9 @@ class TimedRtuSlavePort(SlavePort):
     def _run(self, now: Nanos) -> None:
         """Process everything due by ``now``: arrivals and executions in the order of their moments."""
         for frame in self._framer.expire(now):
-            self._arriving.append((now, frame))
+            # The controller waits for the end of a burst, too: its turnaround begins with that silence.
+            ended = self._incoming.end_before(self._framer.fed - frame.end) if self._units.timing.strict else now
+            self._arriving.append((ended, frame))
         while True:
             execution = min(self._executing, key=_moment, default=None)
             arrival = self._arriving[0][0] if self._arriving else None
