@@ -364,6 +364,8 @@ export const FINDINGS: Readonly<Record<string, string>> = {
   "user registers such as $I0 hold what a master has written":
     "rejestry użytkownika, np. $I0, mają to, co zapisał master",
   // M1486: what can be read.
+  "no command begins with NUL; the sender ends lines with CR NUL":
+    "żadne polecenie nie zaczyna się od NUL; nadawca kończy wiersze znakami CR NUL",
   "no command begins with {char}": "żadne polecenie nie zaczyna się od {char}",
   "{char} begins a second command ({name}) on this line": "{char} zaczyna drugie polecenie ({name}) w tej linii",
   "one command a line": "jedno polecenie w linii",
