@@ -111,7 +111,6 @@ def test_answers_of_a_line_with_timing_come_later(kind: str) -> None:
         place = line.connect("p", kind)
         outputs: list[int] = []
         place.on_output = partial(outputs.append, 1)
-        assert place.at_once is (kind == "tcp" and early)
         line.receive("p", framed(READ_STATUS), there.now)
         there.run(for_="5 ms")
         assert bool(place.received) is early

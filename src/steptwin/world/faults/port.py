@@ -38,7 +38,6 @@ class FaultyPort(Stateful):
         "_units",
         "deadline",
         "exchange",
-        "is_transparent",
         "line_name",
         "link",
         "to_send",
@@ -48,8 +47,6 @@ class FaultyPort(Stateful):
     exchange: Callable[[bytes, Nanos], bytes]
     to_send: Callable[[Nanos], list[tuple[Nanos, bytes]]]
     deadline: Callable[[], Nanos | None]
-    is_transparent: bool
-    """Whether calls are the inner port's own."""
 
     def __init__(
         self,
@@ -102,7 +99,6 @@ class FaultyPort(Stateful):
             self._be_transparent()
 
     def _be_transparent(self) -> None:
-        self.is_transparent = True
         self.exchange = self._inner.exchange
         self.to_send = self._inner.to_send
         self.deadline = self._inner.deadline
@@ -112,7 +108,6 @@ class FaultyPort(Stateful):
         self._held = b""
 
     def _be_faulty(self) -> None:
-        self.is_transparent = False
         self.exchange = self._exchange
         self.to_send = self._to_send
         self.deadline = self._deadline
