@@ -191,11 +191,7 @@ class FaultyPort(Stateful):
         if request is None:  # asked before there were faults
             self._fresh.append((moment, 0, raw))
             return
-        faults = [
-            a
-            for a in self._faults.active
-            if a.fault.kind.layer is Layer.FRAMES and self._is_for(a) and a.fault.get("lost") != "request"
-        ]
+        faults = [a for a in self._faults.of_layer(Layer.FRAMES) if self._is_for(a) and a.fault.get("lost") != "request"]
         exchange = Exchange(self._line, request, raw)
         sent = spoil_answer(exchange, self._addressed(exchange.unit), faults, moment, self._reporter(""))
         if sent.before:
@@ -226,10 +222,8 @@ class FaultyPort(Stateful):
         return self._units[0] if self._line is LineProtocol.TCP and len(self._units) == 1 and unit in (0, 255) else unit
 
     def _bytewise(self, direction: str) -> list[ActiveFault]:
-        faults = self._faults.active
-        return [
-            a for a in faults if a.fault.kind.layer is Layer.BYTES and a.fault.get("direction") == direction and self._is_for(a)
-        ]
+        faults = self._faults.of_layer(Layer.BYTES)
+        return [a for a in faults if a.fault.get("direction") == direction and self._is_for(a)]
 
     def _is_for(self, active: ActiveFault) -> bool:
         return self._line in active.fault.kind.lines and active.is_on(self.link, self.line_name)
