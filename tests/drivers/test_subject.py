@@ -136,8 +136,8 @@ def test_events_of_a_device_come_from_polling(table: DeviceSubject, rig: Rig) ->
     rig.world.apply_input(do.Set((("table", "IN7", 1.0),)))
     rig.time.sleep(0.3)
     events = following.take().events
-    assert [(event.kind, event.axis) for event in events] == [("sample", "1"), ("edge", None), ("status", "1")]
-    assert [event.text for event in events][1:] == ["IN7: 1", "M1: moving to position"]
+    assert [(event.kind, event.axis) for event in events] == [("sample", "1"), ("edge", None), ("edge", None), ("status", "1")]
+    assert [event.text for event in events][1:] == ["M1_EN: 1", "IN7: 1", "M1: moving to position"]
     sample = events[0].payload
     assert isinstance(sample, SamplePayload)
     assert sample.position is not None

@@ -18,6 +18,7 @@ from typing import Any, Protocol, TypeAlias
 
 from steptwin.controllerstate import ControllerState, parts_of
 from steptwin.datasheet import Datasheet
+from steptwin.diagnostics import SourceText
 from steptwin.drivers.blocking import Blocking, blocking, finish
 from steptwin.drivers.line import DriverLine
 from steptwin.errors import Misuse, Refusal
@@ -115,6 +116,10 @@ class DevicePart(Protocol):
 
     async def settings_text(self) -> str:
         """What can be read and written, as JSON, to keep it before it is changed."""
+        ...
+
+    def configuration(self) -> SourceText | None:
+        """The configuration file that the user has named; None without one. It may block. Raises `Misuse`."""
         ...
 
     async def twin(self, name: str) -> DeviceTwin:

@@ -213,6 +213,9 @@ class M1486Part:
         self._check_axis(wanted.axis)
         return AsyncM1486Jog(self._chip, wanted.velocity)
 
+    def configuration(self) -> None:
+        """It has none."""
+
     async def twin(self, name: str) -> DeviceTwin:
         raise Refusal(f"{self.line.place}: no twin beside an M1486, whose position is unknown while it moves (M-28)")
 
