@@ -332,7 +332,7 @@ def _axis(axis: AxisDescription, status: Mic488Status, encoder: float | None) ->
 
 def _edges(before: Mic488Status, status: Mic488Status) -> list[Payload]:
     levels = (("IN", before.inputs, status.inputs), ("OUT", before.outputs, status.outputs))
-    drives = [
+    drives: list[Payload] = [
         EdgePayload(f"M{axis}_EN", float(_is_on(new)))
         for axis, (old, new) in enumerate(zip(before.axes, status.axes, strict=True), start=1)
         if _is_on(old) is not _is_on(new)
