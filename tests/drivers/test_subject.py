@@ -167,8 +167,11 @@ def test_frames_of_a_mic488(table: DeviceSubject, rig: Rig) -> None:
 
 
 def test_frames_of_an_m1486(drum: DeviceSubject) -> None:
-    """Whole lines with their meaning, and their echo."""
-    seen = framed(drum, lambda: drum.do(do.Send(drum.description.lines[0].name, b"V900\r")))
+    """Whole lines with their meaning, and their echo. The driver selects the chip, whose address may come first."""
+    line = drum.description.lines[0].name
+    with pytest.raises(Misuse, match="X7 selects another chip: this device is chip 3"):
+        drum.do(do.Send(line, b"X7\rV900\r"))
+    seen = framed(drum, lambda: drum.do(do.Send(line, b"X3\rV900\r")))
     assert seen == [
         ("in", b"u20\r".hex(), "U20  Upload 20"),
         ("out", b"u20\r".hex(), "echo of 'u20\\r'"),

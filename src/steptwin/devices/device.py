@@ -93,6 +93,10 @@ class ConnectedDevice:
     def followers(self) -> Followers:
         return self._subject.followers
 
+    def selected(self, data: bytes) -> int | None:
+        """See `steptwin.drivers.subject.DevicePart.selected`."""
+        return self._device.selected(data)
+
     def plans(self, what: Filter) -> list[Event]:
         return [event for event in self._subject.samples() if what.wants(event)]
 

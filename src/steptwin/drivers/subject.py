@@ -92,6 +92,10 @@ class DevicePart(Protocol):
         """The unit of a point. Raises `Misuse` for an unknown point."""
         ...
 
+    def selected(self, data: bytes) -> int | None:
+        """The address on the line that characters begin with selecting; None without one."""
+        ...
+
     def effect_of(self, wanted: steps.Request | steps.Write) -> RawEffect:
         """What a raw request, of which nothing else is known, or a write of registers does. Raises `Misuse` for an unknown
         register."""

@@ -197,6 +197,9 @@ class Mic488Part:
         """Write registers one after the other."""
         await self._mic.set_all(*((name, value) for _, name, value in wanted.values), is_sure=True)
 
+    def selected(self, data: bytes) -> None:
+        """It takes no characters."""
+
     def effect_of(self, wanted: steps.Request | steps.Write) -> RawEffect:
         if isinstance(wanted, steps.Write):
             is_stop = all(self._mic.is_stop(name, value) for _, name, value in wanted.values)
