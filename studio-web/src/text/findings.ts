@@ -178,6 +178,8 @@ export const FINDINGS: Readonly<Record<string, string>> = {
   "{value} is out of range": "{value} jest poza zakresem",
   "{value} is out of range for {name}": "{value} jest poza zakresem {name}",
   "REAL reaches ±{most}": "REAL sięga ±{most}",
+  "{number} becomes {real}": "{number} staje się {real}",
+  "REAL holds whole numbers up to {most}": "REAL mieści liczby całkowite do {most}",
   "HOME needs a velocity other than 0": "HOME wymaga prędkości różnej od 0",
   "negative homes to KL, positive to KR": "ujemna bazuje na KL, dodatnia na KR",
   "{name} becomes {nearest}, not {value}": "{name} przyjmie {nearest}, nie {value}",
