@@ -49,7 +49,8 @@ class Form:
     sections: tuple[Section, ...]
     diagnostics: Sequence[Diagnostic]
     points: Mapping[str, float]
-    """The values to write to points so that a running controller has those of the file; in its present units."""
+    """The values to write to points so that a running controller has those of the file; in its present units. Keys that are not
+    in the file have none, and neither have those whose values cannot be converted into these units."""
 
 
 class ConfigurationFormat(Protocol):
@@ -59,4 +60,9 @@ class ConfigurationFormat(Protocol):
 
     def with_values(self, text: str, name: str, changes: Mapping[str, str]) -> str:
         """A text with other values of its settings."""
+        ...
+
+    def known(self, values: Mapping[str, tuple[float | None, str]], sheet: Datasheet) -> Mapping[str, str]:
+        """The settings that a running controller shows, as changes for `with_values`. ``values``: of points (None: unknown),
+        with their units."""
         ...

@@ -121,6 +121,16 @@ def test_motions_that_fail(table: Mic488Controller, engine: RunEngine) -> None:
     assert "MoveFailed" in failure(stopped)
     assert "stopped by a command" in failure(stopped)
 
+    def redirected() -> MsgGenerator:
+        yield from bps.abs_set(table.m1, 200.0, group="move")
+        yield from bps.sleep(0.2)
+        yield from bps.wait_for([lambda: table.driver.set("M1_POS_ABS", 6)])
+        yield from bps.wait(group="move")
+
+    with pytest.raises(FailedStatus) as elsewhere:  # the driver knows no pulses per unit
+        engine(redirected())
+    assert "redirected by another command" in failure(elsewhere)
+
 
 @pytest.mark.parametrize("success", [True, False])
 def test_a_stop(table: Mic488Controller, engine: RunEngine, *, success: bool) -> None:

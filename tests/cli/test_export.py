@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from steptwin.cli import main
-from steptwin.files.export import write_trace
+from steptwin.cli.export import ExportFormat
+from steptwin.files.export import FORMATS, write_trace
 from steptwin.machine import SECOND
 from steptwin.motion import MotionState, plan_position
 from steptwin.world.trace import Trace, TraceRecord
@@ -42,6 +43,14 @@ def test_files_are_named_after_the_trace(run: Run, trace: Path) -> None:
     assert [line.partition(":")[0] for line in out.splitlines()] == [str(trace.with_suffix(s)) for s in (".csv", ".vcd")]
     # 2.5 s of motion.
     assert len(trace.with_suffix(".csv").read_text().splitlines()) == 27
+
+
+@pytest.mark.parametrize("form", sorted(FORMATS))
+def test_every_format_can_be_named(run: Run, trace: Path, form: str) -> None:
+    """``jsonl`` into another place: it would replace what is read."""
+    where = ("-o", str(trace.with_name(f"other.{form}"))) if form == "jsonl" else ()
+    assert run(str(trace), "--to", form, *where)[0] == 0
+    assert form in list(ExportFormat)
 
 
 def test_a_window_of_time_into_a_named_file(run: Run, trace: Path, tmp_path: Path) -> None:

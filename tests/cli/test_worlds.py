@@ -142,6 +142,14 @@ def test_another_seed_is_another_chance_and_stays_with_the_session(tmp_path: Pat
     assert "the same" in invoke("replay", str(session))
 
 
+def test_an_expectation_that_fails_again_and_again_is_two_lines(tmp_path: Path) -> None:
+    world = tmp_path / "w.toml"
+    world.write_text('[[mic488]]\nname = "a"\n[[event]]\nevery = "20 ms"\nsteps = [{ expect = "a.M1.position > 3" }]\n')
+    said = [line for line in invoke("run", str(world), "--for", "1s", code=1).splitlines() if line.startswith(("expect", "and "))]
+    told = "a.M1.position > 3; a.M1.position is 0 imp"
+    assert said == [f"expectation failed at 0.02 s: {told}", f"and 49 more times, the last at 1 s: {told}"]
+
+
 def test_an_expectation_that_fails_is_exit_code_1(tmp_path: Path) -> None:
     world = tmp_path / "w.toml"
     world.write_text('[[mic488]]\nname = "a"\n[[event]]\nat = 1\nsteps = [{ expect = "a.M1.position > 3" }]\n')

@@ -341,8 +341,10 @@ def test_what_cannot_be_run(play: Play, tmp_path: Path) -> None:
         play("PABS M1\n")
     with pytest.raises(Misuse, match="no input pin 'OUT1'"):
         play("OUT1 = ON\n", inputs=parse_inputs("OUT1=1@1s"))
-    with pytest.raises(Misuse, match=r"--travel M1: the configuration has no KR for this axis"):
+    with pytest.raises(Misuse, match=r"--travel M1: the configuration has no KR for this axis$"):
         play("OUT1 = ON\n", travels=[SwitchTravel(1, None, 5.0)])
+    with pytest.raises(Misuse, match=r"no KR for this axis; --travel M1=-12\.\. has the other switch only$"):
+        play("OUT1 = ON\n", config="[Axis0]\nInKL=0\n", travels=[SwitchTravel(1, -12.0, 100.0)])
     with pytest.raises(Misuse, match=r"names positions: give the table with --positions FILE$"):
         play("M1 = ON\nMOVEPTP @top\n")
     with pytest.raises(Misuse, match="cannot read"):

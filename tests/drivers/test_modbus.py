@@ -445,3 +445,18 @@ def test_a_whole_answer_alone_is_taken_without_a_search(
     for number in (1, 2):
         master.start(ModbusQuery(1, request_), 0, urgent=False)
         assert master.receive(mbap.encode_frame(number, 1, answer), 1) == answer
+
+
+def test_what_looks_like_an_answer_inside_of_a_late_one_is_none() -> None:
+    """Registers can hold frames; a write counts as confirmed by its own answer only."""
+    write = WriteRegisterRequest(100, 0x6666)
+    answer = ModbusQuery(1, write).rtu_frame
+    inside = bytes(20) + answer + bytes(12)
+    words_inside = [int.from_bytes(inside[at : at + 2], "big") for at in range(0, len(inside), 2)]
+    late_answer = registers(*words_inside)
+    for cut in range(1, len(late_answer) + 1):
+        master = RtuMaster()
+        late(master, ReadRequest(3, 0, len(words_inside)))
+        master.start(ModbusQuery(1, write), 2000, urgent=False)
+        assert master.receive(late_answer[:cut], 3000) is None
+        assert master.receive(late_answer[cut:] + answer, 4000) == answer[1:-2]

@@ -18,7 +18,7 @@ from steptwin.drivers.m1486.subject import M1486Part
 from steptwin.drivers.mic488.subject import Mic488Part
 from steptwin.drivers.mic488.sync import Mic488
 from steptwin.drivers.subject import AsyncDeviceSubject, DeviceSubject, RawEffect
-from steptwin.errors import LineFailure, Misuse, Refusal
+from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
 from steptwin.machine import SECOND
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.registers import register_map
@@ -27,8 +27,8 @@ from steptwin.subject import commands as command
 from steptwin.subject.commands import row_of
 from steptwin.subject.contract import read_description
 from steptwin.subject.events import read_event
-from steptwin.subject.following import filter_of
-from steptwin.subject.payloads import SamplePayload
+from steptwin.subject.following import Following, filter_of
+from steptwin.subject.payloads import FramePayload, SamplePayload
 from steptwin.subject.world import WorldSubject
 from steptwin.world import script as do
 from steptwin.world.faults import read as read_fault
@@ -128,6 +128,71 @@ def test_a_line_that_fails_is_a_failure(table: DeviceSubject, rig: Rig) -> None:
 # ---------------------------------------------------------------------- events
 
 
+def framed(subject: DeviceSubject, act: Any) -> list[tuple[str, str, str]]:
+    """Direction, bytes and meaning of the frames meanwhile."""
+    following = subject.follow(filter_of(["frame"]), 99)
+    following.take()
+    act()
+    events = Following.take(following).events  # without a poll
+    following.close()
+    assert {event.machine for event in events} <= {subject.description.lines[0].name}
+    seen = [event.payload for event in events if isinstance(event.payload, FramePayload)]
+    assert {one.client for one in seen} <= {"steptwin"}
+    return [(one.direction, one.data.hex(), one.words) for one in seen]
+
+
+def failing(act: Any) -> None:
+    with pytest.raises(SteptwinError):
+        act()
+
+
+def test_frames_of_a_mic488(table: DeviceSubject, rig: Rig) -> None:
+    """With names of registers, as the driver knows them; of this unit only; an answer that does not come is one without bytes."""
+    wire = [("in", "010507d4ff00"), ("out", "010507d4ff00")]
+    seen = framed(table, lambda: table.do(command.StopAxes("table", 1)))[:2]
+    assert [(way, data[12:]) for way, data, _ in seen] == wire
+    assert [words for _, _, words in seen] == ["unit 1: write M1_STOP = ON", "unit 1: wrote M1_STOP = ON"]
+    line: Any = rig.mic._driver.line
+    other = Mic488(line, 2, firmware="1.70")
+    assert framed(table, lambda: failing(other.open)) == []
+
+    def read_in_vain() -> None:
+        rig.world.apply_input(do.SetFault(read_fault("no-answer lost=answer")))
+        failing(lambda: table.read("table.M1.position"))
+
+    seen = framed(table, read_in_vain)
+    asked, missed = seen[0], [(way, data, words) for way, data, words in seen if not data]
+    assert asked[0] == "in"
+    assert [(way, "no answer to 'unit 1: read" in words) for way, _, words in missed] == [("out", True)] * 3
+
+
+def test_frames_of_an_m1486(drum: DeviceSubject) -> None:
+    """Whole lines with their meaning, and their echo. The driver selects the chip, whose address may come first."""
+    line = drum.description.lines[0].name
+    with pytest.raises(Misuse, match="X7 selects another chip: this device is chip 3"):
+        drum.do(do.Send(line, b"X7\rV900\r"))
+    seen = framed(drum, lambda: drum.do(do.Send(line, b"X3\rV900\r")))
+    assert seen == [
+        ("in", b"u20\r".hex(), "U20  Upload 20"),
+        ("out", b"u20\r".hex(), "echo of 'u20\\r'"),
+        ("out", b"B".hex(), "U20 type letter in ASCII = 66"),
+        ("in", b"v900\r".hex(), "V900  Velocity 900 step/s"),
+        ("out", b"v900\r".hex(), "echo of 'v900\\r'"),
+    ]
+
+
+def test_frames_are_observed_only_while_they_are_followed(table: DeviceSubject, drum: DeviceSubject, rig: Rig) -> None:
+    lines: list[Any] = [rig.mic._driver.line, rig.chip._driver.line]
+    modbus, chips = (line._engine.discipline for line in lines)
+    followings = [subject.follow(filter_of(["frame"]), 9) for subject in (table, drum)]
+    assert None not in (modbus.on_frame, chips.on_bytes)
+    for following in followings:
+        following.close()
+    assert (modbus.on_frame, chips.on_bytes) == (None, None)
+    table.follow(filter_of(), 9)
+    assert modbus.on_frame is None
+
+
 def test_events_of_a_device_come_from_polling(table: DeviceSubject, rig: Rig) -> None:
     following = table.follow(filter_of(), 99)
     assert [(event.kind, event.payload.plain()["position"]) for event in following.take().events] == [("sample", 0.0)] * 4
@@ -136,8 +201,8 @@ def test_events_of_a_device_come_from_polling(table: DeviceSubject, rig: Rig) ->
     rig.world.apply_input(do.Set((("table", "IN7", 1.0),)))
     rig.time.sleep(0.3)
     events = following.take().events
-    assert [(event.kind, event.axis) for event in events] == [("sample", "1"), ("edge", None), ("status", "1")]
-    assert [event.text for event in events][1:] == ["IN7: 1", "M1: moving to position"]
+    assert [(event.kind, event.axis) for event in events] == [("sample", "1"), ("edge", None), ("edge", None), ("status", "1")]
+    assert [event.text for event in events][1:] == ["M1_EN: 1", "IN7: 1", "M1: moving to position"]
     sample = events[0].payload
     assert isinstance(sample, SamplePayload)
     assert sample.position is not None

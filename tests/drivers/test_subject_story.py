@@ -83,10 +83,10 @@ POINTS = (
 )
 
 
-UNKNOWN_PINS = {"M1_EN", "M2_EN", "M3_EN", "M4_EN", "AIN1", "AIN2", "ERR"}
+UNKNOWN_PINS = {"AIN1", "AIN2", "ERR"}
 
 
-UNKNOWN_TO_DRIVERS = {"table.M1.moving", "table.M1.enabled", "table.M1_EN", "table.AIN1", "table.ERR", "table.M1_HOME"}
+UNKNOWN_TO_DRIVERS = {"table.AIN1", "table.ERR", "table.M1_HOME"}
 
 
 STORY: tuple[command.Command | int, ...] = (
@@ -185,7 +185,7 @@ def test_a_device_answers_the_same_but_for_what_it_cannot_know_or_refuses(told: 
     present, shown = different[state]
     for axis, seen, count in zip(present["axes"], shown["axes"], counts, strict=True):
         position = pytest.approx(axis["position"], abs=1e-6)
-        assert seen == {**axis, "position": position, "moving": None, "encoder": count["counts"]}
+        assert seen == {**axis, "position": position, "encoder": count["counts"]}
     assert shown["program"] == present["program"]
     assert shown["pins"] == {pin: None if pin in UNKNOWN_PINS else level for pin, level in present["pins"].items()}
     assert shown["details"] == {**present["details"], "user_registers": None}

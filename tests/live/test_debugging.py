@@ -15,7 +15,7 @@ from steptwin.live import debugging as module
 from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
 from steptwin.live.pace import Pace
-from steptwin.live.world import LiveWorld
+from steptwin.live.world import LiveWorld, PlacePort
 from steptwin.live.world_control import WorldControl
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.subject.commands import read_command
@@ -55,9 +55,11 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
 class Rig:
     """A live world in the virtual time of the loop, with a client that follows its debugger."""
 
-    def __init__(self, text: str = TEXT, program: bytes = PROGRAM) -> None:
+    def __init__(self, text: str = TEXT, program: bytes = PROGRAM, *, records: bool = True) -> None:
         loop = asyncio.get_running_loop()
-        self.world = World.from_toml(text, {"count.prg": program})
+        self.world = World.from_toml(text, {"count.prg": program}, keep_trace=records, keep_inputs=records)
+        if not records:
+            self.world.stop_recording()
         self.notices: list[str] = []
         self.live = LiveWorld(self.world, self.notices.append)
         self.cell = Cell(self.live, Clock(wall_ns=lambda: round(loop.time() * SECOND)))
@@ -232,6 +234,44 @@ def test_inputs_from_outside_are_seen(run: Run) -> None:
         assert sorted(hits) == [("data breakpoint", (watch,)), ("function breakpoint", (label,))]
 
     scene(run, play)
+
+
+def test_a_client_that_was_connected_before_the_debugger_is_seen(run: Run) -> None:
+    """Its requests start a program, end a WAIT and change what the past is run again with, in a twin that keeps nothing."""
+
+    async def play() -> None:
+        text = '[[line]]\nname = "bus"\ntcp = "127.0.0.1:0"\n[[mic488]]\nname = "table"\nline = "bus"\nprogram = "count.prg"\n'
+        rig = Rig(text, b"A:\nOUT1 = ON\nWAIT $I0 = 1\nOUT2 = ON\nDELAY 0.1\nJUMP A\n", records=False)
+        port = PlacePort(rig.live, "bus", "tcp-1", "tcp")
+
+        def ask(pdu: str) -> bytes:
+            rig.cell.enter()
+            answer = port.exchange(bytes.fromhex(f"00 01 00 00 00 06 01 {pdu}"), rig.live.now)
+            rig.cell.leave()
+            return answer
+
+        for _ in range(3):
+            assert ask("02 1388 0001")[7:] == bytes.fromhex("02 01 00")
+        await asyncio.sleep(0.3)
+        rig.line(line=2)
+        rig.line(line=4)
+        for _ in range(3):
+            await asyncio.sleep(0.2)
+            ask("06 2713 0001")
+            assert await asyncio.wait_for(rig.stop(), 5) == ("breakpoint", 2)
+            rig.do("resume")
+            await asyncio.sleep(0.2)
+            ask("06 0000 0001")
+            assert await asyncio.wait_for(rig.stop(), 5) == ("breakpoint", 4)
+            rig.do("resume")
+            ask("06 2713 0000")
+            ask("06 0000 0000")
+        await asyncio.sleep(0.2)
+        rig.following.close()
+        rig.pace.close()
+        rig.cell.close()
+
+    run(play())
 
 
 def test_a_step_of_time_ends_at_a_breakpoint(run: Run) -> None:

@@ -41,6 +41,7 @@ def words(text: str, kind: str = "B") -> str:
         ("\r", "an empty line"),
         ("\n \r", "an empty line"),
         ("12", "2 characters without CR"),
+        ("\0r\r", "\0r  no command begins with NUL; the sender ends lines with CR NUL"),
     ],
 )
 def test_what_a_host_types(typed: str, meaning: str) -> None:
@@ -126,3 +127,17 @@ def test_of_bytes_that_never_come_the_last_1000_are_awaited() -> None:
     for byte in (1, 2):
         log.sent(0, byte)
     assert [line.meaning.split(" ")[0] for line in lines] == ["echo", "U1"]
+
+
+def test_a_host_that_ends_its_lines_with_line_feeds_is_noticed_at_the_second() -> None:
+    log, lines = logged()
+    splitter = LineSplitter(log, "")
+    for character in b"\n\nf640\n":
+        splitter.take(bytes((character,)), 1)
+    assert lines == []
+    splitter.take(b"r\n", 2)
+    assert [(line.raw, line.meaning) for line in lines] == [
+        (b"\n\nf640\nr\n", "9 characters without CR: a line feed ends no command")
+    ]
+    splitter.take(b"r\n\r", 3)
+    assert lines[1].meaning == "R  Run"

@@ -19,7 +19,7 @@ from steptwin.mic488.config import (
     keys_of,
     read_config,
 )
-from steptwin.mic488.configform import config_form, with_values
+from steptwin.mic488.configform import config_form, known_settings, with_values
 from steptwin.mic488.configtext import config_text
 from steptwin.mic488.inifile import IniFile
 from steptwin.mic488.registers import firmware
@@ -193,12 +193,32 @@ def test_registers_that_have_the_values_at_run_time() -> None:
 
 
 def test_what_a_running_controller_would_be_given() -> None:
-    """Its axes have other pulses per unit than the file: the same pulses/s² in its units. Unknown units give nothing."""
-    text = "[Axis0]\nGear=100\nAcc=20\nDec=30\nVel=5\n[Axis2]\nGear=10\n"
+    """Its axes have other pulses per unit than the file: the same pulses/s² in its units. Keys that are not in the file give
+    nothing, and neither does a file whose units cannot be converted."""
+    text = "[Axis0]\nGear=100\nAcc=20\nDec=30\nVel=5\n[Axis1]\nAcc=7\n[Axis2]\nGear=10\n"
     assert config_form(text, "m.cfg", gears=(50.0, None, 1.0)).points == {
-        "M1_ACC": 40.0, "M1_DEC": 60.0, "M1_VMAX": 10.0, "M3_ACC": 10_000.0, "M3_DEC": 10_000.0, "M3_VMAX": 10_000.0,
+        "M1_ACC": 40.0, "M1_DEC": 60.0, "M1_VMAX": 10.0, "M2_ACC": 7.0,
     }  # fmt: skip
+    assert config_form(text, "m.cfg", gears=(None, None, None)).points == {"M2_ACC": 7.0}
     assert config_form(text, "m.cfg").points == {}
+
+
+def test_what_a_running_controller_shows_as_settings() -> None:
+    """Nothing else is in the text, and nothing is wrong with it. With DINT and unknown pulses per unit, registers are in pulses,
+    which no setting has."""
+    values = {
+        "M1_ACC": (0.10000000149011612, "mm/s²"),
+        "M2_ACC": (500.0, "imp/s²"),
+        "M3_VMAX": (8.0, "u/s"),
+        "M3_DEC": (None, ""),
+    }
+    known = known_settings(values, [("mm", 640.0), ("u", None), ("u", None), ("u", None)])
+    assert known == {"Axis0.Unit": "3", "Axis0.Gear": "640", "Axis0.Acc": "0.1", "Axis2.Vel": "8"}
+    form = config_form(with_values("", "m.cfg", known), "m.cfg", gears=(640.0, None, None, None))
+    assert (form.points, list(form.diagnostics)) == ({"M1_ACC": 0.1, "M3_VMAX": 8.0}, [])
+    assert [found.text for found in form.sections[1].settings if found.text] == []
+    assert {found.unit for found in form.sections[1].settings if found.name in ("Gear", "Acc")} == {"imp/u", "u/s²"}
+    assert list(config_form("", "m.cfg").diagnostics) == []
 
 
 def test_sources_are_sections_of_the_manuals() -> None:

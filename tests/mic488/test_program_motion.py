@@ -388,6 +388,117 @@ def test_a_soft_limit_that_is_moved_out_of_the_way_leaves_an_arc_as_it_is() -> N
     assert moment_and_place(moves=True) == moment_and_place(moves=False)
 
 
+PATHS = {
+    "MOVELIN": ("A;80;40;50;x\n", "", "MOVELIN @A"),
+    "MOVELIN_REL": ("A;80;40;50;x\n", "", "MOVELIN_REL @A"),
+    "DOCIRC": ("A;50;0;50;180\n", "", "DOCIRC @A"),
+    "DOARC": ("A;100;0;50;0\n", "", "DOARC @A"),
+}
+"""From (0, 0); each goes past X = 30 and Y = 20 outwards within 3 s."""
+
+
+LIMITS = [("POSLIM_R", 1), ("POSLIM_R", 2), ("POSLIM_L", 1)]
+
+
+def on_path(keyword: str) -> Rig:
+    """A controller half a second after a path began."""
+    rows, before, statement = PATHS[keyword]
+    rig = ready(f"{ON}{before}OUT2 = ON\n{statement}\n{DONE}", rows)
+    rig.pin_until("OUT2", 1.0)
+    rig.wait(0.5)
+    assert 0 < rig.position(1) < 30
+    return rig
+
+
+def ideal(keyword: str, x: float) -> float:
+    """Y of each path at ``x``, before its highest point."""
+    return x / 2 if keyword.startswith("MOVELIN") else sqrt(50**2 - (50 - x) ** 2)
+
+
+@pytest.mark.parametrize("how", ["limit", "coordinate", "limit of both"])
+@pytest.mark.parametrize("keyword", PATHS)
+def test_mic_40_a_soft_limit_written_on_a_path_ends_it_there(keyword: str, how: str) -> None:
+    rig = on_path(keyword)
+    limit = 30.0
+    if how == "coordinate":
+        # The limit is 20 mm ahead of where it was written.
+        rig.set("POSLIM_R", 90.0, 1)
+        rig.set("POS_ACT", rig.position(1) + 60.0, 1)
+        limit = 90.0
+    else:
+        rig.set("POSLIM_R", limit, 1)
+    if how == "limit of both":
+        rig.set("POSLIM_R", 1000.0, 2)
+    rig.pin_until("OUT1", 1.0)
+    assert rig.position(1) == limit
+    assert rig.position(2) == pytest.approx(ideal(keyword, 30.0), abs=0.03)
+    assert (rig.status(1), rig.status(2), rig.events("overrun"), rig.events("path-left")) == (10, 1, [], [])
+    assert not any(axis.profile.moving(rig.device.now) for axis in rig.device.axes)
+
+
+@pytest.mark.parametrize("keyword", PATHS)
+def test_mic_40_a_path_whose_limit_is_moved_out_of_the_way_again_goes_on(keyword: str) -> None:
+    rig, undisturbed = on_path(keyword), on_path(keyword)
+    rig.set("POSLIM_R", 30.0, 1)
+    rig.wait(0.1)
+    rig.set("POSLIM_R", 1000.0, 1)
+    for one in (rig, undisturbed):
+        one.pin_until("OUT1", 1.0)
+    assert (rig.position(1), rig.position(2)) == (undisturbed.position(1), undisturbed.position(2))
+    assert (rig.status(1), rig.status(2)) == (4, 4)
+
+
+@pytest.mark.parametrize("keyword", PATHS)
+def test_mic_40_a_path_that_cannot_brake_before_a_limit_overruns_on_its_course(keyword: str) -> None:
+    rig = on_path(keyword)
+    here = rig.position(1)
+    rig.set("POSLIM_R", here, 1)
+    rig.pin_until("OUT1", 1.0)
+    assert here < rig.position(1) < here + 25
+    assert rig.position(2) == pytest.approx(ideal(keyword, rig.position(1)), abs=0.03)
+    assert (rig.status(1), rig.status(2), len(rig.events("overrun"))) == (10, 1, 1)
+
+
+def test_mic_40_a_limit_behind_a_path_lets_it_go_on() -> None:
+    rig = on_path("MOVELIN")
+    rig.set("POSLIM_L", 50.0, 1)
+    rig.pin_until("OUT1", 1.0)
+    assert (rig.position(1), rig.position(2), rig.status(1), rig.status(2)) == (80, 40, 4, 4)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    keyword=st.sampled_from(sorted(PATHS)),
+    written=st.lists(
+        st.tuples(
+            st.integers(1, 400), st.sampled_from([("POSLIM_R", 1), ("POSLIM_R", 2), ("POSLIM_L", 1)]), st.integers(-20, 120)
+        ),
+        min_size=1,
+        max_size=4,
+    ),
+)
+def test_mic_40_a_path_stays_on_its_course_whatever_limits_are_written(
+    keyword: str, written: list[tuple[int, tuple[str, int], int]]
+) -> None:
+    """The counts stay within a pulse of the path, and what is restored on the way goes on alike."""
+    rig, other = on_path(keyword), on_path(keyword)
+    for wait_ms, (key, axis), value in written:
+        rig.set(key, float(value), axis)
+        other.device.restore(rig.device.snapshot())
+        for one in (rig, other):
+            one.wait(wait_ms / 1000)
+        x, y = rig.position(1), rig.position(2)
+        assert (other.position(1), other.position(2)) == (x, y)
+        if keyword.startswith("MOVELIN"):
+            assert y == pytest.approx(x / 2, abs=0.02)
+        else:
+            assert hypot(x - 50, y) == pytest.approx(50, abs=0.02)
+    rig.pin_until("OUT1", 1.0)
+    statuses = {rig.status(1), rig.status(2)}
+    assert statuses == {4} or statuses <= {1, 9, 10}
+    assert statuses != {1}
+
+
 def test_an_arc_ends_on_a_soft_limit() -> None:
     rig = ready(f"{ON}LimRM2 = 8\nMOVETOCIRC @A\nWAITPOS\nDOCIRC @A\n{DONE}", "A;50;0;10;180\n")
     rig.pin_until("OUT1", 1.0)

@@ -153,6 +153,13 @@ def test_devices_are_described_sampled_and_moved(twin: Twin, master: Master, sta
     until(lambda: position(master) == 20.0, "the master sees the axis there")
     viewer.wait_for(lambda one: one.place() == 20.0, "the last sample is there")
     viewer.wait_for(lambda one: one.newest("values") == {"1": [[0, 20.0]]}, "the value is there")
+    form = viewer.ok("configuration", machine="mic488")  # what registers show, and nothing else
+    shown = {f"{part['name']}.{one['name']}": one["text"] for part in form["sections"] for one in part["settings"] if one["text"]}
+    ramps = {f"Axis{axis}.{key}": "1000" for axis in range(1, 4) for key in ("Acc", "Dec", "Vel")}
+    assert shown == {"Axis0.Acc": "400", "Axis0.Dec": "400", "Axis0.Vel": "40"} | ramps
+    assert (form["is_file"], form["diagnostics"]) == (False, [])
+    edited = viewer.ok("edit_configuration", machine="mic488", text="", changes={"Axis1.Acc": "5"})
+    assert (edited["points"], edited["diagnostics"]) == ({"M2_ACC": 5.0}, [])
     viewer.ok("move", machine="m1486-7", axis=1, by=100)
     viewer.wait_for(lambda one: one.events("sample")[-1]["position"] == 100.0, "the chip has moved")
     assert None in [one["position"] for one in viewer.events("sample") if one["machine"] == "m1486-7"]

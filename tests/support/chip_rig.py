@@ -13,7 +13,7 @@ from typing import Any, Literal
 from line_rig import LATENCY, MemoryEndpoint, VirtualWire
 
 from steptwin.drivers.m1486 import sync
-from steptwin.drivers.m1486.lines import TALK, talking
+from steptwin.drivers.m1486.lines import talking
 from steptwin.drivers.m1486.talk import ChipRequest
 from steptwin.drivers.tasks import TaskLine
 from steptwin.drivers.threads import ThreadLine
@@ -155,18 +155,13 @@ def typed(wire: ChipWire) -> str:
 
 def chip_line(wire: ChipWire, log: Callable[[str], object] | None = None) -> ThreadLine[ChipRequest, bytes]:
     endpoint = MemoryEndpoint(wire)
-    exchanger, talk = talking(endpoint, BAUD, log)
-    line: ThreadLine[ChipRequest, bytes] = ThreadLine(endpoint, exchanger, clock=wire.clock, sleeping=wire.sleep)
-    line.notes[TALK] = talk
-    return line
+    exchanger, notes = talking(endpoint, BAUD, log)
+    return ThreadLine(endpoint, exchanger, notes, clock=wire.clock, sleeping=wire.sleep)
 
 
 def chip_task_line(wire: ChipWire) -> TaskLine[ChipRequest, bytes]:
     endpoint = MemoryEndpoint(wire)
-    exchanger, talk = talking(endpoint, BAUD, None)
-    line: TaskLine[ChipRequest, bytes] = TaskLine(endpoint, exchanger)
-    line.notes[TALK] = talk
-    return line
+    return TaskLine(endpoint, *talking(endpoint, BAUD, None))
 
 
 def chip_driver(wire: ChipWire, address: int | None = None, **options: Any) -> sync.M1486:

@@ -160,7 +160,7 @@ def go_on(world: World, steps: list[tuple[int, str]], end: int, files: Mapping[s
     for name, line in world.lines.items():
         there = line.places.get("python")
         if there is not None:
-            found.append(repr((name, there.kind, there.at_once, world.line[name].received())))
+            found.append(repr((name, there.kind, world.line[name].received())))
     return found + shown(world)
 
 

@@ -109,6 +109,9 @@ class NoConnections:
     async def settings(self, machine: str) -> str:
         raise Misuse(f"no device is called {machine!r}; there is none")
 
+    async def configuration(self, machine: str) -> None:
+        raise Misuse(f"no device is called {machine!r}; there is none")
+
     async def shadow(self, machine: str, *, on: bool) -> None:
         raise Misuse(f"no device is called {machine!r}; there is none")
 

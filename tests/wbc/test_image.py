@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from steptwin.errors import Misuse
 from steptwin.wbc.check import check
 from steptwin.wbc.image import build
 from steptwin.wbc.positions import parse_positions
@@ -233,3 +234,15 @@ def test_variables_and_other_interrupts_are_refused() -> None:
 
 def test_every_reason_is_named_at_once() -> None:
     assert [name for name, _ in refused("PABS M1 5\nM1 = ON\nEND\n")] == ["PABS", "END"]
+
+
+def test_a_table_that_the_image_cannot_hold_is_refused() -> None:
+    executable = check("OUT1 = ON\n").executable
+    assert executable is not None
+    for rows, refusal in ((227, None), (228, "228 rows of positions: the image holds 227")):
+        table, _ = parse_positions("".join(f"p{n};1;2;3;4\n" for n in range(rows)))
+        if refusal is None:
+            assert len(build(executable, table)[0] or b"") == 20_094
+        else:
+            with pytest.raises(Misuse, match=refusal):
+                build(executable, table)

@@ -26,6 +26,7 @@ from steptwin.wire.rtu import (
     FrameRole,
     RtuFrame,
     RtuFramer,
+    StrictRtuFramer,
     encode_frame,
 )
 
@@ -146,15 +147,15 @@ def test_a_wrong_crc_costs_the_frame_and_not_the_next() -> None:
     assert framer.unframed == 8
 
 
-def test_what_may_be_the_response_of_another_unit_delays_the_next_frame_by_a_gap_at_most() -> None:
+def test_what_may_be_the_response_of_another_unit_delays_the_next_burst_by_a_gap_at_most() -> None:
     """The end of this frame, 02 04 7F, announces 132 bytes of unit 2; what is inside those would be data."""
     wrong, good = bytes.fromhex("01 03 27 24 00 02 04 7F"), hexed("01 03 27 24 00 02")
     framer = RtuFramer({1})
-    assert framer.feed(wrong + good, 0) == []
-    assert framer.expire(GAP) == [RtuFrame(good, FrameRole.REQUEST, 16)]
-    framer = RtuFramer({1})
-    framer.feed(wrong, 0)
-    assert framer.feed(good, GAP) == [RtuFrame(good, FrameRole.REQUEST, 16, begin=GAP)]
+    assert framer.feed(wrong + good, 0) == framer.expire(GAP) == []
+    assert framer.feed(good, 10 * GAP) == []
+    assert framer.deadline() == 11 * GAP
+    assert framer.expire(11 * GAP) == [RtuFrame(good, FrameRole.REQUEST, 24, begin=10 * GAP)]
+    assert framer.feed(good, 11 * GAP) == [RtuFrame(good, FrameRole.REQUEST, 32, begin=11 * GAP)]
 
 
 def test_mic_15_a_pause_does_not_cut_a_frame() -> None:
@@ -196,12 +197,12 @@ def test_mic_15_a_request_in_pieces_is_one_frame(sizes: tuple[int, ...], pause_m
     assert frames == [RtuFrame(good, FrameRole.REQUEST, 8, begin=5, pause=pause_ms * 1_000_000)]
 
 
-@pytest.mark.parametrize("pause_ms", [0, 5, 30, 200, 1500, 3000])
+@pytest.mark.parametrize("pause_ms", [20, 30, 200, 1500, 3000])
 @pytest.mark.parametrize(
     "body", ["01 03 27 24 00 02", "01 10 27 38 00 02 04 41 20 00 00", "02 03 27 24 00 02", "00 06 00 01 00 02"]
 )
 def test_mic_15_after_a_truncated_frame_the_next_request_is_answered(body: str, pause_ms: int) -> None:
-    """Found at once, or when the gap has passed; whole, and in two pieces with a pause of their own."""
+    """At once, or when the gap has passed; whole, and in two pieces with a pause of their own."""
     truncated, good = hexed(body), hexed("01 10 27 38 00 02 04 41 20 00 01")
     for kept in range(1, len(truncated)):
         for cut_at, inside_ms in ((len(good), 0), (5, 0), (5, 3), (5, 60)):
@@ -228,27 +229,133 @@ def test_when_a_frame_began_and_the_longest_pause_inside_it() -> None:
 
 def test_a_silence_behind_a_frame_is_not_inside_it() -> None:
     framer = RtuFramer({0x41})
-    # Could be seven bytes of a request to unit 3; what comes later shows that the request inside is one.
+    # Behind noise, could be seven bytes of a request to unit 3; what comes later shows that the request inside is one.
     frame = hexed("41 07")
-    assert framer.feed(bytes.fromhex("03 05") + frame, 0) == []
+    assert framer.feed(bytes.fromhex("FF 03 05") + frame, 0) == []
     (found,) = framer.feed(b"\xff\xff", 10_000_000)
     assert (found.raw, found.pause) == (frame, 0)
+
+
+FC16 = "01 10 01 2C 00 28 50"  # 40 registers from 300 on
+EMBEDDED = hexed("01 06 00 64 66 66")
+AROUND = hexed(FC16 + bytes(20).hex() + EMBEDDED.hex() + bytes(52).hex())
+"""A request that writes 40 registers, whose data hold a request."""
+
+
+@pytest.mark.parametrize("own", [{1}, {2}, set()], ids=["own", "foreign", "listener"])
+@pytest.mark.parametrize("pause_ms", [1, 25, 200])
+@pytest.mark.parametrize("parts", [(41, 48), (27, 62), (28, 61), (34, 55), (35, 54), (7, 20, 62), (27, 20, 42), (1,) * 89])
+def test_mic_15_data_of_an_unfinished_frame_are_never_a_request(parts: tuple[int, ...], pause_ms: int, own: set[int]) -> None:
+    framer, frames, now = RtuFramer(own), [], 0
+    at = 0
+    for size in parts:
+        frames += framer.feed(AROUND[at : at + size], now)
+        at, now = at + size, now + pause_ms * 1_000_000
+        while (due := framer.deadline()) is not None and due < now:
+            frames += framer.expire(due)
+    assert [(frame.raw, frame.role) for frame in frames] == [(AROUND, FrameRole.REQUEST)]
+
+
+def test_mic_15_data_of_a_frame_given_up_are_never_a_request() -> None:
+    good = hexed("01 03 27 24 00 02")
+    for kept in range(35, len(AROUND)):
+        framer = RtuFramer({1})
+        assert framer.feed(AROUND[:kept], 0) == framer.expire(GAP) == []
+        frames = framer.feed(good, 10 * GAP)
+        assert [frame.raw for frame in frames or framer.expire(11 * GAP)] == [good], kept
+
+
+def test_mic_15_data_of_a_frame_with_a_wrong_crc_are_no_request() -> None:
+    good, framer = hexed("01 03 27 24 00 02"), RtuFramer({1})
+    assert framer.feed(AROUND[:8] + b"\1" + AROUND[9:], 0) == framer.expire(GAP) == []
+    assert [frame.raw for frame in framer.feed(good, 10 * GAP)] == [good]
+
+
+def test_a_response_of_another_unit_that_pauses_holds_no_request() -> None:
+    for request in (b"", hexed("09 03 00 00 00 7D")):
+        response = hexed("09 03 FA" + bytes(20).hex() + EMBEDDED.hex() + bytes(222).hex())
+        framer = RtuFramer({1})
+        frames = framer.feed(request, 0) + framer.feed(response[:100], 5_000_000) + framer.expire(40_000_000)
+        frames += framer.feed(response[100:], 45_000_000)
+        assert [frame.raw for frame in frames] == [*filter(None, [request]), response]
+
+
+@pytest.mark.parametrize("pause_ns", [750_000, 1_000_000, 3_000_000])
+def test_mic_15_a_burst_that_is_a_request_alone_waits_for_the_gap_behind_an_unfinished_frame(pause_ns: int) -> None:
+    framer, unfinished, good = RtuFramer({1}, gap_ns=rtu.UART_GAP_NS), AROUND[:27], hexed("01 03 27 24 00 02")
+    framer.feed(unfinished, 0)
+    framer.expire(750_000)
+    assert framer.feed(good, 5_000_000) == []
+    assert framer.deadline() == 5_750_000
+    framer.feed(good[:3], 5_100_000)  # the same burst goes on: what may be data waits
+    framer.feed(good[3:], 5_200_000 + pause_ns)
+    assert framer.deadline() == 5_200_000 + pause_ns + 750_000
+    frames = framer.expire(5_200_000 + pause_ns + 750_000)
+    assert [frame.raw for frame in frames] == [good, good]
+
+
+def test_mic_15_a_request_that_is_not_alone_in_its_burst_waits_for_what_a_network_delays() -> None:
+    framer, good = RtuFramer({1}), hexed("01 03 27 24 00 02")
+    framer.feed(AROUND[:27], 0)
+    assert framer.feed(good + b"\xff", 50_000_000) == framer.expire(50_000_000 + GAP) == []
+    assert framer.deadline() == 50_000_000 + GAP + rtu.DELAY_NS
+    assert [frame.raw for frame in framer.expire(50_000_000 + GAP + rtu.DELAY_NS)] == [good]
+    assert framer.deadline() is None
+    assert len(framer.held) == 0
+
+
+def test_mic_15_a_request_with_a_pause_waits_for_another_one_behind_an_unfinished_frame() -> None:
+    """A sender that pauses in a frame does so again: the bytes may be data of the first frame."""
+    good = hexed("01 03 27 24 00 02")
+    for pause_ms, wanted_ms in ((30, 30), (200, 200), (900, 200)):
+        framer, end = RtuFramer({1}), (100 + pause_ms) * 1_000_000
+        framer.feed(AROUND[:27], 0)
+        framer.feed(good[:5], 100_000_000)
+        framer.feed(good[5:], end)
+        assert framer.expire(end + GAP) == []
+        assert framer.deadline() == end + wanted_ms * 1_000_000 + GAP
+        assert [frame.raw for frame in framer.expire(end + wanted_ms * 1_000_000 + GAP)] == [good]
 
 
 def test_mic_15_strict_framing_drops_a_frame_that_pauses() -> None:
     good = hexed("01 03 27 24 00 02")
     for pause, found in ((750_000, [good]), (750_001, [])):
-        framer = RtuFramer({1}, rtu.UART_GAP_NS, rtu.UART_GAP_NS)
+        framer = StrictRtuFramer({1})
         framer.feed(good[:5], 0)
-        assert [frame.raw for frame in framer.feed(good[5:], pause)] == found, pause
-        assert [frame.raw for frame in framer.feed(good, 10_000_000)] == [good]
+        framer.feed(good[5:], pause)
+        assert framer.deadline() == pause + 750_001
+        assert [frame.raw for frame in framer.feed(good, 10_000_000)] == found, pause
+        assert [frame.raw for frame in framer.expire(10_750_001)] == [good]
+        assert framer.deadline() is None
 
 
-def test_mic_15_a_beginning_given_up_does_not_delay_the_next_frame() -> None:
+@pytest.mark.parametrize(
+    "burst",
+    [AROUND[:41], AROUND[41:], AROUND[27:], b"\xff" + EMBEDDED, EMBEDDED + b"\0", EMBEDDED + AROUND[:8], EMBEDDED * 33],
+    ids=["beginning", "end", "end that begins with a request", "behind noise", "noise behind", "half a frame behind", "too long"],
+)
+def test_mic_15_strict_framing_drops_the_whole_burst(burst: bytes) -> None:
+    framer = StrictRtuFramer({1})
+    for at in range(0, len(burst), 7):
+        assert framer.feed(burst[at : at + 7], 0) == []
+        assert len(framer.held) <= rtu.MAX_FRAME + 1
+    assert framer.expire(750_001) == []
+    assert (framer.unframed, len(framer.held)) == (len(burst), 0)
+    assert [frame.raw for frame in framer.feed(EMBEDDED * 32, 800_000) + framer.expire(1_550_001)] == [EMBEDDED] * 32
+
+
+def test_mic_15_strict_framing_has_frames_of_unknown_length() -> None:
+    raw = hexed("01 41 01 02 03")
+    framer = StrictRtuFramer({1})
+    assert framer.feed(raw, 0) + framer.expire(750_001) == [RtuFrame(raw, FrameRole.UNKNOWN, len(raw))]
+
+
+def test_mic_15_a_beginning_given_up_delays_the_next_frame_by_a_gap() -> None:
     framer = RtuFramer({1}, gap_ns=rtu.UART_GAP_NS)
     good = hexed("01 03 27 24 00 02")
     framer.feed(bytes.fromhex("01 10 27 38 00 7B F6 41"), 0)  # announces 255 bytes
-    assert [frame.raw for frame in framer.feed(good, 1_000_000)] == [good]
+    assert framer.feed(good, 1_000_000) == []
+    assert [frame.raw for frame in framer.expire(1_750_000)] == [good]
     assert framer.unframed == 8
     assert framer.deadline() is None
 
@@ -261,22 +368,23 @@ def test_mic_15_a_beginning_is_not_kept_for_ever() -> None:
     assert framer.unframed == 5
 
 
-def test_mic_15_frames_swallowed_by_noise_come_when_the_gap_has_passed() -> None:
+def test_mic_15_what_may_be_data_is_not_executed_when_the_gap_has_passed() -> None:
     framer = RtuFramer({1})
     good = hexed("01 03 27 24 00 02")
     # What looks like a request of 255 bytes keeps the framer waiting.
     assert framer.feed(bytes.fromhex("01 10 27 38 00 7B F6 41") + good + good, 5) == []
     assert framer.deadline() == 5 + GAP
-    assert framer.expire(5 + GAP - 1) == []
-    frames = framer.expire(5 + GAP)
-    assert [(frame.raw, frame.end) for frame in frames] == [(good, 16), (good, 24)]
+    assert framer.expire(5 + GAP - 1) == framer.expire(5 + GAP) == []
     assert framer.deadline() is None
+    assert framer.feed(good, 10 * GAP) == []
+    assert [(frame.raw, frame.end) for frame in framer.expire(11 * GAP)] == [(good, 32)]
 
 
 def test_mic_15_a_late_shell_finds_the_same() -> None:
     framer = RtuFramer({1})
     good = hexed("01 03 27 24 00 02")
-    framer.feed(bytes.fromhex("01 10 27 38 00 7B F6 41") + good, 0)
+    framer.feed(bytes.fromhex("01 10 27 38 00 7B F6 41"), 0)
+    framer.feed(good, 2 * GAP)
     assert [frame.end for frame in framer.feed(good, 10 * GAP)] == [16, 24]
 
 
@@ -315,10 +423,9 @@ def test_whatever_comes_frames_are_intact_and_memory_is_bounded(pieces: list[tup
             framed += len(frame.raw)
         assert len(framer.held) <= rtu.MAX_FRAME
         assert framer.unframed == fed - framed - len(framer.held) >= 0
-    deadline = framer.deadline()
-    if deadline is not None:
-        framer.expire(deadline)
-        assert framer.deadline() is None
+    for _ in range(3):  # a gap, that with a pause, that of a network
+        framer.expire(framer.deadline() or now)
+    assert framer.deadline() is None
 
 
 # What keeps the framer busiest: starts of frames everywhere, announcements of long ones.
@@ -347,11 +454,18 @@ def test_a_flood_of_noise_costs_a_bounded_number_of_looks_per_byte(pattern: str,
         assert len(framer.held) <= rtu.MAX_FRAME
 
 
-@pytest.mark.parametrize("pattern", ["01", "02 03", "01 10 00 00 00 7B F6"])
+@pytest.mark.parametrize("pattern", ["01", "02 03"])
 def test_a_request_behind_a_flood_of_noise_is_found_when_the_gap_has_passed(pattern: str) -> None:
     framer, good = RtuFramer({1}), hexed("01 03 27 24 00 02")
     assert framer.feed(bytes.fromhex(pattern) * 2000 + good, 0) == []
     assert [frame.raw for frame in framer.expire(GAP)] == [good]
+
+
+def test_a_request_after_a_flood_of_beginnings_is_answered() -> None:
+    framer, good = RtuFramer({1}), hexed("01 03 27 24 00 02")
+    assert framer.feed(bytes.fromhex("01 10 00 00 00 7B F6") * 2000 + good, 0) == framer.expire(GAP) == []
+    assert framer.feed(good, 2 * GAP) == []
+    assert [frame.raw for frame in framer.expire(3 * GAP)] == [good]
 
 
 def test_requests_behind_each_other_are_no_noise() -> None:

@@ -106,23 +106,50 @@ def test_mic_32_a_request_that_began_before_the_response_had_left_is_lost(bank: 
     assert (len(bank.executed), port.dropped) == (executed, 2 - executed)
 
 
-def test_mic_32_all_ports_of_a_controller_together(bank: Any, new_bank: NewBank) -> None:
+def run_all(until: int, *ports: TimedRtuSlavePort) -> list[list[tuple[int, bytes]]]:
+    """What each port has sent, all called at the deadlines of all."""
+    out: list[list[tuple[int, bytes]]] = [[] for _ in ports]
+    while (dues := [due for port in ports if (due := port.deadline()) is not None]) and min(dues) <= until:
+        for number, port in enumerate(ports):
+            out[number] += port.to_send(min(dues))
+    return out
+
+
+def test_mic_32_one_request_of_each_port_waits_for_its_turn(bank: Any, new_bank: NewBank) -> None:
     other = new_bank()
     units = TimedUnits({1: bank, 2: other}, TIMING)
-    first, second, third = (TimedRtuSlavePort(units) for _ in range(3))
+    ports = first, second, third, elsewhere = tuple(TimedRtuSlavePort(units) for _ in range(4))
     first.exchange(READ, 0)
-    run(first, READ_NS)
+    run_all(READ_NS, *ports)
     second.exchange(READ, READ_NS)  # while the response of the first is on its way
-    third.exchange(with_crc(bytes.fromhex("02 03 00 05 00 01")), READ_NS)
-    run(first, 10**9)
-    run(second, 10**9)
-    run(third, 10**9)
-    assert (len(bank.executed), len(other.executed)) == (1, 1)
-    assert (first.dropped, second.dropped, third.dropped) == (0, 1, 0)
-    later = READ_NS + TURN + TOLD_NS
-    second.exchange(READ, later)
-    run(second, 10**9)
-    assert [moment for moment, _ in bank.executed] == [READ_NS, READ_NS + FRAME_INTERVAL_NS]
+    third.exchange(READ, READ_NS + 1)
+    third.exchange(READ, READ_NS + 2)  # its own first request waits
+    elsewhere.exchange(with_crc(bytes.fromhex("02 03 00 05 00 01")), READ_NS)
+    sent = run_all(10**9, *ports)
+    turns = [READ_NS + n * FRAME_INTERVAL_NS for n in range(3)]
+    assert [moment for moment, _ in bank.executed] == turns
+    assert [[moment for moment, _ in of] for of in sent[:3]] == [[turn + TURN + TOLD_NS] for turn in turns]
+    assert [moment for moment, _ in other.executed] == [2 * READ_NS]
+    assert [port.dropped for port in ports] == [0, 0, 1, 0]
+
+
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_mic_32_ports_that_ask_without_pause_have_equal_shares_and_lose_nothing(bank: Any, count: int) -> None:
+    ports = [TimedRtuSlavePort(TimedUnits({1: bank}, TIMING))]
+    ports += [TimedRtuSlavePort(ports[0]._units) for _ in range(count - 1)]
+    served = [0] * count
+    now = 0
+    for port in ports:
+        port.exchange(READ, now)
+    while now < 10**9:
+        now = min(due for port in ports if (due := port.deadline()) is not None)
+        for number, port in enumerate(ports):
+            if port.to_send(now):
+                served[number] += 1
+                port.exchange(READ, now)
+    assert 98 <= sum(served) <= 101
+    assert max(served) - min(served) <= 1
+    assert [port.dropped for port in ports] == [0] * count
 
 
 def test_mic_32_a_port_that_goes_away_with_a_request_leaves_the_controller_free(bank: Any) -> None:
@@ -132,17 +159,17 @@ def test_mic_32_a_port_that_goes_away_with_a_request_leaves_the_controller_free(
     gone.to_send(READ_NS)
     gone.exchange(READ, 10_000_000)
     gone.deadline()
-    del gone
+    gone.close()
     port.exchange(READ, 200_000_000)
     assert len(run(port, 10**9)) == 1
 
 
 def test_mic_32_nothing_happens_before_it_could_be_known(bank: Any) -> None:
     port = TimedRtuSlavePort(TimedUnits({0x41: bank}, TIMING))
-    # Could be seven bytes of a request to unit 3; the request inside ends after six, 1.56 ms.
-    port.exchange(bytes.fromhex("03 05") + with_crc(bytes.fromhex("41 07")) + b"\xff", 0)
-    port.exchange(b"\xff", 1_700_000)
-    assert run(port, 10**9) == [(1_700_000 + TURN + LINE.duration(5), with_crc(bytes.fromhex("41 87 01")))]
+    # Behind noise, could be seven bytes of a request to unit 3; the request inside ends after seven, 1.82 ms.
+    port.exchange(bytes.fromhex("FF 03 05") + with_crc(bytes.fromhex("41 07")) + b"\xff", 0)
+    port.exchange(b"\xff", 2_000_000)
+    assert run(port, 10**9) == [(2_000_000 + TURN + LINE.duration(5), with_crc(bytes.fromhex("41 87 01")))]
 
 
 def test_what_is_due_happens_before_what_comes(bank: Any) -> None:
@@ -183,20 +210,21 @@ def test_mic_32_traffic_of_others_takes_the_line_and_no_slot(bank: Any) -> None:
     assert bank.executed == [(arrived, READ[1:-2])]
 
 
-def test_mic_32_a_broadcast_is_executed_by_each_unit_that_is_free_and_not_answered(bank: Any, new_bank: NewBank) -> None:
+def test_mic_32_a_broadcast_is_executed_by_each_unit_in_its_turn_and_not_answered(bank: Any, new_bank: NewBank) -> None:
     other = new_bank()
     units = TimedUnits({1: bank, 2: other}, TIMING)
     port, elsewhere = TimedRtuSlavePort(units), TimedRtuSlavePort(units)
     elsewhere.exchange(READ, 0)
     run(elsewhere, READ_NS)
     port.exchange(with_crc(bytes.fromhex("00 06 00 05 00 63")), READ_NS)
-    assert run(port, 10**9) == []
-    assert [pdu[0] for _, pdu in bank.executed] == [3]
-    assert other.executed == [(2 * READ_NS, bytes.fromhex("06 00 05 00 63"))]
+    port.exchange(with_crc(bytes.fromhex("00 06 00 05 00 64")), READ_NS + 1)  # the second one has no room at unit 1
+    assert run_all(10**9, port, elsewhere)[0] == []
+    assert [(moment, pdu[0]) for moment, pdu in bank.executed] == [(READ_NS, 3), (READ_NS + FRAME_INTERVAL_NS, 6)]
+    assert [moment for moment, _ in other.executed] == [2 * READ_NS, 2 * READ_NS + FRAME_INTERVAL_NS]
     assert port.dropped == 1
     port.exchange(with_crc(bytes.fromhex("00 03 00 05 00 01")), 10**9)  # reads are ignored
     assert run(port, 2 * 10**9) == []
-    assert (len(bank.executed), len(other.executed)) == (1, 1)
+    assert (len(bank.executed), len(other.executed)) == (2, 2)
 
 
 def test_mic_32_a_flood_is_bounded_and_the_line_recovers(bank: Any) -> None:

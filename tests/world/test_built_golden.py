@@ -146,8 +146,8 @@ def described(world: World) -> Iterator[str]:
                 yield from (f"  {name} is moved by {axis.spec.name}: {lane}" for axis, lane in element.moved(built))
     for kernel in world.kernels:
         for number, part in enumerate(kernel.parts):
-            watched = sorted(name for name, numbers in kernel._watches.by_name.items() if number in numbers)
-            yield f"part {number} {type(part).__name__} of {kernel._watches.computes[number]}: {' '.join(watched)}"
+            watched = sorted(name for name, numbers in kernel._parts.by_name.items() if number in numbers)
+            yield f"part {number} {type(part).__name__} of {kernel._parts.computes[number]}: {' '.join(watched)}"
 
 
 @pytest.fixture(scope="module")

@@ -111,7 +111,6 @@ def test_answers_of_a_line_with_timing_come_later(kind: str) -> None:
         place = line.connect("p", kind)
         outputs: list[int] = []
         place.on_output = partial(outputs.append, 1)
-        assert place.at_once is (kind == "tcp" and early)
         line.receive("p", framed(READ_STATUS), there.now)
         there.run(for_="5 ms")
         assert bool(place.received) is early
@@ -412,3 +411,32 @@ def test_a_line_that_nobody_follows_any_more_observes_no_frames() -> None:
     assert framed.on_frame is not None
     line.unfollow_frames(frames)
     assert framed.on_frame is None
+
+
+@pytest.mark.parametrize("moment_ms", range(0, 40, 3))
+def test_mic_32_requests_of_several_ports_that_wait_are_restored(moment_ms: int) -> None:
+    """Four programs ask one controller, each again as soon as it has its answer; one of them leaves."""
+    kinds = {"tcp-1": "tcp", "tcp-2": "tcp", "rtu-1": "rtu", "rtu-2": "rtu"}
+
+    def go_on(there: World, until_ms: int) -> list[tuple[str, int]]:
+        line, answers = there.lines["bus"], []
+        while there.now < until_ms * MILLISECOND:
+            if there.now == 21 * MILLISECOND and "tcp-1" in line.places:
+                line.leave("tcp-1")
+            for name, place in tuple(line.places.items()):
+                for moment, _ in place.take(there.now):
+                    answers.append((name, moment))
+                    line.receive(name, (tcp if kinds[name] == "tcp" else rtu)(READ_STATUS), there.now)
+            there.run(for_="1 ms")
+        return answers
+
+    there, other = world('timing = "real"'), world('timing = "real"')
+    for name, kind in kinds.items():
+        there.lines["bus"].connect(name, kind)
+        there.lines["bus"].receive(name, (tcp if kind == "tcp" else rtu)(READ_STATUS), 0)
+    go_on(there, moment_ms)
+    snapshot = there.snapshot()
+    answers = go_on(there, 200)
+    other.restore(snapshot)
+    assert go_on(other, 200) == answers
+    assert {name for name, _ in answers} >= set(kinds) - {"tcp-1"}

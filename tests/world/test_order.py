@@ -9,7 +9,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from steptwin.files.world import World
-from steptwin.world.order import PartWatches, successors, update_order
+from steptwin.world.order import successors, update_order
 from steptwin.world.wires import PinName, Wire
 
 BASE = '[[mic488]]\nname = "c"\n'
@@ -110,17 +110,6 @@ def test_what_follows_what() -> None:
     assert update_order([set(), set(), set()], [0]) == [1, 2, 0]
     # 1 and 2 are a loop; 0 follows it, 3 is before it.
     assert update_order([set(), {0, 2}, {1}, {2}], ()) == [3, 1, 0, 2]
-
-
-def test_parts_keep_what_they_watch_when_they_are_numbered_anew() -> None:
-    """Part 0 watches b, part 1 computes b from a, part 2 watches everything."""
-    watches = PartWatches()
-    assert [watches.add(["b"], None, None), watches.add(["a", "a"], "b", None), watches.add(None, None, "a")] == [0, 1, 2]
-    order = watches.order([])
-    assert order == [2, 1, 0]
-    watches.arrange(order)
-    assert (watches.by_name, watches.all, watches.computes) == ({"b": [2], "a": [1]}, [0], [None, "b", None])
-    assert watches.order([]) == ()
 
 
 def reached(number: int, after: list[set[int]]) -> set[int]:

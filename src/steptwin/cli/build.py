@@ -32,7 +32,8 @@ def build(
     """Compile a WBC program to the image of firmware 1.25. Exit code 1 if it has errors or something without a known form.
 
     Few statements have a known form: IF, ELSE, WHILE, WAIT, DELAY, JUMP, RETURN, HOME, MOVEPTP, WAITPOS, SET without calculation,
-    labels INT_INn; with --inferred also the other motions and PROGRESET. Variables, END, $I, $D and $R have none.
+    labels INT_INn; with --inferred also the other motions and PROGRESET. Variables, END, $I, $D and $R have none, and neither
+    have the comparisons <= and >=, for which IF ... ELSE can be written.
     """
     from steptwin.diagnostics import Severity, render
     from steptwin.files.programfiles import CompanionFiles, read_program

@@ -20,6 +20,7 @@ class ExportFormat(enum.StrEnum):
     PNG = "png"
     SVG = "svg"
     VCD = "vcd"
+    PCAPNG = "pcapng"
     CSV = "csv"
     PARQUET = "parquet"
     JSONL = "jsonl"

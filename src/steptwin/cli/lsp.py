@@ -5,9 +5,11 @@ From Python: `steptwin.lsp.session`.
 
 from __future__ import annotations
 
+import typer
+
 
 def lsp() -> None:
     """Serve an editor on standard input and output (Language Server Protocol): programs, tables, configurations, worlds."""
     from steptwin.lsp import serve_stdio
 
-    serve_stdio()
+    raise typer.Exit(serve_stdio())

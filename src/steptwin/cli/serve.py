@@ -70,13 +70,13 @@ class ModbusOptions(LineOptions):
         str,
         typer.Option(
             help="'real': requests take the time of the wire and of the controller; 'strict': and a pause above 0.75 ms inside "
-            "a frame drops it; 'off'."
+            "a frame drops the whole burst; 'off'."
         ),
     ] = "off"
     gap: Annotated[
         float | None,
         typer.Option(
-            help="Silence in ms after which bytes outside a frame are discarded: shorten it if requests after noise are lost. "
+            help="Silence in ms that ends a burst: shorten it if requests after noise are lost. "
             "It does not split frames, which may pause for 2 s. Default: 0.75 on a serial port, else 20."
         ),
     ] = None

@@ -31,6 +31,7 @@ from steptwin.world.kind import ProgramAct, ProgramReport
 from steptwin.world.overrides import Overrides
 from steptwin.world.records import PROGRAM, Selection, describe, is_shown, named_in, read_selection
 from steptwin.world.references import check_step
+from steptwin.world.trace import TraceRecord
 from steptwin.world.unfinished import unchanged_inputs, waiting
 
 USUAL_LIMIT_NS: Nanos = 60 * SECOND
@@ -261,6 +262,19 @@ def _with_statement(controller: str, happening: ProgramAct) -> str:
     return f"{happening.time / SECOND:12.6f} s  {controller:<10} {happening.text:<34}  {happening.place}".rstrip()
 
 
+def _print_failures(world: World, out: Print) -> None:
+    """The first failure of each expectation, and how often it failed after it."""
+    by_condition: dict[str, list[TraceRecord]] = {}
+    for failure in world.failures:
+        by_condition.setdefault(str(failure.value).partition(INSTEAD)[0], []).append(failure)
+    for first, *others in by_condition.values():
+        out(f"expectation failed at {first.time / SECOND:g} s: {first.value}")
+        if others:
+            out(f"and {len(others)} more times, the last at {others[-1].time / SECOND:g} s: {others[-1].value}")
+    if world.failures.more:
+        out(f"{world.failures.more} more expectations failed")
+
+
 def _print_end(world: World, outcome: WorldRunResult, selection: Selection, out: Print) -> None:
     out("")
     for name, axis in world.axis.items():
@@ -278,10 +292,7 @@ def _print_end(world: World, outcome: WorldRunResult, selection: Selection, out:
         out(_verdict_text(verdict))
     for name, value in outcome.measures.items():
         out(f"{name}: {value:g}{'' if name.endswith(' cycles') else ' s'}")
-    for failure in world.failures:
-        out(f"expectation failed at {failure.time / SECOND:g} s: {failure.value}")
-    if world.failures.more:
-        out(f"{world.failures.more} more expectations failed")
+    _print_failures(world, out)
     for late in world.overdue:
         out(f"warning: at {late.time / SECOND:g} s {late.value}")
     if world.overdue.more:

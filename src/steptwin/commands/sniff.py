@@ -91,12 +91,19 @@ class Tap(asyncio.Protocol):
         return time.monotonic_ns() - self._begin
 
     def _decode(self, data: bytes, direction: FrameDirection | None) -> None:
-        decoder = self._decoder
-        decoder.feed(data, self._now(), direction)
-        due = decoder.deadline()
+        self._decoder.feed(data, self._now(), direction)
+        self._wait_for_silence()
+
+    def _wait_for_silence(self) -> None:
+        due = self._decoder.deadline()
         if due is not None:
-            delay_s = max(due - self._now(), 0) / SECOND
-            asyncio.get_running_loop().call_later(delay_s, lambda: decoder.expire(self._now()))
+            asyncio.get_running_loop().call_later(max(due - self._now(), 0) / SECOND, self._expire)
+
+    def _expire(self) -> None:
+        due = self._decoder.deadline()
+        if due is not None and due <= self._now():
+            self._decoder.expire(self._now())
+            self._wait_for_silence()
 
 
 async def sniff(

@@ -54,12 +54,22 @@ def place_switches(
             continue
         for name, pin, edge in (("KL", axis.in_kl, travel.low_u), ("KR", axis.in_kr, travel.high_u)):
             if edge is not None and pin >= INPUTS:
-                raise Misuse(f"--travel M{number}: the configuration has no {name} for this axis")
+                without = _without(travel, axis)
+                raise Misuse(f"--travel M{number}: the configuration has no {name} for this axis{without}")
         low, high = (_contact(config, pin) for pin in (axis.in_kl, axis.in_kr))
         pins = f"IN{axis.in_kl + 1}", f"IN{axis.in_kr + 1}"
         switches.append(AxisSwitches(number, travel.low_u, travel.high_u, *pins, (low, high)))
     pins = {pin for one in switches for pin, edge in ((one.low_pin, one.low), (one.high_pin, one.high)) if edge is not None}
     return PlacedSwitches(switches, assumed, frozenset(pins | set(driven)))
+
+
+def _without(travel: SwitchTravel, axis: AxisConfig) -> str:
+    """The option without switches that have no input, as the end of a sentence; nothing if none is left."""
+    low, high = (
+        "" if edge is None or pin >= INPUTS else f"{edge:g}"
+        for pin, edge in ((axis.in_kl, travel.low_u), (axis.in_kr, travel.high_u))
+    )
+    return f"; --travel M{travel.axis}={low}..{high} has the other switch only" if low or high else ""
 
 
 def _contact(config: ControllerConfig, pin: int) -> str:

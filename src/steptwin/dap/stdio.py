@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 import traceback
 from collections.abc import Mapping
@@ -11,8 +12,8 @@ from queue import Empty, SimpleQueue
 from threading import Thread
 from typing import Any, BinaryIO
 
+from steptwin.baseprotocol import message_bytes, read_body
 from steptwin.dap.adapter import Adapter
-from steptwin.dap.wire import message_bytes, read_message
 from steptwin.errors import Misuse, SteptwinError
 
 
@@ -68,7 +69,8 @@ class _Session:
     def _read(self) -> None:
         while True:
             try:
-                message = read_message(self._source)
+                body = read_body(self._source)
+                message = None if body is None else _message(body)
             except Misuse as error:
                 self._waiting.put(error)
                 return
@@ -104,6 +106,16 @@ class _Session:
             return
         self._target.write(message_bytes({"seq": next(self._numbers), **message}))
         self._target.flush()
+
+
+def _message(body: bytes) -> dict[str, Any]:
+    try:
+        message = json.loads(body)
+    except (ValueError, RecursionError) as error:
+        raise Misuse(f"the message is not JSON: {error}") from None
+    if not isinstance(message, dict):
+        raise Misuse("a message is an object of JSON")
+    return message
 
 
 def _failure(text: str) -> dict[str, object]:

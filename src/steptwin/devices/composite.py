@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Protocol
@@ -37,6 +38,10 @@ class SubjectPart(Protocol):
     def read(self, *points: str) -> tuple[Reading, ...]: ...
     async def do(self, wanted: Command, /) -> Result: ...
     def plans(self, what: Filter) -> list[Event]: ...
+    def selected(self, data: bytes) -> int | None:
+        """The address on the line that characters begin with selecting; None without one."""
+        ...
+
     async def begin_jog(self, wanted: command.Jog) -> Held: ...
 
 
@@ -84,6 +89,8 @@ class CompositeSubject:
             (machine.line, machine.unit): part for part in self._parts for machine in part.description.machines if machine.is_real
         }
         self._of_line = {line.name: part for part in reversed(self._parts) for line in part.description.lines}
+        self._several = {name for name, count in Counter(line for line, _ in self._of_unit).items() if count > 1}
+        """Lines with several devices."""
         can = {name for one in all_of for name in one.commands}
         machines = tuple(machine for one in all_of for machine in one.machines)
         base = all_of[0] if self._world is not None else Description(", ".join(one.name for one in machines) or "no device", ())
@@ -108,6 +115,8 @@ class CompositeSubject:
         found: list[SubjectPart] = []
         if isinstance(wanted, steps.Request) and (there := self._of_unit.get((wanted.line, wanted.unit))) is not None:
             return there  # several devices share the line
+        if isinstance(wanted, steps.Send) and wanted.line in self._several:
+            return self._addressed(wanted)
         for field in row_of(wanted).fields:
             value: Any = getattr(wanted, field.key)
             if field.name == "machine" and value is not None:
@@ -128,6 +137,17 @@ class CompositeSubject:
             why = ": name the machine" if name in can else f" is not possible here; possible are {', '.join(can)}"
             raise Refusal(f"{name}{why}")
         return self._parts[0]
+
+    def _addressed(self, wanted: steps.Send) -> SubjectPart:
+        """The device that characters on a line of several are for. Raises `Misuse` where they do not begin with its address."""
+        address = self._of_line[wanted.line].selected(wanted.data)
+        there = self._of_unit.get((wanted.line, address))
+        if there is None:
+            known = ", ".join(f"X{unit:X}" for line, unit in self._of_unit if line == wanted.line and unit is not None)
+            raise Misuse(
+                f"text: several devices are on {wanted.line}: it begins with the address of one of them, {known}, and CR"
+            )
+        return there
 
     # ------------------------------------------------------------------ as `Served`
 

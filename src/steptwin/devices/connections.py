@@ -10,6 +10,7 @@ from typing import Any
 
 from steptwin.devices.composite import CompositeSubject
 from steptwin.devices.device import ConnectedDevice, DeviceSurroundings
+from steptwin.diagnostics import SourceText
 from steptwin.drivers.exchange import ExchangeCounts, NoAnswer
 from steptwin.drivers.kind import DeviceAddress
 from steptwin.drivers.kinds import DRIVERS, others_there
@@ -69,6 +70,9 @@ class DeviceConnections:
 
     async def settings(self, machine: str) -> str:
         return await later(self._connected(machine).device.settings())
+
+    async def configuration(self, machine: str) -> SourceText | None:
+        return await later(asyncio.to_thread(self._connected(machine).device.configuration))
 
     async def shadow(self, machine: str, *, on: bool) -> None:
         device = self._connected(machine).device

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 from steptwin.devices.jog import LeasedJog
 from steptwin.devices.shadow import Known, Shadow
+from steptwin.diagnostics import SourceText
 from steptwin.drivers.subject import AsyncDeviceSubject, DevicePart, RawEffect
 from steptwin.errors import LineFailure, Refusal, SteptwinError
 from steptwin.eventloop import later
@@ -91,6 +92,10 @@ class ConnectedDevice:
     @property
     def followers(self) -> Followers:
         return self._subject.followers
+
+    def selected(self, data: bytes) -> int | None:
+        """See `steptwin.drivers.subject.DevicePart.selected`."""
+        return self._device.selected(data)
 
     def plans(self, what: Filter) -> list[Event]:
         return [event for event in self._subject.samples() if what.wants(event)]
@@ -255,6 +260,10 @@ class ConnectedDevice:
         """What can be read and written, as JSON. Raises `LineFailure`."""
         async with self._turn:
             return await self._device.settings_text()
+
+    def configuration(self) -> SourceText | None:
+        """See `steptwin.drivers.subject.DevicePart.configuration`."""
+        return self._device.configuration()
 
     # ------------------------------------------------------------------ the twin beside it
 

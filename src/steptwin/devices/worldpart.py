@@ -56,5 +56,8 @@ class WorldPart:
     def present(self) -> dict[str, Any]:
         return present_of(self._world)
 
+    def selected(self, data: bytes) -> None:
+        """Its lines take characters as they are."""
+
     def plans(self, what: Filter) -> list[Event]:
         return self._world.plans(what)

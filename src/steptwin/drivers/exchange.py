@@ -236,6 +236,7 @@ class Exchanger(Generic[Q, A]):
         "_urgent",
         "_waiting",
         "discipline",
+        "on_missed",
         "place",
     )
 
@@ -251,6 +252,8 @@ class Exchanger(Generic[Q, A]):
         self._due: Nanos | None = None  # when the next one may begin
         self._next: dict[Hashable, Nanos] = {}  # when a device may be asked again
         self._requests = self._errors = 0
+        self.on_missed: Callable[[Q, LineFailure], object] | None = None
+        """Called with each attempt that failed, and why."""
 
     @property
     def counts(self) -> ExchangeCounts:
@@ -375,6 +378,8 @@ class Exchanger(Generic[Q, A]):
     def _missed(self, job: Job[Q, A], error: LineFailure) -> None:
         """Handle a failed attempt: repeat it before jobs of the same rank, or give up."""
         self._errors += 1
+        if self.on_missed is not None:
+            self.on_missed(job.request, error)
         job.attempts += 1
         job.missed = error
         if job.done:
@@ -401,6 +406,8 @@ class Exchanger(Generic[Q, A]):
         except (Refusal, LineFailure) as error:
             self._errors += 1
             self._current = None
+            if self.on_missed is not None and isinstance(error, LineFailure):
+                self.on_missed(job.request, error)
             if not job.done:
                 job.fail(error)
             return

@@ -210,8 +210,21 @@ class RtuMaster:
                 size = _EXCEPTION_FRAME
             if size and start + size <= len(held) and crc16(held[start : start + size]) == 0:
                 return held[start : start + size]
-            start += 1
+            if self._late_answers and not size and (late := self._late_at(held, start)):
+                if start + late > len(held):
+                    return None  # what looks like the answer may be data of this one
+                start += late
+            else:
+                start += 1
         return None
+
+    def _late_at(self, held: bytes, start: int) -> int:
+        """Length of a late answer that begins at ``start``, whole or not; 0 if none does."""
+        for query in (owed.query for owed in self._late_answers):
+            whole = held[start : start + query.rtu_size]
+            if whole.startswith(query.rtu_head) and (len(whole) < query.rtu_size or crc16(whole) == 0):
+                return query.rtu_size
+        return 0
 
     def _settle(self, asked: ModbusQuery) -> None:
         """Forget earlier requests to the device after ``asked`` was answered, unless this was the answer to one of them."""

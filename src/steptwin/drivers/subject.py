@@ -18,8 +18,10 @@ from typing import Any, Protocol, TypeAlias
 
 from steptwin.controllerstate import ControllerState, parts_of
 from steptwin.datasheet import Datasheet
+from steptwin.diagnostics import SourceText
 from steptwin.drivers.blocking import Blocking, blocking, finish
 from steptwin.drivers.line import DriverLine
+from steptwin.drivers.lineframes import FRAMES, LineFrames, SeenFrame
 from steptwin.errors import Misuse, Refusal
 from steptwin.machine import SECOND, Nanos
 from steptwin.nearmiss import NearMiss
@@ -30,11 +32,13 @@ from steptwin.subject.controls import controls_of
 from steptwin.subject.devicetwin import DeviceTwin
 from steptwin.subject.events import Event, Numbering
 from steptwin.subject.following import EventBatch, Filter, Followers, Following
-from steptwin.subject.payloads import Payload, SamplePayload
+from steptwin.subject.payloads import FramePayload, Payload, SamplePayload
 from steptwin.world import script as steps
 
 PERIOD_S = 0.2
 PERIODS_S = (0.02, 60.0)
+CLIENT = "steptwin"
+"""The only client of a device whose frames are seen."""
 DeviceAction: TypeAlias = Callable[[Any], Awaitable[object]]
 ValueAndUnit: TypeAlias = tuple[float | None, str]
 """The value of a point, None if unknown; and its unit."""
@@ -88,6 +92,10 @@ class DevicePart(Protocol):
         """The unit of a point. Raises `Misuse` for an unknown point."""
         ...
 
+    def selected(self, data: bytes) -> int | None:
+        """The address on the line that characters begin with selecting; None without one."""
+        ...
+
     def effect_of(self, wanted: steps.Request | steps.Write) -> RawEffect:
         """What a raw request, of which nothing else is known, or a write of registers does. Raises `Misuse` for an unknown
         register."""
@@ -115,6 +123,10 @@ class DevicePart(Protocol):
 
     async def settings_text(self) -> str:
         """What can be read and written, as JSON, to keep it before it is changed."""
+        ...
+
+    def configuration(self) -> SourceText | None:
+        """The configuration file that the user has named; None without one. It may block. Raises `Misuse`."""
         ...
 
     async def twin(self, name: str) -> DeviceTwin:
@@ -176,7 +188,8 @@ class AsyncDeviceSubject:
             command.Time: self._time,
         }
         self.description = self._described()
-        self.followers = Followers()
+        self._end_frames: Callable[[], None] | None = None
+        self.followers = Followers(self._follow_frames)
         self._numbering = Numbering({}) if numbering is None else numbering
         self._samples: dict[str, Event] = {}
 
@@ -236,6 +249,21 @@ class AsyncDeviceSubject:
         if type(payload) is SamplePayload:
             self._samples[payload.axis] = event
         self.followers.publish(event)
+
+    def _follow_frames(self) -> None:
+        """Observe the frames of the device while somebody follows them."""
+        frames: LineFrames | None = self._line.notes.get(FRAMES)
+        is_wanted = "frame" in self.followers.kinds
+        if is_wanted and self._end_frames is None and frames is not None:
+            self._end_frames = frames.follow(self._framed)
+        elif not is_wanted and self._end_frames is not None:
+            self._end_frames()
+            self._end_frames = None
+
+    def _framed(self, seen: SeenFrame) -> None:
+        if seen.device == self._device.address:
+            payload = FramePayload(CLIENT, seen.direction.value, seen.raw, seen.meaning)
+            self.followers.publish(self._numbering.event(self.now(), self._line.place, payload))
 
     def samples(self) -> list[Event]:
         """The newest sample of each axis that there is one of."""

@@ -330,8 +330,6 @@ class PlacePort:
         self.line = line
         self._live = live
         self._world = world
-        self._direct: LineEndPoint | None = None
-        """Where it is connected, if nothing that it exchanges is recorded there and its port answers at once."""
         self._line = world.lines[line]
         self._kernel = world.parts.kernel_of[line]
         self._places = self._line.places
@@ -363,23 +361,10 @@ class PlacePort:
             self.on_output()
 
     def exchange(self, data: bytes, now: Nanos) -> bytes:
-        kernel = self._kernel
-        now = self._world.now  # a world that was stopped stands
+        world, kernel = self._world, self._kernel
+        now = world.now  # a world that was stopped stands
         if kernel.now != now or kernel.stale:
             kernel.advance(now)
-        direct = self._direct
-        if direct is None or not direct.is_connected or not direct.port.is_transparent or kernel.is_attentive:
-            return self._exchange(data, now)
-        port = direct.inner
-        answer: bytes = port.exchange(data, now)
-        if kernel.stale:
-            answer = self._with_the_rest(direct, answer, now)
-        self.broken = port.broken
-        return answer
-
-    def _exchange(self, data: bytes, now: Nanos) -> bytes:
-        """As `exchange`, wherever it is connected; the kernel is at ``now``."""
-        world, kernel = self._world, self._kernel
         place = self._places.get(self._name)
         if place is None or place.on_output is None:
             place = self._connected()
@@ -387,7 +372,6 @@ class PlacePort:
             answer = self._recorded(place, data, now)
         else:
             answer = self._line.exchange(self._name, place, data, now)
-            self._direct = place if place.at_once and not place.received else None
         if kernel.stale or place.received:
             answer = self._with_the_rest(place, answer, now)
         self.broken = place.inner.broken

@@ -21,32 +21,41 @@ class Protocol(LanguageServerProtocol):
 
     _is_initialized = False
 
+    @property
+    def is_shut_down(self) -> bool:
+        return self._shutdown
+
     def structure_message(self, data: dict[str, Any]) -> Any:
         try:
             return super().structure_message(data)
         except JsonRpcException as error:
             if "id" in data and "method" in data:
                 text = f"{data['method']}: its parameters are not those of the protocol"
-                self._refuse(data["id"], JsonRpcInvalidParams(text) if isinstance(error, JsonRpcInvalidParams) else error)
+                self.refuse(data["id"], JsonRpcInvalidParams(text) if isinstance(error, JsonRpcInvalidParams) else error)
             return None
 
     def handle_message(self, message: Any) -> None:
         if not hasattr(message, "jsonrpc"):
             return  # refused, or no message of the protocol
         method, number = getattr(message, "method", None), getattr(message, "id", None)
-        if method == lsp.INITIALIZE:
-            self._is_initialized = True
         if method is None or number is None:
             super().handle_message(message)
+        elif method == lsp.INITIALIZE:
+            if self._is_initialized:
+                self.refuse(number, JsonRpcInvalidRequest("initialize is the first request, and comes once"))
+            else:
+                self._is_initialized = True
+                super().handle_message(message)
         elif not self._is_initialized:
-            self._refuse(number, JsonRpcServerNotInitialized("the first request is initialize"))
+            self.refuse(number, JsonRpcServerNotInitialized("the first request is initialize"))
         elif self._shutdown:
-            self._refuse(number, JsonRpcInvalidRequest("the server has been shut down"))
+            self.refuse(number, JsonRpcInvalidRequest("the server has been shut down"))
         else:
             super().handle_message(message)
 
-    def _refuse(self, number: int | str, error: JsonRpcException) -> None:
-        self._send_response(number, None, error.to_response_error())
+    def refuse(self, number: int | str | None, error: JsonRpcException) -> None:
+        """Answer a request with an error; None: a message whose number cannot be read."""
+        self._send_data(lsp.ResponseErrorMessage(id=number, error=error.to_response_error()))
 
     @lsp_method(lsp.TEXT_DOCUMENT_DID_OPEN)
     def lsp_text_document__did_open(self, params: lsp.DidOpenTextDocumentParams) -> Handling:

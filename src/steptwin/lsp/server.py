@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import inspect
 import logging
 from collections.abc import Callable
@@ -14,9 +13,6 @@ from pygls.protocol import json_rpc
 from steptwin.lsp.editorserver import EditorServer
 from steptwin.lsp.files import Files
 from steptwin.lsp.handlers import HANDLERS
-
-_COLLECT_AFTER = 100_000
-"""Objects after which Python looks for garbage: trees of programs are many small objects, none of them in cycles."""
 
 
 def server(files: Files | None = None) -> EditorServer:
@@ -47,9 +43,3 @@ def _bound(made: EditorServer, handler: Callable[[EditorServer, Any], Any]) -> C
         return handler(made, params)
 
     return now
-
-
-def serve_stdio() -> None:
-    """Serve the client on standard input and output until it disconnects."""
-    gc.set_threshold(_COLLECT_AFTER)
-    server().start_io()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import deque
 from collections.abc import Callable
 
@@ -17,6 +18,8 @@ from steptwin.wire.slave import FrameDirection
 UPLOAD = "U"
 LONGEST_LINE = 256
 """More characters than this without CR are logged as an incomplete line."""
+_HAS_LINES = re.compile(rb"\S[^\n]*\n[^\n]*\S[^\n]*\n")
+"""Two lines that end with line feeds alone."""
 UPLOADS_WAITING = 1000
 """Bytes announced and not seen on the line: they may have been lost there."""
 
@@ -76,7 +79,7 @@ class LineSplitter:
         *lines, self._begun = (self._begun + data).split(b"\r")
         for line in lines:
             self._log.received(now, self._link, line + b"\r")
-        if len(self._begun) > LONGEST_LINE:
+        if len(self._begun) > LONGEST_LINE or _HAS_LINES.search(self._begun):
             self._log.received(now, self._link, self._begun)
             self._begun = b""
 
@@ -84,6 +87,8 @@ class LineSplitter:
 def _typed(raw: bytes, variant: Variant) -> str:
     text = raw.decode("latin-1").strip()
     if raw[-1] != CR:
+        if _HAS_LINES.search(raw):
+            return f"{len(raw)} characters without CR: a line feed ends no command"
         return f"{len(raw)} characters without CR"
     line, found = parse_line(text)
     if line.command is not None:

@@ -349,7 +349,10 @@ def _unknown(reader: _LineReader) -> NoReturn:
     meant = _MEANT.get(char)
     # A digit alone is worth a suggestion only where a number follows, as in 120 for l20.
     fix = Fix(span, meant) if meant and (char not in _DIGITS or len(reader.left) > 1) else None
-    reader.give_up(findings.UNKNOWN_COMMAND, span, f"no command begins with {char!r}", None, fix)
+    message = f"no command begins with {char!r}"
+    if char == "\0":
+        message = "no command begins with NUL; the sender ends lines with CR NUL"
+    reader.give_up(findings.UNKNOWN_COMMAND, span, message, None, fix)
 
 
 def _end_of_command(reader: _LineReader, command: ChipCommand) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from steptwin.machine import Nanos
 from steptwin.mic488.axis_motion import AxisMotion
+from steptwin.mic488.path import Path
 from steptwin.mic488.position_control import PositionControl
 from steptwin.mic488.status import AxisStatus
 from steptwin.motion import Profile
@@ -103,19 +104,20 @@ class Axis(AxisMotion):
             self._forget()
             self.homing.start(self, velocity_p, now)
 
-    def follow_path(self, profile: Profile, arrival: AxisStatus, *, corrected: bool) -> None:
-        """Take part in a line or arc, from rest: ``profile`` starts now and respects the soft limits already.
+    def follow_path(self, path: Path, profile: Profile, arrival: AxisStatus) -> None:
+        """Take part in a line or arc, from rest or from elsewhere on it: ``profile`` starts now and respects the soft limits.
 
-        ``arrival`` is the status at its end; ``corrected``: encoder correction is on (WBC-17).
+        ``arrival`` is the status at its end.
         """
         now = profile.start
-        self._forget()
-        self.on_path = True
-        self.on_arc = not corrected
+        begins = self.path is None
+        if begins:
+            self._forget()
+        self.path = path
         self.target_p = profile.base + profile.counts[-1]
         self.speed_p = self.cruise_p
         self._begin(profile, AxisStatus.POSITION, arrival)
-        if corrected:
+        if begins and path.has_arrival:
             self.control.watch(self, now)
 
     def set_coordinate(self, coordinate_p: int, now: Nanos) -> None:

@@ -16,6 +16,7 @@ from steptwin.mic488.config import NO_INPUT, AxisConfig
 from steptwin.mic488.encoder import Coupling, Encoder
 from steptwin.mic488.encoding import DINT_MAX, DINT_MIN, wrapped_dint
 from steptwin.mic488.homing import Homing
+from steptwin.mic488.path import Path
 from steptwin.mic488.position_control import PositionControl
 from steptwin.mic488.status import LIMIT, AxisStatus
 from steptwin.motion import MotionState, Profile, at_rest, plan_position, plan_stop, plan_velocity
@@ -50,6 +51,10 @@ class AxisHost(Protocol):
         """The EN output of ``axis`` (from 1) changed."""
         ...
 
+    def path_limited(self, now: Nanos) -> None:
+        """The soft limits of an axis on a path, or its coordinate, have been written."""
+        ...
+
     def position_error(self, axis: int, now: Nanos) -> None:
         """``axis`` gave up correcting its position (status 5)."""
         ...
@@ -74,8 +79,7 @@ class AxisMotion(Stateful):
         "limit_l_p",
         "limit_r_p",
         "offset_p",
-        "on_arc",
-        "on_path",
+        "path",
         "pending",
         "profile",
         "ramp_p",
@@ -127,9 +131,8 @@ class AxisMotion(Stateful):
         self.velocity_p = 0.0
         self.ramp_p = self.up_p
         """Velocity a velocity move (or a homing) goes to, and its ramp while slowing down."""
-        self.on_path = False
-        """The axis moves along a line, circle or arc together with another axis."""
-        self.on_arc = False
+        self.path: Path | None = None
+        """The line, circle or arc on which the axis moves together with another axis."""
         self.enabled = False
         """Whether the EN output is on."""
         self._rest(now, AxisStatus.OFF)
@@ -198,9 +201,8 @@ class AxisMotion(Stateful):
         self.revision += 1
         self.status = self.arrival
         self.homing.leg = Homing.NONE
-        self.on_path = False
-        # WBC-17
-        self.control.arrived(self, now, corrects=not self.on_arc)
+        path, self.path = self.path, None
+        self.control.arrived(self, now, corrects=path is None or path.has_arrival)
 
     def _rest(self, now: Nanos, status: AxisStatus) -> None:
         """Rest on the counted pulse with ``status``."""
@@ -215,7 +217,7 @@ class AxisMotion(Stateful):
     def _forget(self) -> None:
         """End the present motion, because a new command replaces it."""
         self.jogging = 0
-        self.on_path = self.on_arc = False
+        self.path = None
         self.homing.leg = Homing.NONE
         self.control.stop()
 
@@ -264,9 +266,11 @@ class AxisMotion(Stateful):
 
     def _replan(self, now: Nanos) -> None:
         """Plan a motion anew from its present state, after a change of limits or coordinates."""
-        if not self.profile.moving(now) or self.homing.passes_soft_limits or self.on_path:
+        if not self.profile.moving(now) or self.homing.passes_soft_limits:
             return
-        if self.status is AxisStatus.POSITION:
+        if self.path is not None:
+            self.host.path_limited(now)
+        elif self.status is AxisStatus.POSITION:
             self._go(now)
         elif self.status in (AxisStatus.VELOCITY, AxisStatus.HOMING):
             self._steer(self.status, now)
@@ -322,8 +326,12 @@ class AxisMotion(Stateful):
             return dec_p
         hardest = max(self.rise_p, self.fall_p)
         if (_rest_p(state, hardest) - edge) * direction > NEAR_P:
-            self.host.axis_event(self.number, "overrun", f"M{self.number} cannot brake before its soft limit", state.now)
+            self.overruns(state.now)
         return hardest
+
+    def overruns(self, now: Nanos) -> None:
+        """Report that the axis cannot brake before its soft limit."""
+        self.host.axis_event(self.number, "overrun", f"M{self.number} cannot brake before its soft limit", now)
 
     def edge(self, direction: int) -> int | None:
         """Soft limit in ``direction`` as motor position; None where nothing limits (MIC-12) or homing ignores it (MIC-30)."""

@@ -20,9 +20,9 @@ from steptwin.mic488.config import (
     keys_of,
     sections_of,
 )
-from steptwin.mic488.encoding import REAL_MAX
+from steptwin.mic488.encoding import REAL_MAX, shortest_real
 from steptwin.mic488.inifile import IniFile
-from steptwin.mic488.registers import DEFAULT_FIRMWARE
+from steptwin.mic488.registers import AXES, DEFAULT_FIRMWARE
 from steptwin.nearmiss import NearMiss
 from steptwin.tables import complete
 
@@ -82,12 +82,30 @@ _REGISTERS = {"Acc": "ACC", "Dec": "DEC", "Vel": "VMAX"}
 
 def config_form(text: str, name: str, firmware: str = DEFAULT_FIRMWARE, gears: Sequence[float | None] = ()) -> Form:
     """Of the text of a file. ``gears``: pulses in a unit of the running axes, in whose units points are written; None where it is
-    not known. Raises `Misuse` for an unknown firmware."""
+    not known. Nothing is wrong in an empty text. Raises `Misuse` for an unknown firmware."""
     file = IniFile.of_text(text, name)
     config, findings = examine_config(file, firmware)
-    sections = tuple(_section(section, file, config, firmware) for section in sections_of())
-    points = dict(_points(config.axes, gears))
-    return Form(source=file.source, sections=sections, diagnostics=findings, points=points)
+    units = _units(file, config, gears)
+    sections = tuple(_section(section, file, config, firmware, units) for section in sections_of())
+    points = dict(_points(file, config.axes, gears))
+    return Form(source=file.source, sections=sections, diagnostics=findings if text.strip() else (), points=points)
+
+
+def known_settings(
+    values: Mapping[str, tuple[float | None, str]], scales: Sequence[tuple[str, float | None]]
+) -> Mapping[str, str]:
+    """The settings that a running controller shows, by ``Axis0.Acc`` and so on. ``values``: those of its registers, with their
+    units; ``scales``: unit and pulses per unit of the axes, None where they are not known."""
+    found: dict[str, str] = {}
+    for number, (unit, gear) in enumerate(scales):
+        section = f"Axis{number}"
+        if gear is not None and unit in UNITS:
+            found |= {f"{section}.Unit": str(UNITS.index(unit)), f"{section}.Gear": f"{gear:.10g}"}
+        for key, register in _REGISTERS.items():
+            value, shown = values.get(f"M{number + 1}_{register}", (None, ""))
+            if value is not None and (gear is not None or not shown.startswith("imp")):  # with DINT and no GEAR: pulses
+                found[f"{section}.{key}"] = shortest_real(value)
+    return found
 
 
 def with_values(text: str, name: str, changes: Mapping[str, str]) -> str:
@@ -102,14 +120,27 @@ def with_values(text: str, name: str, changes: Mapping[str, str]) -> str:
     return file.source.text
 
 
-def _points(axes: Iterable[AxisConfig], gears: Sequence[float | None]) -> Iterator[tuple[str, float]]:
-    for number, (axis, gear) in enumerate(zip(axes, gears, strict=False), start=1):
-        if gear is not None:
-            for attribute, key in (("acc", "Acc"), ("dec", "Dec"), ("vel", "Vel")):
-                yield f"M{number}_{_REGISTERS[key]}", getattr(axis, attribute) * axis.gear / gear
+def _units(file: IniFile, config: ControllerConfig, gears: Sequence[float | None]) -> list[str]:
+    """Of the axes; ``u`` where neither the file nor the running controller tells."""
+    is_unknown = [
+        number < len(gears) and gears[number] is None and file.find(f"Axis{number}", "Unit") is None for number in range(AXES)
+    ]
+    return ["u" if unknown else UNITS[axis.unit] for unknown, axis in zip(is_unknown, config.axes, strict=True)]
 
 
-def _section(section: str, file: IniFile, config: ControllerConfig, firmware: str) -> Section:
+def _points(file: IniFile, axes: Iterable[AxisConfig], gears: Sequence[float | None]) -> Iterator[tuple[str, float]]:
+    """Of the keys in the file. Where the pulses per unit are not known, a file without GEAR is in the units that the axis has."""
+    for number, (axis, gear) in enumerate(zip(axes, gears, strict=False)):
+        section = f"Axis{number}"
+        if gear is None and file.find(section, "Gear") is not None:
+            continue
+        scale = 1.0 if gear is None else axis.gear / gear
+        for attribute, key in (("acc", "Acc"), ("dec", "Dec"), ("vel", "Vel")):
+            if file.find(section, key) is not None:
+                yield f"M{number + 1}_{_REGISTERS[key]}", getattr(axis, attribute) * scale
+
+
+def _section(section: str, file: IniFile, config: ControllerConfig, firmware: str, units: Sequence[str]) -> Section:
     kind = section.rstrip("0123456789")
     number = int(section.removeprefix(kind) or 0)
     titles = {
@@ -118,7 +149,7 @@ def _section(section: str, file: IniFile, config: ControllerConfig, firmware: st
         "AIN": f"AIN{number + 1} · COM{number + 1}",
         "WBC_PROGRAM": "Program",
     }
-    unit = UNITS[config.axes[number].unit] if kind == "Axis" else ""
+    unit = units[number] if kind == "Axis" else ""
     keys = [key for key in keys_of(section, firmware) if (section, key.name) != ("AIN1", ADDRESS_KEY.name)]
     held = _held(section, kind, number, config)
     base = _held(section, kind, number, ControllerConfig())

@@ -15,6 +15,7 @@ from steptwin.mic488.config import ANALOG_INPUTS, ControllerConfig
 from steptwin.mic488.encoder import Coupling, ShaftMotion
 from steptwin.mic488.encoding import DINT_MAX, DINT_MIN
 from steptwin.mic488.inputs import Inputs
+from steptwin.mic488.path import keep_within_limits
 from steptwin.mic488.position_control import PositionControl
 from steptwin.mic488.program import ProgramControl
 from steptwin.mic488.program_banks import LoadedProgram
@@ -424,6 +425,9 @@ class ControllerCore(Stateful):
 
     def drive_output(self, axis: int, on: bool, now: Nanos) -> None:
         self._edges.append(PinEdge(now, ENABLE_PINS[axis - 1], float(on)))
+
+    def path_limited(self, now: Nanos) -> None:
+        keep_within_limits(self.axes[:2], now)
 
     def position_error(self, axis: int, now: Nanos) -> None:
         self.axis_event(axis, "position-error", f"M{axis} did not reach its position", now)

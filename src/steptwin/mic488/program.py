@@ -323,11 +323,11 @@ class ProgramControl(Stateful):
         axes = self.device.axes
         if self.together:
             x, y = axes[:2]
-            if not (x.on_path and y.on_path):
+            if x.path is None or y.path is None:
                 # WBC-26: a single axis does not complete a path.
                 self.together = False
                 for axis in (x, y):
-                    if axis.on_path:
+                    if axis.path is not None:
                         axis.brake(now)
                         self.device.event("path-left", f"M{axis.number} slows down: the other axis left their path", now)
         if self.state is STOPPED:

@@ -10,13 +10,14 @@ from typing import NamedTuple, TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.mic488 import path
 from steptwin.mic488.axis import Axis
 from steptwin.mic488.axis_motion import MAX_SPEED_P, SLOWEST_RAMP_P
+from steptwin.mic488.path import Path
 from steptwin.mic488.program_device import ProgramDevice
 from steptwin.mic488.program_registers import position_p
-from steptwin.mic488.status import LIMIT, AxisStatus
+from steptwin.mic488.status import AxisStatus
 from steptwin.motion.paths import Arc, Circular, Straight, arc_between, circle
-from steptwin.motion.planner import MotionState, plan_position
 from steptwin.motion.trig import length
 from steptwin.tables import complete
 from steptwin.wbc.paths import row_problem
@@ -143,7 +144,7 @@ class _Plane:
         ways_p = [target - count for target, count in zip(targets_p, self.counts, strict=True)]
         way_u = length(ways_p[0] / x.gear, ways_p[1] / y.gear)
         slopes = [way_p / way_u if way_u else 0.0 for way_p in ways_p]
-        courses = [Straight(float(count), slope) for count, slope in zip(self.counts, slopes, strict=True)]
+        courses = tuple(Straight(float(count), slope) for count, slope in zip(self.counts, slopes, strict=True))
         pace = _Pace(speed_u, self.lin_acc_u, max(map(abs, slopes)))
         return self._follow(courses, way_u, targets_p, pace, corrected=True)
 
@@ -151,15 +152,15 @@ class _Plane:
         x, y = self.axes
         way_u = arc.length
         turn_q = arc.sweep_q / way_u if way_u else 0.0
-        courses = [
+        courses = (
             Circular(arc.centre_x * x.gear - x.offset_p, arc.radius * x.gear, arc.begin_q, turn_q),
             Circular(arc.centre_y * y.gear - y.offset_p, arc.radius * y.gear, arc.begin_q - 1.0, turn_q),
-        ]
+        )
         return self._follow(courses, way_u, targets_p, _Pace(None, None, max(x.gear, y.gear)), corrected=False)
 
     def _follow(
         self,
-        courses: list[Straight] | list[Circular],
+        courses: tuple[Straight, ...] | tuple[Circular, ...],
         way_u: float,
         targets_p: list[int],
         pace: _Pace,
@@ -179,36 +180,8 @@ class _Plane:
         slowest_u = SLOWEST_RAMP_P / first.gear
         up_u = max(pace.acc_u or first.acc_p / first.gear, slowest_u)
         down_u = max(pace.acc_u or first.dec_p / first.gear, slowest_u)
-        end_w, met = self._way_to_limits(courses, way_u)
-        way = plan_position(MotionState(self.now, 0, 0.0, 0.0), end_w, up_u, down_u, speed_u)
-        moving: list[Axis] = []
-        for axis, course, target_p in zip(self.axes, courses, targets_p, strict=True):
-            edge = met.get(axis.number)
-            final_p = target_p if not met else None if edge is None else edge[0]
-            count = axis.profile.count(self.now)
-            arrival = AxisStatus.REACHED if not met else AxisStatus.ON if edge is None else LIMIT[edge[1]]
-            axis.follow_path(course.profile(way, count, final_p), arrival, corrected=corrected and not met)
-            if axis.profile.moving(self.now):
-                moving.append(axis)
-        return len(moving) == len(self.axes)
-
-    def _way_to_limits(self, courses: list[Straight] | list[Circular], way_u: float) -> tuple[float, dict[int, tuple[int, int]]]:
-        """The permitted part of the path, and the soft limits (motor position, direction) at its end, by axis."""
-        end_w = way_u
-        met: dict[int, tuple[int, int]] = {}
-        for axis, course in zip(self.axes, courses, strict=True):
-            for direction in (-1, 1):
-                edge = axis.edge(direction)
-                beyond_w = None if edge is None else course.first_beyond(float(edge), direction, 0.0, way_u)
-                if edge is None or beyond_w is None or beyond_w > end_w:
-                    continue
-                if beyond_w < end_w:
-                    met.clear()
-                end_w = beyond_w
-                # An axis that is behind the limit already stays where it is.
-                count = axis.profile.count(self.now)
-                met[axis.number] = (max(edge * direction, count * direction) * direction, direction)
-        return end_w, met
+        whole = Path(courses, way_u, tuple(targets_p), speed_u, up_u, down_u, corrected)
+        return path.begin(whole, self.axes, self.now)
 
 
 def _line(plane: _Plane, row: RowValues) -> bool:

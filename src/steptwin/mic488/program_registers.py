@@ -158,7 +158,7 @@ def _position_stretches(axis: Axis, at: Nanos) -> list[Nanos]:
 
 def _velocity_stretches(axis: Axis, at: Nanos) -> list[Nanos] | None:
     # Along an arc the velocity of an axis also turns within segments.
-    return None if axis.on_path and isinstance(axis.profile, ArcProfile) else _segments(axis, at)
+    return None if axis.path is not None and isinstance(axis.profile, ArcProfile) else _segments(axis, at)
 
 
 def _encoder_stretches(axis: Axis, at: Nanos) -> list[Nanos] | None:

@@ -1,36 +1,53 @@
-"""Configuration files of controllers as forms, as plain values: `steptwin.configuration`."""
+"""Configurations of controllers as forms, as plain values: `steptwin.configuration`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 
 from steptwin.configuration import ConfigurationFormat, ConfigurationKey, Form, Section
 from steptwin.datasheet import Datasheet, plain
 from steptwin.diagnostics import SourceText, to_json
 from steptwin.errors import Refusal
 from steptwin.studio.machines import Sheets
+from steptwin.subject.contract import Reading
 from steptwin.world.kinds import KINDS
 from steptwin.world.programtexts import FINDING
 
 
 class Configurations:
-    """Of the controllers of a subject. ``given``: the file of a controller by name, None without one."""
+    """Of the controllers of a subject. ``given``: their files by name, None without one; ``present`` reads points."""
 
-    def __init__(self, sheets: Sheets, given: Callable[[str], SourceText | None]) -> None:
+    def __init__(
+        self,
+        sheets: Sheets,
+        given: Callable[[str], Awaitable[SourceText | None]],
+        present: Callable[[Sequence[str]], Awaitable[Sequence[Reading]]],
+    ) -> None:
         self._sheets = sheets
         self._given = given
+        self._present = present
 
-    def read(self, machine: str) -> Mapping[str, object]:
-        """That with which it runs. Raises `Misuse` for another name, `Refusal` for a kind without such a file."""
+    async def read(self, machine: str) -> Mapping[str, object]:
+        """Its file; without one, what its registers show. Raises `Misuse` for another name, `Refusal` for a kind without such a
+        file, `LineFailure`."""
         kind, sheet = self._kind(machine)
-        source = self._given(machine) or SourceText(f"{machine}.cfg", "")
-        return _plain(kind.form(source.text, source.name, sheet))
+        source = await self._given(machine)
+        if source is not None:
+            return {**_plain(kind.form(source.text, source.name, sheet)), "is_file": True}
+        name = f"{machine}.cfg"
+        paths = [
+            setting.point for section in kind.form("", name, sheet).sections for setting in section.settings if setting.point
+        ]
+        readings = await self._present([f"{machine}.{path}" for path in paths])
+        values = {path: (reading.value, reading.unit) for path, reading in zip(paths, readings, strict=True)}
+        text = kind.with_values("", name, kind.known(values, sheet))
+        return {**_plain(kind.form(text, name, sheet)), "is_file": False}
 
     def edit(self, machine: str, text: str, changes: Mapping[str, str]) -> Mapping[str, object]:
-        """A text with other values. Raises as `read`, and `Misuse` for settings that are not there."""
+        """A text with other values. Raises `Misuse`, also for settings that are not there, and `Refusal` as `read`."""
         kind, sheet = self._kind(machine)
         name = f"{machine}.cfg"
-        return _plain(kind.form(kind.with_values(text, name, changes), name, sheet))
+        return {**_plain(kind.form(kind.with_values(text, name, changes), name, sheet)), "is_file": True}
 
     def _kind(self, machine: str) -> tuple[ConfigurationFormat, Datasheet]:
         sheet = self._sheets.of(machine)

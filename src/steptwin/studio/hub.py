@@ -12,6 +12,7 @@ from itertools import count
 
 from steptwin.access.control import Control, Viewer
 from steptwin.access.roles import Role
+from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.studio.branchrequests import Branches
@@ -111,7 +112,8 @@ class Hub:
         self._described: Description | None = None
         self._describe()
         sheets = Sheets(lambda: subject.description)
-        self.tools = tools(Calculations(sheets), Configurations(sheets, around.configuration))
+        self.configurations = Configurations(sheets, self._configuration, self._present)
+        self.tools = tools(Calculations(sheets), self.configurations)
         self._jogs = jogs
         self._numbers = count(1)
         self._leases: dict[int, Lease] = {}
@@ -331,6 +333,15 @@ class Hub:
         if not points:
             raise Misuse("points: at least one is needed")
         return self.subject.read(*points)
+
+    async def _present(self, points: Sequence[str]) -> Sequence[Reading]:
+        """The present values, also of a device."""
+        result = await self.subject.do(command.ReadPoints(tuple(points)))
+        return [Reading(**one) for one in result.value]
+
+    async def _configuration(self, machine: str) -> SourceText | None:
+        given = self.around.configuration(machine)
+        return await self.around.connections.configuration(machine) if given is None else given
 
     # ------------------------------------------------------------------ time
 

@@ -24,6 +24,7 @@ from steptwin.studio import drawingrequests as drawing
 from steptwin.studio import plantrequests as plant
 from steptwin.studio import recordingrequests as recording
 from steptwin.studio import requests as ask
+from steptwin.studio import toolrequests as tool
 from steptwin.studio import workrequests as work
 from steptwin.studio.hub import Hub
 from steptwin.studio.looking import OF_A_MOMENT, Looking
@@ -117,6 +118,7 @@ class ViewerSession:
             ask.ShowMoment: self._look_at,
             ask.GoBack: self._go_back,
             ask.ReadPastEvents: lambda wanted: self._looking.events(wanted.begin, wanted.end, wanted.kinds),
+            tool.ReadConfiguration: lambda wanted: hub.configurations.read(wanted.machine),
             ask.ListPrograms: self._list_programs,
             ask.ReadProgram: self._read_program,
             ask.ReadMemory: self._read_memory,

@@ -90,6 +90,10 @@ class Connections(Protocol):
         """As text. Raises as `disconnect`, `Refusal` and `LineFailure`."""
         ...
 
+    async def configuration(self, machine: str) -> SourceText | None:
+        """The configuration file with which a device was connected; None without one. Raises `Misuse`."""
+        ...
+
     async def shadow(self, machine: str, *, on: bool) -> None:
         """Put a twin beside a device, or remove it. Raises as `settings`."""
         ...
@@ -130,7 +134,7 @@ class Surroundings:
     connections: Connections
     work: LongWork
     configuration: Callable[[str], SourceText | None] = lambda machine: None
-    """The configuration file of a controller by name; None without one."""
+    """The configuration file of a twin by name; None without one."""
     lookback: KeptPast | None = None
     """The past, where one is kept."""
     recordings: Recordings | None = None

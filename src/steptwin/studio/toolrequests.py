@@ -48,7 +48,7 @@ class ConvertGear:
 
 @dataclass(frozen=True, slots=True)
 class ReadConfiguration:
-    """Requests the configuration file of a controller as a form."""
+    """Requests the configuration of a controller as a form."""
 
     machine: str
 
@@ -148,7 +148,15 @@ _FORM = members(
         "text": _TEXT,
         "sections": _list(members({"name": _TEXT, "title": _TEXT, "settings": _list(_SETTING)})),
         "diagnostics": _list(_FINDING),
-        "points": {**_NUMBERS, "description": "What points get from it, in the units that the controller has now."},
+        "is_file": {
+            **_FLAG,
+            "description": "false: no file; the text has what the registers of the controller show, and no more.",
+        },
+        "points": {
+            **_NUMBERS,
+            "description": "What points get from keys of the text, in the units that the controller has now. Without those that "
+            "cannot be converted into them.",
+        },
     }
 )
 
@@ -226,7 +234,8 @@ TOOLS = (
         "configuration",
         ReadConfiguration,
         LOOK,
-        "The configuration file of a controller as a form: sections, settings with meaning, unit and range, what is wrong.",
+        "The configuration of a controller as a form: sections, settings with meaning, unit and range, what is wrong. It is "
+        "that of its file; without one, what its registers show.",
         _FORM,
         (_MACHINE,),
     ),

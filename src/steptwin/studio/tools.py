@@ -1,4 +1,4 @@
-"""What does the requests of `steptwin.studio.toolrequests`."""
+"""What does the requests of `steptwin.studio.toolrequests` that need no controller."""
 
 from __future__ import annotations
 
@@ -16,6 +16,5 @@ def tools(calculations: Calculations, configurations: Configurations) -> Mapping
         ask.ReadQuantities: lambda wanted: calculations.quantities(wanted.machine, wanted.axis),
         ask.Calculate: lambda wanted: calculations.calculate(wanted.machine, wanted.axis, wanted.given, wanted.find),
         ask.ConvertGear: lambda wanted: gear(wanted.motor_steps, wanted.microsteps, wanted.ratio, wanted.lead),
-        ask.ReadConfiguration: lambda wanted: configurations.read(wanted.machine),
         ask.EditConfiguration: lambda wanted: configurations.edit(wanted.machine, wanted.text, wanted.changes),
     }

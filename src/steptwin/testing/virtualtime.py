@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from steptwin.drivers import LineLost, Mic488
 from steptwin.drivers.m1486 import M1486
-from steptwin.drivers.m1486.lines import BAUD, TALK, talking
+from steptwin.drivers.m1486.lines import BAUD, talking
 from steptwin.drivers.mic488.lines import FRAMES_PER_SECOND, modbus_exchanger
 from steptwin.drivers.place import LineAddress
 from steptwin.drivers.tcp import Channel
@@ -140,6 +140,6 @@ def joined_driver(
 
 def joined_chip(endpoint: MemoryEndpoint, time: VirtualTime, address: int) -> M1486:
     """A driver of a chip; while it waits, the time of the twin advances."""
-    exchanger, talk = talking(endpoint, BAUD, None)
-    line = ThreadLine(endpoint, exchanger, {TALK: talk}, clock=time.now, sleeping=time.sleep)
+    exchanger, notes = talking(endpoint, BAUD, None)
+    line = ThreadLine(endpoint, exchanger, notes, clock=time.now, sleeping=time.sleep)
     return M1486(line, address)

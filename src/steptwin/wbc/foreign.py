@@ -347,7 +347,7 @@ def _notation(line: ForeignLine) -> Advice | None:
         return _number(line, match, "numbers are decimal", str(int(digits, base)))
     if match := _EXPONENT.search(line.code):
         value = float(match[0].replace(",", "."))
-        return _number(line, match, "numbers have no exponent", f"{value:.10f}".rstrip("0").rstrip("."))
+        return _number(line, match, "numbers have no exponent", number_text(value))
     if match := _THOUSANDS.search(line.code):
         return _number(line, match, "numbers have no thousands separator", match[0].replace(match[1], ""))
     return None

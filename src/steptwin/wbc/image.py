@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from steptwin.diagnostics import Diagnostic
+from steptwin.errors import Misuse
 from steptwin.tables import complete
 from steptwin.wbc import findings as f
 from steptwin.wbc import steps as s
@@ -79,6 +80,7 @@ class _NotEncodable(Exception):
 
 def build(executable: s.Executable, positions: PositionTable, *, inferred: bool = False) -> tuple[bytes | None, list[Diagnostic]]:
     """The image of a program without errors and of its table; None and every reason if a statement has no documented form.
+    Raises `Misuse` for a table with more rows than the image holds.
 
     ``inferred``: forms that follow from the order of the keywords, but were never seen in an image (WBC-40), are taken too.
     """
@@ -100,6 +102,8 @@ def build(executable: s.Executable, positions: PositionTable, *, inferred: bool 
                 diagnostics.append(f.NOT_ENCODABLE.at(step, message, hint))
     if diagnostics:
         return None, diagnostics
+    if len(positions.rows) > ROWS:
+        raise Misuse(f"{len(positions.rows)} rows of positions: the image holds {ROWS}")
     rows: list[bytes] = []
     for index, row in enumerate(positions.rows):
         rows.append(executable.position_records.get(index) or row_bytes(row, rows[-1] if rows else None))

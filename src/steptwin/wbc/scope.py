@@ -11,12 +11,18 @@ from steptwin.wbc.dialect import Dialect
 from steptwin.wbc.events import BY_LABEL
 from steptwin.wbc.foreign_words import VALUES
 from steptwin.wbc.positions import PositionTable
+from steptwin.wbc.real import real, real_text, whole
 from steptwin.wbc.registers import PREDEFINED, REAL_MAX, REGISTERS, ROWS, VALUE_NAMES, RegisterRow, parts
 from steptwin.wbc.statements import FUNCTIONS, KEYWORDS, NOT_SUPPORTED
 from steptwin.wbc.steps import AssignmentTarget, Literal, RegisterOperand, ValueSource, Variable
 from steptwin.wbc.tree import Assign, Broken, ConstantDefinition, DecimalNumber, Identifier, ProgramTree, ValueNode
 
 _STATUS_SINCE = "1.70"
+
+COARSE = 0.5
+"""A number that REAL changes by this much or more is no longer the one that was meant."""
+EXACT_REAL = 2**24
+"""All whole numbers up to it are REAL."""
 
 
 class ProgramScope:
@@ -136,6 +142,10 @@ class ProgramScope:
             if not -REAL_MAX <= node.value <= REAL_MAX:
                 self._report(f.OUT_OF_RANGE.at(node, f"{node.text} is out of range", f"REAL reaches ±{REAL_MAX:.3g}"))
                 return None
+            held = real(node.value)
+            if min(abs(held - node.value), abs(whole(held) - node.value)) >= COARSE:  # the largest DINT is right in a DINT
+                hint = f"REAL holds whole numbers up to {EXACT_REAL}"
+                self._report(f.NOT_IN_REAL.at(node, f"{node.text} becomes {real_text(held)}", hint))
             return Literal(node.value)
         known = self.known.get(node.key)
         return known if known is not None else self._look_up(node, other, is_row=is_row)

@@ -1,8 +1,8 @@
 """A gateway in front of a line with timing (MIC-32).
 
-All ports share one line, on which the gateway is the only master. Requests are executed in the order in which they
-came, and each takes the time of its characters, of the controller and of the response. If the queue is full, a request is
-refused with exception 06.
+All ports share one line, on which the gateway is the only master. Requests go over it in the order in which they came, and each
+takes the time of its characters, of the controller and of the response; the controller may serve another port first. If the queue
+is full, a request is refused with exception 06.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from steptwin.wire import mbap, rtu
 from steptwin.wire.crc import with_crc
 from steptwin.wire.pdu import DEVICE_BUSY, GATEWAY_TARGET_FAILED, READS, REFUSED, exception_pdu
 from steptwin.wire.slave import FrameDirection, FrameObserver, SlavePort, tcp_response
-from steptwin.wire.timed import TimedUnits
+from steptwin.wire.timed import TimedUnits, Turn
 
 QUEUE_REQUESTS = 16
 """Most requests in the queue, for all ports of one kind."""
@@ -42,12 +42,14 @@ class ModbusGateway(Stateful):
     """The line behind any number of ports, and the order of their requests."""
 
     FIXED = ("_waiting_ports", "units")
-    __slots__ = (*FIXED, "_count", "_free")
+    __slots__ = (*FIXED, "_count", "_free", "_sent")
 
     def __init__(self, units: TimedUnits) -> None:
         self.units = units
         self._free: Nanos = 0  # when the last response has left the line
         self._count = 0
+        self._sent: tuple[int, Turn] | None = None
+        """The number of the request that is on the line, or has come to its controllers and waits there."""
         self._waiting_ports: WeakSet[GatewayPort] = WeakSet()
 
     def enqueue(self, port: GatewayPort, units: tuple[int, ...], raw: bytes, pdu: bytes, now: Nanos) -> bool:
@@ -57,6 +59,7 @@ class ModbusGateway(Stateful):
         self._count += 1
         port.waiting.append(_Waiting(now, self._count, units, raw, pdu))
         self._waiting_ports.add(port)
+        self._send()
         return True
 
     def requeue(self, port: GatewayPort) -> None:
@@ -66,25 +69,36 @@ class ModbusGateway(Stateful):
         else:
             self._waiting_ports.discard(port)
 
+    def drop(self, port: GatewayPort) -> None:
+        """Forget the waiting requests of ``port``, also one that is on the line."""
+        if self._sent is not None and port.waiting and port.waiting[0].number == self._sent[0]:
+            self.units.withdraw(self._sent[1])
+            self._sent = None
+        port.waiting.clear()
+        self._waiting_ports.discard(port)
+        self._send()
+
     def deadline(self) -> Nanos | None:
-        """The moment at which the next request is executed."""
-        port = self._next_port()
-        return None if port is None else self._due(port.waiting[0])
+        """The moment at which the request on the line is executed, if its controllers serve no other port first."""
+        return None if self._sent is None else self.units.due(self._sent[1])
 
     def run(self, now: Nanos) -> None:
         """Execute the requests that are due by ``now``."""
-        while (port := self._next_port()) is not None and (due := self._due(port.waiting[0])) <= now:
-            self._serve(port, due, now)
+        while self._sent is not None and self.units.serves(self._sent[1]) and (due := self.units.due(self._sent[1])) <= now:
+            self._serve(self._sent[1], due, now)
+            self._send()
 
-    def _next_port(self) -> GatewayPort | None:
-        return min(self._waiting_ports, key=_turn, default=None)
+    def _send(self) -> None:
+        """Begin to send the next request, if the line is free."""
+        if self._sent is None and self._waiting_ports:
+            request = min(self._waiting_ports, key=_turn).waiting[0]
+            begin = max(request.since, self._free)
+            arrival = begin + self.units.timing.line.duration(len(request.pdu) + RTU_BYTES)
+            self._sent = request.number, self.units.wait(request.units, arrival)
 
-    def _due(self, request: _Waiting) -> Nanos:
-        begin = max(request.since, self._free, self.units.busy_until(request.units))
-        arrival = begin + self.units.timing.line.duration(len(request.pdu) + RTU_BYTES)
-        return self.units.execution(request.units, arrival)
-
-    def _serve(self, port: GatewayPort, moment: Nanos, now: Nanos) -> None:
+    def _serve(self, turn: Turn, moment: Nanos, now: Nanos) -> None:
+        port = min(self._waiting_ports, key=_turn)
+        self._sent = None
         request = port.waiting.popleft()
         if not port.waiting:
             self._waiting_ports.discard(port)
@@ -99,7 +113,7 @@ class ModbusGateway(Stateful):
             if is_answered:
                 self._free = moment + timing.turnaround_ns + timing.line.duration(len(response) + RTU_BYTES)
                 port.respond(request.raw, response, self._free)
-            self.units.done(unit, moment, self._free)
+        self.units.done(turn, moment, self._free)
 
 
 def _turn(port: GatewayPort) -> tuple[Nanos, int]:
@@ -143,8 +157,7 @@ class GatewayPort(SlavePort, ABC):
 
     def close(self) -> None:
         """The connection is closed; its waiting requests are dropped."""
-        self.waiting.clear()
-        self._gateway.requeue(self)
+        self._gateway.drop(self)
 
     def exchange(self, data: bytes, now: Nanos) -> bytes:
         self._gateway.run(now)

@@ -1,13 +1,18 @@
 """Modbus RTU frames in a stream of bytes.
 
 A frame is cut where its function makes it end and its CRC is right; silence does not cut frames, because pseudo
-terminals, USB adapters and networks deliver in bursts (MIC-15). The gap only synchronises the framer after noise.
+terminals, USB adapters and networks deliver in bursts (MIC-15). A burst is what comes without a silence as long as the gap.
 
-A line with several slaves carries requests and responses, and both have to be cut so that nothing inside them is taken for
-a frame. At the front of the held bytes the framer tries the length that the function has as a request and the one it has
-as a response. When neither can match any more, one byte is discarded and the rest is examined again, so that a good frame behind
-noise is found at once. When the gap has passed, complete frames are taken wherever they are, and
-a rest with a right CRC is a frame even where the length of its function is not known.
+Nothing is executed that may be the middle of a frame. Frames follow each other from the beginning of a burst. Where the bytes can
+be the beginning of a frame whose end has not come, nothing behind is a frame until
+
+* later bytes complete it, or show that it is none: then a frame may begin one byte later, but what lies within the length of a
+  frame whose CRC is wrong is its data; or
+* a later burst begins with a whole frame and a silence follows: the sender has given up the earlier frame.
+
+A line with several slaves carries requests and responses: at each place the framer tries the length that the function has as a
+request and the one it has as a response. When a burst has ended, a rest with a right CRC is a frame even where the length of its
+function is not known.
 """
 
 from __future__ import annotations
@@ -34,8 +39,10 @@ MAX_FRAME = 256
 UART_GAP_NS: Nanos = 750 * MICROSECOND
 BURSTY_GAP_NS: Nanos = 20 * MILLISECOND
 # USB adapters (16 ms latency timer), Nagle's algorithm (40 to 200 ms) and masters that write byte by byte deliver one frame in
-# pieces. The beginning of a frame is kept for this time; a new frame behind it is found at once.
+# pieces. The beginning of a frame is kept for this time.
 PAUSE_NS: Nanos = 2 * SECOND
+DELAY_NS: Nanos = 200 * MILLISECOND
+"""The longest of these pauses that is usual. A request behind an unfinished frame waits for it, with other bytes behind it."""
 MAX_LOOKS = MAX_FRAME
 """Most places of one delivery that are examined and at which no frame begins. Behind them only the last 256 bytes are kept,
 until the gap has passed. It bounds the cost of noise."""
@@ -108,6 +115,16 @@ class _Piece(NamedTuple):
     end: Nanos
 
 
+class _NewRequest(NamedTuple):
+    """A whole frame behind an unfinished one."""
+
+    start: int
+    length: int
+    role: FrameRole
+    silence: Nanos
+    """The silence after which it counts."""
+
+
 def encode_frame(unit: int, pdu: bytes) -> bytes:
     """Unit, PDU and CRC. `Misuse` for a unit outside 0 to 247 or a PDU outside 1 to 253 bytes."""
     if not 0 <= unit <= MAX_UNIT:
@@ -138,29 +155,31 @@ response_length = partial(_length, _RESPONSES)
 
 
 class RtuFramer(Stateful):
-    """Cuts the frames of one line, at most 256 bytes held between calls.
+    """Cuts the frames of one line, at most 256 bytes held between calls. How a burst is divided into deliveries changes nothing.
 
     ``own`` are the units on this side: a frame that begins with one of them, or with the broadcast address, can only be a request
-    (the echo of an adapter has to be removed before). ``gap_ns`` is the silence after which bytes of no frame are discarded,
-    ``pause_ns`` the longest silence inside a frame (the gap, when that is longer). Call `expire` when `deadline` has come.
+    (the echo of an adapter has to be removed before). ``gap_ns`` is the silence that ends a burst, ``pause_ns`` the longest
+    silence inside a frame (the gap, when that is longer). Call `expire` when `deadline` has come.
     """
 
     FIXED = ("_own", "_pause_ns", "gap_ns")
-    __slots__ = (*FIXED, "_asked", "_burst", "_fed", "_framed", "_last", "_pieces", "_scan", "held")
+    __slots__ = (*FIXED, "_asked", "_beginnings", "_due", "_fed", "_framed", "_garbled", "_last", "_pieces", "_scan", "held")
 
     def __init__(self, own: Collection[int] = (), gap_ns: Nanos = BURSTY_GAP_NS, pause_ns: Nanos = PAUSE_NS) -> None:
         if gap_ns < 1:
             raise Misuse(f"a gap of {gap_ns} ns is not positive")
         self.gap_ns = gap_ns
-        self._pause_ns = pause_ns
+        self._pause_ns = max(pause_ns, gap_ns)
         self.held = bytearray()
         """Bytes not yet cut; empty when the framer is synchronised. It is always the same object."""
         self._own = frozenset(own)
         self._scan = 0  # index in `held` before which no frame begins
-        self._burst = 0  # index in `held` where the bytes after the last cut or gap begin
         self._last: Nanos = 0
+        self._due: Nanos | None = None
         self._fed = 0
         self._framed = 0
+        self._garbled = 0  # number of bytes received up to the end of a frame whose CRC is wrong
+        self._beginnings = [0]  # numbers of bytes received before the bursts of which `held` consists and after the last frame
         self._asked: tuple[int, int] | None = None  # unit and function of the last request, until its response
         self._pieces: deque[_Piece] = deque()  # deliveries of which `held` consists; the first may begin before it
 
@@ -181,19 +200,19 @@ class RtuFramer(Stateful):
         self.held = held
 
     def deadline(self) -> Nanos | None:
-        """The end of the gap, if there are bytes that may have to be discarded then."""
-        return None if len(self.held) == self._burst else self._last + self.gap_ns
+        """The moment at which a silence that lasts until then decides about held bytes; None if none does."""
+        return self._due
 
     def feed(self, data: bytes, now: Nanos, end: Nanos | None = None) -> list[RtuFrame]:
         """The frames completed by ``data``; its first byte arrives at ``now``, its last at ``end`` (default ``now``)."""
-        if self.held:
-            frames = self.expire(now)
-            if now - self._last > self._pause_ns and len(self.held) == self._burst:
-                self._drop(len(self.held))
-        else:
-            frames = []
+        frames = self.expire(now)
         if not data:
             return frames
+        silence = now - self._last
+        if silence > self._pause_ns:
+            self._drop(len(self.held))
+        if silence >= self.gap_ns and self._fed not in self._beginnings:
+            self._beginnings.append(self._fed)
         self._last = now if end is None else end
         self._pieces.append(_Piece(self._fed, len(data), now, self._last))
         self.held += data
@@ -202,54 +221,32 @@ class RtuFramer(Stateful):
         return frames
 
     def expire(self, now: Nanos) -> list[RtuFrame]:
-        """The frames found if the gap has passed at ``now``; empty before that."""
+        """The frames found if the silence has been long enough at ``now``; empty before `deadline`."""
         frames: list[RtuFrame] = []
-        deadline = self.deadline()
-        if deadline is None or now < deadline:
-            return frames
-        held = self.held
-        while held:
-            if self._is_one_unknown():
-                self._take(self._burst, len(held) - self._burst, FrameRole.UNKNOWN, frames)
-                self._drop(len(held))
-                break
-            beginning = len(held)
-            start = self._next_start(self._scan)
-            while start < len(held):
-                length, role = self._look(start, waiting=False)
-                if length > 0:
-                    break
-                if length == 0:
-                    beginning = min(beginning, start)
-                start = self._next_start(start + 1)
-            else:
-                self._drop(beginning)
-                break
-            self._take(start, length, role, frames)
-            self._drop(start + length)
-        self._burst = len(held)
+        if self._due is not None and now >= self._due:
+            self._cut_frames(frames, now - self._last)
         return frames
 
-    def _is_one_unknown(self) -> bool:
-        """Whether all bytes since the last cut or gap are one frame of a function whose length is not known."""
-        rest = self.held[self._burst :]
-        return MIN_FRAME <= len(rest) <= MAX_FRAME and crc16(rest) == 0 and self._look(self._burst, waiting=False)[0] <= 0
-
-    def _cut_frames(self, frames: list[RtuFrame]) -> None:
+    def _cut_frames(self, frames: list[RtuFrame], silence: Nanos = 0) -> None:
+        """Take every frame that is one for certain; ``silence`` is that after the last byte."""
         held = self.held
-        size = len(held)
-        done = looks = 0
+        size, first = len(held), self._fed - len(held)
+        has_ended = silence >= self.gap_ns
+        self._due = None if has_ended else self._last + self.gap_ns
         start = self._scan
+        if has_ended and self._beginnings:
+            start = min(start, self._beginnings[-1] - first)  # the whole burst may be a frame of unknown length
+        done = looks = 0
         while start < size:
-            length, role = self._look(start, waiting=True)
-            if length == 0 and start < self._burst:
-                # The sender may have abandoned the bytes before the gap: then a frame begins after it.
-                after, after_role = self._look(self._burst, waiting=True)
-                if after > 0:
-                    start, length, role = self._burst, after, after_role
+            length, role = self._whole(start) if has_ended else self._look(start, waiting=True)
+            if length == 0 and has_ended and (request := self._new_request(start)) is not None:
+                if silence < request.silence:
+                    self._due = self._last + request.silence
+                else:
+                    start, length, role = request.start, request.length, request.role
             if length == 0:
                 break
-            if length < 0:
+            if (length < 0 or first + start + length <= self._garbled) and self._is_refuted(start, length):
                 looks += 1
                 if looks == MAX_LOOKS and size - start > MAX_FRAME:
                     self._drop(size - MAX_FRAME)
@@ -259,13 +256,55 @@ class RtuFramer(Stateful):
             self._take(start, length, role, frames)
             start += length
             done = start
-        self._scan = start
         if done:
             self._drop(done)
-            self._scan = start - done
-        if len(held) > MAX_FRAME:
-            # Too long for one frame: the bytes before the next possible beginning are not needed any more.
-            self._drop(self._scan)
+            start -= done
+        if has_ended or len(held) > MAX_FRAME:
+            # Nothing before the next possible beginning is needed any more.
+            self._drop(start)
+            start = 0
+        self._scan = start
+        if not held:
+            self._due = None
+
+    def _whole(self, start: int) -> tuple[int, FrameRole]:
+        """As `_look` when the burst has ended: all of its bytes behind the last frame may be one of unknown length."""
+        length, role = self._look(start, waiting=False)
+        if length <= 0 and self._beginnings and self._fed - len(self.held) + start == self._beginnings[-1]:
+            rest = self.held[start:]
+            if MIN_FRAME <= len(rest) <= MAX_FRAME and crc16(rest) == 0:
+                return len(rest), FrameRole.UNKNOWN
+        return length, role
+
+    def _new_request(self, behind: int) -> _NewRequest | None:
+        """The first whole frame at the beginning of a burst that counts instead of the unfinished frame at ``behind``, if any.
+
+        Bytes after it and pauses inside it make it more probable that it is data of the unfinished frame, whose rest comes later.
+        """
+        size, first = len(self.held), self._fed - len(self.held)
+        found = []
+        for beginning in self._beginnings:
+            start = beginning - first
+            length, role = self._whole(start) if start > behind else (0, FrameRole.UNKNOWN)
+            if length <= 0:
+                continue
+            end, following = start + length, 1
+            while end < size and following > 0:
+                following = self._whole(end)[0]
+                end += following
+            pause = min(self._times(beginning, length)[1], DELAY_NS) if end >= size else DELAY_NS
+            found.append(_NewRequest(start, length, role, self.gap_ns + (pause if pause >= self.gap_ns else 0)))
+        return min(found, key=lambda request: request.silence, default=None)
+
+    def _is_refuted(self, start: int, length: int) -> bool:
+        """Whether no frame begins at ``start``, or only in the data of a garbled one. Notes the end of a garbled one."""
+        at = self._fed - len(self.held) + start
+        if at not in self._beginnings:
+            return length < 0 or at + length <= self._garbled
+        if length < 0 and self.held[start] <= MAX_UNIT:
+            response = _IMPOSSIBLE if self._is_mine(self.held[start]) else response_length(self.held, start)
+            self._garbled = max(self._garbled, at + request_length(self.held, start), at + response)
+        return length < 0
 
     def _next_start(self, start: int) -> int:
         found = _FRAME_START.search(self.held, start)
@@ -277,6 +316,12 @@ class RtuFramer(Stateful):
         self._asked = (raw[0], raw[1]) if role is FrameRole.REQUEST else None
         first = self._fed - len(self.held) + start
         end = first + length
+        self._beginnings = [end, *(beginning for beginning in self._beginnings if beginning > end)]
+        frames.append(RtuFrame(raw, role, end, *self._times(first, length)))
+
+    def _times(self, first: int, length: int) -> tuple[Nanos, Nanos]:
+        """The moment of the first of ``length`` bytes and the longest silence between them; ``first`` were received before."""
+        end = first + length
         begin, pause, before = None, 0, 0
         for piece in self._pieces:
             if piece.first >= end:
@@ -287,16 +332,21 @@ class RtuFramer(Stateful):
                 else:
                     pause = max(pause, piece.begin - before)
             before = piece.end
-        frames.append(RtuFrame(raw, role, end, begin or 0, pause))
+        return begin or 0, pause
 
     def _drop(self, count: int) -> None:
         """Remove the first ``count`` bytes; the rest is examined from its beginning."""
         del self.held[:count]
-        self._burst = 0
         self._scan = 0
         pieces, first = self._pieces, self._fed - len(self.held)
         while pieces and pieces[0].first + pieces[0].size <= first:
             pieces.popleft()
+        while self._beginnings and self._beginnings[0] < first:
+            del self._beginnings[0]
+
+    def _is_mine(self, unit: int) -> bool:
+        """Whether a frame that begins with ``unit`` can only be a request."""
+        return unit == BROADCAST or unit in self._own
 
     def _look(self, start: int, *, waiting: bool) -> tuple[int, FrameRole]:
         """Length and role of the frame that begins at ``start``. Length 0: a frame may still be completed there; -1: none can be.
@@ -308,7 +358,7 @@ class RtuFramer(Stateful):
         if unit > MAX_UNIT:
             return _IMPOSSIBLE, FrameRole.UNKNOWN
         have = len(held) - start
-        mine = unit == BROADCAST or unit in self._own
+        mine = self._is_mine(unit)
         request = request_length(held, start)
         response = _IMPOSSIBLE if mine else response_length(held, start)
         first, first_role, second, second_role = request, FrameRole.REQUEST, response, FrameRole.RESPONSE
@@ -326,3 +376,35 @@ class RtuFramer(Stateful):
         if 0 < second <= have and crc16(held[start : start + second]) == 0:
             return second, second_role
         return (0 if max(first, second) > have else _IMPOSSIBLE), FrameRole.UNKNOWN
+
+
+class StrictRtuFramer(RtuFramer):
+    """Cuts frames as the controller does (MIC-15).
+
+    A silence above 750 µs ends a burst. A burst that is not whole frames from its first byte to its last, or has more than 256
+    bytes, is dropped.
+    """
+
+    __slots__ = ()
+
+    def __init__(self, own: Collection[int] = ()) -> None:
+        super().__init__(own, UART_GAP_NS + 1, UART_GAP_NS + 1)
+
+    def _cut_frames(self, frames: list[RtuFrame], silence: Nanos = 0) -> None:
+        held = self.held
+        if silence < self.gap_ns:
+            self._due = self._last + self.gap_ns
+            del held[MAX_FRAME + 1 :]
+            return
+        self._due = None
+        found, end = [], 0
+        while end < len(held) <= MAX_FRAME:
+            length, role = self._whole(end)
+            if length <= 0:
+                found.clear()
+                break
+            found.append((end, length, role))
+            end += length
+        for start, length, role in found:
+            self._take(start, length, role, frames)
+        self._drop(len(held))

@@ -150,7 +150,7 @@ class PauseReports(Stateful):
 class RtuSlavePort(SlavePort):
     """One RTU line without line timing (with it: `steptwin.wire.timed`).
 
-    ``devices`` is read once. ``gap_ns`` is the silence after which noise is discarded (MIC-15). ``line`` gives the time of the
+    ``devices`` is read once. ``gap_ns`` is the silence that ends a burst (MIC-15). ``line`` gives the time of the
     characters of a delivery; without it a delivery takes no time.
     """
 

@@ -1,15 +1,17 @@
 """Controllers with the timing of a serial line and of their firmware (MIC-32).
 
-Each character takes its bit times in both directions. A request is complete when its last character has arrived. A controller has
-one request at a time, from any of its ports, and executes at most 100 per second. Requests that arrive meanwhile are
-lost, as on a UART without a buffer (`steptwin.wire.gateway` has a queue).
+Each character takes its bit times in both directions. A request is complete when its last character has arrived. A controller
+serves one request at a time, and executes at most 100 per second, of all its ports together. Each port has room for one request,
+which waits for its turn; requests that arrive on a port before its response has left are lost, as on a UART without a buffer
+(`steptwin.wire.gateway` has a queue).
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, Nanos
@@ -32,7 +34,7 @@ class LineTiming:
 
     ``turnaround_ns`` passes between the request and the first character of the response; it cannot be shorter than the
     gap that ends the request, which is its default. ``interval_ns`` is the least time between two requests executed.
-    ``strict``: a pause above 750 µs inside a frame ends it, so that the device drops it (MIC-15).
+    ``strict``: a pause above 750 µs inside a frame drops the burst, as the device does (MIC-15).
     """
 
     line: SerialLine
@@ -47,11 +49,18 @@ class LineTiming:
             raise Misuse(f"a frame interval of {self.interval_ns} ns is negative")
 
 
+class Turn(NamedTuple):
+    """A request that waits for its controllers. Turns come in the order in which the requests have arrived."""
+
+    arrival: Nanos
+    number: int
+
+
 class TimedUnits(Stateful):
-    """Controllers behind any number of ports, and the time until which each is busy. ``devices`` is read once."""
+    """Controllers behind any number of ports, until when each is busy, and what waits for it. ``devices`` is read once."""
 
     FIXED = ("devices", "timing")
-    __slots__ = (*FIXED, "_busy", "_next")
+    __slots__ = (*FIXED, "_busy", "_count", "_next", "_waiting")
 
     def __init__(self, devices: Mapping[int, SlaveDevice], timing: LineTiming) -> None:
         check_units(devices)
@@ -59,6 +68,8 @@ class TimedUnits(Stateful):
         self.timing = timing
         self._busy = dict.fromkeys(devices, 0)
         self._next = dict.fromkeys(devices, 0)  # the earliest moment of the next execution of each
+        self._count = 0
+        self._waiting: dict[Turn, tuple[int, ...]] = {}
 
     def addressed(self, unit: int, function: int) -> list[int]:
         """The units that a request is for; none for a foreign unit or a broadcast that is not a write (MIC-2)."""
@@ -66,32 +77,38 @@ class TimedUnits(Stateful):
             return list(self.devices) if function in WRITES else []
         return [unit] if unit in self.devices and 0 < function < REFUSED else []
 
-    def busy_until(self, units: Iterable[int]) -> Nanos:
-        """The end of the present requests of all ``units``."""
-        return max(self._busy[unit] for unit in units)
+    def wait(self, units: tuple[int, ...], arrival: Nanos) -> Turn:
+        """Let a request for ``units`` that arrives at ``arrival`` wait until `serves`; `done` or `withdraw` ends it."""
+        self._count += 1
+        turn = Turn(arrival, self._count)
+        self._waiting[turn] = units
+        return turn
 
-    def execution(self, units: Iterable[int], arrival: Nanos) -> Nanos:
-        """The moment at which the last of ``units`` executes a request that arrives at ``arrival``."""
-        return max(arrival, *(self._next[unit] for unit in units))
+    def withdraw(self, turn: Turn) -> None:
+        """A request is not to be executed: its port has been closed."""
+        self._waiting.pop(turn, None)
 
-    def take(self, unit: int, arrival: Nanos) -> Nanos:
-        """Begin a request of ``unit`` at ``arrival``; `done` ends it. Returns the moment of its execution."""
-        start = max(arrival, self._next[unit])
-        # If the port is closed meanwhile, the unit is free when the longest response would have been sent.
-        self._busy[unit] = start + self.timing.turnaround_ns + self.timing.line.duration(rtu.MAX_FRAME)
-        return start
+    def due(self, turn: Turn) -> Nanos:
+        """When the units of a request are free for it, as far as is known now: others may come before it (`serves`)."""
+        return max(turn.arrival, *(max(self._next[unit], self._busy[unit]) for unit in self._waiting[turn]))
 
-    def done(self, unit: int, executed: Nanos, sent: Nanos) -> None:
-        """End the request of ``unit``, which was executed at ``executed``; its response has left at ``sent``."""
-        self._next[unit] = executed + self.timing.interval_ns
-        self._busy[unit] = sent
+    def serves(self, turn: Turn) -> bool:
+        """Whether none of its units has an earlier request."""
+        units = self._waiting[turn]
+        return not any(other < turn and not set(units).isdisjoint(its) for other, its in self._waiting.items())
+
+    def done(self, turn: Turn, executed: Nanos, sent: Nanos) -> None:
+        """A request was executed at ``executed``, and its response has left at ``sent``."""
+        for unit in self._waiting.pop(turn):
+            self._next[unit] = executed + self.timing.interval_ns
+            self._busy[unit] = sent
 
 
 class TimedRtuSlavePort(SlavePort):
     """As `steptwin.wire.slave.RtuSlavePort`, with line timing. Responses leave when their last character would have.
 
     Call `to_send` at every `deadline`: a request is executed at the moment of the call that finds it due. ``gap_ns`` is the
-    silence after which noise is discarded; with strict timing 750 µs.
+    silence that ends a burst; with strict timing 750 µs.
     """
 
     broken = None
@@ -101,6 +118,7 @@ class TimedRtuSlavePort(SlavePort):
     __slots__ = (
         *FIXED,
         "_arriving",
+        "_busy",
         "_executing",
         "_framer",
         "_incoming",
@@ -122,18 +140,16 @@ class TimedRtuSlavePort(SlavePort):
         super().__init__(on_frame)
         self._units = units
         timing = units.timing
-        if timing.strict:
-            self._framer = rtu.RtuFramer(units.devices, rtu.UART_GAP_NS, rtu.UART_GAP_NS)
-        else:
-            self._framer = rtu.RtuFramer(units.devices, gap_ns)
+        self._framer = rtu.StrictRtuFramer(units.devices) if timing.strict else rtu.RtuFramer(units.devices, gap_ns)
         self._incoming = CharacterClock(timing.line)
         self._outgoing = CharacterClock(timing.line)
         self._arriving: deque[tuple[Nanos, rtu.RtuFrame]] = deque()  # each frame with the moment of its last character
-        self._executing: list[tuple[Nanos, int, rtu.RtuFrame]] = []  # moment of execution, unit, request
+        self._executing: dict[int, tuple[Turn, rtu.RtuFrame]] = {}  # the request of each unit that waits for its turn
+        self._busy: dict[int, Nanos] = {}  # when the last response of each unit has left
         self._responses: deque[tuple[Nanos, bytes]] = deque()
         self._pauses = PauseReports(on_pause)
         self.dropped = 0
-        """Requests lost because the controller was busy; a broadcast counts once for each."""
+        """Requests lost because one of this port was being served; a broadcast counts once for each unit."""
         self.overrun = 0
         """Characters lost because `LINE_CHARACTERS` were waiting."""
 
@@ -177,7 +193,7 @@ class TimedRtuSlavePort(SlavePort):
         return out
 
     def deadline(self) -> Nanos | None:
-        moments = [moment for moment, *_ in self._executing]
+        moments = [self._units.due(turn) for turn, _ in self._executing.values()]
         gap = self._framer.deadline()
         if gap is not None:
             moments.append(gap)
@@ -190,12 +206,16 @@ class TimedRtuSlavePort(SlavePort):
     def _run(self, now: Nanos) -> None:
         """Process everything due by ``now``: arrivals and executions in the order of their moments."""
         for frame in self._framer.expire(now):
-            self._arriving.append((now, frame))
+            # The controller waits for the end of a burst, too: its turnaround begins with that silence.
+            ended = self._incoming.end_before(self._framer.fed - frame.end) if self._units.timing.strict else now
+            self._arriving.append((ended, frame))
         while True:
-            execution = min(self._executing, key=_moment, default=None)
+            executions = [
+                (self._units.due(turn), unit) for unit, (turn, _) in self._executing.items() if self._units.serves(turn)
+            ]
+            execution = min(executions, default=None)
             arrival = self._arriving[0][0] if self._arriving else None
             if execution is not None and execution[0] <= now and (arrival is None or execution[0] <= arrival):
-                self._executing.remove(execution)
                 self._execute(*execution, now)
             elif arrival is not None and arrival <= now:
                 self._arrive(arrival)
@@ -208,12 +228,19 @@ class TimedRtuSlavePort(SlavePort):
         if self.on_frame is not None:
             self.on_frame(moment, FrameDirection.IN, frame.raw)
         for unit in self._units.addressed(frame.unit, frame.raw[1]):
-            if frame.begin < max(self._units.busy_until((unit,)), self._outgoing.end):
+            if unit in self._executing or frame.begin < max(self._busy.get(unit, 0), self._outgoing.end):
                 self.dropped += 1
             else:
-                self._executing.append((self._units.take(unit, moment), unit, frame))
+                self._executing[unit] = self._units.wait((unit,), moment), frame
 
-    def _execute(self, moment: Nanos, unit: int, frame: rtu.RtuFrame, now: Nanos) -> None:
+    def close(self) -> None:
+        """The port is closed: requests that wait are not executed."""
+        for turn, _ in self._executing.values():
+            self._units.withdraw(turn)
+        self._executing.clear()
+
+    def _execute(self, moment: Nanos, unit: int, now: Nanos) -> None:
+        turn, frame = self._executing.pop(unit)
         answer = self._units.devices[unit].execute(frame.pdu, now)
         if self.on_write is not None and frame.pdu[0] not in READS:
             self.on_write(moment, unit, frame.pdu, b"" if frame.unit == rtu.BROADCAST else answer)
@@ -222,9 +249,6 @@ class TimedRtuSlavePort(SlavePort):
         if frame.unit != rtu.BROADCAST:
             sent = self._outgoing.send(len(response), moment + self._units.timing.turnaround_ns)
             self._responses.append((sent, response))
-        self._units.done(unit, moment, sent)
+        self._units.done(turn, moment, sent)
+        self._busy[unit] = sent
         self._pauses.served(frame, now)
-
-
-def _moment(execution: tuple[Nanos, int, rtu.RtuFrame]) -> Nanos:
-    return execution[0]

@@ -15,7 +15,7 @@ from steptwin.machine import Drive, Fact, MotionController, Nanos, PinEdge
 from steptwin.world.board import Board
 from steptwin.world.followers import KernelFollower, KernelFollowers
 from steptwin.world.kernelpart import KernelPart, KernelState
-from steptwin.world.order import PartWatches
+from steptwin.world.kernelparts import KernelParts
 from steptwin.world.recordedplans import RecordedPlans
 from steptwin.world.trace import RecordSink, TraceRecord
 from steptwin.world.turns import Dues, Turns
@@ -53,7 +53,7 @@ class Kernel:
         self.machines: dict[str, MotionController] = {}
         self.boards: dict[str, Board] = {}
         """Terminals of elements."""
-        self.parts: list[KernelPart] = []
+        self._parts = KernelParts()
         self.observers: list[Callable[[str, PinEdge], None]] = []
         """Called with machine name and edge, in order, for every output edge."""
         self.stale = False
@@ -84,21 +84,23 @@ class Kernel:
         """Of machines and elements whose pins were asked for."""
         self._numbers: dict[str, int] = {}
         """The numbers of the machines, by name."""
-        self._watches = PartWatches()
-        """Of the parts."""
         self._sources: dict[str, Source] = {}
         """The machines, and the lines and elements with a part that computes their signals."""
-        self._machine_turns, self._part_turns = Turns(), Turns()
-        """What has to be looked at when the signals settle."""
-        self._machine_dues, self._part_dues = Dues(), Dues()
+        self._machine_turns = Turns()
+        """Those whose edges have to be taken when the signals settle."""
+        self._machine_dues = Dues()
         self._machines_looked_at: set[int] = set()
-        self._parts_looked_at: set[int] = set()
         """Those whose deadlines may have changed since the signals last settled."""
         self._due: Nanos | None = None
         self._alone: tuple[str, RecordedPlans] | None = None
         """The only machine of a kernel without parts and wires, for which nothing has to be scheduled."""
 
     # ------------------------------------------------------------------ what is in it
+
+    @property
+    def parts(self) -> Sequence[KernelPart]:
+        """In the order in which they are updated."""
+        return self._parts.parts
 
     def add(self, name: str, machine: MotionController) -> None:
         """Add a machine and set its ``changed`` hook. Raises `TimeReversal` if its time is after the kernel's."""
@@ -146,24 +148,23 @@ class Kernel:
         it drives.
         """
         self._join()
-        number = self._watches.add(watches, name, drives)
-        self.parts.append(part)
+        number = self._parts.add(part, watches, name, drives)
         if name is not None:
             self._sources[name] = Source(self, name)
         if not self.is_blank:
-            self._part_turns.add(number)
+            self._parts.turns.add(number)
         self.stale = True
         if self.on_change is not None:
             self.on_change(self)
 
     def order(self) -> Sequence[int]:
         """The numbers of its parts in the order in which they should be updated (`arrange`); empty if they are in that order."""
-        return self._watches.order(self.wires)
+        return self._parts.order(self.wires)
 
     def arrange(self, order: Sequence[int]) -> None:
         """Update its parts in another order from now on, before the first moment. ``order``: their present numbers."""
-        self.parts = [self.parts[old] for old in order]
-        self._watches.arrange(order)
+        self._parts = self._parts.arranged(order)
+        self.mark()
 
     def source(self, name: str) -> Source:
         """The machine, line or element ``name`` as what a value depends on."""
@@ -235,13 +236,13 @@ class Kernel:
             for number in range(len(self._names)):
                 self._machine_turns.add(number)
             for number in range(len(self.parts)):
-                self._part_turns.add(number)
+                self._parts.turns.add(number)
         else:
             of_machine = self._numbers.get(name)
             if of_machine is not None:
                 self._machine_turns.add(of_machine)
-            for number in self._watches.by_name.get(name, ()):
-                self._part_turns.add(number)
+            for number in self._parts.by_name.get(name, ()):
+                self._parts.turns.add(number)
         self.stale = True
         if self.on_change is not None:
             self.on_change(self)
@@ -323,8 +324,8 @@ class Kernel:
                 self.followers.leave(self._due)
             self.now = self._due
             self._advance_machines(now)
-            for number in self._part_dues.take(self.now):
-                self._part_turns.add(number)
+            for number in self._parts.dues.take(self.now):
+                self._parts.turns.add(number)
             if self.wires.delayed:
                 self.wires.arrive(self.now)
             self.settle()
@@ -345,7 +346,7 @@ class Kernel:
 
     def _nothing_else_until(self, now: Nanos) -> Nanos:
         """The last moment, at most ``now``, before anything is due besides a machine that is due now."""
-        until, dues = now, (self._machine_dues.first(), self._part_dues.first())
+        until, dues = now, (self._machine_dues.first(), self._parts.dues.first())
         for due in (*dues, self.wires.next_arrival()) if self.wires.delayed else dues:
             if due is not None and due <= until:
                 until = due - 1
@@ -403,8 +404,8 @@ class Kernel:
     def _settle_joined(self) -> None:
         for _ in range(MAX_ROUNDS_PER_INSTANT):
             self.stale = False
-            for number in self._watches.all:
-                self._part_turns.add(number)
+            for number in self._parts.all:
+                self._parts.turns.add(number)
             self._update_parts()
             self._take_edges()
             if not self.stale:
@@ -414,9 +415,10 @@ class Kernel:
         self._find_deadlines()
 
     def _update_parts(self) -> None:
-        while (number := self._part_turns.take()) is not None:
-            self._parts_looked_at.add(number)
-            self.parts[number].update(self.now)
+        parts, turns, looked_at = self._parts.parts, self._parts.turns, self._parts.looked_at
+        while (number := turns.take()) is not None:
+            looked_at.add(number)
+            parts[number].update(self.now)
 
     def _take_edges(self) -> None:
         while (number := self._machine_turns.take()) is not None:
@@ -436,16 +438,17 @@ class Kernel:
             if followers is not None and name in followers.by_name:
                 followers.news |= followers.by_name[name]
             self._machine_dues.put(number, self.machines[name].deadline())
-        for number in self._parts_looked_at:
-            of = self._watches.computes[number]
+        parts = self._parts
+        for number in parts.looked_at:
+            of = parts.computes[number]
             if of is not None:
                 self._changed.add(of)
                 if followers is not None and of in followers.by_name:
                     followers.news |= followers.by_name[of]
-            self._part_dues.put(number, self.parts[number].deadline())
+            parts.dues.put(number, parts.parts[number].deadline())
         self._machines_looked_at.clear()
-        self._parts_looked_at.clear()
-        due, of_parts = self._machine_dues.first(), self._part_dues.first()
+        parts.looked_at.clear()
+        due, of_parts = self._machine_dues.first(), parts.dues.first()
         if due is None or (of_parts is not None and of_parts < due):
             due = of_parts
         arrival = self.wires.next_arrival() if self.wires.delayed else None

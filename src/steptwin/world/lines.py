@@ -82,7 +82,6 @@ class LineEndPoint(Stateful):
     """The connection of one program. ``received``: pieces not fetched yet, with their moments."""
 
     FIXED: ClassVar[tuple[str, ...]] = (
-        "at_once",
         "framed",
         "inner",
         "is_connected",
@@ -103,8 +102,6 @@ class LineEndPoint(Stateful):
         """The port that reports Modbus frames."""
         self.unframed = 0
         """Number of reported bytes that belonged to no frame."""
-        self.at_once = False
-        """Whether the port answers every request immediately and sends nothing else."""
         self.is_connected = True
         """False after the program has disconnected."""
         self.talks = talks
@@ -149,10 +146,6 @@ class Line(Stateful, ABC):
     @abstractmethod
     def _port(self, place: str, kind: str) -> Port:
         """A new port for a program. Its state is copied by `_port_state`."""
-
-    def _answers_at_once(self, kind: str) -> bool:
-        """Whether ports of a kind answer every request immediately."""
-        return False
 
     def _framed(self, port: Any) -> SlavePort | None:
         """The port that reports Modbus frames, for a port made by `_port`."""
@@ -214,7 +207,6 @@ class Line(Stateful, ABC):
             )
             is_busy = False
         found = self.places[place] = LineEndPoint(kind, faulty, port, framed, talks=is_busy)
-        found.at_once = self._answers_at_once(kind)
         if is_busy:
             self._busy[place] = found
         return found

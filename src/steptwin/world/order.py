@@ -9,48 +9,6 @@ from heapq import heapify, heappop, heappush
 from steptwin.world.wires import Wire
 
 
-class PartWatches:
-    """What each part of a kernel watches, computes and drives. Parts have numbers in the order in which they are updated."""
-
-    __slots__ = ("_drives", "all", "by_name", "computes")
-
-    def __init__(self) -> None:
-        self.by_name: dict[str, list[int]] = {}
-        """The parts that watch a machine, a line or an element, by its name."""
-        self.all: list[int] = []
-        """Those that watch everything."""
-        self.computes: list[str | None] = []
-        """The line or element whose signals each part computes."""
-        self._drives: dict[int, str] = {}
-        """The machine or element whose input a part drives."""
-
-    def add(self, watches: Iterable[str] | None, computes: str | None, drives: str | None) -> int:
-        """The number of another part, the last one. ``watches``: None is everything."""
-        number = len(self.computes)
-        self.computes.append(computes)
-        if drives is not None:
-            self._drives[number] = drives
-        if watches is None:
-            self.all.append(number)
-        else:
-            for watched in dict.fromkeys(watches):
-                self.by_name.setdefault(watched, []).append(number)
-        return number
-
-    def order(self, wires: Iterable[Wire]) -> Sequence[int]:
-        """The numbers of the parts in the order in which they should be updated; empty if they are in that order."""
-        found = update_order(successors(self.computes, self.by_name, self._drives, wires), self.all)
-        return () if found == sorted(found) else found
-
-    def arrange(self, order: Sequence[int]) -> None:
-        """Number the parts anew. ``order``: their present numbers."""
-        new = {old: number for number, old in enumerate(order)}
-        self.computes = [self.computes[old] for old in order]
-        self.by_name = {name: [new[old] for old in those] for name, those in self.by_name.items()}
-        self.all = [new[old] for old in self.all]
-        self._drives = {new[old]: name for old, name in self._drives.items()}
-
-
 def successors(
     names: Sequence[str | None], watching: Mapping[str, Iterable[int]], drives: Mapping[int, str], wires: Iterable[Wire]
 ) -> list[set[int]]:

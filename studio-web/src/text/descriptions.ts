@@ -35,6 +35,7 @@ export const DESCRIPTIONS: Readonly<Record<string, string>> = {
   "If flag {#number} is low go to {#label}": "If: flaga {#number} wyzerowana, skok do {#label}",
   "with the internal variable as number": "z liczbą ze zmiennej wewnętrznej",
   "out of range": "poza zakresem",
+  "{#count} characters without CR: a line feed ends no command": "znaków bez CR: {#count}: LF nie kończy polecenia",
   "{#count} characters without CR": "znaków bez CR: {#count}",
   "a comment": "komentarz",
   "an empty line": "pusta linia",

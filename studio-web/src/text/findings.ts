@@ -178,6 +178,8 @@ export const FINDINGS: Readonly<Record<string, string>> = {
   "{value} is out of range": "{value} jest poza zakresem",
   "{value} is out of range for {name}": "{value} jest poza zakresem {name}",
   "REAL reaches ±{most}": "REAL sięga ±{most}",
+  "{number} becomes {real}": "{number} staje się {real}",
+  "REAL holds whole numbers up to {most}": "REAL mieści liczby całkowite do {most}",
   "HOME needs a velocity other than 0": "HOME wymaga prędkości różnej od 0",
   "negative homes to KL, positive to KR": "ujemna bazuje na KL, dodatnia na KR",
   "{name} becomes {nearest}, not {value}": "{name} przyjmie {nearest}, nie {value}",
@@ -364,6 +366,8 @@ export const FINDINGS: Readonly<Record<string, string>> = {
   "user registers such as $I0 hold what a master has written":
     "rejestry użytkownika, np. $I0, mają to, co zapisał master",
   // M1486: what can be read.
+  "no command begins with NUL; the sender ends lines with CR NUL":
+    "żadne polecenie nie zaczyna się od NUL; nadawca kończy wiersze znakami CR NUL",
   "no command begins with {char}": "żadne polecenie nie zaczyna się od {char}",
   "{char} begins a second command ({name}) on this line": "{char} zaczyna drugie polecenie ({name}) w tej linii",
   "one command a line": "jedno polecenie w linii",

@@ -280,6 +280,10 @@ export const REFUSALS: Readonly<Record<string, string>> = {
     "unit = {unit}: to urządzenie o adresie {address}",
   "an M1486 has no command to {action} its program: only stop can be done":
     "M1486 nie ma polecenia {action} dla programu: możliwy jest tylko stop",
+  "text: several devices are on {line}: it begins with the address of one of them, {addresses}, and CR":
+    "tekst: na {line} jest kilka urządzeń: zaczyna się adresem jednego z nich, {addresses}, i CR",
+  "text: X{selected} selects another chip: this device is {own}":
+    "tekst: X{selected} wybiera inny układ: to urządzenie to {own}",
   "text: whole commands are sent to a device, each with CR behind it":
     "text: do urządzenia wysyła się całe polecenia, każde z CR na końcu",
   // Modbus.

@@ -95,6 +95,26 @@ def test_a_move_that_somebody_else_replaced_is_diverted() -> None:
     assert not other.axis(1).wait(check=False).detail
 
 
+@pytest.mark.parametrize("timeout_s", [None, 60.0])
+def test_a_driver_without_configuration_tells_what_it_knows_of_a_target(timeout_s: float | None) -> None:
+    """100 imp/mm: a target between pulses is not confirmed, and not refuted; one that was replaced is."""
+    wire, _ = ready()
+    mic = driver(wire, config=None)
+    ends = []
+    for target, replacement in ((20.0, None), (30.004, None), (60.0, 3100), (60.0, 4500)):
+        mic.axis(1).move_to(target)
+        if replacement is not None:
+            later(wire, 0.3, lambda pulses=replacement: wire.twin.axes[0].move_to(pulses, wire.now))
+        end = mic.axis(1).wait(timeout_s, check=False)
+        ends.append((end.ok, str(end)))
+    assert ends == [
+        (True, "M1: target reached at 20 u"),
+        (True, "M1: came to rest at 30 u (the target was 30.004 u)"),
+        (False, "M1: redirected by another command at 31 u (the target was 60 u)"),
+        (False, "M1: redirected by another command at 45 u (the target was 60 u)"),
+    ]
+
+
 @pytest.mark.parametrize(("err_time_ms", "knows", "distance"), [(2000, True, 5.0), (2000, False, 5.0), (9000, True, 100.0)])
 def test_a_position_error_is_named(err_time_ms: int, knows: bool, distance: float) -> None:
     """The controller gives up long after the motion should have been over."""

@@ -310,10 +310,10 @@ def test_the_face_for_threads_passes_all_its_arguments_on() -> None:
     assert said[0].endswith("unit 7: read DATA_TYPE")
 
 
-def test_what_frames_tell_of_data_type_drivers_of_the_line_know() -> None:
-    mic = Mic488("tcp://127.0.0.1:5020", log=lambda _: None)
-    assert mic._driver.line.notes["frames"] is not None
-    assert "frames" not in Mic488("tcp://127.0.0.1:5020")._driver.line.notes
+def test_frames_are_put_into_words_only_for_a_log() -> None:
+    for log, is_observed in ((lambda _: None, True), (None, False)):
+        line: Any = Mic488("tcp://127.0.0.1:5020", log=log)._driver.line
+        assert (line._engine.discipline.on_frame is not None) is is_observed
 
 
 @pytest.mark.parametrize("frames_per_second", [0.0, -1.0])

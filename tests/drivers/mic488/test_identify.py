@@ -111,6 +111,33 @@ def test_scanning_tells_who_is_no_mic488() -> None:
     assert finish(scan(thread_line(wire), [7])) == [FoundUnit(7, None)]
 
 
+@pytest.mark.parametrize("code", [4, 6])
+def test_a_gateway_that_reports_absent_units_as_failed_or_busy(code: int) -> None:
+    """A unit that was asked for alone is named nevertheless, and a controller that is busy once is found."""
+    wire = Wire()
+    answering(wire, lambda request: bytes((request[0] | 0x80, code)))
+    assert finish(scan(thread_line(wire), [7, 8])) == []
+    assert finish(scan(thread_line(wire), [7])) == [FoundUnit(7, None)]
+    answering(wire, lambda request: bytes((0x82, code)) if request[0] == 2 else bytes((3, 28, *bytes(28))))
+    assert finish(scan(thread_line(wire), [7, 8])) == [FoundUnit(7, "1.70"), FoundUnit(8, "1.70")]
+
+
+def test_a_gateway_that_ignores_the_unit() -> None:
+    """Which is known by a unit that no device has; only over TCP can it be asked for."""
+    for every in (True, False):
+        wire = Wire(tcp=True, units=(1, 2))
+
+        def passed_on(frame: bytes, wire: Wire = wire, every: bool = every) -> None:
+            if frame[6] == 248 and every:
+                wire.inject(frame[:4] + b"\x00\x04\xf8\x02\x01\x00", after=wire.latency)
+
+        wire.before_each = passed_on
+        line = thread_line(wire)
+        line.notes["tcp"] = True
+        assert finish(scan(line, [1, 2, 3])) == [FoundUnit(1, "1.70", every), FoundUnit(2, "1.70", every)]
+        assert finish(scan(line, [1])) == [FoundUnit(1, "1.70")]
+
+
 def test_scanning_a_port_that_is_gone_ends() -> None:
     wire = Wire()
     line = thread_line(wire)

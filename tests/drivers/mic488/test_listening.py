@@ -57,6 +57,7 @@ def test_the_beginning_of_a_frame_that_never_ends_is_told_with_the_next() -> Non
     while (due := ear.deadline()) is not None:
         ear.expire(due)
     ear.feed(READ, 500 * MILLISECOND)
+    ear.expire(500 * MILLISECOND + BURSTY_GAP_NS)
     assert meanings(heard) == ["→ unit 1: read M1_POS_ACT", "? no frame: 5 bytes"]
 
 

@@ -8,7 +8,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from steptwin.drivers.mic488.motion import MOVING, MotionCommand, MotionKind, MoveEnd, Reason, reason_of, status_text, travel_s
+from steptwin.drivers.mic488.motion import (
+    MOVING,
+    MotionCommand,
+    MotionKind,
+    MoveEnd,
+    Reason,
+    arrival,
+    reason_of,
+    status_text,
+    travel_s,
+)
 from steptwin.mic488.status import AxisStatus
 
 
@@ -80,8 +90,34 @@ def test_an_end_in_words() -> None:
     assert str(MoveEnd(1, Reason.DIVERTED, 0.0, "u", 1.0, "x")) == "M1: redirected by another command at 0 u (x)"
     assert {reason for reason in Reason if MoveEnd(1, reason, None, "u", 0.0).ok} == {
         Reason.TARGET,
+        Reason.RESTED,
         Reason.REST,
         Reason.RELEASED,
     }
+    assert str(MoveEnd(1, Reason.RESTED, 10.0, "u", 1.0, "x")) == "M1: came to rest at 10 u (x)"
     assert frozenset({AxisStatus.VELOCITY, AxisStatus.POSITION, AxisStatus.HOMING, AxisStatus.CORRECTION}) == MOVING
     assert status_text(99) == "unknown status 99"
+
+
+@pytest.mark.parametrize(
+    ("target", "position", "seen", "reason"),
+    [
+        (12.5, 12.5, (), Reason.TARGET),
+        (0.1, 0.10000000149011612, (), Reason.TARGET),  # as REAL has it
+        (60.0, 20.0, (), Reason.DIVERTED),  # of pulses that are as large as they can be: 20
+        (60.0, 40.5, (), Reason.RESTED),
+        (60.0, 40.5, (3.25,), Reason.DIVERTED),  # at most 3.25
+        (-60.0, -40.5, (-38.0,), Reason.DIVERTED),  # at most 2.5
+        (10.3, 10.0, (), Reason.RESTED),
+        (10.3, 10.0, (9.0,), Reason.RESTED),  # of 1 imp in a unit
+        (12.345, 12.3453125, (0.0015625,), Reason.RESTED),  # of 640
+        (12.345, 12.346875, (0.0015625,), Reason.DIVERTED),
+        (60.0, 20.0, (20.000001,), Reason.DIVERTED),  # as near as two readings of one place
+        (60.0, 0.0, (), Reason.RESTED),  # nothing is known of its pulses
+        (60.0, 0.0, (4.0,), Reason.DIVERTED),
+    ],
+)
+def test_without_pulses_per_unit_only_what_no_rounding_explains_is_elsewhere(
+    target: float, position: float, seen: tuple[float, ...], reason: Reason
+) -> None:
+    assert arrival(target, position, None, seen) is reason

@@ -171,7 +171,9 @@ def test_a_status_just_after_the_command_may_still_be_the_one_of_before() -> Non
         (2.995, 100.0, Reason.TARGET),
         (3.0052, 100.0, Reason.DIVERTED),
         (2.9948, 100.0, Reason.DIVERTED),
-        (50.0, None, Reason.TARGET),
+        (3.0, None, Reason.TARGET),
+        (3.4, None, Reason.RESTED),
+        (50.0, None, Reason.DIVERTED),
     ],
 )
 def test_a_target_is_reached_to_half_a_pulse(target: float, gear: float | None, reason: Reason) -> None:
@@ -183,6 +185,19 @@ def test_a_target_is_reached_to_half_a_pulse(target: float, gear: float | None, 
     distance = judged(unit, AxisWait(unit, 2, told(MotionKind.DISTANCE, target), None), AxisStatus.REACHED)  # type: ignore[arg-type]
     assert distance is not None
     assert distance.reason is Reason.TARGET
+
+
+def test_a_position_on_the_way_tells_how_large_a_pulse_can_be() -> None:
+    """It is read once, also where the time to wait is given."""
+    for timeout_s in (None, 60.0):
+        unit = Unit(gear=None)
+        watch = AxisWait(unit, 2, told(MotionKind.POSITION, 4.0), timeout_s)  # type: ignore[arg-type]
+        unit.values["POS_ACT"] = 0.25
+        assert [judged(unit, watch, AxisStatus.POSITION) for _ in range(2)] == [None, None]
+        unit.values["POS_ACT"] = 3.0
+        end = judged(unit, watch, AxisStatus.REACHED)
+        assert end is not None
+        assert (end.reason, end.detail) == (Reason.DIVERTED, "the target was 4 mm")
 
 
 def test_large_targets_are_known_to_24_bits() -> None:

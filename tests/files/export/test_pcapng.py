@@ -56,6 +56,14 @@ def test_wireshark_decodes_what_went_over_a_serial_line(tmp_path: Path, require_
     assert found[4][2] == "2"
 
 
+def test_what_went_over_a_serial_line_is_stamped_at_its_end(tmp_path: Path) -> None:
+    """DATA_TX_END (3) of the master and DATA_RX_END (4), after the moment in s and µs."""
+    data = capture(tmp_path / "x.pcapng").read_bytes()
+    for frame, event, moment_us in ((READ_RTU, 3, 3000), (EXCEPTION_RTU, 4, 4000)):
+        head = data[: data.index(frame)][-12:]
+        assert head == (2).to_bytes(4, "big") + moment_us.to_bytes(4, "big") + bytes((event, 0, 0, 0))
+
+
 def test_a_trace_without_frames_is_an_empty_capture(tmp_path: Path) -> None:
     (written,) = write_trace(Trace(["bus"]), tmp_path / "x.pcapng")
     data = written.read_bytes()

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from unittest.mock import patch
+
 import pytest
 
 from steptwin.errors import Misuse
+from steptwin.files.world import World
 from steptwin.machine import SECOND
 from steptwin.world.elements import fault_kinds
 from steptwin.world.faults import ActiveFault, Fault, Faults, read
 from steptwin.world.faults.active import addresses
+from steptwin.world.faults.table import Layer
 
 MS = SECOND // 1000
 
@@ -169,7 +173,7 @@ def test_without_machines_and_elements_there_are_none() -> None:
         faults.check(read("stall machine=a"))
     with pytest.raises(Misuse, match="fault leak: element = 'a': those that can fail are none"):
         faults.check(Fault(fault_kinds()["leak"], {"element": "a"}))
-    assert (faults.active, faults.check(read("busy")), faults.of("a"), faults.of_element("a")) == ((), None, [], [])
+    assert (faults.active, faults.check(read("busy")), faults.of("a"), faults.of_element("a")) == ((), None, (), ())
 
 
 @pytest.mark.parametrize(
@@ -188,3 +192,33 @@ def test_without_machines_and_elements_there_are_none() -> None:
 )
 def test_addresses_of_requests(pdu: str, there: range | None) -> None:
     assert addresses(bytes.fromhex(pdu)) == there
+
+
+def test_an_event_costs_the_same_however_many_faults_others_have() -> None:
+    def looks(count: int) -> int:
+        world = World.from_toml(
+            "".join(
+                f'[[mic488]]\nname = "m{number}"\n[[fault]]\nkind = "stuck"\nmachine = "m{number}"\npin = "IN1"\nvalue = 1\n'
+                for number in range(count)
+            )
+        )
+        world.run(for_="1 s")
+        with patch.object(Fault, "get", autospec=True, side_effect=Fault.get) as get:
+            for level in (0, 1, 0):
+                world.mic488["m1"].write("OUT1", 1 - level)
+                world.run(for_="1 s")
+        return get.call_count
+
+    assert looks(40) <= looks(3)
+
+
+def test_faults_of_each_kind_change_with_what_is_set() -> None:
+    faults = Faults()
+    assert (faults.refusing(), faults.of_layer(Layer.BYTES), faults.of("m")) == ((), (), ())
+    first = faults.add(read("busy"))
+    second = faults.add(read("noise"))
+    assert (faults.refusing(), faults.of_layer(Layer.BYTES)) == ((first,), (second,))
+    faults.remove(first.name, 0)
+    assert (faults.refusing(), faults.of_layer(Layer.BYTES)) == ((), (second,))
+    faults.active = ()
+    assert faults.of_layer(Layer.BYTES) == ()

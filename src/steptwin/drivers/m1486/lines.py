@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 
 from steptwin.drivers.exchange import Exchanger
+from steptwin.drivers.lineframes import FRAMES, LineFrames
+from steptwin.drivers.m1486.decoder import M1486Decoder
 from steptwin.drivers.m1486.talk import CharacterTalk, ChipRequest
 from steptwin.drivers.place import parse_line_address
 from steptwin.drivers.tasks import TaskLine
 from steptwin.drivers.tcp import Endpoint
 from steptwin.drivers.threads import ThreadLine
 from steptwin.errors import Misuse
+from steptwin.m1486.variants import DEFAULT
 from steptwin.machine import SECOND, Nanos
 from steptwin.wire.line import SerialLine
 from steptwin.wire.slave import FrameDirection
@@ -23,15 +26,31 @@ TALK = "m1486 talk"
 
 def talking(
     endpoint: Endpoint, baud: int, log: Callable[[str], object] | None
-) -> tuple[Exchanger[ChipRequest, bytes], CharacterTalk]:
-    """The exchanger and the protocol of a line of chips."""
+) -> tuple[Exchanger[ChipRequest, bytes], dict[Hashable, object]]:
+    """The exchanger of a line of chips, and the notes of its drivers: with the protocol, `TALK`."""
+    talk = CharacterTalk(SerialLine(baud), str(endpoint))
+    exchanger = Exchanger(talk, str(endpoint))
 
     def log_bytes(now: Nanos, direction: FrameDirection, data: bytes) -> None:
         if log is not None:
             log(f"{now / SECOND:12.6f} s  {'→' if direction is FrameDirection.IN else '←'} {data.hex(' '):<24}  {in_words(data)}")
 
-    talk = CharacterTalk(SerialLine(baud), str(endpoint), on_bytes=log_bytes if log is not None else None)
-    return Exchanger(talk, str(endpoint)), talk
+    def observe(followed: bool) -> None:
+        if followed:
+            decoder = M1486Decoder(lambda line: frames.take(talk.device, line.direction, line.raw, line.meaning), DEFAULT.name)
+
+            def seen(now: Nanos, direction: FrameDirection, data: bytes) -> None:
+                log_bytes(now, direction, data)
+                decoder.expire(now)
+                decoder.feed(data, now, direction)
+
+            talk.on_bytes = seen
+        else:
+            talk.on_bytes = None if log is None else log_bytes
+
+    frames = LineFrames(exchanger, observe)
+    observe(False)
+    return exchanger, {TALK: talk, FRAMES: frames}
 
 
 def in_words(data: bytes) -> str:
@@ -51,8 +70,7 @@ class AsyncM1486Line(TaskLine[ChipRequest, bytes]):
 
     def __init__(self, address: str, *, baud: int = BAUD, log: Callable[[str], object] | None = None) -> None:
         endpoint = line_endpoint(address, baud)
-        exchanger, talk = talking(endpoint, baud, log)
-        super().__init__(endpoint, exchanger, {TALK: talk})
+        super().__init__(endpoint, *talking(endpoint, baud, log))
 
 
 class ThreadM1486Line(ThreadLine[ChipRequest, bytes]):
@@ -60,5 +78,4 @@ class ThreadM1486Line(ThreadLine[ChipRequest, bytes]):
 
     def __init__(self, address: str, *, baud: int = BAUD, log: Callable[[str], object] | None = None) -> None:
         endpoint = line_endpoint(address, baud)
-        exchanger, talk = talking(endpoint, baud, log)
-        super().__init__(endpoint, exchanger, {TALK: talk})
+        super().__init__(endpoint, *talking(endpoint, baud, log))

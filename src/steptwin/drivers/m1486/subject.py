@@ -6,6 +6,7 @@ A chip responds only at rest (M-28); while it moves, its values are unknown.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 
@@ -28,6 +29,7 @@ from steptwin.subject.devicetwin import DeviceTwin
 from steptwin.subject.payloads import Payload, SamplePayload, StatusPayload
 from steptwin.world import script as steps
 
+_SELECTION = re.compile(rb"\s*[Xx]\s*([0-9A-Fa-f])\s*\r")
 AXIS = 1
 COUNTER = (1, 2, 3)
 """The bytes of the position counter, by the numbers of ``U``."""
@@ -143,6 +145,10 @@ class M1486Part:
 
     # ------------------------------------------------------------------ commands
 
+    def selected(self, data: bytes) -> int | None:
+        found = _SELECTION.match(data)
+        return None if found is None else int(found[1], 16)
+
     def effect_of(self, wanted: steps.Request | steps.Write) -> RawEffect:
         """It takes none."""
         return RawEffect.WRITE
@@ -185,8 +191,13 @@ class M1486Part:
         await self._chip.stop_program()
 
     async def _send(self, wanted: steps.Send) -> None:
-        """Send whole commands, all checked before the first is sent; motions have commands of their own (ADR 12)."""
-        *lines, rest = wanted.data.decode("latin-1").split("\r")
+        """Send whole commands, all checked before the first is sent; motions have commands of their own (ADR 12). The driver
+        selects the chip: ``X`` with its address may come first. Raises `Misuse`, also for that of another chip."""
+        selected = self.selected(wanted.data)
+        if selected not in (None, self.address):
+            own = "the only chip of its line" if self.address is None else f"chip {self.address:X}"
+            raise Misuse(f"text: X{selected:X} selects another chip: this device is {own}")
+        *lines, rest = _SELECTION.sub(b"", wanted.data, count=1).decode("latin-1").split("\r")
         if rest or not lines:
             raise Misuse("text: whole commands are sent to a device, each with CR behind it")
         for text in lines:
@@ -233,6 +244,9 @@ class M1486Part:
     def held_jog(self, wanted: command.Jog) -> AsyncM1486Jog:
         self._check_axis(wanted.axis)
         return self._chip.jog(wanted.velocity)
+
+    def configuration(self) -> None:
+        """It has none."""
 
     async def twin(self, name: str) -> DeviceTwin:
         raise Refusal(f"{self.line.place}: no twin beside an M1486, whose position is unknown while it moves (M-28)")

@@ -105,7 +105,9 @@ class CharacterTalk:
     def __init__(self, serial: SerialLine, place: str, *, on_bytes: ByteObserver | None = None) -> None:
         self._serial = serial
         self._place = place
-        self._on_bytes = on_bytes
+        self.on_bytes = on_bytes
+        self.device: int | None = ALL
+        """The chip of the last request."""
         self._stored: Counter[int | None] = Counter()  # bits of commands for one chip
         self._stored_by_all = 0  # bits of commands sent while several may listen
         self.reset()
@@ -195,6 +197,7 @@ class CharacterTalk:
 
     def start(self, request: ChipRequest, now: Nanos, *, urgent: bool) -> bytes:
         self._request = request
+        self.device = request.address
         self._lines = []
         self.nearly_full = self._is_stuck = False
         request.committed = request.commented = False
@@ -231,15 +234,15 @@ class CharacterTalk:
     def _put(self, data: bytes, now: Nanos) -> bytes:
         self._sent = data
         self._echoed = b""
-        if data and self._on_bytes is not None:
-            self._on_bytes(now, FrameDirection.IN, data)
+        if data and self.on_bytes is not None:
+            self.on_bytes(now, FrameDirection.IN, data)
         return data
 
     # ------------------------------------------------------------------ receiving
 
     def receive(self, data: bytes, now: Nanos) -> bytes | SendNext | None:
-        if self._on_bytes is not None:
-            self._on_bytes(now, FrameDirection.OUT, data)
+        if self.on_bytes is not None:
+            self.on_bytes(now, FrameDirection.OUT, data)
         request = self._request
         if request is None or request.sort is ChipRequestKind.BLIND:
             return None
@@ -403,8 +406,8 @@ class CharacterTalk:
         return request.sort in (*_SILENT, ChipRequestKind.BLIND, ChipRequestKind.PROBE) or awaits_answer
 
     def stray(self, data: bytes, now: Nanos) -> None:
-        if self._on_bytes is not None and data:
-            self._on_bytes(now, FrameDirection.OUT, data)
+        if self.on_bytes is not None and data:
+            self.on_bytes(now, FrameDirection.OUT, data)
         for byte in data:
             if not self._uploaded(byte) and byte not in (EMPTY, THREE_FREE):
                 self.dirty = True  # the echo of characters that now precede the next command

@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable
 
 from steptwin.drivers.blocking import finish
-from steptwin.drivers.m1486.lines import TALK, talking
+from steptwin.drivers.m1486.lines import talking
 from steptwin.drivers.m1486.talk import ChipRequest
 from steptwin.drivers.m1486.unit import ChipUnit
 from steptwin.drivers.tcp import Channel
@@ -23,8 +23,7 @@ def wake(channel: Channel, place: str, address: int | None, baud: int, log: Call
     Raises `NoEcho` if the chip is absent, moves or runs a program. ``channel`` stays open.
     """
     endpoint = _Opened(channel, place)
-    exchanger, talk = talking(endpoint, baud, log)
-    line: ThreadLine[ChipRequest, bytes] = ThreadLine(endpoint, exchanger, {TALK: talk})
+    line: ThreadLine[ChipRequest, bytes] = ThreadLine(endpoint, *talking(endpoint, baud, log))
     finish(line.open())
     finish(ChipUnit(line, address, timeout_ns=TIMEOUT_NS).wake())
 

@@ -20,16 +20,21 @@ SCAN_NS: Nanos = 100 * MILLISECOND
 PROBE_TRIES = 2
 
 _GATEWAY_CODES = (0x0A, pdu.GATEWAY_TARGET_FAILED)
+_VAGUE_CODES = (pdu.DEVICE_FAILURE, pdu.DEVICE_BUSY)
+"""What some gateways answer in place of these where there is no device."""
+_NO_UNIT = 248
+"""A unit that no device has: slave addresses end at 247. A gateway for which it answers passes every number on to one device."""
 _NEW, _OLD = "1.70", "1.23"
 """One firmware for each address map. At the addresses of 1.23 the others have user registers, which can be read. 1.40 has the
 addresses of 1.70, and no read distinguishes them."""
 
 
 class FoundUnit(NamedTuple):
-    """A unit that responds. ``firmware`` is None if it is not a MIC488."""
+    """A unit that responds. ``firmware`` is None if it is not a MIC488. ``every_unit``: so does a unit that no device has."""
 
     unit: int
     firmware: str | None
+    every_unit: bool = False
 
 
 async def firmware_of(line: DriverLine[ModbusQuery, bytes], unit: int, timeout_ns: Nanos) -> str:
@@ -92,17 +97,23 @@ async def scan(
     timeout_ns: Nanos = SCAN_NS,
     progress: Callable[[int], Any] | None = None,
 ) -> list[FoundUnit]:
-    """The units that respond on a line. ``progress`` is called with every unit before it is tried. Raises `LineLost`."""
-    found = []
+    """The units that respond on a line. ``progress`` is called with every unit before it is tried. Raises `LineLost`.
+
+    Of several units, one that answers everything with exception 04 or 06 is absent: some gateways say so.
+    """
+    units = list(units)
+    found: list[FoundUnit] = []
     inputs = pdu.ReadRequest(pdu.READ_DISCRETE_INPUTS, 5000, 8)  # every firmware has them, and it is the manual's own example
     for unit in units:
         if progress is not None:
             progress(unit)
+        is_vague = False
         try:
             await line.exchange(Job(ModbusQuery(unit, inputs), timeout_ns))
         except pdu.ModbusException as exception:
             if exception.code in _GATEWAY_CODES:
                 continue
+            is_vague = exception.code in _VAGUE_CODES and len(units) > 1
         except LineLost:
             raise
         except LineFailure:
@@ -113,5 +124,21 @@ async def scan(
             raise
         except (Refusal, LineFailure):
             firmware = None
-        found.append(FoundUnit(unit, firmware))
+        if firmware is not None or not is_vague:
+            found.append(FoundUnit(unit, firmware))
+    if sum(one.firmware is not None for one in found) > 1 and await _answers_every_unit(line, inputs, timeout_ns):
+        return [one._replace(every_unit=True) for one in found]
     return found
+
+
+async def _answers_every_unit(line: DriverLine[ModbusQuery, bytes], look: pdu.ReadRequest, timeout_ns: Nanos) -> bool:
+    """Whether a unit that no device has is answered; over RTU it cannot be asked."""
+    if not line.notes.get("tcp"):
+        return False
+    try:
+        await line.exchange(Job(ModbusQuery(_NO_UNIT, look), timeout_ns))
+    except LineLost:
+        raise
+    except (Refusal, LineFailure):
+        return False
+    return True

@@ -41,6 +41,7 @@ from steptwin.mic488.registers import AXES, DEFAULT_FIRMWARE
 BAUD = 38400
 BAUDS = (38400, 9600, 19200, 57600, 115200)
 """Baud rates at which controllers are searched, bit/s."""
+EVERY_UNIT = "; every unit number is answered here, so several of them may be one device"
 RUNS_ON = "the program in the controller runs on and may move the axes again: --program ends it"
 
 
@@ -103,7 +104,8 @@ def _find(
         FoundDevice(
             one.unit,
             one.firmware,
-            "responds, but is not a MIC488" if one.firmware is None else f"MIC488, firmware {one.firmware}",
+            f"{'responds, but is not a MIC488' if one.firmware is None else f'MIC488, firmware {one.firmware}'}"
+            f"{EVERY_UNIT if one.every_unit else ''}",
         )
         for one in found
     ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 
 from steptwin.drivers.exchange import Exchanger
+from steptwin.drivers.lineframes import FRAMES, LineFrames
 from steptwin.drivers.mic488.frames import FrameWords
 from steptwin.drivers.modbus import ModbusQuery, RtuMaster, TcpMaster
 from steptwin.drivers.place import LineAddress, parse_line_address
@@ -12,6 +13,7 @@ from steptwin.drivers.tasks import TaskLine
 from steptwin.drivers.threads import ThreadLine
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
+from steptwin.wire.slave import FrameDirection
 
 FRAMES_PER_SECOND = 100.0
 """Frames per second that a MIC488 serves (manual 2)."""
@@ -24,16 +26,20 @@ def modbus_exchanger(
     if frames_per_second is not None and frames_per_second <= 0.0:
         raise Misuse(f"{frames_per_second:g} frames per second: must be above 0")
     interval: Nanos = 0 if frames_per_second is None else round(SECOND / frames_per_second)
-    notes: dict[Hashable, object] = {"tcp": place.framed}
-    observer = None
-    if log is not None:
-        frames = FrameWords(tcp=place.framed)
-        frames.sinks.append(lambda frame: log(str(frame)))
-        notes["frames"] = frames
-        observer = frames.observe
+    words = FrameWords(tcp=place.framed)
     where = str(place.endpoint)
-    discipline = TcpMaster(where, on_frame=observer) if place.framed else RtuMaster(place.serial, on_frame=observer)
-    return Exchanger(discipline, where, interval), notes
+    discipline = TcpMaster(where) if place.framed else RtuMaster(place.serial)
+    exchanger = Exchanger(discipline, where, interval)
+
+    def observe(followed: bool) -> None:
+        discipline.on_frame = words.observe if followed or log is not None else None
+
+    frames = LineFrames(exchanger, observe)
+    if log is not None:
+        words.sinks.append(lambda frame: log(str(frame)))
+        observe(False)
+    words.sinks.append(lambda one: frames.take(one.unit, one.direction or FrameDirection.OUT, one.raw, one.meaning))
+    return exchanger, {"tcp": place.framed, "frames": words, FRAMES: frames}
 
 
 class AsyncModbusLine(TaskLine[ModbusQuery, bytes]):

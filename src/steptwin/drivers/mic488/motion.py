@@ -6,7 +6,10 @@ Suffixes: ``_u`` configured units (u, u/s, u/s²), ``_s`` seconds.
 from __future__ import annotations
 
 import enum
+from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import pairwise
+from math import inf
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
@@ -24,6 +27,7 @@ class Reason(enum.Enum):
     """Why a motion ended."""
 
     TARGET = "target reached"
+    RESTED = "came to rest"
     REST = "at rest"
     LIMIT_L = "stopped at limit L"
     LIMIT_R = "stopped at limit R"
@@ -80,7 +84,7 @@ class MoveEnd:
 
     @property
     def ok(self) -> bool:
-        return self.reason in (Reason.TARGET, Reason.REST, Reason.RELEASED)
+        return self.reason in (Reason.TARGET, Reason.RESTED, Reason.REST, Reason.RELEASED)
 
     def __str__(self) -> str:
         where = "" if self.position_u is None else f" at {self.position_u:g} {self.unit}"
@@ -89,6 +93,29 @@ class MoveEnd:
 
 def status_text(code: int) -> str:
     return AXIS_STATUS_TEXTS.get(code, f"unknown status {code}")
+
+
+ROUNDED = 2.0**-22
+"""A position in REAL has 24 bits, and so has its target: what both are rounded by, as a part of the target."""
+
+
+def arrival(target_u: float, position_u: float, gear: float | None, seen_u: Iterable[float] = ()) -> Reason:
+    """How a motion to ``target_u`` ended that stands at ``position_u``, by its status at its target (MIC-14).
+
+    The controller rounds the target to pulses. Without ``gear``, their number in a unit, a pulse is at most the least
+    distance of the positions ``seen_u`` from each other and from 0. By the half of it the target may have been rounded; whether
+    that is so, or the axis was sent there instead, cannot be known: `Reason.RESTED`.
+    """
+    rounded = abs(target_u) * ROUNDED
+    off = abs(position_u - target_u)
+    if gear is not None:
+        return Reason.TARGET if off <= 0.51 / gear + rounded else Reason.DIVERTED
+    if off <= rounded:
+        return Reason.TARGET
+    places = sorted({0.0, position_u, *seen_u})
+    noise = max(map(abs, places)) * ROUNDED
+    steps = [after - before for before, after in pairwise(places) if after - before > noise]
+    return Reason.RESTED if off <= 0.51 * min(steps, default=inf) + rounded else Reason.DIVERTED
 
 
 def end_of(status: int) -> Reason:

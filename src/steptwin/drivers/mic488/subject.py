@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from steptwin.controllerstate import ControllerState, DetailValue, StateAxis, StateProgram, StateStatus
 from steptwin.datasheet import AxisDescription, Datasheet
+from steptwin.diagnostics import SourceText
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.mic488.driver import ALL_AXES, AsyncMic488, Mic488Status
 from steptwin.drivers.mic488.failures import ModbusRefusal, NotReady
@@ -20,6 +22,7 @@ from steptwin.drivers.subject import DeviceAction, RawEffect, ValueAndUnit
 from steptwin.errors import LineFailure, Misuse, Refusal
 from steptwin.inputfiles import read_bytes
 from steptwin.mic488.datasheet import datasheet_of
+from steptwin.mic488.inifile import IniFile
 from steptwin.mic488.points import item_of
 from steptwin.mic488.present import ACTIVITIES, axis_status, controller_status
 from steptwin.mic488.registermap import DataType, Register, Space
@@ -52,6 +55,7 @@ class Mic488Part:
         self.datasheet: Datasheet = datasheet_of(mic.firmware, scales)
         self._points = {point.path.upper(): point for point in self.datasheet.points}
         self._pins = {pin.name: pin for pin in self.datasheet.pins}
+        self._from_status = _from_status()
         self._last: Mic488Status | None = None
 
     @property
@@ -74,13 +78,19 @@ class Mic488Part:
 
     async def values(self, points: Sequence[str]) -> Mapping[str, ValueAndUnit]:
         """The values of the data sheet that a register shows; the others are unknown."""
-        registers = {point: self._register(point) for point in points}
+        derived = {point: self._from_status.get(point.upper()) for point in points}
+        registers = {point: self._register(point) if how is None else how.register for point, how in derived.items()}
         names = tuple(dict.fromkeys(name for name in registers.values() if name is not None))
         shown = await self._mic.get_shown(*names) if names else {}
-        return {
-            point: (None, self._unit(point)) if name is None else (float(shown[name][0]), shown[name][1])
-            for point, name in registers.items()
-        }
+        found: dict[str, ValueAndUnit] = {}
+        for point, name in registers.items():
+            how = derived[point]
+            if name is None or how is not None:
+                value = None if name is None or how is None else float(how.holds(int(shown[name][0])))
+                found[point] = value, self._unit(point)
+            else:
+                found[point] = float(shown[name][0]), shown[name][1]
+        return found
 
     def _register(self, path: str) -> str | None:
         """The name of the register that shows a point, None without one. Raises `Misuse` for an unknown point."""
@@ -110,7 +120,7 @@ class Mic488Part:
         return "" if found is None else found.unit
 
     async def state(self) -> ControllerState:
-        """Whether an axis moves, and the statement and variables of a program, are unknown."""
+        """The statement and variables of a program are unknown."""
         status, sheet = await self._mic.status(), self.datasheet
         pins = [pin.name for pin in sheet.pins]
         details = [name for name in _DETAILS.values() if item_of(self._registers, name) is not None]
@@ -187,6 +197,9 @@ class Mic488Part:
         """Write registers one after the other."""
         await self._mic.set_all(*((name, value) for _, name, value in wanted.values), is_sure=True)
 
+    def selected(self, data: bytes) -> None:
+        """It takes no characters."""
+
     def effect_of(self, wanted: steps.Request | steps.Write) -> RawEffect:
         if isinstance(wanted, steps.Write):
             is_stop = all(self._mic.is_stop(name, value) for _, name, value in wanted.values)
@@ -242,6 +255,11 @@ class Mic488Part:
         """A snapshot, which `AsyncMic488.restore_snapshot` writes back."""
         return (await self._mic.take_snapshot()).to_json()
 
+    def configuration(self) -> SourceText | None:
+        if self._config_file is None:
+            return None
+        return IniFile.parse(read_bytes(Path(self._config_file)), Path(self._config_file).name).source
+
     async def twin(self, name: str) -> DeviceTwin:
         """With its registers, positions and drives. Programs cannot be read; pulses per unit are in no register (MIC-27)."""
         if self._config_file is None:
@@ -269,6 +287,27 @@ class Mic488Part:
         )
 
 
+class _FromStatus(NamedTuple):
+    """A point that Mx_STATUS shows: its own register, if it has one, can only be written."""
+
+    register: str
+    holds: Callable[[int], bool]
+
+
+def _from_status() -> Mapping[str, _FromStatus]:
+    """By the upper-case path."""
+    found: dict[str, _FromStatus] = {}
+    for axis in ALL_AXES:
+        name = f"M{axis}_STATUS"
+        enabled = _FromStatus(name, _is_on)
+        found |= {f"M{axis}.ENABLED": enabled, f"M{axis}_EN": enabled, f"M{axis}.MOVING": _FromStatus(name, MOVING.__contains__)}
+    return found
+
+
+def _is_on(status: int) -> bool:
+    return status != AxisStatus.OFF
+
+
 _DETAILS = {
     "data_type": "DATA_TYPE",
     "axis_control_mode": "AXIS_CTR_MODE",
@@ -287,8 +326,8 @@ def _axis(axis: AxisDescription, status: Mic488Status, encoder: float | None) ->
         unit=status.units[index],
         position=status.positions[index],
         velocity=status.velocities[index],
-        moving=None,
-        enabled=code != AxisStatus.OFF,
+        moving=code in MOVING,
+        enabled=_is_on(code),
         encoder=None if encoder is None else round(encoder),
         status=axis_status(code),
     )
@@ -296,7 +335,12 @@ def _axis(axis: AxisDescription, status: Mic488Status, encoder: float | None) ->
 
 def _edges(before: Mic488Status, status: Mic488Status) -> list[Payload]:
     levels = (("IN", before.inputs, status.inputs), ("OUT", before.outputs, status.outputs))
-    return [
+    drives: list[Payload] = [
+        EdgePayload(f"M{axis}_EN", float(_is_on(new)))
+        for axis, (old, new) in enumerate(zip(before.axes, status.axes, strict=True), start=1)
+        if _is_on(old) is not _is_on(new)
+    ]
+    return drives + [
         EdgePayload(f"{name}{number}", float(new))
         for name, olds, news in levels
         for number, (old, new) in enumerate(zip(olds, news, strict=True), start=1)

@@ -4,7 +4,17 @@ from __future__ import annotations
 
 from steptwin.drivers.line import check_wait
 from steptwin.drivers.mic488.failures import MoveFailed
-from steptwin.drivers.mic488.motion import MOVING, MotionCommand, MotionKind, MoveEnd, Reason, reason_of, status_text, travel_s
+from steptwin.drivers.mic488.motion import (
+    MOVING,
+    MotionCommand,
+    MotionKind,
+    MoveEnd,
+    Reason,
+    arrival,
+    reason_of,
+    status_text,
+    travel_s,
+)
 from steptwin.drivers.mic488.unit import ControlRegisters, Unit
 from steptwin.errors import LineFailure, Misuse
 from steptwin.machine import MILLISECOND, SECOND, Nanos
@@ -37,6 +47,8 @@ class AxisWait:
         self._limit: Nanos | None = None if timeout_s is None else self._begin + round(timeout_s * SECOND)
         self._is_computed = timeout_s is None
         self._corrects = False
+        self._seen: list[float] = []
+        """Positions of this motion, u."""
 
     @property
     def after(self) -> Nanos:
@@ -48,6 +60,8 @@ class AxisWait:
         status = control.axes[self._axis - 1]
         motion = self._motion
         if status in MOVING:
+            if not self._seen and self._unit.gear(self._axis) is None and self._limit is not None and self._has_target:
+                self._seen.append((await self._position())[0])
             now = self._unit.line.now()
             corrects = status == AxisStatus.CORRECTION  # which follows the motion that the time was computed of
             if self._limit is None or (self._is_computed and corrects is not self._corrects):
@@ -64,18 +78,25 @@ class AxisWait:
     async def _end(self, reason: Reason, detail: str) -> MoveEnd:
         unit, axis = self._unit, self._axis
         motion = self._motion
-        item = unit.item("POS_ACT", axis)
+        position, name = await self._position()
+        if reason is Reason.TARGET and motion is not None and motion.kind is MotionKind.POSITION:
+            reason = arrival(motion.value_u, position, unit.gear(axis), self._seen)
+            if reason is not Reason.TARGET:
+                detail = f"the target was {motion.value_u:g} {name}"
+        return MoveEnd(axis, reason, position, name, (unit.line.now() - self._begin) / SECOND, detail)
+
+    @property
+    def _has_target(self) -> bool:
+        return self._motion is not None and self._motion.kind is MotionKind.POSITION
+
+    async def _position(self) -> tuple[float, str]:
+        """In units if these are known, with its unit."""
+        unit = self._unit
+        item = unit.item("POS_ACT", self._axis)
         control = unit.notes.control
         data_type = unit.wording.data_type if control is None else control.data_type
-        raw = (await unit.read([item], data_type))[item]
-        position, name = unit.shown(item, raw, data_type)
-        gear = unit.gear(axis)
-        if reason is Reason.TARGET and motion is not None and motion.kind is MotionKind.POSITION and gear is not None:
-            # A REAL has 24 bits; half a pulse is what the target was rounded by (MIC-14).
-            tolerance = 0.51 / gear + abs(motion.value_u) * 2.0**-22
-            if abs(position - motion.value_u) > tolerance:
-                reason, detail = Reason.DIVERTED, f"the target was {motion.value_u:g} {name}"
-        return MoveEnd(axis, reason, float(position), name, (unit.line.now() - self._begin) / SECOND, detail)
+        value, name = unit.shown(item, (await unit.read([item], data_type))[item], data_type)
+        return float(value), name
 
     async def _time_out_s(self, status: int) -> float:
         """Longest remaining time of the motion, s."""
@@ -87,6 +108,7 @@ class AxisWait:
         if status == AxisStatus.HOMING:
             return UNKNOWN_S
         position, velocity, acc, dec, vmax = await dynamics(unit, axis)
+        self._seen.append(position)
         if status == AxisStatus.VELOCITY:
             if motion is not None and motion.kind is MotionKind.VELOCITY and motion.value_u == 0.0:
                 return MARGIN * abs(velocity) / acc + MARGIN_S

@@ -21,8 +21,9 @@ _FIRST_CLIENT_PORT = 50_000
 _SERVER = bytes([127, 0, 0, 1])
 _CLIENT = bytes([127, 0, 0, 2])
 _IP_AND_TCP = 40
-_TRANSMITTED, _RECEIVED = 1, 2
-"""Of an RTAC capture: data from the master, and from the slave."""
+_TRANSMITTED, _RECEIVED = 3, 4
+"""Events of an RTAC capture: the end of data from the master, and from the slave. A record has the moment at which a frame was
+whole; with line timing its first character came earlier."""
 _TCP, _SERIAL = 0, 1
 """Numbers of the interfaces."""
 

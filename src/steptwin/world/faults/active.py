@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 from weakref import WeakSet
 
@@ -136,12 +137,14 @@ class Faults(Stateful):
     faults is not part of its state: a state is restored into the same set.
     """
 
-    FIXED: ClassVar[tuple[str, ...]] = ("elements", "has_supplies", "link", "machines", "ports", "seed", "sinks")
-    __slots__ = (*FIXED, "active")
+    FIXED: ClassVar[tuple[str, ...]] = ("_found", "elements", "has_supplies", "link", "machines", "ports", "seed", "sinks")
+    __slots__ = (*FIXED, "_active")
 
     def __init__(self, seed: int = 0) -> None:
         self.seed = seed
-        self.active: tuple[ActiveFault, ...] = ()
+        self._active: tuple[ActiveFault, ...] = ()
+        self._found: dict[tuple[str, object], tuple[ActiveFault, ...]] = {}
+        """Those of a layer, machine or element, as far as they have been asked for."""
         self.sinks: list[RecordSink] = []
         self.machines: dict[str, FaultyMachine] = {}
         """Machines prepared for faults of physics."""
@@ -153,6 +156,16 @@ class Faults(Stateful):
         """Whether machines may be without supply, so that they do not answer."""
         self.ports: WeakSet[FaultyPort] = WeakSet()
         """Ports in use, which change with programs and clients."""
+
+    @property
+    def active(self) -> tuple[ActiveFault, ...]:
+        """In the order in which they were set."""
+        return self._active
+
+    @active.setter
+    def active(self, active: tuple[ActiveFault, ...]) -> None:
+        self._active = active
+        self._found.clear()
 
     @property
     def interfere(self) -> bool:
@@ -238,28 +251,39 @@ class Faults(Stateful):
             raise Misuse(f"fault {fault.kind.name}: element = {wanted!r}: those that can fail are {there}")
         return found
 
-    def of_element(self, name: str) -> list[ActiveFault]:
+    def of_element(self, name: str) -> tuple[ActiveFault, ...]:
         """The faults of an element."""
-        return [active for active in self.active if active.fault.get("element") == name]
+        return self._those("element", name, lambda fault: fault.get("element") == name)
 
-    def of(self, machine: str) -> list[ActiveFault]:
+    def of(self, machine: str) -> tuple[ActiveFault, ...]:
         """The faults of physics of a machine."""
         only = len(self.machines) == 1
-        return [
-            active
-            for active in self.active
-            if active.fault.kind.layer is Layer.PHYSICS
-            and (active.fault.get("machine") == machine or (only and not active.fault.get("machine")))
-        ]
+
+        def belongs(fault: Fault) -> bool:
+            named = fault.get("machine")
+            return fault.kind.layer is Layer.PHYSICS and (named == machine or (only and not named))
+
+        return self._those("machine", (machine, only), belongs)
+
+    def of_layer(self, layer: Layer) -> tuple[ActiveFault, ...]:
+        """The faults of one layer."""
+        return self._those("layer", layer, lambda fault: fault.kind.layer is layer)
+
+    def _those(self, by: str, key: object, belongs: Callable[[Fault], bool]) -> tuple[ActiveFault, ...]:
+        """Those that belong to a key: every event asks for them, and they change with `active` only."""
+        found = self._found.get((by, key))
+        if found is None:
+            found = self._found[by, key] = tuple(active for active in self._active if belongs(active.fault))
+        return found
 
     def held(self, owner: str) -> dict[str, HeldLevel]:
         """The pins of a machine, or terminals of an element, that faults hold at present, as conditions name them."""
         failing = self.machines.get(owner) or self.elements.get(owner)
         return {} if failing is None else {f"{owner}.{terminal}": held for terminal, held in failing.held()}
 
-    def refusing(self) -> list[ActiveFault]:
+    def refusing(self) -> tuple[ActiveFault, ...]:
         """The faults that refuse a request."""
-        return [active for active in self.active if active.fault.refuses]
+        return self._those("refusing", None, lambda fault: fault.refuses)
 
     def _changed(self) -> None:
         for port in list(self.ports):

@@ -227,7 +227,7 @@ class FaultyMachine(Stateful):
         if not any(other == axis for *_, other in self._released):
             self.body.shafts[axis - 1].block(False, now)
 
-    def _mine(self) -> list[ActiveFault]:
+    def _mine(self) -> tuple[ActiveFault, ...]:
         return self._faults.of(self.name)
 
     def report(self, active: ActiveFault, now: Nanos, text: str) -> None:

@@ -38,7 +38,6 @@ class FaultyPort(Stateful):
         "_units",
         "deadline",
         "exchange",
-        "is_transparent",
         "line_name",
         "link",
         "to_send",
@@ -48,8 +47,6 @@ class FaultyPort(Stateful):
     exchange: Callable[[bytes, Nanos], bytes]
     to_send: Callable[[Nanos], list[tuple[Nanos, bytes]]]
     deadline: Callable[[], Nanos | None]
-    is_transparent: bool
-    """Whether calls are the inner port's own."""
 
     def __init__(
         self,
@@ -102,7 +99,6 @@ class FaultyPort(Stateful):
             self._be_transparent()
 
     def _be_transparent(self) -> None:
-        self.is_transparent = True
         self.exchange = self._inner.exchange
         self.to_send = self._inner.to_send
         self.deadline = self._inner.deadline
@@ -112,7 +108,6 @@ class FaultyPort(Stateful):
         self._held = b""
 
     def _be_faulty(self) -> None:
-        self.is_transparent = False
         self.exchange = self._exchange
         self.to_send = self._to_send
         self.deadline = self._deadline
@@ -196,11 +191,7 @@ class FaultyPort(Stateful):
         if request is None:  # asked before there were faults
             self._fresh.append((moment, 0, raw))
             return
-        faults = [
-            a
-            for a in self._faults.active
-            if a.fault.kind.layer is Layer.FRAMES and self._is_for(a) and a.fault.get("lost") != "request"
-        ]
+        faults = [a for a in self._faults.of_layer(Layer.FRAMES) if self._is_for(a) and a.fault.get("lost") != "request"]
         exchange = Exchange(self._line, request, raw)
         sent = spoil_answer(exchange, self._addressed(exchange.unit), faults, moment, self._reporter(""))
         if sent.before:
@@ -231,10 +222,8 @@ class FaultyPort(Stateful):
         return self._units[0] if self._line is LineProtocol.TCP and len(self._units) == 1 and unit in (0, 255) else unit
 
     def _bytewise(self, direction: str) -> list[ActiveFault]:
-        faults = self._faults.active
-        return [
-            a for a in faults if a.fault.kind.layer is Layer.BYTES and a.fault.get("direction") == direction and self._is_for(a)
-        ]
+        faults = self._faults.of_layer(Layer.BYTES)
+        return [a for a in faults if a.fault.get("direction") == direction and self._is_for(a)]
 
     def _is_for(self, active: ActiveFault) -> bool:
         return self._line in active.fault.kind.lines and active.is_on(self.link, self.line_name)

@@ -1452,7 +1452,7 @@ export type GearRequest = {
   lead?: number | null;
 };
 
-/** The configuration file of a controller as a form: sections, settings with meaning, unit and range, what is wrong. */
+/** The configuration of a controller as a form: sections, settings with meaning, unit and range, what is wrong. It is that of its file; without one, what its registers show. */
 export type ConfigurationRequest = {
   do: "configuration";
   /** Comes back with the answer. */
@@ -1991,7 +1991,9 @@ export type ConfigurationAnswer = {
     message: string;
     hint: string | null;
   })[];
-  /** What points get from it, in the units that the controller has now. */
+  /** false: no file; the text has what the registers of the controller show, and no more. */
+  is_file: boolean;
+  /** What points get from keys of the text, in the units that the controller has now. Without those that cannot be converted into them. */
   points: Record<string, number>;
 };
 
@@ -2032,7 +2034,9 @@ export type EditConfigurationAnswer = {
     message: string;
     hint: string | null;
   })[];
-  /** What points get from it, in the units that the controller has now. */
+  /** false: no file; the text has what the registers of the controller show, and no more. */
+  is_file: boolean;
+  /** What points get from keys of the text, in the units that the controller has now. Without those that cannot be converted into them. */
   points: Record<string, number>;
 };
 

@@ -19,6 +19,22 @@ export function changesOf(points: Form["points"], present: ReadonlyMap<string, n
     .filter(({ old, value }) => old === null || Math.fround(old) !== Math.fround(value));
 }
 
+/** What the form gives to points by the keys that `keys` has; and points of such keys that cannot be converted into the units which the
+ * controller has now. */
+export function pointsOf(form: Form, keys: ReadonlySet<string>): { points: Form["points"]; unknown: string[] } {
+  const wanted = form.sections.flatMap((one) =>
+    one.settings.filter((each) => each.point && each.text && keys.has(keyOf(one, each))).map((each) => each.point),
+  );
+  return {
+    points: Object.fromEntries(Object.entries(form.points).filter(([point]) => wanted.includes(point))),
+    unknown: wanted.filter((point) => !(point in form.points)),
+  };
+}
+
+/** Keys that a text has. */
+export const keysOf = (form: Form): Set<string> =>
+  new Set(form.sections.flatMap((one) => one.settings.filter(({ text }) => text).map((each) => keyOf(one, each))));
+
 /** The value as people see it: the word of a choice, else what is written. */
 export const shownText = ({ text, value, choices }: Setting): string =>
   choices[String(value)] ?? (text || String(value));
@@ -35,10 +51,12 @@ export function changedKeys(before: Form, now: Form): Set<string> {
 
 export const keyOf = (section: Section, setting: Setting): string => `${section.name}.${setting.name}`;
 
-/** Commands that keep a number which the controller shows in its state: its settings. */
-export function settingsOf(sheet: Datasheet, details: Readonly<Record<string, unknown>>): [Command, number][] {
-  return sheet.commands.flatMap((command): [Command, number][] => {
+/** Commands that keep a number which the state of a twin has: its settings, with their present numbers; null where these are unknown. */
+export function settingsOf(sheet: Datasheet, details: Readonly<Record<string, unknown>>): [Command, number | null][] {
+  const numbers = new Set(sheet.details.filter(({ type }) => type === "whole number").map(({ name }) => name));
+  return sheet.commands.flatMap((command): [Command, number | null][] => {
+    if (command.arguments.length !== 1 || !numbers.has(command.code)) return [];
     const value = details[command.code];
-    return command.arguments.length === 1 && typeof value === "number" ? [[command, value]] : [];
+    return [[command, typeof value === "number" ? value : null]];
   });
 }

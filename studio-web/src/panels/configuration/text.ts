@@ -5,6 +5,8 @@ export const t = texts(
     title: "Configuration",
     machine: "Controller",
     section: "Section",
+    noneDevice:
+      "{machine} has no configuration file, and no command reads its settings: their present values are unknown. They can be sent:",
     none: "{machine} has no configuration file. Its settings, by the data sheet:",
     open: "Open file",
     save: "Save file",
@@ -12,7 +14,13 @@ export const t = texts(
     undoEdit: "Undo",
     setting: "{section} {name}",
     usual: "{value} where it is not in the file",
+    unknown: "unknown",
+    notReadable: "cannot be read from the controller",
+    ofRegisters:
+      "Read from the registers of {machine}. What no register shows is empty. Open its file to see all settings, or connect it with config=FILE.",
+    again: "Read again",
     findings: "Wrong in this file",
+    findingsHere: "Wrong here",
     noFindings: "The checker finds nothing.",
     line: "Line {line}",
     gear: "GEAR from mechanics",
@@ -24,6 +32,11 @@ export const t = texts(
     noUnit: "The unit {unit} needs the lead.",
     write: "Write to {machine}",
     writeWhat: "Registers that change",
+    writeHelpDevice:
+      "Registers have these values until power-off. The rest of the file takes effect when it is in the controller: save it, and put it there with the vendor's program.",
+    nothingChanged: "Nothing was changed here that a register has.",
+    noScale:
+      "{points} cannot be written: the pulses per unit that {machine} has are not known, so the values of a file with Gear cannot be converted. Connect it with config=FILE.",
     writeHelp:
       "Registers have these values until power-off. The rest of the file takes effect when the controller starts with it: save it, and name it in the description (config = …), or put it into the controller with the vendor's program.",
     nothing: "The registers have the values of the file.",
@@ -46,6 +59,8 @@ export const t = texts(
     title: "Konfiguracja",
     machine: "Sterownik",
     section: "Sekcja",
+    noneDevice:
+      "{machine} nie ma pliku konfiguracji, a żadne polecenie nie czyta jego nastaw: ich obecne wartości są nieznane. Można je wysłać:",
     none: "{machine} nie ma pliku konfiguracji. Jego nastawy według karty katalogowej:",
     open: "Otwórz plik",
     save: "Zapisz plik",
@@ -53,7 +68,13 @@ export const t = texts(
     undoEdit: "Cofnij",
     setting: "{section} {name}",
     usual: "{value}, gdy nie ma w pliku",
+    unknown: "nieznane",
+    notReadable: "nie da się odczytać ze sterownika",
+    ofRegisters:
+      "Odczytano z rejestrów {machine}. Czego nie pokazuje żaden rejestr, jest puste. Otwórz jego plik, aby zobaczyć wszystkie nastawy, albo połącz go z config=PLIK.",
+    again: "Odczytaj ponownie",
     findings: "Błędy w tym pliku",
+    findingsHere: "Błędy",
     noFindings: "Sprawdzanie nic nie znajduje.",
     line: "Wiersz {line}",
     gear: "GEAR z mechaniki",
@@ -65,6 +86,11 @@ export const t = texts(
     noUnit: "Jednostka {unit} wymaga skoku.",
     write: "Zapisz do {machine}",
     writeWhat: "Rejestry, które się zmienią",
+    writeHelpDevice:
+      "Rejestry mają te wartości do wyłączenia zasilania. Reszta pliku działa, gdy jest w sterowniku: zapisz go i wgraj programem producenta.",
+    nothingChanged: "Nie zmieniono tu niczego, co ma rejestr.",
+    noScale:
+      "{points}: zapis niemożliwy, bo nie wiadomo, ile impulsów na jednostkę ma {machine}, a wartości pliku z Gear nie da się przeliczyć. Połącz go z config=PLIK.",
     writeHelp:
       "Rejestry mają te wartości do wyłączenia zasilania. Reszta pliku działa, gdy sterownik z nim startuje: zapisz go i podaj w opisie (config = …) albo wgraj programem producenta.",
     nothing: "Rejestry mają wartości z pliku.",

@@ -21,7 +21,10 @@ export const t = texts(
     help: "A click sets a level until something else changes it, such as a switch of the machine. A forced input keeps its level until it is free again: ▢ amber.",
     volts: "Level of {pin}",
     none: "This controller has no pins.",
-    readOnly: "The levels of a real device can only be looked at.",
+    ofDevice: "Inputs of a device are only read, outputs and drives can be switched.",
+    notShown: "What no register shows is left out: {pins}.",
+    notAsked:
+      "No register shows the levels of its pins, and they are not asked for: that would overwrite a value that its program may need.",
     shown: "What is shown",
     levels: "Levels",
     wiring: "Wiring",
@@ -54,7 +57,10 @@ export const t = texts(
     help: "Kliknięcie ustawia poziom, dopóki nie zmieni go coś innego, na przykład krańcówka maszyny. Wymuszone wejście trzyma poziom, aż znów będzie wolne: ▢ bursztynowy.",
     volts: "Napięcie {pin}",
     none: "Ten sterownik nie ma wejść ani wyjść.",
-    readOnly: "Poziomy prawdziwego urządzenia można tylko oglądać.",
+    ofDevice: "Wejścia urządzenia można tylko czytać, wyjścia i napędy można przełączać.",
+    notShown: "Pominięto to, czego nie pokazuje żaden rejestr: {pins}.",
+    notAsked:
+      "Żaden rejestr nie pokazuje poziomów jego końcówek, a pytanie o nie zastąpiłoby wartość, której może potrzebować jego program.",
     shown: "Co jest pokazane",
     levels: "Poziomy",
     wiring: "Okablowanie",

@@ -17,3 +17,6 @@ class Mic488Configuration:
 
     def with_values(self, text: str, name: str, changes: Mapping[str, str]) -> str:
         return configform.with_values(text, name, changes)
+
+    def known(self, values: Mapping[str, tuple[float | None, str]], sheet: Datasheet) -> Mapping[str, str]:
+        return configform.known_settings(values, [(axis.unit, axis.pulses_per_unit) for axis in sheet.axes])

@@ -147,9 +147,6 @@ class ModbusBus(Line):
             port = RtuSlavePort(devices, gap_ns=gap, line=wire, on_frame=observe, on_pause=on_pause)
         return port if self._seeing is None or place == SCRIPTS else Com1Port(self._seeing, port)
 
-    def _answers_at_once(self, kind: str) -> bool:
-        return kind == "tcp" and self._timed is None
-
     @property
     def baud(self) -> int:
         return self._baud

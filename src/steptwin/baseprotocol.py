@@ -1,10 +1,13 @@
-"""Messages of the Debug Adapter Protocol as bytes: a header with the length, then JSON."""
+"""Messages of JSON-RPC and of the Debug Adapter Protocol on a stream: a header with the length, then the body.
+
+Nothing in the stream marks where a message begins, so behind a wrong header no byte can be trusted: the session ends.
+"""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 from steptwin.errors import Misuse
 from steptwin.numerals import read_whole
@@ -15,12 +18,14 @@ LONGEST_LINE = 1000
 _LENGTH = b"content-length:"
 
 
-def read_message(stream: BinaryIO) -> dict[str, Any] | None:
-    """The next message; None at the end of the stream. Raises `Misuse` for what is no message."""
+def read_body(stream: BinaryIO) -> bytes | None:
+    """The body of the next message; None at the end of the stream, also inside a message. Raises `Misuse` for a wrong header."""
     length: int | None = None
     while True:
         line = stream.readline(LONGEST_LINE)
-        if not line:
+        if not line.endswith(b"\n"):
+            if len(line) == LONGEST_LINE:
+                raise Misuse(f"header {line[:40].decode('latin-1')!r}…: a line of more than {LONGEST_LINE} bytes")
             return None
         text = line.strip()
         if text.lower().startswith(_LENGTH):
@@ -32,18 +37,10 @@ def read_message(stream: BinaryIO) -> dict[str, Any] | None:
             break
         elif text and b":" not in text:
             raise Misuse(f"header {text[:40].decode('latin-1')!r}: expected Content-Length")
-    data = stream.read(length)
-    if len(data) < length:
-        return None
-    try:
-        message = json.loads(data)
-    except (ValueError, RecursionError) as error:
-        raise Misuse(f"this is no JSON: {error}") from None
-    if not isinstance(message, dict):
-        raise Misuse("a message is an object of JSON")
-    return message
+    body = stream.read(length)
+    return body if len(body) == length else None
 
 
 def message_bytes(message: Mapping[str, object]) -> bytes:
-    data = json.dumps(message, ensure_ascii=False, separators=(",", ":")).encode(errors="replace")
-    return b"Content-Length: %d\r\n\r\n" % len(data) + data
+    body = json.dumps(message, ensure_ascii=False, separators=(",", ":")).encode(errors="replace")
+    return b"Content-Length: %d\r\n\r\n" % len(body) + body
