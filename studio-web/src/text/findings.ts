@@ -446,6 +446,11 @@ export const FINDINGS: Readonly<Record<string, string>> = {
   "A {acceleration} is large for S {start}; the table of permitted pairs is not available":
     "A {acceleration} jest duże jak na S {start}; tabela dozwolonych par nie jest dostępna",
   "up to {times} times S is taken to be safe": "do {times} razy S uważa się za bezpieczne",
+  "the file comes to its end from label {label} and finds this J behind it, again and again":
+    "plik dochodzi do końca od etykiety {label} i trafia za sobą na to J, w kółko",
+  "end it with a loop, such as @9 W1000 J9, which wrong data end":
+    "zakończ go pętlą, na przykład @9 W1000 J9, którą kończą błędne dane",
+  "{name} (U+{code}), which is no blank to the chip": "{name} (U+{code}), która dla układu nie jest odstępem",
   "the distance {distance} ends in steps of M{m} at {speed} step/s, above the {limit} step/s of M{m2}":
     "odcinek {distance} kończy się krokami M{m} przy {speed} krok/s, powyżej {limit} krok/s dla M{m2}",
   "a multiple of {size} is made in steps of Q{q}; S up to {limit} step/s goes with any distance":
