@@ -126,6 +126,7 @@ NOT_FIXED = {
     **dict.fromkeys(("W146", "W209"), "the values of the row are the author's"),
     **dict.fromkeys(("W201", "W202", "W203", "W205", "W210", "W218", "W219", "W221"), _WAY),
     **dict.fromkeys(("W204", "M207"), "the code is needless, or the way to it is missing"),
+    "W224": "which number is meant is the author's to say",
     "W213": "what is read instead depends on what it is for",
     "W215": "the position table is a file",
     UNUSED_ROW: "without it all later rows have other numbers",
