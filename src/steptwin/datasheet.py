@@ -218,7 +218,7 @@ class Datasheet:
     commands: tuple[CommandDescription, ...]
     events: tuple[EventDescription, ...]
     program_actions: tuple[str, ...] = ()
-    """What can be done with its program on command: ``start``, ``pause``, ``stop``; empty where it has none."""
+    """Actions on its program: ``start``, ``pause``, ``stop``; empty where it has none."""
     end_switches_off: bool = False
     """Whether the end of its program switches drives and outputs off."""
     details: tuple[Detail, ...] = ()

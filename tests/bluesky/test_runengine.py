@@ -229,15 +229,17 @@ def test_a_program(table: Mic488Controller, engine: RunEngine) -> None:
         engine(kicked_off_twice(program))
     assert "the program is running" in failure(again)
 
-    def stopped() -> MsgGenerator:
-        yield from bps.wait_for([program.stop])
+    def stopped(*, success: bool) -> MsgGenerator:
+        yield from bps.wait_for([table.driver.program.stop])
         yield from bps.trigger(program, group="program")
         yield from bps.sleep(0.2)
-        yield from bps.wait_for([lambda: program.stop(success=False)])
+        yield from bps.wait_for([lambda: program.stop(success=success)])
         yield from bps.wait(group="program")
 
+    engine(stopped(success=True))
+    assert of_driver(table.driver.program.state()) is ProgramState.PAUSED, "its end would switch drives off"
     with pytest.raises(FailedStatus) as ended:
-        engine(stopped())
+        engine(stopped(success=False))
     assert "table-program was stopped" in failure(ended)
 
 

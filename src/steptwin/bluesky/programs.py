@@ -23,7 +23,7 @@ class RunnableProgram(Device, Triggerable, Flyable, Stoppable):
     def __init__(self, mic: AsyncMic488, place: Callable[[], str], name: str = "") -> None:
         self._mic = mic
         self._place = place
-        self._is_stopped = False
+        self._is_stopped = self._is_failure = False
         super().__init__(name)
 
     @AsyncStatus.wrap
@@ -43,16 +43,18 @@ class RunnableProgram(Device, Triggerable, Flyable, Stoppable):
         await self._over()
 
     async def stop(self, success: bool = True) -> None:
-        """With ``success``, end it, which switches drives and outputs off; `complete` sees no error. Without, as when a plan is
-        aborted, pause it and stop all axes: drives hold their load."""
-        self._is_stopped = not success
-        await (self._mic.program.stop() if success else self._mic.halt())
+        """Pause it and stop all axes: drives hold their load. Without ``success`` a `complete` that follows fails.
+
+        The end of a program switches drives and outputs off: that is ``program.stop`` of the driver.
+        """
+        self._is_stopped, self._is_failure = True, not success
+        await self._mic.halt()
 
     async def _start(self) -> None:
         state = await self._mic.program.state()
         if state is not ProgramState.STOPPED:
             raise Refusal(f"{self._place()}: the program is {state.name.lower()}")
-        self._is_stopped = False
+        self._is_stopped = self._is_failure = False
         await self._mic.program.start()
 
     async def _over(self) -> None:
@@ -60,7 +62,7 @@ class RunnableProgram(Device, Triggerable, Flyable, Stoppable):
             if self._is_stopped or await self._mic.program.state() is ProgramState.STOPPED:
                 break
             await asyncio.sleep(PERIOD_S)
-        if self._is_stopped:
+        if self._is_failure:
             raise RuntimeError(f"{self.name} was stopped; its program is paused")
         code = (await self._mic.status()).controller
         if code is not None and (status := controller_status(code)).level is StatusLevel.ERROR:

@@ -45,7 +45,7 @@ ValueAndUnit: TypeAlias = tuple[float | None, str]
 
 
 class RawEffect(Enum):
-    """What a raw request, or a write of registers, does."""
+    """Effect of a raw request, or of a write of registers."""
 
     LOOK = "look"
     WRITE = "write"
@@ -97,7 +97,7 @@ class DevicePart(Protocol):
         ...
 
     def effect_of(self, wanted: steps.Request | steps.Write) -> RawEffect:
-        """What a raw request, of which nothing else is known, or a write of registers does. Raises `Misuse` for an unknown
+        """Effect of a raw request, of which nothing else is known, or of a write of registers. Raises `Misuse` for an unknown
         register."""
         ...
 

@@ -43,7 +43,7 @@ class HistoryKeeper:
         self._task: asyncio.Task[None] | None = None
         self._has_room = True
         self._head: RunHead | None = None
-        """Of a run that has begun while there was no room."""
+        """Head of a run that has begun while there was no room."""
         self._failed: str | None = None
         """Why nothing is kept any more."""
 

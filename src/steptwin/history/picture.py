@@ -21,7 +21,7 @@ _COLORS = (POSITION_COLOR, VELOCITY_COLOR)
 def draw(series: Mapping[str, Sequence[PointSeries]], file: IO[bytes], form: str) -> None:
     """For each title one series over the date, or two over the time since their begin. ``form`` is png or svg.
 
-    Raises `Misuse` for what is no number."""
+    Raises `Misuse` for what is not a number."""
     if len(series) > MOST_PANELS:
         raise Misuse(f"{len(series)} points: a picture shows at most {MOST_PANELS}")
     with rc_context(STYLE):

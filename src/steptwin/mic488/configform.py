@@ -121,7 +121,7 @@ def with_values(text: str, name: str, changes: Mapping[str, str]) -> str:
 
 
 def _units(file: IniFile, config: ControllerConfig, gears: Sequence[float | None]) -> list[str]:
-    """Of the axes; ``u`` where neither the file nor the running controller tells."""
+    """Units of the axes; ``u`` where neither the file nor the running controller tells."""
     is_unknown = [
         number < len(gears) and gears[number] is None and file.find(f"Axis{number}", "Unit") is None for number in range(AXES)
     ]
@@ -129,7 +129,7 @@ def _units(file: IniFile, config: ControllerConfig, gears: Sequence[float | None
 
 
 def _points(file: IniFile, axes: Iterable[AxisConfig], gears: Sequence[float | None]) -> Iterator[tuple[str, float]]:
-    """Of the keys in the file. Where the pulses per unit are not known, a file without GEAR is in the units that the axis has."""
+    """Values of the keys in the file, by point. Without pulses per unit a file without GEAR is in the units of the axis."""
     for number, (axis, gear) in enumerate(zip(axes, gears, strict=False)):
         section = f"Axis{number}"
         if gear is None and file.find(section, "Gear") is not None:

@@ -113,7 +113,7 @@ def user_item(registers: RegisterMap, number: int, view: UserFormat, count: int 
 
 
 def value_of(register: Register, typed: str) -> float:
-    """What was typed as a number, that of a word also hexadecimal, as ``on``, or as the name of a value. Raises `Misuse`."""
+    """Value of a typed text: a number, that of a word also hexadecimal, ``on``, or the name of a value. Raises `Misuse`."""
     text = typed.strip()
     for number, name in register.values.items():
         if text.lower() == name.lower():

@@ -15,7 +15,7 @@ from steptwin.world.programtexts import FINDING
 
 
 class Configurations:
-    """Of the controllers of a subject. ``given``: their files by name, None without one; ``present`` reads points."""
+    """Configurations of controllers. ``given``: their files by name, None without one; ``present`` reads points."""
 
     def __init__(
         self,

@@ -60,7 +60,7 @@ class Editors:
         await send({"type": "websocket.accept"})
         try:
             async with asyncio.timeout(HELLO_S):
-                self._enter((await receive()).get("text"))
+                token = self._enter((await receive()).get("text"))
         except TimeoutError:
             await _end(send, SILENT, Misuse("the first message is hello"))
         except SteptwinError as error:
@@ -68,20 +68,22 @@ class Editors:
         else:
             self._count += 1
             try:
-                await self._converse(receive, send, scope["state"]["writer"].abort)
+                await self._converse(receive, send, scope["state"]["writer"].abort, token)
             finally:
                 self._count -= 1
 
-    def _enter(self, text: str | None) -> None:
-        """Raises `Misuse` and `Refusal`."""
+    def _enter(self, text: str | None) -> str | None:
+        """The token that was given. Raises `Misuse` and `Refusal`."""
         message = read_message((text or "").encode("utf-8", "replace"))
         if message["do"] != "hello":
             raise Misuse("the first message is hello")
-        self._gate.enter(read_fields("hello", REQUESTS["hello"].fields, fields_of(message))["token"])
+        token: str | None = read_fields("hello", REQUESTS["hello"].fields, fields_of(message))["token"]
+        self._gate.enter(token)
         if self._count >= MOST_EDITORS:
             raise Refusal(f"there are {MOST_EDITORS} editors already, the most possible")
+        return token
 
-    async def _converse(self, receive: AsgiReceive, send: AsgiSend, abort: Callable[[], None]) -> None:
+    async def _converse(self, receive: AsgiReceive, send: AsgiSend, abort: Callable[[], None], token: str | None) -> None:
         loop = asyncio.get_running_loop()
         outgoing: asyncio.Queue[str] = asyncio.Queue(MOST_WAITING)
 
@@ -106,6 +108,7 @@ class Editors:
                 text = message.get("text")
                 if text is None:
                     raise Misuse("a message is a text of JSON; this one is binary")
+                self._gate.enter(token)  # it may be asked for since a device was connected
                 if not limit.allows(self._clock()):
                     raise Refusal(f"too many messages: permitted are {RATE:g} a second")
                 if await self._elsewhere(lambda text=text: _receive(there, text)) > MOST_DOCUMENTS:

@@ -443,7 +443,7 @@ OF_DRAWINGS = frozenset(row.name for row in DRAWINGS)
 OF_PLANT = frozenset(row.name for row in PLANT)
 """What needs a world."""
 WITH_TOKEN = frozenset({"connect", *(row.name for row in WORKS)})
-"""What reaches devices, or tells of them: it needs a token also where nothing else does."""
+"""Requests that reach devices, or describe them: they need a token also where nothing else does."""
 OF_CAMPAIGNS = frozenset(row.name for row in CAMPAIGNS)
 """What needs a world of a file."""
 OF_CONNECTION = frozenset({"follow", "unfollow", *(row.name for row in _ROWS if row.is_of_connection)})

@@ -1,4 +1,4 @@
-"""What does the requests of `steptwin.studio.toolrequests` that need no controller."""
+"""Actions of the requests of `steptwin.studio.toolrequests` that need no controller."""
 
 from __future__ import annotations
 

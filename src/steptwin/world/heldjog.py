@@ -15,7 +15,7 @@ from steptwin.world import script as do
 
 REST_NS: Nanos = 300 * MILLISECOND
 STOP_NS: Nanos = 270 * MILLISECOND
-"""What is left of `REST_NS` is for the stop to get over a line."""
+"""The rest of `REST_NS` is for the stop to get over a line."""
 
 Given: TypeAlias = Sequence[do.Write | do.Send]
 """What goes to the controller at the present moment."""

@@ -21,7 +21,7 @@ PROBE_TRIES = 2
 
 _GATEWAY_CODES = (0x0A, pdu.GATEWAY_TARGET_FAILED)
 _VAGUE_CODES = (pdu.DEVICE_FAILURE, pdu.DEVICE_BUSY)
-"""What some gateways answer in place of these where there is no device."""
+"""Exceptions that some gateways answer in place of these where there is no device."""
 _NO_UNIT = 248
 """A unit that no device has: slave addresses end at 247. A gateway for which it answers passes every number on to one device."""
 _NEW, _OLD = "1.70", "1.23"

@@ -59,7 +59,7 @@ class ChipLine(Line):
         return super().exchange(place, found, data, now)
 
     def recall(self, unit: int, now: Nanos) -> None:
-        """What a fault holds up of it comes to the chips at once, where a stop drops it."""
+        """Bytes that a fault holds up come to the chips at once, where a stop drops them."""
         self.places[SCRIPTS].port.hasten(now)
 
     @property
