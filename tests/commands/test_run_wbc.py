@@ -329,9 +329,11 @@ def test_travel_as_people_type_it() -> None:
         SwitchTravel(4, None, 7.0),
         SwitchTravel(2, -1.5, None),
     ]
-    for text in ("M5=1..2", "M1=5", "X=1..2", "M1=a..2", "M0=1..2"):
+    for text in ("M5=1..2", "M1=5", "X=1..2", "M0=1..2"):
         with pytest.raises(Misuse, match=r"^--travel .*: expected Mn=LOW\.\.HIGH, such as M1=-10\.\.250"):
             parse_travel(text)
+    with pytest.raises(Misuse, match=r"^--travel M1=a\.\.2: 'a' is not a number"):
+        parse_travel("M1=a..2")
     with pytest.raises(Misuse, match=r"--travel M1=5\.\.2: 5 must be below 2"):
         parse_travel("M1=5..2")
 

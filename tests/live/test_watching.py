@@ -116,7 +116,7 @@ def test_a_follower_that_was_too_slow_begins_anew(scene: Scene, monkeypatch: pyt
     scene.twin.do(command.Enable("mic488", 1))
     for to in (5.0, 10.0):
         for number in range(1, 9):
-            scene.twin.do(do.Write((("mic488", f"OUT{number}", to > 5.0),)))
+            scene.twin.do(do.Write((("mic488", f"OUT{number}", float(to > 5.0)),)))
         scene.twin.do(command.Move("mic488", 1, to=to))
         scene.step(5 * SECOND)
         for _ in range(2):
