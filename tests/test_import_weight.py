@@ -25,7 +25,6 @@ HEAVY = {
     "rich",
     "serialx",
     "starlette",
-    "textual",
     "uvicorn",
     "uvloop",
 }

@@ -129,6 +129,7 @@ def test_in_a_studio_a_script_that_stops_is_reported_and_time_goes_on() -> None:
     live = LiveWorld(World.from_toml(STOPPING))
     told = live.subject.follow(filter_of(["status"]), 9)
     live.advance(5 * SECOND)
+    assert session_of(live.world).replay().trace.digest() == live.world.trace.digest()
     assert (live.now, live.world.stopped) == (5 * SECOND, None)
     assert [(event.time, event.text) for event in told.take().events] == [(SECOND, "a script would end the run here: enough")]
 

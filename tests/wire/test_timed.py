@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from steptwin.errors import Misuse
+from steptwin.machine import MILLISECOND
 from steptwin.wire import rtu
 from steptwin.wire.crc import with_crc
 from steptwin.wire.line import SerialLine
@@ -380,3 +381,15 @@ def test_what_arrives_before_an_execution_is_due_is_seen_before_it(new_bank: New
 def test_mic_1_functions_that_a_unit_hears(bank: Any, function: int, units: list[int]) -> None:
     """1 to 127: what no request can have is for nobody."""
     assert TimedUnits({1: bank}, LineTiming(SerialLine(115200))).addressed(1, function) == units
+
+
+def test_a_request_to_all_that_waits_does_not_make_the_line_due_in_the_past(new_bank: NewBank) -> None:
+    """One to unit 1 is served, one to all waits for it, one to unit 2 waits for that: nothing is due before the first ends."""
+    units = TimedUnits({1: new_bank(), 2: new_bank()}, TIMING)
+    first = units.wait((1,), 1_000_000)
+    units.done(first, 1_000_000, 20 * MILLISECOND)
+    to_all = units.wait((1, 2), 3_000_000)
+    last = units.wait((2,), 4_000_000)
+    assert units.due(to_all) >= 20 * MILLISECOND
+    assert units.due(last) >= units.due(to_all)
+    assert not units.serves(last)

@@ -44,11 +44,6 @@ class DeviceFile:
     history: HistorySpec | None
 
 
-def is_device_file(name: str, text: str) -> bool:
-    """Whether the file ``name`` lists devices, rather than a world."""
-    return not TomlText(name, text).data.keys().isdisjoint((DEVICE, BRIDGE))
-
-
 def read_device_file(name: str, text: str) -> DeviceFile:
     """The file ``name`` with this text. Raises `WorldError` with everything that is wrong with it."""
     toml = TomlText(name, text)

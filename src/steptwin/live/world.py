@@ -15,6 +15,7 @@ from steptwin.live.cell import Cell
 from steptwin.live.sharedreads import share_reads
 from steptwin.live.tracedport import traced
 from steptwin.machine import Nanos
+from steptwin.subject.payloads import StatusPayload
 from steptwin.subject.world import WorldSubject
 from steptwin.tracing import is_traced
 from steptwin.wire.slave import SlaveDevice
@@ -23,9 +24,12 @@ from steptwin.world.history import History
 from steptwin.world.kernel import Kernel
 from steptwin.world.kinds import line_kinds
 from steptwin.world.lines import LineEndPoint
+from steptwin.world.plant import WORLD
 from steptwin.world.plantsnapshot import PlantSnapshot
 from steptwin.world.turns import Dues
 
+MOST_PASSED = 100
+"""Stops of scripts that are passed in one advance; a script that stops once more does so for good."""
 MOST_INPUTS = 200_000
 MOST_INPUT_BYTES = 16 << 20
 """Size at which a recorded session ends, so that memory and file stay bounded."""
@@ -107,7 +111,7 @@ class LiveWorld:
         self.companion: Companion | None = None
         """``stale`` is to be set when its deadline has changed."""
         self.on_stop: Callable[[], None] | None = None
-        """Called when a script has stopped the world. None: only the script ends, which is reported, and the world goes on."""
+        """Called when a script has stopped the world. None: that is reported, and the world goes on."""
         self.run_control: RunControl | None = None
         self.on_break: Callable[[], None] = lambda: None
         """Called where the run control has stopped the world."""
@@ -236,7 +240,7 @@ class LiveWorld:
                 return
 
     def _advance(self, now: Nanos) -> None:
-        world = self.world
+        world, passed = self.world, 0
         while True:
             while (due := self._due()) is not None and due <= now:
                 world.advance(due)
@@ -252,7 +256,17 @@ class LiveWorld:
             if self.on_stop is not None:
                 self.on_stop()
                 return
-            world.pass_stop()
+            if passed == MOST_PASSED:
+                return
+            passed += 1
+            self._pass_stop(world.stopped)
+
+    def _pass_stop(self, reason: str) -> None:
+        """Report it without a record: a replay goes on as well."""
+        text = f"a script would end the run here: {reason}"
+        self.show(text)
+        self.subject.publish(self.now, WORLD, StatusPayload("script-stop", text))
+        self.world.go_on()
 
     def deadline(self) -> Nanos | None:
         self._next = self._due()

@@ -79,15 +79,20 @@ class LineSplitter:
         *lines, self._begun = (self._begun + data).split(b"\r")
         for line in lines:
             self._log.received(now, self._link, line + b"\r")
-        if len(self._begun) > LONGEST_LINE or _HAS_LINES.search(self._begun):
+        if len(self._begun) > LONGEST_LINE or _has_lines(self._begun):
             self._log.received(now, self._link, self._begun)
             self._begun = b""
+
+
+def _has_lines(raw: bytes) -> bool:
+    """Whether the first characters have two lines that end with line feeds alone."""
+    return raw.count(b"\n", 0, LONGEST_LINE) > 1 and _HAS_LINES.search(raw[:LONGEST_LINE]) is not None
 
 
 def _typed(raw: bytes, variant: Variant) -> str:
     text = raw.decode("latin-1").strip()
     if raw[-1] != CR:
-        if _HAS_LINES.search(raw):
+        if _has_lines(raw):
             return f"{len(raw)} characters without CR: a line feed ends no command"
         return f"{len(raw)} characters without CR"
     line, found = parse_line(text)

@@ -120,7 +120,9 @@ class Com1Port(Stateful):
         return None if self.modbus is None else self.modbus.deadline()
 
     def close(self) -> None:
-        """The port has nothing to release."""
+        """The requests that wait are not executed."""
+        if self.modbus is not None:
+            self.modbus.close()
 
 
 def uses_vision(program: LoadedProgram) -> bool:

@@ -395,6 +395,8 @@ class StrictRtuFramer(RtuFramer):
         if silence < self.gap_ns:
             self._due = self._last + self.gap_ns
             del held[MAX_FRAME + 1 :]
+            while len(self._pieces) > MAX_FRAME + 1:
+                self._pieces.pop()
             return
         self._due = None
         found, end = [], 0

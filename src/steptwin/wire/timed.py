@@ -89,8 +89,14 @@ class TimedUnits(Stateful):
         self._waiting.pop(turn, None)
 
     def due(self, turn: Turn) -> Nanos:
-        """When the units of a request are free for it, as far as is known now: others may come before it (`serves`)."""
-        return max(turn.arrival, *(max(self._next[unit], self._busy[unit]) for unit in self._waiting[turn]))
+        """When the units of a request are free for it, as far as is known now: not before the requests before it (`serves`)."""
+        free = {unit: max(self._next[unit], self._busy[unit]) for unit in self._next}
+        moment = turn.arrival
+        for other in sorted(other for other in self._waiting if other <= turn):
+            units = self._waiting[other]
+            moment = max(other.arrival, *(free[unit] for unit in units))
+            free |= dict.fromkeys(units, moment)
+        return moment
 
     def serves(self, turn: Turn) -> bool:
         """Whether none of its units has an earlier request."""

@@ -447,11 +447,6 @@ class Plant:
         """Let a stopped world continue."""
         self.stopped = None
 
-    def pass_stop(self) -> None:
-        """Let a world go on that a script has stopped, and report why it did."""
-        self.trace.add(TraceRecord(self.now, WORLD, "event", "script-stop", f"a script would end the run here: {self.stopped}"))
-        self.go_on()
-
     # ------------------------------------------------------------------ snapshots
 
     def snapshot(self, *, with_inputs: bool = True) -> PlantSnapshot:

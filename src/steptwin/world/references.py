@@ -152,6 +152,8 @@ def _power_cycle(plant: Plant, step: do.PowerCycle) -> None:
 def _halt(plant: Plant, given: Halt) -> None:
     kind = plant.kind(given.machine)
     axes = len(plant.machine(given.machine).axes)
+    if given.program not in (None, "pause", "stop"):
+        raise Misuse(f"program = {given.program!r}: permitted are pause and stop")
     if given.axis is not None and not 1 <= given.axis <= axes:
         raise Misuse(f"axis = {given.axis}: {given.machine!r} is {kind.title}, which has axes 1 to {axes}")
 

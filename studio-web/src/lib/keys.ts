@@ -18,7 +18,7 @@ export const NUMBERED = 9;
 /** Whether the focus is in something that Escape leaves: a text, a list that may be open. */
 export const isInField = (event: KeyboardEvent): boolean => {
   const target = originOf(event);
-  return isInText(target) || (target instanceof Element && target.closest("input, select") !== null);
+  return isInText(target) || (target instanceof Element && target.closest("select") !== null);
 };
 
 /** Buttons and pads that jog for as long as they are held are marked while they do. */

@@ -10,8 +10,9 @@ from typing import IO, TypeAlias
 from steptwin.errors import Misuse
 from steptwin.files.export.axes import AxisViews
 from steptwin.files.export.records import begin_records, end_records, record_line
-from steptwin.files.writing import new_text
+from steptwin.files.writing import is_written_directly, new_text
 from steptwin.machine import Nanos
+from steptwin.numerals import read_whole
 from steptwin.system import reason
 from steptwin.world.trace import Trace, TraceRecord
 
@@ -63,10 +64,14 @@ class TraceFile:
         self._show = show
         self._failure: str | None = None
         try:
-            with new_text(path) as file:
-                file.write(begin_records(trace, views, title))
-                file.writelines(map(record_line, trace))
-            self._file: IO[str] = path.open("a", buffering=1, encoding="utf-8", newline="")  # each line is there at once
+            is_stream = is_written_directly(path)  # who reads from it would see its end if it were opened again
+            if not is_stream:
+                with new_text(path) as file:
+                    _begin(file, trace, views, title)
+            mode = "w" if is_stream else "a"
+            self._file: IO[str] = path.open(mode, buffering=1, encoding="utf-8", newline="")  # each line is there at once
+            if is_stream:
+                _begin(self._file, trace, views, title)
         except OSError as error:
             raise Misuse(f"cannot write {path}: {reason(error)}") from error
         trace.watchers.append(self._add)
@@ -98,6 +103,11 @@ class TraceFile:
             raise Misuse(self._failure)
 
 
+def _begin(file: IO[str], trace: Trace, views: AxisViews, title: str) -> None:
+    file.write(begin_records(trace, views, title))
+    file.writelines(map(record_line, trace))
+
+
 Kept: TypeAlias = int | Path | None
 """What is kept of a trace: a number of records, a file or directory, or None."""
 
@@ -109,6 +119,7 @@ def read_kept(text: str) -> Kept:
     word, _, number = text.partition(" ")
     if word != "ring":
         return Path(text)
-    if not number.strip().isdecimal() or not 1 <= int(number) <= MOST_IN_RING:
+    records = read_whole(number.strip())
+    if records is None or not 1 <= records <= MOST_IN_RING:
         raise Misuse(f"trace = {text!r}: a ring takes a number of records from 1 to {MOST_IN_RING}, such as 'ring 10000'")
-    return int(number)
+    return records

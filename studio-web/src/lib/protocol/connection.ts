@@ -137,7 +137,7 @@ export class Connection {
       "the connection was lost before the answer came; whether it was done is not known",
     );
     for (const [id, waiting] of this.waiting) this.reject(id, waiting, error);
-    if (code === NO_TOKEN) return; // it would be refused again
+    if (code === NO_TOKEN && this.stateNow === "refused") return; // it would be refused again
     this.enter("connecting");
     const wait = BACK_OFF_MS[Math.min(this.attempts++, BACK_OFF_MS.length - 1)] as number;
     this.timers.set(() => this.open(), wait);
