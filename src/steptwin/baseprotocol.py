@@ -18,6 +18,11 @@ LONGEST_LINE = 1000
 _LENGTH = b"content-length:"
 
 
+def own_stdin() -> BinaryIO:
+    """Standard input with a buffer of its own: the interpreter cannot end while a thread waits in that of ``sys.stdin``."""
+    return open(0, "rb", closefd=False)
+
+
 def read_body(stream: BinaryIO) -> bytes | None:
     """The body of the next message; None at the end of the stream, also inside a message. Raises `Misuse` for a wrong header."""
     length: int | None = None

@@ -14,6 +14,7 @@ from types import MappingProxyType
 
 from steptwin.errors import Misuse
 from steptwin.nearmiss import NearMiss
+from steptwin.numerals import read_number
 
 
 class Dimension(Enum):
@@ -116,9 +117,7 @@ def read_quantity(text: str, dimension: Dimension) -> tuple[float, str | None]:
     match = _TEXT.match(text.strip())
     if match is None:
         raise Misuse(f"{text!r} is not a number with a unit: expected such as {_EXAMPLES[dimension]}")
-    value, suffix = float(match[1].replace(",", ".")), match[2].lower().replace("s2", "s²").replace("s^2", "s²")
-    if not isfinite(value):
-        raise Misuse(f"{text!r} is too large")
+    value, suffix = read_number(match[1]), match[2].lower().replace("s2", "s²").replace("s^2", "s²")
     if not suffix:
         return value, None
     if dimension is Dimension.TIME:

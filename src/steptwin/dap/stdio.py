@@ -12,14 +12,14 @@ from queue import Empty, SimpleQueue
 from threading import Thread
 from typing import Any, BinaryIO
 
-from steptwin.baseprotocol import message_bytes, read_body
+from steptwin.baseprotocol import message_bytes, own_stdin, read_body
 from steptwin.dap.adapter import Adapter
 from steptwin.errors import Misuse, SteptwinError
 
 
 def serve_stdio() -> None:
     """Serve an editor until it goes away."""
-    source, target = sys.stdin.buffer, sys.stdout.buffer
+    source, target = own_stdin(), sys.stdout.buffer
     sys.stdout = sys.stderr  # nothing but messages may go there
     serve(source, target)
 

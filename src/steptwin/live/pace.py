@@ -44,10 +44,7 @@ def read_speed(text: str, least: float = SLOWEST) -> float:
     """Parse a speed, virtual seconds per second; infinite for ``max``. Raises `Misuse`."""
     if text == "max":
         return inf
-    try:
-        speed = read_number(text)
-    except ValueError:
-        speed = -1.0
+    speed = read_number(text)
     if not SLOWEST <= speed <= FASTEST and speed != least:
         standing = "" if least else "0 (stands), "
         raise Misuse(f"--speed {text}: permitted are {standing}{SLOWEST:g} to {FASTEST:g}, and 'max'")

@@ -18,7 +18,7 @@ from lsprotocol import types as lsp
 from pygls.exceptions import JsonRpcParseError, JsonRpcRequestCancelled
 from pygls.io_ import StdoutWriter
 
-from steptwin.baseprotocol import read_body
+from steptwin.baseprotocol import own_stdin, read_body
 from steptwin.errors import Misuse
 from steptwin.lsp.protocol import Protocol
 from steptwin.lsp.server import server
@@ -31,7 +31,7 @@ def serve_stdio() -> int:
     """Serve the client on standard input and output until it goes. Returns the exit code: 1 for an exit without a shutdown."""
     gc.set_threshold(_COLLECT_AFTER)
     try:
-        return asyncio.run(serve(sys.stdin.buffer, sys.stdout.buffer))
+        return asyncio.run(serve(own_stdin(), sys.stdout.buffer))
     except BrokenPipeError:
         sys.stderr.write("steptwin lsp: the editor is gone\n")
         return 1
