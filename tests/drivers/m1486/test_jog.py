@@ -10,7 +10,7 @@ from chip_rig import ChipWire, chip_line
 
 from steptwin import drivers
 from steptwin.drivers.blocking import finish
-from steptwin.drivers.exchange import LineFailure
+from steptwin.drivers.exchange import LineFailure, Overtaken
 from steptwin.drivers.m1486 import AsyncM1486
 from steptwin.drivers.m1486.jog import LINK_S, NOT_HELD, AsyncM1486Jog
 from steptwin.drivers.m1486.settings import ChipSettings
@@ -165,6 +165,20 @@ def test_a_stop_between_the_distance_and_its_move_ends_the_jog() -> None:
     assert jog.end == "'chip 7: r' was not sent: a stop was requested meanwhile"
     wire.sleep(5.0)
     assert wire.true(7) == 60 * STEP
+
+
+def test_a_jog_that_is_refused_at_its_beginning_puts_the_velocity_back() -> None:
+    wire, chip = ready()
+
+    def stop(data: bytes) -> None:
+        if data.startswith(b"f"):
+            chip._unit.notes.stops += 1
+
+    wire.before_each = stop
+    with pytest.raises(Overtaken):
+        finish(AsyncM1486Jog(chip, 400.0).__aenter__())
+    assert chip.settings.velocity == SETTINGS["velocity"] == wire.chip.drive.velocity
+    assert wire.true(7) == 0
 
 
 @pytest.mark.parametrize(("away_s", "runs_on"), [(0.2, True), (0.41, False)])

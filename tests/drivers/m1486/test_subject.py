@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from chip_rig import ChipWire, chip_task_line
 from device_rig import Rig
+from line_rig import run_virtual
 
 from steptwin.controllerstate import ProgramActivity, read_state
 from steptwin.drivers.blocking import finish
-from steptwin.drivers.m1486 import M1486, Busy
+from steptwin.drivers.m1486 import M1486, AsyncM1486, Busy
 from steptwin.drivers.m1486.subject import M1486Part
 from steptwin.drivers.subject import DeviceSubject, RawEffect
 from steptwin.errors import Misuse, Refusal, SteptwinError
@@ -163,10 +166,38 @@ def test_characters_for_an_m1486_are_whole_commands_that_move_nothing(drum: Devi
     line = drum.description.lines[0].name
     drum.do(do.Send(line, b":17\rt80\r"))
     assert drum.read("drum.variable")[0].value == 17.0
-    for text, message in ((b":18", "each with CR behind it"), (b":18\rf100\rr\r", "motions, files and questions"), (b"", "CR")):
+    refused = {
+        b":18": "each with CR behind it",
+        b":18\rf100\rr\r": "motions, files and questions",
+        b"": "CR",
+        b":18;note\rX3\r:19\r": "X3",
+        b":18\rc75\r": "recover",
+    }
+    for text, message in refused.items():
         with pytest.raises(Misuse, match=message):
             drum.do(do.Send(line, text))
     assert drum.read("drum.variable")[0].value == 17.0
+
+
+def test_the_rest_of_a_text_for_an_m1486_is_not_sent_behind_a_stop() -> None:
+    wire = ChipWire("B", (7,))
+    line = chip_task_line(wire)
+    chip = AsyncM1486(line, 7)
+
+    async def work() -> None:
+        await chip.open()
+        part = M1486Part(chip)
+        sending = asyncio.ensure_future(part.actions()[do.Send](do.Send("chips", b"x7\rs200\rs300\rt6\r")))
+        await line.sleep(0.03)
+        await chip.stop()
+        with pytest.raises(Refusal, match=r"was not sent.*: a stop was requested meanwhile"):
+            await sending
+        wire.sent.clear()
+        await line.sleep(1.0)
+        assert not wire.sent
+        assert wire.codes().count("output") == 0
+
+    run_virtual(wire, work())
 
 
 SECOND_AXIS = (command.Move("drum", 2, to=9.0), command.Jog("drum", 2, 50.0), command.StopAxes("drum", 2))

@@ -14,7 +14,6 @@ from steptwin.drivers.m1486.unit import ChipUnit
 from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Misuse, Refusal
 from steptwin.m1486.check import check
-from steptwin.m1486.functions import CONTINUE
 from steptwin.m1486.lines import INTERFACES, STEP_DIRECTION, Interface
 from steptwin.m1486.syntax import ChipCommand, JumpCondition, ParsedProgram
 from steptwin.m1486.variants import Store, Variant
@@ -92,12 +91,10 @@ async def send_program(
     if other is not None:
         kinds = f"{first.name} is an {first.variant.title}, {other.name} an {other.variant.title}"
         raise Misuse(f"{name} is not sent: {kinds}; a program is checked for one type: send each its own")
-    permission: Permission | None = first.permission()
+    permission = first.permission()
+    asked = {unit: unit.permission().is_stopped for unit in units.values()}
     program = checked_program(text, first.variant, await _interface(first, text, permission), name)
     found = parts(program)
-    for address, commands in found:
-        if address in units and any((command.key, command.number) == ("T", CONTINUE) for command in commands):
-            units[address].notes.note_function(CONTINUE, on=True)  # wrong data do not end it any more
     for address, commands in found:
         if address not in units:
             if address is None:
@@ -113,15 +110,16 @@ async def send_program(
 
     for address, commands in found:
         unit = units[address]
-        if permission is None or unit is not first:
-            permission = unit.permission()
-        uploaded += await _Typist(unit, report, permission).type(commands)
-        permission = None
+        if unit is not first or done:  # not too late: the commands before took their time
+            permission = Permission(unit.line.now, permission.patience_ns, asked[unit])
+        typist = _Typist(unit, report, permission)
+        uploaded += await typist.type(commands)
+        asked[unit] = typist.permission.is_stopped
         done += len(commands)
     return uploaded
 
 
-async def _interface(unit: ChipUnit, text: str, permission: Permission | None) -> Interface:
+async def _interface(unit: ChipUnit, text: str, permission: Permission) -> Interface:
     """The driver interface to check a program for. The chip is asked only where it makes a difference."""
     if unit.notes.interface is None:
         sound = [check(text, unit.variant, interface).is_sound for interface in INTERFACES]
@@ -138,7 +136,8 @@ class _Typist:
     def __init__(self, unit: ChipUnit, report: Callable[[int], object], permission: Permission) -> None:
         self._unit = unit
         self._report = report
-        self._permission = permission
+        self.permission = permission
+        """For the rest: a K of the text begins another one."""
         self._capacity = unit.variant.input_bits // 8
         self._typed = 0  # characters that may lie in the input buffer
         self._may_ask = True  # see `probes`
@@ -148,7 +147,7 @@ class _Typist:
         uploaded = b""
         index = 0
         allowed = probes(commands)
-        async with unit.turn(self._permission):
+        async with unit.turn(self.permission):
             await unit.rest()
             while index < len(commands):
                 self._may_ask = allowed[index]
@@ -162,7 +161,7 @@ class _Typist:
                 else:
                     uploaded += await self._command(commands[index])
                     index += 1
-                self._permission.extend()
+                self.permission.extend()
                 self._report(index)
         return uploaded
 
@@ -172,7 +171,7 @@ class _Typist:
         if unit.variant.store is Store.EEPROM:
             await reset(unit)
         await type_file(
-            unit, [str(command).lower() for command in commands], self._permission, lambda count: self._report(done + count)
+            unit, [str(command).lower() for command in commands], self.permission, lambda count: self._report(done + count)
         )
         self._typed = self._capacity
 
@@ -184,19 +183,22 @@ class _Typist:
             await reset(unit)
             return b""
         if command.key == "K":
+            was_stopped, stops = self.permission.is_stopped(), unit.notes.stops
             await unit.kill()
+            if not was_stopped and unit.notes.stops == stops + 1:  # only by this K, which does not end the text
+                self.permission = unit.permission()
             return b""
         if self._typed + len(text) + 1 + len(TYPE_QUERY) + 1 > self._capacity - 3:
             await self._empty()
-        unit.notes.sent.note(text, unit.stored_bits)
+        unit.notes.note_downloaded(text, unit.stored_bits)
         if text[0] in MOVES:
-            await begin(unit, text, ChipMotion.BLOCK, self._permission)
+            await begin(unit, text, ChipMotion.BLOCK, self.permission)
         else:
             unit.notes.settings = ChipSettings()
             if command.key == "U":
                 await self._empty()
                 return await unit.send(text, answers=True)
-            await unit.send(text, acts=True)
+            await unit.act(text, self.permission)
         self._typed += len(text) + 1
         if unit.talk.nearly_full:
             await self._empty()
@@ -211,7 +213,7 @@ class _Typist:
         if not self._may_ask:
             await unit.line.sleep(FULL_PAUSE_NS / SECOND)
             return
-        if await unit.query_type(round(UNKNOWN_S * SECOND), self._permission) is None:
+        if await unit.query_type(round(UNKNOWN_S * SECOND), self.permission) is None:
             raise Busy(f"{unit.place}: {unit.name} takes no more characters: it {unit.why_busy()}")
         self._typed = 0
 
@@ -222,19 +224,21 @@ async def type_file(unit: ChipUnit, lines: Sequence[str], permission: Permission
     On an earlier error the chip is reset, which discards the file (manual chapter II, Memory), and `FileGivenUp` is raised.
     Raises `DoubtfulMove` if it is unknown whether ``]`` was received.
     """
+    is_whole = False
     try:
         for count, line in enumerate(lines[:-1], start=1):
-            unit.notes.sent.note(line, unit.stored_bits)
-            await unit.send(line, once=True, retype=count == 1)
+            unit.notes.note_downloaded(line, unit.stored_bits)
+            await unit.act(line, permission, once=True, retype=count == 1)
             if unit.talk.nearly_full:
                 await unit.line.sleep(FULL_PAUSE_NS / SECOND)
             permission.extend()
             report(count)
-        unit.notes.sent.note(lines[-1], unit.stored_bits)
+        unit.notes.note_downloaded(lines[-1], unit.stored_bits)
+        is_whole = True
         await begin(unit, lines[-1], ChipMotion.BLOCK, permission, retype=False)
-    except (DoubtfulMove, SentLate):
-        raise
     except (LineFailure, Refusal) as failure:
+        if is_whole and isinstance(failure, DoubtfulMove | SentLate):
+            raise
         try:
             await reset(unit)
         except (LineFailure, Refusal) as second:
@@ -274,6 +278,8 @@ async def begin(
         )
 
     notes.motion = None
+    if kind is ChipMotion.BLOCK:
+        notes.note_begin(label)
     try:
         await unit.act(text, permission, once=True, retype=retype)
     except SentLate:
@@ -293,6 +299,7 @@ async def reset(unit: ChipUnit) -> None:
     notes = unit.notes
     unit.talk.forget(unit.address)
     notes.forget()
+    notes.note_defaults()
     notes.was_awake = False
     notes.is_position_valid = True
     notes.settings = ChipSettings() if notes.interface is None else after_reset(unit.variant, notes.interface)

@@ -12,7 +12,7 @@ from steptwin.drivers.m1486.failures import Busy, ChipMoveFailed, ProgramLost
 from steptwin.drivers.m1486.jog import AsyncM1486Jog
 from steptwin.drivers.m1486.motion import UNKNOWN_S, ChipMotion, ChipMotionCommand, ChipMoveEnd
 from steptwin.drivers.m1486.settings import COMMANDS, checked_number
-from steptwin.drivers.m1486.unit import SLICE_NS
+from steptwin.drivers.m1486.unit import PATIENCE_NS, SLICE_NS
 from steptwin.drivers.m1486.waiting import wait_for
 from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Misuse
@@ -151,11 +151,17 @@ class AsyncM1486(AsyncChip):
         may still be writing a motion into its EEPROM, and a program may go on: `stop_program` finds out. Raises
         `steptwin.drivers.Unconfirmed`.
         """
+        self._note_stop()
+        return await self._unit.kill()
+
+    def _note_stop(self) -> None:
+        """Note that the counter does not show the position any more, where a stop cuts a move short (M-16). Nothing is known of
+        what a chip does that was not opened."""
         notes = self._unit.notes
         motion = notes.motion
-        if motion is not None and motion.kind in (ChipMotion.MOVE, ChipMotion.BLOCK) and not motion.is_over(self.line.now()):
+        is_cut = motion is not None and motion.kind in (ChipMotion.MOVE, ChipMotion.BLOCK) and not motion.is_over(self.line.now())
+        if is_cut or notes.variant is None:
             notes.is_position_valid = False
-        return await self._unit.kill()
 
     async def recover(self) -> None:
         """Continue what Kill has stopped (C75), if function 51 is OFF. A program may move the motor at once."""
@@ -167,21 +173,31 @@ class AsyncM1486(AsyncChip):
     async def stop_program(self, timeout_s: float = 10.0) -> None:
         """End motion and program: the motion by Kill, the program by wrong data (function 44 must be OFF). Nothing is erased.
 
-        Raises `Busy` if that has no effect: then only `reset` or RST helps, and the position is lost.
+        What Kill holds (function 51 OFF) is released only where function 44 is known to be OFF, so that nothing of it is left.
+        Raises `Busy` if the chip is not at rest then: it is held, which only `recover` (it goes on) or `reset` ends, or goes on,
+        and only `reset` or RST helps, and the position is lost.
         """
         unit = self._unit
         notes = unit.notes
-        if notes.motion is None or notes.motion.kind is not ChipMotion.ENDLESS:
-            notes.is_position_valid = False
-        await unit.kill(program=True)
-        permission = unit.permission()
+        self._note_stop()
+        has_ended = await unit.kill(program=True)
+        is_held = notes.function(RECOVER) is not True and not has_ended
+        # Another stop does not forbid C75: it leaves nothing that could begin.
+        permission = Permission(self.line.now, PATIENCE_NS)
         async with unit.turn(permission):
             unit.talk.settle(unit.address)  # questions went with the program
-            if notes.function(RECOVER) is not True:
-                await unit.act("c75", permission, stored=False)
-            notes.is_killed = False
+            if has_ended:
+                if notes.function(RECOVER) is not True:
+                    await unit.act("c75", permission, stored=False)
+                notes.is_killed = False
             notes.motion = None
             if await unit.query_type(round(timeout_s * SECOND)) is None:
+                if is_held:
+                    raise Busy(
+                        f"{self.line.place}: {unit.name} is not at rest: Kill holds it (function 51 OFF), its program continues, "
+                        "LIMIT is low, or it is still braking. C75 was not sent, because function 44 may be ON and the motor "
+                        "would move again: recover lets it go on, reset ends it"
+                    )
                 raise Busy(f"{self.line.place}: {unit.name} continues: function 44 is ON, LIMIT is low, or it is still braking")
 
     async def wait(self, timeout_s: float | None = None, *, check: bool = True) -> ChipMoveEnd:
@@ -204,17 +220,26 @@ class AsyncM1486(AsyncChip):
 
         Raises `Misuse` for a command that the chip would drop.
         """
+        await self.commands([text])
+
+    async def commands(self, texts: Iterable[str]) -> None:
+        """Send commands one after the other, as `command`, all checked before the first is sent. Behind a stop nothing of them
+        is sent."""
         unit = self._unit
-        typed = self.check_command(text)
+        typed = [self.check_command(text) for text in texts]
         permission = unit.permission()
-        async with unit.turn(permission):
-            await unit.rest()
-            self._learn(typed)
-            await unit.act(typed, permission, once=typed[0] in "d+-*/")
+        for command in typed:
+            async with unit.turn(permission):
+                await unit.rest()
+                self._learn(command)
+                await unit.act(command, permission, once=command[0] in "d+-*/")
+                permission.extend()
 
     def check_command(self, text: str) -> str:
         """A command as `command` sends it. Raises `Misuse` for others."""
         typed = self._unit.checked(text)
+        if typed == "c75":
+            raise Misuse(f"{text!r} is not a command to type alone: recover continues what Kill has stopped")
         if typed[0] not in _TYPED:
             raise Misuse(f"{text!r} is not a command to type alone: motions, files and questions have methods of their own")
         return typed
@@ -227,6 +252,8 @@ class AsyncM1486(AsyncChip):
             notes.settings = notes.settings.with_(**{name: int(typed[1:]) if typed[1:] else None})
         if typed[0] in "tc" and typed[1:].isdecimal() and int(typed[1:]) in FUNCTIONS:
             notes.note_function(int(typed[1:]), on=typed[0] == "t")
+        elif typed in ("t", "c"):  # the internal variable has the number
+            notes.forget_functions(*FUNCTIONS)
 
     async def run_block(self, commands: Iterable[str], timeout_s: float | None = None) -> ChipMoveEnd:
         """Have commands done one after the other, as a file in ``[ ]`` that nothing of runs before it is there whole, and wait

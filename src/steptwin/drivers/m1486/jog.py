@@ -9,6 +9,7 @@ the letter that tells its end. So a program that was suspended for longer begins
 
 from __future__ import annotations
 
+from contextlib import suppress
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
@@ -79,16 +80,26 @@ class AsyncM1486Jog:
         unit, chip = self._unit, self._chip
         # A jog begins at once or not at all.
         begun = unit.permission(HOLD_NS + 2 * unit.timeout_ns + unit.talk.wire_ns(PREPARING))
-        await chip.configure(velocity=self._velocity)
-        self._distance_u = self._link_u()
-        async with unit.turn():
-            self._counter = await unit.read_number(1)
-            permission = Permission(unit.line.now, HOLD_NS, begun.is_stopped)
-            if begun.has_expired():
-                raise TooLate(f"{unit.name}: jog", begun.patience_ns)
-            await self._go(permission)
+        try:
+            await chip.configure(velocity=self._velocity)
+            self._distance_u = self._link_u()
+            async with unit.turn():
+                self._counter = await unit.read_number(1)
+                permission = Permission(unit.line.now, HOLD_NS, begun.is_stopped)
+                if begun.has_expired():
+                    raise TooLate(f"{unit.name}: jog", begun.patience_ns)
+                await self._go(permission)
+        except SteptwinError:
+            with suppress(SteptwinError):
+                await self._put_back()
+            raise
         self._permission = permission
         return self
+
+    async def _put_back(self) -> None:
+        """Put V back where it was before the jog, if that was known."""
+        if self._before is not None and self._chip.settings.velocity != self._before:
+            await self._chip.configure(velocity=self._before)
 
     def _link_u(self) -> int:
         chip = self._chip
@@ -135,8 +146,7 @@ class AsyncM1486Jog:
         try:
             end = await self._chip.wait(check=False)
             self.end = self.end or (RELEASED if end.ok else str(end))
-            if self._before is not None:
-                await self._chip.configure(velocity=self._before)
+            await self._put_back()
         except SteptwinError:
             if error is None:
                 raise

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 from steptwin.drivers.m1486.failures import Restarted
 from steptwin.drivers.m1486.motion import ChipMotionCommand
-from steptwin.drivers.m1486.sentcommands import SentCommands
+from steptwin.drivers.m1486.sentcommands import SentCommands, may_turn_on
 from steptwin.drivers.m1486.settings import ChipSettings
-from steptwin.m1486.functions import FUNCTIONS, TABLE
+from steptwin.m1486.functions import CONTINUE, FUNCTIONS, TABLE
 from steptwin.m1486.lines import Interface
-from steptwin.m1486.variants import Variant
+from steptwin.m1486.variants import Store, Variant
 from steptwin.machine import Nanos
 
 FUNCTION_BYTES = (17, 18, 19)
@@ -40,6 +40,8 @@ class ChipNotes:
         """Set when a wait for another chip has detected that this one was switched off; the next use raises `Restarted`."""
         self.stops = 0
         """Number of stops: a motion requested before a stop must not begin after it."""
+        self.pending_stops: set[object] = set()
+        """Stops that are not acknowledged yet: a motion requested meanwhile must not begin either."""
         self.is_killed = False
         """Whether Kill may hold the program (function 51 OFF)."""
         self.uploads: bytearray | None = None
@@ -54,7 +56,9 @@ class ChipNotes:
     def forget(self) -> None:
         """Forget the state of a chip that was switched off or reset by others."""
         self.settings = ChipSettings()
-        self._functions = {function.number: function.default for function in TABLE}
+        self._functions = {}
+        if self.variant is not None and self.variant.store is not Store.EEPROM:  # else a stored program has begun
+            self.note_defaults()
         self.readings = {}
         self.is_at_rest = False
         self.sent = SentCommands()
@@ -68,6 +72,26 @@ class ChipNotes:
 
     def note_function(self, number: int, *, on: bool) -> None:
         self._functions[number] = on
+
+    def note_defaults(self) -> None:
+        """Note the functions after a reset."""
+        self._functions = {function.number: function.default for function in TABLE}
+
+    def forget_functions(self, *numbers: int) -> None:
+        """Forget functions that may have been switched, until they are read again."""
+        for number in numbers:
+            self._functions.pop(number, None)
+
+    def note_downloaded(self, text: str, stored_bits: int) -> None:
+        """Note a command of a program that is about to be sent (`SentCommands.note`)."""
+        command = self.sent.note(text, stored_bits)
+        if command is not None and may_turn_on(CONTINUE, command):
+            self.forget_functions(CONTINUE)  # wrong data may end nothing any more
+
+    def note_begin(self, label: int | None) -> None:
+        """Note that commands begin to be executed, those at ``label`` if given. They switch what they like."""
+        if self.sent.may_turn_on(CONTINUE, label):
+            self.forget_functions(CONTINUE)
 
     def note_command(self, text: str) -> None:
         """Note a command that is sent: what it may change is not known any more."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from steptwin.m1486.lines import STEP_DIRECTION, Interface
-from steptwin.m1486.structure import stream_of
+from steptwin.m1486.structure import stream_of, written_label
 from steptwin.m1486.successors import flow_of
 from steptwin.m1486.syntax import ChipCommand, parse_line
 from steptwin.m1486.variants import Variant
@@ -23,6 +23,11 @@ class LabelledPart(NamedTuple):
     """Whether the last command can be reached, and with it what was sent since."""
 
 
+def may_turn_on(function: int, command: ChipCommand) -> bool:
+    """Whether a command turns a function on, or one that the internal variable names."""
+    return command.key == "T" and command.number in (None, function)
+
+
 class SentCommands:
     """The commands that were downloaded since the last reset, with the number of bits that had been sent before each."""
 
@@ -30,12 +35,22 @@ class SentCommands:
         self._commands: list[ChipCommand] = []
         self._before: list[int] = []
 
-    def note(self, text: str, stored_bits: int) -> None:
-        """Note a command that is about to be sent. ``stored_bits``: all that have been sent before it."""
+    def note(self, text: str, stored_bits: int) -> ChipCommand | None:
+        """Note a command that is about to be sent, and return it. ``stored_bits``: all that have been sent before it."""
         command = parse_line(text)[0].command
         if command is not None:
             self._commands.append(command)
             self._before.append(stored_bits)
+        return command
+
+    def may_turn_on(self, function: int, label: int | None = None) -> bool:
+        """Whether what was downloaded may turn a function on when it is executed, at ``label`` if given: also by a jump to
+        commands that were not downloaded here."""
+        if any(may_turn_on(function, command) for command in self._commands):
+            return True
+        jumps = [written_label(command) for command in self._commands if command.key in ("J", "I", "'")]
+        here = {command.number for command in self._commands if command.key == "@"}
+        return not here.issuperset(jumps) or (label is not None and label not in here)
 
     def part(self, label: int, variant: Variant, interface: Interface | None) -> LabelledPart | None:
         """What can be executed from a label on; None for a label that was not downloaded."""

@@ -197,13 +197,11 @@ class M1486Part:
         if selected not in (None, self.address):
             own = "the only chip of its line" if self.address is None else f"chip {self.address:X}"
             raise Misuse(f"text: X{selected:X} selects another chip: this device is {own}")
-        *lines, rest = _SELECTION.sub(b"", wanted.data, count=1).decode("latin-1").split("\r")
+        found = _SELECTION.match(wanted.data)
+        *lines, rest = wanted.data[0 if found is None else found.end() :].decode("latin-1").split("\r")
         if rest or not lines:
             raise Misuse("text: whole commands are sent to a device, each with CR behind it")
-        for text in lines:
-            self._chip.check_command(text)
-        for text in lines:
-            await self._chip.command(text)
+        await self._chip.commands(lines)
 
     # ------------------------------------------------------------------ polling
 

@@ -106,11 +106,13 @@ class ChipUnit:
         return self.line.lock("m1486 turn", None if permission is None else permission.extend)
 
     def permission(self, patience_ns: Nanos | None = None) -> Permission:
-        """Permission for a motion requested now. It ends with a stop of the chip, or after too long without progress."""
-        before = self.notes.stops
+        """Permission for a motion requested now. It ends with a stop of the chip, or after too long without progress. While a
+        stop is not acknowledged there is none."""
+        notes = self.notes
+        before = None if notes.pending_stops else notes.stops
         if patience_ns is None:
             patience_ns = max(PATIENCE_NS, 4 * TRIES * self.timeout_ns)
-        return Permission(self.line.now, patience_ns, lambda: self.notes.stops != before)
+        return Permission(self.line.now, patience_ns, lambda: notes.stops != before)
 
     # ------------------------------------------------------------------ exchanges
 
@@ -562,6 +564,15 @@ class ChipUnit:
         notes = self.notes
         notes.stops += 1
         notes.is_killed = True
+        stop = object()
+        notes.pending_stops.add(stop)
+        try:
+            return await self._kill(program=program)
+        finally:
+            notes.pending_stops.discard(stop)
+
+    async def _kill(self, *, program: bool) -> bool:
+        notes = self.notes
         if not program and self._has_begun():
             await self._send_kill("k")
             return True
@@ -571,15 +582,16 @@ class ChipUnit:
             return True
         write_ns = LONGEST_WRITE_NS if notes.variant is None else notes.variant.write_ns
         await self.line.sleep((write_ns + BEGUN_NS) / SECOND)
-        notes.stops += 1
         await self._send_kill(STOP)
         return False
 
     def _has_begun(self) -> bool:
-        """Whether all that the chip may have to do is a motion, which has begun."""
-        motion = self.notes.motion
-        is_known = motion is not None and motion.kind is not ChipMotion.BLOCK
-        return is_known and self.line.now() >= self.notes.begins_at + BEGUN_NS
+        """Whether all that the chip may have to do is a motion, which has begun. After its computed end, or where that is not
+        known, somebody else may have started a program."""
+        motion, now = self.notes.motion, self.line.now()
+        if motion is None or now < self.notes.begins_at + BEGUN_NS:
+            return False
+        return motion.kind is ChipMotion.ENDLESS or (motion.kind is ChipMotion.MOVE and now < motion.end)
 
     async def _send_kill(self, text: str) -> None:
         notes = self.notes
