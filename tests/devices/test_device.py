@@ -6,6 +6,8 @@ import asyncio
 from typing import Any, cast
 
 import pytest
+from bridge_rig import BridgeRig
+from virtual_loop import run_virtually
 
 from steptwin.devices.device import MOST_WAITING, ConnectedDevice, DeviceSurroundings
 from steptwin.drivers.subject import RawEffect
@@ -144,3 +146,47 @@ def test_raw_requests_wait_in_order_reads_do_not_and_a_stop_overtakes_them() -> 
         await rig.shown.close()
 
     asyncio.run(story())
+
+
+PAUSE = command.ControlProgram("table", "pause")
+STOP_PROGRAM = command.ControlProgram("table", "stop")
+
+
+@pytest.mark.parametrize(
+    ("stop", "is_ended"),
+    [
+        (command.StopAxes("table", 1), True),
+        (command.StopAxes("table", 2), False),
+        (command.StopAxes("table", None), True),
+        (command.StopAll(), True),
+        (PAUSE, False),
+        (STOP_PROGRAM, True),  # its drive is switched off
+        (steps.Write((("table", "M1_STOP", 1.0),)), True),
+        (steps.Write((("table", "M2_STOP", 1.0),)), False),
+        (steps.Write((("table", "M_STOP", 14.0),)), False),
+        (steps.Write((("table", "PROGRAM_CTRL", 2.0),)), False),
+        (steps.Write((("table", "PROGRAM_CTRL", 0.0),)), True),
+    ],
+    ids=str,
+)
+def test_a_stop_ends_held_jogs_of_its_axes_only(stop: Any, is_ended: bool) -> None:
+    async def story() -> None:
+        rig = BridgeRig()
+        await rig.open()
+        await rig.subject.do(command.Enable("table", 1, on=True))
+        await rig.subject.do(command.ControlProgram("table", "start"))
+        held: Any = await rig.connected._begin_jog(command.Jog("table", 1, 5.0))
+        held.lasts_ns = 5 * SECOND
+        held.extend()
+        await rig.wait(0.3)
+        assert rig.is_moving
+        await rig.connected._do(stop)
+        if is_ended:
+            assert not rig.is_moving
+        await rig.wait(0.3)
+        assert (held.over is not None, rig.is_moving) == (is_ended, not is_ended), held.over
+        held.release()
+        await rig.wait(1.0)
+        await rig.close()
+
+    run_virtually(story())

@@ -424,6 +424,7 @@ def test_a_request_that_is_none_is_not_sent(table: DeviceSubject, request_: byte
         ("0507d8ff00", RawEffect.WRITE),
         ("100064000102", RawEffect.WRITE),  # cut
         ("10271400010200ff", RawEffect.WRITE),  # several registers
+        ("1027130001020002", RawEffect.STOP),  # PROGRAM_CTRL PAUSE, as one of several
     ],
 )
 def test_raw_requests_that_stop_are_known(rig: Rig, pdu: str, effect: RawEffect) -> None:
@@ -449,11 +450,37 @@ def test_writes_of_words_that_stop_are_known(rig: Rig, key: str, value: int, eff
         ({"M_STOP": 0}, "write"),
         ({"M1_STOP": 1, "M2_POS_ABS": 5.0}, "write"),
         ({"OUT1": 1}, "write"),
+        ({}, "write"),
     ],
 )
 def test_writes_of_registers_that_stop_are_known(rig: Rig, values: dict[str, float], effect: str) -> None:
     part = Mic488Part(rig.mic._driver)
     assert part.effect_of(do.Write(tuple(("table", name, value) for name, value in values.items()))).value == effect
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "is_refused"),
+    [
+        ("M1_POS_ABS", 0.0, True),
+        ("M1_HOME", 0.0, True),
+        ("M1_JOG_PLUS", 1.0, True),
+        ("M1_POS_REL", 0.5, True),
+        ("M1_POS_REL", 0.0, False),
+        ("M1_VEL_ABS", 0.0, False),
+        ("M1_VEL_REL", 0.0, False),
+        ("M1_JOG_PLUS", 0.0, False),
+    ],
+)
+def test_motions_that_are_ignored_with_the_drive_off_are_refused(
+    table: DeviceSubject, name: str, value: float, is_refused: bool
+) -> None:
+    """Position 0 is a motion, velocity 0 and distance 0 are none."""
+    wanted = do.Write((("table", name, value),))
+    if is_refused:
+        with pytest.raises(Refusal, match="M1 of unit 1 is switched off"):
+            table.do(wanted)
+    else:
+        table.do(wanted)
 
 
 def test_a_stop_between_the_values_of_a_write_refuses_the_rest(table: DeviceSubject, rig: Rig) -> None:

@@ -11,14 +11,17 @@ from steptwin.mic488.registermap import DataType, Space, Type
 from steptwin.mic488.registers import register_map
 from steptwin.mic488.values import (
     FORM,
+    PROGRAM,
     RegisterItem,
     UserFormat,
     decoded,
     encoded,
+    halted,
     moves,
     named,
     plan,
     repeatable,
+    starts_program,
     user_item,
     value_of,
 )
@@ -90,6 +93,7 @@ REPEATED = [
     pdu.WriteCoilRequest(2004, True),  # M1_STOP
     pdu.WriteCoilRequest(2008, True),  # M1 JOG_PLUS
     pdu.WriteRegisterRequest(10003, 0),  # PROGRAM_CTRL: stop
+    pdu.WriteRegistersRequest(10003, (0,)),
     pdu.WriteRegisterRequest(10016, 15),  # M_STOP
     pdu.WriteRegistersRequest(10036, (0, 0)),  # M1_ACC
     pdu.WriteRegistersRequest(10068, (0, 0)),  # M1_VEL_ABS
@@ -127,6 +131,33 @@ MOVING = {10005, 10007, 10060, 10068, 10076, 10084, 10090, 10092, 2008, 9000}
 def test_what_may_begin_a_motion(request_: pdu.ModbusRequest) -> None:
     starts_program = request_ == pdu.WriteRegisterRequest(10003, 1)
     assert moves(MAP, request_) == (request_.address in MOVING or starts_program)
+
+
+@pytest.mark.parametrize(
+    ("request_", "ended"),
+    [
+        (pdu.WriteCoilRequest(2005, True), (2,)),  # M2_STOP
+        (pdu.WriteCoilRequest(2005, False), ()),
+        (pdu.WriteCoilRequest(2010, False), (2,)),  # M2_JOG_PLUS
+        (pdu.WriteCoilRequest(2011, False), (2,)),  # M2_JOG_MINUS
+        (pdu.WriteCoilRequest(2011, True), ()),
+        (pdu.WriteRegisterRequest(10016, 0xFA), (2, 4)),  # M_STOP
+        (pdu.WriteRegistersRequest(10016, (5,)), (1, 3)),
+        (pdu.WriteRegisterRequest(10003, 0), (PROGRAM,)),  # PROGRAM_CTRL
+        (pdu.WriteRegistersRequest(10003, (0,)), (PROGRAM,)),
+        (pdu.WriteRegistersRequest(10003, (2,)), (PROGRAM,)),
+        (pdu.WriteRegistersRequest(10003, (1,)), ()),
+        (pdu.WriteRegistersRequest(10003, (2, 0)), (PROGRAM,)),  # and AXIS_CTR_MODE
+        (pdu.WriteRegistersRequest(10003, (2, 1, 1)), ()),  # and a trigger
+        (pdu.WriteRegistersRequest(10014, (0, 0, 2)), (2,)),  # M_ENABLE, M_DISABLE, M_STOP
+        (pdu.WriteRegistersRequest(9000, (0,)), ()),
+        (pdu.ReadRequest(3, 10003, 1), ()),
+    ],
+    ids=str,
+)
+def test_what_a_write_ends(request_: pdu.ModbusRequest, ended: tuple[int, ...]) -> None:
+    assert halted(MAP, request_) == ended
+    assert not (ended and (moves(MAP, request_) or starts_program(MAP, request_)))
 
 
 # ---------------------------------------------------------------------- names

@@ -331,7 +331,9 @@ class ConnectedDevice:
         return held
 
     def _cut_jogs(self, stopped: Command) -> None:
-        """End the jogs that a stop ends, whoever holds them."""
+        """End the jogs of stopped axes, whoever holds them. Those that other stops end, their driver ends."""
+        if not isinstance(stopped, command.StopAxes | command.StopAll):
+            return
         axis = stopped.axis if isinstance(stopped, command.StopAxes) else None
         for held in [held for number, held in self._jogs.items() if axis in (None, number)]:
             held.cut()

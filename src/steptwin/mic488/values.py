@@ -11,7 +11,7 @@ from typing import NamedTuple, TypeAlias
 from steptwin.errors import Misuse
 from steptwin.mic488.encoding import dint_to_words, real_to_words, word_to_int, words_to_dint, words_to_real
 from steptwin.mic488.registermap import DataType, Register, RegisterMap, Space, Type, WriteEffect
-from steptwin.mic488.registers import AXES
+from steptwin.mic488.registers import axes_of_mask
 from steptwin.mic488.status import ProgramState
 from steptwin.numerals import read_number
 from steptwin.wire import pdu
@@ -26,6 +26,8 @@ _READS = {Space.HOLDING: pdu.READ_HOLDING_REGISTERS, Space.COIL: pdu.READ_COILS,
 _SPACES = {space: number for number, space in enumerate(Space)}
 _NAME = re.compile(r"(?P<name>\w+?)(?:\[(?P<cell>\d{1,5})\])?(?::(?P<view>\w+))?\Z", re.ASCII)
 _SWITCHES = {"on": 1.0, "true": 1.0, "off": 0.0, "false": 0.0}
+PROGRAM = 0
+"""The program beside axes 1 to 4, in `halted`."""
 FORM = "expected NAME, or USER_REGISTER[N] with :int, :dint or :real behind it if it is no WORD"
 
 
@@ -239,60 +241,74 @@ def _block(group: list[RegisterItem]) -> Block:
 
 def repeatable(registers: RegisterMap, request: pdu.ModbusRequest) -> bool:
     """Whether a request whose answer was lost may be sent again: only where that cannot move anything twice."""
-    if isinstance(request, pdu.ReadRequest) or _stops(registers, request):
+    if isinstance(request, pdu.ReadRequest):
         return True
-    return all(register is not None and _repeatable(register) for register in _written(registers, request))
+    return all(register is not None and _repeatable(register, value) for register, value in _written(registers, request))
 
 
 def moves(registers: RegisterMap, request: pdu.ModbusRequest) -> bool:
     """Whether a request may start a motion, as far as it can be decoded."""
     if isinstance(request, pdu.ReadRequest) or halted(registers, request):
         return False
-    return any(
-        register is None or register.effect in (WriteEffect.MOVE, WriteEffect.ADD) for register in _written(registers, request)
-    )
+    return any(_may_move(register) for register, _ in _written(registers, request))
+
+
+def starts_program(registers: RegisterMap, request: pdu.ModbusRequest) -> bool:
+    """Whether a request may start the program, as far as it can be decoded."""
+    if isinstance(request, pdu.ReadRequest) or halted(registers, request):
+        return False
+    return any(register is None or register.key == "PROGRAM_CTRL" for register, _ in _written(registers, request))
 
 
 def halted(registers: RegisterMap, request: pdu.ModbusRequest) -> tuple[int, ...]:
-    """The axes whose motions a write ends: a stop, the end of a jog, a program that stops or pauses."""
-    match request:
-        case pdu.WriteCoilRequest(address=address, on=on):
-            register = registers.find(Space.COIL, address)
-            keys = ("STOP",) if on else ("JOG_PLUS", "JOG_MINUS")
-            return () if register is None or register.axis is None or register.key not in keys else (register.axis,)
-        case pdu.WriteRegisterRequest(address=address, value=value):
-            register = registers.find(Space.HOLDING, address)
-            key = "" if register is None else register.key
-            all_axes = range(1, AXES + 1)
-            if key == "M_STOP":
-                return tuple(axis for axis in all_axes if value & 1 << axis - 1)
-            return tuple(all_axes) if key == "PROGRAM_CTRL" and value != ProgramState.RUNNING else ()
+    """What a write ends: axes by a stop or the end of a jog, `PROGRAM` by its stop or pause. Nothing where it may begin a
+    motion as well."""
+    if isinstance(request, pdu.ReadRequest):
+        return ()
+    found: set[int] = set()
+    for register, value in _written(registers, request):
+        ended = () if register is None else _ended(register, value)
+        if not ended and _may_move(register):
+            return ()
+        found.update(ended)
+    return tuple(sorted(found))
+
+
+def _ended(register: Register, value: int) -> tuple[int, ...]:
+    match register.key:
+        case "M_STOP":
+            return axes_of_mask(value)
+        case "PROGRAM_CTRL":
+            return () if value == ProgramState.RUNNING else (PROGRAM,)
+        case "STOP" | "JOG_PLUS" | "JOG_MINUS" if register.axis is not None:
+            return (register.axis,) if bool(value) is (register.key == "STOP") else ()
         case _:
             return ()
 
 
-def _stops(registers: RegisterMap, request: pdu.ModbusRequest) -> bool:
-    """Whether it stops the program. (Starting and pausing it depends on what happened meanwhile.)"""
-    if not isinstance(request, pdu.WriteRegisterRequest) or request.value != 0:
-        return False
-    register = registers.find(Space.HOLDING, request.address)
-    return register is not None and register.key == "PROGRAM_CTRL"
+def _may_move(register: Register | None) -> bool:
+    return register is None or register.effect in (WriteEffect.MOVE, WriteEffect.ADD)
 
 
 def _written(
     registers: RegisterMap, request: pdu.WriteCoilRequest | pdu.WriteRegisterRequest | pdu.WriteRegistersRequest
-) -> list[Register | None]:
+) -> list[tuple[Register | None, int]]:
+    """The registers of a write, each with its first word; None for an address without one."""
     match request:
-        case pdu.WriteCoilRequest(address):
-            return [registers.find(Space.COIL, address)]
-        case pdu.WriteRegisterRequest(address):
-            return [registers.find(Space.HOLDING, address)]
+        case pdu.WriteCoilRequest(address, on):
+            return [(registers.find(Space.COIL, address), on)]
+        case pdu.WriteRegisterRequest(address, value):
+            return [(registers.find(Space.HOLDING, address), value)]
         case pdu.WriteRegistersRequest(address, values):
-            return [piece.register for piece in registers.pieces(Space.HOLDING, address, len(values))]
+            pieces = registers.pieces(Space.HOLDING, address, len(values))
+            return [(piece.register, values[piece.address - address]) for piece in pieces]
 
 
-def _repeatable(register: Register) -> bool:
-    # A homing that has ended already would be done again: the same goal, but a second motion.
-    return register.effect in (WriteEffect.STORE, WriteEffect.ACT) or (
-        register.effect is WriteEffect.MOVE and register.key != "HOME"
+def _repeatable(register: Register, value: int) -> bool:
+    # A homing that has ended already would be done again: the same goal, but a second motion. Starting and pausing the program
+    # depends on what happened meanwhile, stopping it does not.
+    return (
+        register.effect in (WriteEffect.STORE, WriteEffect.ACT)
+        or (register.effect is WriteEffect.MOVE and register.key != "HOME")
+        or (register.key == "PROGRAM_CTRL" and value == ProgramState.STOPPED)
     )

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import asyncio
+from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from host_rig import MemoryEndpoint, Wire, driver, spindles, thread_line
+from host_rig import MemoryEndpoint, Wire, async_driver, driver, run_virtual, spindles, task_line, thread_line
+from mic488_rig import loaded
 
 from steptwin.drivers import (
+    AsyncMic488,
     Mic488,
     ModbusLine,
     ModbusRefusal,
@@ -17,7 +21,8 @@ from steptwin.drivers import (
     Unconfirmed,
     load_config,
 )
-from steptwin.drivers.exchange import Overtaken
+from steptwin.drivers.blocking import finish
+from steptwin.drivers.exchange import Overtaken, SentLate
 from steptwin.drivers.mic488.frames import FrameWords
 from steptwin.drivers.mic488.lines import ThreadModbusLine, modbus_exchanger
 from steptwin.drivers.modbus import ModbusQuery
@@ -28,7 +33,7 @@ from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.registermap import DataType
 from steptwin.mic488.registers import register_map
 from steptwin.wire import pdu, rtu
-from steptwin.wire.pdu import BitsResponse, ReadRequest, WriteCoilRequest
+from steptwin.wire.pdu import BitsResponse, ReadRequest, WriteCoilRequest, WriteRegistersRequest
 from steptwin.wire.slave import FrameDirection
 
 CFG = """[Axis0]
@@ -274,12 +279,151 @@ def test_a_running_program_is_paused_before_what_waits_and_ended_by_a_stop() -> 
     stops = list(unit.notes.stops)
     mic.program.pause()
     mic.program.stop()
-    assert asked == [(ProgramState.PAUSED, True, None), (ProgramState.STOPPED, True, 5)]
-    assert unit.notes.stops[1:] == [count + 2 for count in stops[1:]], "motions asked for before either are not begun after it"
+    assert asked == [(ProgramState.PAUSED, True, 5), (ProgramState.STOPPED, True, 5)]
+    counted = [after - before for after, before in zip(unit.notes.stops, stops, strict=True)]
+    assert counted == [2, 0, 0, 0, 0]
     assert twin.program.state == ProgramState.STOPPED
     wire.severed = True
     with pytest.raises(Unconfirmed, match="the program could not be stopped: the controller cannot be reached"):
         mic.program.stop()
+    with pytest.raises(Unconfirmed, match="the program could not be paused: the controller cannot be reached"):
+        mic.program.pause()
+
+
+# ---------------------------------------------------------------------- stops
+
+
+def moving() -> tuple[Wire, Mic488]:
+    """M1 runs at JOG_SPEED, by its coil."""
+    wire = Wire()
+    wire.twin.program.banks.programs[0], _ = loaded("MAIN:\nDELAY 0.1\nJUMP MAIN\n")
+    mic = driver(wire)
+    mic.enable(1)
+    mic.set_jog_speed(5.0)
+    mic.axis(1).jog_bit(1, True)
+    return wire, mic
+
+
+STOPS = (("M1_STOP", 1), ("M_STOP", 1), ("M1_JOG_PLUS", 0), ("M1_JOG_MINUS", 0), ("PROGRAM_CTRL", 0), ("PROGRAM_CTRL", 2))
+
+
+@pytest.mark.parametrize(("name", "value"), STOPS)
+def test_what_stops_is_written_by_name_and_what_is_behind_it_in_the_same_write(name: str, value: float) -> None:
+    """It does not refuse itself, nor what follows."""
+    wire, mic = moving()
+    mic.program.start()
+    mic.set(name, value)
+    wire.rest(1.0)
+    assert wire.moving() is ((name, value) in (("M1_JOG_MINUS", 0), ("PROGRAM_CTRL", 2)))
+    states: dict[tuple[str, float], ProgramState] = {
+        ("PROGRAM_CTRL", 0): ProgramState.STOPPED,
+        ("PROGRAM_CTRL", 2): ProgramState.PAUSED,
+    }
+    assert wire.twin.program.state is states.get((name, value), ProgramState.RUNNING)
+    mic.stop_all()
+    there = mic.axis(1).position()
+    finish(mic._driver.set_all((name, value), ("M1_EN", 1), ("M1_POS_REL", 5.0)))
+    wire.rest(5.0)
+    assert mic.axis(1).position() == pytest.approx(there + 5.0)
+
+
+def test_a_stop_of_another_client_between_own_stops_refuses_the_rest() -> None:
+    wire, mic = moving()
+    notes = mic._driver._unit.notes
+
+    def stop(_: bytes) -> None:
+        wire.before_each = None
+        notes.stops[1] += 1
+
+    wire.before_each = stop
+    with pytest.raises(Overtaken):
+        finish(mic._driver.set_all(("M_STOP", 1), ("M1_POS_REL", 5.0)))
+
+
+ENDS: dict[str, Callable[[AsyncMic488], Awaitable[Any]]] = {
+    "axis": lambda mic: mic.axis(1).stop(),
+    "axis switched off": lambda mic: mic.axis(1).disable(),
+    "all": lambda mic: mic.stop_all(),
+    "all switched off": lambda mic: mic.disable(),
+    "halt": lambda mic: mic.halt(),
+    "program paused": lambda mic: mic.program.pause(),
+    "program stopped": lambda mic: mic.program.stop(),
+    "by name": lambda mic: mic.set("M1_STOP", 1),
+    "raw": lambda mic: mic.request(WriteRegistersRequest(register_map("1.70").of("M_STOP").address, (1,))),
+}
+
+
+MOTIONS: tuple[Callable[[AsyncMic488], Awaitable[Any]], ...] = (
+    lambda mic: mic.axis(1).move_to(200.0),
+    lambda mic: mic.set("M1_POS_ABS", 200.0),
+    lambda mic: mic.request(WriteRegistersRequest(register_map("1.70").of("POS_ABS", 1).address, (0, 0))),
+    lambda mic: mic.program.start(),
+)
+
+
+@pytest.mark.parametrize("how", ENDS)
+def test_what_is_asked_for_while_a_stop_is_unanswered_is_refused(how: str) -> None:
+    wire = Wire()
+
+    async def story() -> None:
+        async with async_driver(task_line(wire), wire) as mic:
+            for motion in MOTIONS:
+                await mic.enable(1)
+                stop = asyncio.ensure_future(ENDS[how](mic))
+                await asyncio.sleep(0.0)
+                assert not stop.done()
+                with pytest.raises((Overtaken, NotReady)):  # the drive may be off already
+                    await motion(mic)
+                await stop
+
+    run_virtual(wire, story())
+
+
+def test_a_program_that_may_have_been_started_too_late_is_paused_and_its_axes_are_stopped_in_any_case() -> None:
+    wire, mic = moving()
+    unit = mic._driver._unit
+
+    async def late() -> None:
+        async with unit.stopping_if_late(1, program=True):
+            raise SentLate("the start", SECOND)
+
+    with pytest.raises(SentLate):
+        finish(late())
+    wire.rest(1.0)
+    assert not wire.moving()
+    mic.axis(1).jog_bit(1, True)
+    program_ctrl = register_map("1.70").of("PROGRAM_CTRL").address.to_bytes(2, "big")
+
+    def lose_pauses(frame: bytes) -> None:
+        wire.severed = frame[2:4] == program_ctrl
+
+    wire.before_each = lose_pauses
+    with pytest.raises(Unconfirmed, match="a request was sent too late, and the program could not be paused"):
+        finish(late())
+    wire.rest(1.0)
+    assert not wire.moving()
+
+
+@pytest.mark.parametrize(("lost", "is_confirmed"), [(0, True), (1, True), (4, True), (5, False)])
+def test_a_halt_pauses_the_program_although_frames_are_lost(lost: int, is_confirmed: bool) -> None:
+    wire, mic = moving()
+    mic.program.start()
+    m_stop, program_ctrl = (register_map("1.70").of(key).address.to_bytes(2, "big") for key in ("M_STOP", "PROGRAM_CTRL"))
+    seen: list[bytes] = []
+
+    def lose(frame: bytes) -> None:
+        seen.append(frame[2:4])
+        is_pause = frame[1] == 6 and frame[2:4] == program_ctrl
+        wire.severed = is_pause and seen.count(program_ctrl) <= lost
+
+    wire.before_each = lose
+    if is_confirmed:
+        mic.halt()
+        assert wire.twin.program.state is ProgramState.PAUSED
+    else:
+        with pytest.raises(Unconfirmed, match="the program could not be paused"):
+            mic.halt()
+    assert seen.count(m_stop) == 2
 
 
 @pytest.mark.parametrize(("timeout_s", "patience_s"), [(0.3, 5.0), (0.8, 5.0), (1.0, 6.0), (2.0, 12.0)])

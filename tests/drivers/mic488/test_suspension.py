@@ -8,12 +8,14 @@ from typing import Any
 
 import pytest
 from host_rig import Wire, async_driver, task_line, thread_line
+from mic488_rig import loaded
 from suspension import AT_THE_LAST_MOMENT, Suspension
 
 from steptwin.drivers import AsyncMic488
 from steptwin.drivers.blocking import finish
 from steptwin.errors import SteptwinError
 from steptwin.mic488.registers import register_map
+from steptwin.mic488.status import ProgramState
 from steptwin.mic488.values import moves
 from steptwin.wire import pdu
 
@@ -52,6 +54,8 @@ OPERATIONS: dict[str, Callable[[AsyncMic488], Awaitable[Any]]] = {
     "set a position": lambda mic: mic.set("M1_POS_ABS", 20.0),
     "raw": lambda mic: mic.request(pdu.WriteRegistersRequest(10032, (0, 0x41A0))),
     "program": lambda mic: mic.program.start(),
+    "set the program": lambda mic: mic.set("PROGRAM_CTRL", 1),
+    "raw start of the program": lambda mic: mic.request(pdu.WriteRegisterRequest(_PROGRAM_CTRL, 1)),
 }
 
 
@@ -73,6 +77,7 @@ def _motions_since(wire: Wire, back: int) -> list[str]:
 def _trial(name: str, at: int | None, *, tasks: bool, loss: int) -> tuple[int, str]:
     """Do an operation with a suspension at point ``at``: how many points it has, and what was wrong."""
     wire = Wire()
+    wire.twin.program.banks.programs[0], _ = loaded("MAIN:\nDELAY 60\nJUMP MAIN\n")
     suspension = Suspension(wire)
     line: Any = suspension.task(task_line(wire)) if tasks else suspension.thread(thread_line(wire))
     mic = async_driver(line, wire)
@@ -104,6 +109,8 @@ def _trial(name: str, at: int | None, *, tasks: bool, loss: int) -> tuple[int, s
     if any(abs(wire.position(axis) - position) > RACE_P for axis, position in stood.items()):
         wrong.append(f"stood at {stood} pulses, then at {[wire.position(axis) for axis in stood]}")
     begun = sent.count("motion")
+    if begun and wire.twin.program.state is ProgramState.RUNNING:
+        wrong.append("a program runs on")
     if begun and (sent[:2] != ["motion", "stop"] or begun > 1 or suspension.what not in AT_THE_LAST_MOMENT):
         wrong.append(f"sent {sent}")
     return points, f"{name}, suspended {suspension.what} (point {at}): {'; '.join(wrong)}" if wrong else ""

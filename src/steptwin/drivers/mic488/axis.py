@@ -167,11 +167,11 @@ class AsyncMic488Axis:
 
     async def _halt(self, key: str, *, on: bool, what: str) -> None:
         unit = self._unit
-        unit.notes.stops[self.number] += 1
-        try:
-            await unit.write(unit.item(key, self.number), on, urgent=True, most_attempts=URGENT_TRIES)
-        except LineFailure as failure:
-            raise unconfirmed(f"M{self.number}", what, failure) from failure
+        with unit.stopping(self.number):
+            try:
+                await unit.write(unit.item(key, self.number), on, urgent=True, most_attempts=URGENT_TRIES)
+            except LineFailure as failure:
+                raise unconfirmed(f"M{self.number}", what, failure) from failure
         self.forget()
 
     def forget(self) -> None:

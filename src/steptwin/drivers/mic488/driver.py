@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,7 +23,7 @@ from steptwin.drivers.mic488.user import AsyncUserRegisters
 from steptwin.drivers.mic488.waiting import wait_for
 from steptwin.drivers.modbus import ModbusQuery, check_unit, words
 from steptwin.drivers.permission import Permission
-from steptwin.errors import Misuse
+from steptwin.errors import LineFailure, Misuse
 from steptwin.inputfiles import read_bytes
 from steptwin.machine import SECOND
 from steptwin.mic488.config import ControllerConfig, read_config
@@ -31,11 +32,13 @@ from steptwin.mic488.inifile import IniFile
 from steptwin.mic488.registermap import DataType, WriteEffect
 from steptwin.mic488.registers import AXES, DEFAULT_FIRMWARE, INPUTS, OUTPUTS, register_map
 from steptwin.mic488.status import ProgramState
-from steptwin.mic488.values import RegisterItem, RegisterValue, halted, named
+from steptwin.mic488.values import PROGRAM, RegisterItem, RegisterValue, halted, named, starts_program
 from steptwin.wire import pdu
 
 TIMEOUT_S = 0.3
 TRIES = 3
+_CHANGES = frozenset({"VEL_ABS", "VEL_REL", "POS_REL"})
+"""Registers by which a value of 0 moves nothing."""
 
 _log = logging.getLogger(__name__)
 
@@ -229,10 +232,17 @@ class AsyncMic488:
 
         Raises `Unconfirmed` if the program was not paused.
         """
-        await self.stop()
-        if await self.program.state() is ProgramState.RUNNING:
-            await self.program.pause()
-            await self.stop()  # the program may have begun a motion meanwhile
+        with self._unit.stopping(PROGRAM, *ALL_AXES):
+            await self.stop()
+            try:
+                if await self.program.state() is not ProgramState.RUNNING:
+                    return
+            except LineFailure as failure:
+                _log.warning("%s: whether a program runs is not known, and it is paused (%s)", self.line.place, failure)
+            try:
+                await self.program.pause()
+            finally:
+                await self.stop()  # the program may have begun a motion meanwhile
             if await self.program.state() is ProgramState.RUNNING:
                 raise Unconfirmed("the program was paused, but runs: another master has started it again")
 
@@ -285,31 +295,34 @@ class AsyncMic488:
         await self.set_all((name, value))
 
     async def set_all(self, *values: tuple[str, float], is_sure: bool = False) -> None:
-        """`set` one after the other. Names are checked before the first is written. A stop of an axis meanwhile refuses what may
-        move it and has not been written. ``is_sure``: a motion that the controller would ignore, because its drive is off, is not
-        written but raises `NotReady`."""
-        unit = self._unit
-        chosen: list[tuple[RegisterItem, float, tuple[int, ...], Permission | None]] = []
+        """`set` one after the other. Names are checked before the first is written. A stop of an axis meanwhile that is none of
+        these values refuses what may move it and has not been written. ``is_sure``: a motion that the controller would ignore,
+        because its drive is off, is not written but raises `NotReady`."""
+        unit, own = self._unit, Counter[int]()
+        chosen: list[tuple[RegisterItem, float, tuple[int, ...], tuple[int, ...], Permission | None]] = []
         for name, value in values:
             item = named(unit.registers, name)
             if not item.register.accepts:
                 raise Misuse(f"{name} can only be read")
-            moved = _moved_by(item)
-            chosen.append((item, value, moved, unit.permission(*moved) if moved else None))
-        for item, value, moved, permission in chosen:
-            data_type = DataType.REAL
-            if not unit.is_stop(item, value):
+            ended = unit.ended_by(item, value)
+            moved = () if ended else _moved_by(item)
+            chosen.append((item, value, ended, moved, unit.permission(*moved, own=own) if moved else None))
+        for item, value, ended, moved, permission in chosen:
+            key, data_type = item.register.key, DataType.REAL
+            if not ended:
                 control = await unit.control()
                 data_type = control.data_type
-                if is_sure and item.register.axis in moved and not control.triggered and value:
+                is_rest = value == 0 and key in _CHANGES
+                if is_sure and item.register.axis in moved and not control.triggered and not is_rest:
                     unit.check_enabled(control, *moved)
-            async with unit.stopping_if_late(*moved):
+            own.update(ended)
+            async with unit.stopping_if_late(*moved, program=key == "PROGRAM_CTRL"):
                 await unit.write(item, unit.travelling(item, value, data_type), data_type=data_type, permission=permission)
 
     def is_stop(self, name: str, value: float) -> bool:
         """Whether `set` with these ends a motion. Such a write precedes all waiting requests. Raises `Misuse` for an unknown
         name."""
-        return self._unit.is_stop(named(self._unit.registers, name), value)
+        return bool(self._unit.ended_by(named(self._unit.registers, name), value))
 
     async def registers(self, address: int, count: int) -> tuple[int, ...]:
         """Raw holding registers."""
@@ -322,7 +335,7 @@ class AsyncMic488:
         unit = self._unit
         if isinstance(request, pdu.ReadRequest) or halted(unit.registers, request):
             return pdu.answer(request, await unit.ask(request))
-        async with unit.stopping_if_late(*ALL_AXES):
+        async with unit.stopping_if_late(*ALL_AXES, program=starts_program(unit.registers, request)):
             return pdu.answer(request, await unit.ask(request, permission=unit.permission(*ALL_AXES)))
 
     # ------------------------------------------------------------------ snapshots

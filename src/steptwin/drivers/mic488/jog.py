@@ -95,7 +95,7 @@ class AsyncMic488Jog:
             if vmax != speed:
                 self._vmax_u = vmax
                 await unit.set_axis("VMAX", axis, speed, control.data_type)
-        permission = Permission(unit.line.now, round(self._hold_s * SECOND), begin.is_stopped)
+        permission = unit.permission(axis, patience_ns=round(self._hold_s * SECOND), has_begun=True)
         try:
             await self._move(control, begin)
             permission.extend()

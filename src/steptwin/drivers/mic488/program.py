@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from steptwin.drivers.exchange import SentLate
-from steptwin.drivers.mic488.failures import unconfirmed
-from steptwin.drivers.mic488.unit import ALL_AXES, URGENT_TRIES, Unit
-from steptwin.errors import LineFailure
+from steptwin.drivers.mic488.unit import ALL_AXES, Unit
 from steptwin.mic488.status import ProgramState
 
 
@@ -27,21 +24,17 @@ class AsyncMic488Program:
     async def start(self) -> None:
         """Start the selected program, or continue a paused one. Sent only once: after a lost answer it is unknown whether it
         runs. One that began after a suspension of this process is paused, and its axes are stopped."""
-        permission = self._unit.permission(*ALL_AXES)
-        try:
-            await self._unit.write(self._unit.item("PROGRAM_CTRL"), ProgramState.RUNNING, permission=permission)
-        except SentLate:
-            await self.pause()
-            await self._unit.stop(ALL_AXES, "M_STOP", "stopped")
-            raise
+        unit = self._unit
+        permission = unit.permission(*ALL_AXES)
+        async with unit.stopping_if_late(*ALL_AXES, program=True):
+            await unit.write(unit.item("PROGRAM_CTRL"), ProgramState.RUNNING, permission=permission)
 
     async def pause(self) -> None:
-        await self._unit.write(self._unit.item("PROGRAM_CTRL"), ProgramState.PAUSED, urgent=True)
+        """Pause the program; motions that have begun, and held jogs, go on. It precedes all waiting requests. Raises
+        `Unconfirmed`."""
+        await self._unit.end_program(ProgramState.PAUSED, "paused")
 
     async def stop(self) -> None:
-        """End the program, which switches drives and outputs off (MIC-31). It precedes all waiting requests."""
-        unit = self._unit
-        try:
-            await unit.write(unit.item("PROGRAM_CTRL"), ProgramState.STOPPED, urgent=True, most_attempts=URGENT_TRIES)
-        except LineFailure as failure:
-            raise unconfirmed("the program", "stopped", failure) from failure
+        """End the program, which switches drives and outputs off (MIC-31). It precedes all waiting requests. Raises
+        `Unconfirmed`."""
+        await self._unit.end_program(ProgramState.STOPPED, "stopped")

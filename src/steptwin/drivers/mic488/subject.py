@@ -202,7 +202,7 @@ class Mic488Part:
 
     def effect_of(self, wanted: steps.Request | steps.Write) -> RawEffect:
         if isinstance(wanted, steps.Write):
-            is_stop = all(self._mic.is_stop(name, value) for _, name, value in wanted.values)
+            is_stop = bool(wanted.values) and all(self._mic.is_stop(name, value) for _, name, value in wanted.values)
             return RawEffect.STOP if is_stop else RawEffect.WRITE
         if wanted.pdu and wanted.pdu[0] in pdu.READS:
             return RawEffect.LOOK

@@ -5,13 +5,14 @@ Suffixes: ``_u`` configured units, ``_p`` pulses, ``_ns`` nanoseconds, ``_s`` se
 
 from __future__ import annotations
 
-from collections.abc import AsyncGenerator, Iterable, Sequence
-from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from collections.abc import AsyncGenerator, Generator, Iterable, Mapping, Sequence
+from contextlib import AbstractAsyncContextManager, asynccontextmanager, contextmanager
+from types import MappingProxyType
 from typing import NamedTuple
 
 from steptwin.drivers.exchange import Job, SentLate
 from steptwin.drivers.line import DriverLine
-from steptwin.drivers.mic488.failures import ModbusRefusal, NotReady, unconfirmed
+from steptwin.drivers.mic488.failures import ModbusRefusal, NotReady, Unconfirmed, unconfirmed
 from steptwin.drivers.mic488.frames import FrameWords
 from steptwin.drivers.modbus import ModbusQuery, bits, words
 from steptwin.drivers.permission import Permission
@@ -21,8 +22,9 @@ from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.describe import AxisScale, Wording
 from steptwin.mic488.registermap import DataType, RegisterMap, Type
 from steptwin.mic488.registers import AXES
-from steptwin.mic488.status import AxisStatus
+from steptwin.mic488.status import AxisStatus, ProgramState
 from steptwin.mic488.values import (
+    PROGRAM,
     Block,
     RegisterItem,
     RegisterValue,
@@ -65,7 +67,10 @@ class UnitNotes:
 
     def __init__(self) -> None:
         self.stops = [0] * (AXES + 1)
-        """Number of stops of each axis (from 1): a motion requested before a stop must not begin after it."""
+        """Number of stops of the program (at 0, `PROGRAM`) and of each axis: a motion requested before a stop must not begin
+        after it."""
+        self.unanswered: list[tuple[int, ...]] = []
+        """What each stop ends that has not been answered."""
         self.control: ControlRegisters | None = None
 
 
@@ -142,18 +147,18 @@ class Unit:
         """Send a request and return the answer PDU. Raises `ModbusRefusal` or a `LineFailure`.
 
         What may begin a motion, and has no ``permission``, is not sent after a stop of any axis. What ends a motion is urgent and
-        counts as a stop of its axes.
+        counts as a stop.
         """
         if most_attempts is None:
             most_attempts = self.tries if repeatable(self.registers, request) else 1
-        for axis in halted(self.registers, request):
-            urgent = True
-            self.notes.stops[axis] += 1
+        ended = halted(self.registers, request)
         if permission is None and moves(self.registers, request):
             permission = self.permission(*ALL_AXES)
-        return await self._exchange(
-            ModbusQuery(self.number, request, self.wording.request), urgent, permission, timeout_ns, most_attempts
-        )
+        query = ModbusQuery(self.number, request, self.wording.request)
+        if not ended:
+            return await self._exchange(query, urgent, permission, timeout_ns, most_attempts)
+        with self.stopping(*ended):
+            return await self._exchange(query, True, permission, timeout_ns, most_attempts)
 
     async def _exchange(
         self, query: ModbusQuery, urgent: bool, permission: Permission | None, timeout_ns: Nanos | None, most_attempts: int
@@ -219,12 +224,12 @@ class Unit:
         request = encoded(item, value, data_type, self.unit_name(axis) if axis else "u")
         await self.ask(request, urgent=urgent, permission=permission, timeout_ns=timeout_ns, most_attempts=most_attempts)
 
-    def is_stop(self, item: RegisterItem, value: RegisterValue) -> bool:
-        """Whether writing ``value`` ends a motion."""
+    def ended_by(self, item: RegisterItem, value: RegisterValue) -> tuple[int, ...]:
+        """What writing ``value`` ends: see `halted`."""
         register = item.register
         if register.type not in (Type.BIT, Type.WORD) or not register.accepts or not register.permits(value):
-            return False
-        return bool(halted(self.registers, encoded(item, value, DataType.REAL)))
+            return ()
+        return halted(self.registers, encoded(item, value, DataType.REAL))
 
     async def read_user(self, number: int, view: UserFormat, count: int) -> list[RegisterValue]:
         """Read ``count`` user registers from ``number`` on, as ``view``."""
@@ -326,31 +331,72 @@ class Unit:
         """A lock for exchanges that no other motion command may interrupt."""
         return self.line.lock(("mic488", self.number))
 
-    def permission(self, *axes: int, patience_ns: Nanos | None = None) -> Permission:
-        """Permission for a request made now. It ends with a stop of one of the axes, or after `PATIENCE_NS`."""
-        stops = self.notes.stops
-        before = [stops[axis] for axis in axes]
+    def permission(
+        self,
+        *axes: int,
+        patience_ns: Nanos | None = None,
+        has_begun: bool = False,
+        own: Mapping[int, int] = MappingProxyType({}),
+    ) -> Permission:
+        """Permission for a request made now. It ends with a stop of one of the axes or of the program, or after `PATIENCE_NS`;
+        while such a stop is unanswered there is none.
+
+        ``has_begun``: for what goes on when the program is stopped. ``own``: number of stops since now, of each axis, that do not
+        end it.
+        """
+        stops, places = self.notes.stops, axes if has_begun else (PROGRAM, *axes)
+        is_stopping = any(not set(places).isdisjoint(ended) for ended in tuple(self.notes.unanswered))
+        before = [stops[place] - own.get(place, 0) for place in places]
         if patience_ns is None:
             patience_ns = max(PATIENCE_NS, 2 * self.tries * self.timeout_ns)
-        return Permission(self.line.now, patience_ns, lambda: [stops[axis] for axis in axes] != before)
+        return Permission(
+            self.line.now,
+            patience_ns,
+            lambda: is_stopping or [stops[place] - own.get(place, 0) for place in places] != before,
+        )
 
-    @asynccontextmanager
-    async def stopping_if_late(self, *axes: int) -> AsyncGenerator[None]:
-        """Stop the axes if their motion was sent too late (`SentLate`)."""
+    @contextmanager
+    def stopping(self, *ended: int) -> Generator[None]:
+        """Stop axes and `PROGRAM` inside: motions that were requested before its end are not begun after it."""
+        for place in ended:
+            self.notes.stops[place] += 1
+        self.notes.unanswered.append(ended)
         try:
             yield
-        except SentLate:
-            await self.stop(axes)
+        finally:
+            self.notes.unanswered.remove(ended)
+
+    @asynccontextmanager
+    async def stopping_if_late(self, *axes: int, program: bool = False) -> AsyncGenerator[None]:
+        """Stop the axes if their motion was sent too late (`SentLate`), and before it pause the ``program`` that may have been
+        started. Raises `Unconfirmed`."""
+        try:
+            yield
+        except SentLate as late:
+            try:
+                try:
+                    if program:
+                        await self.end_program(ProgramState.PAUSED, "paused")
+                finally:
+                    await self.stop(axes)
+            except LineFailure as failure:
+                raise Unconfirmed(f"a request was sent too late, and {failure}") from late
             raise
+
+    async def end_program(self, state: ProgramState, what: str) -> None:
+        """Stop or pause the program, before all waiting requests. Raises `Unconfirmed`."""
+        try:
+            await self.write(self.item("PROGRAM_CTRL"), state, urgent=True, most_attempts=URGENT_TRIES)
+        except LineFailure as failure:
+            raise unconfirmed("the program", what, failure) from failure
 
     async def stop(self, axes: Sequence[int], key: str = "M_STOP", what: str = "stopped") -> None:
         """Stop axes in the same instant, before all waiting requests. Raises `Unconfirmed`."""
-        for axis in axes:
-            self.notes.stops[axis] += 1
-        try:
-            await self.write(self.item(key), axis_mask(axes), urgent=True, most_attempts=URGENT_TRIES)
-        except LineFailure as failure:
-            raise unconfirmed(" ".join(f"M{axis}" for axis in axes), what, failure) from failure
+        with self.stopping(*axes):
+            try:
+                await self.write(self.item(key), axis_mask(axes), urgent=True, most_attempts=URGENT_TRIES)
+            except LineFailure as failure:
+                raise unconfirmed(" ".join(f"M{axis}" for axis in axes), what, failure) from failure
 
 
 def axis_mask(axes: Iterable[int]) -> int:
