@@ -81,6 +81,8 @@ class MotorState(MotorCoordinates):
         self._conditions = _conditions(part, axis)
         self._motion: RecordMotion | None = None
         self._jog: tuple[Putter, Jog] | None = None
+        self._beginning: tuple[Putter, str] | None = None
+        """Who has asked for a jog that has not begun yet, by which button; None once it is let go of."""
         self._is_homed = False
         self._is_pausing = False
         self._has_not_aimed = True
@@ -155,7 +157,7 @@ class MotorState(MotorCoordinates):
 
     @property
     def is_busy(self) -> bool:
-        return self._motion is not None
+        return self._motion is not None or self._beginning is not None
 
     def _take(self, state: Any, time: Nanos, *, is_sure: bool) -> None:
         code, level = state["status"]["code"], state["status"]["level"]
