@@ -28,6 +28,7 @@ class MotorRecord(MotorState):
 
     async def take(self, sample: Sample, *, is_sure: bool) -> None:
         self.at_s = sample.at.timestamp()
+        self._see_stops()
         if sample.state is None:
             self.alarm = LOST
             self.values["MSTA"] = int(self.values["MSTA"]) | StatusBit.COMM_ERROR
@@ -104,7 +105,9 @@ class MotorRecord(MotorState):
     async def _wait_paused(self, who: Putter, dial: float) -> None:
         self._controller.check_may_change(who)
         motion = self._motion or RecordMotion()
+        self._see_stops()
         motion.target, motion.is_paused, self._motion = dial, True, motion
+        self._watch_stops()
         self.values["DMOV"] = 0
         over = asyncio.get_running_loop().create_future()
         motion.waiting.append(over)
@@ -207,6 +210,7 @@ class MotorRecord(MotorState):
         """SPMG is put."""
         if state in (MOVE, GO):
             self._controller.check_may_change(who)
+        self._see_stops()
         motion, before = self._motion, self.values["SPMG"]
         self.values["SPMG"] = state
         if motion is None:
@@ -221,6 +225,7 @@ class MotorRecord(MotorState):
                 await self.stop(who)
             finally:
                 self._is_pausing = False
+                self._watch_stops()
         elif state in (STOP, PAUSE):
             await self.stop(who)
         elif motion.is_paused and motion.target is not None:
