@@ -14,6 +14,7 @@ from steptwin.access.roles import Role
 from steptwin.errors import Refusal
 from steptwin.gateways.clients import GatewayClient
 from steptwin.gateways.contract import GatewaySubject
+from steptwin.machine import SECOND
 from steptwin.subject import commands as command
 from steptwin.subject.commands import Command
 from steptwin.world.script import Write
@@ -44,6 +45,36 @@ async def outcomes(subject: GatewaySubject) -> list[str]:
 def test_a_twin_without_its_drive() -> None:
     found = asyncio.run(outcomes(GatewayWorld('[[mic488]]\nname = "table"\n')))
     assert found == ["ignored: not enabled"] * 4 + ["done"] * 5
+
+
+def test_a_twin_whose_answers_take_their_time() -> None:
+    line = '[[line]]\nname = "bus"\nkind = "modbus"\ntiming = "real"\nbaud = 9600\n'
+    world = GatewayWorld(f'{line}[[mic488]]\nname = "table"\nline = "bus"\n[[mic488]]\nname = "other"\nline = "bus"\nunit = 2\n')
+    logged: list[str] = []
+    world.audit = lambda who, do, fields, outcome: logged.append(outcome)
+
+    async def switch_on(*, is_stopped: bool) -> None:
+        """The world goes on while the command is on its way."""
+        await asyncio.sleep(0.07)
+        if is_stopped:
+            world.inner.do(command.StopAxes("table"))
+            world.inner.do(command.Enable("table", 1))
+        world.inner.do(command.Advance(duration=SECOND))
+
+    async def story() -> None:
+        await ME.do(world, command.Enable("other", 1))
+        for wanted in MOTIONS[:3]:
+            with pytest.raises(Refusal, match="M1 is not enabled: switch its drive on first"):
+                await ME.do(world, wanted)
+        with pytest.raises(Refusal, match="a stop was requested meanwhile"):
+            await asyncio.gather(switch_on(is_stopped=True), ME.do(world, MOTIONS[0]))
+        world.inner.do(command.Enable("table", 1, on=False))
+        world.inner.do(command.Advance(duration=SECOND))
+        await ME.do(world, command.Enable("table", 1))
+        await asyncio.gather(switch_on(is_stopped=False), ME.do(world, MOTIONS[0]))
+
+    run_virtually(story())
+    assert logged == ["done", *["ignored: not enabled"] * 3, "refusal", "done", "done"]
 
 
 def test_a_device_without_its_drive_is_sent_nothing() -> None:

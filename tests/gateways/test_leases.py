@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from typing import Any
 
 import pytest
+from bridge_rig import BridgeRig
 from gateway_rig import GatewayWorld
 from virtual_loop import run_virtually
 
@@ -52,15 +54,18 @@ def test_a_client_that_goes_on_calling_does_not_begin_a_stopped_jog_again() -> N
         rig.stop()
         there = rig.position
         assert there > 0.5
+        logged: list[str] = []
+        rig.world.audit = lambda who, do, fields, outcome: logged.append(do)
         for _ in range(5):
             await rig.wait(0.2)
             with pytest.raises(Refusal, match=r"the jog has ended: .*; it can be begun again 0\.5 s after its last"):
                 await rig.call()
-        assert rig.position == there
+        assert (rig.position, logged) == (there, []), "these calls are of a press that is in the audit log already"
         await rig.wait(LEASE_S + 0.1)
         await rig.call()
         await rig.wait(0.4)
         assert rig.position > there
+        assert logged == ["jog"]
         rig.leases.close()
 
     run_virtually(story())
@@ -77,5 +82,44 @@ def test_the_other_direction_and_other_clients_need_not_wait() -> None:
             rig.stop()
             await rig.wait(0.2)
         rig.leases.close()
+
+    run_virtually(story())
+
+
+ENDS: dict[str, tuple[Callable[[JogLeases], object], str]] = {
+    "drop": (lambda leases: leases.drop("session"), "its client has let go"),
+    "close": (lambda leases: leases.close(), "the connection of its client has ended"),
+    "stop": (lambda leases: leases.stopped(StopAxes("table")), "it was stopped"),
+    "replaced": (lambda leases: leases.replaced("table", 1), "another command has taken the axis"),
+    "time": (lambda leases: None, "its time was over before it began"),
+}
+
+
+@pytest.mark.parametrize("name", ENDS)
+def test_what_ends_a_jog_ends_one_that_is_still_beginning(name: str) -> None:
+    async def story() -> None:
+        rig = BridgeRig()
+        await rig.open()
+        await rig.subject.do(Enable("table", 1))
+        leases = JogLeases(rig.subject)
+        end, why = ENDS[name]
+        rig.line.fall_silent()
+        call = asyncio.create_task(leases.jog("session", ME, FORWARDS, LEASE_S))
+        await rig.wait(0.1)
+        for owner in ("session", "another"):
+            with pytest.raises(Refusal, match=r"a jog is being begun|is jogged by another client"):
+                await leases.jog(owner, ME, FORWARDS, LEASE_S)
+        end(leases)
+        await rig.wait(LEASE_S if name == "time" else 0.0)
+        rig.line.answer_again()
+        with pytest.raises(Refusal, match=why):
+            await call
+        await rig.wait(1.0)
+        assert not rig.is_moving
+        await leases.jog("another", ME, BACKWARDS, LEASE_S)
+        await rig.wait(0.2)
+        assert rig.is_moving
+        leases.close()
+        await rig.close()
 
     run_virtually(story())

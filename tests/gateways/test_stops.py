@@ -66,7 +66,11 @@ STOPS: dict[str, Command] = {
     "axis": command.StopAxes("table", AXIS),
     "controller": command.StopAxes("table"),
     "program": command.ControlProgram("table", "stop"),
+    "everything": command.StopAll(),
+    "registers": steps.Write((("table", f"M{AXIS}_STOP", 1.0),)),
 }
+FURTHER = {"studio": ("everything", "registers")}
+"""Stops that only these ways have."""
 
 
 class Refused(Exception):
@@ -182,6 +186,10 @@ class Nodes:
         client, path, kind = calls[what]
         await self._call(client, path, kind, "Stop")
 
+    async def leave(self) -> None:
+        """The session ends; its connection does not."""
+        await self._one.close_session()
+
 
 @asynccontextmanager
 async def opcua(rig: BridgeRig) -> AsyncGenerator[Way]:
@@ -220,6 +228,10 @@ class Topics:
             "program": {"do": "program", "action": "stop"},
         }
         await self._do(**messages[what])
+
+    async def leave(self) -> None:
+        """The broker is lost."""
+        self._commands.lost()
 
 
 @asynccontextmanager
@@ -330,6 +342,12 @@ class Records:
         puts = {"axis": (f"M{AXIS}", "STOP"), "controller": ("Stop", "VAL"), "program": ("program:Stop", "VAL")}
         await self._put(*puts[what], 1, "other")
 
+    async def leave(self) -> None:
+        await self._controller.leave(("one", 1))
+
+    async def release(self) -> None:
+        await self._put(f"M{AXIS}", "JOGF", 0, "one")
+
 
 @asynccontextmanager
 async def epics(rig: BridgeRig) -> AsyncGenerator[Way]:
@@ -402,9 +420,35 @@ def test_what_was_asked_for_before_a_stop_does_not_begin_after_it(name: str) -> 
         async with WAYS[name](rig) as way:
             for what in MOTIONS:
                 for place in PLACES:
-                    for stop in ("axis", "controller") if what != "program" else ("program",):
+                    for stop in ("axis", "controller", *FURTHER.get(name, ())) if what != "program" else ("program",):
                         if (name, what) != ("sparkplug", "jog"):  # it has no jog
                             await check_case(rig, way, what, place, stop)
+        await rig.close()
+
+    run_virtually(story())
+
+
+@pytest.mark.parametrize(("name", "end"), [("opcua", "leave"), ("mqtt", "leave"), ("epics", "leave"), ("epics", "release")])
+def test_a_jog_whose_client_lets_go_before_it_begins_does_not_last(name: str, end: str) -> None:
+    async def story() -> None:
+        rig = BridgeRig()
+        await rig.open()
+        async with WAYS[name](rig) as way:
+            await rig.subject.do(command.Enable("table", AXIS, on=True))
+            rig.line.fall_silent()
+            asked = asyncio.create_task(_asked(way.ask("jog")))
+            await rig.wait(0.05)
+            ending = asyncio.create_task(getattr(way, end)())
+            await rig.wait(SILENCE_S)
+            rig.line.answer_again()
+            await ending
+            await rig.wait(1.0)
+            there = rig.position
+            await rig.wait(2.0)
+            assert (rig.is_moving, rig.position) == (False, there)
+            if name != "opcua":  # nobody is there for an answer
+                assert "let go" in await asked
+            asked.cancel()
         await rig.close()
 
     run_virtually(story())

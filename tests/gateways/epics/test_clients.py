@@ -94,7 +94,9 @@ def test_records_for_pyepics(tmp_path: Path) -> None:
 
 PV_EXPECTED = {
     "types": [f"epics:nt/{name}:1.0" for name in ("NTScalar", "NTScalar", "NTEnum", "NTScalar", "NTEnum")],
-    "while it is off": "channel ST:table:M1 PvaClientPut::put table M1: the motion ended at 0 imp, not at 10 imp: off",
+    "while it is off": (
+        "channel ST:table:M1 PvaClientPut::put table: position command ignored: M1 is not enabled: switch its drive on first"
+    ),
     "moved": [30.0, 30.0, 1],
     "seen": [1, 0, 1, 0, 1],
     "by": 20.0,

@@ -5,8 +5,10 @@ from __future__ import annotations
 import pytest
 from motorrecord_rig import ME, OTHER, MotorRig, check
 
+from steptwin.access.roles import Role
 from steptwin.errors import Misuse, Refusal
-from steptwin.subject.commands import StopAxes
+from steptwin.gateways.clients import GatewayClient
+from steptwin.subject.commands import Command, StopAll, StopAxes
 
 
 @pytest.mark.parametrize(("button", "sign"), [("JOGF", 1), ("JOGR", -1)])
@@ -160,5 +162,33 @@ def test_a_jog_that_another_gateway_has_stopped_does_not_go_on() -> None:
         await rig.until(lambda: float(rig.get("RBV")[0]) > begin + 5.0)
         await rig.put("JOGF", 0)
         await rig.over(put)
+
+    check(act)
+
+
+@pytest.mark.parametrize("stop", [StopAxes("table"), StopAxes("table", 1), StopAll()], ids=str)
+@pytest.mark.parametrize("is_of_gateway", [False, True])
+def test_a_move_that_waits_for_go_does_not_outlast_a_stop_by_others(stop: Command, is_of_gateway: bool) -> None:
+    async def act(rig: MotorRig) -> None:
+        for has_begun in (False, True):
+            await rig.put("SPMG", 3 if has_begun else 1)
+            put = await rig.begin("VAL", 1000.0)
+            if has_begun:
+                await rig.until(lambda: float(rig.get("RBV")[0]) > 5.0)
+                await rig.put("SPMG", 1)
+            await rig.until(lambda: rig.get("MOVN") == [0])
+            rig.world.inner.do(StopAxes("table", 2))
+            await rig.tick()
+            assert not put.done()
+            if is_of_gateway:
+                await GatewayClient("another", Role.VIEWER).do(rig.world, stop)
+            else:
+                rig.world.inner.do(stop)
+            there = rig.get("RBV")
+            await rig.put("SPMG", 3)
+            with pytest.raises(Refusal, match="the motion was stopped while it waited for Go"):
+                await rig.over(put)
+            await rig.stands()
+            assert (rig.get("RBV"), rig.get("VAL")) == (there, there)
 
     check(act)

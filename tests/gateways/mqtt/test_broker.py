@@ -185,7 +185,7 @@ def test_a_broker_that_falls_silent_is_given_up(broker: Mosquitto, tmp_path: Pat
         until(lambda: "connected again" in (tmp_path / "output").read_text(), "it is tried again")
         online(broker)
         with broker.subscribe("me/answers") as answers:
-            assert Requests(broker, answers)("stop", machine="table")["ok"] is None
+            assert Requests(broker, answers)("stop", machine="table")["ok"] == {"program": "stopped"}
         assert broker.retained(f"{BASE}/online") is True, "the will of the session before came before this one"
 
 
@@ -229,7 +229,7 @@ def test_roles_by_token(broker: Mosquitto, tmp_path: Path) -> None:
             assert "is for the role operator" in ask("enable", **enable)["error"]["message"]
             assert ask("enable", **enable, token="wrong")["error"]["message"] == "wrong token"
             assert ask("enable", **enable, token="0123456789abcdef")["ok"] is None
-            assert ask("stop", machine="table")["ok"] is None
+            assert ask("stop", machine="table")["ok"] == {"program": "stopped"}
             power = ask("power_cycle", machine="table", token="0123456789abcdef")
             assert "is for the role engineer; press has the role operator" in power["error"]["message"]
 
@@ -337,7 +337,7 @@ def test_home_assistant_finds_the_controllers(broker: Mosquitto, tmp_path: Path)
         button = found["cmps"]["stop_M1"]
         with broker.subscribe(f"{BASE}/answer") as answers:
             broker.publish(button["cmd_t"], button["pl_prs"])
-            answers.wait_for(lambda one: one["payload"]["ok"] is None, "it stops")
+            answers.wait_for(lambda one: one["payload"]["ok"] == {"program": "stopped"}, "it stops")
 
 
 def test_a_bridge_shows_a_device(broker: Mosquitto, tmp_path: Path) -> None:

@@ -14,9 +14,12 @@ from steptwin.gateways.epics.records import Putter
 from steptwin.gateways.leases import LEASE_S, JogLeases
 from steptwin.gateways.sampling import Sample, Sampler
 from steptwin.subject.commands import Command, Jog, ReadPoints, StopAxes
+from steptwin.subject.following import Filter, Following
 
 JOG_LEASE_S = 1.0
 """A jog ends so long after the gateway has last looked after it."""
+MOST_INPUTS = 1000
+"""Inputs between two samples."""
 
 
 class SampledRecord(Protocol):
@@ -144,6 +147,14 @@ class EpicsController:
     def end_jog(self, owner: object) -> None:
         self._commands += 1
         self._leases.drop(owner)
+
+    def follow_inputs(self) -> Following:
+        """Those of a twin; stops by anybody are among them (`steptwin.subject.payloads.InputPayload`)."""
+        return self._subject.follow(Filter(frozenset({"input"}), frozenset({self.name})), MOST_INPUTS)
+
+    def stops_of(self, axis: int) -> int:
+        """The number of stops by clients of all gateways."""
+        return self._subject.samples.stops_of(self.name, axis)
 
     def replace_jog(self, axis: int) -> None:
         """Another command has taken the axis."""

@@ -38,7 +38,7 @@ class PutTarget(Protocol):
 
     async def jog(self, who: Putter, button: str) -> None: ...
 
-    async def end_jog(self) -> None: ...
+    async def end_jog(self, button: str) -> None: ...
 
     async def stop(self, who: Putter) -> None: ...
 
@@ -92,8 +92,8 @@ async def _put_button(record: PutTarget, who: Putter, name: str, value: FieldVal
         await record.home(who, name)
     elif value:
         await record.jog(who, name)
-    elif record.values[name]:
-        await record.end_jog()
+    else:
+        await record.end_jog(name)
 
 
 async def _put_stop(record: PutTarget, who: Putter, name: str, value: FieldValue) -> None:

@@ -28,6 +28,7 @@ class MotorRecord(MotorState):
 
     async def take(self, sample: Sample, *, is_sure: bool) -> None:
         self.at_s = sample.at.timestamp()
+        self._see_stops()
         if sample.state is None:
             self.alarm = LOST
             self.values["MSTA"] = int(self.values["MSTA"]) | StatusBit.COMM_ERROR
@@ -51,24 +52,25 @@ class MotorRecord(MotorState):
     async def _begin(self, motion: RecordMotion, act: Callable[[], Awaitable[None]]) -> asyncio.Future[None]:
         """Begin a motion; the result is there at its end. A motion that is being made becomes it: who waits for that waits for
         this."""
-        before, shown = self._motion, {name: self.values[name] for name in ("DMOV", "ATHM")}
+        shown = {name: self.values[name] for name in ("DMOV", "ATHM")}
         if motion.button is not None:
             self.values[motion.button] = 1
         self.values |= {"DMOV": 0, "ATHM": 0}
         await self.show()
         try:
             await act()
-        except SteptwinError:
+        except BaseException:
             self.values |= shown
             if motion.button is not None:
                 self.values[motion.button] = 0
             raise
-        if before is not None and self._motion is before:
+        before = self._motion
+        if before is not None:
             motion.waiting = before.waiting
-            if before.button is not None:
+            if before.button is not None and before.button != motion.button:
                 self.values[before.button] = 0
-        if self._jog is not None and motion.button not in ("JOGF", "JOGR"):
-            self._jog = None
+        if motion.button not in ("JOGF", "JOGR"):
+            self._jog = self._beginning = None
             self._controller.replace_jog(self._axis.number)
         self._motion = motion
         over: asyncio.Future[None] = asyncio.get_running_loop().create_future()
@@ -103,7 +105,9 @@ class MotorRecord(MotorState):
     async def _wait_paused(self, who: Putter, dial: float) -> None:
         self._controller.check_may_change(who)
         motion = self._motion or RecordMotion()
+        self._see_stops()
         motion.target, motion.is_paused, self._motion = dial, True, motion
+        self._watch_stops()
         self.values["DMOV"] = 0
         over = asyncio.get_running_loop().create_future()
         motion.waiting.append(over)
@@ -126,17 +130,28 @@ class MotorRecord(MotorState):
         velocity = abs(self._number("JVEL")) * self._sign * (1 if button == "JOGF" else -1)
         if not velocity:
             raise Misuse(f"{self._place}: JVEL is 0")
+        if self._beginning is not None:
+            raise Refusal(f"{self._place}: a jog is being begun")
         wanted = Jog(self._controller.name, self._axis.number, velocity)
         if self._runs_out(velocity):
             self.values["LVIO"] = 1
             raise Misuse(f"{self._place}: a jog would leave {self._number('LLM'):.9g} to {self._number('HLM'):.9g} {self.unit}")
         self.values["LVIO"] = 0
 
+        beginning = self._beginning = who, button
+
         async def begin() -> None:
+            if self._beginning is not beginning:
+                raise Refusal(f"{self._place}: the jog was let go of before it began")
             await self._controller.jog(self, who, wanted)
             self._jog = who, wanted
 
-        await (await self._begin(RecordMotion(button=button), begin))
+        try:
+            over = await self._begin(RecordMotion(button=button), begin)
+        finally:
+            if self._beginning is beginning:
+                self._beginning = None
+        await over
 
     def _check_goes(self) -> None:
         if self.values["SPMG"] in (STOP, PAUSE):
@@ -149,7 +164,7 @@ class MotorRecord(MotorState):
         return self._has_limits and (there > self._number("DHLM") if velocity > 0.0 else there < self._number("DLLM"))
 
     def _look_after_jog(self) -> None:
-        if self._jog is None:
+        if self._jog is None or self._beginning is not None:
             return
         _, wanted = self._jog
         if self._runs_out(wanted.velocity):
@@ -161,18 +176,21 @@ class MotorRecord(MotorState):
         except SteptwinError:
             self._end_jog()
 
-    async def end_jog(self) -> None:
+    async def end_jog(self, button: str) -> None:
         """JOGF or JOGR is put to 0."""
+        begins = self._beginning is not None and self._beginning[1] == button
+        if not begins and (self._motion is None or self._motion.button != button):
+            return
         self._end_jog()
         await self._controller.refresh()
 
     def _end_jog(self) -> None:
-        self._jog = None
+        self._jog = self._beginning = None
         self._controller.end_jog(self)
 
     async def leave(self, circuit: object) -> None:
         """A jog ends with the connection of its client."""
-        if self._jog is not None and self._jog[0].circuit == circuit:
+        if any(one is not None and one[0].circuit == circuit for one in (self._beginning, self._jog)):
             self._end_jog()
 
     async def stop(self, who: Putter) -> None:
@@ -180,7 +198,10 @@ class MotorRecord(MotorState):
         await self._controller.refresh()
 
     def stopped(self, axis: int | None) -> None:
-        if axis not in (None, self._axis.number) or self._motion is None or self._is_pausing:
+        if axis not in (None, self._axis.number):
+            return
+        self._beginning = None
+        if self._motion is None or self._is_pausing:
             return
         self._jog = None
         self._motion.is_stopped, self._motion.is_paused = True, False
@@ -189,6 +210,7 @@ class MotorRecord(MotorState):
         """SPMG is put."""
         if state in (MOVE, GO):
             self._controller.check_may_change(who)
+        self._see_stops()
         motion, before = self._motion, self.values["SPMG"]
         self.values["SPMG"] = state
         if motion is None:
@@ -203,6 +225,7 @@ class MotorRecord(MotorState):
                 await self.stop(who)
             finally:
                 self._is_pausing = False
+                self._watch_stops()
         elif state in (STOP, PAUSE):
             await self.stop(who)
         elif motion.is_paused and motion.target is not None:

@@ -27,6 +27,8 @@ from steptwin.gateways.epics.records import (
 from steptwin.machine import SECOND, Nanos
 from steptwin.subject.commands import Jog
 from steptwin.subject.contract import MachinePart
+from steptwin.subject.following import Following
+from steptwin.subject.payloads import InputPayload
 
 ON_ITS_WAY = SECOND // 2
 """A motion that has not begun so long after its command does not begin any more."""
@@ -81,8 +83,14 @@ class MotorState(MotorCoordinates):
         self._conditions = _conditions(part, axis)
         self._motion: RecordMotion | None = None
         self._jog: tuple[Putter, Jog] | None = None
+        self._beginning: tuple[Putter, str] | None = None
+        """Who has asked for a jog that has not begun yet, by which button; None once it is let go of."""
         self._is_homed = False
         self._is_pausing = False
+        self._inputs: Following | None = None
+        """While a motion waits for Go."""
+        self._stops = 0
+        """The stops of its axis when it began to wait."""
         self._has_not_aimed = True
         """Before the first sample VAL is not known."""
         self._ramp: tuple[float, ...] = ()
@@ -155,7 +163,7 @@ class MotorState(MotorCoordinates):
 
     @property
     def is_busy(self) -> bool:
-        return self._motion is not None
+        return self._motion is not None or self._beginning is not None
 
     def _take(self, state: Any, time: Nanos, *, is_sure: bool) -> None:
         code, level = state["status"]["code"], state["status"]["level"]
@@ -210,6 +218,28 @@ class MotorState(MotorCoordinates):
             return False
         is_there = motion.target is not None and abs(self._number("DRBV") - motion.target) <= self._number("RDBD")
         return motion.has_begun or has_moved or is_there
+
+    def _watch_stops(self) -> None:
+        """From now on others may stop the motion that waits for Go."""
+        if self._inputs is not None:
+            self._inputs.close()
+        self._inputs = self._controller.follow_inputs()
+        self._stops = self._controller.stops_of(self._axis.number)
+
+    def _see_stops(self) -> None:
+        """End a motion that waits for Go if others have stopped its axis."""
+        if self._inputs is None:
+            return
+        motion, (missed, events) = self._motion, self._inputs.take()
+        if motion is not None and motion.is_paused:
+            stops = {one.payload.value for one in events if isinstance(one.payload, InputPayload) and one.payload.what == "stop"}
+            is_same = self._stops == self._controller.stops_of(self._axis.number)
+            if is_same and not missed and stops.isdisjoint(("all axes", f"axis {self._axis.number}")):
+                return
+            motion.is_stopped, motion.is_paused = True, False
+            motion.end(Refusal(f"{self._place}: the motion was stopped while it waited for Go"))
+        self._inputs.close()
+        self._inputs = None
 
     def _moves(self, state: Any) -> bool:
         """Whether the axis moves; of a device whose status has no text for it: unless it says that it rests."""

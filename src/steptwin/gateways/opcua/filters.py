@@ -62,7 +62,7 @@ def _is_number(space: AddressSpace, node: Any) -> bool:
 
 
 def differs(before: ua.DataValue, value: ua.DataValue, what: ChangeFilter) -> bool:
-    """Whether a client that has the filter ``what`` is told (OPC 10000-4, 7.22.2)."""
+    """Whether a change is reported to a client that has the filter ``what`` (OPC 10000-4, 7.22.2)."""
     if before.StatusCode != value.StatusCode:
         return True
     if what.trigger == ua.DataChangeTrigger.Status:

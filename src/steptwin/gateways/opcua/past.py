@@ -27,8 +27,8 @@ _NEVER = -(1 << 63)
 
 
 class _Reading(NamedTuple):
-    """What is asked for. Moments in µs since 1970; None: open. ``at`` and ``skip``: go on with the value at this moment that
-    comes behind so many others of it."""
+    """A request for past values. Moments in µs since 1970; None: open. ``at`` and ``skip``: go on with the value at this moment
+    that comes behind so many others of it."""
 
     begin: int | None
     end: int | None

@@ -70,7 +70,7 @@ class SessionRequests(Protocol):
         ...
 
     def refused(self, client: GatewayClient, do: str, fields: Mapping[str, object]) -> None:
-        """A write or call that is no command."""
+        """Record a write or call that is not a command."""
         ...
 
     def leave(self, session: object) -> None:
@@ -213,7 +213,7 @@ class GatewaySession(InternalSession):
 
 
 def _asked(asked: ua.WriteValue | ua.CallMethodRequest) -> dict[str, object]:
-    """What a client wants, as fields of the audit log."""
+    """Fields of the audit log for what a client wants."""
     if isinstance(asked, ua.WriteValue):
         value = None if asked.Value.Value is None else asked.Value.Value.Value
         return {"node": asked.NodeId.to_string(), "value": str(value)}
