@@ -245,18 +245,18 @@ def _print_happened(
 ) -> None:
     """Print in order of time what happened in the world, and what programs did with the statements that caused it.
 
-    At one moment what came from outside stands before what statements did, and that before what came of it.
+    At one moment what statements did stands before what came of it.
     """
-    shown: list[tuple[Nanos, int, str]] = []
+    shown: list[tuple[Nanos, bool, str]] = []
     for record in filter(is_shown, world.trace):
         if outcome.known[record.machine]:
             outcome.known[record.machine] -= 1
         elif selection.shows(record):
-            shown.append((record.time, 0 if record.kind == "input" else 2, describe(record)))
+            shown.append((record.time, True, describe(record)))
     for name, watch in watches.items():
         if not selection.takes(PROGRAM, (name,)):
             continue
-        shown += [(each.time, 1 if each.place else 2, _with_statement(name, each)) for each in watch.happened]
+        shown += [(each.time, not each.is_done, _with_statement(name, each)) for each in watch.happened]
     for _, _, text in sorted(shown, key=itemgetter(0, 1)):
         out(text)
 

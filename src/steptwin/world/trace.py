@@ -1,8 +1,8 @@
 """What happened in a world, exactly and compactly: profiles instead of pulses, edges instead of samples.
 
-Each machine's records come in the order in which they happened to it. Machines that share a kernel are advanced together, so their
-records are merged by (time, order in which they happened): a cause stands before its effect of the same nanosecond. Machines of
-several kernels are advanced apart from each other; theirs are merged by (time, order of the kernels).
+Each machine's records come in the order in which they happened to it. Machines that share a kernel are advanced together, so
+their records are merged by (time, order in which they happened): a cause stands before its effect of the same nanosecond.
+Machines of several kernels are advanced apart from each other; theirs are merged by (time, order of the kernels).
 
 Values by kind: ``plan`` the new `Profile` of an axis (subject ``"1"``…), in pulses, or the `StepTrain` of one that does not give
 a pulse for every unit of position; ``load`` where the load of an axis is until the next such record: tuples (moment, whether it
@@ -72,7 +72,7 @@ RecordSink: TypeAlias = Callable[[TraceRecord], None]
 
 
 class Trace:
-    """The records of a world. ``machines`` fixes their order in the digest; a machine not named there comes after those before it.
+    """The records of a world. ``machines`` fixes their order in the digest; a machine not named there comes last.
 
     With ``keep=False`` only the digest and the number of records grow: for runs too long to be kept.
     """

@@ -42,6 +42,11 @@ class ProgramEvent(NamedTuple):
         found, source = self.program.steps[self.step], self.program.source
         return f"{source.position(found.start)[0]:>4}  {visible(source.text[found.start : found.end].strip())}"
 
+    @property
+    def is_done(self) -> bool:
+        """See `steptwin.world.kind.ProgramAct.is_done`: an interrupt comes of others itself."""
+        return self.step is not None and self.code != "interrupt"
+
 
 def watch_program(device: Mic488Device, kernel: Kernel, name: str) -> ProgramWatch | None:
     """See `steptwin.world.kind.ControllerKind.watch_program`."""
