@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -13,7 +14,7 @@ from steptwin.campaign.findings import FoundFailure, find, is_within
 from steptwin.campaign.reading import load_campaign
 from steptwin.campaign.reproduce import check_case, identifier
 from steptwin.campaign.runner import CaseRunner
-from steptwin.campaign.shrink import digits_of
+from steptwin.campaign.shrink import digits_of, failures_of
 from steptwin.campaign.variation import Between, Choice, Normal
 from steptwin.files import session as sessions
 
@@ -176,3 +177,19 @@ def test_only_values_of_a_spread_are_within(spread: Between | Normal | Choice, i
 def test_names_of_files() -> None:
     assert identifier("Guard: stops it!") == "guard_stops_it"
     assert identifier("…") == "case"
+
+
+def test_causes_that_differ_before_they_are_made_simple_only_are_one(campaign: Path) -> None:
+    """With a stuck input the property fails in other words, but without it, too; the values of the simplest cases differ. Those
+    that are times have their unit."""
+    properties = 'expectations = false\n[[property]]\nname = "near"\nalways = "x.position < 10 and not table.IN1"\n'
+    properties += '[[vary]]\nname = "u"\nchoose = [3, 4, 5, 6]\n'
+    campaign.write_text(CAMPAIGN.replace("[[vary]]", f"{properties}\n[[vary]]", 1))
+    description = load_campaign(campaign)
+    runner, cases = CaseRunner(description), Cases(description)
+    results = [runner.run(cases[number]) for number in range(12)]
+    assert len({failures_of(one)[0].cause for one in results}) > 1
+    (found,) = find(runner, results, cases.__getitem__, campaign.parent / "out", campaign)
+    assert len(found.numbers) == 12
+    assert found.where is not None
+    assert re.match(r"u = \d; t = \d00 ms; end ", found.where)

@@ -43,6 +43,19 @@ def test_a_replay_that_differs_says_so(tmp_path: Path) -> None:
     assert "the run differs from the recorded one" in invoke("replay", str(session), code=1)
 
 
+def test_what_a_statement_does_stands_before_what_came_of_it(tmp_path: Path) -> None:
+    """At one nanosecond, and whichever controller is the first of the description; an event of an element has its name."""
+    (tmp_path / "p.prg").write_text("OUT1 = ON\nEND\n")
+    world = '[[mic488]]\nname = "a"\n[[mic488]]\nname = "b"\nprogram = "p.prg"\nstart = true\n'
+    joined = '[[collision]]\nname = "crash"\nwhen = "b.OUT1 and not a.OUT1"\n'
+    (tmp_path / "w.toml").write_text(f"{world}{joined}")
+    told = [line.split() for line in invoke("run", str(tmp_path / "w.toml"), "--for", "1s").splitlines()]
+    assert [(time, who, what) for time, _, who, what, *_ in told[:2]] == [
+        ("0.001000", "b", "OUT1"),
+        ("0.001000", "crash", "crash:"),
+    ]
+
+
 def test_run_ends_on_a_condition_and_tells_it_as_json() -> None:
     told = json.loads(invoke("run", str(FEEDER), "--until", "x.position <= 100", "--json"))
     assert told["ended_by"] == "x.position <= 100"

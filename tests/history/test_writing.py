@@ -43,6 +43,18 @@ def test_what_did_not_come_to_its_end_is_not_there(engine: Engine) -> None:
         assert connection.execute(select(func.count()).select_from(POINT)).scalar_one() == 1
 
 
+def test_tries_that_fail_take_no_numbers_of_runs(engine: Engine) -> None:
+    for key in ("one", "two"):
+        for _ in range(3):
+            with engine.connect() as connection:
+                TableWriter().write(connection, head(key), [batch(1)])
+                connection.rollback()
+        with engine.begin() as connection:
+            TableWriter().write(connection, head(key), [batch(1)])
+    with engine.connect() as connection:
+        assert connection.execute(select(RUN.c.id).order_by(RUN.c.id)).scalars().all() == [1, 2]
+
+
 def test_all_kinds_of_rows_and_the_row_of_the_run(engine: Engine) -> None:
     rows = RowBatch(
         run="one",

@@ -14,7 +14,12 @@ SLOW = ("s200", "v80")
     [
         (["[", "f64", "w5", "]"], "file", "a file of 64 bits", {"size": 64}),
         ([*SLOW, "f640", "r"], "moves", "moves +640 to 640 in 0.125000 s", {"axis": 1, "direction": 1, "distance": 640}),
-        ([*SLOW, "b640", "r"], "moves", "moves -640 to 16776576 in 0.125000 s", {"axis": 1, "direction": -1, "distance": -640}),
+        (
+            [*SLOW, "b640", "r"],
+            "moves",
+            "moves -640 to 16776576 (-640) in 0.125000 s",
+            {"axis": 1, "direction": -1, "distance": -640},
+        ),
         (["g+", "r", "k"], "moves", "moves on in positive direction", {"axis": 1, "direction": 1}),
         (["g-", "r", "k"], "moves", "moves on in negative direction", {"axis": 1, "direction": -1}),
         ([")4", "k"], "seeks", "seeks B4 in positive direction", {"axis": 1, "direction": 1, "line": 4}),

@@ -225,3 +225,14 @@ def test_a_chip_has_what_its_data_sheet_has(studio: Studio) -> None:
     page.get_by_label("Step drum", exact=True).fill("6400")
     button(page, "Step drum +").click()
     expect(page.get_by_label("drum position")).to_have_text("6400")
+
+
+def test_a_jog_that_is_refused_is_not_shown_as_held(studio: Studio) -> None:
+    """The drive of M2 is off. The button may stay pressed; what is pressed next is another jog."""
+    page = studio.page()
+    jog = button(page, "Jog M2 +")
+    jog.hover()
+    page.mouse.down()
+    expect(page.get_by_role("alert").last).to_contain_text("not enabled")
+    expect(jog).not_to_have_attribute("data-held", "true")
+    page.mouse.up()

@@ -226,3 +226,16 @@ def test_what_is_english_on_the_polish_page_says_so(start_studio: Callable[..., 
     found["Zdarzenia"] = page.evaluate(ENGLISH)
     studio.close()
     assert {panel: texts for panel, texts in found.items() if texts} == {}
+
+
+def test_actions_of_a_table_that_is_wider_than_its_pane_stay_in_sight(studio: Studio) -> None:
+    page = studio.page()
+    show(page, "Overview")
+    page.set_viewport_size({"width": 620, "height": 800})
+    shown = page.get_by_role("button", name="Power-cycle").first
+    box, table = shown.bounding_box(), page.get_by_role("table").first
+    pane = table.locator("xpath=..").bounding_box()
+    assert box is not None
+    assert pane is not None
+    assert table.evaluate("table => table.offsetWidth") > pane["width"]
+    assert box["x"] + box["width"] <= pane["x"] + pane["width"] + 1

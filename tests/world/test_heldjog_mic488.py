@@ -167,7 +167,7 @@ def test_another_motion_is_not_stopped_by_a_jog_that_lapses() -> None:
 
 @pytest.mark.parametrize("velocity", [0.0, 40.5, -41.0])
 def test_velocities_are_limited_to_vmax(velocity: float) -> None:
-    with pytest.raises(Misuse, match=r"more than 0 and at most VMAX, 40 mm/s"):
+    with pytest.raises(Misuse, match=r"permitted are -40 to 40 mm/s \(VMAX\), but not 0"):
         mic().begin(Jog("a", 1, velocity))
 
 

@@ -6,6 +6,7 @@ from textwrap import dedent
 
 from steptwin.files.world import World
 from steptwin.world.kinds.mic488.program_watch import ProgramWatch
+from steptwin.world.script import Turn
 
 WORLD = """
     [[mic488]]
@@ -109,3 +110,25 @@ def test_motions_and_a_reset() -> None:
         (404_000, "axis", "M1 off", "13  PROGRESET"),
         (405_000, "axis", "M1 on", "1  M1 = ON"),
     ]
+
+
+def test_an_axis_that_follows_its_encoder_is_told_once() -> None:
+    """ENCFOLLOW comes to where the shaft was and goes on with each count: two lines for each of them."""
+    text = (
+        WORLD
+        + """[mic488.M2]
+    gear = 1.0
+    acc = 1000.0
+    dec = 1000.0
+    vel = 500.0
+    pos_ctrl_mode = "ENCFOLLOW"
+    """
+    )
+    world = World.from_toml(dedent(text), {"first.prg": b"M2 = ON\nDELAY 2\nM2 = OFF\n"}, name="w.toml")
+    watch = ProgramWatch(world.mic488["t"].device, world.parts.kernel_of["t"], "t")
+    for _ in range(10):
+        world.run(for_=0.1)
+        world.apply_input(Turn("t", 2, 4))
+    world.run(for_=2.0)
+    told = [event.text for event in watch.happened if event.text.startswith("M2 ")]
+    assert told == ["M2 on", "M2 follows its encoder", "M2 off"]

@@ -87,7 +87,7 @@ def test_by_name(ran: World) -> None:
     """A controller, an element that is recorded at its controller, what scripts do."""
     assert all(text.startswith("c ") for text in shown(ran, "c"))
     assert shown(ran, "clamp") == ["clamp      no-air: clamp has no air"]
-    assert shown(ran, "crash") == ["a          crash: parts touch", "a          crash: apart again"]
+    assert shown(ran, "crash") == ["crash      crash: parts touch", "crash      crash: apart again"]
     assert shown(ran, "start") == ["a          start: pressed"]
     assert shown(ran, "world", "note") == ["world      note: pressed"]
     assert shown(ran, "clamp", "note") == []
@@ -97,7 +97,7 @@ def test_names_are_no_words_of_a_text() -> None:
     """A note may begin with the name of an element, and an axis that stalls has its name among the facts."""
     world = World.from_toml(STALLING)
     world.run(for_=3)
-    assert shown(world, "slide")[0] == "a          slide stalls: the motion needs 1.26 N·m, the motor has 0.01 N·m"
+    assert shown(world, "slide")[0] == "slide      slide stalls: the motion needs 1.26 N·m, the motor has 0.01 N·m"
     assert shown(world, "world") == ["world      note: slide has no load"]
 
 

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import pickle
+
 import pytest
 
 from steptwin.errors import Misuse
@@ -19,6 +21,28 @@ def test_records_of_several_machines_are_merged_by_time_then_order_of_the_machin
     assert [record.subject for record in trace] == ["4", "1", "5", "6", "2", "3"]
     assert [record.subject for record in trace.events("a")] == ["1", "2", "3"]
     assert list(trace.events("no such machine")) == []
+
+
+def test_records_of_machines_that_are_advanced_together_are_read_in_the_order_in_which_they_came() -> None:
+    """A cause stands before its effect at the same nanosecond, whatever the order of their controllers in the description."""
+
+    def take(trace: Trace, *records: tuple[int, str, str]) -> None:
+        for time, machine, subject in records:
+            trace.add(TraceRecord(time, machine, "event", subject, ""))
+
+    def subjects(trace: Trace) -> str:
+        return "".join(record.subject for record in trace)
+
+    trace = Trace(["effect", "alone", "cause"])
+    trace.read_together([("effect", "cause"), ("alone",)])
+    take(trace, (5, "alone", "c"), (5, "cause", "a"), (5, "effect", "b"), (9, "cause", "d"))
+    assert subjects(trace) == "abcd"
+    middle = trace.mark()
+    take(trace, (9, "effect", "x"))
+    trace.rewind(pickle.loads(pickle.dumps(middle)))
+    take(trace, (9, "effect", "e"), (9, "cause", "f"), (7, "alone", "-"))
+    assert subjects(trace) == "abc-def"
+    assert [record.subject for record in trace.events("cause")] == ["a", "d", "f"]
 
 
 def test_the_digest_does_not_depend_on_the_order_in_which_independent_machines_were_advanced() -> None:

@@ -12,7 +12,7 @@ from steptwin.campaign.cases import Cases
 from steptwin.campaign.description import CampaignDescription
 from steptwin.campaign.reproduce import Reproduction, identifier, reproduce, summary, where
 from steptwin.campaign.runner import CaseRunner
-from steptwin.campaign.shrink import ADDED, MOST_RUNS, CaseFailure, RunCase, ShrunkCase, failures_of, shrink
+from steptwin.campaign.shrink import ADDED, MOST_RUNS, CaseFailure, RunCase, ShrunkCase, failures_of, shrink, without_numbers
 from steptwin.campaign.variation import Between, Choice, Normal
 
 MOST_FINDINGS = 10
@@ -21,13 +21,15 @@ MOST_FINDINGS = 10
 
 @dataclass(frozen=True, slots=True)
 class FoundFailure:
-    """``numbers``: of the cases that failed so. ``shrunk``: the simplest one; None where that was not looked for."""
+    """``numbers``: of the cases that failed so. ``shrunk``: the simplest one; None where that was not looked for. ``where``: what
+    is particular to it, in words."""
 
     failure: CaseFailure
     numbers: tuple[int, ...]
     result: CaseResult
     shrunk: ShrunkCase | None
     files: Reproduction | None
+    where: str | None = None
 
     def plain(self, folder: Path) -> dict[str, Any]:
         """As JSON; paths are relative to ``folder``."""
@@ -39,7 +41,7 @@ class FoundFailure:
             "count": len(self.numbers),
             "cases": list(self.numbers[:100]),
             "simplest": None if shrunk is None else shrunk.case.plain(),
-            "where": None if shrunk is None else where(shrunk.case),
+            "where": self.where,
             "repeats": None if shrunk is None else shrunk.repeats,
             "shrinking_runs": 0 if shrunk is None else shrunk.runs,
             "files": {} if self.files is None else self.files.plain(folder),
@@ -105,7 +107,7 @@ def find(
         if len(groups[failure]) <= MOST_FINDINGS:
             firsts[result.number] = result
     simpler = shrinker(runner.description, runner.run)
-    found: dict[tuple[str, str], FoundFailure] = {}
+    found: dict[tuple[object, ...], FoundFailure] = {}
     waiting = sorted(groups.items(), key=lambda group: -len(group[1]))
     while waiting:
         failure, numbers = waiting.pop(0)
@@ -118,12 +120,13 @@ def find(
         alike, others = _alike(shrunk.case, numbers, case_of)
         if others:
             waiting.append((failure, others))
-        key = failure.property, replace(shrunk.case, number=0, seed=0).digest
+        key = _cause(shrunk)
         if key in found:
             found[key] = replace(found[key], numbers=(*found[key].numbers, *alike))
             continue
         files = reproduce(runner, shrunk.case, shrunk.result, folder, f"{identifier(failure.property)}-{number}", campaign)
-        found[key] = FoundFailure(shrunk.failure, tuple(alike), shrunk.result, shrunk, files)
+        particular = where(shrunk.case, runner.description)
+        found[key] = FoundFailure(shrunk.failure, tuple(alike), shrunk.result, shrunk, files, particular)
     return sorted(found.values(), key=lambda one: -len(one.numbers))
 
 
@@ -137,6 +140,18 @@ def _without_cut(shrunk: ShrunkCase, run: RunCase) -> ShrunkCase:
     meant.add(shrunk.failure.property)
     kept = tuple(one for one in result.verdicts if one.holds or one.name in meant)
     return replace(shrunk, result=replace(result, verdicts=kept))
+
+
+def _cause(shrunk: ShrunkCase) -> tuple[object, ...]:
+    """Equal for failures that have one cause as far as their simplest cases tell: the same failure, faults and steps.
+
+    Before they were made simple they may have differed in words, and their values may still differ.
+    """
+    case = shrunk.case
+    if not shrunk.repeats:
+        return shrunk.failure.property, replace(case, number=0, seed=0).digest
+    given = (*(one.fault for one in case.faults), *(one.step for one in case.steps))
+    return (*shrunk.failure, *map(without_numbers, given))
 
 
 def _alike(simplest: Case, numbers: list[int], case_of: Callable[[int], Case]) -> tuple[list[int], list[int]]:

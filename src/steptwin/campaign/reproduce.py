@@ -12,9 +12,12 @@ from pprint import pformat
 from textwrap import fill
 from typing import Any
 
-from steptwin.campaign.case import Case, CaseResult
+from steptwin.campaign.case import Case, CaseResult, VariedValue
+from steptwin.campaign.description import CampaignDescription
 from steptwin.campaign.reading import load_campaign
 from steptwin.campaign.runner import CaseRunner
+from steptwin.campaign.variation import Choice
+from steptwin.durations import duration_text
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.files import session as sessions
 from steptwin.files.export import axis_views, write_trace
@@ -60,8 +63,9 @@ def reproduce(
             sessions.save(sessions.session_of(world), session)
             write_trace(world.trace, timeline, views=axis_views(world), title=name, ended=world.now)
     if campaign is not None:
+        beside = os.path.relpath(campaign, folder)
         test = folder / f"test_{identifier(name)}.py"
-        write_bytes(test, text_of_test(case, result, name, os.path.relpath(campaign, folder)).encode())
+        write_bytes(test, text_of_test(case, result, name, beside, where(case, runner.description)).encode())
     return Reproduction(session, timeline, test)
 
 
@@ -70,9 +74,9 @@ def identifier(text: str) -> str:
     return re.sub(r"\W+", "_", text).strip("_").lower()[:LONGEST_NAME] or "case"
 
 
-def text_of_test(case: Case, result: CaseResult, name: str, campaign: str) -> str:
-    """The text of a test that fails with this case."""
-    title = fill(f"{summary(result)}. At {where(case)}.", WIDTH).replace("\\", "\\\\").replace('"""', "'''")
+def text_of_test(case: Case, result: CaseResult, name: str, campaign: str, at: str) -> str:
+    """The text of a test that fails with this case. ``at``: what is particular to it, in words."""
+    title = fill(f"{summary(result)}. At {at}.", WIDTH).replace("\\", "\\\\").replace('"""', "'''")
     return (
         f'"""{title}"""\n\nfrom pathlib import Path\n\nfrom steptwin.campaign.reproduce import check_case\n\n'
         f"CAMPAIGN = Path(__file__).parent / {Path(campaign).as_posix()!r}\n"
@@ -89,12 +93,17 @@ def summary(result: CaseResult) -> str:
     return "; ".join(f"{one.name}: {one.why}" if one.why else one.name for one in result.verdicts if not one.holds)
 
 
-def where(case: Case) -> str:
-    """What is particular to a case, in words."""
-    parts = [f"{name} = {value}" for name, value in case.values.items()]
+def where(case: Case, description: CampaignDescription) -> str:
+    """What is particular to a case of a campaign, in words: values that it varies as times have units."""
+    times = {one.name for one in description.vary if not isinstance(one.spread, Choice) and one.spread.is_time}
+    parts = [f"{name} = {_value_text(value, is_time=name in times)}" for name, value in case.values.items()]
     parts += [f"{one.at_ns / SECOND:.9g} s: {one.fault}" for one in case.faults]
     parts += [f"{one.at_ns / SECOND:.9g} s: {one.step}" for one in case.steps]
     return "; ".join((*parts, f"end {case.end_ns / SECOND:.9g} s"))
+
+
+def _value_text(value: VariedValue, *, is_time: bool) -> str:
+    return duration_text(round(float(value) * SECOND)) if is_time else str(value)
 
 
 def check_case(campaign: Path | str, case: Mapping[str, Any], properties: Collection[str] | None = None) -> None:

@@ -44,6 +44,7 @@ from steptwin.m1486.lines import interface
 from steptwin.m1486.microsteps import FULL_STEP
 from steptwin.m1486.pins import OPEN_ADDRESS, refuse_taken, settable_pin
 from steptwin.m1486.present import program_words, velocity
+from steptwin.m1486.unit import counter_text
 from steptwin.m1486.variants import DEFAULT, Store, Variant, variant
 from steptwin.machine import SECOND, Nanos
 from steptwin.wire.slave import FrameDirection
@@ -258,7 +259,7 @@ def _address(name: str) -> str:
 
 def _position(chip: M1486Chip, now: Nanos) -> str:
     drive = chip.drive
-    counter = f"position {drive.counter_u(now)}{'' if drive.is_valid else ' (not valid)'}"
+    counter = f"position {counter_text(drive.counter_u(now))}{'' if drive.is_valid else ' (not valid)'}"
     true = drive.true_u(now)
     moving = f", {drive.motion.value} at {velocity(chip, now):.1f} step/s" if drive.is_busy else ""
     return f"{counter}, true position {true} ({true / FULL_STEP:g} full steps){moving}"

@@ -243,18 +243,21 @@ def _write_trace(world: World, where: Path) -> list[Path]:
 def _print_happened(
     world: World, outcome: WorldRunResult, watches: Mapping[str, ProgramReport], selection: Selection, out: Print
 ) -> None:
-    """Print in order of time what happened in the world, and what programs did with the statements that caused it."""
-    shown: list[tuple[Nanos, str]] = []
+    """Print in order of time what happened in the world, and what programs did with the statements that caused it.
+
+    At one moment what statements did stands before what came of it.
+    """
+    shown: list[tuple[Nanos, bool, str]] = []
     for record in filter(is_shown, world.trace):
         if outcome.known[record.machine]:
             outcome.known[record.machine] -= 1
         elif selection.shows(record):
-            shown.append((record.time, describe(record)))
+            shown.append((record.time, True, describe(record)))
     for name, watch in watches.items():
         if not selection.takes(PROGRAM, (name,)):
             continue
-        shown += [(each.time, _with_statement(name, each)) for each in watch.happened]
-    for _, text in sorted(shown, key=itemgetter(0)):
+        shown += [(each.time, not each.is_done, _with_statement(name, each)) for each in watch.happened]
+    for _, _, text in sorted(shown, key=itemgetter(0, 1)):
         out(text)
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from sqlalchemy import Connection, and_, insert, select, update
+from sqlalchemy import Connection, and_, func, insert, select, update
+from sqlalchemy import text as sql
 
 from steptwin.history.database import insert_all
 from steptwin.history.rows import KeptValue, PointRow, RowBatch, RunHead
@@ -67,7 +68,11 @@ class TableWriter:
         found = connection.execute(select(RUN.c.id, RUN.c.batches).where(RUN.c.key == head.key)).one_or_none()
         if found is not None:
             return found.id, found.batches
+        if connection.dialect.name == "postgresql":  # another process may begin a run, too
+            connection.execute(sql("LOCK TABLE run IN SHARE ROW EXCLUSIVE MODE"))
         values = {
+            # A sequence would count the tries that fail, too.
+            "id": select(func.coalesce(func.max(RUN.c.id), 0) + 1).scalar_subquery(),
             "key": head.key,
             "subject": head.subject,
             "virtual": head.is_virtual,

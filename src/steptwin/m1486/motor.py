@@ -10,7 +10,7 @@ from steptwin.m1486.functions import EDGE, FULLSTEP, FULLSTEPSS, LIMITOFF, RECOV
 from steptwin.m1486.lines import STEP_DIRECTION, Interface
 from steptwin.m1486.microsteps import FULL_STEP
 from steptwin.m1486.pins import JOG_DIRECTION_LINE, ChipPins, seek_ends
-from steptwin.m1486.unit import NumericUnit
+from steptwin.m1486.unit import NumericUnit, counter_text
 from steptwin.machine import SECOND, Fact, Nanos
 from steptwin.state import Stateful
 
@@ -78,7 +78,7 @@ class MotorControl(Stateful):
             )
         else:
             duration = ((drive.profile.end or now) - now) / SECOND
-            text = f"moves {drive.distance_u:+d} to {drive.counter_u(now)} in {duration:.6f} s"
+            text = f"moves {drive.distance_u:+d} to {counter_text(drive.counter_u(now))} in {duration:.6f} s"
             self._started("moves", text, now, ("direction", 1 if drive.distance_u > 0 else -1), ("distance", drive.distance_u))
         return True
 
@@ -134,7 +134,7 @@ class MotorControl(Stateful):
             validity = "" if self.drive.is_valid else ", position not valid"
             counter = self.drive.counter_u(now)
             facts = ("counter", counter), ("is_valid", self.drive.is_valid)
-            chip.event("stands", f"stands at {counter}{validity}", now, AXIS, *facts)
+            chip.event("stands", f"stands at {counter_text(counter)}{validity}", now, AXIS, *facts)
             chip.io.set_output("BOOST", 1, now)
             self.show_runsign(now)
         chip.program.motion_ended()

@@ -7,11 +7,16 @@ from steptwin.state import Stateful
 
 #: M-13: the internal variable and the position counter have 24 bits and begin anew after the last.
 MASK = 0xFFFFFF
-
+_SIGN = 0x800000
 #: Source of the operand of + - * /.
 NUMBER, FROM_LINES, FROM_REGISTER = range(3)
 
 _DEFAULTS = tuple(function.default for function in TABLE)
+
+
+def counter_text(counter_u: int) -> str:
+    """The position counter as text; a position below 0, which its 24 bits show as a large number, also as itself."""
+    return f"{counter_u} ({counter_u - MASK - 1})" if counter_u & _SIGN else str(counter_u)
 
 
 class NumericUnit(Stateful):

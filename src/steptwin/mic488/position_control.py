@@ -68,6 +68,11 @@ class PositionControl(Stateful):
         """The moment at which the shaft was at ``_shaft``, or the correction reached ``_best_p``."""
         self._best_p = 0.0
 
+    @property
+    def is_following(self) -> bool:
+        """Whether the axis goes where its encoder says (ENCFOLLOW)."""
+        return self._following
+
     def reference(self, axis: ControlledAxis, now: Nanos) -> None:
         """Take the present positions of drive and encoder as equal."""
         self._ref_motor = axis.profile.count(now)

@@ -22,6 +22,7 @@ from steptwin.later import start
 from steptwin.machine import Nanos
 from steptwin.studio.hub import Hub
 from steptwin.studio.requests import ALL, OF_CONNECTION, permit_of
+from steptwin.studio.schema import answer_schemas
 from steptwin.studio.session import STOPS, ViewerSession
 from steptwin.subject.dispatch import LONGEST_REQUEST, Message, failure
 from steptwin.subject.schema import definitions, request_schema
@@ -53,8 +54,10 @@ class Rest:
         self._sessions: dict[tuple[Role, str | None], ViewerSession] = {}
 
     def add_to(self, app: FastAPI) -> None:
+        answers = {"describe": {"$ref": "#/$defs/(description)"}, **answer_schemas()}
         for name, row in ALL.items():
             if name not in OF_CONNECTION:
+                answer = answers.get(name)
                 permit = permit_of(name)
                 needs = f" Role {permit.role.title}{', and control' if permit.control else ''}."
                 app.add_api_route(
@@ -62,10 +65,11 @@ class Rest:
                     self._command(name),
                     methods=["POST"],
                     name=name,
+                    operation_id=name,
                     summary=row.meaning,
                     description=row.meaning + needs,
                     openapi_extra=_extra(body=_body(name)),
-                    responses=RESPONSES,
+                    responses=RESPONSES if answer is None else {**RESPONSES, DONE: _done(answer)},
                 )
         reading = (
             _Reading("/api/describe", self._describe, "get_describe", "What there is."),
@@ -206,6 +210,7 @@ class _Reading(NamedTuple):
             self.endpoint,
             methods=["GET"],
             name=self.name,
+            operation_id=self.name,
             summary=self.summary,
             openapi_extra=_extra(parameters=parameters),
             responses={**RESPONSES, DONE: FILE_RESPONSE} if self.is_file else RESPONSES,
@@ -279,6 +284,14 @@ RESPONSES: dict[int | str, dict[str, Any]] = {
     status: {"description": text, "content": {"application/json": {"schema": {"$ref": "#/components/schemas/Answer"}}}}
     for status, text in STATUS_TEXTS.items()
 }
+
+
+def _done(ok: object) -> dict[str, Any]:
+    """The response to a request whose answer has the schema ``ok``."""
+    answer: Any = definitions()["(answer)"]
+    properties = {name: one for name, one in answer["properties"].items() if name not in ("id", "error")}
+    schema = {"type": "object", "properties": {**properties, "ok": _local(ok)}, "required": ["ok", "number", "time_ns"]}
+    return {"description": STATUS_TEXTS[DONE], "content": {"application/json": {"schema": schema}}}
 
 
 FILE_TYPE = "application/octet-stream"

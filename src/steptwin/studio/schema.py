@@ -16,7 +16,7 @@ def schema() -> dict[str, object]:
     ``NAME message``."""
     defs = definitions()
     requests = {name: _request(name) for name in (*COMMANDS, *REQUESTS)}
-    answers = {f"{name} answer": answer for name, answer in _answers().items()}
+    answers = {f"{name} answer": answer for name, answer in answer_schemas().items()}
     messages = {f"{row.name} message": row.schema() for row in MESSAGES.values()}
     return {
         "$schema": DIALECT,
@@ -46,7 +46,7 @@ def _of_subject(name: str) -> tuple[str, tuple[Field, ...]]:
     return (f"{row.meaning} A lease, which has to be renewed." if name == "jog" else meaning), row.fields
 
 
-def _answers() -> dict[str, object]:
+def answer_schemas() -> dict[str, object]:
     """Of requests whose answer has a schema; those of other commands of a subject are described in words."""
     return {"jog": LEASE, **{row.name: row.answer for row in REQUESTS.values()}}
 

@@ -38,6 +38,7 @@ from steptwin.subject.payloads import (
     is_shown,
 )
 from steptwin.tables import complete
+from steptwin.world.records import owner_of
 from steptwin.world.trace import KINDS as RECORDS
 from steptwin.world.trace import TraceRecord
 
@@ -69,8 +70,13 @@ class Event:
         """Whether it is shown to a user. Requests are not: they are as frequent as frames."""
         return is_shown(self.payload)
 
+    @property
+    def owner(self) -> str:
+        """Who it is about, for people: the element, where one reports it."""
+        return _owner(self.machine, self.payload)
+
     def __str__(self) -> str:
-        return line_of(self.time, self.machine, self.text)
+        return line_of(self.time, self.owner, self.text)
 
     def plain(self) -> dict[str, object]:
         """As JSON. ``text`` describes it; it adds nothing to the rest."""
@@ -136,7 +142,12 @@ def payload_of(record: TraceRecord) -> Payload:
 
 def shown(record: TraceRecord) -> str:
     """A record in one line."""
-    return line_of(record.time, record.machine, payload_of(record).text)
+    payload = payload_of(record)
+    return line_of(record.time, _owner(record.machine, payload), payload.text)
+
+
+def _owner(machine: str, payload: Payload) -> str:
+    return owner_of(machine, payload.facts) if isinstance(payload, StatusPayload) else machine
 
 
 # ---------------------------------------------------------------------- from JSON

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from typing import Any
 
@@ -127,20 +127,35 @@ class _Builder:
     # ------------------------------------------------------------------ elements
 
     def _make_elements(self) -> None:
+        """In the order of `ELEMENTS`, but behind those whose signals they are over (`_waits`)."""
+        later: list[tuple[AnyElement, ElementSpec]] = []
         for element in ELEMENTS.values():
             specs = self.spec.elements[element.name]
-            if not specs:
-                continue
-            built = [(spec, self._element(element, spec)) for spec in specs]
-            if element.connect is not None:
-                for spec, part in built:
-                    if part is not None:
-                        self.spec.text.unless_wrong(spec.path, partial(element.connect, spec, part, self.site))
+            waiting = [spec for spec in specs if self._waits(element, spec)]
+            later += [(element, spec) for spec in waiting]
+            self._build_elements(element, [spec for spec in specs if all(spec is not one for one in waiting)])
+        while later:
+            # Where all wait for each other, the first one says so.
+            turn = next((turn for turn, one in enumerate(later) if not self._waits(*one)), 0)
+            element, spec = later.pop(turn)
+            self._build_elements(element, [spec])
         if not self.spec.text.findings:
             self.site.close_circuits()
             for number, kernel in enumerate(self.parts.kernels):
                 if order := self.blueprint.once(("order", number), kernel.order):
                     kernel.arrange(order)
+
+    def _waits(self, element: AnyElement, spec: ElementSpec) -> bool:
+        """Whether it is over a signal of an element that is not built yet."""
+        over = (reference.other for reference in element.refers(spec, self.spec) if reference.path[-1:] in (("of",), ("when",)))
+        return any(self.parts.unbuilt(owner) is not None for owner in over)
+
+    def _build_elements(self, element: AnyElement, specs: Iterable[ElementSpec]) -> None:
+        built = [(spec, self._element(element, spec)) for spec in specs]
+        if element.connect is not None:
+            for spec, part in built:
+                if part is not None:
+                    self.spec.text.unless_wrong(spec.path, partial(element.connect, spec, part, self.site))
 
     def _element(self, element: AnyElement, spec: ElementSpec) -> Any:
         """The built element; None if it has errors."""

@@ -289,6 +289,11 @@ class ProgramAct(Protocol):
         """Line and text of the statement; empty without one."""
         ...
 
+    @property
+    def is_done(self) -> bool:
+        """Whether a statement did it, which others of that moment may come of; it did not if it has only begun."""
+        ...
+
 
 class ProgramReport(Protocol):
     """Actions of programs since they are watched, in order of time."""

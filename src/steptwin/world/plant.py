@@ -70,6 +70,7 @@ class Plant:
         self.files = blueprint.files
         self.trace = Trace(names, keep=keep_trace)
         self.parts: WorldParts = build(blueprint, self.trace.add, keep_memory, is_blank=at is not None)
+        self.trace.read_together(blueprint.joined or ())
         self.now: Nanos = 0
         self.stopped: str | None = None
         """The reason a script gave for ending the run; None if none did."""

@@ -187,13 +187,17 @@ class TomlText:
             self.leave_out(name)
 
     def _key_with(self, path: Path, name: str) -> Path:
-        """The key of the table at ``path`` whose text has a name, if exactly one has it; else ``path``."""
+        """The key of the table at ``path``, or of a table in it, whose text has a name, if exactly one has it; else ``path``."""
         table: Any = self.data
         for step in path:
             table = table[step]
         if not isinstance(table, dict):
             return path
         keys = [key for key, value in table.items() if any(name.lower() in text.lower() for text in _texts(value))]
+        if not keys:
+            inner = [(*path, key) for key, value in table.items() if isinstance(value, dict)]
+            found = [key for table_in in inner if (key := self._key_with(table_in, name)) != table_in]
+            return found[0] if len(found) == 1 else path
         return (*path, keys[0]) if len(keys) == 1 else path
 
     def _name_of(self, kind: str | int, number: str | int) -> str | None:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND
+from steptwin.machine import SECOND, Fact
 from steptwin.nearmiss import NearMiss
 from steptwin.world.parts import WorldParts
 from steptwin.world.trace import TraceRecord
@@ -93,8 +93,13 @@ def named_in(parts: WorldParts) -> Iterable[str]:
     return (*parts.machines, *parts.lines, *parts.element_names)
 
 
+def owner_of(machine: str, facts: Iterable[Fact]) -> str:
+    """Who reports an event: the element that its facts name, which is recorded under a controller that it is joined to."""
+    return str(dict(facts).get("element", machine))
+
+
 def describe(record: TraceRecord) -> str:
     """What happened, in one line."""
     what = f"{record.subject}: " if record.kind != "event" or record.subject in _NAMED else ""
     value = record.value.hex(" ") if isinstance(record.value, bytes) else record.value
-    return f"{record.time / SECOND:12.6f} s  {record.machine:<10} {what}{value}".rstrip()
+    return f"{record.time / SECOND:12.6f} s  {owner_of(record.machine, record.facts):<10} {what}{value}".rstrip()

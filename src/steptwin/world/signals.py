@@ -126,11 +126,6 @@ class Idle:
         return None
 
 
-BUILT_BEFORE = (
-    "; an element may depend on those of its kind above it in the file, and on kinds that 'up --keys' has before its own"
-)
-
-
 def find_signal(plan: WorldParts, name: str) -> SignalOf | Idle:
     """The signal called ``name``. Raises `Misuse` with the existing names."""
     if name == "time":
@@ -148,7 +143,9 @@ def find_signal(plan: WorldParts, name: str) -> SignalOf | Idle:
     if machine is None:
         later = plan.unbuilt(owner)
         if later is not None:
-            raise Unknown(owner, f"no signal {name!r} yet: [[{later}]] {owner!r} is built later{BUILT_BEFORE}")
+            raise Unknown(
+                owner, f"no signal {name!r} yet: [[{later}]] {owner!r} is built later; elements cannot depend on each other"
+            )
         known = [*plan.machines, *plan.element_names, "time", "idle"]
         near = NearMiss()
         text = f"no signal {name!r}: nothing is called {owner!r}{near.hint(owner, known)}; there are {', '.join(known)}"

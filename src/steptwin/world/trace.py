@@ -1,7 +1,8 @@
 """What happened in a world, exactly and compactly: profiles instead of pulses, edges instead of samples.
 
-Each machine's records come in the order in which they happened to it; machines that share no wire are advanced apart from each
-other, so the records of several machines are merged by (time, order of the machines, sequence) when they are read.
+Each machine's records come in the order in which they happened to it. Machines that share a kernel are advanced together, so
+their records are merged by (time, order in which they happened): a cause stands before its effect of the same nanosecond.
+Machines of several kernels are advanced apart from each other; theirs are merged by (time, order of the kernels).
 
 Values by kind: ``plan`` the new `Profile` of an axis (subject ``"1"``…), in pulses, or the `StepTrain` of one that does not give
 a pulse for every unit of position; ``load`` where the load of an axis is until the next such record: tuples (moment, whether it
@@ -15,7 +16,7 @@ code); ``input`` what came from outside (subject: what was done); ``fault`` a te
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache
 from hashlib import blake2b
 from heapq import merge
@@ -71,7 +72,7 @@ RecordSink: TypeAlias = Callable[[TraceRecord], None]
 
 
 class Trace:
-    """The records of a world. ``machines`` fixes their order; a machine not named there comes after those seen before it.
+    """The records of a world. ``machines`` fixes their order in the digest; a machine not named there comes last.
 
     With ``keep=False`` only the digest and the number of records grow: for runs too long to be kept.
     """
@@ -81,12 +82,19 @@ class Trace:
         self.is_recorded = True
         """Whether there is a digest."""
         self._streams: dict[str, _Stream] = {name: _Stream() for name in machines}
+        self._together: Sequence[Sequence[str]] = ()
+        self._latest_number = 0
         self.watchers: list[RecordSink] = []
         """Called with every record."""
 
     @property
     def machines(self) -> list[str]:
         return list(self._streams)
+
+    def read_together(self, machines: Iterable[Sequence[str]]) -> None:
+        """Read the records of these machines, which share a kernel, in the order in which they came; those of each kernel one
+        after the other, and before those of machines that are not named."""
+        self._together = tuple(machines)
 
     def add(self, record: TraceRecord) -> None:
         """Take what happened to a machine after everything taken of it before. `Misuse` where its time goes back.
@@ -101,7 +109,9 @@ class Trace:
         stream.latest = record.time
         stream.count += 1
         if self.is_kept:
+            self._latest_number += 1
             stream.records.append(record)
+            stream.numbers.append(self._latest_number)
         elif self.is_recorded:
             stream.hash.update(encode(record))
         for watcher in self.watchers:
@@ -112,8 +122,13 @@ class Trace:
         return sum(stream.count for stream in self._streams.values())
 
     def __iter__(self) -> Iterator[TraceRecord]:
-        """All kept records by (time, machine, sequence)."""
-        return merge(*(stream.records for stream in self._streams.values()), key=itemgetter(0))
+        """All kept records by time; those of one moment by the order of kernels, within one as they happened."""
+        apart = dict(self._streams)
+        groups: list[Iterable[TraceRecord]] = []
+        for names in self._together:
+            streams = [apart.pop(name) for name in names if name in apart]
+            groups.append(_as_they_came(streams) if len(streams) > 1 else streams[0].records if streams else ())
+        return merge(*groups, *(stream.records for stream in apart.values()), key=itemgetter(0))
 
     def of(self, *kinds: str, machine: str | None = None) -> Iterator[TraceRecord]:
         """The records of these kinds, of one machine where it is named, in order. `Misuse` for an unknown kind."""
@@ -154,7 +169,7 @@ class Trace:
         """Keep no records and no digest from now on; only `watchers` are called."""
         self.is_kept = self.is_recorded = False
         for stream in self._streams.values():
-            stream.records.clear()
+            stream.clear()
 
     def let_go(self) -> None:
         """Keep only the digest, including that of the records so far."""
@@ -173,6 +188,7 @@ class Trace:
             self._streams.setdefault(name, _Stream())
         for name, stream in self._streams.items():
             stream.rewind(known.get(name) or _Stream().mark())
+            self._latest_number = max(self._latest_number, *stream.numbers[-1:], 0)
 
     def digest(self) -> str:
         """Equal for two runs of the same world, on any machine and Python version: 32 hexadecimal digits. A digest of the digests
@@ -194,16 +210,27 @@ class StreamMark(NamedTuple):
     hash: blake2b
     hashed: int
     records: tuple[TraceRecord, ...]
+    numbers: tuple[int, ...]
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For pickle: a hash in progress cannot be saved, but made again from records that were kept."""
         if self.count != len(self.records):
             raise Misuse("a world that keeps no trace cannot be pickled")
-        return _mark_of, (self.latest, self.records)
+        return _mark_of, (self.latest, self.records, self.numbers)
 
 
-def _mark_of(latest: Nanos, records: tuple[TraceRecord, ...]) -> StreamMark:
-    return StreamMark(len(records), latest, blake2b(digest_size=DIGEST_BYTES), 0, records)
+def _mark_of(latest: Nanos, records: tuple[TraceRecord, ...], numbers: tuple[int, ...]) -> StreamMark:
+    return StreamMark(len(records), latest, blake2b(digest_size=DIGEST_BYTES), 0, records, numbers)
+
+
+def _as_they_came(streams: Iterable[_Stream]) -> Iterator[TraceRecord]:
+    """The records of several machines by time, those of one moment in the order in which they came."""
+    numbered = (zip(stream.records, stream.numbers, strict=True) for stream in streams)
+    return (record for record, _ in merge(*numbered, key=_time_and_number))
+
+
+def _time_and_number(numbered: tuple[TraceRecord, int]) -> tuple[Nanos, int]:
+    return numbered[0].time, numbered[1]
 
 
 class Mark(NamedTuple):
@@ -215,10 +242,12 @@ class Mark(NamedTuple):
 class _Stream:
     """The records of one machine."""
 
-    __slots__ = ("_hashed", "count", "hash", "latest", "records")
+    __slots__ = ("_hashed", "count", "hash", "latest", "numbers", "records")
 
     def __init__(self) -> None:
         self.records: list[TraceRecord] = []
+        self.numbers: list[int] = []
+        """Of each record its number among those of all machines."""
         self.count = 0
         self.latest: Nanos = 0
         self.hash = blake2b(digest_size=DIGEST_BYTES)
@@ -233,15 +262,19 @@ class _Stream:
 
     def let_go(self) -> None:
         self.digest()
+        self.clear()
+
+    def clear(self) -> None:
         self.records.clear()
+        self.numbers.clear()
         self._hashed = 0
 
     def mark(self) -> StreamMark:
-        return StreamMark(self.count, self.latest, self.hash.copy(), self._hashed, tuple(self.records))
+        return StreamMark(self.count, self.latest, self.hash.copy(), self._hashed, tuple(self.records), tuple(self.numbers))
 
     def rewind(self, mark: StreamMark) -> None:
-        self.count, self.latest, hashed, self._hashed, records = mark
-        self.hash, self.records = hashed.copy(), list(records)
+        self.count, self.latest, hashed, self._hashed, records, numbers = mark
+        self.hash, self.records, self.numbers = hashed.copy(), list(records), list(numbers)
 
 
 # ---------------------------------------------------------------------- canonical bytes

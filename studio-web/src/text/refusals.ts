@@ -110,8 +110,8 @@ export const REFUSALS: Readonly<Record<string, string>> = {
     "{name} wykonuje program: przed jazdą ręczną wstrzymaj go albo zatrzymaj",
   "{name} waits for triggers (AXIS_CTR_MODE), so an axis cannot be jogged":
     "{name} czeka na wyzwolenie (AXIS_CTR_MODE), więc jazda ręczna nie jest możliwa",
-  "velocity = {#value} {unit}/s: permitted are more than 0 and at most VMAX, {#most} {unit2}/s":
-    "prędkość {#value} {unit}/s: dozwolone więcej niż 0 i najwyżej VMAX, {#most} {unit2}/s",
+  "velocity = {#value} {unit}/s: permitted are {#least} to {#most} {unit2}/s (VMAX), but not 0":
+    "prędkość {#value} {unit}/s: dozwolone od {#least} do {#most} {unit2}/s (VMAX), oprócz 0",
   "velocity = {#value} {unit}/s: {permitted}": "prędkość {#value} {unit}/s: {permitted}",
   "velocity {#value} {unit}/s, V{#number}: {why}": "prędkość {#value} {unit}/s, V{#number}: {why}",
   "velocity = 0: the sign of the velocity is the direction; stop ends the motion":

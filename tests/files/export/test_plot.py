@@ -33,6 +33,7 @@ def test_a_picture_names_every_lane(mic488: Run, tmp_path: Path) -> None:
     ):
         assert f">{lane}<" in text, lane
     assert ">mm/s<" in text
+    assert ">max<" in text
     assert ">time (s)<" in text
     assert "IN9<" not in text
 

@@ -330,7 +330,7 @@ def test_a_belt_that_goes_back_takes_what_stands_with_its_first_pulse() -> None:
     ((back, what),) = happened(world)[-1:]
     assert (back - began / MILLISECOND, what) == (pytest.approx(4.4722, abs=1e-3), "belt.1 goes back on belt")
     (fact,) = [record.facts for record in world.trace.events("a") if "goes back" in str(record.value)]
-    assert fact == (("workpiece", "belt.1"), ("conveyor", "belt"), ("what", "goes back"))
+    assert fact == (("workpiece", "belt.1"), ("element", "belt"), ("what", "goes back"))
 
 
 def test_a_workpiece_waits_until_the_next_belt_has_room() -> None:

@@ -40,22 +40,32 @@ def quantity_text(node: Quantity) -> str:
 
 
 def found_text(comparison: Comparison, value: float, scale: float, unit: str) -> str:
-    """What there was where a comparison did not hold: ``value`` is its distance from holding, as a share of ``scale``."""
+    """What there was where a comparison did not hold: ``value`` is its distance from holding, as a share of ``scale``.
+
+    A share of 1 is one of 1 or more, and that of an equality has no side: no more is said.
+    """
     left, limit = quantity_text(comparison.left), quantity_text(comparison.right)
     is_alone = isinstance(comparison.left, SignalName)
-    off = abs(value) * scale
+    off, is_least = abs(value) * scale, abs(value) >= 1.0
+    least = "at least " if is_least else ""
     if comparison.sign == "!=":
         return f"{left} is {limit}"
     if comparison.sign == "==":
         if is_alone and comparison.right == NumberLiteral(0.0):
             return f"{left} is not 0"
-        return f"{left} is {_measure(off, unit)} away from {limit}"
+        if isinstance(comparison.right, NumberLiteral):
+            number = comparison.right.number
+            if is_least:
+                return f"{left} is not {_measure(number, unit)}"
+            return f"{left} is {_measure(number - off, unit)} or {_measure(number + off, unit)}, not {_measure(number, unit)}"
+        return f"{left} is {least}{_measure(off, unit)} away from {limit}"
     is_below = comparison.sign in (">", ">=")
     if isinstance(comparison.right, NumberLiteral):
         there = comparison.right.number + (-off if is_below else off)
         shown = quantity_text(NumberLiteral(comparison.right.number, unit))
-        return f"{left} is {_measure(there, unit)}, not {comparison.sign} {shown}"
-    return f"{left} is {_measure(off, unit)} {'below' if is_below else 'above'} {limit}"
+        beyond = "" if not is_least else " or less" if is_below else " or more"
+        return f"{left} is {_measure(there, unit)}{beyond}, not {comparison.sign} {shown}"
+    return f"{left} is {least}{_measure(off, unit)} {'below' if is_below else 'above'} {limit}"
 
 
 def _measure(number: float, unit: str) -> str:

@@ -14,7 +14,7 @@ from steptwin.campaign.findings import FoundFailure
 from steptwin.campaign.report.html import link, page, table
 from steptwin.campaign.report.sobolindices import SobolIndex
 from steptwin.campaign.report.statistics import Histogram, Influence
-from steptwin.campaign.reproduce import summary, where
+from steptwin.campaign.reproduce import summary
 from steptwin.campaign.summary import CampaignSummary, percent
 
 WIDTH, HEIGHT = 340, 130
@@ -141,11 +141,11 @@ def cause_text(one: FoundFailure) -> str:
 
 
 def _simplest(one: FoundFailure) -> str:
-    if one.shrunk is None:
+    if one.shrunk is None or one.where is None:
         return f"case {one.numbers[0]}"
     if not one.shrunk.repeats:
         return f"case {one.numbers[0]} did not fail again"
-    return where(one.shrunk.case) + ("" if one.shrunk.is_complete else " (the budget ended before it was the simplest)")
+    return one.where + ("" if one.shrunk.is_complete else " (the budget ended before it was the simplest)")
 
 
 def _figure(one: Histogram) -> str:

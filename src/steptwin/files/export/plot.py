@@ -257,7 +257,7 @@ def _lanes(panel: Axes, rows: list[_PlotRow], recording: Recording) -> None:
 
 
 def _levels(pin: PinTrack, recording: Recording) -> tuple[Reals, Reals, str]:
-    """The corners of the curve of a pin, scaled to 0…1, and the value of 1 if it is analog."""
+    """The corners of the curve of a pin, scaled to 0…1, and what 1 is if it is analog: its greatest value."""
     level = pin.level(recording.begin)
     times, levels = [recording.begin], [np.nan if level is None else level]
     for time, value in pin.changes(recording.begin, recording.until):
@@ -268,7 +268,7 @@ def _levels(pin: PinTrack, recording: Recording) -> tuple[Reals, Reals, str]:
     if pin.analog:
         most = float(np.nanmax(np.abs(drawn))) or 1.0
         drawn = drawn / most
-        note = f"{most:.3g}"
+        note = f"max\n{most:.3g}"
     return np.array([*times, recording.until]) / SECOND, drawn, note
 
 

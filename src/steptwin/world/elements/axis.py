@@ -88,8 +88,10 @@ def _refers(spec: AxisSpec, world: WorldSpec) -> Iterator[Reference]:
         yield Reference(spec.drive[0], switch.target[0], (*switch.path, "to"))
     if spec.encoder is not None and spec.encoder.follows is not None:
         drives = {axis.name: axis.drive[0] for axis in world.elements_of(AXIS)}
-        if spec.encoder.follows in drives:
-            yield Reference(spec.drive[0], drives[spec.encoder.follows], (*spec.encoder.path, "follows"))
+        followed = spec.encoder.follows
+        others = (one.name for specs in world.elements.values() for one in specs if isinstance(one, NamedSpec))
+        if followed in drives or followed in others:  # one that is not an axis is joined, too: what is wrong is `follows`
+            yield Reference(spec.drive[0], drives.get(followed, followed), (*spec.encoder.path, "follows"))
 
 
 def _build(spec: AxisSpec, site: Site) -> BuiltAxis:

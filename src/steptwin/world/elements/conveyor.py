@@ -206,7 +206,7 @@ class Conveyor(BoardPart):
     def report(self, text: str, name: str, what: str) -> None:
         """Something has happened to a workpiece."""
         kernel = self.board.kernel
-        facts = ("workpiece", name), ("conveyor", self.spec.name), ("what", what)
+        facts = ("workpiece", name), ("element", self.spec.name), ("what", what)
         kernel.report(kernel.owner(self.board.name), "event", "workpiece", text, *facts)
 
     def _hold(self, now: Nanos) -> None:

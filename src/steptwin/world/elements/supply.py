@@ -169,7 +169,7 @@ class Supply(BoardPart):
         kernel, name = self.board.kernel, self.board.name
         names = ", ".join(self._spec.feeds)
         text = f"{name} is {'on' if self.is_good else 'off'}, with {names}"
-        facts = ("supply", name), ("on", self.is_good), ("fed", names)
+        facts = ("element", name), ("on", self.is_good), ("fed", names)
         kernel.report(kernel.owner(name), "event", "supply", text, *facts)
 
     def deadline(self) -> Nanos | None:

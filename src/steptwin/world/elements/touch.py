@@ -83,7 +83,7 @@ class Touch(BoardPart):
 
     def _report(self, text: str, *, touches: bool) -> None:
         kernel = self.board.kernel
-        facts = ("collision", self.board.name), ("touches", touches), ("jams", self._jams)
+        facts = ("element", self.board.name), ("touches", touches), ("jams", self._jams)
         kernel.report(kernel.owner(self.board.name), "event", "collision", text, *facts)
 
     def deadline(self) -> Nanos | None:

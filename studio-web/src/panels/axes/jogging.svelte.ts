@@ -55,14 +55,18 @@ export class Jogging {
     return found;
   }
 
-  begin(axis: AxisModel, sign: number, percent = this.percent): void {
+  /** `isOver` is called when the jog is refused, or ends otherwise than by `end`. */
+  begin(axis: AxisModel, sign: number, isOver: () => void, percent = this.percent): void {
     this.end(axis);
     const velocity = (sign * this.fullOf(axis) * percent) / 100;
     const fields = { machine: axis.machine, axis: axis.number, velocity };
     const jog: HeldJog = HeldJog.begin(
       (name, given, within) => this.studio.ask(name, given, within),
       fields,
-      (error) => this.failed(axis, jog, error),
+      (error) => {
+        isOver();
+        this.failed(axis, jog, error);
+      },
     );
     this.held.set(axis.id, jog);
   }

@@ -39,9 +39,10 @@ function jogging(): Jogging {
 test("a jog whose predecessor is refused late still ends when it is let go", async () => {
   const jogs = jogging();
   const axis = AXIS as unknown as AxisModel;
-  jogs.begin(axis, 1);
+  const isOver = vi.fn();
+  jogs.begin(axis, 1, isOver);
   jogs.end(axis);
-  jogs.begin(axis, 1);
+  jogs.begin(axis, 1, vi.fn());
   const [first, second] = open;
   first?.refuse(new RequestError("refusal", "not yet"));
   await vi.advanceTimersByTimeAsync(1);
@@ -51,4 +52,5 @@ test("a jog whose predecessor is refused late still ends when it is let go", asy
   await vi.advanceTimersByTimeAsync(1000);
   expect(open.map(({ name }) => name)).toEqual(["jog", "jog", "let_go"]);
   expect(report).toHaveBeenCalledOnce();
+  expect(isOver).toHaveBeenCalledOnce();
 });

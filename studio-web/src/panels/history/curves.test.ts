@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { csvOf, linesOf, rangeOf, stretchesOf, valueAt, type Series } from "./curves";
+import { csvOf, linesOf, movedFirst, rangeOf, stretchesOf, valueAt, type Series } from "./curves";
 
 const series = (values: Series["values"], at_s: number[], is_motion = false): Series => ({
   point: "table.M1.position",
@@ -48,4 +48,13 @@ test("a table has the unit of each value", () => {
   expect(csvOf([series([1.5, null], [0, 1])])).toBe(
     'point,unit,seconds,value\r\n"table.M1.position","mm",0,1.5\r\n"table.M1.position","mm",1,\r\n',
   );
+});
+
+test("what has moved is shown first", () => {
+  const named = (point: string, values: Series["values"]) => ({ ...series(values, [0, 1]), point });
+  expect(movedFirst([named("drum", [3]), named("feeder", [null, null]), named("x", [0, 5])])).toEqual([
+    "x",
+    "drum",
+    "feeder",
+  ]);
 });

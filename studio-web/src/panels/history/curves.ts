@@ -93,3 +93,10 @@ const rowsOf = ({ point, unit, at_s, values }: Series): string[] =>
     const shown = value === null ? "" : typeof value === "string" ? quoted(value) : value;
     return [quoted(point), quoted(unit), at, shown].join(",");
   });
+
+/** The points, those first whose value has changed. */
+export function movedFirst(series: readonly Series[]): string[] {
+  const moved = ({ values }: Series) =>
+    values.some((value) => value !== null && value !== values.find((one) => one !== null));
+  return [...series.filter(moved), ...series.filter((one) => !moved(one))].map(({ point }) => point);
+}

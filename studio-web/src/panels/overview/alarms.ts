@@ -1,4 +1,5 @@
 import type { SubjectEvent } from "../../lib/protocol/types";
+import { ownerOf } from "../../lib/state/owner";
 import type { Severity } from "../../lib/state/severity";
 
 /** An alarm, and how often it came: the same machine, code and axis. */
@@ -18,7 +19,7 @@ export function alarmsOf(events: readonly SubjectEvent[], severityOf: (event: Su
   for (const event of events) {
     const severity = severityOf(event);
     if (severity === "information") continue;
-    const key = `${event.machine} ${codeOf(event)} ${axisOf(event)}`;
+    const key = `${ownerOf(event)} ${codeOf(event)} ${axisOf(event)}`;
     const known = found.get(key);
     if (known === undefined) found.set(key, { key, severity, count: 1, last: event });
     else known.count++;

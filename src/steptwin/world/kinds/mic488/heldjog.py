@@ -66,7 +66,7 @@ class Mic488HeldJog:
         vmax = axis.vmax_p / axis.gear
         if not 0.0 < abs(wanted.velocity) <= vmax * (1.0 + SAME):
             unit = axis.config.unit_name
-            permitted = f"permitted are more than 0 and at most VMAX, {vmax:g} {unit}/s"
+            permitted = f"permitted are {-vmax:g} to {vmax:g} {unit}/s (VMAX), but not 0"
             raise Misuse(f"velocity = {wanted.velocity:g} {unit}/s: {permitted}")
 
     def _has_same_speed(self) -> bool:

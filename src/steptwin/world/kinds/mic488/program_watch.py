@@ -24,6 +24,9 @@ from steptwin.world.kernel import Kernel
 from steptwin.world.kinds.mic488.statement_use import use_of
 from steptwin.world.programs import ResourceKind
 
+_FOLLOWS = (AxisStatus.POSITION, AxisStatus.REACHED)
+"""Statuses of an axis that follows its encoder."""
+
 
 class ProgramEvent(NamedTuple):
     """An action or event to report. ``step`` is the step of ``program`` that caused it, if one did."""
@@ -41,6 +44,11 @@ class ProgramEvent(NamedTuple):
             return ""
         found, source = self.program.steps[self.step], self.program.source
         return f"{source.position(found.start)[0]:>4}  {visible(source.text[found.start : found.end].strip())}"
+
+    @property
+    def is_done(self) -> bool:
+        """See `steptwin.world.kind.ProgramAct.is_done`: an interrupt comes of others itself."""
+        return self.step is not None and self.code != "interrupt"
 
 
 def watch_program(device: Mic488Device, kernel: Kernel, name: str) -> ProgramWatch | None:
@@ -66,6 +74,8 @@ class ProgramWatch:
         self.program = next(iter(device.program.banks.programs.values()))
         """The one that was executed last."""
         self._axes = [(axis.status, axis.revision, axis.velocity_p) for axis in device.axes]
+        self._following: set[int] = set()
+        """Axes of which it was told that they follow their encoders."""
         device.program.interpreter.hook(self._begins)
         kernel.add_part(self, (name,))
         kernel.observers.append(self._edge)
@@ -157,8 +167,12 @@ class ProgramWatch:
         self._finish()
         for index, axis in enumerate(self.device.axes):
             known = self._axes[index]
+            if index in self._following and axis.control.is_following and axis.status in _FOLLOWS:
+                continue  # told once: it comes to where its shaft was, and goes on, up to a hundred times a second
             if axis.revision != known[1] or axis.status is not known[0]:
                 self._axes[index] = axis.status, axis.revision, axis.velocity_p
+                follows = axis.control.is_following and axis.status is AxisStatus.POSITION
+                (self._following.add if follows else self._following.discard)(index)
                 self._tell_of(axis, known[0], known[2], now)
 
     def _tell_of(self, axis: Axis, before: AxisStatus, velocity_p: float, now: Nanos) -> None:
@@ -192,6 +206,8 @@ def _words(axis: Axis, before: AxisStatus, now: Nanos) -> str:
             return f"{name} slows down from {real_text(axis.profile.velocity(now) / gear)} {unit}/s"
         case AxisStatus.VELOCITY:
             return f"{name} runs at {real_text(axis.velocity_p / gear)} {unit}/s"
+        case AxisStatus.POSITION if axis.control.is_following:
+            return f"{name} follows its encoder"
         case AxisStatus.POSITION:
             return f"{name} moves to {real_text((axis.target_p + axis.offset_p) / gear)} {unit}"
         case AxisStatus.HOMING:

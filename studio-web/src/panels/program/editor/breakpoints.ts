@@ -55,25 +55,34 @@ const marks = StateField.define<RangeSet<Dot>>({
 
 const SPACER = new Dot("plain", "");
 
-/** Breakpoints beside the text: a click there or on the number of a line, or F9, sets and removes them; with Shift, or the other
- * button of the mouse, they are edited. */
-export function breakpoints(events: GutterEvents | null): Extension {
-  if (events === null) return [marks, lineNumbers(), beside({})];
-  const lineOf = (view: EditorView, from: number) => view.state.doc.lineAt(from).number;
-  const handlers = {
-    mousedown: (view: EditorView, line: { from: number }, event: Event) => {
+type Handlers = Record<string, (view: EditorView, line: { from: number }, event: Event) => boolean>;
+
+const lineOf = (view: EditorView, from: number) => view.state.doc.lineAt(from).number;
+
+/** What the mouse does beside the text, in each of its columns; nothing where there are no breakpoints. */
+export function handlersOf(events: GutterEvents | null): Handlers {
+  if (events === null) return {};
+  return {
+    mousedown: (view, line, event) => {
       const { button, shiftKey } = event as MouseEvent;
       if (button !== 0) return false;
       (shiftKey ? events.edit : events.toggle)(lineOf(view, line.from));
       event.preventDefault();
       return true;
     },
-    contextmenu: (view: EditorView, line: { from: number }, event: Event) => {
+    contextmenu: (view, line, event) => {
       events.edit(lineOf(view, line.from));
       event.preventDefault();
       return true;
     },
   };
+}
+
+/** Breakpoints beside the text: a click there or on the number of a line, or F9, sets and removes them; with Shift, or the other
+ * button of the mouse, they are edited. */
+export function breakpoints(events: GutterEvents | null): Extension {
+  if (events === null) return [marks, lineNumbers(), beside({})];
+  const handlers = handlersOf(events);
   const here = (act: (line: number) => void) => (view: EditorView) => {
     act(lineOf(view, view.state.selection.main.head));
     return true;
@@ -85,8 +94,6 @@ export function breakpoints(events: GutterEvents | null): Extension {
     keymap.of([{ key: "F9", run: here(events.toggle), shift: here(events.edit) }]),
   ];
 }
-
-type Handlers = Record<string, (view: EditorView, line: { from: number }, event: Event) => boolean>;
 
 const beside = (handlers: Handlers): Extension =>
   gutter({

@@ -19,7 +19,7 @@ import { highlightSelectionMatches, search, searchKeymap } from "@codemirror/sea
 import { EditorState, type Extension, type Text } from "@codemirror/state";
 import { EditorView, drawSelection, highlightActiveLine, keymap } from "@codemirror/view";
 import { sentence } from "../../../text";
-import { breakpoints, marksAre, type GutterEvents, type Mark } from "./breakpoints";
+import { breakpoints, handlersOf, marksAre, type GutterEvents, type Mark } from "./breakpoints";
 import { Documents, OpenText, textOf, type Finding } from "./documents";
 import { runningLine, runsAt } from "./running";
 import { look } from "./theme";
@@ -222,9 +222,10 @@ export class ProgramEditor {
   }
 
   private extensions(uri: string, language: string, label: string, isEditable: boolean): Extension {
+    const gutter = language === "wbc" || language === "m1486" ? this.events.gutter : null;
     return [
-      breakpoints(language === "wbc" || language === "m1486" ? this.events.gutter : null),
-      runningLine(),
+      breakpoints(gutter),
+      runningLine(handlersOf(gutter)),
       history(),
       drawSelection(),
       highlightActiveLine(),

@@ -1,5 +1,6 @@
 import { StateEffect, StateField, type Extension } from "@codemirror/state";
 import { Decoration, EditorView, GutterMarker, gutter, type DecorationSet } from "@codemirror/view";
+import type { handlersOf } from "./breakpoints";
 
 const NOW = Decoration.line({ class: "now", attributes: { "aria-current": "step" } });
 
@@ -26,8 +27,8 @@ class Arrow extends GutterMarker {
 }
 const ARROW = new Arrow();
 
-/** The running line, marked in the text and beside it. */
-export const runningLine = (): Extension => [
+/** The running line, marked in the text and beside it, in a column that takes clicks as the others do. */
+export const runningLine = (domEventHandlers: ReturnType<typeof handlersOf>): Extension => [
   place,
   gutter({
     class: "cm-running",
@@ -40,5 +41,6 @@ export const runningLine = (): Extension => [
     },
     lineMarkerChange: (update) => update.startState.field(place) !== update.state.field(place),
     initialSpacer: () => ARROW,
+    domEventHandlers,
   }),
 ];
