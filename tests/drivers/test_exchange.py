@@ -8,7 +8,7 @@ import pytest
 
 from steptwin.drivers.exchange import Exchanger, Job, LineLost, NoAnswer, Overtaken, SendNext, SentLate, TooLate
 from steptwin.drivers.permission import Permission
-from steptwin.errors import LineFailure, Refusal
+from steptwin.errors import LineFailure, Misuse, Refusal
 from steptwin.machine import MILLISECOND, SECOND
 
 TIMEOUT = 300 * MILLISECOND
@@ -37,6 +37,8 @@ class Spelling:
         self.wary = False
 
     def start(self, request: Ask, now: int, *, urgent: bool) -> bytes:
+        if request.text == "unspeakable":
+            raise Misuse(f"{request} cannot be sent")
         self.asked, self.held = request, ""
         return request.text.encode()
 
@@ -90,6 +92,17 @@ def test_an_engine_is_busy_from_the_first_job_to_the_last_answer() -> None:
     assert (e.busy, e.in_flight) == (True, True)
     e.receive(b"two!", 2)
     assert (e.busy, e.in_flight) == (False, False)
+
+
+def test_a_request_that_cannot_be_begun_fails_and_the_next_one_goes() -> None:
+    """Its caller would wait for ever, and the error end in the loop."""
+    e = engine()
+    wrong, right = submit(e, "unspeakable"), submit(e, "right")
+    assert e.step(0) == b"right"
+    assert wrong.done
+    with pytest.raises(Misuse, match="unspeakable"):
+        wrong.result()
+    assert not right.done
 
 
 def test_one_exchange_at_a_time_in_the_order_they_came() -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from typing import Any
 
 from chip_rig import ChipWire, chip_line, chip_task_line
@@ -10,6 +12,7 @@ from line_rig import run_virtual
 
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.m1486 import AsyncM1486
+from steptwin.errors import SteptwinError
 from steptwin.files.world import World
 from steptwin.machine import SECOND, Nanos
 from steptwin.subject import commands as command
@@ -22,16 +25,20 @@ from steptwin.world.motions import ordered
 
 FAMILIES = ("A", "B", "C", "E1", "E2")
 ASKED = ("move", "jog", "seek", "program")
-WAYS = ("threads", "tasks", "control", "control over a slow line", "stop_all")
+WAYS = ("threads", "tasks", "tasks together", "control", "control over a slow line", "stop_all")
+BY_DRIVER = WAYS[:3]
+"""``together``: one task asks, and another one stops it at a moment since then."""
 PROGRAM = "[\n@5\nF6400\nR\nW50\nB6400\nR\nJ5\n]"
 QUIET_S = 4.0
 """Longer than everything that may be under way takes to begin, a program at 300 bit/s excepted."""
+ANSWERED_S = 150.0
+"""An E type that was stopped while a program was typed is reset."""
 BEGINS = ("moves", "seeks")
 
 
 def trial(family: str, asked: str, way: str, delay_s: float) -> str | None:
     """What was wrong; None if nothing was."""
-    stopped_at, begun, is_at_rest = _by_driver(family, asked, way, delay_s) if way in ("threads", "tasks") else _by_command(
+    stopped_at, begun, is_at_rest = _by_driver(family, asked, way, delay_s) if way in BY_DRIVER else _by_command(
         family, asked, way, delay_s
     )  # fmt: skip
     late = [at for at in begun if at > stopped_at]
@@ -59,10 +66,17 @@ def _by_driver(family: str, asked: str, way: str, delay_s: float) -> tuple[Nanos
 
     async def work() -> Nanos:
         await chip.open()
-        await OPERATIONS[asked](chip)
+        if way != "tasks together":
+            await OPERATIONS[asked](chip)
+        asking = asyncio.ensure_future(OPERATIONS[asked](chip)) if way == "tasks together" else None
         await line.sleep(delay_s)
         await chip.stop()
-        return line.now()
+        stopped = line.now()
+        if asking is not None:
+            with suppress(SteptwinError):  # it says that a stop was requested meanwhile
+                async with asyncio.timeout(ANSWERED_S):
+                    await asking
+        return stopped
 
     stopped_at = finish(work()) if way == "threads" else run_virtual(wire, work())
     # The process has died: nothing is sent any more.

@@ -318,8 +318,12 @@ class Exchanger(Generic[Q, A]):
         if job is None:
             return b""
         request = job.request
+        try:
+            data = self.discipline.start(request, now, urgent=job.urgent)
+        except SteptwinError as error:  # whoever waits for it learns that, not the loop or the thread that happens to be here
+            job.fail(error)
+            return self._begin(now)
         self._requests += 1
-        data = self.discipline.start(request, now, urgent=job.urgent)
         self._current = job
         self._sent(job, now)
         return data

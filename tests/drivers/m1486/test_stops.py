@@ -254,3 +254,18 @@ def test_the_rest_of_a_text_is_not_sent_behind_a_stop() -> None:
         assert sorted(address for address, event in wire.happened if event.code == "moves") == [1, 1, 1, 1, 2]
 
     run_virtual(wire, work())
+
+
+def test_two_that_drop_the_same_unfinished_line_are_both_done() -> None:
+    """Two commands that a stop has overtaken: the second finds nothing more to drop."""
+    wire = ChipWire("B", (7,))
+    chip = AsyncM1486(chip_task_line(wire), 7)
+
+    async def work() -> bool:
+        await chip.open()
+        chip._unit.talk.dirty = True
+        async with asyncio.timeout(5.0):
+            await asyncio.gather(chip._unit.drop_line(), chip._unit.drop_line())
+            return await chip.is_busy()
+
+    assert run_virtual(wire, work()) is False

@@ -550,7 +550,7 @@ class ChipUnit:
     async def drop_line(self) -> None:
         """Make the chip drop characters sent without CR: the next CR on the line would execute them."""
         if self.talk.dirty:
-            with suppress(NoAnswer, Garbled):
+            with suppress(NoAnswer, Garbled, Misuse):  # a stop that went first has spoilt them: there is nothing to send
                 await self._exchange(ChipRequest(self.address, "", sort=ChipRequestKind.SELECT))
 
     async def kill(self, *, program: bool = False) -> bool:
