@@ -7,12 +7,14 @@ from pathlib import Path
 import pytest
 from world_rig import small
 
-from steptwin.errors import Misuse
+from steptwin.drivers.blocking import finish
+from steptwin.errors import Misuse, Refusal
 from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.subject import commands as command
 from steptwin.subject.following import filter_of
+from steptwin.subject.jogs import WorldJogs
 from steptwin.subject.world import WorldSubject
 from steptwin.world.actions import Bytes
 from steptwin.world.faults import read as read_fault
@@ -117,6 +119,25 @@ def test_what_waits_for_a_slow_line_is_dropped_by_a_stop(asked: command.Command,
     subject.do(command.Move("a", 1, to=there + 10))  # what comes behind it is done
     world.advance(world.now + 5 * SECOND)
     assert world.read("a.M1.position") == pytest.approx(there + 10)
+
+
+@pytest.mark.parametrize("stop", [command.StopAxes("a"), command.StopAxes("a", 1), command.StopAll()])
+def test_a_jog_that_somebody_holds_is_not_begun_again_after_a_stop_by_somebody_else(stop: command.Command) -> None:
+    """Its first motion is still on the line."""
+    world = World.from_toml(TIMED.partition("[[script]]")[0])
+    subject = WorldSubject(world)
+    jogs = WorldJogs(subject)
+    subject.do(command.Enable("a", 1))
+    world.advance(100 * MILLISECOND)
+    held = finish(jogs.begin(command.Jog("a", 1, 10.0)))
+    world.advance(world.now + 2 * MILLISECOND)
+    subject.do(stop)
+    for _ in range(10):
+        with pytest.raises(Refusal, match="the jog has ended: stopped"):
+            held.extend()
+        world.advance(world.now + 80 * MILLISECOND)
+        jogs.advance(world.now)
+    assert world.read("a.M1.position") == 0.0
 
 
 def test_requests_for_another_controller_and_other_masters_are_left_alone() -> None:

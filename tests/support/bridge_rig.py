@@ -1,4 +1,7 @@
-"""A MIC488 behind a bridge in virtual time: a twin in memory whose line can fall silent, its driver, the subject of gateways."""
+"""A device behind a bridge in virtual time: a twin in memory whose line can fall silent, its driver, the subject of gateways.
+
+`BridgeRig` has a MIC488, `ChipBridgeRig` an M1486.
+"""
 
 from __future__ import annotations
 
@@ -6,18 +9,22 @@ import asyncio
 from collections.abc import Callable
 from typing import Any
 
+from chip_rig import ChipWire, chip_task_line
 from mic488_rig import MM, controller, loaded
 
 from steptwin.commands.bridge import _Devices, connections_of
 from steptwin.devices.composite import CompositeSubject
 from steptwin.devices.device import ConnectedDevice, DeviceSurroundings
+from steptwin.drivers.m1486 import AsyncM1486
+from steptwin.drivers.m1486.subject import M1486Part
 from steptwin.drivers.mic488.driver import AsyncMic488
 from steptwin.drivers.mic488.lines import modbus_exchanger
 from steptwin.drivers.mic488.subject import Mic488Part
 from steptwin.drivers.place import LineAddress
-from steptwin.drivers.subject import AsyncDeviceSubject
+from steptwin.drivers.subject import AsyncDeviceSubject, DevicePart
 from steptwin.drivers.tasks import TaskLine
 from steptwin.live.cell import Cell
+from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.program import ProgramState
 from steptwin.subject.events import Numbering
@@ -28,6 +35,9 @@ from steptwin.world.script import Write
 AXIS = 1
 PROGRAM = "MAIN:\nDELAY 0.1\nJUMP MAIN\n"
 PLACE = "memory"
+ADDRESS = 7
+BEGINS = ("moves", "seeks")
+"""Codes of events of an M1486."""
 
 
 class SilentLine:
@@ -76,8 +86,32 @@ class SilentLine:
     abort = close
 
 
-class BridgeRig:
-    """Made in a running virtual loop. ``subject`` is that of gateways, ``composite`` that of the studio."""
+class BridgedDevice:
+    """A device as a bridge shows it. ``subject`` is that of gateways, ``composite`` that of the studio."""
+
+    composite: CompositeSubject
+    connected: ConnectedDevice
+    subject: _Devices
+
+    def add(self, part: DevicePart) -> None:
+        loop = asyncio.get_running_loop()
+        numbering = Numbering({})
+
+        def now() -> int:
+            return round(loop.time() * 1e9)
+
+        self.composite = CompositeSubject(None, now, numbering)
+        around = DeviceSurroundings(clock=now, keep=lambda name, text: "a file", on_internal=self._fail)
+        self.connected = ConnectedDevice(AsyncDeviceSubject("table", part, clock=now, numbering=numbering), part, around)
+        self.composite.add(self.connected)
+        self.subject = _Devices("cell", self.composite, connections_of(self.composite, self._fail))
+
+    def _fail(self, error: Exception) -> None:
+        raise error
+
+
+class BridgeRig(BridgedDevice):
+    """Made in a running virtual loop."""
 
     def __init__(self) -> None:
         program, _ = loaded(PROGRAM)
@@ -90,29 +124,14 @@ class BridgeRig:
 
     async def open(self) -> None:
         self.cell.start()
-        loop = asyncio.get_running_loop()
         endpoint: Any = self.line
         exchanger, notes = modbus_exchanger(LineAddress(endpoint, framed=True), 100.0, None)
         driver_line: TaskLine[Any, Any] = TaskLine(endpoint, exchanger, notes)
         await driver_line.open()
         mic = AsyncMic488(driver_line, 1, firmware="1.70", config=self.device.config, timeout_s=3.0, observe=True)
         await mic.open()
-        numbering = Numbering({})
-
-        def now() -> int:
-            return round(loop.time() * 1e9)
-
-        self.composite = CompositeSubject(None, now, numbering)
-        part = Mic488Part(mic)
-        subject = AsyncDeviceSubject("table", part, clock=now, numbering=numbering)
-        around = DeviceSurroundings(clock=now, keep=lambda name, text: "a file", on_internal=self._fail)
-        self.connected = ConnectedDevice(subject, part, around)
-        self.composite.add(self.connected)
-        self.subject = _Devices("cell", self.composite, connections_of(self.composite, self._fail))
+        self.add(Mic488Part(mic))
         await self.subject.do(Write((("table", "USER_REGISTER[5]", 0.0),)))  # its settings are kept now
-
-    def _fail(self, error: Exception) -> None:
-        raise error
 
     async def close(self) -> None:
         await self.connected.close()
@@ -136,3 +155,43 @@ class BridgeRig:
     def position(self) -> float:
         self.cell.enter()
         return self.device.axes[AXIS - 1].profile.position(self.cell.kernel.now)
+
+
+class ChipBridgeRig(BridgedDevice):
+    """Made in a running virtual loop, too. ``family``: of the M1486, such as E1."""
+
+    def __init__(self, family: str) -> None:
+        self.wire = ChipWire(family, (ADDRESS,))
+
+    async def open(self) -> None:
+        loop: Any = asyncio.get_running_loop()
+        loop.now_ns = max(loop.now_ns, self.wire.now)
+        self.line = chip_task_line(self.wire)
+        await self.line.open()
+        self.chip = AsyncM1486(self.line, ADDRESS)
+        await self.chip.open()
+        self.add(M1486Part(self.chip))
+
+    async def close(self) -> None:
+        await self.connected.close()
+        await self.line.close()
+
+    async def wait(self, seconds: float) -> None:
+        await asyncio.sleep(seconds)
+
+    async def begin_program(self, text: str) -> None:
+        """As another driver does it: a bridge takes no programs of an M1486."""
+        await self.chip.download(text)
+
+    @property
+    def now(self) -> Nanos:
+        return round(asyncio.get_running_loop().time() * SECOND)
+
+    @property
+    def begun(self) -> list[Nanos]:
+        """When motions have begun."""
+        return [event.time for _, event in self.wire.happened if event.code in BEGINS]
+
+    @property
+    def is_moving(self) -> bool:
+        return self.wire.moving(ADDRESS)

@@ -21,7 +21,7 @@ from steptwin.subject.time import advance
 from steptwin.wire.frameline import FrameLine
 from steptwin.world import script as steps
 from steptwin.world.actions import Download, EndScripts, ExternalInput, See
-from steptwin.world.control import ControllerCommand, Jog, StopAxes, standstill
+from steptwin.world.control import ControllerCommand, Halt, Jog, StopAxes, standstill
 from steptwin.world.elements import failing
 from steptwin.world.faults.kinds import rows
 from steptwin.world.heldjog import HeldJog
@@ -66,6 +66,8 @@ class WorldSubject:
         self._machine_of = {(line.name, unit): name for name, (line, unit) in world.parts.line_of.items()}
         self._is_watching = False
         self._statements: StatementFollower | None = None
+        self._jogs: list[tuple[Jog, HeldJog]] = []
+        """Those that have not ended."""
 
     def _actions(self) -> dict[Any, Action]:
         taken: dict[Any, Action] = dict.fromkeys(STEPS, self._step)
@@ -146,7 +148,18 @@ class WorldSubject:
         if type(wanted) not in kind.control:
             known = ", ".join(command.name_of(one) for one in kind.control)
             raise Refusal(f"{name!r} is {kind.title}, which cannot do {command.name_of(type(wanted))}; it can do {known}")
-        self._apply_input(ordered(world, wanted))
+        step = ordered(world, wanted)
+        self._apply_input(step)
+        if isinstance(step, Halt):
+            self._cut_jogs(step)
+
+    def _cut_jogs(self, halt: Halt) -> None:
+        """A stop ends the held jogs of its axis, whoever holds them; that of a controller or of its program all of it. They may
+        be between two of their motions, where there was nothing to stop."""
+        self._jogs = [(wanted, jog) for wanted, jog in self._jogs if jog.over is None]
+        for wanted, jog in self._jogs:
+            if wanted.machine == halt.machine and halt.axis in (None, wanted.axis):
+                jog.cut()
 
     def _stop(self, wanted: StopAxes) -> object:
         self._control(wanted)
@@ -161,6 +174,7 @@ class WorldSubject:
         for name in world.machines:
             for halt in standstill(name, world.kind(name).datasheet(world.machine(name)).program_actions):
                 self._apply_input(halt)
+                self._cut_jogs(halt)
         return {"machines": list(world.machines), "scripts": sorted(before - {script.name for script in world.scripts})}
 
     def held_jog(self, wanted: Jog) -> HeldJog:
@@ -171,7 +185,9 @@ class WorldSubject:
             raise Refusal(f"{name!r} is {kind.title}, which cannot be jogged")
         world.touch(name)
         on = world.parts.line_of.get(name)
-        return kind.held_jog(machine, None if on is None else on[0].name, wanted)
+        held = kind.held_jog(machine, None if on is None else on[0].name, wanted)
+        self._jogs = [(one, jog) for one, jog in self._jogs if jog.over is None] + [(wanted, held)]
+        return held
 
     def _request(self, step: steps.Request) -> object:
         master = self.world.line_called(step.line).master
