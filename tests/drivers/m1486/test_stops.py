@@ -64,6 +64,28 @@ def test_a_stop_of_a_chip_of_which_nothing_is_known_is_confirmed_by_its_second_k
     assert not wire.moving(7)
 
 
+@pytest.mark.parametrize("family", FAMILIES)
+def test_of_a_chip_that_has_never_echoed_nothing_is_claimed(family: str) -> None:
+    """Another program has asked for the motion without echoes (function 41 OFF), and switched function 44 ON. An E type cannot be
+    had to echo in time, and that is said."""
+    wire = ChipWire(family, (7,))
+    wire.send(b"x7\rt44\r")
+    wire.sleep(1.0)
+    wire.send(b"g+\rr\r")
+    wire.sleep(0.2)
+    stopping = M1486(chip_line(wire), 7)
+    stopping.open_line()
+    if wire.chip.variant.write_ns:
+        with pytest.raises(Unconfirmed):
+            stopping.stop()
+        return
+    assert stopping.stop() is False
+    confirmed = wire.now
+    wire.sleep(5.0)
+    assert not [event for _, event in wire.happened if event.code == "moves" and event.time > confirmed]
+    assert not wire.moving(7)
+
+
 def test_a_stop_that_does_not_get_through_is_not_confirmed() -> None:
     wire = ChipWire("E1", (7,))
     chip = chip_driver(wire, 7)

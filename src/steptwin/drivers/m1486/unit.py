@@ -609,8 +609,10 @@ class ChipUnit:
         select = "" if self.address is None else f"x{self.address:x}\r"
         await self._blind(2 * f"{select}{text}\r", PAUSES_NS[1], urgent=True)
         try:
+            had_echoed = notes.was_awake
             await self.wake()
-            notes.forget()
+            if had_echoed:  # it was switched off; of one that had never echoed nothing is known, function 44 neither
+                notes.forget()
             await self._exchange(ChipRequest(self.address, text, sort=ChipRequestKind.KILL), urgent=True)
         except (NoEcho, Garbled, NoAnswer) as error:
             raise unconfirmed(self.name, failure or error) from error
