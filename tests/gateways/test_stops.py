@@ -131,7 +131,7 @@ class Endpoint:
         async def answered(one: Command, _: object) -> Result:
             return await self._rig.control.answer(one)
 
-        answer: Any = await respond(answered, json.dumps(plain_command(wanted)).encode(), pytest.fail)
+        answer: Any = await respond(answered, json.dumps(plain_command(wanted)).encode(), _raise)
         if "error" in answer:
             raise Refused(answer["error"])
 
