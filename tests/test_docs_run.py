@@ -39,6 +39,7 @@ NOT_RUN = {
         "needs devices",
         "it goes on until Ctrl-C",
         "needs a running studio; tests/studio/test_examples.py does it",
+        "needs a running studio; tests/studio/test_examples.py does it",
     ],
     "docs/testing.md": ["needs devices"],
     "docs/why.md": ["it goes on until Ctrl-C"],

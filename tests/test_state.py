@@ -47,7 +47,8 @@ class Ports(Stateful):
         self.device = Mic488Device(ControllerConfig())
         units = TimedUnits({1: self.device}, LineTiming(SerialLine(38400)))
         gateway = ModbusGateway(units)
-        self.shared = (units, gateway)
+        strict = TimedUnits({1: self.device}, LineTiming(SerialLine(38400), strict=True))
+        self.shared = (units, gateway, strict)
         vision = RtuSlavePort({1: self.device})
         self.ports: tuple[Any, ...] = (
             RtuSlavePort({1: self.device}, on_pause=self._paused),
@@ -58,6 +59,7 @@ class Ports(Stateful):
             ScriptPort(gateway),
             Com1Port(self.device, vision),
             vision,
+            TimedRtuSlavePort(strict),
         )
         self.out: list[tuple[int, object]] = []
 
@@ -100,6 +102,8 @@ PIECES = [
     Piece(6, READ[4:], SECOND),
     Piece(0, b"\x02\x03" * 300, MILLISECOND),
     Piece(0, READ, SECOND),
+    Piece(8, READ[:3], 500_000),
+    Piece(8, READ[3:], 20 * MILLISECOND),
 ]
 
 
@@ -128,7 +132,7 @@ def test_what_comes_back_of_these_pieces() -> None:
     for piece in PIECES:
         now = ports.receive(piece, now)
     answering = {entry[0] for entry in ports.out if isinstance(entry[1], tuple)}
-    assert answering == {0, 1, 2, 3, 4, 5, 6}
+    assert answering == {0, 1, 2, 3, 4, 5, 6, 8}
     assert [entry for entry in ports.out if not isinstance(entry[1], tuple)] != []  # pauses
 
 

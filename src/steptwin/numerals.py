@@ -44,7 +44,7 @@ def read_integer(text: str) -> int:
     value = read_number(text, or_hexadecimal=True)
     if not value.is_integer():
         raise Misuse(f"{shown(text.strip())} is not a whole number")
-    return int(text) if len(text.strip()) <= _LONGEST_WHOLE and text.strip().lstrip("+-").isdecimal() else int(value)
+    return int(text) if len(text) <= 4000 and text.strip().lstrip("+-").isdecimal() else int(value)
 
 
 def _meant(text: str) -> str | None:

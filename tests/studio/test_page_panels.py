@@ -320,7 +320,7 @@ def test_the_machine_is_drawn_and_its_button_pressed(start_studio: Callable[...,
     page.mouse.up()
     until(lambda: studio.master.inputs(5008, 1) == [False], "it is released")
     button(page, "Stop all").click()
-    until(lambda: studio.master.words(10003)[0] == 0, "the program has been stopped")
+    until(lambda: studio.master.words(10003)[0] == 2, "the program has been paused")
     until(lambda: studio.stands(1) and studio.stands(2), "the axes stand")
     target = 60.0 if studio.at(1) > 100.0 else 140.0
     studio.master.enable(1)

@@ -44,10 +44,14 @@ def read_speed(text: str, least: float = SLOWEST) -> float:
     """Parse a speed, virtual seconds per second; infinite for ``max``. Raises `Misuse`."""
     if text == "max":
         return inf
-    speed = read_number(text)
+    standing = "" if least else "0 (stands), "
+    permitted = f"permitted are {standing}{SLOWEST:g} to {FASTEST:g}, and 'max'"
+    try:
+        speed = read_number(text)
+    except Misuse as error:
+        raise Misuse(f"--speed {error}: {permitted}") from None
     if not SLOWEST <= speed <= FASTEST and speed != least:
-        standing = "" if least else "0 (stands), "
-        raise Misuse(f"--speed {text}: permitted are {standing}{SLOWEST:g} to {FASTEST:g}, and 'max'")
+        raise Misuse(f"--speed {text}: {permitted}")
     return speed
 
 
