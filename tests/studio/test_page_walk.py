@@ -63,7 +63,7 @@ KINDS = {
             "Registers": "Cyclic read",
             "Configuration": "no command reads its settings: their present values are unknown",
             "Calculator": "Start/stop velocity",
-            "Frames": "U20 type letter in ASCII = 65",
+            "Frames": "echo of 'x7",
         },
     ),
 }
