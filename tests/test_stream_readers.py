@@ -224,6 +224,16 @@ def test_nothing_is_acted_on_that_may_be_the_middle_of_something(name: str) -> N
         assert read([outer[:cut], outer[cut:]]) == ([whole] if takes_pauses else []), cut
 
 
+@pytest.mark.parametrize("name", [name for name, row in ROWS.items() if row.outer is _AROUND])
+def test_what_lies_inside_a_frame_is_never_acted_on_however_much_noise_is_around_it(name: str) -> None:
+    """Each byte of the noise may begin a frame."""
+    read, outer, _, takes_pauses = ROWS[name]
+    whole = read([outer])
+    for before in (1, 256, 300, 1000):
+        for behind in range(0, 300, 12):
+            assert read([b"\5" * before + outer + b"\5" * behind]) == (whole if takes_pauses else []), (before, behind)
+
+
 def test_a_trace_that_is_cut_off_ends_with_its_last_whole_record() -> None:
     head = b'{"steptwin_trace":2,"title":"","machines":{},"axes":[],"until_ns":null,"digest":""}\n'
     assert list(read_records(BytesIO(head), "x").trace) == []

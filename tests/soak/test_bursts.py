@@ -71,7 +71,9 @@ class Line:
             place = chance.randrange(len(frame))
             return frame[:place] + bytes((frame[place] ^ 1 << chance.randrange(8),)) + frame[place + 1 :]
         body = bytes((UNIT, chance.choice([0x41, 0x64]))) + chance.randbytes(chance.randrange(1, 6))
-        return chance.choice([chance.randbytes(chance.randrange(1, 12)), bytes((255,)), body + checksum(body)])
+        beginnings = bytes((chance.choice([5, UNIT]),)) * chance.choice([chance.randrange(4), chance.randrange(600)])
+        noise = chance.randbytes(chance.randrange(1, 12))
+        return chance.choice([noise, bytes((255,)), beginnings or b"\0", body + checksum(body)])
 
     def pieces(self, item: bytes) -> list[bytes]:
         """Whole mostly; in two or three; around a frame in its data; byte by byte."""

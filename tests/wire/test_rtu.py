@@ -450,15 +450,7 @@ def test_a_flood_of_noise_costs_a_bounded_number_of_looks_per_byte(pattern: str,
         for at in range(0, len(data), size):
             framer.feed(data[at : at + size], 0)
         assert looks <= len(data) + 2 * (len(data) // size)
-        assert looks <= 2 * (rtu.MAX_LOOKS + 1) * (len(data) // size)
         assert len(framer.held) <= rtu.MAX_FRAME
-
-
-@pytest.mark.parametrize("pattern", ["01", "02 03"])
-def test_a_request_behind_a_flood_of_noise_is_found_when_the_gap_has_passed(pattern: str) -> None:
-    framer, good = RtuFramer({1}), hexed("01 03 27 24 00 02")
-    assert framer.feed(bytes.fromhex(pattern) * 2000 + good, 0) == []
-    assert [frame.raw for frame in framer.expire(GAP)] == [good]
 
 
 def test_a_request_after_a_flood_of_beginnings_is_answered() -> None:
@@ -516,12 +508,3 @@ def test_the_shortest_gap() -> None:
     framer = RtuFramer(gap_ns=1)
     framer.feed(b"\x01", 7)
     assert framer.deadline() == 8
-
-
-@pytest.mark.parametrize("count", [rtu.MAX_LOOKS - 1, rtu.MAX_LOOKS, rtu.MAX_LOOKS + 1, 300])
-def test_a_frame_within_the_last_256_bytes_is_found_at_once_behind_noise(count: int) -> None:
-    """At each byte of this noise a request of function 5 might begin; only so many places are looked at if more bytes follow."""
-    frame = with_crc(bytes.fromhex("010300050001"))
-    framer = RtuFramer()
-    assert [found.raw for found in framer.feed(bytes((5,)) * count + frame, 0)] == [frame]
-    assert (framer.unframed, len(framer.held)) == (count, 0)

@@ -13,6 +13,8 @@ be the beginning of a frame whose end has not come, nothing behind is a frame un
 A line with several slaves carries requests and responses: at each place the framer tries the length that the function has as a
 request and the one it has as a response. When a burst has ended, a rest with a right CRC is a frame even where the length of its
 function is not known.
+
+Nothing bounds the search in noise: a cut could fall into a frame, and a byte of noise costs little more than one of a request.
 """
 
 from __future__ import annotations
@@ -43,9 +45,6 @@ BURSTY_GAP_NS: Nanos = 20 * MILLISECOND
 PAUSE_NS: Nanos = 2 * SECOND
 DELAY_NS: Nanos = 200 * MILLISECOND
 """The longest of these pauses that is usual. A request behind an unfinished frame waits for it, with other bytes behind it."""
-MAX_LOOKS = MAX_FRAME
-"""Most places of one delivery that are examined and at which no frame begins. Behind them only the last 256 bytes are kept,
-until the gap has passed. It bounds the cost of noise."""
 
 # function: (length of the frame, index of a byte to be added to it or 0). Modbus application protocol V1.1b3, section 6.
 _REQUEST_LENGTHS = {
@@ -236,7 +235,7 @@ class RtuFramer(Stateful):
         start = self._scan
         if has_ended and self._beginnings:
             start = min(start, self._beginnings[-1] - first)  # the whole burst may be a frame of unknown length
-        done = looks = 0
+        done = 0
         while start < size:
             length, role = self._whole(start) if has_ended else self._look(start, waiting=True)
             if length == 0 and has_ended and (request := self._new_request(start)) is not None:
@@ -247,10 +246,6 @@ class RtuFramer(Stateful):
             if length == 0:
                 break
             if (length < 0 or first + start + length <= self._garbled) and self._is_refuted(start, length):
-                looks += 1
-                if looks == MAX_LOOKS and size - start > MAX_FRAME:
-                    self._drop(size - MAX_FRAME)
-                    return
                 start = self._next_start(start + 1)
                 continue
             self._take(start, length, role, frames)
