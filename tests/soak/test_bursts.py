@@ -66,7 +66,8 @@ class Line:
         if kind < 8:
             return frame
         if kind < 10:
-            return frame[: chance.randrange(1, len(frame))]
+            kept = chance.randrange(1, len(frame))
+            return frame[: kept - (frame[kept:] == bytes((UNIT,)))]  # otherwise the next request would complete it
         if kind < 11:
             place = chance.randrange(len(frame))
             return frame[:place] + bytes((frame[place] ^ 1 << chance.randrange(8),)) + frame[place + 1 :]
