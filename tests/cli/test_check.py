@@ -155,11 +155,11 @@ def test_files_in_other_encodings(run: Run, tmp_path: Path) -> None:
 
 def test_a_world_is_checked_with_its_files(run: Run, program: Callable[..., Path]) -> None:
     file = program('[[mic488]]\nname = "a"\nprogram = "a.prg"\n[[axis]]\nname = "x"\ndrive = "b.M1"\n', "w.toml")
-    used = program("M1 = ON\nMOVE M1\nMOVE M2\nHOME M1 10\n", "a.prg")
+    used = program("M1 = ON\nPRINT M1\nPRINT M2\nHOME M1 10\n", "a.prg")
     code, out, _ = run(file)
     assert code == 1
-    assert f"{file}:3:1: error D010: a file has errors: {used}:2:1: error W137: WBC has no MOVE" in out
-    assert f"{used}:3:1: error W137: WBC has no MOVE" in out
+    assert f"{file}:3:1: error D010: a file has errors: {used}:2:1: error W137: WBC has no PRINT" in out
+    assert f"{used}:3:1: error W137: WBC has no PRINT" in out
     assert f"{file}:6:1: error D009: nothing is called 'b'" in out
     assert out.endswith(f"{file}: 3 errors, 0 warnings\n")
     used.write_text("M1 = ON\nHOME M1 10\n")

@@ -163,8 +163,7 @@ def test_the_line_limit_is_that_of_the_firmware() -> None:
 @pytest.mark.parametrize(
     ("written", "seconds"),
     [
-        ("20 s", "20"), ("20 sec", "20"), ("2,5sek", "2,5"), ("20 ms", "0.02"), ("1500ms", "1.5"), ("20 us", "0.00002"),
-        ("20000 µs", "0.02"), ("20 min", "1200"), ("1.5 h", "5400"), ("20 mm", None),
+        ("20 s", "20"), ("2,5s", "2,5"), ("20 ms", "0.02"), ("1500ms", "1.5"), ("20 min", "1200"), ("20 mm", None),
     ],
 )  # fmt: skip
 def test_times_with_a_unit_are_repaired_into_seconds(written: str, seconds: str | None) -> None:

@@ -1,7 +1,7 @@
 """Advice for wrong lines with elements of other languages.
 
-Only lines that the reader has refused are analysed, so this module cannot make a correct program wrong. It knows PLC
-languages, BASIC, C and G-code.
+Only lines that the reader has refused are analysed, so this module cannot make a correct program wrong. It knows BASIC, C and
+Structured Text.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def _is_bit(text: str) -> bool:
 # ---------------------------------------------------------------------- comments and several statements
 
 
-_COMMENT = re.compile(r"/\*|\(\*|;|(?:^|(?<=\s))'|^\s*(?:--|REM\b|!|/)", re.IGNORECASE)
+_COMMENT = re.compile(r"/\*|\(\*|;|(?:^|(?<=\s))'|^\s*(?:REM\b|/)", re.IGNORECASE)
 _SLASHES = "comments begin with //"
 
 
@@ -111,8 +111,6 @@ def _comment(line: ForeignLine) -> Advice | None:
 def _hash(line: ForeignLine) -> Advice | None:
     words = line.words
     if words[0].text == "#" and len(words) > 3 and all(word.kind == WORD for word in words[1:]):
-        if words[1].text.upper() == "DEFINE":
-            return None
         return _over(line, (0, 0), _SLASHES, "#name value names a number or a register", "//")
     return None
 
@@ -161,7 +159,7 @@ def _blocks(line: ForeignLine) -> Advice | None:
 def _label(line: ForeignLine) -> Advice | None:
     words = line.words
     name = words[-1]
-    if (len(words) == 1 or (len(words) == 2 and line.key in ("LABEL", "SUB", "PROC", "FUNCTION"))) and (
+    if (len(words) == 1 or (len(words) == 2 and line.key in ("SUB", "FUNCTION"))) and (
         name.text.upper() in line.jumps() and line.reads(f"{name.text}:")
     ):
         return _of_all(line, f"{name.text} is a label", "a label is written with a ':'", f"{name.text}:", keyword=LABEL)
@@ -173,10 +171,6 @@ def _instead(line: ForeignLine) -> Advice | None:
     words, key = line.words, line.key
     if key in STATEMENTS or key == SET or (len(words) > 1 and words[1].text in ("=", ":")):
         return None
-    if key in ("ENABLE", "DISABLE", "RESET") and len(words) == 2 and parts(words[1].text.upper()):
-        state = "ON" if key == "ENABLE" else "OFF"
-        fix = f"{words[1].text} = {state}"
-        return _of_all(line, f"WBC has no {key}", f"write {fix}", fix if line.reads(fix) else None)
     found = parts(f"{key}M1") or parts(f"{key}1")
     if found is not None and len(words) == 3 and re.fullmatch(r"M[1-4]", words[1].text, re.IGNORECASE):
         fix = f"{found[0].name}{words[1].text[1:]} = {words[2].text}"
@@ -190,7 +184,7 @@ def _instead(line: ForeignLine) -> Advice | None:
 def _declaration(line: ForeignLine) -> Advice | None:
     if line.key == "LET" and line.reads(f"SET {line.text(1)}"):
         return _over(line, (0, 0), "WBC has no LET", "write SET, or leave it out", SET)
-    if line.key in ("CONST", "DEFINE") and len(line.words) >= 3:
+    if line.key == "CONST" and len(line.words) >= 3:
         value = line.text(3) if line.words[2].text == "=" and len(line.words) > 3 else line.text(2)
         fix = f"#{line.words[1].text} {value}"
         return _of_all(line, f"WBC has no {line.key}", f"write {fix}", fix if line.reads(fix) else None)
@@ -201,15 +195,6 @@ def declared(words: Sequence[Lexeme]) -> Lexeme | None:
     """The name that a refused line would have given a value in another language."""
     known = words[0].text.upper() in DECLARATIONS | {"FOR"}
     return words[1] if known and len(words) > 1 and is_name(words[1].text) else None
-
-
-def _define(line: ForeignLine) -> Advice | None:
-    """``#define speed 60``."""
-    words = line.words
-    if words[0].text != "#" or len(words) < 3 or words[1].text.upper() != "DEFINE":
-        return None
-    fix = f"#{line.text(2)}"
-    return _over(line, (0, 1), "a constant is written #name value", f"write {fix}", "#") if line.reads(fix) else None
 
 
 def _waitpos(line: ForeignLine) -> Advice | None:
@@ -319,9 +304,7 @@ def _incomplete(line: ForeignLine) -> Advice | None:
 _NUMBER = r"(?<![\w.,$])([0-9]{1,15}(?:[.,][0-9]{1,15})?)"
 _WITH_UNIT = re.compile(rf"{_NUMBER}\s*({'|'.join(sorted(map(re.escape, UNITS), key=len, reverse=True))})(?![\w])")
 _THOUSANDS = re.compile(r"(?<![\w.,])[0-9]{1,3}(?:([.,' ])[0-9]{3})(?:\1[0-9]{3})*(?:[.,][0-9]+)?(?![\w.,])")
-_OTHER_BASE = re.compile(
-    r"(?<!\w)(?:(0x|\$(?![IDR][0-9]+\b)|&H|16#)([0-9A-F]+)|(0b|2#)([01]+)|([0-9][0-9A-F]*)H)(?!\w)", re.IGNORECASE
-)
+_OTHER_BASE = re.compile(r"(?<!\w)(?:(?:0x|&H|16#)([0-9A-F]+)|(?:0b|2#)([01]+))(?!\w)", re.IGNORECASE)
 _EXPONENT = re.compile(r"(?<![\w.,])[0-9]{1,15}(?:[.,][0-9]{1,15})?E[+-]?[0-9]{1,2}(?![\w.])", re.IGNORECASE)
 
 
@@ -343,8 +326,8 @@ def _unit(line: ForeignLine) -> Advice | None:
 
 def _notation(line: ForeignLine) -> Advice | None:
     if match := _OTHER_BASE.search(line.code):
-        digits, base = (match[2], 16) if match[2] else (match[4], 2) if match[4] else (match[5], 16)
-        return _number(line, match, "numbers are decimal", str(int(digits, base)))
+        value = int(match[1], 16) if match[1] else int(match[2], 2)
+        return _number(line, match, "numbers are decimal", str(value))
     if match := _EXPONENT.search(line.code):
         value = float(match[0].replace(",", "."))
         return _number(line, match, "numbers have no exponent", number_text(value))
@@ -451,7 +434,6 @@ def _counted(line: ForeignLine, first: int, fix: str, message: str) -> Advice | 
 
 _LOOKS: tuple[Callable[[ForeignLine], Advice | None], ...] = (
     _comment,
-    _define,
     _blocks,
     _label,
     _notation,

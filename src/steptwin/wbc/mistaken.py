@@ -14,30 +14,18 @@ from steptwin.wbc.scope import ProgramScope
 from steptwin.wbc.usage import sources
 
 _FAMILIES: Mapping[str, str] = {
-    **dict.fromkeys(("OUTPUT", "OUTP", "DO", "DOUT", "Q"), "OUT"),
-    **dict.fromkeys(("INPUT", "INP", "DI", "DIN"), "IN"),
-    **dict.fromkeys(("AI", "ADC", "ANALOG", "AINPUT"), "AIN"),
-    **dict.fromkeys(("VMAX", "VEL", "VELM", "SPEED", "SPEEDM", "VELOCITYM", "VMX"), "VMAXM"),
-    **dict.fromkeys(("STATUS", "STATUSM", "STAT"), "STATM"),
-    **dict.fromkeys(("LIML", "LIMITL", "LIMITLM"), "LIMLM"),
-    **dict.fromkeys(("LIMR", "LIMITR", "LIMITRM"), "LIMRM"),
-    **dict.fromkeys(("ACC", "ACCEL", "ACCELM"), "ACCM"),
-    **dict.fromkeys(("DEC", "DECEL", "DECELM"), "DECM"),
-    **dict.fromkeys(("POS", "POSITIONM"), "POSM"),
-    **dict.fromkeys(("MOTOR", "DRIVE", "AXIS"), "M"),
-    **dict.fromkeys(("ENCODER", "ENCM"), "ENC"),
-    **dict.fromkeys(("TIMER", "TIM", "TMR"), "TIMA"),
-    **dict.fromkeys(("CFGINT", "INT_IN", "CFG_IN"), "CFGINT_IN"),
-    "VACT": "VACTM",
-    "PTP": "PTPM",
+    "OUTPUT": "OUT",
+    "INPUT": "IN",
+    "VMAX": "VMAXM",
+    "ACC": "ACCM",
+    "DEC": "DECM",
+    "POS": "POSM",
     "I": "$I",
     "D": "$D",
     "R": "$R",
 }
-_CERTAIN = frozenset(
-    {"OUTPUT", "DOUT", "DO", "INPUT", "DIN", "DI", "AINPUT", "VELM", "SPEEDM", "VELOCITYM", "STATUSM", "LIMITLM", "LIMITRM"}
-    | {"ACCELM", "DECELM", "POSITIONM", "ENCM"}
-)
+"""Names of the configuration and the Modbus map for registers of WBC, and user registers without their sign."""
+_CERTAIN = frozenset({"OUTPUT", "INPUT"})
 """Names that never denote a variable intentionally. Others are reported only if the variable is not used."""
 _NAME = re.compile(r"([A-Z_]+?)([0-9]{1,4})$")
 

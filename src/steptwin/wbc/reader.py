@@ -11,7 +11,7 @@ from steptwin.diagnostics import Diagnostic, Fix, Span
 from steptwin.nearmiss import NearMiss
 from steptwin.wbc import findings as f
 from steptwin.wbc.findings import ProgramFinding
-from steptwin.wbc.foreign_words import DECLARATIONS, ELSE_IF, INSTEAD
+from steptwin.wbc.foreign_words import DECLARATIONS, ELSE_IF, INSTEAD, STATEMENTS_ELSEWHERE
 from steptwin.wbc.lexer import COMPARISON, NUMBER, OPERATOR, STRANGE, WORD, WRONG_NUMBER, Lexeme, is_name, plain_name
 from steptwin.wbc.registers import parts
 from steptwin.wbc.statements import (
@@ -49,16 +49,6 @@ from steptwin.wbc.tree import (
 _USER_REGISTER = re.compile(r"\$[IDR][0-9]+$", re.IGNORECASE | re.ASCII)
 _MEANT = {"==": "=", ":=": "=", "=<": "<=", "=>": ">="}
 _EQUALS_ELSEWHERE = ("==", ":=")
-_FUNCTIONS_ELSEWHERE = {"TAN": "tg", "COT": "ctg", "ARCSIN": "asin", "ARCCOS": "acos", "SQR": "sqrt"}
-_STATEMENTS_ELSEWHERE = {
-    **dict.fromkeys(("GOTO", "GOSUB", "CALL", "JMP", "JP", "GO"), "JUMP"),
-    **dict.fromkeys(("SLEEP", "PAUSE"), "DELAY"),
-    **dict.fromkeys(("RET", "RETI", "IRET", "RETFIE"), "RETURN"),
-    **dict.fromkeys(("WEND", "ENDW", "END_WHILE", "ENDLOOP", "ENDDO"), "ENDWHILE"),
-    **dict.fromkeys(("END_IF", "FI"), "ENDIF"),
-    **dict.fromkeys(("WAITUNTIL", "WAIT_UNTIL", "AWAIT"), "WAIT"),
-    **dict.fromkeys(("RESTART", "REBOOT"), "PROGRESET"),
-}
 _BLOCK_WORDS = frozenset({"ELSE", "ENDIF", "ENDWHILE"})
 
 
@@ -236,7 +226,7 @@ class StatementReader:
             return Rejected(f.MISSING_EQUALS.at(first, f"= is missing after {first.text}", hint, fix=f"{first.text} ="))
         if self._last > 2 and second is not None and second.kind == OPERATOR and self._tokens[2].text == "=":
             return Rejected(_compound(first.text, second, self._tokens[2]))
-        meant = _STATEMENTS_ELSEWHERE.get(key)
+        meant = STATEMENTS_ELSEWHERE.get(key)
         if meant is None and key not in INSTEAD and key not in ELSE_IF:
             meant = self._near.of(first.text, (SET, *STATEMENTS))
         if meant is not None:
@@ -346,7 +336,7 @@ class StatementReader:
         row = FUNCTIONS.get(token.text.upper())
         if row is None:
             known = [r.name for r in FUNCTIONS.values()]
-            meant = _FUNCTIONS_ELSEWHERE.get(token.text.upper()) or self._near.of(token.text, known)
+            meant = "tg" if token.text.upper() == "TAN" else self._near.of(token.text, known)
             hint = f"known are {', '.join(known)}"
             raise Rejected(f.UNKNOWN_FUNCTION.at(token, f"unknown function {token.text}", hint, meant=meant))
         usage = f"write {row.name}({', '.join('XY'[: row.arguments])})"

@@ -255,7 +255,6 @@ export const FINDINGS: Readonly<Record<string, string>> = {
   "it gives M_STATUS from firmware {since} on": "podaje M_STATUS od firmware {since}",
   "a constant lacks its name": "stała nie ma nazwy",
   "a constant is written without =": "stałą pisze się bez =",
-  "a constant is written #name value": "stałą pisze się #nazwa wartość",
   "write #name value, like #speed 60 or #pump OUT3": "napisz #nazwa wartość, np. #speed 60 lub #pump OUT3",
   "#name value names a number or a register": "#nazwa wartość nazywa liczbę lub rejestr",
   "{name} is neither a number nor a register": "{name} nie jest ani liczbą, ani rejestrem",
@@ -334,13 +333,10 @@ export const FINDINGS: Readonly<Record<string, string>> = {
   "count in a WHILE … ENDWHILE, or JUMP back to a label": "licz w WHILE … ENDWHILE albo wróć przez JUMP do etykiety",
   "a WHILE ends with ENDWHILE": "WHILE kończy się na ENDWHILE",
   "a loop that looks at its end is a label, an IF and a JUMP": "pętla sprawdzana na końcu to etykieta, IF i JUMP",
-  "JUMP back to a label, or WHILE 1 = 1 … ENDWHILE": "JUMP z powrotem do etykiety albo WHILE 1 = 1 … ENDWHILE",
   "JUMP to a label behind the ENDWHILE": "JUMP do etykiety za ENDWHILE",
-  "JUMP to a label before the ENDWHILE": "JUMP do etykiety przed ENDWHILE",
   "JUMP to a label behind the ENDWHILE; END ends the program": "JUMP do etykiety za ENDWHILE; END kończy program",
   "a subroutine is a label: JUMP goes there, RETURN comes back to the line after the JUMP":
     "podprogram to etykieta: JUMP do niej prowadzi, RETURN wraca do linii po JUMP",
-  "a subroutine ends with RETURN": "podprogram kończy się na RETURN",
   "WAITPOS waits for all enabled drives": "WAITPOS czeka na wszystkie załączone napędy",
   "write WAITPOS, or WAIT {axis} = 0 for this drive alone":
     "napisz WAITPOS albo WAIT {axis} = 0 dla samego tego napędu",
@@ -349,22 +345,15 @@ export const FINDINGS: Readonly<Record<string, string>> = {
   "write SET, or leave it out": "napisz SET albo je pomiń",
   "variables are not declared": "zmiennych się nie deklaruje",
   "the remainder is written %": "resztę z dzielenia pisze się %",
-  "/ gives a fraction; a register such as $I0 takes the nearest whole number":
-    "/ daje ułamek; rejestr taki jak $I0 przyjmuje najbliższą liczbę całkowitą",
   "& is 'and' of bits, && of conditions": "& to iloczyn bitów, && warunków",
-  "shifts are written << and >>": "przesunięcia pisze się << i >>",
   "a value is written without parentheses": "wartość pisze się bez nawiasów",
   "a value has no parentheses": "wartość nie ma nawiasów",
   "{name} is a register of each drive": "{name} to rejestr każdego napędu",
-  "PABS and PREL move one drive, MOVEPTP and MOVELIN go to rows of the position table":
-    "PABS i PREL ruszają jeden napęd, MOVEPTP i MOVELIN jadą do wierszy tabeli pozycji",
   "{char} is a dash, not a minus": "{char} to myślnik, nie minus",
   "{char} is a no-break space, not a blank": "{char} to twarda spacja, nie zwykła",
   "{char} is not an operator of WBC": "{char} nie jest działaniem WBC",
   "{char} is one character, WBC writes two": "{char} to jeden znak, WBC pisze dwa",
   "write a blank": "napisz spację",
-  "user registers such as $I0 hold what a master has written":
-    "rejestry użytkownika, np. $I0, mają to, co zapisał master",
   // M1486: what can be read.
   "no command begins with NUL; the sender ends lines with CR NUL":
     "żadne polecenie nie zaczyna się od NUL; nadawca kończy wiersze znakami CR NUL",
