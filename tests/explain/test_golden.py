@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from contextlib import chdir
 from pathlib import Path
 
@@ -27,6 +28,8 @@ CASES = {
     "chip_traps.txt": GOLDEN / "chip_traps.m1486",
     "chip_traps.json": GOLDEN / "chip_traps.m1486",
 }
+INNERMOST = re.compile(r"[\[{]\n[^\[\]{}]*[\]}]")
+"""Objects and lists without others in them: they are one line."""
 PICTURE = REPOSITORY / "docs" / "images" / "explain-feeder.svg"
 """The picture of docs/explain.md."""
 
@@ -35,7 +38,8 @@ def made(name: str) -> str:
     path = CASES[name]
     found = explanations(path, {})
     if name.endswith(".json"):
-        return json.dumps([plain(one) for one in found], ensure_ascii=False, indent=1) + "\n"
+        written = json.dumps([plain(one) for one in found], ensure_ascii=False, indent=1) + "\n"
+        return INNERMOST.sub(lambda match: " ".join(match[0].split()), written)
     return "\n".join(text(one) for one in found).replace(str(path), path.name)
 
 

@@ -1,24 +1,20 @@
 """What is built of descriptions before anything happens: mechanics, references, what is drawn and moved; golden/built.txt.
 
-The worlds are those of golden/elements.txt, and one with references across. Regenerate with
+The world has references across controllers. Regenerate with
 ``make golden ARGS=tests/world/test_built_golden.py`` and read the diff.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from pathlib import Path
-
-import pytest
 
 from steptwin.files.export import axis_views
 from steptwin.files.world import World
 from steptwin.world.elements import ELEMENTS
 from steptwin.world.elements.axis import AXIS
 
-FOLDER = Path(__file__).parent / "golden"
-GOLDEN, WORLDS = FOLDER / "built.txt", FOLDER / "elements.txt"
+GOLDEN = Path(__file__).parent / "golden" / "built.txt"
 ACROSS = """
 [[line]]
 name = "bus"
@@ -114,17 +110,6 @@ from = "crash.hit"
 to = "a.IN6"
 """
 """References to other controllers at every key that can have them."""
-FILE = re.compile(r"^@ (.+)\n", re.MULTILINE)
-
-
-def worlds() -> dict[str, World]:
-    found = {"across": World.from_toml(ACROSS)}
-    for case in WORLDS.read_text(encoding="utf-8").split("=== ")[1:]:
-        name, _, body = case.partition("\n")
-        text, *named = FILE.split(body.partition("---\n")[0])
-        files = dict(zip(named[::2], (content.encode() for content in named[1::2]), strict=True))
-        found[name.partition(",")[0]] = World.from_toml(text, files)
-    return found
 
 
 def described(world: World) -> Iterator[str]:
@@ -150,16 +135,9 @@ def described(world: World) -> Iterator[str]:
             yield f"part {number} {type(part).__name__} of {kernel._parts.computes[number]}: {' '.join(watched)}"
 
 
-@pytest.fixture(scope="module")
-def expected() -> dict[str, list[str]]:
-    texts = GOLDEN.read_text(encoding="utf-8").split("=== ")[1:]
-    return {name: lines for name, *lines in (text.rstrip("\n").splitlines() for text in texts)}
-
-
-def test_what_is_built_is_the_reviewed(expected: dict[str, list[str]]) -> None:
-    assert {name: [*described(world)] for name, world in worlds().items()} == expected
+def test_what_is_built_is_the_reviewed() -> None:
+    assert list(described(World.from_toml(ACROSS))) == GOLDEN.read_text(encoding="utf-8").splitlines()
 
 
 if __name__ == "__main__":
-    texts = ("\n".join([f"=== {name}", *described(world)]) for name, world in worlds().items())
-    GOLDEN.write_text("\n".join(texts) + "\n", encoding="utf-8")
+    GOLDEN.write_text("".join(f"{line}\n" for line in described(World.from_toml(ACROSS))), encoding="utf-8")
