@@ -1,16 +1,17 @@
 """Transcripts of what drivers say to twins in virtual time, in files that are reviewed.
 
-A case is ``=== name``, the script, ``---``, the transcript. Lines of a script:
+A case is ``=== name`` and its script, whose lines are followed by what comes of them:
 
-    @ 7 8                  options of the line; what they mean says the test
-    chip.move_by(10.0)     Python: the call, what was sent meanwhile (after a pause with its milliseconds), what happened, the
-                           result or the error, and how many milliseconds it took
-    | chip.open()          the same without a transcript
-    % drop 0 to chip       the next line meets this fault (kind, number of the byte, direction)
-    %% drop, invert        as the last line before a call: each byte of the call goes wrong once, with the next of these kinds;
-                           what stands before and behind is done anew each time. One line of transcript each: the fault, how long
-                           the call took, and what was different from a call without: what was sent then, its result, what
-                           happened, the result of the last line
+    @ 7 8                    options of the line; what they mean says the test
+    > chip.move_by(10.0)     Python: below the call what was sent meanwhile (after a pause with its milliseconds), what happened, the
+                             result or the error, and how many milliseconds it took
+    | chip.open()            the same without what comes of it
+    % drop 0 to chip         the next line meets this fault (kind, number of the byte, direction)
+    # reason                 for readers
+    %% drop, invert          as the last line before a call: each byte of the call goes wrong once, with the next of these kinds;
+                             what stands before and behind is done anew each time. Such a script ends with ``---``. Behind it is
+                             one line for each byte: the fault, how long the call took, and what was different from a call without:
+                             what was sent then, its result, what happened, the result of the last line
 """
 
 from __future__ import annotations
@@ -37,6 +38,8 @@ CASE, RESULT = "=== ", "---"
 PAUSE_NS = 20 * MILLISECOND
 """Longer ones are shown, with their moment since the call."""
 MANY = 5
+SCRIPT = ("@ ", "> ", "| ", "% ", "# ")
+"""Beginnings of lines of a script."""
 FAULT = re.compile(r"(.+) (\d+) (to .+)")
 
 
@@ -63,27 +66,26 @@ class Case:
     expected: str
 
     def transcript(self, make: Callable[[str], Bench]) -> str:
-        lines = self.script.splitlines()
-        options = " ".join(line[2:] for line in lines if line.startswith("@ "))
-        steps = [line for line in lines if line and line[0] not in "@#"]
+        steps = self.script.splitlines()
+        options = " ".join(line[2:] for line in steps if line.startswith("@ "))
         sweep = next((at for at, step in enumerate(steps) if step.startswith("%% ")), None)
         if sweep is None:
             return "\n".join(_run(make(options), steps))
-        before, kinds, (call, *after) = steps[:sweep], steps[sweep][3:].split(", "), steps[sweep + 1 :]
+        before = [step for step in steps[:sweep] if step[0] not in "@#"]
+        kinds, (call, *after) = steps[sweep][3:].split(", "), steps[sweep + 1 :]
         return "\n".join(_sweep(lambda: make(options), before, kinds, call, after))
 
 
 def _run(bench: Bench, steps: list[str]) -> Iterator[str]:
     for step in steps:
+        yield step
         if step.startswith("% "):
             kind, number, direction = FAULT.fullmatch(step[2:]).groups()  # type: ignore[union-attr]
             bench.wire.put(bench.fault(kind, direction, int(number)))
-            yield f"  {step}"
         elif step.startswith("| "):
-            _call(bench, step[2:])
+            _call(bench, step)
             bench.happened()
-        else:
-            yield f"> {step}"
+        elif step.startswith("> "):
             begin, sent = bench.wire.now, len(bench.wire.sent)
             result = _call(bench, step)
             if said := " ".join(_said(bench, begin, sent)):
@@ -128,7 +130,7 @@ def _sweep(make: Callable[[], Bench], before: list[str], kinds: list[str], call:
     def outcome(*fault: Any) -> tuple[_Outcome, Mapping[str, int]]:
         bench = make()
         for step in before:
-            _call(bench, step.removeprefix("| "))
+            _call(bench, step)
         bench.happened()
         bench.wire.put(*(bench.fault(*one) for one in fault))
         begin, sent = bench.wire.now, len(bench.wire.sent)
@@ -142,7 +144,7 @@ def _sweep(make: Callable[[], Bench], before: list[str], kinds: list[str], call:
         return _Outcome(said, result, happened, _brief("".join(ends[-1:])), took), passed
 
     usual, passed = outcome()
-    yield f"> {call}: {usual.result} ({_ms(usual.took)}) {' '.join(usual.said)}"
+    yield f"{call}: {usual.result} ({_ms(usual.took)}) {' '.join(usual.said)}"
     yield f"    {usual.happened} | {usual.end}"
     number = 0
     for direction, count in passed.items():
@@ -153,7 +155,8 @@ def _sweep(make: Callable[[], Bench], before: list[str], kinds: list[str], call:
             yield f"{kind} {index} {direction} ({_ms(found.took)}): {found.beside(usual)}".rstrip(" |")
 
 
-def _call(bench: Bench, text: str) -> str:
+def _call(bench: Bench, step: str) -> str:
+    text = step[2:]
     try:
         try:
             code = compile(text, "<script>", "eval")
@@ -184,7 +187,9 @@ def _cases_in(golden: Path) -> list[Case]:
     found = []
     for part in golden.read_text(encoding="utf-8").split(CASE)[1:]:
         name, _, body = part.partition("\n")
-        script, _, expected = body.partition(f"{RESULT}\n")
+        script, is_sweep, expected = body.partition(f"{RESULT}\n")
+        if not is_sweep:
+            script, expected = "\n".join(line for line in body.splitlines() if line[:2] in SCRIPT), body
         found.append(Case(name.strip(), script, expected.strip("\n")))
     return found
 
@@ -192,7 +197,10 @@ def _cases_in(golden: Path) -> list[Case]:
 def regenerate(make: Callable[[str], Bench], *goldens: Path) -> None:
     for golden in goldens:
         head = golden.read_text(encoding="utf-8").split(CASE)[0]
-        written = (f"{CASE}{case.name}\n{case.script}{RESULT}\n{case.transcript(make)}\n" for case in cases(golden))
+        written = []
+        for case in cases(golden):
+            script = f"{case.script}{RESULT}\n" if "%% " in case.script else ""
+            written.append(f"{CASE}{case.name}\n{script}{case.transcript(make)}\n")
         golden.write_text(head + "\n".join(written), encoding="utf-8")
 
 
