@@ -1,8 +1,8 @@
 """Golden traces: what a controller does with a script of commands, event by event, in files that are reviewed.
 
-A case is ``=== name``, the script, ``---``, the trace. A script has lines of settings (``@ axis1 gear=100``, ``@ row a;1;2;x;x``,
-``@ firmware 1.40``, ``@ input3 interrupt=2``, ``@ axes 2``: the number of axes shown), of the program (``| OUT1 = ON``), and
-commands:
+A case is ``=== name`` and a script, whose commands are followed by what comes of them. A script has lines of settings
+(``@ axis1 gear=100``, ``@ row a;1;2;x;x``, ``@ firmware 1.40``, ``@ input3 interrupt=2``, ``@ axes 2``: the number of axes
+shown), of the program (``| OUT1 = ON``), and commands behind ``>``:
 
     set POS_ABS 1 250     value register of axis 1, as REAL; M_ENABLE and other words without axis: word M_ENABLE 3
     coil 2000 1           pin IN1 1           turn 1 -50           couple 1 blocked           user 10 -5           wait 2.5
@@ -23,14 +23,17 @@ from steptwin.mic488.core import Mic488Event
 from steptwin.mic488.encoder import Coupling
 from steptwin.mic488.status import AxisStatus
 
-CASE, RESULT = "=== ", "---"
+CASE = "=== "
 
 
 @dataclass(frozen=True)
 class Case:
     name: str
-    script: str
     expected: str
+
+    @property
+    def script(self) -> str:
+        return "\n".join(line for line in self.expected.splitlines() if line[:1] in {"@", "|", ">"})
 
     def settings(self, word: str) -> list[str]:
         start = f"@ {word} "
@@ -64,8 +67,9 @@ class Case:
         trace = _Trace(rig, int((*self.settings("axes"), "1")[0]), program=bool(program), in_one_go=in_one_go)
         found = []
         for line in lines:
-            if line and line[0] not in "@|#":
-                found += [*trace.rest(), f"> {line}", *trace.command(*line.split())]
+            found += [*trace.rest(), line]
+            if line.startswith("> "):
+                found += trace.command(*line[2:].split())
         found += trace.rest()
         readers = {"I": rig.i, "D": rig.d, "R": rig.r}
         names = dict.fromkeys(re.findall(r"\$([IDR])(\d+)", program))
@@ -184,12 +188,11 @@ def cases(golden: Path) -> list[Case]:
     found = []
     for part in parts:
         name, _, body = part.partition("\n")
-        script, _, expected = body.partition(f"{RESULT}\n")
-        found.append(Case(name.strip(), script, expected.strip("\n")))
+        found.append(Case(name.strip(), body.strip("\n")))
     return found
 
 
 def regenerate(golden: Path) -> None:
     head = golden.read_text(encoding="utf-8").split(CASE)[0]
-    written = (f"{CASE}{case.name}\n{case.script}{RESULT}\n{case.trace()}\n" for case in cases(golden))
+    written = (f"{CASE}{case.name}\n{case.trace()}\n" for case in cases(golden))
     golden.write_text(head + "\n".join(written), encoding="utf-8")

@@ -3,15 +3,15 @@
 A case is ``=== name`` and its script, whose lines are followed by what comes of them:
 
     @ 7 8                    options of the line; what they mean says the test
-    > chip.move_by(10.0)     Python: below the call what was sent meanwhile (after a pause with its milliseconds), what happened, the
-                             result or the error, and how many milliseconds it took
+    > chip.move_by(10.0)     Python: below the call what was sent meanwhile (after a pause with its milliseconds), what happened,
+                             the result or the error, and how many milliseconds it took
     | chip.open()            the same without what comes of it
     % drop 0 to chip         the next line meets this fault (kind, number of the byte, direction)
     # reason                 for readers
     %% drop, invert          as the last line before a call: each byte of the call goes wrong once, with the next of these kinds;
                              what stands before and behind is done anew each time. Such a script ends with ``---``. Behind it is
-                             one line for each byte: the fault, how long the call took, and what was different from a call without:
-                             what was sent then, its result, what happened, the result of the last line
+                             one line for each byte: the fault, how long the call took, and what was different from a call
+                             without: what was sent then, its result, what happened, the result of the last line
 """
 
 from __future__ import annotations
