@@ -32,6 +32,9 @@ class Device:
             return RawEffect.WRITE
         return {3: RawEffect.LOOK, 5: RawEffect.STOP}.get(request.pdu[0], RawEffect.WRITE)
 
+    def ended_by(self, request: steps.Request | steps.Write) -> frozenset[int]:
+        return frozenset({1})
+
     async def settings_text(self) -> str:
         self.is_asked.set()
         await self.is_read.wait()

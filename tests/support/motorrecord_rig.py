@@ -11,6 +11,7 @@ from virtual_loop import run_virtually
 
 from steptwin.access.roles import Role
 from steptwin.errors import SteptwinError
+from steptwin.gateways.contract import GatewaySubject
 from steptwin.gateways.epics.controller import EpicsController
 from steptwin.gateways.epics.motorrecord import MotorRecord
 from steptwin.gateways.epics.records import FieldValue, Putter
@@ -54,16 +55,22 @@ STEP_NS = 20 * MILLISECOND
 LONGEST_S = 60.0
 
 
+def first_record(subject: GatewaySubject, leases: JogLeases, role: Role) -> tuple[EpicsController, MotorRecord]:
+    """Of the first axis of the first controller."""
+    part = subject.description.machines[0]
+    controller = EpicsController(part.name, subject, Sampler(subject, {}), leases, role)
+    record = MotorRecord("ST:x", part, part.datasheet.axes[0], controller)
+    controller.records.append(record)
+    return controller, record
+
+
 class MotorRig:
     """The record of the first axis; its world goes on while somebody waits."""
 
     def __init__(self, text: str, role: Role) -> None:
         self.world = GatewayWorld(text)
-        part = self.world.description.machines[0]
         self.leases = JogLeases(self.world)
-        self.controller = EpicsController(part.name, self.world, Sampler(self.world, {}), self.leases, role)
-        self.record = MotorRecord("ST:x", part, part.datasheet.axes[0], self.controller)
-        self.controller.records.append(self.record)
+        self.controller, self.record = first_record(self.world, self.leases, role)
 
     def get(self, *names: str) -> list[FieldValue]:
         return [self.record.value(name) for name in names]

@@ -25,9 +25,10 @@ from steptwin.subject.contract import UNKNOWN, Description, Reading, Result
 from steptwin.subject.events import Event
 from steptwin.subject.following import Filter, Followers
 from steptwin.subject.jogs import Held
-from steptwin.subject.payloads import StatusPayload
+from steptwin.subject.payloads import InputPayload, StatusPayload
 from steptwin.tracing import span
 from steptwin.world import script as steps
+from steptwin.world.control import Halt
 
 POLL_S = 0.1
 """A device is polled at most this often, and at most half of the time."""
@@ -190,6 +191,8 @@ class ConnectedDevice:
         self._stops += 1
         self._stopping += 1
         try:
+            for stop in self._stops_in(wanted):
+                self._subject.publish(InputPayload("stop", stop.scope))
             self._cut_jogs(wanted)
             return await self._execute(wanted)
         finally:
@@ -197,6 +200,18 @@ class ConnectedDevice:
 
     def _is_stop(self, wanted: Command) -> bool:
         return _is_stop(wanted) or self._effect_of(wanted) is RawEffect.STOP
+
+    def _stops_in(self, wanted: Command) -> list[Halt]:
+        match wanted:
+            case command.StopAxes(axis=axis):
+                return [Halt(self.name, axis)]
+            case command.ControlProgram(action=action):
+                return [Halt(self.name, program=action)]
+            case steps.Request() | steps.Write():
+                ended = sorted(self._device.ended_by(wanted))
+                return [Halt(self.name, axis) if axis else Halt(self.name, program="stop") for axis in ended]
+            case _:
+                return [Halt(self.name)]
 
     def _effect_of(self, wanted: Command) -> RawEffect | None:
         """The effect of a raw request or of a write of registers; None of other commands."""

@@ -101,6 +101,10 @@ class DevicePart(Protocol):
         register."""
         ...
 
+    def ended_by(self, wanted: steps.Request | steps.Write) -> frozenset[int]:
+        """What it ends if it is a stop: the numbers of axes, and 0 for the program. Raises `Misuse` for an unknown register."""
+        ...
+
     def actions(self) -> Mapping[type, DeviceAction]:
         """The commands that the device can execute; names of machine and line have been checked."""
         ...

@@ -12,7 +12,7 @@ from steptwin.access.commands import PERMITS
 from steptwin.access.roles import LOOK, Role
 from steptwin.errors import Refusal, SteptwinError
 from steptwin.gateways.contract import GatewaySubject
-from steptwin.subject.commands import Command, Home, Move, ReadState, StopAll, StopAxes, plain_command, row_of
+from steptwin.subject.commands import Command, Home, Move, ReadState, StopAxes, plain_command, row_of
 from steptwin.subject.contract import Result
 from steptwin.subject.dispatch import code_of
 from steptwin.subject.following import Filter, Following
@@ -62,10 +62,6 @@ class GatewayClient:
         """Raises `NotPermitted`, `Misuse`, `Refusal` and `LineFailure`."""
         with self.noted(subject, wanted):
             self.check(wanted)
-            if isinstance(wanted, StopAxes):
-                subject.samples.note_stop(wanted.machine, wanted.axis)
-            elif isinstance(wanted, StopAll):
-                subject.samples.note_stop()
             return await _done(subject, wanted)
 
     @contextmanager

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -77,15 +77,6 @@ class SharedSamples:
         self._on_line: dict[str, list[str]] = {}
         """Controllers by their line."""
         self._registers: dict[str, tuple[str, ...]] = {}
-        self._stops: Counter[tuple[str | None, int | None]] = Counter()
-
-    def note_stop(self, machine: str | None = None, axis: int | None = None) -> None:
-        """A client of a gateway has asked for a stop. None: of all of them."""
-        self._stops[machine, axis] += 1
-
-    def stops_of(self, machine: str, axis: int) -> int:
-        """The number of stops of an axis that clients of gateways have asked for."""
-        return self._stops[machine, axis] + self._stops[machine, None] + self._stops[None, None]
 
     def join(self, sampler: Sampler) -> None:
         if self._following is None:

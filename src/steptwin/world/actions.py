@@ -183,8 +183,7 @@ def _halt(plant: Plant, given: Halt) -> None:
         if on is not None:
             line, unit = on
             line.recall(unit, plant.now)
-        what = {None: "all axes" if given.axis is None else f"axis {given.axis}", "pause": "program, paused"}
-        _record(plant, given.machine, "stop", what.get(given.program, "program"))
+        _record(plant, given.machine, "stop", given.scope)
         plant.unschedule(_downloading(given.machine))
         plant.kind(given.machine).halt(plant.machine(given.machine), given, plant.now)
 

@@ -87,6 +87,13 @@ class Halt:
     axis: int | None = None
     program: str | None = None
 
+    @property
+    def scope(self) -> str:
+        """What it stops, in the words of records and events (`steptwin.subject.payloads.InputPayload`)."""
+        if self.program is not None:
+            return "program, paused" if self.program == "pause" else "program"
+        return "all axes" if self.axis is None else f"axis {self.axis}"
+
 
 def standstill(machine: str, program_actions: Collection[str]) -> tuple[Halt, ...]:
     """Stop everything of a controller whose program takes these actions. A program is paused where that can be done, because its

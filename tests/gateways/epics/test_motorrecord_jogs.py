@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import asyncio
+
 import pytest
-from motorrecord_rig import ME, OTHER, MotorRig, check
+from bridge_rig import PLACE, BridgeRig
+from motorrecord_rig import ME, OTHER, MotorRig, check, first_record
+from virtual_loop import run_virtually
 
 from steptwin.access.roles import Role
 from steptwin.errors import Misuse, Refusal
 from steptwin.gateways.clients import GatewayClient
-from steptwin.subject.commands import Command, StopAll, StopAxes
+from steptwin.gateways.leases import JogLeases
+from steptwin.machine import SECOND
+from steptwin.subject.commands import Command, Enable, StopAll, StopAxes
+from steptwin.world.script import Request, Write
 
 
 @pytest.mark.parametrize(("button", "sign"), [("JOGF", 1), ("JOGR", -1)])
@@ -192,3 +199,40 @@ def test_a_move_that_waits_for_go_does_not_outlast_a_stop_by_others(stop: Comman
             assert (rig.get("RBV"), rig.get("VAL")) == (there, there)
 
     check(act)
+
+
+@pytest.mark.parametrize(
+    "stop",
+    [
+        StopAxes("table"),
+        StopAxes("table", 1),
+        StopAll(),
+        Write((("table", "M1_STOP", 1.0),)),
+        Write((("table", "M_STOP", 3.0),)),
+        Request(PLACE, 1, bytes.fromhex("0507d4ff00"), SECOND),
+    ],
+    ids=str,
+)
+def test_a_move_of_a_device_that_waits_for_go_does_not_outlast_a_stop_by_others(stop: Command) -> None:
+    async def story() -> None:
+        bridge = BridgeRig()
+        await bridge.open()
+        await bridge.subject.do(Enable("table", 1))
+        controller, record = first_record(bridge.subject, JogLeases(bridge.subject), Role.ENGINEER)
+        await record.refresh()
+        await record.put(ME, "SPMG", 1)
+        put = asyncio.create_task(record.put(ME, "VAL", 1000.0))
+        await asyncio.sleep(0.1)
+        await bridge.subject.do(Write((("table", "M2_STOP", 1.0),)))
+        await controller.refresh()
+        assert not put.done()
+        await bridge.subject.do(stop)
+        await record.put(ME, "SPMG", 3)
+        with pytest.raises(Refusal, match="the motion was stopped while it waited for Go"):
+            await put
+        await bridge.wait(0.5)
+        assert not bridge.is_moving
+        await controller.close()
+        await bridge.close()
+
+    run_virtually(story())

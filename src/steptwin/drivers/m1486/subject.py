@@ -153,6 +153,10 @@ class M1486Part:
         """It takes none."""
         return RawEffect.WRITE
 
+    def ended_by(self, wanted: steps.Request | steps.Write) -> frozenset[int]:
+        """It takes none."""
+        return frozenset()
+
     def actions(self) -> Mapping[type, DeviceAction]:
         return {
             command.Move: self._move,

@@ -319,10 +319,10 @@ class AsyncMic488:
             async with unit.stopping_if_late(*moved, program=key == "PROGRAM_CTRL"):
                 await unit.write(item, unit.travelling(item, value, data_type), data_type=data_type, permission=permission)
 
-    def is_stop(self, name: str, value: float) -> bool:
-        """Whether `set` with these ends a motion. Such a write precedes all waiting requests. Raises `Misuse` for an unknown
-        name."""
-        return bool(self._unit.ended_by(named(self._unit.registers, name), value))
+    def ended_by(self, name: str, value: float) -> tuple[int, ...]:
+        """What `set` with these ends: the numbers of axes, and 0 for the program. Such a write precedes all waiting requests. Raises
+        `Misuse` for an unknown name."""
+        return self._unit.ended_by(named(self._unit.registers, name), value)
 
     async def registers(self, address: int, count: int) -> tuple[int, ...]:
         """Raw holding registers."""

@@ -201,16 +201,18 @@ class Mic488Part:
         """It takes no characters."""
 
     def effect_of(self, wanted: steps.Request | steps.Write) -> RawEffect:
-        if isinstance(wanted, steps.Write):
-            is_stop = bool(wanted.values) and all(self._mic.is_stop(name, value) for _, name, value in wanted.values)
-            return RawEffect.STOP if is_stop else RawEffect.WRITE
-        if wanted.pdu and wanted.pdu[0] in pdu.READS:
+        if isinstance(wanted, steps.Request) and wanted.pdu and wanted.pdu[0] in pdu.READS:
             return RawEffect.LOOK
+        return RawEffect.STOP if self.ended_by(wanted) else RawEffect.WRITE
+
+    def ended_by(self, wanted: steps.Request | steps.Write) -> frozenset[int]:
+        if isinstance(wanted, steps.Write):
+            each = [self._mic.ended_by(name, value) for _, name, value in wanted.values]
+            return frozenset().union(*each) if all(each) else frozenset()
         try:
-            is_stop = bool(halted(self._registers, pdu.decode_request(wanted.pdu)))
+            return frozenset(halted(self._registers, pdu.decode_request(wanted.pdu)))
         except pdu.ModbusException:
-            is_stop = False
-        return RawEffect.STOP if is_stop else RawEffect.WRITE
+            return frozenset()
 
     async def _request(self, wanted: steps.Request) -> object:
         if wanted.unit != self.address:

@@ -149,12 +149,8 @@ class EpicsController:
         self._leases.drop(owner)
 
     def follow_inputs(self) -> Following:
-        """Those of a twin; stops by anybody are among them (`steptwin.subject.payloads.InputPayload`)."""
+        """Stops by anybody are among them (`steptwin.subject.payloads.InputPayload`)."""
         return self._subject.follow(Filter(frozenset({"input"}), frozenset({self.name})), MOST_INPUTS)
-
-    def stops_of(self, axis: int) -> int:
-        """The number of stops by clients of all gateways."""
-        return self._subject.samples.stops_of(self.name, axis)
 
     def replace_jog(self, axis: int) -> None:
         """Another command has taken the axis."""

@@ -29,6 +29,7 @@ from steptwin.subject.commands import Jog
 from steptwin.subject.contract import MachinePart
 from steptwin.subject.following import Following
 from steptwin.subject.payloads import InputPayload
+from steptwin.world.control import Halt
 
 ON_ITS_WAY = SECOND // 2
 """A motion that has not begun so long after its command does not begin any more."""
@@ -89,8 +90,6 @@ class MotorState(MotorCoordinates):
         self._is_pausing = False
         self._inputs: Following | None = None
         """While a motion waits for Go."""
-        self._stops = 0
-        """The stops of its axis when it began to wait."""
         self._has_not_aimed = True
         """Before the first sample VAL is not known."""
         self._ramp: tuple[float, ...] = ()
@@ -224,7 +223,6 @@ class MotorState(MotorCoordinates):
         if self._inputs is not None:
             self._inputs.close()
         self._inputs = self._controller.follow_inputs()
-        self._stops = self._controller.stops_of(self._axis.number)
 
     def _see_stops(self) -> None:
         """End a motion that waits for Go if others have stopped its axis."""
@@ -233,8 +231,8 @@ class MotorState(MotorCoordinates):
         motion, (missed, events) = self._motion, self._inputs.take()
         if motion is not None and motion.is_paused:
             stops = {one.payload.value for one in events if isinstance(one.payload, InputPayload) and one.payload.what == "stop"}
-            is_same = self._stops == self._controller.stops_of(self._axis.number)
-            if is_same and not missed and stops.isdisjoint(("all axes", f"axis {self._axis.number}")):
+            name = self._controller.name
+            if not missed and stops.isdisjoint((Halt(name).scope, Halt(name, self._axis.number).scope)):
                 return
             motion.is_stopped, motion.is_paused = True, False
             motion.end(Refusal(f"{self._place}: the motion was stopped while it waited for Go"))
