@@ -35,6 +35,9 @@ class Device:
     def ended_by(self, request: steps.Request | steps.Write) -> frozenset[int]:
         return frozenset({1})
 
+    async def ignored(self, request: steps.Request) -> tuple[int, ...]:
+        return ()
+
     async def settings_text(self) -> str:
         self.is_asked.set()
         await self.is_read.wait()

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+from pathlib import Path
 from typing import Any
 
 import pytest
-from bridge_rig import BridgeRig
+from bridge_rig import PLACE, BridgeRig
 from gateway_rig import GatewayWorld
 from virtual_loop import run_virtually
 
@@ -14,10 +15,16 @@ from steptwin.access.roles import Role
 from steptwin.errors import Refusal
 from steptwin.gateways.clients import GatewayClient
 from steptwin.gateways.contract import GatewaySubject
+from steptwin.gateways.modbus import MasterGateway
 from steptwin.machine import SECOND
+from steptwin.mic488.registermap import DataType
+from steptwin.mic488.registers import register_map
+from steptwin.mic488.values import encoded, named
 from steptwin.subject import commands as command
 from steptwin.subject.commands import Command
-from steptwin.world.script import Write
+from steptwin.wire.pdu import encode_request
+from steptwin.world.gateways import ModbusSpec
+from steptwin.world.script import Request, Write
 
 ME = GatewayClient("me", Role.ENGINEER)
 MOTIONS: tuple[Command, ...] = (
@@ -70,11 +77,22 @@ def test_a_twin_whose_answers_take_their_time() -> None:
             await asyncio.gather(switch_on(is_stopped=True), ME.do(world, MOTIONS[0]))
         world.inner.do(command.Enable("table", 1, on=False))
         world.inner.do(command.Advance(duration=SECOND))
+
+        async def go_on() -> None:
+            await asyncio.sleep(0.3)
+            world.inner.do(command.Advance(duration=SECOND))
+
+        for _ in "register", "register again":
+            with pytest.raises(Refusal, match="M1 is not enabled: switch its drive on first"):
+                await asyncio.gather(go_on(), ME.do(world, MOTIONS[3]))
+        await ME.do(world, Write((("table", "M1_JOG_PLUS", 0.0), ("table", "M1_VMAX", 5.0))))
+        world.inner.do(command.Enable("table", 1, on=False))
+        world.inner.do(command.Advance(duration=SECOND))
         await ME.do(world, command.Enable("table", 1))
         await asyncio.gather(switch_on(is_stopped=False), ME.do(world, MOTIONS[0]))
 
     run_virtually(story())
-    assert logged == ["done", *["ignored: not enabled"] * 3, "refusal", "done", "done"]
+    assert logged == ["done", *["ignored: not enabled"] * 3, "refusal", *["ignored: not enabled"] * 2, "done", "done", "done"]
 
 
 def test_a_device_without_its_drive_is_sent_nothing() -> None:
@@ -86,3 +104,35 @@ def test_a_device_without_its_drive_is_sent_nothing() -> None:
         return found
 
     assert run_virtually(story()) == ["refusal"] * 4 + ["done"] * 5
+
+
+async def raw(rig: BridgeRig, asked: str) -> tuple[str, list[str]]:
+    """What a Modbus master is answered, and the outcomes in the audit log."""
+    logged: list[str] = []
+    known: Any = rig.subject
+    known.audit = lambda who, do, fields, outcome: logged.append(outcome)
+    gateway = MasterGateway(ModbusSpec(kind="modbus", listen="127.0.0.1:0", units={}, role=None), rig.subject, Path())
+    (part,) = rig.subject.description.machines
+    return (await gateway.ask(ME, part, bytes.fromhex(asked))).hex(), logged
+
+
+POSITION = encode_request(encoded(named(register_map("1.70"), "M1_POS_ABS"), 5.0, DataType.REAL)).hex()
+
+
+@pytest.mark.parametrize("motion", [POSITION, "0507d8ff00"], ids=["M1_POS_ABS", "M1_JOG_PLUS"])
+def test_a_raw_motion_that_a_device_ignores_is_answered_by_it_and_logged_as_ignored(motion: str) -> None:
+    async def story() -> None:
+        rig = BridgeRig()
+        await rig.open()
+        for is_on in (False, True):
+            await rig.subject.do(command.Enable("table", 1, on=is_on))
+            expected = rig.device.execute(bytes.fromhex(motion), rig.cell.enter()).hex()
+            assert await raw(rig, motion) == (expected, ["done" if is_on else "ignored: not enabled"])
+            request = Request(PLACE, 1, bytes.fromhex(motion), SECOND)
+            assert (await ME.do(rig.subject, request)).value == {"pdu": expected}
+        for other in ("0507d80000", "0507d4ff00", "10271400010200ff"):  # a jog that is let go of, a stop, an output
+            await rig.subject.do(command.Enable("table", 1, on=False))
+            assert (await raw(rig, other))[1] == ["done"]
+        await rig.close()
+
+    run_virtually(story())

@@ -25,10 +25,10 @@ from steptwin.subject.contract import UNKNOWN, Description, Reading, Result
 from steptwin.subject.events import Event
 from steptwin.subject.following import Filter, Followers
 from steptwin.subject.jogs import Held
-from steptwin.subject.payloads import InputPayload, StatusPayload
+from steptwin.subject.payloads import NOT_ENABLED, InputPayload, StatusPayload
 from steptwin.tracing import span
 from steptwin.world import script as steps
-from steptwin.world.control import Halt
+from steptwin.world.control import Halt, ended
 
 POLL_S = 0.1
 """A device is polled at most this often, and at most half of the time."""
@@ -208,8 +208,7 @@ class ConnectedDevice:
             case command.ControlProgram(action=action):
                 return [Halt(self.name, program=action)]
             case steps.Request() | steps.Write():
-                ended = sorted(self._device.ended_by(wanted))
-                return [Halt(self.name, axis) if axis else Halt(self.name, program="stop") for axis in ended]
+                return ended(self.name, self._device.ended_by(wanted))
             case _:
                 return [Halt(self.name)]
 
@@ -244,9 +243,17 @@ class ConnectedDevice:
         """Also by the twin beside it."""
         begun = self._around.clock()
         result = await self._subject.do(wanted)
+        if isinstance(wanted, steps.Request):
+            await self._report_ignored(wanted)
         if self._shadow is not None:
             self._shadow.did(wanted, begun, self._around.clock())
         return result
+
+    async def _report_ignored(self, request: steps.Request) -> None:
+        """As a twin does it. The request has been answered, whatever becomes of the look at its drives."""
+        with contextlib.suppress(SteptwinError):
+            for axis in await self._device.ignored(request):
+                self._subject.publish(StatusPayload(NOT_ENABLED, f"motion ignored: M{axis} is not enabled", (("axis", axis),)))
 
     def _refuse_while_stopping(self, wanted: Command) -> None:
         if self._stopping:

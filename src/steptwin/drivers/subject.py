@@ -105,6 +105,11 @@ class DevicePart(Protocol):
         """What it ends if it is a stop: the numbers of axes, and 0 for the program. Raises `Misuse` for an unknown register."""
         ...
 
+    async def ignored(self, request: steps.Request) -> tuple[int, ...]:
+        """The axes to which a raw request that has been answered gave motions which they ignored, because their drives are off
+        now. Raises `LineFailure`, `Refusal`."""
+        ...
+
     def actions(self) -> Mapping[type, DeviceAction]:
         """The commands that the device can execute; names of machine and line have been checked."""
         ...

@@ -10,15 +10,18 @@ from typing import Any
 
 from steptwin.access.commands import PERMITS
 from steptwin.access.roles import LOOK, Role
+from steptwin.datasheet import PointEffect
 from steptwin.errors import Refusal, SteptwinError
 from steptwin.gateways.contract import GatewaySubject
 from steptwin.subject.commands import Command, Home, Move, ReadState, StopAxes, plain_command, row_of
-from steptwin.subject.contract import Result
+from steptwin.subject.contract import MachinePart, Result
 from steptwin.subject.dispatch import code_of
+from steptwin.subject.events import Event
 from steptwin.subject.following import Filter, Following
-from steptwin.subject.payloads import InputPayload, StatusPayload
+from steptwin.subject.payloads import NOT_ENABLED, InputPayload, StatusPayload
 from steptwin.tracing import span
-from steptwin.world.script import Write
+from steptwin.wire.rtu import BROADCAST
+from steptwin.world.script import Request, Write
 
 
 def address_text(address: object) -> str:
@@ -31,18 +34,20 @@ class NotPermitted(Refusal):
 
 
 class Ignored(Refusal):
-    """The controller has accepted a command and does nothing, because its drive is off."""
+    """The controller has accepted a command and does nothing, because its drive is off. ``result`` is its answer."""
+
+    result: Result | None = None
 
 
 MOST_EVENTS = 256
 """The most events of one command."""
 IGNORED = "ignored: not enabled"
 """Its outcome in the audit log."""
-NOT_ENABLED = "drive-off"
-"""The event of a controller that ignores a command (`steptwin.datasheet.Datasheet.events`)."""
 LOOKS_AT_DRIVE, BETWEEN_LOOKS_S = 6, 0.05
 """So often is it seen whether a drive is on before a motion is refused: what switches it on may be on its way."""
-MOVING = (Move, Home, Write)
+UNDER_WAY_S = 1.0
+"""So long is it waited for what becomes of a motion that was written to a twin over its line."""
+MOVING = (Move, Home, Write, Request)
 """Commands that a controller may ignore; a jog is refused, and devices are asked by their drivers first."""
 
 
@@ -58,11 +63,18 @@ class GatewayClient:
     def __str__(self) -> str:
         return f"{self.name} ({self.place})"
 
-    async def do(self, subject: GatewaySubject, wanted: Command) -> Result:
-        """Raises `NotPermitted`, `Misuse`, `Refusal` and `LineFailure`."""
-        with self.noted(subject, wanted):
-            self.check(wanted)
-            return await _done(subject, wanted)
+    async def do(self, subject: GatewaySubject, wanted: Command, needed: Role | None = None) -> Result:
+        """``needed``: the role for it, if not that of its name. A raw request is answered as the controller does it, also if that
+        ignores it. Raises `NotPermitted`, `Misuse`, `Refusal` and `LineFailure`."""
+        try:
+            with self.noted(subject, wanted):
+                name = row_of(wanted).name
+                self.check_role(name, PERMITS[name].role if needed is None else needed)
+                return await _done(subject, wanted)
+        except Ignored as ignored:
+            if isinstance(wanted, Request) and ignored.result is not None:
+                return ignored.result
+            raise
 
     @contextmanager
     def noted(self, subject: GatewaySubject, wanted: Command) -> Generator[None]:
@@ -100,21 +112,67 @@ async def _done(subject: GatewaySubject, wanted: Command) -> Result:
     """Raises `Ignored` for what a controller has not done although it has accepted it."""
     if not isinstance(wanted, MOVING):
         return await subject.do(wanted)
-    axis = str(wanted.axis) if isinstance(wanted, Move | Home) else None
-    machines = frozenset(one[0] for one in wanted.values) if isinstance(wanted, Write) else frozenset({wanted.machine})
-    axes = None if axis is None else frozenset({axis})
-    following = subject.follow(Filter(frozenset({"status", "input"}), machines, axes), MOST_EVENTS)
+    axes = frozenset({str(wanted.axis)}) if isinstance(wanted, Move | Home) else None
+    following = subject.follow(Filter(frozenset({"status", "input"}), _machines(subject, wanted), axes), MOST_EVENTS)
     try:
         if isinstance(wanted, Move | Home):
             await _check_drive(subject, wanted, following)
         result = await subject.do(wanted)
-        for event in following.take().events:
-            # What was due before has happened before it; a world does it at once.
-            if event.number > result.number and isinstance(event.payload, StatusPayload) and event.payload.code == NOT_ENABLED:
-                raise Ignored(f"{event.machine}: {event.text}: switch its drive on first")
+        event = await _drive_off(subject, wanted, following, result.number)
+        if event is not None:
+            ignored = Ignored(f"{event.machine}: {event.text}: switch its drive on first")
+            ignored.result = result
+            raise ignored
         return result
     finally:
         following.close()
+
+
+def _machines(subject: GatewaySubject, wanted: Move | Home | Write | Request) -> frozenset[str]:
+    match wanted:
+        case Write(values=values):
+            return frozenset(one[0] for one in values)
+        case Request(line=line, unit=unit):
+            parts = subject.description.machines
+            return frozenset(part.name for part in parts if part.line == line and unit in (part.unit, BROADCAST))
+        case Move() | Home():
+            return frozenset({wanted.machine})
+
+
+async def _drive_off(subject: GatewaySubject, wanted: Command, following: Following, number: int) -> Event | None:
+    """The event of a controller that has ignored a motion of the command with this number, None if there is none."""
+    loop = asyncio.get_running_loop()
+    end = loop.time() + UNDER_WAY_S
+    while True:
+        for event in following.take().events:
+            # What was due before has happened before it; a world does it at once.
+            if event.number > number and isinstance(event.payload, StatusPayload) and event.payload.code == NOT_ENABLED:
+                return event
+        if not isinstance(wanted, Write) or loop.time() >= end or not await _is_under_way(subject, wanted):
+            return None
+        await asyncio.sleep(BETWEEN_LOOKS_S)
+
+
+async def _is_under_way(subject: GatewaySubject, wanted: Write) -> bool:
+    """Whether a twin on a line, which may take its time, is sent a motion of an axis whose drive is off."""
+    for part in subject.description.machines:
+        axes = set() if part.is_real or part.line is None else _moved(part, wanted)
+        if axes:
+            state: Any = (await subject.do(ReadState(part.name))).value
+            if any(one["enabled"] is False for one in state["axes"] if one["number"] in axes):
+                return True
+    return False
+
+
+def _moved(part: MachinePart, wanted: Write) -> set[int]:
+    """The axes of a controller to whose registers motions are written; a switch that is written 0 moves nothing."""
+    found: set[int] = set()
+    moving = {point.path: point for point in part.datasheet.points if point.effect is PointEffect.MOVES}
+    for machine, register, value in wanted.values:
+        point = moving.get(register.upper())
+        if machine == part.name and point is not None and (value or point.type != "switch"):
+            found.update(axis.number for axis in part.datasheet.axes if point.path.startswith(f"{axis.name}_"))
+    return found
 
 
 async def _check_drive(subject: GatewaySubject, wanted: Move | Home, following: Following) -> None:

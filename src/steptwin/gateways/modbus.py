@@ -127,9 +127,7 @@ class MasterGateway:
             decode_request(pdu)
             if function in READS:
                 return await self._read(wanted)
-            with client.noted(self._subject, wanted):
-                client.check_role("a write", permit_of(function).role)
-                return _pdu(await self._subject.do(wanted))
+            return _pdu(await client.do(self._subject, wanted, permit_of(function).role))
         except ModbusException as error:
             return exception_pdu(function, error.code)
         except NotPermitted:

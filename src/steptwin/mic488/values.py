@@ -253,6 +253,14 @@ def moves(registers: RegisterMap, request: pdu.ModbusRequest) -> bool:
     return any(_may_move(register) for register, _ in _written(registers, request))
 
 
+def given_motions(registers: RegisterMap, request: pdu.ModbusRequest) -> tuple[int, ...]:
+    """The axes to whose own registers a request writes a motion, as far as it can be decoded."""
+    if isinstance(request, pdu.ReadRequest):
+        return ()
+    written = [register for register, value in _written(registers, request) if register and not _ended(register, value)]
+    return tuple(sorted({one.axis for one in written if one.axis is not None and _may_move(one)}))
+
+
 def starts_program(registers: RegisterMap, request: pdu.ModbusRequest) -> bool:
     """Whether a request may start the program, as far as it can be decoded."""
     if isinstance(request, pdu.ReadRequest) or halted(registers, request):

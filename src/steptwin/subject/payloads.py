@@ -181,6 +181,10 @@ class StatementPayload:
         return {"program": self.program, "line": self.line}
 
 
+NOT_ENABLED = "drive-off"
+"""The code of the event of a controller that ignores a motion (`steptwin.datasheet.Datasheet.events`)."""
+
+
 @dataclass(frozen=True, slots=True)
 class StatusPayload:
     """Something happened in a controller or to its mechanics. ``code`` is stable; ``facts`` have the content of its text."""

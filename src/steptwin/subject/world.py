@@ -15,13 +15,13 @@ from steptwin.subject.describe import describe
 from steptwin.subject.dispatch import Action, Dispatcher
 from steptwin.subject.events import Event, Numbering, payload_of
 from steptwin.subject.following import Filter, Followers, Following, filter_of
-from steptwin.subject.payloads import FramePayload, PacePayload, Payload, PlanPayload, RestoredPayload, WritePayload
+from steptwin.subject.payloads import FramePayload, InputPayload, PacePayload, Payload, PlanPayload, RestoredPayload, WritePayload
 from steptwin.subject.snapshots import Snapshots
 from steptwin.subject.time import advance
 from steptwin.wire.frameline import FrameLine
 from steptwin.world import script as steps
 from steptwin.world.actions import Download, EndScripts, ExternalInput, See
-from steptwin.world.control import ControllerCommand, Halt, Jog, StopAxes, standstill
+from steptwin.world.control import ControllerCommand, Halt, Jog, StopAxes, ended, standstill
 from steptwin.world.elements import failing
 from steptwin.world.faults.kinds import rows
 from steptwin.world.heldjog import HeldJog
@@ -34,7 +34,7 @@ from steptwin.world.programs import StatementFollower
 from steptwin.world.trace import TraceRecord
 
 STEPS = (
-    steps.Set, steps.Press, steps.Release, steps.Write, steps.Send, steps.PowerCycle, steps.Turn, steps.Couple, steps.ClearFault,
+    steps.Set, steps.Press, steps.Release, steps.Send, steps.PowerCycle, steps.Turn, steps.Couple, steps.ClearFault,
     steps.Note, See, Download,
 )  # fmt: skip
 """Commands that are steps themselves, without a result."""
@@ -77,6 +77,7 @@ class WorldSubject:
             **control,
             command.StopAxes: self._stop,
             command.StopAll: lambda _: self._stop_all(),
+            steps.Write: self._write,
             steps.Request: self._request,
             steps.SetFault: self._set_fault,
             steps.Expect: self._expect,
@@ -141,6 +142,20 @@ class WorldSubject:
     def _step(self, step: ExternalInput) -> None:
         self._apply_input(step)
 
+    def _write(self, step: steps.Write) -> None:
+        self._apply_input(step)
+        world = self.world
+        for name, values in world.by_machine(step):
+            for pdu in world.requests(name, world.registers(name), values):
+                self._publish_stops(name, pdu)
+
+    def _publish_stops(self, name: str, pdu: bytes) -> None:
+        """A write that ends motions is a stop (docs/stopping.md)."""
+        registers = self.world.kind(name).registers
+        if registers is not None:
+            for halt in ended(name, registers.ended_by(self.world.machine(name), pdu)):
+                self.publish(self.world.now, name, InputPayload("stop", halt.scope))
+
     def _control(self, wanted: ControllerCommand) -> None:
         """Execute a command for a controller as its master does."""
         world, name = self.world, wanted.machine
@@ -197,6 +212,9 @@ class WorldSubject:
             self._apply_input(step)
         finally:
             master.wanted -= {number}
+        name = self._machine_of.get((step.line, step.unit))
+        if name is not None:
+            self._publish_stops(name, step.pdu)
         found = master.answers.pop(number, None)
         return {"pdu": found[1:-2].hex() if found else None}
 

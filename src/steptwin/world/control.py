@@ -3,7 +3,7 @@ them (`steptwin.world.kind.ControllerKind.control`)."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -93,6 +93,11 @@ class Halt:
         if self.program is not None:
             return "program, paused" if self.program == "pause" else "program"
         return "all axes" if self.axis is None else f"axis {self.axis}"
+
+
+def ended(machine: str, numbers: Iterable[int]) -> list[Halt]:
+    """What a write of registers ends, by the numbers of axes, and 0 for the program."""
+    return [Halt(machine, number) if number else Halt(machine, program="stop") for number in sorted(numbers)]
 
 
 def standstill(machine: str, program_actions: Collection[str]) -> tuple[Halt, ...]:

@@ -155,6 +155,8 @@ class NamedRegisters(Generic[M]):
     """What requests depend on besides names and values."""
     execute: Callable[[M, bytes, Nanos], bytes]
     """The answer to a PDU that reaches the controller without a line."""
+    ended_by: Callable[[M, bytes], tuple[int, ...]]
+    """What a PDU ends if it is a stop: the numbers of axes, and 0 for the program."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

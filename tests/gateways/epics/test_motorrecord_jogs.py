@@ -173,7 +173,9 @@ def test_a_jog_that_another_gateway_has_stopped_does_not_go_on() -> None:
     check(act)
 
 
-@pytest.mark.parametrize("stop", [StopAxes("table"), StopAxes("table", 1), StopAll()], ids=str)
+@pytest.mark.parametrize(
+    "stop", [StopAxes("table"), StopAxes("table", 1), StopAll(), Write((("table", "M1_STOP", 1.0),))], ids=str
+)
 @pytest.mark.parametrize("is_of_gateway", [False, True])
 def test_a_move_that_waits_for_go_does_not_outlast_a_stop_by_others(stop: Command, is_of_gateway: bool) -> None:
     async def act(rig: MotorRig) -> None:
@@ -188,7 +190,7 @@ def test_a_move_that_waits_for_go_does_not_outlast_a_stop_by_others(stop: Comman
             await rig.tick()
             assert not put.done()
             if is_of_gateway:
-                await GatewayClient("another", Role.VIEWER).do(rig.world, stop)
+                await GatewayClient("another", Role.ENGINEER).do(rig.world, stop)
             else:
                 rig.world.inner.do(stop)
             there = rig.get("RBV")

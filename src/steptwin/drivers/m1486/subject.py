@@ -157,6 +157,10 @@ class M1486Part:
         """It takes none."""
         return frozenset()
 
+    async def ignored(self, request: steps.Request) -> tuple[int, ...]:
+        """It takes none."""
+        return ()
+
     def actions(self) -> Mapping[type, DeviceAction]:
         return {
             command.Move: self._move,

@@ -31,8 +31,8 @@ from steptwin.mic488.describe import AxisScale
 from steptwin.mic488.inifile import IniFile
 from steptwin.mic488.registermap import DataType, WriteEffect
 from steptwin.mic488.registers import AXES, DEFAULT_FIRMWARE, INPUTS, OUTPUTS, register_map
-from steptwin.mic488.status import ProgramState
-from steptwin.mic488.values import PROGRAM, RegisterItem, RegisterValue, halted, named, starts_program
+from steptwin.mic488.status import AxisStatus, ProgramState
+from steptwin.mic488.values import PROGRAM, RegisterItem, RegisterValue, given_motions, halted, named, starts_program
 from steptwin.wire import pdu
 
 TIMEOUT_S = 0.3
@@ -320,8 +320,8 @@ class AsyncMic488:
                 await unit.write(item, unit.travelling(item, value, data_type), data_type=data_type, permission=permission)
 
     def ended_by(self, name: str, value: float) -> tuple[int, ...]:
-        """What `set` with these ends: the numbers of axes, and 0 for the program. Such a write precedes all waiting requests. Raises
-        `Misuse` for an unknown name."""
+        """What `set` with these ends: the numbers of axes, and 0 for the program. Such a write precedes all waiting requests.
+        Raises `Misuse` for an unknown name."""
         return self._unit.ended_by(named(self._unit.registers, name), value)
 
     async def registers(self, address: int, count: int) -> tuple[int, ...]:
@@ -337,6 +337,16 @@ class AsyncMic488:
             return pdu.answer(request, await unit.ask(request))
         async with unit.stopping_if_late(*ALL_AXES, program=starts_program(unit.registers, request)):
             return pdu.answer(request, await unit.ask(request, permission=unit.permission(*ALL_AXES)))
+
+    async def ignored(self, request: pdu.ModbusRequest) -> tuple[int, ...]:
+        """The axes to which a request that has been answered gave motions which they ignored, because their drives are off now
+        (MIC-8)."""
+        unit = self._unit
+        axes = given_motions(unit.registers, request)
+        control = await unit.control() if axes else None
+        if control is None or control.triggered:
+            return ()
+        return tuple(axis for axis in axes if control.axes[axis - 1] == AxisStatus.OFF)
 
     # ------------------------------------------------------------------ snapshots
 

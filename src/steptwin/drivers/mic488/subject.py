@@ -214,6 +214,9 @@ class Mic488Part:
         except pdu.ModbusException:
             return frozenset()
 
+    async def ignored(self, request: steps.Request) -> tuple[int, ...]:
+        return await self._mic.ignored(pdu.decode_request(request.pdu))
+
     async def _request(self, wanted: steps.Request) -> object:
         if wanted.unit != self.address:
             raise Misuse(f"unit = {wanted.unit}: this subject is the device with address {self.address}")

@@ -11,7 +11,9 @@ from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.present import empty_banks, state_of, statement_of
 from steptwin.mic488.registers import DEFAULT_FIRMWARE
 from steptwin.mic488.status import ProgramState
+from steptwin.mic488.values import halted
 from steptwin.mic488.vision import VisionReceiver, VisionRecord
+from steptwin.wire.pdu import ModbusException, decode_request
 from steptwin.world.kind import ControllerKind, LineKind, LinkKind, NamedRegisters, PointMarks, Terminals, Vision
 from steptwin.world.kinds.mic488 import axes, build, control, faults, line, memory, programs, table
 from steptwin.world.kinds.mic488.configuration import Mic488Configuration
@@ -43,6 +45,13 @@ def _input_pin(pin: str, level: float) -> str:
 def _is_idle(device: Mic488Device, now: Nanos) -> bool:
     running = device.program.state is ProgramState.RUNNING
     return not running and not any(axis.profile.moving(now) for axis in device.axes)
+
+
+def _ended_by(device: Mic488Device, pdu: bytes) -> tuple[int, ...]:
+    try:
+        return halted(device.registers, decode_request(pdu))
+    except ModbusException:
+        return ()
 
 
 def _see(device: Mic488Device, record: tuple[float, float, float, float], now: Nanos) -> None:
@@ -116,6 +125,7 @@ MIC488: ControllerKind[Mic488Spec, Mic488Device, Mic488View] = ControllerKind(
         requests=encode_write,
         dialect=lambda device: (device.firmware.name, device.data_type),
         execute=lambda device, pdu, now: device.execute(pdu, now),
+        ended_by=_ended_by,
     ),
     vision=Vision(address=lambda spec: spec.vision, see=_see, records=lambda: VisionReceiver().feed),
 )
