@@ -50,8 +50,17 @@ def test_pure_packages_bring_nothing_heavy() -> None:
     assert brought_by(modules) & HEAVY == set()
 
 
-def test_the_command_line_brings_nothing_heavy() -> None:
-    assert brought_by(["steptwin.cli"]) & HEAVY == set()
+def test_the_help_of_a_command_brings_nothing_heavy() -> None:
+    modules = modules_of("cli")
+    assert {"steptwin.cli.up", "steptwin.cli.run"} <= set(modules)
+    assert brought_by(modules) & HEAVY == set()
+
+
+def test_the_help_of_all_commands_imports_none_of_them() -> None:
+    code = "import sys; from typer.testing import CliRunner; from steptwin.cli import app; CliRunner().invoke(app, '--help'); "
+    run = subprocess.run([sys.executable, "-c", code + "print(*sys.modules)"], capture_output=True, text=True, check=True)
+    room = {name for name in run.stdout.split() if name.startswith("steptwin.cli.")}
+    assert room == {"steptwin.cli.commandgroup", "steptwin.cli.optiongroups"}
 
 
 def test_exports_bring_their_libraries_when_they_write() -> None:

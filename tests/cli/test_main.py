@@ -7,13 +7,16 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
+import typer
 from typer.core import TyperGroup
 from typer.main import get_command
 
 from steptwin import __version__
-from steptwin.cli import GROUPS, app, main
+from steptwin.cli import COMMANDS, app, commandgroup, main
+from steptwin.cli.commandgroup import LONGEST_SUMMARY
 
 
 def steptwin(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -58,14 +61,26 @@ def help_of(*arguments: str) -> str:
     return shown.stdout
 
 
-def test_every_command_is_in_one_group_of_the_help_with_its_whole_summary() -> None:
-    named = [name for group in GROUPS.values() for name in group]
-    command = get_command(app)
-    assert isinstance(command, TyperGroup)
-    assert sorted(named) == sorted({*named}) == sorted(command.commands)
+def every_command() -> dict[str, Any]:
+    group = get_command(app)
+    assert isinstance(group, TyperGroup)
+    context = typer.Context(group)
+    return {name: group.get_command(context, name) for name in group.list_commands(context)}
+
+
+def test_the_help_shows_the_first_sentence_of_every_command_in_its_group() -> None:
+    summaries = {name: summary for group in COMMANDS.values() for name, summary in group.items()}
+    assert len(summaries) == sum(map(len, COMMANDS.values()))
+    assert summaries == {name: each.get_short_help_str(LONGEST_SUMMARY) for name, each in every_command().items()}
     shown = help_of()
-    assert [line[:-1] for line in shown.splitlines() if line.endswith(":") and not line.startswith(" ")] == ["Options", *GROUPS]
+    assert [line[:-1] for line in shown.splitlines() if line.endswith(":") and not line.startswith(" ")] == ["Options", *COMMANDS]
     assert "..." not in shown.partition("Options:")[2]
+
+
+def test_a_module_of_the_command_line_with_a_command_is_in_the_help() -> None:
+    names = {name.replace("-", "_") for group in COMMANDS.values() for name in group}
+    files = Path(commandgroup.__file__).parent.glob("*.py")
+    assert names == {file.stem for file in files if re.search(r"^(def command\(|command = )", file.read_text(), re.MULTILINE)}
 
 
 @pytest.mark.parametrize("arguments", [("serve",), ("serve", "mic488"), ("run",), ("get",), ("move",), ("up",)])
@@ -155,9 +170,7 @@ def test_errors_in_files_have_their_place_and_nothing_before_it(
 
 
 def test_json_of_every_command_is_documented() -> None:
-    command = get_command(app)
-    assert isinstance(command, TyperGroup)
-    named = {name for name, each in command.commands.items() if any("--json" in option.opts for option in each.params)}
+    named = {name for name, each in every_command().items() if any("--json" in option.opts for option in each.params)}
     page = (Path(__file__).parents[2] / "docs/reference/command-line.md").read_text().partition("## JSON of each command")[2]
     first = " ".join(row.split("|")[1] for row in page.splitlines() if row.startswith("|"))
     documented = set(re.findall(r"`([a-z-]+)`", first))

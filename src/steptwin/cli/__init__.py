@@ -8,186 +8,140 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Mapping
-from functools import partial
+from collections.abc import Mapping
+from functools import cache
+from importlib import import_module
 from io import TextIOWrapper
 from itertools import pairwise
 from typing import Annotated, Any, NoReturn
 
 import typer
-from typer.core import TyperArgument, TyperGroup, TyperOption
+from typer.core import TyperCommand
 from typer.exceptions import TyperException
+from typer.main import get_command
 
 from steptwin import __version__
-from steptwin.cli import (
-    bridge,
-    build,
-    calc,
-    campaign,
-    certificate,
-    check,
-    commands,
-    dap,
-    datasheet,
-    decompile,
-    explain,
-    export,
-    fault,
-    fmt,
-    get,
-    history,
-    info,
-    lsp,
-    migrate,
-    move,
-    pace,
-    record,
-    registers,
-    replay,
-    run,
-    scan,
-    send,
-    serve,
-    sniff,
-    studio,
-    terminal,
-    twin,
-    twins,
-    up,
-    verify,
-    watch,
-    why,
-)
+from steptwin.cli.commandgroup import CommandGroup
 from steptwin.cli.optiongroups import GroupedCommand
 from steptwin.errors import DatabaseFailure, Misuse, SourceErrors, SteptwinError
 
-COMMANDS: Mapping[str, Mapping[str, Callable[..., None]]] = {
+COMMANDS: Mapping[str, Mapping[str, str]] = {
     "Twins": {
-        "studio": studio.studio,
-        "up": up.up,
-        "twins": twins.twins,
-        "state": twin.state,
-        "pin": twin.pin,
-        "encoder": twin.encoder,
-        "power-cycle": twin.power_cycle,
-        "fault": fault.fault,
-        "pause": pace.pause,
-        "step": pace.step,
-        "resume": pace.resume,
-        "save": pace.save,
-        "certificate": certificate.certificate,
+        "serve": "Serve a twin until Ctrl-C.",
+        "studio": "Show a world or devices in a browser, until Ctrl-C.",
+        "up": "Run a world in real time until Ctrl-C or until one of its scripts stops it; other programs connect to its lines.",
+        "twins": "List running twins: names as --device takes them, kinds, and addresses at which other programs reach them.",
+        "state": "Show the state of a running twin.",
+        "pin": "Set inputs of a running twin, press or release its buttons, or show all pins.",
+        "encoder": "Turn, couple or block the encoder shafts of a running twin, or show them.",
+        "power-cycle": "Switch a running twin off and on again.",
+        "fault": "Set, clear or show the faults of a running twin.",
+        "pause": "Pause a running world.",
+        "step": "Advance a world by a time, to a condition or to its next event, show what happened, and pause.",
+        "resume": "Continue a paused world, or change its speed.",
+        "save": "Save the session of a running world, to replay it or to continue from it with 'run' and 'up'.",
+        "certificate": "Make a certificate, signed by itself, and its key: for [gateway.opcua], tls_tcp of a [[line]], steptwin "
+        "studio.",
     },
     "Programs and runs": {
-        "check": check.check,
-        "explain": explain.explain,
-        "migrate": migrate.migrate,
-        "fmt": fmt.fmt,
-        "build": build.build,
-        "decompile": decompile.decompile,
-        "run": run.run,
-        "replay": replay.replay,
-        "why": why.why,
-        "export": export.export,
-        "lsp": lsp.lsp,
-        "dap": dap.dap,
+        "check": "Check a file and report everything wrong or doubtful in it: WBC programs (.prg), position tables (.csv), "
+        "configurations (.cfg), worlds (.toml); all others are M1486 programs.",
+        "explain": "Explain a program without running it: control flow, durations, memory, inputs and outputs, where it can wait "
+        "for ever.",
+        "migrate": "Show what of a program does not fit another type of M1486 or another firmware of the MIC488, and why, with "
+        "changes.",
+        "fmt": "Write WBC programs in one style: blanks, indentation, keywords in capitals.",
+        "build": "Compile a WBC program to the image of firmware 1.25.",
+        "decompile": "Turn a compiled image into a program and a position table that build to the same bytes.",
+        "run": "Run a program or a world in virtual time and print its moves, waits, outputs and uploads.",
+        "replay": "Run a recorded session again and compare what happens.",
+        "why": "Show the chain of causes of a value, of a condition or of a wait.",
+        "export": "Write a recorded trace as timeline (html), picture (png, svg), signals (vcd), frames (pcapng) or samples "
+        "(csv, parquet).",
+        "lsp": "Serve an editor on standard input and output (Language Server Protocol): programs, tables, configurations, "
+        "worlds.",
+        "dap": "Serve an editor on standard input and output (Debug Adapter Protocol): breakpoints, steps, also backwards in "
+        "time.",
+        "campaign": "Run campaigns: many runs of a world, each a little different.",
     },
     "Devices and twins": {
-        "ports": scan.ports,
-        "scan": scan.scan,
-        "info": info.info,
-        "get": get.get,
-        "set": get.set_,
-        "watch": watch.watch,
-        "enable": move.enable,
-        "disable": move.disable,
-        "home": move.home,
-        "seek": move.seek,
-        "move": move.move,
-        "jog": move.jog,
-        "stop": move.stop,
-        "send": send.send,
-        "terminal": terminal.terminal,
-        "sniff": sniff.sniff,
-        "verify": verify.verify,
-        "bridge": bridge.bridge,
-        "history": history.history,
-        "record": record.record,
-        "diff": record.diff,
+        "ports": "List serial ports, and the pseudo terminals of running twins.",
+        "scan": "Find controllers on serial ports and network addresses.",
+        "info": "Show what a controller is and what it is doing.",
+        "get": "Read registers by name or address.",
+        "set": "Write registers by name, one after the other.",
+        "watch": "Read registers again and again.",
+        "enable": "Switch drives on.",
+        "disable": "Switch drives off.",
+        "home": "Home axes, at the velocities given.",
+        "seek": "Move an M1486 at start/stop speed until a line has its end level.",
+        "move": "Move axes; several begin in the same instant.",
+        "jog": "Jog an axis until a key is pressed.",
+        "stop": "Stop axes at once, without ramp; an M1486 with its ramp, and its program.",
+        "send": "Download a program into an M1486.",
+        "terminal": "Talk to a controller line by line: names read, NAME=VALUE writes.",
+        "sniff": "Log the traffic between a master and a device in words.",
+        "verify": "Check whether a controller behaves as the numbered interpretations say.",
+        "bridge": "Serve real devices to programs of a plant, by the gateways of a file, until Ctrl-C.",
+        "history": "Show, export and compare what a database has kept of twins and devices.",
+        "record": "Run a list of requests on a controller and record the answers.",
+        "diff": "Report where two recordings of the same session differ.",
     },
     "Reference": {
-        "calc": calc.calc,
-        "registers": registers.registers,
-        "commands": commands.commands,
-        "datasheet": datasheet.datasheet,
+        "calc": "Calculate a move: its times, or with a time the quantity that is not given; and GEAR from the mechanics.",
+        "registers": "Show the coils, inputs and holding registers of a controller.",
+        "commands": "Show the statements or commands of a controller, their arguments and effects, and all findings of the "
+        "checker.",
+        "datasheet": "Show the data sheet of a controller: axes, pins, points with unit and range, commands, events.",
     },
 }
-"""By group and name, in the order of ``--help``. ``serve`` and ``campaign`` are groups of commands themselves."""
-GROUPS = {title: tuple(group) for title, group in COMMANDS.items()}
-GROUPS["Twins"] = ("serve", *GROUPS["Twins"])
-GROUPS["Programs and runs"] = (*GROUPS["Programs and runs"], "campaign")
-"""Names, as ``--help`` lists them."""
-LONGEST_SUMMARY = 200
+"""By group and name, in the order of ``--help``: the first sentence of each command's help, so that it imports none of them.
+
+A command is ``command`` in the module of its name.
+"""
 NOT_DONE, MISUSED, DATABASE = 1, 2, 3
 """Exit codes."""
 
-VALUE_NAMES = {"str": "TEXT", "list[str]": "TEXT", "int": "N", "float": "NUMBER", "path": "PATH", "list[path]": "PATH"}
-"""Names of option values in help, instead of Python types."""
 
+class _Steptwin(CommandGroup):
+    """The commands of `COMMANDS`, imported one by one when they are needed."""
 
-def _constant(text: str, ctx: Any) -> str:
-    return text
-
-
-def _process_number(parameter: Any, process: Callable[[Any, Any], Any], is_float: bool, ctx: Any, value: Any) -> Any:
-    """The value of an option, which is a number as everywhere; the library takes others, too. Raises `Misuse`."""
-    if not isinstance(value, str):
-        return process(ctx, value)
-    from steptwin.numerals import read_number
-
-    try:
-        number = read_number(value)
-    except Misuse as error:
-        process(ctx, value)  # what it refuses as well has its usual message
-        raise Misuse(f"{parameter.opts[0]}: {error}") from None
-    return process(ctx, number if is_float else value)
-
-
-class _Commands(TyperGroup):
-    """Help in groups, with names of values instead of Python types; messages without the name of a validator."""
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        rows = [row for group in COMMANDS.values() for row in group.items()]
+        self.commands = {name: TyperCommand(name, help=summary) for name, summary in rows}
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        command = super().get_command(ctx, cmd_name)
-        for parameter in getattr(command, "params", ()):
-            shown = parameter.display_type(ctx).strip("<>") if isinstance(parameter, TyperOption) else ""
-            parameter.display_type = partial(_constant, VALUE_NAMES.get(shown, shown))
-            if shown in {"int", "float"}:
-                parameter.process_value = partial(_process_number, parameter, parameter.process_value, shown == "float")
-            if isinstance(parameter, TyperArgument) and parameter.metavar is None:
-                parameter.metavar = str(parameter.name).upper()
-        return command
+        if cmd_name in self.commands:
+            self.commands[cmd_name] = _imported(cmd_name)
+        return super().get_command(ctx, cmd_name)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        names = self.list_commands(ctx)
-        for title, group in GROUPS.items() if ctx.parent is None else (("Commands", tuple(names)),):
-            rows = [(name, self.commands[name].get_short_help_str(LONGEST_SUMMARY)) for name in group if name in names]
+        for title, group in COMMANDS.items():
             with formatter.section(title):
-                formatter.write_dl(rows)
+                formatter.write_dl(list(group.items()))
+
+
+@cache
+def _imported(name: str) -> Any:
+    """The command or group of commands in the module of its name."""
+    found = import_module(f"steptwin.cli.{name.replace('-', '_')}").command
+    if not isinstance(found, typer.Typer):
+        alone = typer.Typer(add_completion=False, rich_markup_mode=None)
+        alone.command(name, cls=GroupedCommand)(found)
+        found = alone
+    return get_command(found)
 
 
 app = typer.Typer(
     name="steptwin",
-    cls=_Commands,
+    cls=_Steptwin,
     no_args_is_help=True,
     add_completion=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.add_typer(serve.app, name="serve", cls=_Commands)
-app.add_typer(campaign.app, name="campaign", cls=_Commands)
-for _group in COMMANDS.values():
-    for _name, _command in _group.items():
-        app.command(_name, cls=GroupedCommand)(_command)
 
 
 def _show_version(wanted: bool) -> None:

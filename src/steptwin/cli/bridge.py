@@ -12,7 +12,7 @@ from steptwin.cli.worldoptions import AuditInto, ListenAny, LogOptions, ReadyFil
 
 
 @grouped
-def bridge(
+def command(
     file: Annotated[Path, typer.Argument(metavar="FILE.toml", help="Devices and gateways: see docs/gateways.md.")],
     *,
     listen_any: ListenAny = False,

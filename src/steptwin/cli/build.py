@@ -15,7 +15,7 @@ from steptwin.cli.device import Json, print_json
 from steptwin.errors import Misuse
 
 
-def build(
+def command(
     file: Annotated[Path, typer.Argument(help="WBC program (.prg).")],
     positions: Annotated[
         Path | None, typer.Option(help="Position table; default: the .csv of the same name, else an empty one.")

@@ -101,7 +101,7 @@ class M1486MoveOptions(OptionGroup):
 
 
 @grouped
-def calc(
+def command(
     kind: Annotated[CalculatedKind, typer.Argument(metavar="KIND", help="mic488 or m1486.")],
     find: Annotated[
         str | None,

@@ -10,14 +10,21 @@ from typing import Annotated
 
 import typer
 
+from steptwin.cli.commandgroup import CommandGroup
 from steptwin.cli.device import Json
 
-app = typer.Typer(no_args_is_help=True, help="Run campaigns: many runs of a world, each a little different.")
+command = typer.Typer(
+    cls=CommandGroup,
+    add_completion=False,
+    rich_markup_mode=None,
+    no_args_is_help=True,
+    help="Run campaigns: many runs of a world, each a little different.",
+)
 
 File = Annotated[Path, typer.Argument(metavar="FILE", help="The campaign, TOML.")]
 
 
-@app.command("run")
+@command.command("run")
 def run(
     file: File,
     runs: Annotated[int | None, typer.Option(help="Number of runs. Default: that of the file.")] = None,
@@ -72,7 +79,7 @@ def run(
         raise typer.Exit(1)
 
 
-@app.command("faults")
+@command.command("faults")
 def faults(
     file: File,
     jobs: Annotated[int | None, typer.Option(help="Number of processes. Default: one for each processor.")] = None,
@@ -93,7 +100,7 @@ def faults(
         raise typer.Exit(1)
 
 
-@app.command("compare")
+@command.command("compare")
 def compare(
     before: Annotated[Path, typer.Argument(metavar="DIR1", help="Folder of the results before.")],
     after: Annotated[Path, typer.Argument(metavar="DIR2", help="Folder of the results after.")],
@@ -106,7 +113,7 @@ def compare(
         raise typer.Exit(1)
 
 
-@app.command("show")
+@command.command("show")
 def show(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder for the results.")],
     json: Json = False,

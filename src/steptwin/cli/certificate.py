@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 
-def certificate(
+def command(
     folder: Annotated[Path, typer.Argument(help="Folder for certificate.pem and key.pem.")],
     host: Annotated[
         list[str] | None, typer.Option(metavar="NAME", help="Another host name or address of this computer; may be repeated.")

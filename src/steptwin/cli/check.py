@@ -26,7 +26,7 @@ class M1486CheckOptions(M1486FileOptions):
 
 
 @grouped
-def check(
+def command(
     file: Annotated[Path, typer.Argument(help="File to check.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     *,

@@ -24,7 +24,7 @@ class CommandsOf(enum.StrEnum):
     MIC488 = "mic488"
 
 
-def commands(
+def command(
     device: Annotated[CommandsOf, typer.Argument(help="Controller.")],
     variant: Annotated[
         str | None,

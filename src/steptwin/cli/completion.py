@@ -58,5 +58,12 @@ def faults(context: typer.Context, incomplete: str) -> list[str]:
     return _beginning((f"{each.name}=" for each in kinds[words[0]].parameters if each.name not in given), incomplete)
 
 
+def values(incomplete: str) -> list[str]:
+    """Names of values of devices."""
+    from steptwin.drivers.kinds import DRIVERS
+
+    return [name for kind in DRIVERS.values() for name in kind.names() if name.startswith(incomplete.upper())]
+
+
 def _beginning(names: Iterable[str], incomplete: str) -> list[str]:
     return [name for name in names if name.startswith(incomplete)]

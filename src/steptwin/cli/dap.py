@@ -8,7 +8,7 @@ from __future__ import annotations
 from contextlib import suppress
 
 
-def dap() -> None:
+def command() -> None:
     """Serve an editor on standard input and output (Debug Adapter Protocol): breakpoints, steps, also backwards in time."""
     from steptwin.cli.keys import interruptible
     from steptwin.dap.stdio import serve_stdio

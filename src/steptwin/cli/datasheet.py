@@ -10,16 +10,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from steptwin.cli.device import table
+from steptwin.cli.device import Json, Twin, table
 from steptwin.cli.selected import selected
-from steptwin.cli.twin import Json, Twin
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
     from steptwin.datasheet import CommandDescription, Datasheet, Limits, Point
 
 
-def datasheet(
+def command(
     kind: Annotated[str | None, typer.Argument(metavar="KIND", help="mic488 or m1486.")] = None,
     variant: Annotated[str | None, typer.Option(help="Firmware of a MIC488, type of an M1486.")] = None,
     twin: Twin = None,

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from steptwin.wbc.decompile import Decompiled
 
 
-def decompile(
+def command(
     file: Annotated[Path, typer.Argument(help="Compiled image (.wbc).")],
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Program to write (.prg); default: print it.")] = None,
     positions: Annotated[Path | None, typer.Option(help="Position table to write; default: beside the program, as .csv.")] = None,

@@ -1,4 +1,4 @@
-"""Common parts of the commands for devices: selection of the device, input and output of values and names."""
+"""Common parts of the commands for devices and twins: selection of the device, input and output of values and names."""
 
 from __future__ import annotations
 
@@ -29,6 +29,16 @@ Device = Annotated[
         "HOST:PORT, rtu-tcp://HOST:PORT, rfc2217://HOST:PORT, tls://HOST:PORT?…. "
         "Behind it ,unit=N ,baud=N ,config=FILE ,firmware=V ,timeout=S; for "
         "an M1486 ,kind=m1486 or ,chip=7 ,variant=B. Default: the only running twin.",
+        autocompletion=completion.devices,
+    ),
+]
+Twin = Annotated[
+    str | None,
+    typer.Option(
+        "--device",
+        "-d",
+        metavar="TWIN",
+        help="A running twin: mic488, machine.table (a controller of it), its file or address. Default: the only one running.",
         autocompletion=completion.devices,
     ),
 ]

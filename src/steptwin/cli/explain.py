@@ -16,7 +16,7 @@ from steptwin.cli.optiongroups import grouped, option_of
 
 
 @grouped
-def explain(
+def command(
     file: Annotated[Path, typer.Argument(help="WBC program (.prg) or M1486 program.")],
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="A picture of the control flow: FILE.svg, instead of the text.")

@@ -26,7 +26,7 @@ class ExportFormat(enum.StrEnum):
     JSONL = "jsonl"
 
 
-def export(
+def command(
     trace: Annotated[Path, typer.Argument(help="A trace (.jsonl), or the directory that has trace.jsonl.")],
     to: Annotated[list[ExportFormat] | None, typer.Option(help="Format; may be given more than once.")] = None,
     output: Annotated[

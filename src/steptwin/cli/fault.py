@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from steptwin.cli import completion
+from steptwin.cli.device import Json, Twin
 from steptwin.cli.pages import PageFormat, PageSection, show
 from steptwin.cli.selected import selected
-from steptwin.cli.twin import Json, Twin
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
     from steptwin.world.faults.table import Parameter
 
 
-def fault(
+def command(
     words: Annotated[
         list[str] | None,
         typer.Argument(

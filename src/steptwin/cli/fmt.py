@@ -13,7 +13,7 @@ import typer
 from steptwin.cli.device import Json, print_json
 
 
-def fmt(
+def command(
     files: Annotated[list[Path], typer.Argument(help="WBC programs (.prg).")],
     check: Annotated[bool, typer.Option("--check", help="Change nothing; exit code 1 if a file is not in the style.")] = False,
     json: Json = False,

@@ -13,7 +13,7 @@ import typer
 from steptwin.cli.device import Json
 
 
-def history(
+def command(
     database: Annotated[str, typer.Argument(metavar="DATABASE", help="FILE.db, sqlite:///FILE.db or postgresql://HOST/NAME.")],
     points: Annotated[
         list[str] | None, typer.Argument(metavar="[POINT]...", help="Such as table.M1.position or 'table.pins.*'.")

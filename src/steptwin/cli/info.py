@@ -10,7 +10,7 @@ import typer
 from steptwin.cli.device import Device, Json, LogFrames, find, kind_of, opened, print_json, shown, table
 
 
-def info(device: Device = None, json: Json = False, log_frames: LogFrames = False) -> None:
+def command(device: Device = None, json: Json = False, log_frames: LogFrames = False) -> None:
     """Show what a controller is and what it is doing."""
     address = find(device)
     with opened(address, log_frames=log_frames) as driver:

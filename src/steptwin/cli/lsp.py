@@ -8,7 +8,7 @@ from __future__ import annotations
 import typer
 
 
-def lsp() -> None:
+def command() -> None:
     """Serve an editor on standard input and output (Language Server Protocol): programs, tables, configurations, worlds."""
     from steptwin.lsp import serve_stdio
 

@@ -14,7 +14,7 @@ import typer
 from steptwin.cli.device import Json, print_json
 
 
-def migrate(
+def command(
     file: Annotated[Path, typer.Argument(help="WBC program (.prg) or M1486 program.")],
     to: Annotated[str, typer.Option(metavar="TYPE", help="Type of M1486 (B, E2, A2x), or firmware of the MIC488 (1.40).")],
     old: Annotated[

@@ -1,4 +1,4 @@
-"""``steptwin record``, ``diff``: the same session with a twin and with the device, and where they differ.
+"""``steptwin record``: a session with a twin or with the device, for 'diff'.
 
 From Python: `steptwin.drivers.mic488.session`.
 """
@@ -6,15 +6,15 @@ From Python: `steptwin.drivers.mic488.session`.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from steptwin.cli.device import Device, Json, LogFrames, complain, find, opened, print_json
+from steptwin.cli.device import Device, LogFrames, complain, find, opened
 from steptwin.errors import Misuse
 
 
-def record(
+def command(
     session: Annotated[
         Path, typer.Argument(help="The session: get NAME..., set NAME=VALUE, wait AXIS..., sleep SECONDS, raw HEX.")
     ],
@@ -32,8 +32,9 @@ def record(
     from steptwin.drivers.mic488.named import map_of
     from steptwin.drivers.mic488.session import carry_out, steps_of, to_text
     from steptwin.files.textfiles import check_writable, write_bytes
+    from steptwin.inputfiles import read_recorded
 
-    text = _read(session)
+    text = read_recorded(session)
     if output is not None:
         check_writable(output)
     with opened(of_mic488(find(device), "record"), observe=False, log_frames=log_frames) as mic:
@@ -55,34 +56,3 @@ def record(
         finally:
             if output is not None and kept[1:]:  # an earlier recording is not given up for none
                 write_bytes(output, ("\n".join(kept) + "\n").encode())
-
-
-def diff(
-    one: Annotated[Path, typer.Argument(help="A recording, of a twin for example.")],
-    two: Annotated[Path, typer.Argument(help="Another of the same session, of the device.")],
-    tolerance: Annotated[float, typer.Option(help="How far numbers may be apart.")] = 0.0,
-    time: Annotated[
-        float | None, typer.Option(help="How far moments may be apart, in seconds. Default: they do not matter.")
-    ] = None,
-    json: Json = False,
-) -> None:
-    """Report where two recordings of the same session differ. Exit code 1 if they do."""
-    from steptwin.drivers.mic488.session import differences, from_text
-
-    found = differences(from_text(_read(one), str(one)), from_text(_read(two), str(two)), tolerance=tolerance, time_s=time)
-    if json:
-        print_json([_data(d.step, d.line, d.what, d.one, d.two) for d in found])
-    elif found:
-        typer.echo("\n".join(map(str, found)))
-    if found:
-        raise typer.Exit(1)
-
-
-def _data(step: int, line: str, what: str, one: Any, two: Any) -> dict[str, Any]:
-    return {"step": step, "line": line, "what": what, "one": one, "two": two}
-
-
-def _read(path: Path) -> str:
-    from steptwin.inputfiles import read_recorded
-
-    return read_recorded(path)

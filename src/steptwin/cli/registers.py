@@ -33,7 +33,7 @@ class Layout(enum.StrEnum):
     TAGS = "tags"
 
 
-def registers(
+def command(
     device: Annotated[str, typer.Argument(metavar="mic488", help="Controller.")],
     firmware: Annotated[
         str, typer.Option(help="Firmware generation: 1.23, 1.40 or 1.70.", autocompletion=completion.firmwares)

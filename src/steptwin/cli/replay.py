@@ -13,7 +13,7 @@ import typer
 from steptwin.cli.device import Json
 
 
-def replay(
+def command(
     file: Annotated[Path, typer.Argument(help="A session, as 'steptwin run' and 'steptwin up' write them.")],
     trace: Annotated[Path | None, typer.Option(help="Write what happened to a file or into a directory.")] = None,
     json: Json = False,

@@ -97,7 +97,7 @@ class _CommonOptions(TypedDict):
 
 
 @grouped
-def run(
+def command(
     file: File,
     duration: Duration = None,
     until: Until = None,

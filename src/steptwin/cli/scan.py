@@ -1,6 +1,6 @@
-"""``steptwin ports``, ``scan``: ports of this computer, and devices that respond on them.
+"""``steptwin scan``: devices that respond on ports of this computer.
 
-From Python: `steptwin.live.ports`, `steptwin.drivers.mic488.identify.scan`, `steptwin.drivers.m1486.identify.scan_chips`.
+From Python: `steptwin.drivers.mic488.identify.scan`, `steptwin.drivers.m1486.identify.scan_chips`.
 """
 
 from __future__ import annotations
@@ -16,20 +16,7 @@ from steptwin.cli.device import Json, complain, print_json, table
 from steptwin.errors import Misuse
 
 
-def ports(json: Json = False) -> None:
-    """List serial ports, and the pseudo terminals of running twins."""
-    from steptwin.live.ports import serial_ports, twin_ports
-
-    places = serial_ports() + twin_ports()
-    if json:
-        print_json([{"address": place.address, "what": place.what} for place in places])
-    elif places:
-        typer.echo(table([(place.address, place.what) for place in places]))
-    else:
-        complain("this computer has no serial port, and no twin is running")
-
-
-def scan(
+def command(
     places: Annotated[
         list[str] | None, typer.Argument(metavar="ADDRESS", help="Ports or addresses. Default: all that 'ports' lists.")
     ] = None,

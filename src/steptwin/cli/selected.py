@@ -6,6 +6,8 @@ from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+import typer
+
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
@@ -74,3 +76,10 @@ def levels_of(there: Selected) -> dict[str, float]:
     from steptwin.subject.commands import ReadPins
 
     return {name: level for machine in there.shown for name, level in there.do(ReadPins(machine)).items()}
+
+
+def print_data(value: object) -> None:
+    """Print what a twin has sent, as JSON."""
+    import json
+
+    typer.echo(json.dumps(value, indent=2))

@@ -17,7 +17,7 @@ from steptwin.cli.device import Device, Json, LogFrames, SuspensionDetector, fin
 from steptwin.errors import Refusal
 
 
-def send(
+def command(
     file: Annotated[Path, typer.Argument(help="The program.")],
     device: Device = None,
     json: Json = False,

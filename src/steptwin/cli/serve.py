@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from steptwin.cli import completion
+from steptwin.cli.commandgroup import CommandGroup
 from steptwin.cli.optiongroups import GroupedCommand, OptionGroup, grouped
 from steptwin.cli.worldoptions import Control, Faults, LogOptions, LogTraffic, ReadyFile, Speed
 from steptwin.errors import Misuse
@@ -17,7 +18,9 @@ from steptwin.errors import Misuse
 if TYPE_CHECKING:
     from steptwin.commands.serve import ServeOptions
 
-app = typer.Typer(help="Serve a twin until Ctrl-C.", no_args_is_help=True)
+command = typer.Typer(
+    cls=CommandGroup, add_completion=False, rich_markup_mode=None, help="Serve a twin until Ctrl-C.", no_args_is_help=True
+)
 
 MODBUS_TCP_PORT = 5020
 RTU_TCP_PORT = 5021
@@ -189,7 +192,7 @@ StatementTime = Annotated[str, typer.Option(metavar="TIME", help="What one state
 Lenient = Annotated[bool, typer.Option("--lenient", help="Holes of the register map read as 0 instead of being refused.")]
 
 
-@app.command(cls=GroupedCommand)
+@command.command(cls=GroupedCommand)
 @grouped
 def mic488(
     firmware: Firmware = "1.70",
@@ -231,7 +234,7 @@ def mic488(
     serve_mic488(twin.on(line, "mic488", ports, log), controllers)
 
 
-@app.command(cls=GroupedCommand)
+@command.command(cls=GroupedCommand)
 @grouped
 def m1486(
     variant: Annotated[

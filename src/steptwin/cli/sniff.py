@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from steptwin.wire.frameline import FrameLine
 
 
-def sniff(
+def command(
     address: Annotated[str, typer.Argument(metavar="ADDRESS", help="The line, or the device to pass everything on to.")],
     listen: Annotated[
         str | None, typer.Option(metavar="HOST:PORT", help="Relay: programs connect here instead of to the device.")

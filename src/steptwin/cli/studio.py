@@ -64,7 +64,7 @@ class PageOptions(OptionGroup):
 
 
 @grouped
-def studio(
+def command(
     world: Annotated[
         Path | None,
         typer.Argument(metavar="MACHINE.toml", help="The description of a world, or a session (.json). Default: a demo machine."),

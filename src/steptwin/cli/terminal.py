@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from steptwin.drivers.kind import DeviceTerminal
 
 
-def terminal(device: Device = None, log_frames: LogFrames = False) -> None:
+def command(device: Device = None, log_frames: LogFrames = False) -> None:
     """Talk to a controller line by line: names read, NAME=VALUE writes. 'help' lists the rest. Lines may come from a pipe.
 
     An M1486 takes its own commands; what it sends is shown decoded.

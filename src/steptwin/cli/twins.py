@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from steptwin.live.twins import Twin, TwinController
 
 
-def twins(json: Json = False) -> None:
+def command(json: Json = False) -> None:
     """List running twins: names as --device takes them, kinds, and addresses at which other programs reach them."""
     from steptwin.live.twins import START, running_twins
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 @grouped
-def up(
+def command(
     world: Annotated[
         Path | None,
         typer.Argument(metavar="MACHINE.toml", help="The description of the world, or a session (.json) to continue."),

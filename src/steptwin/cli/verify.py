@@ -16,7 +16,7 @@ from steptwin.cli.device import Device, complain, find, kind_of
 from steptwin.errors import Misuse
 
 
-def verify(
+def command(
     device: Device = None,
     write: Annotated[bool, typer.Option("--write", help="Permit checks that write settings and put them back.")] = False,
     move: Annotated[

@@ -13,8 +13,8 @@ from typing import Annotated, Any
 
 import typer
 
+from steptwin.cli import completion
 from steptwin.cli.device import Device, LogFrames, as_json, find, kind_of, opened, shown, table
-from steptwin.cli.get import names_from
 from steptwin.errors import Misuse
 
 Look = Callable[[], dict[str, tuple[Any, str]]]
@@ -23,10 +23,10 @@ LEAST_WIDTH = 10
 """Of a column: as wide as most values."""
 
 
-def watch(
+def command(
     names: Annotated[
         list[str] | None,
-        typer.Argument(metavar="NAME", help="As of get. Default: what the axes do.", autocompletion=names_from),
+        typer.Argument(metavar="NAME", help="As of get. Default: what the axes do.", autocompletion=completion.values),
     ] = None,
     device: Device = None,
     hz: Annotated[float, typer.Option(help="Samples per second, up to 50; the device may be slower.")] = 5.0,

@@ -13,7 +13,7 @@ from steptwin.cli import completion
 from steptwin.cli.device import Json
 
 
-def why(
+def command(
     where: Annotated[
         str,
         typer.Argument(
