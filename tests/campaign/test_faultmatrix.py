@@ -13,6 +13,7 @@ from steptwin.campaign.case import EXPECTATIONS, CaseResult, Verdict
 from steptwin.campaign.effects import FaultEffect, RunFacts, judge
 from steptwin.campaign.faultmatrix import FaultMatrix, fault_matrix
 from steptwin.campaign.reading import load_campaign
+from steptwin.campaign.report.matrixpage import write_matrix
 from steptwin.errors import Misuse
 from steptwin.files import session as sessions
 
@@ -118,7 +119,7 @@ def test_each_cell_replays(press: tuple[FaultMatrix, Path]) -> None:
 
 def test_table_page_and_json(press: tuple[FaultMatrix, Path]) -> None:
     matrix, folder = press
-    page, table, plain = matrix.write(folder)
+    page, table, plain = write_matrix(matrix, folder)
     with table.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == sum(matrix.counts.values())

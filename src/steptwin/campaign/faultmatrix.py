@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future
@@ -17,7 +16,6 @@ from steptwin.campaign.description import CampaignDescription, MatrixRules
 from steptwin.campaign.effects import FactsWatch, FaultEffect, Judgement, RunFacts, judge
 from steptwin.campaign.inventory import PossibleFault, occasions, possible_faults
 from steptwin.campaign.phases import MOST_PHASES, CyclePhase, cycle_phases
-from steptwin.campaign.report.matrixpage import matrix_page
 from steptwin.campaign.runner import CaseRunner
 from steptwin.campaign.search.exhaustive import without_faults
 from steptwin.campaign.shrink import ADDED
@@ -25,7 +23,6 @@ from steptwin.campaign.workers import workers
 from steptwin.coverage.counts import Coverage
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.files import session as sessions
-from steptwin.files.textfiles import write_bytes
 from steptwin.files.world import World
 from steptwin.machine import SECOND
 
@@ -102,17 +99,6 @@ class FaultMatrix:
         writer.writerow(COLUMNS)
         writer.writerows(["" if value is None else value for value in row] for row in self.table())
         return file.getvalue()
-
-    def write(self, folder: Path) -> list[Path]:
-        """``faults.html``, ``faults.csv`` and ``faults.json``."""
-        texts = {
-            "faults.html": matrix_page(self),
-            "faults.csv": self.csv(),
-            "faults.json": json.dumps(self.plain(), ensure_ascii=False, indent=1) + "\n",
-        }
-        for name, text in texts.items():
-            write_bytes(folder / name, text.encode())
-        return [folder / name for name in texts]
 
 
 class _CellTask(NamedTuple):

@@ -83,8 +83,8 @@ def command(
     machine asks for one only where a device is connected.
     """
     try:
-        from steptwin.commands.studio import StudioOptions
         from steptwin.commands.studio import studio as run_studio
+        from steptwin.commands.studiooptions import StudioOptions
     except ModuleNotFoundError as error:
         if error.name is None or error.name.partition(".")[0] not in ("fastapi", "uvicorn", "websockets", "starlette"):
             raise

@@ -12,6 +12,7 @@ from pathlib import Path
 from steptwin.campaign.effects import FaultEffect
 from steptwin.campaign.faultmatrix import FaultMatrix, fault_matrix
 from steptwin.campaign.reading import MOST_PHASES, load_campaign
+from steptwin.campaign.report.matrixpage import write_matrix
 from steptwin.errors import Misuse
 from steptwin.system import reason
 
@@ -34,7 +35,7 @@ def faults(file: Path, out: Path | None, write: Print, *, jobs: int | None, phas
         raise Misuse(f"--out {folder}: {reason(error)}") from None
     began = time.monotonic()
     matrix = fault_matrix(description, folder, jobs=jobs, progress=_progress)
-    written = matrix.write(folder)
+    written = write_matrix(matrix, folder)
     if as_json:
         write(json.dumps(matrix.plain(), ensure_ascii=False, indent=2))
     else:

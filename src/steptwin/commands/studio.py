@@ -31,6 +31,7 @@ from steptwin.commands.studio_drawing import WorldArrangement
 from steptwin.commands.studio_plant import WorldPlant
 from steptwin.commands.studio_recordings import WorldRecordings
 from steptwin.commands.studio_work import LineWork
+from steptwin.commands.studiooptions import StudioOptions
 from steptwin.commands.up_world import Running, UpOptions, send_away, up, up_with
 from steptwin.commands.without_world import serve_without_world
 from steptwin.devices.composite import CompositeSubject
@@ -64,33 +65,6 @@ from steptwin.world.programtexts import WorldPrograms, configuration_text
 
 DEFAULT = Address("127.0.0.1", 8488)
 ANY = ("0.0.0.0", "::")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StudioOptions:
-    """The command's own options as given; see ``steptwin studio --help``."""
-
-    http: str | None = None
-    remote: bool = False
-    """Whether others may reach it without TLS."""
-    certificate: Path | None = None
-    key: Path | None = None
-    tokens: Path | None = None
-    open_to_local_users: bool = False
-    """Whether no token is asked for, at an address of this computer."""
-    audit: Path | None = None
-    browser: bool = True
-    devices: Sequence[str] = ()
-    """Addresses of devices. With them there is no demo machine."""
-    view: bool = False
-    """Whether a session is shown as it was, and everybody has the role viewer."""
-    is_demo: bool = False
-    """Whether no file of the user is behind it: only what reaches a device needs a token."""
-
-    @property
-    def highest(self) -> Role:
-        """No viewer has a higher role."""
-        return Role.VIEWER if self.view else Role.ENGINEER
 
 
 def studio(own: StudioOptions, options: UpOptions) -> bool:

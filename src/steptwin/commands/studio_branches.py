@@ -8,9 +8,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from steptwin.commands.studio_processes import ChildProcesses, Process
+from steptwin.commands.studiooptions import StudioOptions
 from steptwin.errors import Misuse, Refusal
 from steptwin.eventloop import later
 from steptwin.live.cell import Cell
@@ -19,9 +20,6 @@ from steptwin.live.world import LiveWorld
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.world.plantsnapshot import PlantSnapshot
 from steptwin.world.trace import Mark
-
-if TYPE_CHECKING:
-    from steptwin.commands.studio import StudioOptions
 
 MOST_BRANCHES = 4
 MODULE = "steptwin.commands.studio_branch"

@@ -7,11 +7,11 @@ from datetime import datetime
 from typing import NamedTuple, Protocol
 
 from steptwin.access.audit import CommandLog
-from steptwin.gateways.sampling import SharedSamples
-from steptwin.subject.commands import Command, Jog
-from steptwin.subject.contract import Description, Reading, Result
+from steptwin.gateways.sampling import SampledSubject
+from steptwin.subject.commands import Jog
+from steptwin.subject.contract import Reading
 from steptwin.subject.events import Event
-from steptwin.subject.following import Filter, Following
+from steptwin.subject.following import Filter
 from steptwin.subject.jogs import Held
 from steptwin.world.lines import LineTraffic
 
@@ -44,7 +44,7 @@ class PastValues(Protocol):
         ...
 
 
-class GatewaySubject(Protocol):
+class GatewaySubject(SampledSubject, Protocol):
     """What gateways see: a world, or devices. Answers of devices come later."""
 
     @property
@@ -57,27 +57,13 @@ class GatewaySubject(Protocol):
         """None where commands are not recorded."""
         ...
 
-    @property
-    def description(self) -> Description: ...
-
-    @property
-    def samples(self) -> SharedSamples:
-        """What the samplers of its gateways share."""
-        ...
-
     def read(self, *points: str) -> tuple[Reading, ...]:
         """Values known at present. `Misuse` for points that are not there."""
-        ...
-
-    async def do(self, wanted: Command, /) -> Result:
-        """Execute a command. Raises `SteptwinError` for a refusal or a failure of a line."""
         ...
 
     async def begin_jog(self, wanted: Jog, /) -> Held:
         """A jog that goes on while it is extended (`Held.lasts_ns`). Raises as `do`."""
         ...
-
-    def follow(self, what: Filter, bound: int) -> Following: ...
 
     def traffic(self) -> Mapping[str, LineTraffic]:
         """What has been sent over each line, by its name; of a device by ``NAME.line``."""

@@ -14,7 +14,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from math import inf
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, Protocol, cast
 from zlib import crc32
 
 from steptwin.errors import LineFailure, Refusal
@@ -22,12 +22,10 @@ from steptwin.gateways.heldstate import HeldState, is_resting, merged, parts_onl
 from steptwin.gateways.points import CLOCK, State
 from steptwin.machine import SECOND, Nanos
 from steptwin.subject import commands as command
+from steptwin.subject.contract import Description, Result
 from steptwin.subject.events import Event
 from steptwin.subject.following import USUAL, Filter, Following
 from steptwin.subject.payloads import RestoredPayload
-
-if TYPE_CHECKING:
-    from steptwin.gateways.contract import GatewaySubject
 
 KINDS = USUAL | {"write"}
 """Of events; a write of a program on a line may change what no other event tells."""
@@ -59,10 +57,28 @@ class Sample:
     answer, and of the `CLOCK`."""
 
 
+class SampledSubject(Protocol):
+    """A world or devices, as samplers see it. Answers of devices come later."""
+
+    @property
+    def description(self) -> Description: ...
+
+    @property
+    def samples(self) -> SharedSamples:
+        """What the samplers of its gateways share."""
+        ...
+
+    async def do(self, wanted: command.Command, /) -> Result:
+        """Execute a command. Raises `SteptwinError` for a refusal or a failure of a line."""
+        ...
+
+    def follow(self, what: Filter, bound: int) -> Following: ...
+
+
 class SharedSamples:
     """What the samplers of ``subject`` share: events, and samples that one of them has just taken."""
 
-    def __init__(self, subject: GatewaySubject) -> None:
+    def __init__(self, subject: SampledSubject) -> None:
         self._subject = subject
         self._samplers: list[Sampler] = []
         self._following: Following | None = None
@@ -222,7 +238,7 @@ class SharedSamples:
 class Sampler:
     """Samples of the controllers of ``subject`` for one gateway, with the registers that are named by controller."""
 
-    def __init__(self, subject: GatewaySubject, registers: Mapping[str, Iterable[str]], interval: Nanos = INTERVAL) -> None:
+    def __init__(self, subject: SampledSubject, registers: Mapping[str, Iterable[str]], interval: Nanos = INTERVAL) -> None:
         self.registers = {name: tuple(of) for name, of in registers.items()}
         self._shared = subject.samples
         self._slots = max(round(interval / SECOND / TICK_S), 1)

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.subject.commands import Advance
 from steptwin.subject.following import Filter, Following, filter_of
 from steptwin.subject.payloads import SHOWN_KINDS, STEP_KINDS
-
-if TYPE_CHECKING:
-    from steptwin.subject.world import WorldSubject
-    from steptwin.world.plant import Plant
+from steptwin.world.plant import Plant
 
 LONGEST_RUN_NS: Nanos = 3600 * SECOND
 """A condition that never comes true is given up after an hour, where no other limit is given."""
@@ -20,13 +17,12 @@ MOST_SHOWN = 1000
 """Events in the answer to a step."""
 
 
-def advance(subject: WorldSubject, wanted: Advance) -> object:
-    """A step in virtual time."""
-    world = subject.world
+def advance(world: Plant, follow: Callable[[Filter, int], Following], wanted: Advance) -> Mapping[str, object]:
+    """Execute a step in virtual time. ``follow``: `WorldSubject.follow`."""
     if wanted.until is not None:
         world.condition(wanted.until)  # raises `Misuse` here
     end = end_of(world, wanted, next_due(world))
-    following = subject.follow(shown_of(wanted), MOST_SHOWN)
+    following = follow(shown_of(wanted), MOST_SHOWN)
     try:
         came = False
         if end is not None:
@@ -36,7 +32,7 @@ def advance(subject: WorldSubject, wanted: Advance) -> object:
             came = reason is not None and reason == wanted.until
     finally:
         following.close()
-    return {**subject.time(), **happened(following), "came": came, "idle": end is None}
+    return {**happened(following), "came": came, "idle": end is None}
 
 
 def shown_of(wanted: Advance) -> Filter:

@@ -93,7 +93,7 @@ class WorldSubject:
             command.ListSnapshots: lambda _: self.snapshots.plain(),
             command.RestoreSnapshot: self._restore,
             command.DropSnapshot: self.snapshots.drop,
-            command.Advance: lambda wanted: advance(self, wanted),
+            command.Advance: self._advance,
         }
 
     # ------------------------------------------------------------------ interface of a subject
@@ -249,6 +249,10 @@ class WorldSubject:
         encoders = self.world.encoders(wanted.machine)
         self.world.touch(wanted.machine)
         return encoders.shown(self.world.machine(wanted.machine), self.world.now)
+
+    def _advance(self, wanted: command.Advance) -> object:
+        done = advance(self.world, self.follow, wanted)
+        return {**self.time(), **done}
 
     def _restore(self, wanted: command.RestoreSnapshot) -> object:
         self.go_back(self.snapshots.find(wanted), wanted.name)

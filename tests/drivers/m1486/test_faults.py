@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import pytest
 from chip_rig import KINDS, ChipWire, Direction, Fault, Kind, chip_line
 
-from steptwin.drivers.m1486.failures import ChipMoveFailed, DoubtfulMove, FileGivenUp, Garbled
-from steptwin.drivers.m1486.motion import ChipReason
+from steptwin.drivers.m1486.failures import DoubtfulMove, FileGivenUp, Garbled
+from steptwin.drivers.m1486.motion import ChipMoveFailed, ChipReason
 from steptwin.drivers.m1486.sync import M1486
 from steptwin.errors import LineFailure, Refusal, SteptwinError
 from steptwin.machine import SECOND

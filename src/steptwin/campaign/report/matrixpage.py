@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+import json
 from html import escape
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from steptwin.campaign.effects import FaultEffect
+from steptwin.campaign.faultmatrix import FaultMatrix, MatrixCell
 from steptwin.campaign.report.html import link, page, table
 from steptwin.coverage.table import percent_text
+from steptwin.files.textfiles import write_bytes
 from steptwin.machine import SECOND
-
-if TYPE_CHECKING:
-    from steptwin.campaign.faultmatrix import FaultMatrix, MatrixCell
 
 _STYLE = """
 .matrix td.e { padding: 0; } .matrix td.e a { display: block; padding: .2rem .5rem; text-decoration: none; color: inherit; }
@@ -28,6 +28,18 @@ _MEANINGS = {
     FaultEffect.WRONG_PART: "it went on to its end with another result",
     FaultEffect.UNSAFE: "a property failed",
 }
+
+
+def write_matrix(matrix: FaultMatrix, folder: Path) -> list[Path]:
+    """Write ``faults.html``, ``faults.csv`` and ``faults.json``."""
+    texts = {
+        "faults.html": matrix_page(matrix),
+        "faults.csv": matrix.csv(),
+        "faults.json": json.dumps(matrix.plain(), ensure_ascii=False, indent=1) + "\n",
+    }
+    for name, text in texts.items():
+        write_bytes(folder / name, text.encode())
+    return [folder / name for name in texts]
 
 
 def matrix_page(matrix: FaultMatrix) -> str:

@@ -10,7 +10,6 @@ from steptwin.drivers.m1486.chip import ChipStatus
 from steptwin.drivers.m1486.driver import AsyncM1486
 from steptwin.drivers.m1486.failures import (
     Busy,
-    ChipMoveFailed,
     DoubtfulMove,
     FileGivenUp,
     Garbled,
@@ -24,7 +23,7 @@ from steptwin.drivers.m1486.failures import (
 )
 from steptwin.drivers.m1486.jog import AsyncM1486Jog
 from steptwin.drivers.m1486.lines import AsyncM1486Line
-from steptwin.drivers.m1486.motion import ChipMoveEnd, ChipReason
+from steptwin.drivers.m1486.motion import ChipMoveEnd, ChipMoveFailed, ChipReason
 from steptwin.drivers.m1486.settings import ChipSettings
 from steptwin.drivers.m1486.sync import M1486, M1486Jog, M1486Line
 

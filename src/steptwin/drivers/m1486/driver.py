@@ -8,9 +8,9 @@ from math import isfinite
 from steptwin.drivers.line import check_wait
 from steptwin.drivers.m1486.chip import LARGEST, AsyncChip
 from steptwin.drivers.m1486.download import DownloadProgress, begin, reset, send_program, type_file
-from steptwin.drivers.m1486.failures import Busy, ChipMoveFailed, ProgramLost
+from steptwin.drivers.m1486.failures import Busy, ProgramLost
 from steptwin.drivers.m1486.jog import AsyncM1486Jog
-from steptwin.drivers.m1486.motion import UNKNOWN_S, ChipMotion, ChipMotionCommand, ChipMoveEnd
+from steptwin.drivers.m1486.motion import UNKNOWN_S, ChipMotion, ChipMotionCommand, ChipMoveEnd, ChipMoveFailed
 from steptwin.drivers.m1486.settings import COMMANDS, checked_number
 from steptwin.drivers.m1486.unit import PATIENCE_NS, SLICE_NS
 from steptwin.drivers.m1486.waiting import wait_for

@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import TYPE_CHECKING
 
 from steptwin.drivers.mic488.failures import Unconfirmed
 from steptwin.errors import LineFailure, Refusal
-
-if TYPE_CHECKING:
-    from steptwin.drivers.m1486.motion import ChipMoveEnd
 
 
 class NoRoom(Refusal):
@@ -47,14 +43,6 @@ class WrongType(Refusal):
 
 class ProgramLost(Refusal):
     """A program is not, or no longer, in the command memory of a chip."""
-
-
-class ChipMoveFailed(Refusal):
-    """A motion did not end as intended; ``end`` has the reason."""
-
-    def __init__(self, end: ChipMoveEnd) -> None:
-        self.end = end
-        super().__init__(str(end))
 
 
 class Garbled(LineFailure):

@@ -11,11 +11,13 @@ from __future__ import annotations
 
 from contextlib import suppress
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 from steptwin.drivers.exchange import Overtaken, SentLate, TooLate
+from steptwin.drivers.m1486.chip import AsyncChip
 from steptwin.drivers.m1486.download import begin
 from steptwin.drivers.m1486.motion import ChipMotion
+from steptwin.drivers.m1486.waiting import wait_for
 from steptwin.drivers.permission import HOLD_NS, Permission
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.m1486.lines import STEP_DIRECTION
@@ -23,9 +25,6 @@ from steptwin.m1486.microsteps import FULL_STEP
 from steptwin.m1486.unit import MASK
 from steptwin.m1486.variants import SLOWEST_JOG, Store
 from steptwin.machine import MILLISECOND, SECOND, Nanos
-
-if TYPE_CHECKING:
-    from steptwin.drivers.m1486.driver import AsyncM1486
 
 LINK_S = 0.15
 """A move is as long as the velocity of the jog makes in this time; it lasts longer by its ramps."""
@@ -50,7 +49,7 @@ class AsyncM1486Jog:
     EEPROM, and for a line slower than 1200 bit/s.
     """
 
-    def __init__(self, chip: AsyncM1486, velocity: float) -> None:
+    def __init__(self, chip: AsyncChip, velocity: float) -> None:
         if not velocity:
             raise Misuse("velocity = 0: the sign of the velocity is the direction")
         if chip.variant.store is Store.EEPROM:
@@ -144,7 +143,7 @@ class AsyncM1486Jog:
     async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         """Wait for the end of the present move, and put V back."""
         try:
-            end = await self._chip.wait(check=False)
+            end = await wait_for(self._unit, None, self._chip.unit, self._chip._shown, check=False)
             self.end = self.end or (RELEASED if end.ok else str(end))
             await self._put_back()
         except SteptwinError:

@@ -6,6 +6,7 @@ import enum
 from dataclasses import dataclass
 
 from steptwin.drivers.m1486.talk import chip_name
+from steptwin.errors import Refusal
 from steptwin.machine import SECOND, Nanos
 
 MARGIN_S = 1.0
@@ -99,6 +100,14 @@ class ChipMoveEnd:
         where = "" if self.position is None else f" at {self.position:g} {self.unit}"
         target = "" if self.target is None else f", target {self.target:g} {self.unit}"
         return f"{chip_name(self.address)}: {self.reason.value}{where}{target}{f' ({self.detail})' if self.detail else ''}"
+
+
+class ChipMoveFailed(Refusal):
+    """A motion did not end as intended; ``end`` has the reason."""
+
+    def __init__(self, end: ChipMoveEnd) -> None:
+        self.end = end
+        super().__init__(str(end))
 
 
 _INTENDED = (ChipReason.TARGET, ChipReason.CAME_TO_REST, ChipReason.SOUGHT, ChipReason.REST, ChipReason.DONE)
