@@ -13,7 +13,8 @@ from typing import Any, Generic, TypeAlias, TypeVar, cast
 
 from steptwin.datasheet import AxisDescription, Datasheet, Detail, plain
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, MotionController, Nanos
+from steptwin.machine import SECOND, Nanos
+from steptwin.motioncontroller import MotionController
 from steptwin.nearmiss import NearMiss
 
 M = TypeVar("M", bound=MotionController)

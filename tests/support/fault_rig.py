@@ -9,7 +9,7 @@ from steptwin.wire.gateway import ModbusGateway, TcpGatewayPort
 from steptwin.wire.line import SerialLine
 from steptwin.wire.slave import RtuSlavePort, TcpSlavePort
 from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
-from steptwin.world.faults import ActiveFault, Faults, FaultyPort, LineProtocol, read, rig
+from steptwin.world.faults import ActiveFault, Faults, FaultyMachine, FaultyPort, LineProtocol, read, rig
 from steptwin.world.kernel import Kernel
 from steptwin.world.kinds.mic488.faults import Mic488Body
 from steptwin.world.trace import TraceRecord
@@ -58,10 +58,11 @@ class FaultRig:
         self.kernel = Kernel()
         self.faults = Faults(seed)
         self.devices = {unit: Mic488Device(config or ControllerConfig()) for unit in units}
+        self.machines: dict[int, FaultyMachine] = {}
         for unit, device in self.devices.items():
             device.execute(bytes.fromhex("06 00 64 12 34"), 0)
             self.kernel.add(str(unit), device)
-            rig(self.kernel, str(unit), self.faults, Mic488Body(device, unit))
+            self.machines[unit] = rig(self.kernel, str(unit), self.faults, Mic488Body(device, unit))
         self.records: list[TraceRecord] = []
         self.faults.sinks.append(self.records.append)
         if line is LineProtocol.TCP and is_timed:

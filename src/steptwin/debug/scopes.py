@@ -10,7 +10,7 @@ from steptwin.datasheet import Access
 from steptwin.debug.calculation import ResolvedExpression, number_text
 from steptwin.debug.values import Scope, ShownValue
 from steptwin.errors import Misuse
-from steptwin.machine import MotionController
+from steptwin.motioncontroller import MotionController
 from steptwin.points import LivePoint
 from steptwin.subject.debugcommands import SCOPES
 from steptwin.world.actions import ExternalInput, SetVariable

@@ -86,7 +86,7 @@ class M1486Chip(ChipCore):
 
     @property
     def axes(self) -> tuple[ChipDrive]:
-        """The one axis, as `steptwin.machine.MotionController` has it."""
+        """The one axis, as `steptwin.motioncontroller.MotionController` has it."""
         return (self.motor.drive,)
 
     # ------------------------------------------------------------------ time
@@ -101,7 +101,7 @@ class M1486Chip(ChipCore):
         self.now = now
 
     def advance_to_change(self, until: Nanos) -> Nanos:
-        """See `steptwin.machine.MotionController.advance_to_change`."""
+        """See `steptwin.motioncontroller.MotionController.advance_to_change`."""
         due = self._due
         if due is None or due > until:
             self.advance(until)

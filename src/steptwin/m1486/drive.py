@@ -65,7 +65,7 @@ class WrongMove(Exception):
 
 
 class ChipDrive(Stateful):
-    """The axis of a chip: a `steptwin.machine.Drive`."""
+    """The axis of a chip: a `steptwin.motioncontroller.Drive`."""
 
     FIXED: ClassVar[tuple[str, ...]] = ("_clock",)
     __slots__ = (

@@ -197,7 +197,7 @@ class ControllerCore(Stateful):
         self.now = now
 
     def advance_to_change(self, until: Nanos) -> Nanos:
-        """See `steptwin.machine.MotionController.advance_to_change`."""
+        """See `steptwin.motioncontroller.MotionController.advance_to_change`."""
         due = self._due
         if due is None or due > until:
             self.advance(until)

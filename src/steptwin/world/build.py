@@ -9,13 +9,12 @@ from typing import Any
 from steptwin.errors import Misuse
 from steptwin.machine import MachineEvent, Nanos
 from steptwin.world.blueprint import Blueprint, memory_file
-from steptwin.world.board import Board
 from steptwin.world.element import AnyElement, ElementSpec, NamedSpec
 from steptwin.world.elements import ELEMENTS
 from steptwin.world.faults import Faults
 from steptwin.world.faults.element import FaultyElement
 from steptwin.world.joined import joined_names
-from steptwin.world.kernel import Kernel
+from steptwin.world.kernel import Board, Kernel
 from steptwin.world.kind import Member, Terminals
 from steptwin.world.kinds import line_kinds
 from steptwin.world.parts import WorldParts

@@ -12,8 +12,9 @@ from math import ceil, floor
 from typing import ClassVar, Protocol
 
 from steptwin.errors import Misuse
-from steptwin.machine import Drive, Nanos
+from steptwin.machine import Nanos
 from steptwin.motion.divisions import profile_of
+from steptwin.motioncontroller import Drive
 from steptwin.state import Plain, Stateful
 from steptwin.world.chance import Chance
 from steptwin.world.kernel import Kernel

@@ -10,7 +10,8 @@ from string import digits
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeAlias, TypeVar
 
 from steptwin.errors import Misuse
-from steptwin.machine import MachineEvent, MotionController, Nanos
+from steptwin.machine import MachineEvent, Nanos
+from steptwin.motioncontroller import MotionController
 from steptwin.nearmiss import NearMiss
 from steptwin.textcodec import decode
 from steptwin.world.kernel import Kernel

@@ -5,9 +5,10 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from steptwin.machine import Drive, Nanos
+from steptwin.machine import Nanos
 from steptwin.motion import Profile, at_rest
 from steptwin.motion.divisions import profile_of
+from steptwin.motioncontroller import Drive
 from steptwin.state import Stateful
 from steptwin.world.course import Build, Course, MechanicalState
 from steptwin.world.free import FreeMotion, slow_from

@@ -12,9 +12,10 @@ from operator import attrgetter
 from typing import ClassVar, NamedTuple, Protocol
 
 from steptwin.errors import Misuse
-from steptwin.machine import MILLISECOND, Drive, Nanos
+from steptwin.machine import MILLISECOND, Nanos
 from steptwin.motion import Profile
 from steptwin.motion.divisions import profile_of
+from steptwin.motioncontroller import Drive
 from steptwin.state import Plain, Stateful
 from steptwin.world.course import Build, Course, LoadPiece, MechanicalState
 from steptwin.world.kernel import Kernel

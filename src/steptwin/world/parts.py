@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, cast
 
-from steptwin.machine import MotionController
+from steptwin.motioncontroller import MotionController
 from steptwin.world.contacts import Button, Circuit
 from steptwin.world.element import B, Element, S
 from steptwin.world.elements import ELEMENTS

@@ -15,7 +15,8 @@ from typing import Any
 
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse, Runaway, TimeReversal
-from steptwin.machine import MotionController, Nanos
+from steptwin.machine import Nanos
+from steptwin.motioncontroller import MotionController
 from steptwin.nearmiss import NearMiss
 from steptwin.world import script as do
 from steptwin.world.actions import ExternalInput, act, is_release

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from steptwin.machine import MotionController, Nanos
+from steptwin.machine import Nanos
 from steptwin.motion import Profile
 from steptwin.motion.divisions import profile_of
+from steptwin.motioncontroller import MotionController
 from steptwin.world.trace import RecordSink, TraceRecord
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from steptwin.machine import Nanos
 from steptwin.world.faults import ActiveFault, Fault, RequestRoute, check_place, rig
 from steptwin.world.faults.machine import FaultyMachine
-from steptwin.world.faults.table import Layer, RequestEffect
+from steptwin.world.faults.table import Layer, Occasion
 from steptwin.world.kind import LineUnit
 from steptwin.world.kinds import line_kinds
 from steptwin.world.lines import SCRIPTS
@@ -44,21 +44,22 @@ class Rigging:
         there.set_state(state)
 
     def _prepare(self, fault: Fault) -> None:
-        if fault.kind.layer is Layer.PHYSICS or isinstance(fault.kind.effect, RequestEffect):
+        if fault.kind.layer is Layer.PHYSICS or fault.kind.occasion is Occasion.REQUEST:
             for name in self._plan.machines:
                 self.rig(name)
 
     def rig(self, name: str) -> FaultyMachine:
         """Prepare a machine for faults; if an axis has mechanics, its faults act on these instead of on the encoder."""
         plan = self._plan
-        machine = plan.machines[name]
-        if name in plan.faults.machines:
-            return plan.faults.machines[name]
+        machine, kernel = plan.machines[name], plan.kernel_of[name]
+        rigged = kernel.machines[name]
+        if isinstance(rigged, FaultyMachine):
+            return rigged
         mechanisms = {axis.mechanism.number: axis.mechanism for axis in plan.axes.values() if axis.spec.drive[0] == name}
         on = plan.line_of.get(name)
         service = LineUnit() if on is None else LineUnit(on[1], on[0].name)
         body = plan.kind_of[name].body(machine, service, mechanisms)
-        return rig(plan.kernel_of[name], name, plan.faults, body)
+        return rig(kernel, name, plan.faults, body)
 
 
 def _wires(plan: WorldParts) -> Iterator[RequestRoute]:

@@ -9,7 +9,8 @@ from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, MotionController, Nanos
+from steptwin.machine import SECOND, Nanos
+from steptwin.motioncontroller import MotionController
 from steptwin.nearmiss import NearMiss, alike
 from steptwin.world.kernel import Source
 from steptwin.world.names import Unknown, UnknownSignal

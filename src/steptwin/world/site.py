@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from steptwin.errors import Misuse
-from steptwin.machine import MotionController
+from steptwin.motioncontroller import MotionController
 from steptwin.world.chance import Chance
 from steptwin.world.contacts import Circuit
-from steptwin.world.kernel import Kernel
+from steptwin.world.kernel import Board, Kernel
 from steptwin.world.kind import AnyKind
 from steptwin.world.names import Unknown
 from steptwin.world.tomlplaces import Path
@@ -17,7 +17,6 @@ from steptwin.world.wires import PinName, Wire
 
 if TYPE_CHECKING:
     from steptwin.world.blueprint import Blueprint
-    from steptwin.world.board import Board
     from steptwin.world.element import AnyElement, NamedSpec
     from steptwin.world.parts import WorldParts
 

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from steptwin.durations import duration_text
 from steptwin.machine import Nanos
-from steptwin.world.faults.fault import Fault, value_text
+from steptwin.world.faults.table import Fault, value_text
 from steptwin.world.tables import all_keys, written
 
 LINE = "bus"

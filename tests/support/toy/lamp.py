@@ -12,7 +12,7 @@ from steptwin.state import Stateful
 from steptwin.world.element import Element, NamedSpec, Reference
 from steptwin.world.elements import forget, register
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
-from steptwin.world.faults.table import ElementEffect
+from steptwin.world.faults.effects import ElementEffect
 from steptwin.world.kernel import Kernel
 from steptwin.world.reader import Key, Row, Table, TomlText, optional
 from steptwin.world.sense import TableRows

@@ -6,8 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
 from steptwin.errors import Misuse, TimeReversal
-from steptwin.machine import Drive, Nanos, PinEdge
+from steptwin.machine import Nanos, PinEdge
 from steptwin.motion import MotionState, Profile, at_rest, plan_position, plan_stop
+from steptwin.motioncontroller import Drive
 from steptwin.state import Plain, Stateful
 
 STEP_P = 10

@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 from steptwin.errors import Misuse
 from steptwin.tables import IncompleteTable
 from steptwin.world.faults import KINDS, ActiveFault, Fault, FaultKind, Layer, Occasion, Parameter, parse, read, schema
-from steptwin.world.faults.active import addresses
-from steptwin.world.faults.stream import Run, spoil
-from steptwin.world.faults.table import LARGEST_WHOLE, ByteEffect, FaultReporter, ParameterForm, check, checked
+from steptwin.world.faults.active import FaultReporter, addresses
+from steptwin.world.faults.effects import ByteEffect, Run, checked
+from steptwin.world.faults.stream import spoil
+from steptwin.world.faults.table import LARGEST_WHOLE, ParameterForm, check
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from steptwin.world.faults import KINDS
-from steptwin.world.faults.table import SaveEffect
+from steptwin.world.faults.effects import SaveEffect
 
 
 @pytest.mark.parametrize("written", [0, 1, 3])

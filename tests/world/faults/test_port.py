@@ -445,7 +445,7 @@ def test_a_request_that_comes_on_no_known_link_meets_the_faults_of_every_link() 
     """As a request of a script does, also after one on a link."""
     rig = FaultRig("busy link=link-2")
     assert rig.ask() == ANSWER
-    refused = rig.faults.machines["1"].refusal(1, "", READ, rig.now)
+    refused = rig.machines[1].refusal(1, "", READ, rig.now)
     assert refused == bytes.fromhex("83 06")
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from steptwin.machine import MotionController
+from steptwin.motioncontroller import MotionController
 from steptwin.world.elements import ELEMENTS
 from steptwin.world.kind import AnyKind
 from steptwin.world.lanes import AxisLane, AxisViews, Mechanics, MovedLane

@@ -8,11 +8,12 @@ from typing import ClassVar
 
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, Nanos
-from steptwin.world.board import Board
 from steptwin.world.elements.axis import find_axis
 from steptwin.world.elements.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
-from steptwin.world.faults.table import ElementEffect, number
+from steptwin.world.faults.effects import ElementEffect
+from steptwin.world.faults.table import number
+from steptwin.world.kernel import Board
 from steptwin.world.kind import Terminals
 from steptwin.world.mechanics import Mechanism
 from steptwin.world.reader import Key, optional

@@ -17,7 +17,7 @@ from steptwin.world.element import Element, NamedSpec, Reference
 from steptwin.world.elements.axis import AXIS, BuiltAxis, find_axis
 from steptwin.world.elements.switch import SWITCH, SwitchSpec, lane_of, put_switch, read_switches, zone_of
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
-from steptwin.world.faults.table import ElementEffect
+from steptwin.world.faults.effects import ElementEffect
 from steptwin.world.faults.table import number as parameter
 from steptwin.world.lanes import SPRING_SHARE, MovedLane
 from steptwin.world.loadmotion import load_stretches

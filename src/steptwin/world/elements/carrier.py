@@ -9,9 +9,9 @@ from typing import ClassVar
 
 from steptwin.machine import Nanos
 from steptwin.world.belt import Workpiece, next_change
-from steptwin.world.board import Board
 from steptwin.world.elements.conveyor import find_conveyor
 from steptwin.world.elements.logic import BoardPart, BoardSpec, Joint
+from steptwin.world.kernel import Board
 from steptwin.world.reader import optional
 from steptwin.world.signals import SignalOf
 from steptwin.world.site import Site, Terminal

@@ -15,7 +15,6 @@ from typing import ClassVar
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.world.belt import BeltDrive, ConstantDrive, Load, Workpiece, next_change
-from steptwin.world.board import Board
 from steptwin.world.drawing import BELT, Drawing, SensorZone
 from steptwin.world.element import Reference
 from steptwin.world.elements.axis import find_axis, turns_of_axis
@@ -23,7 +22,8 @@ from steptwin.world.elements.beltsensor import SENSOR, Sensor, SensorSpec, read_
 from steptwin.world.elements.conveyortable import FEED, RUN, STOP, ConveyorSpec, StopSpec, mark_places, stop_terminal
 from steptwin.world.elements.logic import STUCK_INPUT, BoardPart, Inner, with_terminals
 from steptwin.world.faults import ActiveFault, Fault, FaultKind, Layer, Occasion
-from steptwin.world.faults.table import ElementEffect
+from steptwin.world.faults.effects import ElementEffect
+from steptwin.world.kernel import Board
 from steptwin.world.names import Unknown
 from steptwin.world.reader import Key, optional
 from steptwin.world.scale import exact_fraction

@@ -10,13 +10,13 @@ from math import floor
 from typing import ClassVar
 
 from steptwin.machine import MILLISECOND, Nanos
-from steptwin.world.board import Board
 from steptwin.world.drawing import ROD, Drawing
 from steptwin.world.element import Reference
 from steptwin.world.elements.logic import STUCK, BoardPart, BoardSpec, Inner, Joint, with_terminals
 from steptwin.world.elements.switch import SWITCH, SwitchSpec, lane_of, put_switch, read_switches, zone_of
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
-from steptwin.world.faults.table import ElementEffect
+from steptwin.world.faults.effects import ElementEffect
+from steptwin.world.kernel import Board
 from steptwin.world.kind import Terminals
 from steptwin.world.reader import TomlText, optional
 from steptwin.world.scale import exact_fraction

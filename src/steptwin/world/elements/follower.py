@@ -19,7 +19,8 @@ from steptwin.world.elements.axis import AXIS, BuiltAxis, turns_of_axis
 from steptwin.world.elements.shaft import SHAFT, TURN, GearedShaft
 from steptwin.world.elements.switch import SWITCH, SwitchSpec, lane_of, put_switch, read_switches, zone_of
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
-from steptwin.world.faults.table import ElementEffect, number
+from steptwin.world.faults.effects import ElementEffect
+from steptwin.world.faults.table import number
 from steptwin.world.lanes import LIFT_SHARE, STUCK, MovedLane
 from steptwin.world.names import Unknown
 from steptwin.world.reader import Key, Row, Table, TomlText, optional

@@ -8,7 +8,6 @@ from typing import ClassVar
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
-from steptwin.world.board import Board
 from steptwin.world.condition import SignalCondition
 from steptwin.world.coordinate import Coordinate, Pulled
 from steptwin.world.drawing import Drawing, rail
@@ -16,7 +15,9 @@ from steptwin.world.elements.axis import BuiltAxis, find_axis
 from steptwin.world.elements.logic import STUCK, BoardSpec, Joint, with_terminals
 from steptwin.world.elements.touch import JAM, REPORT, RESET, Touch
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
-from steptwin.world.faults.table import ElementEffect, number
+from steptwin.world.faults.effects import ElementEffect
+from steptwin.world.faults.table import number
+from steptwin.world.kernel import Board
 from steptwin.world.kind import Terminals
 from steptwin.world.lanes import MovedLane
 from steptwin.world.reader import Key, TomlText, optional

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 from steptwin.machine import Nanos
-from steptwin.world.board import Board
 from steptwin.world.elements.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
+from steptwin.world.kernel import Board
 from steptwin.world.kind import Terminals
 from steptwin.world.reader import Key, TomlText
 from steptwin.world.site import Terminal

@@ -8,12 +8,12 @@ from math import floor
 from typing import ClassVar
 
 from steptwin.machine import MILLISECOND, Nanos
-from steptwin.world.board import Board
 from steptwin.world.drawing import ROD, Drawing
 from steptwin.world.elements.carrier import CARRIER_KEYS, HELD, PICK, PLACE, Carrier, CarrierSpec, carrier_signals
 from steptwin.world.elements.logic import STUCK, Joint, with_terminals
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
-from steptwin.world.faults.table import ElementEffect
+from steptwin.world.faults.effects import ElementEffect
+from steptwin.world.kernel import Board
 from steptwin.world.kind import Terminals
 from steptwin.world.reader import TomlText, optional
 from steptwin.world.scale import exact_fraction

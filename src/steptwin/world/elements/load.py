@@ -9,14 +9,15 @@ from typing import ClassVar
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.state import Plain
-from steptwin.world.board import Board
 from steptwin.world.condition import SignalCondition
 from steptwin.world.curve import Stepped
 from steptwin.world.elements.axis import BuiltAxis, find_axis
 from steptwin.world.elements.logic import BoardPart, BoardSpec, Joint, with_terminals
 from steptwin.world.elements.quantity import TIME, check_condition, check_owners, condition_of, owner_of, owners_of, signal_of
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
-from steptwin.world.faults.table import ElementEffect, number
+from steptwin.world.faults.effects import ElementEffect
+from steptwin.world.faults.table import number
+from steptwin.world.kernel import Board
 from steptwin.world.kind import Terminals
 from steptwin.world.motor import Burden
 from steptwin.world.reader import Key, TomlText, optional

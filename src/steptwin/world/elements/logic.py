@@ -12,11 +12,12 @@ from typing import Any, Generic, NamedTuple, TypeVar
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.state import Stateful
-from steptwin.world.board import Board
 from steptwin.world.drawing import Drawing
 from steptwin.world.element import Element, NamedSpec, Reference
 from steptwin.world.faults import ActiveFault, Fault, FaultKind, Layer, Occasion
-from steptwin.world.faults.table import ElementEffect, Parameter, ParameterForm, whole
+from steptwin.world.faults.effects import ElementEffect
+from steptwin.world.faults.table import Parameter, ParameterForm, whole
+from steptwin.world.kernel import Board
 from steptwin.world.kind import Terminals
 from steptwin.world.reader import Key, Row, Table, TomlText
 from steptwin.world.sense import TableRows

@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import partial
 
 from steptwin.errors import Misuse
-from steptwin.world.board import Board
 from steptwin.world.condition import SignalCondition
 from steptwin.world.expression import parse_condition
+from steptwin.world.kernel import Board
 from steptwin.world.reader import TomlText
 from steptwin.world.signals import Idle, SignalOf, find_signal
 from steptwin.world.site import Site

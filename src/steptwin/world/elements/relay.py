@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from steptwin.machine import Nanos
-from steptwin.world.board import Board
 from steptwin.world.elements.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
-from steptwin.world.faults.table import ElementEffect
+from steptwin.world.faults.effects import ElementEffect
+from steptwin.world.kernel import Board
 from steptwin.world.kind import Terminals
 from steptwin.world.reader import optional
 from steptwin.world.site import Terminal

@@ -19,7 +19,7 @@ from steptwin.world.elements.axis import AXIS, BuiltAxis, find_axis, turns_of_ax
 from steptwin.world.elements.contact import CONTACT_KEYS
 from steptwin.world.elements.switch import lane_of, put_switch
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
-from steptwin.world.faults.table import ElementEffect
+from steptwin.world.faults.effects import ElementEffect
 from steptwin.world.lanes import SLIPS, MovedLane
 from steptwin.world.reader import Key, Row, Table, TomlText, optional, read_table
 from steptwin.world.scale import exact_fraction

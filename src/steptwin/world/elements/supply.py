@@ -9,12 +9,12 @@ from typing import Any, ClassVar, NamedTuple
 
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, Nanos
-from steptwin.world.board import Board
 from steptwin.world.elements.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
+from steptwin.world.faults.effects import ElementEffect
 from steptwin.world.faults.machine import FaultyMachine
-from steptwin.world.faults.table import ElementEffect
 from steptwin.world.faults.table import number as parameter
+from steptwin.world.kernel import Board
 from steptwin.world.kind import Terminals
 from steptwin.world.reader import Key, TomlText, optional
 from steptwin.world.rigging import Rigging

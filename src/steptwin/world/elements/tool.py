@@ -16,7 +16,8 @@ from steptwin.world.element import Element, NamedSpec, Reference
 from steptwin.world.elements.axis import AXIS, BuiltAxis, find_axis
 from steptwin.world.elements.switch import SWITCH, SwitchSpec, put_switch, read_switches, zone_of
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
-from steptwin.world.faults.table import ElementEffect, Parameter, ParameterForm
+from steptwin.world.faults.effects import ElementEffect
+from steptwin.world.faults.table import Parameter, ParameterForm
 from steptwin.world.lanes import SLIPS, MovedLane
 from steptwin.world.reader import Key, Row, Table, TomlText, optional
 from steptwin.world.scale import exact_fraction

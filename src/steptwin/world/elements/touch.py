@@ -7,9 +7,9 @@ from typing import ClassVar
 
 from steptwin.machine import Nanos
 from steptwin.state import Plain
-from steptwin.world.board import Board
 from steptwin.world.condition import SignalCondition
 from steptwin.world.elements.logic import BoardPart
+from steptwin.world.kernel import Board
 from steptwin.world.mechanics import Mechanism
 
 RESET, HIT = "RESET", "HIT"

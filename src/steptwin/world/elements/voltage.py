@@ -6,7 +6,8 @@ from typing import Protocol
 
 from steptwin.machine import Nanos
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
-from steptwin.world.faults.table import ElementEffect, number
+from steptwin.world.faults.effects import ElementEffect
+from steptwin.world.faults.table import number
 
 
 class VoltageOutput(Protocol):

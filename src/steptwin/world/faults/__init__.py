@@ -5,12 +5,12 @@ between a link and a port, `rig` lets a machine in its kernel have faults. `step
 """
 
 from steptwin.world.faults.active import ActiveFault, Faults
-from steptwin.world.faults.fault import EXAMPLE, GRAMMAR, Fault, FaultMistake, parse, read, schema
+from steptwin.world.faults.fault import EXAMPLE, GRAMMAR, FaultMistake, parse, read, schema
 from steptwin.world.faults.kinds import KINDS
 from steptwin.world.faults.machine import AxisLoad, Body, FaultyMachine, rig
 from steptwin.world.faults.places import RequestRoute, check_place
 from steptwin.world.faults.port import FaultyPort, FaultySendingPort
-from steptwin.world.faults.table import FaultKind, Layer, LineProtocol, Occasion, Parameter
+from steptwin.world.faults.table import Fault, FaultKind, Layer, LineProtocol, Occasion, Parameter
 
 __all__ = [
     "EXAMPLE",

@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from collections.abc import Callable, Iterator
+from typing import ClassVar, NamedTuple, Protocol, TypeAlias
 from weakref import WeakSet
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.state import Stateful
 from steptwin.world.chance import Chance
-from steptwin.world.faults.fault import Fault
-from steptwin.world.faults.table import Layer
+from steptwin.world.faults.table import Fault, Layer
 from steptwin.world.trace import RecordSink, TraceRecord
-
-if TYPE_CHECKING:
-    from steptwin.world.faults.element import FaultyElement
-    from steptwin.world.faults.machine import FaultyMachine
-    from steptwin.world.faults.port import FaultyPort
 
 _MULTIPLE = 0x10
 _LAST_WITH_COUNT = 4
@@ -130,6 +124,38 @@ class HeldLevel(NamedTuple):
         return f"held at {self.level:g} by fault {self.fault}"
 
 
+FaultReporter: TypeAlias = Callable[[ActiveFault, str], None]
+"""Reports that a fault has happened, and what it did."""
+
+
+class Failing(Protocol):
+    """A machine or an element, and the faults of it that are set."""
+
+    def check(self, fault: Fault) -> None:
+        """Raises `Misuse` for a fault that is impossible there."""
+        ...
+
+    def begin(self, active: ActiveFault) -> None:
+        """A fault was set."""
+        ...
+
+    def end(self, active: ActiveFault, now: Nanos) -> None:
+        """Remove a fault and release what it holds."""
+        ...
+
+    def held(self) -> Iterator[tuple[str, HeldLevel]]:
+        """The pins or terminals that faults hold."""
+        ...
+
+
+class FailingPort(Protocol):
+    """A port whose bytes and frames faults alter."""
+
+    def choose(self) -> None:
+        """The set of faults has changed."""
+        ...
+
+
 class Faults(Stateful):
     """The faults of a world. The random stream of a fault depends only on ``seed`` and its name.
 
@@ -146,15 +172,15 @@ class Faults(Stateful):
         self._found: dict[tuple[str, object], tuple[ActiveFault, ...]] = {}
         """Those of a layer, machine or element, as far as they have been asked for."""
         self.sinks: list[RecordSink] = []
-        self.machines: dict[str, FaultyMachine] = {}
+        self.machines: dict[str, Failing] = {}
         """Machines prepared for faults of physics."""
-        self.elements: dict[str, FaultyElement] = {}
+        self.elements: dict[str, Failing] = {}
         """Elements with faults."""
         self.link = ""
         """The link whose request is being served."""
         self.has_supplies = False
         """Whether machines may be without supply, so that they do not answer."""
-        self.ports: WeakSet[FaultyPort] = WeakSet()
+        self.ports: WeakSet[FailingPort] = WeakSet()
         """Ports in use, which change with programs and clients."""
 
     @property
@@ -189,14 +215,14 @@ class Faults(Stateful):
         self._changed()
         return active
 
-    def check(self, fault: Fault) -> FaultyMachine | FaultyElement | None:
+    def check(self, fault: Fault) -> Failing | None:
         """The machine or element of the fault, if any. `Misuse` for a machine, pin, axis or element that does not exist."""
         failing = self._failing(fault)
         if failing is not None:
             failing.check(fault)
         return failing
 
-    def _failing(self, fault: Fault) -> FaultyMachine | FaultyElement | None:
+    def _failing(self, fault: Fault) -> Failing | None:
         if fault.kind.layer is Layer.ELEMENT:
             return self._element(fault)
         return self._machine(fault) if fault.kind.layer is Layer.PHYSICS else None
@@ -231,7 +257,7 @@ class Faults(Stateful):
             name = f"{kind}-{number}"
         return name
 
-    def _machine(self, fault: Fault) -> FaultyMachine:
+    def _machine(self, fault: Fault) -> Failing:
         wanted = fault.get("machine")
         if wanted is None and len(self.machines) == 1:
             return next(iter(self.machines.values()))
@@ -243,7 +269,7 @@ class Faults(Stateful):
             raise Misuse(f"fault {fault.kind.name}: machine = {wanted!r}: there are {there}")
         return machine
 
-    def _element(self, fault: Fault) -> FaultyElement:
+    def _element(self, fault: Fault) -> Failing:
         wanted = fault.get("element")
         found = self.elements.get(str(wanted))
         if found is None:

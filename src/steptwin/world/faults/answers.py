@@ -7,10 +7,11 @@ from typing import NamedTuple
 
 from steptwin.machine import Nanos
 from steptwin.wire.pdu import REFUSED
-from steptwin.world.faults.active import ActiveFault
-from steptwin.world.faults.kinds_frames import NEVER_SENT
-from steptwin.world.faults.table import FaultReporter, LineProtocol
+from steptwin.world.faults.active import ActiveFault, FaultReporter
+from steptwin.world.faults.table import LineProtocol
 
+NEVER_SENT = 0
+"""No answer carries this exception code: a slave that must not answer gives it, and the port keeps it."""
 _UNIT = {LineProtocol.RTU: 0, LineProtocol.TCP: 6}
 
 

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.state import Stateful
-from steptwin.world.faults.active import HeldLevel
-from steptwin.world.faults.table import FaultKind
-
-if TYPE_CHECKING:
-    from steptwin.world.faults.active import ActiveFault, Faults
-    from steptwin.world.faults.fault import Fault
-    from steptwin.world.kernel import Kernel
+from steptwin.world.faults.active import ActiveFault, Faults, HeldLevel
+from steptwin.world.faults.table import Fault, FaultKind
+from steptwin.world.kernel import Kernel
 
 
 class FaultyElement(Stateful):

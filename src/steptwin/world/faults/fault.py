@@ -1,71 +1,18 @@
-"""A fault as a value: from a table of a TOML file, from a line of text, and back."""
+"""Faults read from a table of a TOML file or a line of text."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 
 from steptwin.errors import Misuse
 from steptwin.nearmiss import NearMiss
 from steptwin.numerals import read_integer, read_number
 from steptwin.world.faults.kinds import KINDS
-from steptwin.world.faults.table import FaultKind, FaultValue, Parameter, ParameterForm, RequestEffect, check
+from steptwin.world.faults.table import Fault, FaultKind, FaultValue, Parameter, ParameterForm, check
 
 GRAMMAR = "KIND [NAME=VALUE ...]"
 EXAMPLE = "crc unit=1 nth=3"
-
-
-@dataclass(frozen=True, slots=True)
-class Fault:
-    """``given`` are the parameters that were given; ``name`` distinguishes it from others of its kind; empty: none."""
-
-    kind: FaultKind
-    given: Mapping[str, FaultValue]
-    name: str = ""
-
-    def get(self, name: str) -> FaultValue | None:
-        """A parameter, else its default, else None."""
-        value = self.given.get(name)
-        if value is None:
-            parameter = self.kind.parameter(name)
-            return None if parameter is None else parameter.default
-        return value
-
-    def number(self, name: str) -> float:
-        """A parameter that is a number and has a default or was given. `Misuse` if it is none."""
-        value = self.get(name)
-        if isinstance(value, int | float):
-            return value
-        raise Misuse(f"fault {self.kind.name}: {name} = {value!r} is not a number")
-
-    def whole(self, name: str) -> int | None:
-        value = self.get(name)
-        return value if isinstance(value, int) else None
-
-    @property
-    def refuses(self) -> bool:
-        """Whether the requests it happens to are not carried out."""
-        effect = self.kind.effect
-        return isinstance(effect, RequestEffect) and (effect.is_refused is None or effect.is_refused(self))
-
-    def __str__(self) -> str:
-        """The line that `read` makes this of."""
-        name = {"name": self.name} if self.name else {}
-        parts = [self.kind.name, *(f"{key}={value_text(value)}" for key, value in (name | dict(self.given)).items())]
-        return " ".join(parts)
-
-
-def value_text(value: FaultValue) -> str:
-    if isinstance(value, tuple):
-        return str(value[0]) if value[0] == value[1] else f"{value[0]}-{value[1]}"
-    return (
-        repr(value)
-        if isinstance(value, float) and value != int(value)
-        else f"{value:.0f}"
-        if isinstance(value, float)
-        else f"{value}"
-    )
 
 
 class FaultMistake(Misuse):

@@ -5,10 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from steptwin.world.faults.effects import checked
 from steptwin.world.faults.kinds_bytes import BYTES
 from steptwin.world.faults.kinds_frames import FRAMES
 from steptwin.world.faults.kinds_physics import PHYSICS
-from steptwin.world.faults.table import WHEN, WHERE, FaultKind, Layer, Occasion, Parameter, checked
+from steptwin.world.faults.table import WHEN, WHERE, FaultKind, Layer, Occasion, Parameter
 
 KINDS = checked((*BYTES, *FRAMES, *PHYSICS))
 

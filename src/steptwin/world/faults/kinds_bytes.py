@@ -2,27 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from steptwin.machine import Nanos
-from steptwin.world.faults.table import (
-    ALL_LINES,
-    LONGEST_MS,
-    SERIAL,
-    ByteEffect,
-    FaultKind,
-    FaultReporter,
-    InsertEffect,
-    Layer,
-    Occasion,
-    PiecesEffect,
-    number,
-    whole,
-)
-
-if TYPE_CHECKING:
-    from steptwin.world.faults.active import ActiveFault
-    from steptwin.world.faults.stream import Run
+from steptwin.world.faults.active import ActiveFault, FaultReporter
+from steptwin.world.faults.effects import ByteEffect, InsertEffect, PiecesEffect, Run
+from steptwin.world.faults.table import ALL_LINES, LONGEST_MS, SERIAL, FaultKind, Layer, Occasion, number, whole
 
 
 def _flip(active: ActiveFault, byte: int, run: Run, report: FaultReporter) -> int:

@@ -2,33 +2,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from steptwin.wire.crc import with_crc
 from steptwin.wire.pdu import DEVICE_BUSY
+from steptwin.world.faults.active import ActiveFault, FaultReporter
+from steptwin.world.faults.answers import NEVER_SENT, AlteredAnswer, Exchange
+from steptwin.world.faults.effects import AnswerEffect, RequestEffect
 from steptwin.world.faults.table import (
     LONGEST_MS,
     MODBUS,
-    AnswerEffect,
+    Fault,
     FaultKind,
-    FaultReporter,
     Layer,
     LineProtocol,
     Occasion,
     Parameter,
     ParameterForm,
-    RequestEffect,
     number,
     whole,
 )
-
-if TYPE_CHECKING:
-    from steptwin.world.faults.active import ActiveFault
-    from steptwin.world.faults.answers import AlteredAnswer, Exchange
-    from steptwin.world.faults.fault import Fault
-
-NEVER_SENT = 0
-"""No answer carries this exception code: a slave that must not answer gives it, and the port keeps it."""
 
 _UNITS = 248
 """Unit 247 is followed by 0."""

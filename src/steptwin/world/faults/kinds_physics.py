@@ -2,32 +2,25 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.world.faults.active import ActiveFault
+from steptwin.world.faults.effects import ChangeEffect, MomentEffect, SaveEffect, WindowEffect
+from steptwin.world.faults.machine import FaultyMachine
 from steptwin.world.faults.table import (
     AXIS,
     LONGEST_MS,
     LONGEST_S,
     OFF,
     PIN,
-    ChangeEffect,
+    Fault,
     FaultKind,
     Layer,
-    MomentEffect,
     Need,
     Occasion,
-    SaveEffect,
-    WindowEffect,
     number,
     whole,
 )
-
-if TYPE_CHECKING:
-    from steptwin.world.faults.active import ActiveFault
-    from steptwin.world.faults.fault import Fault
-    from steptwin.world.faults.machine import FaultyMachine
 
 
 def _axis(active: ActiveFault) -> int:

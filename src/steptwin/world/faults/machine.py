@@ -6,13 +6,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple, Protocol
 
 from steptwin.errors import Misuse
-from steptwin.machine import Drive, MotionController, Nanos, PinEdge
+from steptwin.machine import Nanos, PinEdge
+from steptwin.motioncontroller import Drive, MotionController
 from steptwin.state import Plain, Stateful
 from steptwin.wire.pdu import exception_pdu
 from steptwin.world.faults.active import ActiveFault, Faults, HeldLevel
-from steptwin.world.faults.fault import Fault
-from steptwin.world.faults.kinds_frames import NEVER_SENT
-from steptwin.world.faults.table import ChangeEffect, FaultKind, Occasion, SaveEffect
+from steptwin.world.faults.answers import NEVER_SENT
+from steptwin.world.faults.table import Fault, FaultKind, Occasion
 from steptwin.world.kernel import Kernel
 from steptwin.world.trace import TraceRecord
 from steptwin.world.wires import PinName
@@ -152,7 +152,7 @@ class FaultyMachine(Stateful):
         self.inner.advance(now)
 
     def advance_to_change(self, until: Nanos) -> Nanos:
-        """See `steptwin.machine.MotionController.advance_to_change`."""
+        """See `steptwin.motioncontroller.MotionController.advance_to_change`."""
         own, due = self._own(), self.inner.deadline()
         if own is None or own > until:
             return self.inner.advance_to_change(until)
@@ -318,9 +318,8 @@ class FaultyMachine(Stateful):
         self.inner.set_pin(name, value, now)
         if value != before:
             for active in self._mine():
-                effect = active.fault.kind.effect
-                if isinstance(effect, ChangeEffect) and self.pin_of(active.fault) == name and active.strikes(now):
-                    effect.act(active, self, name, (before, value), now)
+                if active.fault.kind.occasion is Occasion.CHANGE and self.pin_of(active.fault) == name and active.strikes(now):
+                    active.fault.kind.effect.act(active, self, name, (before, value), now)
 
     def bounce(self, changes: list[tuple[Nanos, str, float]]) -> None:
         """Levels of inputs to come, each with its moment and pin."""
@@ -375,7 +374,7 @@ class FaultyMachine(Stateful):
     def kept(self, old: bytes, new: bytes, now: Nanos) -> bytes:
         """The content of the memory after ``new`` was saved over ``old`` of the same length."""
         kept = bytearray(new)
-        saves = [active for active in self._mine() if isinstance(active.fault.kind.effect, SaveEffect)]
+        saves = [active for active in self._mine() if active.fault.kind.occasion is Occasion.SAVE]
         for active in saves:
             if active.strikes(now):
                 active.fault.kind.effect.act(active, self, old, kept, now)
@@ -392,12 +391,13 @@ class FaultyMachine(Stateful):
 
 def rig(kernel: Kernel, name: str, faults: Faults, body: Body) -> FaultyMachine:
     """Apply faults of physics and protocol to the machine ``name`` of a kernel."""
-    there = faults.machines.get(name)
-    if there is None:
 
-        def on_edge(pin: str, now: Nanos, level: float) -> None:
-            kernel.mark_recorded(PinName(name, pin), now, level)
+    def on_edge(pin: str, now: Nanos, level: float) -> None:
+        kernel.mark_recorded(PinName(name, pin), now, level)
 
-        there = faults.machines[name] = FaultyMachine(kernel.machines[name], name, faults, body, on_edge)
-        kernel.replace(name, there)
-    return there
+    machine = kernel.machines[name]
+    if isinstance(machine, FaultyMachine):
+        return machine
+    failing = faults.machines[name] = FaultyMachine(machine, name, faults, body, on_edge)
+    kernel.replace(name, failing)
+    return failing

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from steptwin.errors import Misuse
-from steptwin.world.faults.fault import Fault
 from steptwin.world.faults.kinds import KINDS
-from steptwin.world.faults.table import Layer, LineProtocol
+from steptwin.world.faults.table import Fault, Layer, LineProtocol
 
 
 class RequestRoute(NamedTuple):

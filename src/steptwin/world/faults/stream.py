@@ -2,24 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from steptwin.machine import Nanos
-from steptwin.world.faults.active import ActiveFault
-from steptwin.world.faults.table import ByteEffect, FaultReporter, InsertEffect, PiecesEffect
-
-
-class Run:
-    """The received pieces, each with its additional delay."""
-
-    def __init__(self) -> None:
-        self.pieces: list[tuple[Nanos, bytearray]] = [(0, bytearray())]
-
-    def put(self, data: Iterable[int]) -> None:
-        self.pieces[-1][1].extend(data)
-
-    def pause(self, time: Nanos) -> None:
-        self.pieces.append((self.pieces[-1][0] + time, bytearray()))
+from steptwin.world.faults.active import ActiveFault, FaultReporter
+from steptwin.world.faults.effects import ByteEffect, InsertEffect, PiecesEffect, Run
 
 
 def spoil(data: bytes, actives: Sequence[ActiveFault], now: Nanos, report: FaultReporter) -> list[tuple[Nanos, bytes]]:

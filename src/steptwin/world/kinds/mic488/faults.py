@@ -9,7 +9,7 @@ from steptwin.mic488.core import ControllerCore, check_pin
 from steptwin.mic488.device import Mic488Device, Serving
 from steptwin.mic488.encoder import Coupling
 from steptwin.wire.pdu import exception_pdu
-from steptwin.world.faults.kinds_frames import NEVER_SENT
+from steptwin.world.faults.answers import NEVER_SENT
 from steptwin.world.faults.machine import AxisLoad, FaultyMachine
 from steptwin.world.faults.table import FaultKind, Need
 from steptwin.world.kind import LineUnit
