@@ -83,12 +83,12 @@ def test_a_complete_table_is_read_only() -> None:
             )
         ),
         (
-            "import steptwin.world.actions as t; t.FOR_SCRIPTS |= {t.Bytes}",
+            "import steptwin.world.inputs as t; t.FOR_SCRIPTS |= {t.Bytes}",
             "steptwin.world.scripts",
             "step of scripts Bytes lacks its execution",
         ),
         (
-            "import steptwin.world.actions as t; t.ExternalInput |= int",
+            "import steptwin.world.inputs as t; t.ExternalInput |= int",
             "steptwin.world.references",
             "step int lacks its check",
         ),

@@ -9,7 +9,7 @@ from steptwin.files.session import session_of
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.world import script as do
-from steptwin.world.actions import Download
+from steptwin.world.inputs import Download
 
 WBC = """\
 n = 0

@@ -17,9 +17,9 @@ from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.world import script as do
-from steptwin.world.actions import Bytes, ExternalInput
 from steptwin.world.control import Move
 from steptwin.world.faults import read
+from steptwin.world.inputs import Bytes, ExternalInput
 from steptwin.world.script import Steps
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"

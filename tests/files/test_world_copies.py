@@ -132,7 +132,7 @@ def test_values_of_a_description_can_be_replaced(tmp_path: Path) -> None:
     world = World.load(EXAMPLES / "feeder.toml", overrides=overrides)
     assert (world.axis["x"].position, world.spec.name) == (60.0, "other")
     assert world.mic488["table"].device.config.axes[0].acc == 500.0
-    assert world.parts.axes["x"].spec.pitch == 10.0
+    assert world.axes["x"].spec.pitch == 10.0
     world.run(for_=1)
     save(session_of(world), tmp_path / "s.json")
     session = load(tmp_path / "s.json")

@@ -31,7 +31,7 @@ from steptwin.subject.payloads import (
     StatusPayload,
 )
 from steptwin.subject.world import WorldSubject
-from steptwin.world.actions import Bytes
+from steptwin.world.inputs import Bytes
 from steptwin.world.script import PowerCycle, Send, Write
 
 FEEDER = Path(__file__).parents[2] / "examples/worlds/feeder.toml"

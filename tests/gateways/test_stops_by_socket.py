@@ -20,7 +20,7 @@ from websockets.sync.client import connect
 from steptwin.gateways.opcua.addressspace import node_id
 from steptwin.live.remote import RemoteSubject
 from steptwin.subject import commands as command
-from steptwin.world.actions import Download
+from steptwin.world.inputs import Download
 
 WORLD = """
 [world]

@@ -24,7 +24,7 @@ from steptwin.wire import mbap
 from steptwin.wire.crc import with_crc
 from steptwin.wire.pdu import READS
 from steptwin.wire.slave import FrameDirection, RtuSlavePort, TcpSlavePort
-from steptwin.world.actions import Bytes
+from steptwin.world.inputs import Bytes
 from steptwin.world.kinds.mic488.line import ModbusBus
 from steptwin.world.plantsnapshot import RecordedInput
 from steptwin.world.trace import TraceRecord

@@ -18,7 +18,7 @@ from steptwin.files.session import load
 from steptwin.files.world import World
 from steptwin.live.transports import forget, register
 from steptwin.wire.crc import with_crc
-from steptwin.world.actions import Bytes
+from steptwin.world.inputs import Bytes
 from steptwin.world.kinds import line_kinds
 from steptwin.world.reader import WorldError
 

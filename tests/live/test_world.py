@@ -26,9 +26,9 @@ from steptwin.mic488.device import Mic488Device
 from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection, TcpSlavePort
 from steptwin.world import script as do
-from steptwin.world.actions import Bytes, See
 from steptwin.world.faults import Faults, FaultyPort
 from steptwin.world.faults import LineProtocol as FaultLine
+from steptwin.world.inputs import Bytes, See
 from steptwin.world.kernel import Kernel
 
 LINE = '[[line]]\nname = "bus"\ntcp = "127.0.0.1:0"\n[[mic488]]\nname = "twin"\nline = "bus"\n'

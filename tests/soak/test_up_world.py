@@ -18,7 +18,7 @@ from steptwin.live import world as live_world_module
 from steptwin.live.world import LiveWorld, PlacePort
 from steptwin.machine import MILLISECOND
 from steptwin.world import script as do
-from steptwin.world.actions import Bytes
+from steptwin.world.inputs import Bytes
 from steptwin.world.kinds.mic488.line import ModbusBus
 from steptwin.world.lines import SCRIPTS
 

@@ -26,7 +26,7 @@ from steptwin.subject.debugcommands import (
 from steptwin.subject.following import EventBatch, Filter
 from steptwin.subject.world import WorldSubject
 from steptwin.world.history import History, Past
-from steptwin.world.programtexts import WorldPrograms
+from steptwin.world.worldprograms import WorldPrograms
 
 T = TypeVar("T")
 

@@ -10,9 +10,9 @@ from steptwin.files.world import World
 from steptwin.machine import SECOND
 from steptwin.subject import commands as command
 from steptwin.subject.world import WorldSubject
-from steptwin.world.actions import Download
 from steptwin.world.control import ControlProgram
 from steptwin.world.faults import read as read_fault
+from steptwin.world.inputs import Download
 from steptwin.world.script import SetFault
 
 LOOPING = "[\n@5\nF12800\nR\nW100\nB12800\nR\nW100\nJ5\n]"

@@ -17,9 +17,10 @@ from steptwin.subject import debugcommands as debug
 from steptwin.subject.commands import COMMANDS, plain_command, read_command
 from steptwin.subject.schema import schema
 from steptwin.world import script as do
-from steptwin.world.actions import ACTIONS, Bytes, Download, EndScripts, Leave, Refused, See, SetVariable
+from steptwin.world.actions import ACTIONS
 from steptwin.world.control import Halt
 from steptwin.world.faults import read as read_fault
+from steptwin.world.inputs import Bytes, Download, EndScripts, Leave, Refused, See, SetVariable
 
 SCHEMA = Path(__file__).parents[2] / "docs" / "control.schema.json"
 

@@ -16,8 +16,8 @@ from steptwin.subject import commands as command
 from steptwin.subject.following import filter_of
 from steptwin.subject.jogs import WorldJogs
 from steptwin.subject.world import WorldSubject
-from steptwin.world.actions import Bytes
 from steptwin.world.faults import read as read_fault
+from steptwin.world.inputs import Bytes
 from steptwin.world.script import SetFault
 
 HOIST = """

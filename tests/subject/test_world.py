@@ -28,9 +28,9 @@ from steptwin.subject.payloads import FramePayload, InputPayload
 from steptwin.subject.world import WorldSubject
 from steptwin.wire.crc import with_crc
 from steptwin.world import script as do
-from steptwin.world.actions import Bytes, Download
 from steptwin.world.faults import read as read_fault
 from steptwin.world.faults.kinds import KINDS
+from steptwin.world.inputs import Bytes, Download
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
 READ_POSITION = with_crc(bytes.fromhex("01 03 27 24 00 02"))

@@ -18,7 +18,7 @@ from steptwin.subject.payloads import PlanPayload
 from steptwin.subject.world import WorldSubject
 from steptwin.wire.crc import with_crc
 from steptwin.world import script as do
-from steptwin.world.actions import Bytes
+from steptwin.world.inputs import Bytes
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
 

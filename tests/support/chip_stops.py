@@ -19,8 +19,8 @@ from steptwin.subject import commands as command
 from steptwin.subject.following import filter_of
 from steptwin.subject.payloads import StatusPayload
 from steptwin.subject.world import WorldSubject
-from steptwin.world.actions import Download
 from steptwin.world.control import Seek
+from steptwin.world.inputs import Download
 from steptwin.world.motions import ordered
 
 FAMILIES = ("A", "B", "C", "E1", "E2")

@@ -28,20 +28,21 @@ from steptwin.motion.divisions import StepTrain
 from steptwin.motion.profile import Profile
 from steptwin.subject.describe import describe
 from steptwin.wire.crc import with_crc
-from steptwin.world.actions import ACTIONS, Bytes, Download, Leave, See, SetVariable
+from steptwin.world.actions import ACTIONS
 from steptwin.world.check import diagnose
 from steptwin.world.history import History, Past
+from steptwin.world.inputs import Bytes, Download, Leave, See, SetVariable
 from steptwin.world.overrides import read_overrides
 from steptwin.world.pieces import given_files
 from steptwin.world.plant import Plant
 from steptwin.world.programs import Place, StatementFollower
-from steptwin.world.programtexts import WorldPrograms, program_texts
 from steptwin.world.reader import TomlText
-from steptwin.world.signals import SignalOf
+from steptwin.world.signal import SignalOf
 from steptwin.world.steptable import read_steps
 from steptwin.world.trace import TraceRecord, encode
 from steptwin.world.unfinished import unchanged_inputs, waiting
 from steptwin.world.views import MechanicsView
+from steptwin.world.worldprograms import WorldPrograms, program_texts
 
 STEPS = 16
 MOMENTS = 7
@@ -106,7 +107,7 @@ def seen(name: str, seed: int) -> dict[str, list[str]]:
     files = {file: chance.filled(content).encode() for file, content in scene.files.items()}
     world = World.from_toml(text, files)
     statements: list[TraceRecord] = []
-    follower = StatementFollower(world, statements.append)
+    follower = StatementFollower(world.programs, statements.append)
     listener, history = Listener(world), History(world)
     moments = sorted(chance.below(round(END_S * SECOND)) for _ in range(MOMENTS))
     steps = list(zip(moments, from_outside, strict=True))

@@ -26,7 +26,7 @@ from steptwin.studio.session import ViewerSession
 from steptwin.studio.surroundings import PresentMoment, Surroundings
 from steptwin.subject.jogs import WorldJogs
 from steptwin.subject.world import WorldSubject
-from steptwin.world.programtexts import WorldPrograms, configuration_text
+from steptwin.world.worldprograms import WorldPrograms, configuration_text
 
 WORLD = """
     [world]

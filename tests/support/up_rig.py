@@ -18,7 +18,7 @@ from steptwin.motion.profile import Profile
 from steptwin.subject.following import filter_of
 from steptwin.subject.jogs import WorldJogs
 from steptwin.subject.payloads import PlanPayload, StatusPayload
-from steptwin.world.actions import Download
+from steptwin.world.inputs import Download
 
 LOOPING = "M1 = ON\nA:\nPREL M1 40\nWAITPOS\nPREL M1 -40\nWAITPOS\nJUMP A\n"
 MIC488 = """

@@ -14,7 +14,7 @@ from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
 from steptwin.m1486.lines import STEP_DIRECTION, Interface
 from steptwin.machine import Nanos
-from steptwin.world.actions import Bytes
+from steptwin.world.inputs import Bytes
 from steptwin.world.kinds.m1486.small import m1486_world
 from steptwin.world.kinds.mic488.small import mic488_world
 from steptwin.world.small import LINE, Whole

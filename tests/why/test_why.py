@@ -13,8 +13,8 @@ from steptwin.why.kept import PastQuestions
 from steptwin.why.question import finish
 from steptwin.wire.rtu import encode_frame
 from steptwin.world import script as do
-from steptwin.world.actions import Bytes, Download
 from steptwin.world.history import History
+from steptwin.world.inputs import Bytes, Download
 from steptwin.world.kinds.mic488.writes import encode_write
 
 

@@ -7,7 +7,7 @@ from world_rig import small
 
 from steptwin.errors import Misuse
 from steptwin.world import script as do
-from steptwin.world.actions import Bytes, Download, ExternalInput, Leave, act, size_of
+from steptwin.world.inputs import Bytes, Download, ExternalInput, Leave, size_of
 
 
 @pytest.mark.parametrize(
@@ -20,4 +20,4 @@ def test_how_much_a_program_outside_has_given(what: ExternalInput, size: int) ->
 
 def test_what_only_scripts_can_do_does_not_come_from_outside() -> None:
     with pytest.raises(Misuse, match="only scripts can execute this step"):
-        act(small(), do.Wait(1))
+        small().perform(do.Wait(1))

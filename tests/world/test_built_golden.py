@@ -118,8 +118,10 @@ def described(world: World) -> Iterator[str]:
         yield f"axis {name}: {axis.mechanism.build}, {float(axis.scale.pulses_per_unit):.12g} imp/{axis.scale.unit}"
     yield from (f"view {'.'.join(name)}: {view}" for name, view in axis_views(world).items())
     for element in ELEMENTS.values():
-        for spec in world.spec.elements_of(element):
-            refers = (f"{one.one}–{one.other} {'.'.join(map(str, one.path))}" for one in element.refers(spec, world.spec))
+        for spec in world.spec.elements.of(element):
+            refers = (
+                f"{one.one}–{one.other} {'.'.join(map(str, one.path))}" for one in element.refers(spec, world.spec.elements)
+            )
             yield f"{'.'.join(map(str, spec.path))}: {', '.join(refers)}"
         for name, built in world.parts.built(element).items():
             if element.drawing is not None:
@@ -128,7 +130,7 @@ def described(world: World) -> Iterator[str]:
                 sources = " ".join(source.name for source in of.sources)
                 yield f"  {name}.{signal}: {of.unit} {of.bounds} of {sources}"
             if element.moved is not None:
-                yield from (f"  {name} is moved by {axis.spec.name}: {lane}" for axis, lane in element.moved(built))
+                yield from (f"  {name} is moved by {axis}: {lane}" for axis, lane in element.moved(built))
     for kernel in world.kernels:
         for number, part in enumerate(kernel.parts):
             watched = sorted(name for name, numbers in kernel._parts.by_name.items() if number in numbers)

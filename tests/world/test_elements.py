@@ -21,11 +21,11 @@ from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND
 from steptwin.tables import IncompleteTable
-from steptwin.world.element import ElementSpec
 from steptwin.world.elements import ELEMENTS, register
 from steptwin.world.elements.button import BUTTON
 from steptwin.world.elements.source import SOURCE
 from steptwin.world.elements.wire import WIRE
+from steptwin.world.elementspec import ElementSpec
 from steptwin.world.faults import KINDS, read
 from steptwin.world.reader import WorldError, optional
 from steptwin.world.script import SetFault

@@ -18,7 +18,7 @@ from steptwin.world import script as do
 from steptwin.world.eventpoints import EventPoints, points_of, stays_between_events
 
 if TYPE_CHECKING:
-    from steptwin.world.actions import ExternalInput
+    from steptwin.world.inputs import ExternalInput
 
 CHIP = """
 [[line]]

@@ -12,8 +12,8 @@ from steptwin.errors import Misuse
 from steptwin.files.world import World
 from steptwin.machine import SECOND, Nanos
 from steptwin.world import history as module
-from steptwin.world.actions import Bytes, size_of
 from steptwin.world.history import History, Past
+from steptwin.world.inputs import Bytes, size_of
 from steptwin.world.plant import Plant
 from steptwin.world.script import Set, Write
 

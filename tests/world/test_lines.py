@@ -11,7 +11,7 @@ from steptwin.files.world import World
 from steptwin.machine import MILLISECOND
 from steptwin.wire.crc import with_crc
 from steptwin.wire.slave import FrameDirection
-from steptwin.world.actions import Download, SetVariable
+from steptwin.world.inputs import Download, SetVariable
 from steptwin.world.kinds import line_kinds
 from steptwin.world.lines import SCRIPTS, LineTraffic, LineWrite
 

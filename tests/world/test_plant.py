@@ -14,10 +14,11 @@ from steptwin.files.world import World
 from steptwin.machine import SECOND
 from steptwin.wire.crc import with_crc
 from steptwin.wire.slave import FrameDirection
-from steptwin.world import plant
+from steptwin.world import model
 from steptwin.world import script as do
-from steptwin.world.actions import Bytes, Leave, See
 from steptwin.world.faults import read
+from steptwin.world.inputs import Bytes, Leave, See
+from steptwin.world.plant import Plant
 from steptwin.world.script import Steps
 
 
@@ -344,17 +345,17 @@ def test_whoever_watches_kernels_sees_those_that_scripts_wait_for_as_well() -> N
 def test_what_was_to_be_done_later_is_done_once_and_may_be_called_off() -> None:
     world = small()
     steps = (do.Wait(SECOND), do.Press("go"))
-    world.schedule("press it", steps)
+    world._scripts.schedule("press it", steps)
     world.run(for_=0.5)
-    world.schedule("press it", steps)
+    world._scripts.schedule("press it", steps)
     world.run(for_=0.75)
     assert world.read("go.pressed") == 0.0, "begun anew: the first was called off"
     world.run(for_=0.25)
     assert world.read("go.pressed") == 1.0
     world.release("go")
-    world.schedule("press it", steps)
-    world.unschedule("press it")
-    world.unschedule("press it")
+    world._scripts.schedule("press it", steps)
+    world._scripts.unschedule("press it")
+    world._scripts.unschedule("press it")
     world.run(for_=2)
     assert world.read("go.pressed") == 0.0
 
@@ -369,7 +370,7 @@ def test_time_does_not_go_back() -> None:
 
 
 def test_what_is_remembered_of_texts_does_not_grow_without_bound(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(plant, "MOST_REMEMBERED", 3)
+    monkeypatch.setattr(model, "MOST_REMEMBERED", 3)
     world = small()
     for number in range(20):
         assert world.holds(world.condition(f"time >= -{number}"))
@@ -489,7 +490,7 @@ def test_what_a_program_does_not_fetch_is_kept_up_to_a_limit(count: int) -> None
 
 def test_a_plant_keeps_what_happens_and_what_comes_in_unless_told_otherwise() -> None:
     world = small()
-    usual, light = plant.Plant(world.blueprint), plant.Plant(world.blueprint, keep_trace=False, keep_inputs=False)
+    usual, light = Plant(world.blueprint), Plant(world.blueprint, keep_trace=False, keep_inputs=False)
     for keeps, found in ((True, usual), (False, light)):
         assert (found.trace.is_kept, found.keeps_inputs) == (keeps, keeps)
         found.apply_input(do.Set((("a", "IN5", 1.0),)))

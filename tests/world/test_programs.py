@@ -55,7 +55,7 @@ def two() -> World:
 
 def executed(world: World, seconds: float) -> list[tuple[int, str, str, object]]:
     found: list[TraceRecord] = []
-    follower = StatementFollower(world, found.append)
+    follower = StatementFollower(world.programs, found.append)
     world.run_to(world.now + round(seconds * SECOND))
     follower.close()
     count = len(found)

@@ -17,10 +17,10 @@ from steptwin.mic488.inifile import IniFile
 from steptwin.subject.commands import ControlProgram
 from steptwin.subject.world import WorldSubject
 from steptwin.world import script as do
-from steptwin.world.actions import Download
+from steptwin.world.inputs import Download
 from steptwin.world.kinds.m1486.build import keep_memory
 from steptwin.world.programs import StatementFollower
-from steptwin.world.programtexts import WorldPrograms, configuration_text, program_texts
+from steptwin.world.worldprograms import WorldPrograms, configuration_text, program_texts
 
 WORLD = """
 [world]
@@ -215,7 +215,7 @@ def test_a_chip_that_is_shut_down_receives_nothing(is_off: bool) -> None:
 def test_statements_are_those_of_the_present_texts() -> None:
     there = world()
     seen: list[tuple[str, str, object]] = []
-    follower = StatementFollower(there, lambda record: seen.append((record.machine, record.subject, record.value)))
+    follower = StatementFollower(there.programs, lambda record: seen.append((record.machine, record.subject, record.value)))
     there.apply_input(Download("drum", "program", "; two\n\nf640\nr\n"))
     there.apply_input(Download("table", "program 3", "\n\nDELAY 0.5\n"))
     there.apply_input(do.Write((("table", "PROG_BANK_SEL", 3.0),)))

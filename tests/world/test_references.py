@@ -9,8 +9,8 @@ import pytest
 from steptwin.errors import Misuse
 from steptwin.files.world import World
 from steptwin.world import script as do
-from steptwin.world.actions import See, SetVariable
 from steptwin.world.faults import read
+from steptwin.world.inputs import See, SetVariable
 from steptwin.world.references import check_step
 
 WORLD = """

@@ -120,7 +120,7 @@ def test_what_begins_in_a_restored_world_does_not_take_the_place_of_what_goes_on
     snapshot = world.snapshot()
     other = small()
     other.restore(snapshot)
-    other.schedule("note it", (do.Wait(SECOND // 2), do.Note("noted")))
+    other._scripts.schedule("note it", (do.Wait(SECOND // 2), do.Note("noted")))
     other.run(for_=1)
     assert [(r.time, r.value) for r in other.trace.events("world")] == [(SECOND, "noted")]
     assert other.read("go.pressed") == 1.0
@@ -371,13 +371,13 @@ def test_a_script_is_not_looked_at_that_another_one_has_called_off_at_the_same_m
     def other() -> Steps:
         if not begun_before:
             yield do.Until("time >= 1")
-        world.unschedule("guest")
+        world._scripts.unschedule("guest")
         yield do.Note("called off")
 
     world = small()
     if not begun_before:
         world.start("other", other)
-    world.schedule("guest", (do.Until("time >= 1"), do.Note("guest")))
+    world._scripts.schedule("guest", (do.Until("time >= 1"), do.Note("guest")))
     if begun_before:
         world.start("other", other)
     world.run(for_="2 s")

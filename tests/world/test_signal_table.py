@@ -15,7 +15,7 @@ from whole_world import everything
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.world.elements import ELEMENTS
-from steptwin.world.signals import SignalOf
+from steptwin.world.signal import SignalOf
 
 GOLDEN = Path(__file__).parent / "golden" / "signals.txt"
 MOMENTS: tuple[Nanos, ...] = (0, 99 * MILLISECOND, 433 * MILLISECOND, 2_333 * MILLISECOND)

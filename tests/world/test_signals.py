@@ -12,7 +12,8 @@ from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.datasheet import datasheet_of
 from steptwin.wire.crc import with_crc
 from steptwin.world.script import Send
-from steptwin.world.signals import Idle, SignalOf, find_signal
+from steptwin.world.signal import SignalOf
+from steptwin.world.signals import Idle, find_signal
 
 OF_M1 = "M1.status, M1.enabled, M1.moving, M1.position, M1.velocity, M1.encoder"
 CHIP = """

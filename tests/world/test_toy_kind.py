@@ -29,7 +29,7 @@ from steptwin.live.world_frames import follow_frames
 from steptwin.subject.commands import Advance, Describe, Home, Move, ReadPins, ReadState
 from steptwin.subject.world import WorldSubject
 from steptwin.wire.frameline import FrameLine
-from steptwin.world.actions import Download, ExternalInput, See, SetVariable
+from steptwin.world.inputs import Download, ExternalInput, See, SetVariable
 from steptwin.world.motions import ordered
 from steptwin.world.reader import WorldError
 from steptwin.world.script import Turn

@@ -11,6 +11,7 @@ from steptwin.datasheet import PinDirection
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion.divisions import StepTrain
 from steptwin.motion.profile import Profile
+from steptwin.world.elements.button import BUTTON
 from steptwin.world.plant import Plant
 from steptwin.world.trace import TraceRecord
 
@@ -70,7 +71,7 @@ def _acting(world: Plant) -> frozenset[str]:
     for name, machine in world.machines.items():
         sheet = world.kind(name).datasheet(machine)
         found |= {f"{name}.{pin.name}" for pin in sheet.pins if pin.direction is not PinDirection.INPUT}
-    return frozenset(found | set(world.parts.buttons))
+    return frozenset(found | set(world.parts.built(BUTTON)))
 
 
 def _changes(trace: Iterable[TraceRecord], acting: Collection[str], end: Nanos) -> list[tuple[Nanos, str, bool]]:

@@ -98,7 +98,7 @@ class CaseRunner:
         common = self._blueprint(overrides)
         blueprint = common.with_seed(seed)
         world = World(blueprint, keep_trace=keep, keep_inputs=keep)
-        common.is_checked, common.joined = blueprint.is_checked, blueprint.joined
+        common.joined = blueprint.joined
         return world
 
     def _blueprint(self, overrides: Overrides) -> Blueprint:

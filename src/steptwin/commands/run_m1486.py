@@ -112,7 +112,7 @@ def run(options: M1486Run, out: Print, warn: Print) -> bool:
                 world.downloaded[name, PLACE] = source  # what the host is about to type
         reports.observe(world, Path())
         if options.trace is not None:
-            StatementFollower(world, world.trace.add)
+            StatementFollower(world.programs, world.trace.add)
         chips = Chips(world, len(typed), changes)
         limit = options.longest
         begin = time.perf_counter()

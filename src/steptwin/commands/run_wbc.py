@@ -95,7 +95,7 @@ def run(options: WbcRun, out: Print, warn: Print) -> bool:
         watch = RunWatch(world)
         reports.observe(world, Path())
         if keep_trace:
-            StatementFollower(world, world.trace.add)
+            StatementFollower(world.programs, world.trace.add)
         if is_late:
             given.start(watch.device)
         limit = options.longest

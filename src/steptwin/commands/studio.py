@@ -61,7 +61,7 @@ from steptwin.world.blueprint import Blueprint
 from steptwin.world.description import read_world
 from steptwin.world.history import History
 from steptwin.world.pieces import given_files
-from steptwin.world.programtexts import WorldPrograms, configuration_text
+from steptwin.world.worldprograms import WorldPrograms, configuration_text
 
 DEFAULT = Address("127.0.0.1", 8488)
 ANY = ("0.0.0.0", "::")

@@ -40,14 +40,13 @@ from steptwin.live.world import LiveWorld, PlacePort, VisionPort, announced
 from steptwin.live.world_control import WorldControl
 from steptwin.machine import Nanos, SendingPort
 from steptwin.tracing import is_traced
-from steptwin.world.actions import Leave
 from steptwin.world.addresses import check_addresses, parse_address
-from steptwin.world.kind import LinkKind
+from steptwin.world.inputs import Leave
+from steptwin.world.kind import LineSpec, LinkKind
 from steptwin.world.kinds import line_kinds
 from steptwin.world.lines import SCRIPTS
 from steptwin.world.overrides import Overrides
 from steptwin.world.records import is_shown, named_in, read_selection
-from steptwin.world.spec import LineSpec
 from steptwin.world.trace import TraceRecord
 
 

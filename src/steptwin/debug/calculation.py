@@ -18,7 +18,8 @@ from steptwin.nearmiss import NearMiss
 from steptwin.world.expression import ReadAt, parse_expression, value_of
 from steptwin.world.plant import Plant
 from steptwin.world.quantities import unit_of_all
-from steptwin.world.signals import Idle, SignalOf
+from steptwin.world.signal import SignalOf
+from steptwin.world.signals import Idle
 
 EXACT = 1e15
 """Whole numbers below it are shown with all their digits."""

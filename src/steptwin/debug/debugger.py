@@ -23,8 +23,8 @@ from steptwin.machine import SECOND, Nanos
 from steptwin.subject.time import next_due
 from steptwin.why.answer import Answer
 from steptwin.why.kept import PastQuestions
-from steptwin.world.actions import ExternalInput
 from steptwin.world.history import History, outside_past
+from steptwin.world.inputs import ExternalInput
 from steptwin.world.plant import Plant
 from steptwin.world.plantsnapshot import PlantSnapshot
 from steptwin.world.programs import Place, Programs

@@ -13,7 +13,7 @@ from steptwin.errors import Misuse
 from steptwin.motioncontroller import MotionController
 from steptwin.points import LivePoint
 from steptwin.subject.debugcommands import SCOPES
-from steptwin.world.actions import ExternalInput, SetVariable
+from steptwin.world.inputs import ExternalInput, SetVariable
 from steptwin.world.kind import AnyKind
 from steptwin.world.plant import Plant
 from steptwin.world.script import Set, Write

@@ -21,11 +21,12 @@ from steptwin.inputfiles import read_recorded
 from steptwin.machine import SECOND, Nanos
 from steptwin.plaintypes import fitting
 from steptwin.world import script as do
-from steptwin.world.actions import ACTIONS, ExternalInput
+from steptwin.world.actions import ACTIONS
 from steptwin.world.blueprint import Blueprint
 from steptwin.world.description import read_world
 from steptwin.world.faults import Fault, parse
 from steptwin.world.history import replay
+from steptwin.world.inputs import ExternalInput
 from steptwin.world.overrides import Overrides
 from steptwin.world.pieces import given_files
 from steptwin.world.plantsnapshot import RecordedInput

@@ -28,8 +28,8 @@ from steptwin.subject import debugcommands as command
 from steptwin.subject.dispatch import Action
 from steptwin.subject.payloads import BreakpointsPayload, LogPayload, StoppedPayload
 from steptwin.tables import complete
-from steptwin.world.actions import Download
-from steptwin.world.plant import WORLD
+from steptwin.world.inputs import Download
+from steptwin.world.model import WORLD
 from steptwin.world.plantsnapshot import PlantSnapshot, RecordedInput
 
 _EVENTS = complete("event", command.EVENTS, "codes", {event.code: event for event in Events})

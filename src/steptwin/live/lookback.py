@@ -19,7 +19,7 @@ from steptwin.subject.following import EventBatch, Filter
 from steptwin.subject.world import WorldSubject
 from steptwin.world.history import History, Past
 from steptwin.world.plantsnapshot import PlantSnapshot
-from steptwin.world.programtexts import WorldPrograms
+from steptwin.world.worldprograms import WorldPrograms
 
 STATE_S = 1.0
 """A state is kept so often, in real time: what is replayed from it then took no longer when it happened."""

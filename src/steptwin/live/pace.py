@@ -28,7 +28,7 @@ from steptwin.subject.fields import FASTEST, SLOWEST
 from steptwin.subject.following import Following
 from steptwin.subject.time import MOST_SHOWN, end_of, happened, shown_of
 from steptwin.world.condition import SignalCondition
-from steptwin.world.plant import WORLD
+from steptwin.world.model import WORLD
 from steptwin.world.plantsnapshot import PlantSnapshot
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from steptwin.subject.events import Event
 from steptwin.subject.following import USUAL, filter_of
 from steptwin.subject.motion import Motions
 from steptwin.subject.payloads import PacePayload
-from steptwin.world.plant import WORLD
+from steptwin.world.model import WORLD
 
 BOUND = 10_000
 SETTLING_NS: Nanos = 100 * MILLISECOND

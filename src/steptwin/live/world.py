@@ -19,12 +19,12 @@ from steptwin.subject.payloads import StatusPayload
 from steptwin.subject.world import WorldSubject
 from steptwin.tracing import is_traced
 from steptwin.wire.slave import SlaveDevice
-from steptwin.world.actions import Bytes, ExternalInput, Leave, See, size_of
 from steptwin.world.history import History
+from steptwin.world.inputs import Bytes, ExternalInput, Leave, See, size_of
 from steptwin.world.kernel import Kernel
 from steptwin.world.kinds import line_kinds
 from steptwin.world.lines import LineEndPoint
-from steptwin.world.plant import WORLD
+from steptwin.world.model import WORLD
 from steptwin.world.plantsnapshot import PlantSnapshot
 from steptwin.world.turns import Dues
 

@@ -11,7 +11,7 @@ from steptwin.errors import Refusal
 from steptwin.studio.machines import Sheets
 from steptwin.subject.contract import Reading
 from steptwin.world.kinds import KINDS
-from steptwin.world.programtexts import FINDING
+from steptwin.world.worldprograms import FINDING
 
 
 class Configurations:

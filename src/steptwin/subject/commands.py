@@ -38,8 +38,8 @@ from steptwin.subject.fields import (
 )
 from steptwin.subject.payloads import KINDS
 from steptwin.world import script as do
-from steptwin.world.actions import Download, See
 from steptwin.world.control import ControlProgram, Enable, Home, Jog, Move, StopAxes
+from steptwin.world.inputs import Download, See
 
 VERSION = 1
 """Of the commands, their answers and the events; a request may name the one that it was written for."""

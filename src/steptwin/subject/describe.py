@@ -33,7 +33,7 @@ def describe(world: Plant) -> Description:
         world.spec.name,
         tuple(_machine(world, name, is_moved=name in moved) for name in world.machines),
         tuple(_mechanics(world, name) for name in world.axes),
-        tuple(world.parts.buttons),
+        tuple(world.parts.built(BUTTON)),
         tuple(_elements(world)),
         tuple(_connections(world)),
         tuple(LinePart(line.name, line.kind, world.lines[line.name].baud) for line in world.spec.lines),

@@ -20,15 +20,16 @@ from steptwin.subject.snapshots import Snapshots
 from steptwin.subject.time import advance
 from steptwin.wire.frameline import FrameLine
 from steptwin.world import script as steps
-from steptwin.world.actions import Download, EndScripts, ExternalInput, See
 from steptwin.world.control import ControllerCommand, Halt, Jog, StopAxes, ended, standstill
 from steptwin.world.elements import failing
 from steptwin.world.faults.kinds import rows
 from steptwin.world.heldjog import HeldJog
+from steptwin.world.inputs import Download, EndScripts, ExternalInput, See
 from steptwin.world.kinds import line_kinds
 from steptwin.world.lines import LineWords, LineWrite
+from steptwin.world.model import WORLD
 from steptwin.world.motions import ordered
-from steptwin.world.plant import WORLD, Plant
+from steptwin.world.plant import Plant
 from steptwin.world.plantsnapshot import PlantSnapshot
 from steptwin.world.programs import StatementFollower
 from steptwin.world.trace import TraceRecord
@@ -336,7 +337,7 @@ class WorldSubject:
                 watchers.remove(self._recorded)
         if ("statement" in self.followers.kinds) is not (self._statements is not None):
             if self._statements is None:
-                self._statements = StatementFollower(self.world, self._executed)
+                self._statements = StatementFollower(self.world.programs, self._executed)
             else:
                 self._statements.close()
                 self._statements = None

@@ -13,10 +13,10 @@ from steptwin.why.answer import ChainLink, since_before
 from steptwin.why.log import Act, CauseLog, Change
 from steptwin.why.sentences import Frames, statement, words_of
 from steptwin.world import script as do
-from steptwin.world.actions import Download, See, SetVariable
 from steptwin.world.control import Halt
 from steptwin.world.elements import ELEMENTS
 from steptwin.world.elements.logic import BoardPart
+from steptwin.world.inputs import Download, See, SetVariable
 from steptwin.world.lines import SCRIPTS
 from steptwin.world.programs import Place, Resource, ResourceKind, StatementUse
 from steptwin.world.trace import TraceRecord

@@ -17,10 +17,10 @@ from steptwin.machine import SECOND, Nanos
 from steptwin.statements import StatementHook
 from steptwin.why import points
 from steptwin.world import script as do
-from steptwin.world.actions import Download, ExternalInput
 from steptwin.world.elements import ELEMENTS
 from steptwin.world.faults.active import HeldLevel
 from steptwin.world.history import SLICE_NS, replay
+from steptwin.world.inputs import Download, ExternalInput
 from steptwin.world.plant import Plant
 from steptwin.world.plantsnapshot import RecordedInput
 from steptwin.world.programs import Place, Programs

@@ -25,7 +25,7 @@ from steptwin.world.history import outside_past
 from steptwin.world.plant import Plant
 from steptwin.world.plantsnapshot import RecordedInput
 from steptwin.world.programs import Resource, ResourceKind
-from steptwin.world.signals import SignalOf
+from steptwin.world.signal import SignalOf
 
 MOST_STATES = 5
 """Limit of the signals whose present levels are shown of what a program waits for."""

@@ -15,12 +15,12 @@ from steptwin.why import points
 from steptwin.why.courses import CourseTurns, watch_truth
 from steptwin.why.log import in_parts, levels_of
 from steptwin.why.states import rest_of
-from steptwin.world.actions import Bytes, Download
 from steptwin.world.history import ACTED, MOVED, PastState
+from steptwin.world.inputs import Bytes, Download
 from steptwin.world.plant import Plant
 from steptwin.world.plantsnapshot import PlantSnapshot, RecordedInput
 from steptwin.world.programs import Place, Programs, Resource, ResourceKind
-from steptwin.world.signals import SignalOf
+from steptwin.world.signal import SignalOf
 from steptwin.world.trace import TraceRecord
 
 MOST_PARTS = 20_000

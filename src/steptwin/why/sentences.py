@@ -10,8 +10,8 @@ from steptwin.why.log import CauseLog, Executed
 from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection
 from steptwin.world import script as do
-from steptwin.world.actions import Bytes, Download, ExternalInput, SetVariable
 from steptwin.world.control import Halt
+from steptwin.world.inputs import Bytes, Download, ExternalInput, SetVariable
 from steptwin.world.kinds import line_kinds
 from steptwin.world.lines import LineWords
 from steptwin.world.plant import Plant

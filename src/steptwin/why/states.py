@@ -11,7 +11,7 @@ from steptwin.machine import SECOND, Nanos
 from steptwin.points import FARTHEST_NS
 from steptwin.world.history import PastState
 from steptwin.world.plant import Plant
-from steptwin.world.signals import SignalOf
+from steptwin.world.signal import SignalOf
 
 MOST_KEPT = 64
 FIRST_DISTANCE_NS: Nanos = SECOND // 2

@@ -7,15 +7,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import partial
-from typing import Any, TypeAlias, TypeVar, cast
+from typing import Any, TypeAlias
 
 from steptwin.diagnostics import Diagnostic, Severity, SourceText, in_order, render
 from steptwin.errors import Misuse, SourceErrors
+from steptwin.world.buildmemo import BuildMemo
+from steptwin.world.kind import ControllerSpec, LineSpec
 from steptwin.world.pieces import beside
-from steptwin.world.spec import ControllerSpec, WorldSpec
-from steptwin.world.tomlplaces import Path
-
-T = TypeVar("T")
+from steptwin.world.spec import WorldSpec
 
 FileContents: TypeAlias = Mapping[str, bytes]
 """Contents of the files a description names, and of non-volatile memories (`memory_file`)."""
@@ -46,9 +45,7 @@ class Blueprint:
         """Make the machine of each controller whose files have no errors, as `ControllerKind.build`."""
         self.joined: Sequence[Sequence[str]] | None = None
         """What shares a kernel, by name (`joined_names`), once a world was built."""
-        self.is_checked = False
-        """Whether a world was built from it without an error: then no other has one, and checks can be left out."""
-        self._known: dict[Path, Any] = {}
+        self.memo = BuildMemo()
         for controller in spec.controllers:
             spec.text.unless_wrong(controller.path, partial(self._prepare, controller))
 
@@ -57,16 +54,6 @@ class Blueprint:
         other = copy(self)
         other.spec = replace(self.spec, seed=seed)
         return other
-
-    def once(self, path: Path, make: Callable[[], T]) -> T:
-        """What ``make`` gives, which is called in the first world only. ``path``: a place in the description, or one beyond it.
-
-        The value must follow from the description and its files, and nothing may change it.
-        """
-        found = self._known.get(path)
-        if found is None:
-            found = self._known[path] = make()
-        return cast("T", found)
 
     @property
     def findings(self) -> Sequence[tuple[SourceText, Sequence[Diagnostic]]]:
@@ -86,6 +73,11 @@ class Blueprint:
         except _FileErrors as error:
             keys = [key for name, key in controller.kind.files(controller) if name == error.file]
             self.spec.text.wrong_file((*controller.path, *keys[:1]), error)
+
+    @property
+    def lines(self) -> Sequence[LineSpec]:
+        """As `BuildContext.lines`."""
+        return self.spec.lines
 
     def data(self, name: str) -> bytes:
         """As `BuildContext.data`."""

@@ -9,17 +9,17 @@ from typing import Any
 from steptwin.errors import Misuse
 from steptwin.machine import MachineEvent, Nanos
 from steptwin.world.blueprint import Blueprint, memory_file
-from steptwin.world.element import AnyElement, ElementSpec, NamedSpec
+from steptwin.world.element import AnyElement
 from steptwin.world.elements import ELEMENTS
+from steptwin.world.elementspec import ElementSpec, NamedSpec
 from steptwin.world.faults import Faults
 from steptwin.world.faults.element import FaultyElement
 from steptwin.world.joined import joined_names
 from steptwin.world.kernel import Board, Kernel
-from steptwin.world.kind import Member, Terminals
+from steptwin.world.kind import ControllerSpec, LineSpec, Member, Terminals
 from steptwin.world.kinds import line_kinds
 from steptwin.world.parts import WorldParts
 from steptwin.world.site import Site
-from steptwin.world.spec import ControllerSpec, LineSpec
 from steptwin.world.trace import RecordSink, TraceRecord
 
 Keep = Callable[[str, bytes, Nanos], None]
@@ -40,9 +40,9 @@ class _Builder:
         self.blueprint = blueprint
         self._keep = keep
         self._is_blank = is_blank
-        self.parts = WorldParts(spec, Faults(spec.seed), record)
+        self.parts = WorldParts(spec.lines, spec.elements, Faults(spec.seed), record)
         self.parts.faults.sinks.append(record)
-        self.site = Site(blueprint, self.parts)
+        self.site = Site(spec.text, spec.seed, blueprint.memo, self.parts)
         self._make_machines()
         self._make_kernels()
         self._make_lines()
@@ -69,11 +69,12 @@ class _Builder:
 
     def _make_kernels(self) -> None:
         """Machines connected by a line, a wire or mechanics share a kernel; kernels are ordered by their first machine."""
-        boards = self.blueprint.once(("boards",), lambda: {spec.name: (spec, terminals) for spec, terminals in self._boards()})
+        memo = self.blueprint.memo
+        boards = memo.once(("boards",), lambda: {spec.name: (spec, terminals) for spec, terminals in self._boards()})
         if self.blueprint.joined is None:
             self.blueprint.joined = joined_names(self.spec, self.parts.machines)
         for names in self.blueprint.joined:
-            kernel = Kernel(record=self.parts.record, is_checked=self.blueprint.is_checked, is_blank=self._is_blank)
+            kernel = Kernel(record=self.parts.record, is_checked=memo.is_checked, is_blank=self._is_blank)
             self.parts.kernels.append(kernel)
             for name in names:
                 self.parts.kernel_of[name] = kernel
@@ -141,12 +142,13 @@ class _Builder:
         if not self.spec.text.findings:
             self.site.close_circuits()
             for number, kernel in enumerate(self.parts.kernels):
-                if order := self.blueprint.once(("order", number), kernel.order):
+                if order := self.blueprint.memo.once(("order", number), kernel.order):
                     kernel.arrange(order)
 
     def _waits(self, element: AnyElement, spec: ElementSpec) -> bool:
         """Whether it is over a signal of an element that is not built yet."""
-        over = (reference.other for reference in element.refers(spec, self.spec) if reference.path[-1:] in (("of",), ("when",)))
+        references = element.refers(spec, self.spec.elements)
+        over = (reference.other for reference in references if reference.path[-1:] in (("of",), ("when",)))
         return any(self.parts.unbuilt(owner) is not None for owner in over)
 
     def _build_elements(self, element: AnyElement, specs: Iterable[ElementSpec]) -> None:
@@ -163,12 +165,19 @@ class _Builder:
             return None
         for named in element.named((spec,)):
             self.parts.elements.setdefault(element.name, {})[named.name] = found
+            if element.signals is not None:
+                self.parts.signals_of[named.name] = partial(element.signals, found)
             if element.faults:
-                kernel = self.site.kernel_of(element, named)
+                kernel = self._kernel_of(element, named)
                 failing = FaultyElement(kernel, named.name, self.parts.faults, element.faults, found)
                 self.parts.faults.elements[named.name] = failing
                 kernel.add_part(failing, ())
         return found
+
+    def _kernel_of(self, element: AnyElement, spec: NamedSpec) -> Kernel:
+        """The kernel that an element is in: its own, or that of the first thing it refers to."""
+        name = next(iter(element.refers(spec, self.spec.elements))).one if element.terminals is None else spec.name
+        return self.site.kernel(name)
 
 
 def _record_event(record: RecordSink, machine: str, event: MachineEvent) -> None:

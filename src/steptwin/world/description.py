@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
 from steptwin.errors import Misuse
 from steptwin.world.arrangement import DRAWING, check_places, read_places
-from steptwin.world.element import AnyElement, ElementSpec
+from steptwin.world.element import AnyElement
 from steptwin.world.elements import ELEMENTS
+from steptwin.world.elementspec import ElementSpec, ElementSpecs, NamedSpec
 from steptwin.world.faults import Fault, FaultMistake, parse
 from steptwin.world.gateways import GATEWAY, read_gateways
 from steptwin.world.historytable import read_history
+from steptwin.world.kind import LineSpec
 from steptwin.world.kinds import KINDS
 from steptwin.world.links import LINK_KEYS, TLS_KEYS, TlsFiles
-from steptwin.world.names import check_names
+from steptwin.world.names import RESERVED
 from steptwin.world.overrides import NO_OVERRIDES, Overrides, override
 from steptwin.world.pieces import PARAMETERS, USE, Pieces, ReadFile, is_piece, no_files
 from steptwin.world.reader import TomlText, read_table
 from steptwin.world.sense import check_sense
-from steptwin.world.spec import LineSpec, ScriptSpec, WorldSpec
+from steptwin.world.spec import ScriptSpec, WorldSpec
 from steptwin.world.steptable import STEPS, read_steps
 from steptwin.world.tables import KEYS, SEED, tables
 
@@ -77,7 +79,7 @@ def describe(
             for kind in KINDS.values()
             for row, table in _tables(toml, kind.name, kind.inner_tables)
         ),
-        elements={element.name: tuple(_elements(toml, element)) for element in ELEMENTS.values()},
+        elements=ElementSpecs({element.name: tuple(_elements(toml, element)) for element in ELEMENTS.values()}),
         scripts=(*_events(toml), *_scripts(toml)),
         gateways=tuple(read_gateways(toml)),
         history=read_history(toml),
@@ -88,7 +90,7 @@ def describe(
         pieces=pieces.files,
     )
     named_elements = [one for element in ELEMENTS.values() for one in element.named(spec.elements[element.name])]
-    check_names(spec, named_elements)
+    _check_names(spec, named_elements)
     check_places(toml, placed, [one.name for one in named_elements])
     return spec if seed is None else replace(spec, seed=_seed(seed))
 
@@ -178,3 +180,19 @@ def _faults(toml: TomlText) -> list[Fault | None]:
             toml.wrong(("fault", n, error.key), "D003", str(error))
             found.append(None)
     return found
+
+
+def _check_names(spec: WorldSpec, elements: Iterable[NamedSpec]) -> None:
+    """Report names of lines, machines and elements that hide each other. The command line ignores case."""
+    text = spec.text
+    taken: dict[str, str] = {}
+    for one in (*spec.lines, *spec.controllers, *elements):
+        path = (*one.path, "name")
+        kind = one.path[0]
+        key = one.name.lower()
+        owner = f"[[{kind}]] {one.name!r}"
+        if key in RESERVED:
+            text.wrong(path, "D006", f"{one.name!r} is {RESERVED[key]}: choose another name")
+        elif key in taken and taken[key] != owner:  # this one is reported already
+            text.wrong(path, "D006", f"{one.name!r} is taken by {taken[key]}", "upper and lower case are the same here")
+        taken.setdefault(key, owner)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from steptwin.world.site import Terminal
+from steptwin.world.values import Terminal
 
 ROD = "rod"
 """The one place is that of the end of a rod, which comes out of its body at 0."""

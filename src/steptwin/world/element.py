@@ -8,57 +8,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeAlias, TypeVar, cast
+from typing import Any, TypeAlias, cast
 
 from steptwin.tables import IncompleteTable
+from steptwin.world.drawing import Drawing
+from steptwin.world.elementspec import B, ElementSpec, ElementSpecs, ElementTable, NamedSpec, Reference, S
 from steptwin.world.faults.table import FaultKind, Layer
+from steptwin.world.kind import Terminals
+from steptwin.world.lanes import MovedLane
 from steptwin.world.reader import Row, Table, TomlText
 from steptwin.world.sense import TableRows
-from steptwin.world.tomlplaces import Path
-
-if TYPE_CHECKING:
-    from steptwin.world.drawing import Drawing
-    from steptwin.world.elements.axis import BuiltAxis
-    from steptwin.world.kind import Terminals
-    from steptwin.world.lanes import MovedLane
-    from steptwin.world.signals import SignalOf
-    from steptwin.world.site import Site
-    from steptwin.world.spec import WorldSpec
+from steptwin.world.signal import SignalOf
+from steptwin.world.site import Site
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ElementSpec:
-    """An element as its table describes it. ``path``: the place of the table in the text."""
-
-    path: Path = ()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NamedSpec(ElementSpec):
-    """The specification of an element with a name, which may be empty where its key is optional."""
-
-    name: str
-
-
-S = TypeVar("S", bound=ElementSpec)
-B = TypeVar("B")
-
-
-class Reference(NamedTuple):
-    """Two machines, lines or elements with terminals that an element connects, so that they share a kernel. ``path``: the key
-    that names ``other``; what names ``one`` is its own table, or another reference, in which both are the same."""
-
-    one: str
-    other: str
-    path: Path
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Element(Generic[S, B]):
+class Element(ElementTable[S, B]):
     """A kind of element. ``S`` is its table as a value, ``B`` the built object. Raises `IncompleteTable` for missing entries."""
 
-    name: str
-    """The name of its table: ``[[NAME]]``."""
     spec: type[S]
     rows: TableRows
     """The keys of its table, with meanings, units and ranges."""
@@ -68,7 +35,7 @@ class Element(Generic[S, B]):
     """Attributes of nested tables whose names differ from their keys."""
     read: Callable[[TomlText, Row, Table], S]
     """Makes ``S``. Reports inconsistent combinations of keys, and errors in nested tables."""
-    refers: Callable[[S, WorldSpec], Iterable[Reference]]
+    refers: Callable[[S, ElementSpecs], Iterable[Reference]]
     """All machines, lines and elements with terminals that it names. Names that do not exist are reported at the path."""
     build: Callable[[S, Site], B]
     """Adds it to its kernel. Raises `Misuse` if it does not fit."""
@@ -82,8 +49,8 @@ class Element(Generic[S, B]):
     """How it is drawn, where there is more to see than levels and numbers."""
     function: Callable[[B], str] | None = None
     """The word that says what it does among those of its kind, such as ``and``."""
-    moved: Callable[[B], Iterable[tuple[BuiltAxis, MovedLane]]] | None = None
-    """The lanes of its motion, each of which follows from that of an axis."""
+    moved: Callable[[B], Iterable[tuple[str, MovedLane]]] | None = None
+    """The lanes of its motion, each of which follows from that of an axis, by name."""
     faults: tuple[FaultKind, ...] = ()
     """Its faults (`Layer.ELEMENT`), which act on the built object."""
     is_named: bool = field(init=False)

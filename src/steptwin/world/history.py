@@ -16,8 +16,8 @@ from typing import NamedTuple, TypeAlias
 from steptwin.durations import duration_text
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
-from steptwin.world.actions import ExternalInput, size_of
 from steptwin.world.eventpoints import EventPoints, points_of, stays_between_events
+from steptwin.world.inputs import ExternalInput, size_of
 from steptwin.world.plant import Plant
 from steptwin.world.plantsnapshot import PlantSnapshot, RecordedInput
 from steptwin.world.trace import TraceRecord

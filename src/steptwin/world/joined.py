@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from steptwin.world.element import Reference
 from steptwin.world.elements import ELEMENTS
+from steptwin.world.elementspec import Reference
 from steptwin.world.spec import WorldSpec
 from steptwin.world.tomlplaces import Path
 from steptwin.world.values import NameOf
@@ -66,7 +66,7 @@ def _element_named_by(path: Path) -> str | None:
 def _placed(spec: WorldSpec) -> Mapping[str, str]:
     """For each element without terminals of its own the first thing that it refers to, in whose kernel it is."""
     return {
-        one.name: next(iter(element.refers(one, spec))).one
+        one.name: next(iter(element.refers(one, spec.elements))).one
         for element in ELEMENTS.values()
         if element.terminals is None
         for one in element.named(spec.elements[element.name])
@@ -79,4 +79,4 @@ def _joints(spec: WorldSpec) -> Iterator[Reference]:
             yield Reference(controller.name, controller.line, (*controller.path, "line"))
     for element in ELEMENTS.values():
         for one in spec.elements[element.name]:
-            yield from element.refers(one, spec)
+            yield from element.refers(one, spec.elements)

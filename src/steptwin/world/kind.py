@@ -15,12 +15,11 @@ from steptwin.motioncontroller import MotionController
 from steptwin.nearmiss import NearMiss
 from steptwin.textcodec import decode
 from steptwin.world.kernel import Kernel
-from steptwin.world.links import LINK_KEYS
+from steptwin.world.links import LINK_KEYS, TlsFiles
 from steptwin.world.mechanics import EncoderReader
 from steptwin.world.names import WrongTerminal
-from steptwin.world.reader import Key, Row, Table, TomlText
-from steptwin.world.scale import DriveScale
-from steptwin.world.spec import ControllerSpec, LineSpec, WorldSpec
+from steptwin.world.reader import Key, Path, Row, Table, TomlText
+from steptwin.world.scale import DriveScale, GivenScale
 from steptwin.world.values import ANALOG_INPUT, DIGITAL_INPUT, OUTPUT
 from steptwin.world.wires import PinName
 
@@ -32,16 +31,44 @@ if TYPE_CHECKING:
     from steptwin.points import LivePoint
     from steptwin.wire.frameline import FrameLine
     from steptwin.world.control import ControllerCommand, Halt, Jog, Seek
-    from steptwin.world.elements.axis import AxisSpec
     from steptwin.world.faults import AxisLoad, Body, Faults
     from steptwin.world.heldjog import HeldJog
     from steptwin.world.lanes import AxisLane
     from steptwin.world.lines import Line, LineWords, LineWrite
-    from steptwin.world.plant import Plant
     from steptwin.world.programs import Programs
     from steptwin.world.programtexts import Destination, Downloading, ProgramText, TextLanguage
     from steptwin.world.script import Step
     from steptwin.world.trace import RecordSink
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LineSpec:
+    name: str
+    kind: str
+    baud: int | None
+    timing: str
+    gap: Nanos | None
+    links: Mapping[str, str]
+    """Addresses of its external links, by key."""
+    tls: TlsFiles | None = None
+    """Of encrypted ones, relative to the description."""
+    path: Path = ()
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it has external links."""
+        return bool(self.links)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ControllerSpec:
+    """The common part of all controllers' tables; each kind adds its own."""
+
+    kind: AnyKind
+    name: str
+    line: str | None
+    path: Path = ()
+
 
 S = TypeVar("S", bound=ControllerSpec)
 M = TypeVar("M", bound=MotionController)
@@ -63,7 +90,8 @@ class PointMarks(NamedTuple, Generic[M]):
 class BuildContext(Protocol):
     """The description and the files that it refers to, while those of a controller are read."""
 
-    spec: WorldSpec
+    @property
+    def lines(self) -> Sequence[LineSpec]: ...
 
     def data(self, name: str) -> bytes:
         """The content of a file that the description names. Raises `Misuse` if it is not given."""
@@ -108,6 +136,27 @@ class Terminals:
             meant = near.of(name.pin, others)
             text = f"{name} is not {article} {kind}{near.hint(name.pin, others)}: {kind}s of {name.machine!r} are {there}"
             raise WrongTerminal(str(name), text, None if meant is None else f"{name.machine}.{meant}")
+
+
+class RunningWorld(Protocol):
+    """A running world, as the views of its controllers see it."""
+
+    now: Nanos
+
+    @property
+    def machines(self) -> Mapping[str, MotionController]: ...
+
+    def kind(self, name: str, /) -> AnyKind:
+        """The kind of a machine."""
+        ...
+
+    def touch(self, name: str, /) -> Kernel:
+        """The kernel of a machine or line, advanced to the present."""
+        ...
+
+    def apply_input(self, what: Step, /) -> None:
+        """Execute a step at the present moment, as one from outside. Raises `Misuse`."""
+        ...
 
 
 class MotionEnds(NamedTuple):
@@ -211,7 +260,7 @@ class ControllerKind(Generic[S, M, V]):
     """The pin that a name means. Raises `Misuse` with the inputs, or for a value that the pin does not take."""
     refuse_taken: Callable[[M, str], None] = lambda machine, pin: None
     """Raises `Misuse` for a pin that is neither input nor output as the machine is configured."""
-    scale: Callable[[AxisSpec, M, int], DriveScale]
+    scale: Callable[[GivenScale, M, int], DriveScale]
     """How its axis of a number (from 1) counts. Raises `Misuse`."""
     is_idle: Callable[[M, Nanos], bool]
     """Whether all axes stand and no program runs."""
@@ -243,7 +292,7 @@ class ControllerKind(Generic[S, M, V]):
     """Its present state; the machine is at that moment."""
     statement: Callable[[M], str | None] = lambda machine: None
     """The statement that its program is at, while one runs or is paused, as text."""
-    view: Callable[[Plant, str, M], V]
+    view: Callable[[RunningWorld, str, M], V]
     """Its view for Python programs in a running world."""
     lanes: Callable[[M], Mapping[str, AxisLane]]
     """How its axes are shown in a trace, by the subject of their plans."""

@@ -3,35 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, overload
+from typing import Any, overload
 
 from steptwin.errors import Misuse
-from steptwin.world.control import Home, Seek
+from steptwin.world.control import ControllerCommand, Halt, Home, Move, Seek
 from steptwin.world.kind import AnyKind, MotionEnds, lacks
-
-if TYPE_CHECKING:
-    from steptwin.world.control import ControllerCommand, Halt, Move
-    from steptwin.world.plant import Plant
-    from steptwin.world.script import Step
+from steptwin.world.model import Model
+from steptwin.world.script import Step
 
 
 @overload
-def ordered(plant: Plant, command: Move | Home | Seek) -> Step: ...
+def ordered(model: Model, command: Move | Home | Seek) -> Step: ...
 @overload
-def ordered(plant: Plant, command: ControllerCommand) -> Step | Halt: ...
-def ordered(plant: Plant, command: ControllerCommand | Seek) -> Step | Halt:
+def ordered(model: Model, command: ControllerCommand) -> Step | Halt: ...
+def ordered(model: Model, command: ControllerCommand | Seek) -> Step | Halt:
     """The step by which the master of a controller does a command now; a stop is done at the controller itself.
 
     Raises `Misuse` and `Refusal`.
     """
     name = command.machine
-    kind, machine = plant.kind(name), plant.machine(name)
+    kind, machine = model.kind(name), model.machine(name)
     make = _maker(kind, command)
     if make is None:
         raise _lacks(name, kind, command)
-    plant.touch(name)
-    machine.advance(plant.now)
-    on = plant.parts.line_of.get(name)
+    model.touch(name)
+    machine.advance(model.now)
+    on = model.parts.line_of.get(name)
     return make(machine, None if on is None else on[0].name, command)
 
 
@@ -48,16 +45,16 @@ def _lacks(name: str, kind: AnyKind, command: ControllerCommand | Seek) -> Misus
     return lacks(name, kind, f"command {type(command).__name__.lower()}")
 
 
-def motion_ends(plant: Plant, name: str, axis: int, seek: Seek | None = None) -> MotionEnds:
+def motion_ends(model: Model, name: str, axis: int, seek: Seek | None = None) -> MotionEnds:
     """The conditions on an axis (from 1), or at the end of a seek of it.
 
     Raises `Misuse` for one that is not there, or does not show how its motions end.
     """
-    kind = plant.kind(name)
+    kind = model.kind(name)
     if kind.motion_ends is None:
         raise lacks(name, kind, "status of motions: send its commands, and wait for a condition")
-    axes = len(plant.machine(name).axes)
+    axes = len(model.machine(name).axes)
     if not 1 <= axis <= axes:
         raise Misuse(f"{name}.M{axis}: {name} has {', '.join(f'M{number}' for number in range(1, axes + 1))}")
-    on = plant.parts.line_of.get(name)
+    on = model.parts.line_of.get(name)
     return kind.motion_ends(f"{name}.M{axis}", None if on is None else on[0].name, seek)

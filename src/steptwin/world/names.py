@@ -1,15 +1,8 @@
-"""Names in a description: what conditions, scripts and commands address by the same kind of name must differ."""
+"""Names in a description: those that mean something already, and errors of names that mean nothing."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import TYPE_CHECKING
-
 from steptwin.errors import Misuse
-
-if TYPE_CHECKING:
-    from steptwin.world.element import NamedSpec
-    from steptwin.world.spec import WorldSpec
 
 
 class Unknown(Misuse):
@@ -49,19 +42,3 @@ RESERVED = {
     "not": "a word of conditions",
 }
 """Names that mean something already."""
-
-
-def check_names(spec: WorldSpec, elements: Iterable[NamedSpec]) -> None:
-    """Report names of lines, machines and elements that hide each other. The command line ignores case."""
-    text = spec.text
-    taken: dict[str, str] = {}
-    for one in (*spec.lines, *spec.controllers, *elements):
-        path = (*one.path, "name")
-        kind = one.path[0]
-        key = one.name.lower()
-        owner = f"[[{kind}]] {one.name!r}"
-        if key in RESERVED:
-            text.wrong(path, "D006", f"{one.name!r} is {RESERVED[key]}: choose another name")
-        elif key in taken and taken[key] != owner:  # this one is reported already
-            text.wrong(path, "D006", f"{one.name!r} is taken by {taken[key]}", "upper and lower case are the same here")
-        taken.setdefault(key, owner)

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, cast
 
 from steptwin.motioncontroller import MotionController
-from steptwin.world.contacts import Button, Circuit
-from steptwin.world.element import B, Element, S
-from steptwin.world.elements import ELEMENTS
-from steptwin.world.elements.axis import AXIS, BuiltAxis
-from steptwin.world.elements.button import BUTTON
+from steptwin.world.contacts import Circuit
+from steptwin.world.elementspec import B, ElementSpecs, ElementTable, NamedSpec, S
 from steptwin.world.faults import Faults
 from steptwin.world.kernel import Kernel
-from steptwin.world.kind import AnyKind, Terminals
+from steptwin.world.kind import AnyKind, LineSpec, Terminals
 from steptwin.world.lines import Line
-from steptwin.world.signals import SignalOf
-from steptwin.world.spec import WorldSpec
+from steptwin.world.signal import SignalOf
 from steptwin.world.tomlplaces import Path
 from steptwin.world.trace import RecordSink
 from steptwin.world.wires import PinName
@@ -27,7 +23,9 @@ from steptwin.world.wires import PinName
 class WorldParts:
     """The objects built from a description."""
 
-    spec: WorldSpec
+    line_specs: Sequence[LineSpec]
+    described: ElementSpecs
+    """The elements of the description."""
     faults: Faults
     record: RecordSink
     kernels: list[Kernel] = field(default_factory=list)
@@ -47,10 +45,12 @@ class WorldParts:
     """The contacts of the inputs that have some."""
     elements: dict[str, dict[str, Any]] = field(default_factory=dict)
     """Built elements with names: by the name of the kind, then by their own."""
+    signals_of: dict[str, Callable[[], Mapping[str, SignalOf]]] = field(default_factory=dict)
+    """Of built elements with names."""
     supplied: dict[str, str] = field(default_factory=dict)
     """The power supplies of machines that have one."""
 
-    def built(self, element: Element[S, B]) -> Mapping[str, B]:
+    def built(self, element: ElementTable[S, B]) -> Mapping[str, B]:
         """The built elements of a kind, by name."""
         return cast("Mapping[str, B]", self.elements.get(element.name, {}))
 
@@ -60,23 +60,13 @@ class WorldParts:
 
     def unbuilt(self, name: str) -> str | None:
         """The kind of an element that the description has and that is not built yet."""
-        for kind, specs in self.spec.elements.items():
-            if name not in self.elements.get(kind, {}) and any(one.name == name for one in ELEMENTS[kind].named(specs)):
+        for kind, specs in self.described.items():
+            named = any(isinstance(one, NamedSpec) and one.name == name for one in specs)
+            if named and name not in self.elements.get(kind, {}):
                 return kind
         return None
 
     def element_signals(self, name: str) -> Mapping[str, SignalOf] | None:
         """The signals of an element; None if no element has the name."""
-        for kind, built in self.elements.items():
-            signals = ELEMENTS[kind].signals
-            if name in built and signals is not None:
-                return signals(built[name])
-        return None
-
-    @property
-    def axes(self) -> Mapping[str, BuiltAxis]:
-        return self.built(AXIS)
-
-    @property
-    def buttons(self) -> Mapping[str, tuple[Button, Kernel]]:
-        return self.built(BUTTON)
+        signals = self.signals_of.get(name)
+        return None if signals is None else signals()

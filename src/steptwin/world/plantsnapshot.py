@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 from steptwin.diagnostics import SourceText
 from steptwin.machine import Nanos
-from steptwin.world.actions import ExternalInput
 from steptwin.world.blueprint import FileContents
 from steptwin.world.faults import Fault
+from steptwin.world.inputs import ExternalInput
 from steptwin.world.kernelpart import KernelState
 from steptwin.world.overrides import Overrides
 from steptwin.world.reports import ReportsState

@@ -9,15 +9,12 @@ from __future__ import annotations
 import enum
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 from steptwin.diagnostics import SourceText
 from steptwin.machine import Nanos
 from steptwin.statements import StatementHook
 from steptwin.world.trace import RecordSink, TraceRecord
-
-if TYPE_CHECKING:
-    from steptwin.world.plant import Plant
 
 
 class Place(NamedTuple):
@@ -163,9 +160,10 @@ class Programs(Protocol):
 class StatementFollower:
     """Reports each statement that a program of the world executes as a record of kind ``statement``, until `close`."""
 
-    def __init__(self, plant: Plant, report: RecordSink) -> None:
+    def __init__(self, programs_of: Mapping[str, Programs], report: RecordSink) -> None:
+        """``programs_of``: by controller."""
         self._hooks: list[tuple[Programs, StatementHook]] = []
-        for name, programs in plant.programs.items():
+        for name, programs in programs_of.items():
             hook = _reporting(name, programs, report)
             programs.hook(hook)
             self._hooks.append((programs, hook))

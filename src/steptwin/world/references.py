@@ -5,49 +5,47 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, get_args
 
 from steptwin.errors import Misuse, Refusal
 from steptwin.tables import complete
 from steptwin.world import script as do
-from steptwin.world.actions import Bytes, Download, EndScripts, ExternalInput, Leave, Refused, See, SetVariable
 from steptwin.world.control import Halt, Seek
 from steptwin.world.faults import Fault
+from steptwin.world.inputs import Bytes, Download, EndScripts, ExternalInput, Leave, Refused, See, SetVariable
+from steptwin.world.model import Model
 from steptwin.world.motions import motion_ends, ordered
 from steptwin.world.spec import ScriptSpec
 from steptwin.world.steptable import STEPS
 from steptwin.world.tomlplaces import Path
 
-if TYPE_CHECKING:
-    from steptwin.world.plant import Plant
 
-
-def check_scripts(plant: Plant, scripts: Sequence[ScriptSpec]) -> None:
+def check_scripts(model: Model, scripts: Sequence[ScriptSpec]) -> None:
     """Report every invalid step in the text of the description."""
-    text = plant.spec.text
+    text = model.spec.text
     set_somewhere = [step.fault for script in scripts for step in _all(script.steps) if isinstance(step, do.SetFault)]
     for script in scripts:
         if script.when is not None:
             try:
-                plant.condition(script.when)
+                model.condition(script.when)
             except Misuse as error:
                 text.wrong_reference((*script.path, "when"), error)
-        _check(plant, script.steps, (*script.path, STEPS.name), set_somewhere)
+        _check(model, script.steps, (*script.path, STEPS.name), set_somewhere)
 
 
-def check_faults(plant: Plant, faults: Sequence[Fault | None]) -> None:
+def check_faults(model: Model, faults: Sequence[Fault | None]) -> None:
     """Set the faults of the description; report impossible ones."""
     for n, fault in enumerate(faults):
-        if fault is not None and not _is_on_something_broken(plant, fault):
+        if fault is not None and not _is_on_something_broken(model, fault):
             try:
-                plant.put_fault(fault)
+                model.put_fault(fault)
             except Misuse as error:
-                plant.spec.text.wrong_reference(("fault", n), error)
+                model.spec.text.wrong_reference(("fault", n), error)
 
 
-def _is_on_something_broken(plant: Plant, fault: Fault) -> bool:
+def _is_on_something_broken(model: Model, fault: Fault) -> bool:
     """Whether a fault concerns, or may concern, a machine or line whose own table has errors."""
-    text = plant.spec.text
+    text = model.spec.text
     named = [str(name) for key in ("machine", "line", "element") if (name := fault.get(key)) is not None]
     return any(map(text.may_be_broken, named)) if named else text.is_any_wrong(*text.controllers, "line", "axis")
 
@@ -60,21 +58,21 @@ def _all(steps: Iterable[do.Step]) -> Iterator[do.Step]:
             yield step
 
 
-def _check(plant: Plant, steps: Iterable[do.Step], path: Path, set_somewhere: Sequence[Fault]) -> None:
-    text = plant.spec.text
+def _check(model: Model, steps: Iterable[do.Step], path: Path, set_somewhere: Sequence[Fault]) -> None:
+    text = model.spec.text
     for n, step in enumerate(steps):
         if isinstance(step, do.Repeat) and not step.is_one:
-            _check(plant, step.steps, (*path, n, STEPS.name), set_somewhere)
+            _check(model, step.steps, (*path, n, STEPS.name), set_somewhere)
             continue
         if isinstance(step, do.ClearFault) and (
             any(_may_be_called(fault, step.name) for fault in set_somewhere) or text.is_any_wrong("fault", "event", "script")
         ):
             continue
-        if isinstance(step, do.SetFault) and _is_on_something_broken(plant, step.fault):
+        if isinstance(step, do.SetFault) and _is_on_something_broken(model, step.fault):
             continue
         for part in _parts(step):
             try:
-                check_step(plant, part)
+                check_step(model, part)
             except Misuse as error:
                 text.wrong_reference((*path, n), error, f"step {n + 1}: ")
 
@@ -96,101 +94,101 @@ def _may_be_called(fault: Fault, name: str) -> bool:
     return name == fault.name or (not fault.name and fault.kind.name in (name, kind if number.isdecimal() else name))
 
 
-def check_step(plant: Plant, step: object) -> None:
+def check_step(model: Model, step: object) -> None:
     """Raises `Misuse` for a step with unknown names or invalid values."""
     check = _CHECKS.get(type(step))
     if check is not None:
-        check(plant, step)
+        check(model, step)
 
 
-def _condition(plant: Plant, step: do.Until | do.Expect) -> None:
-    plant.condition(step.condition)
+def _condition(model: Model, step: do.Until | do.Expect) -> None:
+    model.condition(step.condition)
 
 
-def _order(plant: Plant, step: do.Order) -> None:
+def _order(model: Model, step: do.Order) -> None:
     command = step.command
-    motion_ends(plant, command.machine, command.axis)
+    motion_ends(model, command.machine, command.axis)
     with suppress(Refusal):  # what cannot be done now may be possible later
-        check_step(plant, ordered(plant, command))
+        check_step(model, ordered(model, command))
     if isinstance(command, Seek):
-        plant.condition(motion_ends(plant, command.machine, command.axis, command).reached)
+        model.condition(motion_ends(model, command.machine, command.axis, command).reached)
 
 
-def _motion(plant: Plant, step: do.UntilOver | do.ExpectReached) -> None:
-    motion_ends(plant, step.machine, step.axis)
+def _motion(model: Model, step: do.UntilOver | do.ExpectReached) -> None:
+    motion_ends(model, step.machine, step.axis)
 
 
-def _set(plant: Plant, step: do.Set) -> None:
+def _set(model: Model, step: do.Set) -> None:
     for name, pin, level in step.levels:
-        plant.input_pin(name, pin, level)
+        model.input_pin(name, pin, level)
 
 
-def _button(plant: Plant, step: do.Press | do.Release) -> None:
-    plant.button(step.button)
+def _button(model: Model, step: do.Press | do.Release) -> None:
+    model.button(step.button)
 
 
-def _write(plant: Plant, step: do.Write) -> None:
-    for name, values in plant.by_machine(step):
-        plant.requests(name, plant.registers(name), values)
+def _write(model: Model, step: do.Write) -> None:
+    for name, values in model.by_machine(step):
+        model.requests(name, model.registers(name), values)
 
 
-def _request(plant: Plant, step: do.Request) -> None:
-    _ = plant.line_called(step.line).master
+def _request(model: Model, step: do.Request) -> None:
+    _ = model.line_called(step.line).master
 
 
-def _send(plant: Plant, step: do.Send) -> None:
-    plant.line_called(step.line)
+def _send(model: Model, step: do.Send) -> None:
+    model.line_called(step.line)
 
 
-def _power_cycle(plant: Plant, step: do.PowerCycle) -> None:
-    plant.machine(step.machine)
-    supply = plant.parts.supplied.get(step.machine)
+def _power_cycle(model: Model, step: do.PowerCycle) -> None:
+    model.machine(step.machine)
+    supply = model.parts.supplied.get(step.machine)
     if supply is not None:
         raise Misuse(f"{step.machine!r} is switched by its supply {supply!r}: switch that, or let it have a brown-out")
 
 
-def _halt(plant: Plant, given: Halt) -> None:
-    kind = plant.kind(given.machine)
-    axes = len(plant.machine(given.machine).axes)
+def _halt(model: Model, given: Halt) -> None:
+    kind = model.kind(given.machine)
+    axes = len(model.machine(given.machine).axes)
     if given.program not in (None, "pause", "stop"):
         raise Misuse(f"program = {given.program!r}: permitted are pause and stop")
     if given.axis is not None and not 1 <= given.axis <= axes:
         raise Misuse(f"axis = {given.axis}: {given.machine!r} is {kind.title}, which has axes 1 to {axes}")
 
 
-def _turn(plant: Plant, step: do.Turn) -> None:
-    plant.encoders(step.machine).check_turn(step.axis, step.counts)
+def _turn(model: Model, step: do.Turn) -> None:
+    model.encoders(step.machine).check_turn(step.axis, step.counts)
 
 
-def _couple(plant: Plant, step: do.Couple) -> None:
-    plant.encoders(step.machine).check_turn(step.axis, 0)
+def _couple(model: Model, step: do.Couple) -> None:
+    model.encoders(step.machine).check_turn(step.axis, 0)
     drive = step.machine, f"M{step.axis}"
-    for axis in plant.axes.values():
+    for axis in model.axes.values():
         if axis.spec.drive == drive:
             raise Misuse(f"{'.'.join(drive)}: its encoder is part of the mechanics of axis {axis.spec.name!r}")
 
 
-def _see(plant: Plant, step: See) -> None:
-    plant.vision(step.machine)
+def _see(model: Model, step: See) -> None:
+    model.vision(step.machine)
 
 
-def _set_variable(plant: Plant, step: SetVariable) -> None:
-    plant.programs_of(step.machine)
+def _set_variable(model: Model, step: SetVariable) -> None:
+    model.programs_of(step.machine)
 
 
-def _fault(plant: Plant, step: do.SetFault) -> None:
-    plant.rigging.check(step.fault)
+def _fault(model: Model, step: do.SetFault) -> None:
+    model.rigging.check(step.fault)
 
 
-def _clear_fault(plant: Plant, step: do.ClearFault) -> None:
-    plant.parts.faults.called(step.name)
+def _clear_fault(model: Model, step: do.ClearFault) -> None:
+    model.parts.faults.called(step.name)
 
 
-def _nothing(plant: Plant, step: object) -> None:
+def _nothing(model: Model, step: object) -> None:
     """No check: the step has no names, or is checked when it is executed."""
 
 
-_CHECKS: Mapping[type, Callable[[Plant, Any], None]] = complete(
+_CHECKS: Mapping[type, Callable[[Model, Any], None]] = complete(
     "step",
     get_args(ExternalInput),
     "check",

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from steptwin.machine import Nanos
+from steptwin.world.elements.axis import AXIS
 from steptwin.world.faults import ActiveFault, Fault, RequestRoute, check_place, rig
 from steptwin.world.faults.machine import FaultyMachine
 from steptwin.world.faults.table import Layer, Occasion
 from steptwin.world.kind import LineUnit
 from steptwin.world.kinds import line_kinds
 from steptwin.world.lines import SCRIPTS
-
-if TYPE_CHECKING:
-    from steptwin.world.parts import WorldParts
+from steptwin.world.parts import WorldParts
 
 
 class Rigging:
@@ -55,7 +54,7 @@ class Rigging:
         rigged = kernel.machines[name]
         if isinstance(rigged, FaultyMachine):
             return rigged
-        mechanisms = {axis.mechanism.number: axis.mechanism for axis in plan.axes.values() if axis.spec.drive[0] == name}
+        mechanisms = {axis.mechanism.number: axis.mechanism for axis in plan.built(AXIS).values() if axis.spec.drive[0] == name}
         on = plan.line_of.get(name)
         service = LineUnit() if on is None else LineUnit(on[1], on[0].name)
         body = plan.kind_of[name].body(machine, service, mechanisms)
@@ -64,7 +63,7 @@ class Rigging:
 
 def _wires(plan: WorldParts) -> Iterator[RequestRoute]:
     """The routes of requests: external links of lines, described or present; scripts; None for a machine without a line."""
-    for spec in plan.spec.lines:
+    for spec in plan.line_specs:
         line = plan.lines.get(spec.name)
         if line is None:
             continue  # something is wrong with it

@@ -6,16 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from steptwin.errors import Misuse
 from steptwin.motion.trig import PI
-from steptwin.world.motor import Burden, StepperMotor
-from steptwin.world.resonance import Resonance
-
-if TYPE_CHECKING:
-    from steptwin.world.elements.axis import AxisSpec
-    from steptwin.world.elements.motor import MotorSpec
+from steptwin.world.motor import Burden
 
 FULL_STEPS = 200
 """Default full steps per revolution of a motor."""
@@ -64,6 +59,21 @@ class Scale:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class GivenScale:
+    """What the table of an axis gives of its scale; None for the rest."""
+
+    machine: str
+    """The controller of the axis, for messages."""
+    is_rotary: bool
+    unit: str | None
+    pulses_per_unit: float | None
+    pitch: float | None
+    pulses_per_rev: int | None
+    full_steps: int | None
+    """Of its motor, per revolution."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class DriveScale:
     """How a controller counts the position of an axis."""
 
@@ -78,32 +88,32 @@ class DriveScale:
     """The counted quantity, for messages: ``counts minimum microsteps``."""
 
 
-def scale_of(spec: AxisSpec, drive: DriveScale) -> Scale:
+def scale_of(given: GivenScale, drive: DriveScale) -> Scale:
     """The scale of an axis; the description takes precedence over the configuration of the controller. Raises `Misuse` for a unit
     without a scale."""
-    unit, per_unit = _per_unit(spec, drive)
+    unit, per_unit = _per_unit(given, drive)
     return Scale(unit, per_unit, drive.pulses_per_rev, drive.full_steps)
 
 
-def _per_unit(spec: AxisSpec, drive: DriveScale) -> tuple[str, Fraction]:
-    is_rotary = spec.kind == "rotary"
+def _per_unit(given: GivenScale, drive: DriveScale) -> tuple[str, Fraction]:
+    is_rotary = given.is_rotary
     usual = "degree" if is_rotary else "mm"
-    unit = usual if spec.unit is None else spec.unit
-    if spec.pulses_per_unit is not None:
-        return unit, exact_fraction(spec.pulses_per_unit)
-    if spec.pitch is not None:
-        return unit, Fraction(drive.pulses_per_rev) / exact_fraction(spec.pitch)
-    if drive.unit is not None and (spec.pulses_per_rev is None or not is_rotary):
+    unit = usual if given.unit is None else given.unit
+    if given.pulses_per_unit is not None:
+        return unit, exact_fraction(given.pulses_per_unit)
+    if given.pitch is not None:
+        return unit, Fraction(drive.pulses_per_rev) / exact_fraction(given.pitch)
+    if drive.unit is not None and (given.pulses_per_rev is None or not is_rotary):
         configured = drive.unit
-        wanted = configured if spec.unit is None and not is_rotary else unit
+        wanted = configured if given.unit is None and not is_rotary else unit
         for kin in (LENGTHS, TURNS, {configured: Fraction(1)}):
             if wanted in kin and configured in kin:
                 return wanted, drive.pulses_per_unit * kin[wanted] / kin[configured]
     if is_rotary and unit in TURNS:
         return unit, drive.pulses_per_rev * TURNS[unit]
-    if spec.unit is None and not is_rotary:
+    if given.unit is None and not is_rotary:
         return PULSES, Fraction(1)
-    raise Misuse(f"unit = {unit!r}: give pulses_per_unit or pitch, for {spec.drive[0]} {drive.text}")
+    raise Misuse(f"unit = {unit!r}: give pulses_per_unit or pitch, for {given.machine} {drive.text}")
 
 
 def _arm(scale: Scale, what: str) -> float:
@@ -135,26 +145,3 @@ def burden_of(loading: Loading, scale: Scale, what: str) -> Burden:
         friction=loading.friction + loading.friction_force * arm,
         load=loading.load + loading.force * arm,
     )
-
-
-def motor_of(motor: MotorSpec, scale: Scale) -> StepperMotor:
-    """Torques at the motor; speeds and accelerations in pulses. Raises `Misuse` for masses and forces without a length."""
-    per_rev = float(scale.pulses_per_rev)
-    loading = Loading(motor.inertia, motor.mass, motor.friction, motor.friction_force, motor.load, motor.force)
-    own = burden_of(loading, scale, "motor")
-    return StepperMotor(
-        curve=tuple((speed / 60.0 * per_rev, torque) for speed, torque in motor.torque),
-        inertia=own.inertia,
-        friction=own.friction,
-        load=own.load,
-        start_p=None if motor.start_speed is None else motor.start_speed / 60.0 * per_rev,
-        detent=motor.detent,
-        hold=motor.hold_current,
-        hold_ns=motor.hold_delay,
-        overruns=motor.overruns,
-        resonance=None if motor.resonance is None else _resonance(motor, *motor.resonance, per_rev),
-    )
-
-
-def _resonance(motor: MotorSpec, low: float, high: float, per_rev: float) -> Resonance:
-    return Resonance(low / 60.0 * per_rev, high / 60.0 * per_rev, motor.resonance_growth, motor.resonance_fading, motor.vibration)

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from functools import partial
 from heapq import heappop, heappush
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from steptwin.errors import Refusal, Runaway
 from steptwin.machine import Nanos
 from steptwin.tables import complete
 from steptwin.world import script as do
-from steptwin.world.actions import FOR_SCRIPTS, ExternalInput, Refused
 from steptwin.world.agenda import Agenda, Watchers
+from steptwin.world.inputs import FOR_SCRIPTS, ExternalInput, Refused
 from steptwin.world.kernel import Kernel
 from steptwin.world.master import Master
+from steptwin.world.model import WORLD, Model
 from steptwin.world.motions import motion_ends, ordered
 from steptwin.world.observing import WorldObserver
 from steptwin.world.running import PendingRequests, Script, ScriptState, ScriptWait
-
-if TYPE_CHECKING:
-    from steptwin.world.plant import Plant
+from steptwin.world.trace import TraceRecord
 
 MOST_STEPS_PER_INSTANT = 10_000
 """Limit of steps of scripts at one moment; more are reported as `Runaway`."""
@@ -39,8 +39,13 @@ class ScriptsState(NamedTuple):
 class Scripts:
     """Runs scripts step by step. At one moment, scripts of the description run before external ones."""
 
-    def __init__(self, plant: Plant) -> None:
-        self._plant = plant
+    def __init__(
+        self, model: Model, perform: Callable[[ExternalInput, str], None], apply: Callable[[ExternalInput], None]
+    ) -> None:
+        """``perform`` executes an action of a script of the description, which it is given by name; ``apply`` one of others."""
+        self._model = model
+        self._perform = perform
+        self._apply = apply
         self._begun = 0
         self._scripts: dict[int, Script] = {}
         self._described: Agenda[Script] = Agenda()
@@ -48,6 +53,8 @@ class Scripts:
         self._observed: Agenda[WorldObserver] = Agenda()
         self._observers: list[WorldObserver] = []
         self._watchers = Watchers()
+        self._scheduled: dict[str, Script] = {}
+        """Scheduled steps that can be cancelled, by name."""
 
     def watch_kernels(self, kernels: Iterable[Kernel], watch: Callable[[Kernel], None]) -> None:
         """Call ``watch`` from now on with every kernel that has changed."""
@@ -62,7 +69,7 @@ class Scripts:
     def start(self, name: str, make: Callable[[], do.Steps | do.Walk], *, is_external: bool) -> Script:
         script = self._scripts[self._begun] = Script(self._begun, name, make, is_external=is_external)
         self._begun += 1
-        self._wait(script, ScriptWait(self._plant.now))
+        self._wait(script, ScriptWait(self._model.now))
         return script
 
     def end(self, script: Script) -> None:
@@ -70,6 +77,31 @@ class Scripts:
         if self._scripts.get(script.number) is script:
             script.end()
             self._remove(script)
+
+    def schedule(self, name: str, steps: tuple[do.Step, ...]) -> None:
+        """Start steps as a script of the description; they replace steps scheduled under the same name."""
+        self.unschedule(name)
+        self._scheduled[name] = self.start(name, partial(do.run_through, steps), is_external=False)
+
+    def unschedule(self, name: str) -> None:
+        """Cancel the steps scheduled under a name, if any."""
+        script = self._scheduled.pop(name, None)
+        if script is not None:
+            self.end(script)
+
+    @property
+    def scheduled(self) -> frozenset[str]:
+        """Names of the scheduled steps that can still be cancelled."""
+        return frozenset(self._scheduled)
+
+    def end_described(self, is_kept: Callable[[str], bool]) -> None:
+        """End the scripts of the description, and scheduled steps but for those whose names are kept."""
+        model = self._model
+        kept = {script for name, script in self._scheduled.items() if is_kept(name)}
+        for script in [one for one in self if not one.is_external and one not in kept]:
+            model.trace.add(TraceRecord(model.now, WORLD, "event", "script-ended", f"script {script.name} was ended"))
+            self.end(script)
+        self._scheduled = {name: script for name, script in self._scheduled.items() if script in kept}
 
     def _remove(self, script: Script) -> None:
         script.waiting = None
@@ -106,8 +138,8 @@ class Scripts:
 
     def look(self) -> None:
         """Let observers look that are due now."""
-        for observer in self._observed.take_watching(self._plant.now):
-            self._watchers.set(observer, observer.look(self._plant.now))
+        for observer in self._observed.take_watching(self._model.now):
+            self._watchers.set(observer, observer.look(self._model.now))
 
     # ------------------------------------------------------------------ scheduling
 
@@ -118,7 +150,7 @@ class Scripts:
 
     def advance_kernels(self) -> None:
         """Advance the kernels that are due now; scripts that wait for what happens there become due."""
-        self._watchers.advance(self._plant.now)
+        self._watchers.advance(self._model.now)
 
     def _renew(self) -> None:
         """Update the due moments of scripts when something has changed on which they depend."""
@@ -127,7 +159,7 @@ class Scripts:
                 if isinstance(script, Script):
                     self._plan(script)
                 else:
-                    self._observed.watch(script, self._plant.now)
+                    self._observed.watch(script, self._model.now)
 
     def _wait(self, script: Script, waiting: ScriptWait) -> None:
         script.waiting = waiting
@@ -139,17 +171,17 @@ class Scripts:
 
     def _plan(self, script: Script) -> None:
         """Schedule the evaluation of a script that waits for a condition or answers."""
-        waiting, plant = script.waiting, self._plant
+        waiting, model = script.waiting, self._model
         if waiting is None:
             return
         dues = [waiting.until]
         if waiting.condition is None:
-            sources = tuple(plant.touch(asked.line).source(asked.line) for asked in waiting.asked)
-            dues.append(plant.now if self._are_answered(waiting) else None)
+            sources = tuple(model.touch(asked.line).source(asked.line) for asked in waiting.asked)
+            dues.append(model.now if self._are_answered(waiting) else None)
         else:
-            condition = plant.condition(waiting.condition)
-            sources = condition.bring(plant.now)
-            dues.append(condition.due(plant.now))
+            condition = model.condition(waiting.condition)
+            sources = condition.bring(model.now)
+            dues.append(condition.due(model.now))
         self._watchers.set(script, sources)
         self._agenda_of(script).watch(script, min((due for due in dues if due is not None), default=None))
 
@@ -157,7 +189,7 @@ class Scripts:
         return all(self._master(asked.line).finished >= asked.last for asked in waiting.asked)
 
     def _master(self, line: str) -> Master:
-        return self._plant.line_called(line).master
+        return self._model.line_called(line).master
 
     # ------------------------------------------------------------------ execution
 
@@ -172,8 +204,8 @@ class Scripts:
     def _run(self, agenda: Agenda[Script]) -> None:
         """Run scripts whose moment has come, then those with conditions, each once and in order. A script that becomes due after
         its turn runs with the next call."""
-        plant = self._plant  # its moment changes if a step restores a snapshot
-        while (timed := agenda.take_timed(plant.now)) is not None:
+        model = self._model  # its moment changes if a step restores a snapshot
+        while (timed := agenda.take_timed(model.now)) is not None:
             self._resume(timed, None)
         ready: dict[int, Script] = {}
         order: list[int] = []
@@ -181,7 +213,7 @@ class Scripts:
         last = -1
         while True:
             self._renew()
-            for script in agenda.take_watching(plant.now):
+            for script in agenda.take_watching(model.now):
                 if script.number <= last:
                     behind.append(script)
                 elif script.number not in ready:
@@ -193,15 +225,15 @@ class Scripts:
             self._look(ready.pop(last))
         for script in behind:
             if script.waiting is not None:
-                agenda.watch(script, plant.now)
+                agenda.watch(script, model.now)
 
     def _look(self, script: Script) -> None:
         """Resume a watching script if its condition holds, its answer has come, or its time is over."""
-        waiting, now = script.waiting, self._plant.now
+        waiting, now = script.waiting, self._model.now
         if waiting is None:
             return
         if waiting.condition is not None:
-            condition = self._plant.condition(waiting.condition)
+            condition = self._model.condition(waiting.condition)
             condition.bring(now)
             value: Any = condition.holds(now)
             has_come = value
@@ -226,10 +258,10 @@ class Scripts:
         if script.is_external or waiting.is_request:
             return
         if waiting.condition is not None and not has_come:
-            self._plant.report_overdue(f"{script.name} waited in vain for {self._plant.told(waiting.condition)}")
+            self._model.report_overdue(f"{script.name} waited in vain for {self._model.told(waiting.condition)}")
         for asked in waiting.asked:
             if asked.first <= self._master(asked.line).unanswered <= asked.last:
-                self._plant.report_overdue(f"{script.name} waited in vain for an answer on {asked.line}")
+                self._model.report_overdue(f"{script.name} waited in vain for an answer on {asked.line}")
 
     def _resume(self, script: Script, value: Any) -> None:
         script.waiting = None
@@ -244,7 +276,7 @@ class Scripts:
             if waiting is not None:
                 self._wait(script, waiting)
                 return
-        raise Runaway(f"script {script.name!r}: more than {MOST_STEPS_PER_INSTANT} steps at {self._plant.now} ns")
+        raise Runaway(f"script {script.name!r}: more than {MOST_STEPS_PER_INSTANT} steps at {self._model.now} ns")
 
     def _take(self, step: do.Step, script: Script) -> StepResult:
         """Execute a step; returns what it waits for, or its result."""
@@ -255,37 +287,37 @@ class Scripts:
         return None, None
 
     def _pause(self, step: do.Wait, script: Script) -> StepResult:
-        return (ScriptWait(self._plant.now + step.duration) if step.duration > 0 else None), None
+        return (ScriptWait(self._model.now + step.duration) if step.duration > 0 else None), None
 
     def _wait_for_moment(self, step: do.At, script: Script) -> StepResult:
-        return (ScriptWait(step.time) if step.time > self._plant.now else None), None
+        return (ScriptWait(step.time) if step.time > self._model.now else None), None
 
     def _wait_for_condition(self, step: do.Until, script: Script) -> StepResult:
-        return ScriptWait(None if step.within is None else self._plant.now + step.within, step.condition), None
+        return ScriptWait(None if step.within is None else self._model.now + step.within, step.condition), None
 
     def _order(self, step: do.Order, script: Script) -> StepResult:
         try:
-            found = ordered(self._plant, step.command)
+            found = ordered(self._model, step.command)
         except Refusal as error:
             self._do(script, Refused(str(error)))
             return None, None
         return self._take(found, script)
 
     def _wait_for_end(self, step: do.UntilOver, script: Script) -> StepResult:
-        over = motion_ends(self._plant, step.machine, step.axis).over
-        return ScriptWait(None if step.within is None else self._plant.now + step.within, over), None
+        over = motion_ends(self._model, step.machine, step.axis).over
+        return ScriptWait(None if step.within is None else self._model.now + step.within, over), None
 
     def _expect_reached(self, step: do.ExpectReached, script: Script) -> StepResult:
-        self._do(script, do.Expect(motion_ends(self._plant, step.machine, step.axis, step.seek).reached))
+        self._do(script, do.Expect(motion_ends(self._model, step.machine, step.axis, step.seek).reached))
         return None, None
 
     def _stop(self, step: do.Stop, script: Script) -> StepResult:
-        plant = self._plant
-        plant.stopped = step.reason if plant.stopped is None else plant.stopped
-        return ScriptWait(plant.now + 1), None
+        model = self._model
+        model.stopped = step.reason if model.stopped is None else model.stopped
+        return ScriptWait(model.now + 1), None
 
     def _read(self, step: do.Read, script: Script) -> StepResult:
-        return None, self._plant.read(step.signal)
+        return None, self._model.read(step.signal)
 
     def _call(self, step: do.Call, script: Script) -> StepResult:
         step.function()
@@ -300,8 +332,8 @@ class Scripts:
 
     def _write(self, step: do.Write, script: Script) -> StepResult:
         """Write as a Modbus master: wait for the answers before the next step."""
-        plant = self._plant
-        lines = dict.fromkeys(plant.parts.line_of[name][0].name for name, *_ in step.values if name in plant.parts.line_of)
+        model = self._model
+        lines = dict.fromkeys(model.parts.line_of[name][0].name for name, *_ in step.values if name in model.parts.line_of)
         before = {name: self._master(name).asked for name in lines}
         self._do(script, step)
         asked = tuple(PendingRequests(name, before[name] + 1, self._master(name).asked) for name in lines)
@@ -310,27 +342,28 @@ class Scripts:
 
     def _do(self, script: Script, what: ExternalInput) -> None:
         if script.is_external:
-            self._plant.apply_input(what)
+            self._apply(what)
         else:
-            self._plant.perform(what, script.name)
+            self._perform(what, script.name)
 
     # ------------------------------------------------------------------ snapshots
 
     def state(self) -> ScriptsState:
         return ScriptsState(self._begun, tuple(script.state() for script in self._scripts.values()))
 
-    def restore(self, state: ScriptsState) -> None:
+    def restore(self, state: ScriptsState, scheduled: Collection[str]) -> None:
         """Restore a state; the kernels must have been restored before."""
         for script in list(self._scripts.values()):
             self.end(script)
         self._begun = state.begun
         for observer in self._observers:
-            observer.rewind(self._plant.now)
+            observer.rewind(self._model.now)
             self._watchers.again(observer)
         for one in state.scripts:
             script = self._scripts[one.number] = Script.at(one)
             if one.waiting is not None:
                 self._wait(script, one.waiting)
+        self._scheduled = {script.name: script for script in self if script.name in scheduled and not script.is_external}
 
 
 _TAKING: Mapping[type, Callable[[Scripts, Any, Script], StepResult]] = complete(

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 
 from steptwin.errors import Misuse
 from steptwin.tables import IncompleteTable
-from steptwin.world.kinds import line_kinds
 from steptwin.world.reader import Key, Path, TomlText
 
 
@@ -61,11 +60,3 @@ def check_sense(text: TomlText, path: Path, rows: TableRows, table: object, kind
     for key, kinds in rows.only.items():
         if key in table and kind not in kinds:
             text.means_nothing((*path, key), f"{key} means nothing for kind = {kind!r}", f"it is for {' and '.join(kinds)}")
-
-
-def of_lines() -> Mapping[str, tuple[str, ...]]:
-    """Keys of a line that not all kinds of lines have, and the kinds that do."""
-    lines = {kind.name: (*kind.opened_by, *kind.keys) for kind in line_kinds().values()}
-    keys = dict.fromkeys(key for keys in lines.values() for key in keys)
-    having = {key: tuple(name for name, keys in lines.items() if key in keys) for key in keys}
-    return {key: kinds for key, kinds in having.items() if len(kinds) < len(lines)}

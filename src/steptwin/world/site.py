@@ -2,35 +2,30 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from steptwin.errors import Misuse
 from steptwin.motioncontroller import MotionController
+from steptwin.world.buildmemo import BuildMemo
 from steptwin.world.chance import Chance
 from steptwin.world.contacts import Circuit
 from steptwin.world.kernel import Board, Kernel
 from steptwin.world.kind import AnyKind
 from steptwin.world.names import Unknown
+from steptwin.world.parts import WorldParts
+from steptwin.world.reader import TomlText
 from steptwin.world.tomlplaces import Path
-from steptwin.world.values import DIGITAL_INPUT, OUTPUT
+from steptwin.world.values import DIGITAL_INPUT, OUTPUT, Terminal
 from steptwin.world.wires import PinName, Wire
-
-if TYPE_CHECKING:
-    from steptwin.world.blueprint import Blueprint
-    from steptwin.world.element import AnyElement, NamedSpec
-    from steptwin.world.parts import WorldParts
-
-Terminal = tuple[str, str]
-"""Machine and pin, as a description names them."""
 
 
 class Site:
     """The context for building an element. Every method raises `Misuse` for a name that does not exist or does not fit."""
 
-    def __init__(self, blueprint: Blueprint, parts: WorldParts) -> None:
-        self.blueprint = blueprint
-        self.spec = blueprint.spec
+    def __init__(self, text: TomlText, seed: int, memo: BuildMemo, parts: WorldParts) -> None:
+        """``text``: the description; ``seed``: that of the world."""
+        self.text = text
+        self.memo = memo
         self.parts = parts
+        self._seed = seed
         self._joins: dict[PinName, str | None] = {}
         """``join`` of each input with contacts."""
 
@@ -58,10 +53,6 @@ class Site:
             raise Unknown(name, f"nothing is called {name!r}")
         return found
 
-    def kernel_of(self, element: AnyElement, spec: NamedSpec) -> Kernel:
-        """The kernel that an element is in: its own, or that of the first thing it refers to."""
-        return self.kernel(next(iter(element.refers(spec, self.spec))).one if element.terminals is None else spec.name)
-
     # ------------------------------------------------------------------ terminals
 
     def board(self, name: str) -> Board:
@@ -71,7 +62,7 @@ class Site:
     def join(self, wire: Wire, path: Path) -> None:
         """Join an output to an input that nothing else drives. ``path``: the table of the wire, or the key of its source."""
         kernel = self.kernel(wire.source.machine)
-        if self.blueprint.is_checked:
+        if self.memo.is_checked:
             self.parts.driven[wire.target] = path
         else:
             self.terminal(wire.source, OUTPUT)
@@ -81,7 +72,7 @@ class Site:
     def terminal(self, name: Terminal, kind: str) -> PinName:
         """A terminal of a machine or an element; ``kind`` is one of those of `steptwin.world.values`."""
         pin = PinName(*name)
-        if self.blueprint.is_checked:
+        if self.memo.is_checked:
             return pin
         of_element = self.parts.terminals.get(pin.machine)
         if of_element is not None:
@@ -95,8 +86,8 @@ class Site:
     def input(self, name: Terminal, path: Path, kind: str = DIGITAL_INPUT) -> PinName:
         """An input, reserved for one driver."""
         target = PinName(*name)
-        if target in self.parts.driven and not self.blueprint.is_checked:
-            raise Misuse(f"{target} is driven already, from {self.spec.text.where(self.parts.driven[target])}")
+        if target in self.parts.driven and not self.memo.is_checked:
+            raise Misuse(f"{target} is driven already, from {self.text.where(self.parts.driven[target])}")
         self.terminal(name, kind)
         self.parts.driven[target] = path
         return target
@@ -110,7 +101,7 @@ class Site:
             self.parts.circuits[target], self._joins[target] = circuit, join
             return circuit
         if join is None or join != self._joins[target]:
-            where = self.spec.text.where(self.parts.driven[target])
+            where = self.text.where(self.parts.driven[target])
             raise Misuse(
                 f"{target} is driven already, from {where}: contacts that share an input all have join = 'parallel', "
                 "or all join = 'series'"
@@ -120,7 +111,7 @@ class Site:
     def bounce_of(self, circuit: Circuit) -> Chance:
         """The random stream for the bounce of the next contact in a circuit."""
         number = f" {len(circuit.contacts) + 1}" if circuit.contacts else ""
-        return Chance(self.spec.seed, f"bounce {circuit.target}{number}")
+        return Chance(self._seed, f"bounce {circuit.target}{number}")
 
     def close_circuits(self) -> None:
         """Drive all inputs with contacts to their initial levels."""

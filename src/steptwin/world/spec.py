@@ -4,52 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from steptwin.machine import Nanos
+from steptwin.world.arrangement import DrawnPlace
+from steptwin.world.elementspec import ElementSpecs
 from steptwin.world.faults import Fault
-from steptwin.world.links import TlsFiles
+from steptwin.world.gateways import GatewaySpec
+from steptwin.world.historytable import HistorySpec
+from steptwin.world.kind import ControllerSpec, LineSpec
 from steptwin.world.overrides import Overrides
 from steptwin.world.reader import Path, TomlText
 from steptwin.world.script import Step
-
-if TYPE_CHECKING:
-    from steptwin.world.arrangement import DrawnPlace
-    from steptwin.world.element import Element, ElementSpec
-    from steptwin.world.gateways import GatewaySpec
-    from steptwin.world.historytable import HistorySpec
-    from steptwin.world.kind import AnyKind
-
-S = TypeVar("S", bound="ElementSpec")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LineSpec:
-    name: str
-    kind: str
-    baud: int | None
-    timing: str
-    gap: Nanos | None
-    links: Mapping[str, str]
-    """Addresses of its external links, by key."""
-    tls: TlsFiles | None = None
-    """Of encrypted ones, relative to the description."""
-    path: Path = ()
-
-    @property
-    def is_open(self) -> bool:
-        """Whether it has external links."""
-        return bool(self.links)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ControllerSpec:
-    """The common part of all controllers' tables; each kind adds its own."""
-
-    kind: AnyKind
-    name: str
-    line: str | None
-    path: Path = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,8 +43,7 @@ class WorldSpec:
     """Trace of a live run: a file, ``ring N``, ``off``."""
     lines: tuple[LineSpec, ...]
     controllers: tuple[ControllerSpec, ...]
-    elements: Mapping[str, tuple[ElementSpec, ...]]
-    """The elements by the names of their tables."""
+    elements: ElementSpecs
     scripts: tuple[ScriptSpec, ...]
     gateways: tuple[GatewaySpec, ...]
     history: HistorySpec | None
@@ -91,10 +55,6 @@ class WorldSpec:
     """Values that replace those of the text."""
     pieces: Mapping[str, Path]
     """Files of tables that it uses, and the keys that name them first."""
-
-    def elements_of(self, element: Element[S, Any]) -> tuple[S, ...]:
-        """The tables of a kind of element."""
-        return cast("tuple[S, ...]", self.elements[element.name])
 
     def vision_addresses(self) -> Iterator[tuple[str, str]]:
         """Controllers with an input for records of a vision system, and its address."""

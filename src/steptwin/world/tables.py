@@ -23,7 +23,7 @@ from steptwin.world.kinds import KINDS, line_kinds
 from steptwin.world.links import LINK_KEYS, TLS_KEYS, TLS_NEED
 from steptwin.world.pieces import USE, USES
 from steptwin.world.reader import Key, optional
-from steptwin.world.sense import TableRows, of_lines
+from steptwin.world.sense import TableRows
 from steptwin.world.steptable import STEPS
 from steptwin.world.values import (
     flag,
@@ -109,7 +109,7 @@ def _tables_with(registered: tuple[int, ...]) -> Mapping[str, TableRows]:
     found = {
         "world": TableRows(written="[world]", keys=KEYS["world"]),
         USE: USES,
-        "line": TableRows(written="[[line]]", keys=_line_keys(), need=TLS_NEED, only=of_lines()),
+        "line": TableRows(written="[[line]]", keys=_line_keys(), need=TLS_NEED, only=_only_of_lines()),
     }
     for kind in KINDS.values():
         found[kind.name] = TableRows(written=f"[[{kind.name}]]", keys=kind.keys, exclude=kind.exclusive)
@@ -155,3 +155,11 @@ def _inner_tables(kind: AnyKind) -> dict[str, tuple[Key, ...]]:
         " to ".join(dict.fromkeys((names[0], names[-1]))): kind.inner_keys(names[0][len(kind.name) + 2 : -1])
         for names in groups.values()
     }
+
+
+def _only_of_lines() -> Mapping[str, tuple[str, ...]]:
+    """Keys of a line that not all kinds of lines have, and the kinds that do."""
+    lines = {kind.name: (*kind.opened_by, *kind.keys) for kind in line_kinds().values()}
+    keys = dict.fromkeys(key for keys in lines.values() for key in keys)
+    having = {key: tuple(name for name, keys in lines.items() if key in keys) for key in keys}
+    return {key: kinds for key, kinds in having.items() if len(kinds) < len(lines)}

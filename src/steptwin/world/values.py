@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from math import isnan
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypeAlias, TypeVar
 
 from steptwin.durations import duration
 from steptwin.errors import Misuse
@@ -19,6 +19,9 @@ MOST = 1e300
 """Numbers beyond it would overflow in products."""
 
 T = TypeVar("T")
+
+Terminal: TypeAlias = tuple[str, str]
+"""Machine and pin, as a description names them."""
 
 
 @dataclass(frozen=True, slots=True)

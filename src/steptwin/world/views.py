@@ -1,4 +1,4 @@
-"""Views of a running world for Python programs: its controllers, their axes, and the mechanics, at the present moment.
+"""Views of a running world for Python programs: its controllers, its mechanics and lines, at the present moment.
 
 Positions in the units of the axis, times in seconds, torques in N·m.
 """
@@ -6,15 +6,11 @@ Positions in the units of the axis, times in seconds, torques in N·m.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
-from steptwin.world import script as do
-from steptwin.world.actions import Bytes
-
-if TYPE_CHECKING:
-    from steptwin.controllerstate import ControllerState
-    from steptwin.world.elements.axis import BuiltAxis
-    from steptwin.world.plant import Plant
+from steptwin.world.elements.axis import BuiltAxis
+from steptwin.world.inputs import Bytes
+from steptwin.world.plant import Plant
 
 View = TypeVar("View")
 
@@ -43,37 +39,6 @@ class Views(Mapping[str, View], Generic[View]):
 
     def __len__(self) -> int:
         return len(self._views)
-
-
-class MachineView:
-    """The common part of all controllers' views."""
-
-    def __init__(self, plant: Plant, name: str) -> None:
-        self._plant = plant
-        self.name = name
-
-    def _touch(self) -> None:
-        self._plant.touch(self.name)
-
-    @property
-    def state(self) -> ControllerState:
-        """Status, program, axes, pins and details."""
-        self._touch()
-        return self._plant.kind(self.name).state(self._plant.machines[self.name], self._plant.now)
-
-    @property
-    def pins(self) -> Mapping[str, float]:
-        """The level of every pin: 0, 1, volts."""
-        self._touch()
-        return self._plant.kind(self.name).state.pins(self._plant.machines[self.name], self._plant.now)
-
-    def set_pin(self, pin: str, value: float) -> None:
-        """Set an input from outside: 0, 1, volts. Raises `Misuse`."""
-        self._plant.apply_input(do.Set(((self.name, pin.upper(), float(value)),)))
-
-    def power_cycle(self) -> None:
-        """Switch it off and on again."""
-        self._plant.apply_input(do.PowerCycle(self.name))
 
 
 class MechanicsView:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from steptwin.machine import Nanos
-from steptwin.world.element import NamedSpec
+from steptwin.world.elementspec import NamedSpec
 from steptwin.world.parts import WorldParts
 from steptwin.world.wires import PinName
 
@@ -38,7 +38,7 @@ def connections(parts: WorldParts) -> Iterator[Connection]:
                 yield Connection(contact.lane, target, contact.normally_closed, join=join)
         else:
             kind, number = str(path[0]), path[1]
-            spec = parts.spec.elements[kind][int(number)]
+            spec = parts.described[kind][int(number)]
             yield Connection((spec.name if isinstance(spec, NamedSpec) else "") or kind, target)
 
 

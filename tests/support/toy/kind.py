@@ -19,21 +19,30 @@ from steptwin.world import script as do
 from steptwin.world.control import Halt, Move, StopAxes
 from steptwin.world.faults import AxisLoad, Faults
 from steptwin.world.kernel import Kernel
-from steptwin.world.kind import BuildContext, ControllerKind, LineKind, LineUnit, LinkKind, Member, Terminals
+from steptwin.world.kind import (
+    BuildContext,
+    ControllerKind,
+    ControllerSpec,
+    LineKind,
+    LineSpec,
+    LineUnit,
+    LinkKind,
+    Member,
+    Terminals,
+)
 from steptwin.world.kinds import KINDS, register
 from steptwin.world.lanes import AxisLane, plain_view
+from steptwin.world.machineview import MachineView
 from steptwin.world.reader import Key, Row, TomlText, optional
-from steptwin.world.scale import FULL_STEPS, DriveScale
-from steptwin.world.spec import ControllerSpec, LineSpec
+from steptwin.world.scale import FULL_STEPS, DriveScale, GivenScale
 from steptwin.world.trace import RecordSink, TraceRecord
 from steptwin.world.values import name_value, whole
-from steptwin.world.views import MachineView
 from toy.faults import ToyBody
 from toy.line import ToyLine
 from toy.machine import STEP_P, Toy
 
 if TYPE_CHECKING:
-    from steptwin.world.elements.axis import AxisSpec
+    pass
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,8 +111,8 @@ def _input_pin(pin: str, level: float) -> str:
     return "STOP"
 
 
-def _scale(spec: AxisSpec, toy: Toy, number: int) -> DriveScale:
-    return DriveScale(pulses_per_rev=spec.pulses_per_rev or 200, full_steps=FULL_STEPS, text="counts pulses")
+def _scale(given: GivenScale, toy: Toy, number: int) -> DriveScale:
+    return DriveScale(pulses_per_rev=given.pulses_per_rev or 200, full_steps=FULL_STEPS, text="counts pulses")
 
 
 def _body(toy: Toy, service: LineUnit, shafts: Mapping[int, AxisLoad]) -> ToyBody:

@@ -9,17 +9,17 @@ from typing import ClassVar
 
 from steptwin.machine import Nanos
 from steptwin.state import Stateful
-from steptwin.world.element import Element, NamedSpec, Reference
+from steptwin.world.element import Element
 from steptwin.world.elements import forget, register
+from steptwin.world.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.effects import ElementEffect
 from steptwin.world.kernel import Kernel
 from steptwin.world.reader import Key, Row, Table, TomlText, optional
 from steptwin.world.sense import TableRows
-from steptwin.world.signals import SignalOf
-from steptwin.world.site import Site, Terminal
-from steptwin.world.spec import WorldSpec
-from steptwin.world.values import OUTPUT, flag, name_value, pin_name, time_value
+from steptwin.world.signal import SignalOf
+from steptwin.world.site import Site
+from steptwin.world.values import OUTPUT, Terminal, flag, name_value, pin_name, time_value
 from steptwin.world.wires import PinName
 
 
@@ -72,7 +72,7 @@ def _read(text: TomlText, row: Row, table: Table) -> LampSpec:
     return LampSpec(**row)
 
 
-def _refers(spec: LampSpec, world: WorldSpec) -> Iterator[Reference]:
+def _refers(spec: LampSpec, described: ElementSpecs) -> Iterator[Reference]:
     yield Reference(spec.source[0], spec.source[0], (*spec.path, "from"))
 
 

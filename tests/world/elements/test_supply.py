@@ -176,7 +176,7 @@ def test_a_supply_that_drops_while_the_fault_of_a_machine_lasts() -> None:
 
 
 def test_all_of_its_voltage_may_be_needed() -> None:
-    found = {one.name: one for one in world(text=TEXT.replace("enough = 18", "enough = 24")).spec.elements_of(SUPPLY)}
+    found = {one.name: one for one in world(text=TEXT.replace("enough = 18", "enough = 24")).spec.elements.of(SUPPLY)}
     assert (found["logic"].enough, found["logic"].threshold) == (24.0, 24.0)
 
 

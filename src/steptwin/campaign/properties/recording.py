@@ -31,7 +31,8 @@ from steptwin.world.quantities import (
     change_between,
     unit_of_all,
 )
-from steptwin.world.signals import Idle, SignalOf
+from steptwin.world.signal import SignalOf
+from steptwin.world.signals import Idle
 
 _SIGNS = {"<": -1.0, "<=": -1.0, ">": 1.0, ">=": 1.0, "==": 0.0, "!=": 0.0}
 """Whether more of the left side is nearer to the truth, or less; 0: neither."""

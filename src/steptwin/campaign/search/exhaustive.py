@@ -63,7 +63,7 @@ class ExhaustiveCases:
 
         world = runner.begin(self._nominal)
         world.trace.watchers.append(note)
-        follower = StatementFollower(world, note)
+        follower = StatementFollower(world.programs, note)
         world.run_to(self._nominal.end_ns, description.until)
         follower.close()
         moments = tuple(sorted(found))

@@ -24,7 +24,7 @@ def axis_views(world: Plant) -> AxisViews:
         if element.moved is not None:
             for built in world.parts.built(element).values():
                 for axis, lane in element.moved(built):
-                    moved.setdefault(axis.spec.name, []).append(lane)
+                    moved.setdefault(axis, []).append(lane)
     for name, fitted in world.axes.items():
         place = fitted.mechanism.machine, str(fitted.mechanism.number)
         views[place] = views[place]._replace(mechanics=_mechanics(fitted)._replace(moved=tuple(moved.get(name, ()))))

@@ -4,26 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import partial
+from typing import Any
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
-from steptwin.world.contacts import Zone
+from steptwin.world.contacts import Switch, Zone
 from steptwin.world.course import Build, Course
-from steptwin.world.element import Element, NamedSpec, Reference
-from steptwin.world.elements.encoder import ENCODER, EncoderSpec, fit_encoder, read_encoder
-from steptwin.world.elements.motor import MOTOR, MotorSpec, read_motor
+from steptwin.world.element import Element
+from steptwin.world.elements.encoder import ENCODER, EncoderSpec, read_encoder
+from steptwin.world.elements.motor import MOTOR, MotorSpec, motor_of, read_motor
 from steptwin.world.elements.switch import SWITCH, SwitchSpec, lane_of, put_switch, read_switches, zone_of
+from steptwin.world.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.world.kernel import Kernel, Source
-from steptwin.world.mechanics import Mechanism
+from steptwin.world.kind import EncoderInputs
+from steptwin.world.mechanics import EncoderBuild, Mechanism, RotorMark
 from steptwin.world.names import Unknown, WrongTerminal
 from steptwin.world.reader import Key, Row, Table, TomlText, optional
-from steptwin.world.scale import Scale, motor_of, scale_of
+from steptwin.world.scale import GivenScale, Scale, exact_fraction, scale_of
 from steptwin.world.sense import TableRows
-from steptwin.world.signals import SignalOf
-from steptwin.world.site import Site, Terminal
-from steptwin.world.spec import WorldSpec
-from steptwin.world.values import axis_number, flag, name_value, number, pair, pin_name, text_value, whole, word
+from steptwin.world.signal import SignalOf
+from steptwin.world.site import Site
+from steptwin.world.values import Terminal, axis_number, flag, name_value, number, pair, pin_name, text_value, whole, word
 
 MECHANICS = ("position", "lost", "stalled")
 """What there is of the mechanics of an axis."""
@@ -44,6 +47,18 @@ class AxisSpec(NamedSpec):
     switches: tuple[SwitchSpec, ...]
     encoder: EncoderSpec | None
     motor: MotorSpec | None
+
+    @property
+    def scale(self) -> GivenScale:
+        return GivenScale(
+            machine=self.drive[0],
+            is_rotary=self.kind == "rotary",
+            unit=self.unit,
+            pulses_per_unit=self.pulses_per_unit,
+            pitch=self.pitch,
+            pulses_per_rev=self.pulses_per_rev,
+            full_steps=None if self.motor is None else self.motor.full_steps,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,14 +97,14 @@ def _read(text: TomlText, row: Row, table: Table) -> AxisSpec:
     return spec
 
 
-def _refers(spec: AxisSpec, world: WorldSpec) -> Iterator[Reference]:
+def _refers(spec: AxisSpec, described: ElementSpecs) -> Iterator[Reference]:
     yield Reference(spec.drive[0], spec.drive[0], (*spec.path, "drive"))
     for switch in spec.switches:
         yield Reference(spec.drive[0], switch.target[0], (*switch.path, "to"))
     if spec.encoder is not None and spec.encoder.follows is not None:
-        drives = {axis.name: axis.drive[0] for axis in world.elements_of(AXIS)}
+        drives = {axis.name: axis.drive[0] for axis in described.of(AXIS)}
         followed = spec.encoder.follows
-        others = (one.name for specs in world.elements.values() for one in specs if isinstance(one, NamedSpec))
+        others = (one.name for specs in described.values() for one in specs if isinstance(one, NamedSpec))
         if followed in drives or followed in others:  # one that is not an axis is joined, too: what is wrong is `follows`
             yield Reference(spec.drive[0], drives.get(followed, followed), (*spec.encoder.path, "follows"))
 
@@ -97,12 +112,12 @@ def _refers(spec: AxisSpec, world: WorldSpec) -> Iterator[Reference]:
 def _build(spec: AxisSpec, site: Site) -> BuiltAxis:
     machine = spec.drive[0]
     kernel = site.kernel(machine)
-    number, scale, build = site.blueprint.once(spec.path, lambda: _checked(spec, site))
+    number, scale, build = site.memo.once(spec.path, lambda: _checked(spec, site))
     mechanism = Mechanism(kernel, machine, number, build, spec.name)
     kernel.add_part(mechanism, (machine,), spec.name)
     fitted = BuiltAxis(spec, kernel, mechanism, scale)
     for n, switch in enumerate(spec.switches, start=1):
-        site.spec.text.unless_wrong(switch.path, partial(_put_switch, fitted, switch, lane_of(spec.name, n), site))
+        site.text.unless_wrong(switch.path, partial(_put_switch, fitted, switch, lane_of(spec.name, n), site))
     return fitted
 
 
@@ -117,7 +132,7 @@ def _checked(spec: AxisSpec, site: Site) -> tuple[int, Scale, Build]:
     taken = [axis.spec.name for axis in site.parts.built(AXIS).values() if axis.spec.drive == spec.drive]
     if taken:
         raise Misuse(f"drive = '{machine}.{drive}' moves {taken[0]!r} already")
-    scale = scale_of(spec, site.kind(machine).scale(spec, site.machine(machine), number))
+    scale = scale_of(spec.scale, site.kind(machine).scale(spec.scale, site.machine(machine), number))
     pulses = scale.nearest
     build = Build(
         sign=-1 if spec.inverted else 1,
@@ -140,11 +155,60 @@ def _put_switch(axis: BuiltAxis, spec: SwitchSpec, lane: str, site: Site) -> Non
         period = usual if spec.period is None else axis.scale.pulses(spec.period)
         return zone_of(spec, axis.scale.nearest, period)
 
-    put_switch(axis.kernel, axis.mechanism, axis.spec.drive[0], site.blueprint.once(spec.path, zone), spec, lane, site)
+    put_switch(axis.kernel, axis.mechanism, axis.spec.drive[0], site.memo.once(spec.path, zone), spec, lane, site)
 
 
 def _connect(spec: AxisSpec, fitted: BuiltAxis, site: Site) -> None:
-    fit_encoder(fitted, spec.encoder, site.parts.built(AXIS), site)
+    _fit_encoder(fitted, spec.encoder, site.parts.built(AXIS), site)
+
+
+def _fit_encoder(axis: BuiltAxis, spec: EncoderSpec | None, axes: Mapping[str, BuiltAxis], site: Site) -> None:
+    """Put an encoder on an axis, or on the one that it follows. Without one, mechanics between pulses and load turn that of the
+    controller."""
+    mechanism = axis.mechanism
+    name = axis.spec.drive[0]
+    kind, machine = site.kind(name), site.machine(name)
+    encoders = kind.encoders
+    if encoders is None:
+        if spec is not None:
+            raise Misuse(f"encoder: {name} is {kind.title}, which reads none")
+        return
+    now = axis.kernel.now
+    reader = encoders.reader(machine)
+    if spec is None:
+        if not mechanism.build.ideal:
+            mechanism.fit(EncoderBuild(name, reader, mechanism.number), now)
+        return
+    turned = axis
+    if spec.follows is not None:
+        other = axes.get(spec.follows)
+        if other is None:
+            raise Unknown(spec.follows, f"encoder: follows = {spec.follows!r}: axes are {', '.join(axes)}")
+        turned = other
+    counts = _counts(spec, turned, encoders, machine, mechanism.number)
+    on_load = spec.mount == "load" or spec.follows is not None
+    numerator, denominator = (None, 1) if counts is None else (counts.numerator, counts.denominator)
+    turned.mechanism.fit(EncoderBuild(name, reader, mechanism.number, on_load, numerator, denominator), now)
+    if spec.index:
+        low = axis.scale.nearest(spec.offset)
+        target = (name, encoders.index_input(mechanism.number))
+        circuit = site.circuit(axis.kernel, target, (*spec.path, "index"), None)
+        zone = Zone(low, low + spec.index_width - 1, 0, axis.scale.pulses_per_rev)
+        axis.kernel.add_part(Switch(circuit, RotorMark(turned.mechanism), zone, now), (turned.mechanism.machine,))
+
+
+def _counts(spec: EncoderSpec, turned: BuiltAxis, encoders: EncoderInputs[Any], machine: Any, number: int) -> Fraction | None:
+    """Counts per pulse of what turns it; None: as the controller is configured."""
+    counts: Fraction | None = None
+    if spec.counts_per_unit is not None:
+        counts = exact_fraction(spec.counts_per_unit) / turned.scale.pulses_per_unit
+    elif spec.counts_per_rev is not None:
+        counts = Fraction(spec.counts_per_rev, turned.scale.pulses_per_rev)
+    if spec.slip:
+        if counts is None:
+            counts = encoders.counts_per_pulse(machine, number)
+        counts *= 1 - exact_fraction(spec.slip)
+    return counts
 
 
 def find_axis(name: str, site: Site) -> BuiltAxis:

@@ -13,9 +13,8 @@ from steptwin.world.contacts import Circuit, Contact
 from steptwin.world.elements.contact import CONTACT_KEYS
 from steptwin.world.reader import Key, Table, TomlText, optional, read_table
 from steptwin.world.sense import TableRows, check_sense
-from steptwin.world.site import Terminal
 from steptwin.world.tomlplaces import Path
-from steptwin.world.values import INPUT_PIN, number, word
+from steptwin.world.values import INPUT_PIN, Terminal, number, word
 
 WORKPIECE, MARK = "workpiece", "mark"
 T = TypeVar("T")

@@ -10,6 +10,7 @@ from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.world.elements.axis import find_axis
 from steptwin.world.elements.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
+from steptwin.world.elementspec import ElementSpecs
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.effects import ElementEffect
 from steptwin.world.faults.table import number
@@ -17,9 +18,8 @@ from steptwin.world.kernel import Board
 from steptwin.world.kind import Terminals
 from steptwin.world.mechanics import Mechanism
 from steptwin.world.reader import Key, optional
-from steptwin.world.site import Site, Terminal
-from steptwin.world.spec import WorldSpec
-from steptwin.world.values import OUTPUT_PIN, NameOf, time_value
+from steptwin.world.site import Site
+from steptwin.world.values import OUTPUT_PIN, NameOf, Terminal, time_value
 from steptwin.world.values import number as number_value
 
 RELEASE, RELEASED = "RELEASE", "RELEASED"
@@ -44,7 +44,7 @@ class BrakeSpec(BoardSpec):
         if self.release is not None:
             yield Joint("release", RELEASE, self.release)
 
-    def others(self, world: WorldSpec) -> Iterator[tuple[str, str]]:
+    def others(self, described: ElementSpecs) -> Iterator[tuple[str, str]]:
         yield "axis", self.axis
 
 

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 
 from steptwin.machine import Nanos
 from steptwin.world.contacts import Button
-from steptwin.world.element import Element, NamedSpec, Reference
+from steptwin.world.element import Element
 from steptwin.world.elements.contact import CONTACT_KEYS
+from steptwin.world.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.world.kernel import Kernel
 from steptwin.world.reader import Key, Row, Table, TomlText
 from steptwin.world.sense import TableRows
-from steptwin.world.signals import SignalOf
-from steptwin.world.site import Site, Terminal
-from steptwin.world.spec import WorldSpec
-from steptwin.world.values import INPUT_PIN, name_value
+from steptwin.world.signal import SignalOf
+from steptwin.world.site import Site
+from steptwin.world.values import INPUT_PIN, Terminal, name_value
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,7 +31,7 @@ def _read(text: TomlText, row: Row, table: Table) -> ButtonSpec:
     return ButtonSpec(**row)
 
 
-def _refers(spec: ButtonSpec, world: WorldSpec) -> Iterator[Reference]:
+def _refers(spec: ButtonSpec, described: ElementSpecs) -> Iterator[Reference]:
     yield Reference(spec.target[0], spec.target[0], (*spec.path, "to"))
 
 

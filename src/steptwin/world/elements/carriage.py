@@ -13,9 +13,10 @@ from steptwin.machine import Nanos
 from steptwin.motion.elastic import Response, Spring
 from steptwin.state import Plain, Stateful
 from steptwin.world.drawing import rail
-from steptwin.world.element import Element, NamedSpec, Reference
+from steptwin.world.element import Element
 from steptwin.world.elements.axis import AXIS, BuiltAxis, find_axis
 from steptwin.world.elements.switch import SWITCH, SwitchSpec, lane_of, put_switch, read_switches, zone_of
+from steptwin.world.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.effects import ElementEffect
 from steptwin.world.faults.table import number as parameter
@@ -23,9 +24,8 @@ from steptwin.world.lanes import SPRING_SHARE, MovedLane
 from steptwin.world.loadmotion import load_stretches
 from steptwin.world.reader import Key, Row, Table, TomlText, optional
 from steptwin.world.sense import TableRows
-from steptwin.world.signals import SignalOf
+from steptwin.world.signal import SignalOf
 from steptwin.world.site import Site
-from steptwin.world.spec import WorldSpec
 from steptwin.world.values import NameOf, name_value, number
 
 
@@ -103,10 +103,10 @@ class Carriage(Stateful):
         return self._response.reaches(position - 0.5 * direction, after, direction)
 
     @property
-    def moved(self) -> tuple[BuiltAxis, MovedLane]:
+    def moved(self) -> tuple[str, MovedLane]:
         spec, scale = self.spec, self.axis.scale
         per_pulse = self.axis.mechanism.build.sign / float(scale.pulses_per_unit)
-        return self.axis, MovedLane(spec.name, "position", scale.unit, per_pulse, spring=(spec.frequency, spec.damping))
+        return self.axis.spec.name, MovedLane(spec.name, "position", scale.unit, per_pulse, spring=(spec.frequency, spec.damping))
 
     # ------------------------------------------------------------------ signals
 
@@ -145,8 +145,8 @@ def _read(text: TomlText, row: Row, table: Table) -> CarriageSpec:
     return CarriageSpec(**row, switches=tuple(read_switches(text, row["path"], table)))
 
 
-def _refers(spec: CarriageSpec, world: WorldSpec) -> Iterator[Reference]:
-    drives = {axis.name: axis.drive[0] for axis in world.elements_of(AXIS)}
+def _refers(spec: CarriageSpec, described: ElementSpecs) -> Iterator[Reference]:
+    drives = {axis.name: axis.drive[0] for axis in described.of(AXIS)}
     machine = drives.get(spec.axis, spec.axis)
     yield Reference(machine, machine, (*spec.path, "axis"))
     for switch in spec.switches:
@@ -158,7 +158,7 @@ def _build(spec: CarriageSpec, site: Site) -> Carriage:
     mechanism = carriage.axis.mechanism
     carriage.axis.kernel.add_part(carriage, (mechanism.machine, spec.axis), spec.name)
     for n, switch in enumerate(spec.switches, start=1):
-        site.spec.text.unless_wrong(switch.path, partial(_put_switch, carriage, switch, lane_of(spec.name, n), site))
+        site.text.unless_wrong(switch.path, partial(_put_switch, carriage, switch, lane_of(spec.name, n), site))
     return carriage
 
 

@@ -11,12 +11,12 @@ from steptwin.machine import Nanos
 from steptwin.world.belt import Workpiece, next_change
 from steptwin.world.elements.conveyor import find_conveyor
 from steptwin.world.elements.logic import BoardPart, BoardSpec, Joint
+from steptwin.world.elementspec import ElementSpecs
 from steptwin.world.kernel import Board
 from steptwin.world.reader import optional
-from steptwin.world.signals import SignalOf
-from steptwin.world.site import Site, Terminal
-from steptwin.world.spec import WorldSpec
-from steptwin.world.values import OUTPUT_PIN, NameOf, number
+from steptwin.world.signal import SignalOf
+from steptwin.world.site import Site
+from steptwin.world.values import OUTPUT_PIN, NameOf, Terminal, number
 
 PICK, PLACE, HELD = "PICK", "PLACE", "HELD"
 
@@ -59,7 +59,7 @@ class CarrierSpec(BoardSpec):
             if source is not None:
                 yield Joint(key, terminal, source)
 
-    def others(self, world: WorldSpec) -> Iterable[tuple[str, str]]:
+    def others(self, described: ElementSpecs) -> Iterable[tuple[str, str]]:
         if self.source is not None:
             yield "from", self.source
         if self.onto is not None:

@@ -14,13 +14,13 @@ from steptwin.world.elements.quantity import TIME, check_condition, condition_of
 from steptwin.world.elements.shaft import SHAFT
 from steptwin.world.elements.tool import TOOL
 from steptwin.world.elements.touch import HIT, JAM, REPORT, RESET, Touch
+from steptwin.world.elementspec import ElementSpecs
 from steptwin.world.kind import Terminals
 from steptwin.world.mechanics import Mechanism
 from steptwin.world.reader import Key, TomlText, optional
-from steptwin.world.signals import SignalOf
-from steptwin.world.site import Site, Terminal
-from steptwin.world.spec import WorldSpec
-from steptwin.world.values import OUTPUT_PIN, text_value, word
+from steptwin.world.signal import SignalOf
+from steptwin.world.site import Site
+from steptwin.world.values import OUTPUT_PIN, Terminal, text_value, word
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,7 +43,7 @@ class CollisionSpec(BoardSpec):
         """Machines and elements whose signals are in the condition."""
         return owners_of(self.when)
 
-    def others(self, world: WorldSpec) -> Iterator[tuple[str, str]]:
+    def others(self, described: ElementSpecs) -> Iterator[tuple[str, str]]:
         yield from (("when", owner) for owner in self.owners if owner != TIME)
 
     def check(self, text: TomlText) -> None:

@@ -16,18 +16,18 @@ from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.world.belt import BeltDrive, ConstantDrive, Load, Workpiece, next_change
 from steptwin.world.drawing import BELT, Drawing, SensorZone
-from steptwin.world.element import Reference
 from steptwin.world.elements.axis import find_axis, turns_of_axis
 from steptwin.world.elements.beltsensor import SENSOR, Sensor, SensorSpec, read_inner
 from steptwin.world.elements.conveyortable import FEED, RUN, STOP, ConveyorSpec, StopSpec, mark_places, stop_terminal
 from steptwin.world.elements.logic import STUCK_INPUT, BoardPart, Inner, with_terminals
+from steptwin.world.elementspec import Reference
 from steptwin.world.faults import ActiveFault, Fault, FaultKind, Layer, Occasion
 from steptwin.world.faults.effects import ElementEffect
 from steptwin.world.kernel import Board
 from steptwin.world.names import Unknown
 from steptwin.world.reader import Key, optional
 from steptwin.world.scale import exact_fraction
-from steptwin.world.signals import SignalOf
+from steptwin.world.signal import SignalOf
 from steptwin.world.site import Site
 from steptwin.world.values import OUTPUT_PIN, NameOf, number, positive_time
 
@@ -357,7 +357,7 @@ def _lane(spec: ConveyorSpec, number: int) -> str:
 
 def _put_sensors(spec: ConveyorSpec, conveyor: Conveyor, site: Site) -> None:
     for n, sensor in enumerate(spec.sensors, start=1):
-        site.spec.text.unless_wrong(sensor.path, partial(_put_sensor, conveyor, sensor, _lane(spec, n), site))
+        site.text.unless_wrong(sensor.path, partial(_put_sensor, conveyor, sensor, _lane(spec, n), site))
 
 
 def _put_sensor(conveyor: Conveyor, spec: SensorSpec, lane: str, site: Site) -> None:

@@ -10,13 +10,12 @@ from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.world.elements.beltsensor import SensorSpec
 from steptwin.world.elements.logic import BoardSpec, Joint
+from steptwin.world.elementspec import ElementSpecs
 from steptwin.world.kind import Terminals
 from steptwin.world.reader import Key, TomlText, optional
 from steptwin.world.sense import TableRows
-from steptwin.world.site import Terminal
-from steptwin.world.spec import WorldSpec
 from steptwin.world.tomlplaces import Path
-from steptwin.world.values import OUTPUT_PIN, number, permitting
+from steptwin.world.values import OUTPUT_PIN, Terminal, number, permitting
 
 RUN, FEED = "RUN", "FEED"
 
@@ -71,7 +70,7 @@ class ConveyorSpec(BoardSpec):
             if stop.hold is not None:
                 yield Joint("stop", stop_terminal(n + 1), stop.hold)
 
-    def others(self, world: WorldSpec) -> Iterable[tuple[str, str]]:
+    def others(self, described: ElementSpecs) -> Iterable[tuple[str, str]]:
         if self.axis is not None:
             yield "axis", self.axis
         if self.next is not None:

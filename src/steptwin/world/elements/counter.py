@@ -11,9 +11,8 @@ from steptwin.world.elements.logic import STUCK, BoardPart, BoardSpec, Joint, wi
 from steptwin.world.kernel import Board
 from steptwin.world.kind import Terminals
 from steptwin.world.reader import Key, optional
-from steptwin.world.signals import SignalOf
-from steptwin.world.site import Terminal
-from steptwin.world.values import OUTPUT_PIN, whole
+from steptwin.world.signal import SignalOf
+from steptwin.world.values import OUTPUT_PIN, Terminal, whole
 
 UP, DOWN, RESET, OUT = "UP", "DOWN", "RESET", "OUT"
 MOST = 2**31 - 1

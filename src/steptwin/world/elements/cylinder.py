@@ -11,19 +11,19 @@ from typing import ClassVar
 
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.world.drawing import ROD, Drawing
-from steptwin.world.element import Reference
 from steptwin.world.elements.logic import STUCK, BoardPart, BoardSpec, Inner, Joint, with_terminals
 from steptwin.world.elements.switch import SWITCH, SwitchSpec, lane_of, put_switch, read_switches, zone_of
+from steptwin.world.elementspec import Reference
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.effects import ElementEffect
 from steptwin.world.kernel import Board
 from steptwin.world.kind import Terminals
 from steptwin.world.reader import TomlText, optional
 from steptwin.world.scale import exact_fraction
-from steptwin.world.signals import SignalOf
-from steptwin.world.site import Site, Terminal
+from steptwin.world.signal import SignalOf
+from steptwin.world.site import Site
 from steptwin.world.travel import Travel
-from steptwin.world.values import OUTPUT_PIN, number, positive_time, time_value, word
+from steptwin.world.values import OUTPUT_PIN, Terminal, number, positive_time, time_value, word
 
 EXTEND, RETRACT, EXTENDED, RETRACTED = "EXTEND", "RETRACT", "EXTENDED", "RETRACTED"
 SINGLE, DOUBLE = "single", "double"
@@ -165,7 +165,7 @@ def _refers_of_switches(spec: CylinderSpec) -> Iterator[Reference]:
 
 def _put_switches(spec: CylinderSpec, cylinder: Cylinder, site: Site) -> None:
     for n, switch in enumerate(spec.switches, start=1):
-        site.spec.text.unless_wrong(switch.path, partial(_put_switch, cylinder, switch, lane_of(spec.name, n), site))
+        site.text.unless_wrong(switch.path, partial(_put_switch, cylinder, switch, lane_of(spec.name, n), site))
 
 
 def _put_switch(cylinder: Cylinder, spec: SwitchSpec, lane: str, site: Site) -> None:

@@ -14,10 +14,11 @@ from steptwin.machine import Nanos
 from steptwin.state import Stateful
 from steptwin.world.cam import Cam
 from steptwin.world.drawing import ROD, Drawing
-from steptwin.world.element import Element, NamedSpec, Reference
-from steptwin.world.elements.axis import AXIS, BuiltAxis, turns_of_axis
+from steptwin.world.element import Element
+from steptwin.world.elements.axis import AXIS, turns_of_axis
 from steptwin.world.elements.shaft import SHAFT, TURN, GearedShaft
 from steptwin.world.elements.switch import SWITCH, SwitchSpec, lane_of, put_switch, read_switches, zone_of
+from steptwin.world.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.effects import ElementEffect
 from steptwin.world.faults.table import number
@@ -26,9 +27,8 @@ from steptwin.world.names import Unknown
 from steptwin.world.reader import Key, Row, Table, TomlText, optional
 from steptwin.world.scale import exact_fraction
 from steptwin.world.sense import TableRows
-from steptwin.world.signals import SignalOf
+from steptwin.world.signal import SignalOf
 from steptwin.world.site import Site
-from steptwin.world.spec import WorldSpec
 from steptwin.world.values import NameOf, name_value, points, text_value
 
 PLACES = 10**6
@@ -137,7 +137,7 @@ class Follower(Stateful):
         axis.kernel.report(axis.mechanism.machine, "edge", f"{self.spec.name}.{what}", level)
 
     @property
-    def moved(self) -> tuple[BuiltAxis, MovedLane]:
+    def moved(self) -> tuple[str, MovedLane]:
         axis, lane = self.shaft.moved
         points = tuple(sorted(self.spec.points))
         return axis, lane._replace(name=self.spec.name, signal="position", unit=self.spec.unit, points=points)
@@ -172,16 +172,16 @@ def _read(text: TomlText, row: Row, table: Table) -> FollowerSpec:
     return spec
 
 
-def _machine(spec: FollowerSpec, world: WorldSpec) -> str:
+def _machine(spec: FollowerSpec, described: ElementSpecs) -> str:
     """What drives the axis of its shaft; otherwise the name that does not exist."""
-    axes = {shaft.name: shaft.axis for shaft in world.elements_of(SHAFT)}
-    drives = {axis.name: axis.drive[0] for axis in world.elements_of(AXIS)}
+    axes = {shaft.name: shaft.axis for shaft in described.of(SHAFT)}
+    drives = {axis.name: axis.drive[0] for axis in described.of(AXIS)}
     axis = axes.get(spec.shaft)
     return spec.shaft if axis is None else drives.get(axis, axis)
 
 
-def _refers(spec: FollowerSpec, world: WorldSpec) -> Iterator[Reference]:
-    machine = _machine(spec, world)
+def _refers(spec: FollowerSpec, described: ElementSpecs) -> Iterator[Reference]:
+    machine = _machine(spec, described)
     yield Reference(machine, machine, (*spec.path, "shaft"))
     for switch in spec.switches:
         yield Reference(machine, switch.target[0], (*switch.path, "to"))
@@ -191,11 +191,11 @@ def _build(spec: FollowerSpec, site: Site) -> Follower:
     shaft = site.parts.built(SHAFT).get(spec.shaft)
     if shaft is None:
         raise Unknown(spec.shaft, f"no shaft is called {spec.shaft!r}")
-    follower = Follower(spec, shaft, site.blueprint.once(spec.path, lambda: _cam(spec, shaft)))
+    follower = Follower(spec, shaft, site.memo.once(spec.path, lambda: _cam(spec, shaft)))
     kernel = shaft.axis.kernel
     kernel.add_part(follower, (shaft.axis.mechanism.machine, shaft.axis.spec.name, spec.shaft, spec.name), spec.name)
     for n, switch in enumerate(spec.switches, start=1):
-        site.spec.text.unless_wrong(switch.path, partial(_put_switch, follower, switch, lane_of(spec.name, n), site))
+        site.text.unless_wrong(switch.path, partial(_put_switch, follower, switch, lane_of(spec.name, n), site))
     return follower
 
 
@@ -214,7 +214,7 @@ def _put_switch(follower: Follower, spec: SwitchSpec, lane: str, site: Site) -> 
     def places(units: float) -> int:
         return floor(exact_fraction(units) * PLACES + Fraction(1, 2))
 
-    zone = site.blueprint.once(spec.path, lambda: zone_of(spec, places))
+    zone = site.memo.once(spec.path, lambda: zone_of(spec, places))
     mechanism = follower.shaft.axis.mechanism
     kernel = follower.shaft.axis.kernel
     put_switch(kernel, follower, (mechanism.machine, follower.spec.shaft, follower.spec.name), zone, spec, lane, site)

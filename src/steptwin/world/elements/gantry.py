@@ -14,6 +14,7 @@ from steptwin.world.drawing import Drawing, rail
 from steptwin.world.elements.axis import BuiltAxis, find_axis
 from steptwin.world.elements.logic import STUCK, BoardSpec, Joint, with_terminals
 from steptwin.world.elements.touch import JAM, REPORT, RESET, Touch
+from steptwin.world.elementspec import ElementSpecs
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.effects import ElementEffect
 from steptwin.world.faults.table import number
@@ -22,10 +23,9 @@ from steptwin.world.kind import Terminals
 from steptwin.world.lanes import MovedLane
 from steptwin.world.reader import Key, TomlText, optional
 from steptwin.world.scale import Loading, burden_of
-from steptwin.world.signals import SignalOf
-from steptwin.world.site import Site, Terminal
-from steptwin.world.spec import WorldSpec
-from steptwin.world.values import OUTPUT_PIN, NameOf, word
+from steptwin.world.signal import SignalOf
+from steptwin.world.site import Site
+from steptwin.world.values import OUTPUT_PIN, NameOf, Terminal, word
 from steptwin.world.values import number as number_value
 
 SKEWED = "SKEWED"
@@ -55,7 +55,7 @@ class GantrySpec(BoardSpec):
         if self.reset is not None:
             yield Joint("reset", RESET, self.reset)
 
-    def others(self, world: WorldSpec) -> Iterator[tuple[str, str]]:
+    def others(self, described: ElementSpecs) -> Iterator[tuple[str, str]]:
         yield "axis", self.axis
         yield "other", self.other
 
@@ -121,11 +121,13 @@ class Gantry(Touch):
         return rail(self.ends[0].spec.travel)
 
     @property
-    def moved(self) -> tuple[BuiltAxis, MovedLane]:
+    def moved(self) -> tuple[str, MovedLane]:
         half, other_half = (end.mechanism.build.sign / (2.0 * float(end.scale.pulses_per_unit)) for end in self.ends)
         other = self.ends[1].mechanism
         place = other.machine, str(other.number)
-        return self.ends[0], MovedLane(self.board.name, "position", self.unit, half, other=place, other_per_pulse=other_half)
+        return self.ends[0].spec.name, MovedLane(
+            self.board.name, "position", self.unit, half, other=place, other_per_pulse=other_half
+        )
 
     @property
     def unit(self) -> str:

@@ -11,8 +11,7 @@ from steptwin.world.elements.logic import STUCK, BoardPart, BoardSpec, Joint, wi
 from steptwin.world.kernel import Board
 from steptwin.world.kind import Terminals
 from steptwin.world.reader import Key, TomlText
-from steptwin.world.site import Terminal
-from steptwin.world.values import OUTPUT, PinOf, whole, word
+from steptwin.world.values import OUTPUT, PinOf, Terminal, whole, word
 
 MOST_INPUTS = 32
 OUT = "OUT"

@@ -17,10 +17,10 @@ from steptwin.world.kernel import Board
 from steptwin.world.kind import Terminals
 from steptwin.world.reader import TomlText, optional
 from steptwin.world.scale import exact_fraction
-from steptwin.world.signals import SignalOf
-from steptwin.world.site import Site, Terminal
+from steptwin.world.signal import SignalOf
+from steptwin.world.site import Site
 from steptwin.world.travel import Travel
-from steptwin.world.values import OUTPUT_PIN, number, positive_time
+from steptwin.world.values import OUTPUT_PIN, Terminal, number, positive_time
 
 CLOSE, OPENED, CLOSED = "CLOSE", "OPENED", "CLOSED"
 

@@ -11,8 +11,7 @@ from steptwin.world.elements.logic import STUCK, BoardPart, BoardSpec, Joint, wi
 from steptwin.world.kernel import Board
 from steptwin.world.kind import Terminals
 from steptwin.world.reader import optional
-from steptwin.world.site import Terminal
-from steptwin.world.values import OUTPUT_PIN, word
+from steptwin.world.values import OUTPUT_PIN, Terminal, word
 
 SET, RESET, OUT = "SET", "RESET", "OUT"
 

@@ -14,6 +14,7 @@ from steptwin.world.curve import Stepped
 from steptwin.world.elements.axis import BuiltAxis, find_axis
 from steptwin.world.elements.logic import BoardPart, BoardSpec, Joint, with_terminals
 from steptwin.world.elements.quantity import TIME, check_condition, check_owners, condition_of, owner_of, owners_of, signal_of
+from steptwin.world.elementspec import ElementSpecs
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.effects import ElementEffect
 from steptwin.world.faults.table import number
@@ -22,9 +23,8 @@ from steptwin.world.kind import Terminals
 from steptwin.world.motor import Burden
 from steptwin.world.reader import Key, TomlText, optional
 from steptwin.world.scale import Loading, burden_of
-from steptwin.world.signals import SignalOf
+from steptwin.world.signal import SignalOf
 from steptwin.world.site import Site
-from steptwin.world.spec import WorldSpec
 from steptwin.world.values import NameOf, points, text_value
 from steptwin.world.values import number as number_value
 
@@ -60,7 +60,7 @@ class LoadSpec(BoardSpec):
     def loading(self) -> Loading:
         return Loading(self.inertia, self.mass, self.friction, self.friction_force, self.load, self.force)
 
-    def others(self, world: WorldSpec) -> Iterator[tuple[str, str]]:
+    def others(self, described: ElementSpecs) -> Iterator[tuple[str, str]]:
         yield "axis", self.axis
         named = () if self.of is None else (owner_of(self.of),)
         for key, owners in (("when", () if self.when is None else owners_of(self.when)), ("of", named)):

@@ -13,7 +13,8 @@ from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.state import Stateful
 from steptwin.world.drawing import Drawing
-from steptwin.world.element import Element, NamedSpec, Reference
+from steptwin.world.element import Element
+from steptwin.world.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.world.faults import ActiveFault, Fault, FaultKind, Layer, Occasion
 from steptwin.world.faults.effects import ElementEffect
 from steptwin.world.faults.table import Parameter, ParameterForm, whole
@@ -21,11 +22,10 @@ from steptwin.world.kernel import Board
 from steptwin.world.kind import Terminals
 from steptwin.world.reader import Key, Row, Table, TomlText
 from steptwin.world.sense import TableRows
-from steptwin.world.signals import SignalOf
-from steptwin.world.site import Site, Terminal
-from steptwin.world.spec import WorldSpec
+from steptwin.world.signal import SignalOf
+from steptwin.world.site import Site
 from steptwin.world.tomlplaces import Path
-from steptwin.world.values import name_value
+from steptwin.world.values import Terminal, name_value
 from steptwin.world.wires import PinName, Wire
 
 
@@ -51,7 +51,7 @@ class BoardSpec(NamedSpec, ABC):
     def joints(self) -> Iterable[Joint]:
         """What its keys join to its inputs."""
 
-    def others(self, world: WorldSpec) -> Iterable[tuple[str, str]]:
+    def others(self, described: ElementSpecs) -> Iterable[tuple[str, str]]:
         """Keys that name other elements, and the names of these or of what they are in one kernel with."""
         return ()
 
@@ -190,15 +190,15 @@ def with_terminals(
         found.check(text)
         return found
 
-    def refers(found: S, world: WorldSpec) -> Iterator[Reference]:
-        yield from _references(found, world)
+    def refers(found: S, described: ElementSpecs) -> Iterator[Reference]:
+        yield from _references(found, described)
         for one in inner:
             yield from one.refers(found)
 
     def build(found: S, site: Site) -> P:
         part = make(found, site)
         part.board.kernel.add_part(part, part.watches, found.name)
-        for wire, path in site.blueprint.once((*found.path, "wires"), lambda: tuple(_wires(found))):
+        for wire, path in site.memo.once((*found.path, "wires"), lambda: tuple(_wires(found))):
             site.join(wire, path)
         for one in inner:
             one.build(found, part, site)
@@ -221,12 +221,12 @@ def with_terminals(
     )
 
 
-def _references(found: BoardSpec, world: WorldSpec) -> Iterator[Reference]:
+def _references(found: BoardSpec, described: ElementSpecs) -> Iterator[Reference]:
     """Of the terminals and keys of an element."""
     yield Reference(found.name, found.name, found.path)
     for joint in found.joints:
         yield Reference(found.name, joint.source[0], (*found.path, joint.key))
-    for key, other in found.others(world):
+    for key, other in found.others(described):
         yield Reference(found.name, other, (*found.path, key))
 
 

@@ -7,7 +7,10 @@ from typing import Any
 
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, Nanos
+from steptwin.world.motor import StepperMotor
 from steptwin.world.reader import Key, Table, TomlText, optional, read_table
+from steptwin.world.resonance import Resonance
+from steptwin.world.scale import Loading, Scale, burden_of
 from steptwin.world.sense import TableRows, check_sense
 from steptwin.world.tomlplaces import Path
 from steptwin.world.values import flag, number, pair, permitting, points, time_value, whole, word
@@ -101,3 +104,26 @@ def read_motor(text: TomlText, axis: Path, table: Table) -> MotorSpec | None:
         if key in table["motor"] and motor.when_off != "free":
             text.wrong((*path, key), "D007", f"{key} acts on a rotor that may move: it needs when_off = 'free'")
     return motor
+
+
+def motor_of(motor: MotorSpec, scale: Scale) -> StepperMotor:
+    """Torques at the motor; speeds and accelerations in pulses. Raises `Misuse` for masses and forces without a length."""
+    per_rev = float(scale.pulses_per_rev)
+    loading = Loading(motor.inertia, motor.mass, motor.friction, motor.friction_force, motor.load, motor.force)
+    own = burden_of(loading, scale, "motor")
+    return StepperMotor(
+        curve=tuple((speed / 60.0 * per_rev, torque) for speed, torque in motor.torque),
+        inertia=own.inertia,
+        friction=own.friction,
+        load=own.load,
+        start_p=None if motor.start_speed is None else motor.start_speed / 60.0 * per_rev,
+        detent=motor.detent,
+        hold=motor.hold_current,
+        hold_ns=motor.hold_delay,
+        overruns=motor.overruns,
+        resonance=None if motor.resonance is None else _resonance(motor, *motor.resonance, per_rev),
+    )
+
+
+def _resonance(motor: MotorSpec, low: float, high: float, per_rev: float) -> Resonance:
+    return Resonance(low / 60.0 * per_rev, high / 60.0 * per_rev, motor.resonance_growth, motor.resonance_fading, motor.vibration)

@@ -9,7 +9,8 @@ from steptwin.world.condition import SignalCondition
 from steptwin.world.expression import parse_condition
 from steptwin.world.kernel import Board
 from steptwin.world.reader import TomlText
-from steptwin.world.signals import Idle, SignalOf, find_signal
+from steptwin.world.signal import SignalOf
+from steptwin.world.signals import Idle, find_signal
 from steptwin.world.site import Site
 from steptwin.world.tomlplaces import Path
 

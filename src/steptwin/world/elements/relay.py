@@ -13,8 +13,7 @@ from steptwin.world.faults.effects import ElementEffect
 from steptwin.world.kernel import Board
 from steptwin.world.kind import Terminals
 from steptwin.world.reader import optional
-from steptwin.world.site import Terminal
-from steptwin.world.values import OUTPUT_PIN, time_value
+from steptwin.world.values import OUTPUT_PIN, Terminal, time_value
 
 COIL, NO, NC = "COIL", "NO", "NC"
 

@@ -14,21 +14,21 @@ from steptwin.machine import Nanos
 from steptwin.state import Stateful
 from steptwin.world.contacts import Zone
 from steptwin.world.drawing import DIAL, Drawing, SensorZone
-from steptwin.world.element import Element, NamedSpec, Reference
+from steptwin.world.element import Element
 from steptwin.world.elements.axis import AXIS, BuiltAxis, find_axis, turns_of_axis
 from steptwin.world.elements.contact import CONTACT_KEYS
 from steptwin.world.elements.switch import lane_of, put_switch
+from steptwin.world.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.effects import ElementEffect
 from steptwin.world.lanes import SLIPS, MovedLane
 from steptwin.world.reader import Key, Row, Table, TomlText, optional, read_table
 from steptwin.world.scale import exact_fraction
 from steptwin.world.sense import TableRows, check_sense
-from steptwin.world.signals import SignalOf
-from steptwin.world.site import Site, Terminal
-from steptwin.world.spec import WorldSpec
+from steptwin.world.signal import SignalOf
+from steptwin.world.site import Site
 from steptwin.world.tomlplaces import Path
-from steptwin.world.values import INPUT_PIN, NameOf, name_value, number, permitting
+from steptwin.world.values import INPUT_PIN, NameOf, Terminal, name_value, number, permitting
 
 TURN = 360
 
@@ -120,9 +120,11 @@ class GearedShaft(Stateful):
         kernel.mark(self.spec.name)
 
     @property
-    def moved(self) -> tuple[BuiltAxis, MovedLane]:
+    def moved(self) -> tuple[str, MovedLane]:
         sign, name = self.axis.mechanism.build.sign, self.spec.name
-        return self.axis, MovedLane(name, "angle", "degree", float(sign * TURN / self.pulses_per_turn), self.spec.offset, name)
+        return self.axis.spec.name, MovedLane(
+            name, "angle", "degree", float(sign * TURN / self.pulses_per_turn), self.spec.offset, name
+        )
 
     @property
     def behind(self) -> float:
@@ -168,8 +170,8 @@ def _read_cams(text: TomlText, path: Path, table: Table) -> Iterator[CamSpec]:
             yield CamSpec(**values, path=of_cam)
 
 
-def _refers(spec: ShaftSpec, world: WorldSpec) -> Iterator[Reference]:
-    drives = {axis.name: axis.drive[0] for axis in world.elements_of(AXIS)}
+def _refers(spec: ShaftSpec, described: ElementSpecs) -> Iterator[Reference]:
+    drives = {axis.name: axis.drive[0] for axis in described.of(AXIS)}
     machine = drives.get(spec.axis, spec.axis)
     yield Reference(machine, machine, (*spec.path, "axis"))
     for cam in spec.cams:
@@ -181,7 +183,7 @@ def _build(spec: ShaftSpec, site: Site) -> GearedShaft:
     mechanism = shaft.axis.mechanism
     shaft.axis.kernel.add_part(shaft, (mechanism.machine, spec.axis, spec.name), spec.name)
     for n, cam in enumerate(spec.cams, start=1):
-        site.spec.text.unless_wrong(cam.path, partial(_put_cam, shaft, cam, lane_of(spec.name, n), site))
+        site.text.unless_wrong(cam.path, partial(_put_cam, shaft, cam, lane_of(spec.name, n), site))
     return shaft
 
 

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, SECOND, Nanos
-from steptwin.world.element import Element, NamedSpec, Reference
+from steptwin.world.element import Element
 from steptwin.world.elements.voltage import BROKEN_WIRE, DRIFT
+from steptwin.world.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.world.reader import Key, Row, Table, TomlText, optional
 from steptwin.world.sense import TableRows
-from steptwin.world.signals import SignalOf
-from steptwin.world.site import Site, Terminal
+from steptwin.world.signal import SignalOf
+from steptwin.world.site import Site
 from steptwin.world.sources import HIGHEST_V, LOWEST_V, AnalogSource, ConstantWaveform, SineWaveform, TableWaveform, Waveform
-from steptwin.world.spec import WorldSpec
-from steptwin.world.values import ANALOG_INPUT, PinOf, name_value, number, points, positive_time, time_value, word
+from steptwin.world.values import ANALOG_INPUT, PinOf, Terminal, name_value, number, points, positive_time, time_value, word
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,7 +63,7 @@ def _read(text: TomlText, row: Row, table: Table) -> SourceSpec:
     return SourceSpec(**row)
 
 
-def _refers(spec: SourceSpec, world: WorldSpec) -> Iterator[Reference]:
+def _refers(spec: SourceSpec, described: ElementSpecs) -> Iterator[Reference]:
     yield Reference(spec.target[0], spec.target[0], (*spec.path, "to"))
 
 

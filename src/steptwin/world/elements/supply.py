@@ -10,6 +10,7 @@ from typing import Any, ClassVar, NamedTuple
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.world.elements.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
+from steptwin.world.elementspec import ElementSpecs
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.effects import ElementEffect
 from steptwin.world.faults.machine import FaultyMachine
@@ -18,10 +19,9 @@ from steptwin.world.kernel import Board
 from steptwin.world.kind import Terminals
 from steptwin.world.reader import Key, TomlText, optional
 from steptwin.world.rigging import Rigging
-from steptwin.world.signals import SignalOf
-from steptwin.world.site import Site, Terminal
-from steptwin.world.spec import WorldSpec
-from steptwin.world.values import OUTPUT_PIN, flag, name_value, number, permitting, time_value
+from steptwin.world.signal import SignalOf
+from steptwin.world.site import Site
+from steptwin.world.values import OUTPUT_PIN, Terminal, flag, name_value, number, permitting, time_value
 
 ON, GOOD = "ON", "GOOD"
 USUAL_SHARE = 0.75
@@ -60,7 +60,7 @@ class SupplySpec(BoardSpec):
         if self.on is not None:
             yield Joint("on", ON, self.on)
 
-    def others(self, world: WorldSpec) -> Iterator[tuple[str, str]]:
+    def others(self, described: ElementSpecs) -> Iterator[tuple[str, str]]:
         yield from (("feeds", name) for name in self.feeds)
 
     def check(self, text: TomlText) -> None:
@@ -185,7 +185,7 @@ def _sag(active: ActiveFault, supply: Supply, begins: bool, now: Nanos) -> str:
 
 def _check_order(spec: SupplySpec, site: Site) -> None:
     """Raises `Misuse` for supplies that wait for one another."""
-    waits_for = {one.name: one.on[0] for one in site.spec.elements_of(SUPPLY) if one.on is not None and one.on[1] == GOOD}
+    waits_for = {one.name: one.on[0] for one in site.parts.described.of(SUPPLY) if one.on is not None and one.on[1] == GOOD}
     way = [spec.name]
     while (before := waits_for.get(way[-1])) is not None and before not in way[1:]:
         way.append(before)
@@ -194,7 +194,7 @@ def _check_order(spec: SupplySpec, site: Site) -> None:
 
 
 def _make(spec: SupplySpec, site: Site) -> Supply:
-    site.blueprint.once((*spec.path, "order"), lambda: _check_order(spec, site))
+    site.memo.once((*spec.path, "order"), lambda: _check_order(spec, site))
     rigging = Rigging(site.parts)
     site.parts.faults.expect_supplies()
     fed = []

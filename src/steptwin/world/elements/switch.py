@@ -14,9 +14,9 @@ from steptwin.world.elements.contact import CONTACT_KEYS
 from steptwin.world.kernel import Kernel
 from steptwin.world.reader import Key, Table, TomlText, optional, read_table
 from steptwin.world.sense import TableRows, check_sense
-from steptwin.world.site import Site, Terminal
+from steptwin.world.site import Site
 from steptwin.world.tomlplaces import Path
-from steptwin.world.values import INPUT_PIN, number
+from steptwin.world.values import INPUT_PIN, Terminal, number
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,8 +11,7 @@ from steptwin.world.elements.logic import STUCK, BoardPart, BoardSpec, Joint, wi
 from steptwin.world.kernel import Board
 from steptwin.world.kind import Terminals
 from steptwin.world.reader import Key, optional
-from steptwin.world.site import Terminal
-from steptwin.world.values import OUTPUT_PIN, positive_time, word
+from steptwin.world.values import OUTPUT_PIN, Terminal, positive_time, word
 
 IN, OUT = "IN", "OUT"
 ON_DELAY, OFF_DELAY, PULSE = "on-delay", "off-delay", "pulse"

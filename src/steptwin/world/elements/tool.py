@@ -12,9 +12,10 @@ from steptwin.machine import Nanos
 from steptwin.state import Plain, Stateful
 from steptwin.world.coordinate import PLACES, Coordinate, Pulled, pulled_to
 from steptwin.world.drawing import PLANE, Drawing, rail
-from steptwin.world.element import Element, NamedSpec, Reference
+from steptwin.world.element import Element
 from steptwin.world.elements.axis import AXIS, BuiltAxis, find_axis
 from steptwin.world.elements.switch import SWITCH, SwitchSpec, put_switch, read_switches, zone_of
+from steptwin.world.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.world.faults.effects import ElementEffect
 from steptwin.world.faults.table import Parameter, ParameterForm
@@ -22,9 +23,8 @@ from steptwin.world.lanes import SLIPS, MovedLane
 from steptwin.world.reader import Key, Row, Table, TomlText, optional
 from steptwin.world.scale import exact_fraction
 from steptwin.world.sense import TableRows
-from steptwin.world.signals import SignalOf
+from steptwin.world.signal import SignalOf
 from steptwin.world.site import Site
-from steptwin.world.spec import WorldSpec
 from steptwin.world.values import NameOf, name_value, number, pair, permitting
 
 COORDINATES = ("x", "y")
@@ -108,7 +108,7 @@ class Tool(Stateful):
         return Drawing(PLANE, x.length, COORDINATES, sensors=x.sensors, low=x.low, across=y.length, across_low=y.low)
 
     @property
-    def moved(self) -> Iterator[tuple[BuiltAxis, MovedLane]]:
+    def moved(self) -> Iterator[tuple[str, MovedLane]]:
         other = self.axes[1].mechanism
         for name, shares in zip(COORDINATES, (self.spec.x, self.spec.y), strict=True):
             factors = [
@@ -116,7 +116,7 @@ class Tool(Stateful):
                 for share, axis in zip(shares, self.axes, strict=True)
             ]
             yield (
-                self.axes[0],
+                self.axes[0].spec.name,
                 MovedLane(
                     self.spec.name,
                     name,
@@ -154,8 +154,8 @@ def _read(text: TomlText, row: Row, table: Table) -> ToolSpec:
     return spec
 
 
-def _refers(spec: ToolSpec, world: WorldSpec) -> Iterator[Reference]:
-    drives = {axis.name: axis.drive[0] for axis in world.elements_of(AXIS)}
+def _refers(spec: ToolSpec, described: ElementSpecs) -> Iterator[Reference]:
+    drives = {axis.name: axis.drive[0] for axis in described.of(AXIS)}
     machine, other = (drives.get(name, name) for name in (spec.axis, spec.other))
     yield Reference(machine, machine, (*spec.path, "axis"))
     yield Reference(machine, other, (*spec.path, "other"))
@@ -171,7 +171,7 @@ def _build(spec: ToolSpec, site: Site) -> Tool:
     one.kernel.add_part(tool, (*_machines(tool), spec.axis, spec.other, spec.name), spec.name)
     for name, n, switch in spec.switches:
         lane = f"{spec.name}.{name}_switch{n}"
-        site.spec.text.unless_wrong(switch.path, partial(_put_switch, tool, name, switch, lane, site))
+        site.text.unless_wrong(switch.path, partial(_put_switch, tool, name, switch, lane, site))
     return tool
 
 

@@ -11,17 +11,18 @@ from steptwin.machine import Nanos
 from steptwin.state import Stateful
 from steptwin.world.condition import Signal
 from steptwin.world.curve import Stepped
-from steptwin.world.element import Element, NamedSpec, Reference
+from steptwin.world.element import Element
 from steptwin.world.elements.quantity import check_owners, owner_of
 from steptwin.world.elements.voltage import BROKEN_WIRE, DRIFT
+from steptwin.world.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.world.kernel import Kernel, Source
 from steptwin.world.reader import Key, Row, Table, TomlText, optional
 from steptwin.world.sense import TableRows
-from steptwin.world.signals import SignalOf, find_signal
-from steptwin.world.site import Site, Terminal
+from steptwin.world.signal import SignalOf
+from steptwin.world.signals import find_signal
+from steptwin.world.site import Site
 from steptwin.world.sources import HIGHEST_V, LOWEST_V
-from steptwin.world.spec import WorldSpec
-from steptwin.world.values import ANALOG_INPUT, PinOf, name_value, points, text_value
+from steptwin.world.values import ANALOG_INPUT, PinOf, Terminal, name_value, points, text_value
 from steptwin.world.values import number as number_value
 from steptwin.world.wires import PinName
 
@@ -82,7 +83,7 @@ def _read(text: TomlText, row: Row, table: Table) -> TransducerSpec:
     return spec
 
 
-def _refers(spec: TransducerSpec, world: WorldSpec) -> Iterator[Reference]:
+def _refers(spec: TransducerSpec, described: ElementSpecs) -> Iterator[Reference]:
     yield Reference(spec.target[0], spec.target[0], (*spec.path, "to"))
     yield Reference(spec.target[0], owner_of(spec.of), (*spec.path, "of"))
 

@@ -16,9 +16,9 @@ from steptwin.world.faults.effects import ElementEffect
 from steptwin.world.kernel import Board
 from steptwin.world.kind import Terminals
 from steptwin.world.reader import TomlText, optional
-from steptwin.world.signals import SignalOf
-from steptwin.world.site import Site, Terminal
-from steptwin.world.values import OUTPUT_PIN, number, positive_time
+from steptwin.world.signal import SignalOf
+from steptwin.world.site import Site
+from steptwin.world.values import OUTPUT_PIN, Terminal, number, positive_time
 
 EJECTOR = "EJECTOR"
 

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from steptwin.machine import Nanos
-from steptwin.world.element import Element, ElementSpec, Reference
+from steptwin.world.element import Element
+from steptwin.world.elementspec import ElementSpec, ElementSpecs, Reference
 from steptwin.world.reader import Key, Row, Table, TomlText, optional
 from steptwin.world.sense import TableRows
-from steptwin.world.site import Site, Terminal
-from steptwin.world.spec import WorldSpec
-from steptwin.world.values import INPUT_PIN, OUTPUT_PIN, flag, time_value
+from steptwin.world.site import Site
+from steptwin.world.values import INPUT_PIN, OUTPUT_PIN, Terminal, flag, time_value
 from steptwin.world.wires import PinName, Wire
 
 
@@ -27,13 +27,13 @@ def _read(text: TomlText, row: Row, table: Table) -> WireSpec:
     return WireSpec(**row)
 
 
-def _refers(spec: WireSpec, world: WorldSpec) -> Iterator[Reference]:
+def _refers(spec: WireSpec, described: ElementSpecs) -> Iterator[Reference]:
     yield Reference(spec.source[0], spec.source[0], spec.path)
     yield Reference(spec.source[0], spec.target[0], spec.path)
 
 
 def _build(spec: WireSpec, site: Site) -> Wire:
-    wire = site.blueprint.once(spec.path, lambda: Wire(PinName(*spec.source), PinName(*spec.target), spec.inverted, spec.delay))
+    wire = site.memo.once(spec.path, lambda: Wire(PinName(*spec.source), PinName(*spec.target), spec.inverted, spec.delay))
     site.join(wire, spec.path)
     return wire
 

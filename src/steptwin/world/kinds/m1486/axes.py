@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from steptwin.errors import Misuse
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.microsteps import FULL_STEP
-from steptwin.world.scale import FULL_STEPS, DriveScale
-
-if TYPE_CHECKING:
-    from steptwin.world.elements.axis import AxisSpec
+from steptwin.world.scale import FULL_STEPS, DriveScale, GivenScale
 
 
-def scale(spec: AxisSpec, chip: M1486Chip, number: int) -> DriveScale:
-    per_rev, full_steps = _motor(spec.pulses_per_rev, None if spec.motor is None else spec.motor.full_steps)
+def scale(given: GivenScale, chip: M1486Chip, number: int) -> DriveScale:
+    per_rev, full_steps = _motor(given.pulses_per_rev, given.full_steps)
     return DriveScale(pulses_per_rev=per_rev, full_steps=full_steps, text="counts minimum microsteps")
 
 

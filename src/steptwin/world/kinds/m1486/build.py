@@ -20,10 +20,10 @@ def build(spec: M1486Spec, context: BuildContext) -> Callable[[bytes | None], M1
     """As `steptwin.world.kind.ControllerKind.build`."""
     kind = variant(spec.variant)
     program = _program(spec, kind, context)
-    timed = any(line.name == spec.line and line.timing != "off" for line in context.spec.lines)
+    timed = any(line.name == spec.line and line.timing != "off" for line in context.lines)
     baud = spec.baud
     if baud is None:
-        baud = next((line.baud for line in context.spec.lines if line.name == spec.line), None)
+        baud = next((line.baud for line in context.lines if line.name == spec.line), None)
 
     def make(memory: bytes | None) -> M1486Chip:
         kept = memory if memory is not None and kind.store is Store.EEPROM else b""

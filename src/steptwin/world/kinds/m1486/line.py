@@ -14,9 +14,8 @@ from steptwin.wire.slave import FrameDirection
 from steptwin.world.faults import Faults
 from steptwin.world.faults import LineProtocol as FaultLine
 from steptwin.world.kernel import Kernel
-from steptwin.world.kind import Member
+from steptwin.world.kind import LineSpec, Member
 from steptwin.world.lines import SCRIPTS, Line, LineEndPoint, LineTraffic
-from steptwin.world.spec import LineSpec
 from steptwin.world.trace import RecordSink
 
 

@@ -9,8 +9,8 @@ from typing import Any
 from steptwin.m1486.lines import INTERFACES
 from steptwin.m1486.variants import VARIANTS
 from steptwin.machine import Nanos
+from steptwin.world.kind import ControllerSpec
 from steptwin.world.reader import Key, Row, TomlText, optional
-from steptwin.world.spec import ControllerSpec
 from steptwin.world.values import name_value, permitting, text_value, time_value, whole, word
 
 DEFAULT_VARIANT = "B"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from fractions import Fraction
-from typing import TYPE_CHECKING
 
 from steptwin.machine import Nanos
 from steptwin.mic488.core import check_turn
@@ -13,18 +12,14 @@ from steptwin.mic488.encoder import Coupling
 from steptwin.mic488.inputs import index_input
 from steptwin.world.kind import EncoderInputs
 from steptwin.world.lanes import AxisLane, plain_view
-from steptwin.world.scale import FULL_STEPS, DriveScale, exact_fraction
-
-if TYPE_CHECKING:
-    from steptwin.world.elements.axis import AxisSpec
+from steptwin.world.scale import FULL_STEPS, DriveScale, GivenScale, exact_fraction
 
 
-def scale(spec: AxisSpec, device: Mic488Device, number: int) -> DriveScale:
+def scale(given: GivenScale, device: Mic488Device, number: int) -> DriveScale:
     axis = device.axes[number - 1]
-    full_steps = None if spec.motor is None else spec.motor.full_steps
     return DriveScale(
-        pulses_per_rev=axis.config.mot_resol if spec.pulses_per_rev is None else spec.pulses_per_rev,
-        full_steps=FULL_STEPS if full_steps is None else full_steps,
+        pulses_per_rev=axis.config.mot_resol if given.pulses_per_rev is None else given.pulses_per_rev,
+        full_steps=FULL_STEPS if given.full_steps is None else given.full_steps,
         unit=axis.config.unit_name,
         pulses_per_unit=exact_fraction(axis.gear),
         text=f"has axis {number} in {axis.config.unit_name}",

@@ -20,10 +20,9 @@ from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
 from steptwin.world.faults import Faults
 from steptwin.world.faults import LineProtocol as FaultLine
 from steptwin.world.kernel import Kernel
-from steptwin.world.kind import Member
+from steptwin.world.kind import LineSpec, Member
 from steptwin.world.lines import SCRIPTS, Line, LineEndPoint
 from steptwin.world.master import Master
-from steptwin.world.spec import LineSpec
 from steptwin.world.trace import RecordSink
 
 SILENT_CHARACTERS = 4

@@ -12,8 +12,8 @@ from steptwin.machine import Nanos
 from steptwin.mic488.config import AXIS_KEYS, INPUT_KEYS, INPUTS, NO_INPUT, ConfigKey, ControllerConfig
 from steptwin.mic488.registers import AXES, FIRMWARES
 from steptwin.wire.rtu import MAX_UNIT
+from steptwin.world.kind import ControllerSpec
 from steptwin.world.reader import Key, Path, Row, TomlText, optional, read_table
-from steptwin.world.spec import ControllerSpec
 from steptwin.world.values import ValueReader, address_value, flag, name_value, permitting, text_value, time_value, whole, word
 
 BankFiles: TypeAlias = tuple[tuple[int, str], ...]

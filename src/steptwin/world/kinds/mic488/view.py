@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 from steptwin.errors import Misuse
 from steptwin.mic488.axis import Axis
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.status import AxisStatus, ProgramState
 from steptwin.world import script as do
-from steptwin.world.views import MachineView
-
-if TYPE_CHECKING:
-    from steptwin.world.plant import Plant
+from steptwin.world.kind import RunningWorld
+from steptwin.world.machineview import MachineView
 
 
 class Mic488View(MachineView):
     """A MIC488. ``device`` is the controller itself: what is changed there directly is not part of a session."""
 
-    def __init__(self, plant: Plant, name: str, device: Mic488Device) -> None:
-        super().__init__(plant, name)
+    def __init__(self, world: RunningWorld, name: str, device: Mic488Device) -> None:
+        super().__init__(world, name)
         self.device = device
         self.axis: Mapping[int, Mic488AxisView] = _Axes((axis.number, Mic488AxisView(self, axis)) for axis in device.axes)
         """Axes by number, from 1. A number that is not there raises `Misuse`."""
@@ -38,7 +35,7 @@ class Mic488View(MachineView):
 
     def write(self, register: str, value: float) -> None:
         """Write a register by name as a master does, over the line if there is one. Raises `Misuse`."""
-        self._plant.apply_input(do.Write(((self.name, register.upper(), float(value)),)))
+        self._world.apply_input(do.Write(((self.name, register.upper(), float(value)),)))
 
 
 class _Axes(dict[int, "Mic488AxisView"]):
@@ -56,7 +53,7 @@ class Mic488AxisView:
     @property
     def _now(self) -> int:
         self._controller._touch()
-        return self._controller._plant.now
+        return self._controller._world.now
 
     @property
     def number(self) -> int:
