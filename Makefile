@@ -16,7 +16,8 @@ WEB := $(BIN)/python studio-web/build.py
 
 # The page of the studio, and what it is made of.
 PAGE := src/steptwin/studio/page/index.html
-PAGE_SOURCES := $(shell find studio-web -type f -not -path '*/node_modules/*' -not -path '*/__pycache__/*')
+PAGE_SOURCES := docs/studio.schema.json $(shell find studio-web -type f -not -path '*/node_modules/*' -not -path '*/__pycache__/*' \
+  -not -name types.ts)
 
 # Tools that its tests need beside what it is built with.
 WEB_STAMP := .venv/.ready-web

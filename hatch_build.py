@@ -24,8 +24,9 @@ class PageHook(BuildHookInterface):
 def sources(root: Path) -> list[Path]:
     """What the page is made of."""
     web = root / "studio-web"
-    files = (path for path in web.rglob("*") if path.is_file())
-    return [path for path in files if "node_modules" not in path.parts and "__pycache__" not in path.parts]
+    files = (path for path in web.rglob("*") if path.is_file() and path.name != "types.ts")
+    own = [path for path in files if "node_modules" not in path.parts and "__pycache__" not in path.parts]
+    return [*own, root / "docs/studio.schema.json"]
 
 
 def is_current(root: Path) -> bool:

@@ -1,8 +1,7 @@
-// TypeScript types from docs/studio.schema.json: `npm run protocol` writes src/lib/protocol/types.ts, a test compares.
+// TypeScript types from docs/studio.schema.json, written to src/lib/protocol/types.ts before each build, check and test of the page.
+// A file that is as it should be is left, so that the built page does not become older than its sources.
 
-import { readFileSync, writeFileSync } from "node:fs";
-import { argv } from "node:process";
-import { fileURLToPath } from "node:url";
+import { existsSync, readFileSync, writeFileSync } from "node:fs";
 
 const SCHEMA = new URL("../../docs/studio.schema.json", import.meta.url);
 const TYPES = new URL("../src/lib/protocol/types.ts", import.meta.url);
@@ -71,7 +70,7 @@ function objectType(schema, indent) {
 }
 
 /** The text of types.ts for a schema. */
-export function protocolTypes(schema) {
+function protocolTypes(schema) {
   const definitions = Object.entries(schema.$defs);
   const types = definitions.map(([name, definition]) => {
     const comment = definition.description ? `/** ${definition.description} */\n` : "";
@@ -85,14 +84,12 @@ export function protocolTypes(schema) {
   });
   const messages = definitions.filter(([name]) => name.endsWith(" message")).map(([name]) => typeName(name));
   return [
-    "// Made from docs/studio.schema.json by `npm run protocol`; not to be changed by hand.\n",
+    "// Made from docs/studio.schema.json by scripts/protocol.mjs; not in git.\n",
     ...types,
     `/** What is sent without being asked for. */\nexport type Pushed = ${messages.join(" | ")};\n`,
     `/** Requests and the types of their answers, by name. */\nexport interface Requests {\n${table.join("")}}\n`,
   ].join("\n");
 }
 
-export const schemaText = () => readFileSync(SCHEMA, "utf-8");
-export const typesText = () => readFileSync(TYPES, "utf-8");
-
-if (argv[1] === fileURLToPath(import.meta.url)) writeFileSync(TYPES, protocolTypes(JSON.parse(schemaText())));
+const text = protocolTypes(JSON.parse(readFileSync(SCHEMA, "utf-8")));
+if (!existsSync(TYPES) || readFileSync(TYPES, "utf-8") !== text) writeFileSync(TYPES, text);

@@ -174,7 +174,7 @@ def newer_source(page: Path, web: Path = ROOT / "studio-web") -> Path | None:
     for folder, folders, files in os.walk(web):
         folders[:] = set(folders) - {"node_modules", "__pycache__"}
         for name in files:
-            if (Path(folder) / name).stat().st_mtime > built:
+            if name != "types.ts" and (Path(folder) / name).stat().st_mtime > built:
                 return Path(folder) / name
     return None
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -21,8 +20,6 @@ from steptwin.world.actions import ACTIONS
 from steptwin.world.control import Halt
 from steptwin.world.faults import read as read_fault
 from steptwin.world.inputs import Bytes, Download, EndScripts, Leave, Refused, See, SetVariable
-
-SCHEMA = Path(__file__).parents[2] / "docs" / "control.schema.json"
 
 EXAMPLES: list[tuple[dict[str, Any], command.Command]] = [
     ({"do": "describe"}, command.Describe()),
@@ -191,11 +188,6 @@ def test_whatever_is_read_is_a_command_or_misuse(name: str, data: st.DataObject)
     again = plain_command(found)
     assert again.pop("do") == name
     assert read_command(name, json.loads(json.dumps(again))) == found
-
-
-def test_the_schema_that_is_kept_is_that_of_the_table() -> None:
-    """`python -m steptwin.subject.schema > docs/control.schema.json` writes it."""
-    assert json.loads(SCHEMA.read_text("utf-8")) == json.loads(json.dumps(schema()))
 
 
 def test_the_schema_has_what_the_table_has() -> None:

@@ -236,4 +236,4 @@ def text() -> str:
 
 
 if __name__ == "__main__":
-    print(text(), end="")  # noqa: T201  python -m steptwin.subject.schema > docs/control.schema.json
+    print(text(), end="")  # noqa: T201  for programs in other languages: docs/control.md
