@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from base64 import b64decode
+
 import pytest
 from tests.support.studio_rig import VIEWER, WORLD, Studio
+
+from steptwin.machine import SECOND
+from steptwin.wire.pcapng import CapturedFrame, capture
 
 
 def test_a_move_of_an_axis_in_its_units() -> None:
@@ -81,3 +86,14 @@ def test_what_is_wrong_in_a_file() -> None:
     assert "would not read back" in tab.error("edit_configuration", machine="table", text="", changes={"Axis0.Gear": "1\n2"})[1]
     assert "which has no configuration file" in tab.error("configuration", machine="drum")[1]
     assert "at most 48000 characters" in tab.error("edit_configuration", machine="table", text="x" * 50_000, changes={})[1]
+
+
+def test_frames_as_a_capture() -> None:
+    data = bytes.fromhex("000100000006010327240002")
+    frame = {"time_ns": "2000000000", "machine": "bus", "client": "tcp-1", "direction": "in", "data": data.hex()}
+    tab = Studio(tokens=True).open(token=VIEWER)
+    made = b"".join(capture([CapturedFrame(2 * SECOND, "bus", "tcp-1", True, data)]))
+    assert b64decode(tab.ok("capture", frames=[frame])["data"]) == made
+    assert "expected 'in' or 'out'" in tab.error("capture", frames=[{**frame, "direction": "up"}])[1]
+    assert "expected bytes as hexadecimal digits" in tab.error("capture", frames=[frame, {**frame, "data": "0"}])[1]
+    assert "at most 5000 frames" in tab.error("capture", frames=[frame] * 5001)[1]

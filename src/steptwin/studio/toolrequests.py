@@ -1,8 +1,8 @@
-"""Requests for the motion calculator and for configurations as forms. They change nothing."""
+"""Requests for the motion calculator, configurations as forms, and captures of frames. They change nothing."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -11,11 +11,27 @@ from steptwin.calc import Formula, MovePart, RequiredSetting
 from steptwin.diagnostics import Severity
 from steptwin.errors import Misuse
 from steptwin.studio.requestrow import RequestRow
-from steptwin.subject.fields import MOST_ITEMS, TEXT, Field, Schema, ValueType, number, whole, wrong
+from steptwin.subject.fields import (
+    HEX,
+    MOST_ITEMS,
+    TEXT,
+    TIME,
+    Field,
+    Schema,
+    ValueType,
+    choice,
+    number,
+    read_fields,
+    whole,
+    wrong,
+)
 from steptwin.subject.shapes import members
+from steptwin.wire.pcapng import CapturedFrame
 
 LONGEST_FILE = 48_000
 """Characters of a configuration; those of the vendor have 3000."""
+MOST_FRAMES = 5000
+"""Of a capture: as many as the page keeps."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +78,14 @@ class EditConfiguration:
     changes: Mapping[str, str]
 
 
-ToolRequest: TypeAlias = ReadQuantities | Calculate | ConvertGear | ReadConfiguration | EditConfiguration
+@dataclass(frozen=True, slots=True)
+class MakeCapture:
+    """Requests a capture file (pcapng) of frames."""
+
+    frames: Sequence[CapturedFrame]
+
+
+ToolRequest: TypeAlias = ReadQuantities | Calculate | ConvertGear | ReadConfiguration | EditConfiguration | MakeCapture
 
 _TEXT: Schema = {"type": "string"}
 _WHOLE: Schema = {"type": "integer"}
@@ -189,6 +212,28 @@ def _table(value: Any) -> Mapping[str, Any]:
     return value
 
 
+def _frames(value: Any) -> Sequence[CapturedFrame]:
+    if not isinstance(value, list) or len(value) > MOST_FRAMES:
+        raise wrong(value, _FRAMES.what)
+    return [_frame(read_fields("frame", _OF_FRAME, _table(one))) for one in value]
+
+
+def _frame(of: Mapping[str, Any]) -> CapturedFrame:
+    return CapturedFrame(of["time_ns"], of["machine"], of["client"], of["direction"] == "in", of["data"])
+
+
+_OF_FRAME = (
+    Field("time_ns", TIME, "Virtual time."),
+    Field("machine", TEXT, "The line."),
+    Field("client", TEXT, "The client of the line."),
+    Field("direction", choice("in", "out"), "in: to the controller."),
+    Field("data", HEX, "Its bytes, in hexadecimal."),
+)
+_FRAMES = ValueType(
+    f"a list of at most {MOST_FRAMES} frames",
+    {"type": "array", "maxItems": MOST_FRAMES, "items": members({field.name: field.schema() for field in _OF_FRAME})},
+    _frames,
+)
 _GIVEN = ValueType('{"QUANTITY": NUMBER, ...}', {**_NUMBERS, "maxProperties": MOST_ITEMS}, _numbers, dict)
 _CHANGES = ValueType('{"SECTION.KEY": TEXT, ...}', {**_TEXTS, "maxProperties": MOST_ITEMS}, _texts, dict)
 _MACHINE = Field("machine", TEXT, "The name of a machine.")
@@ -238,6 +283,15 @@ TOOLS = (
         "that of its file; without one, what its registers show.",
         _FORM,
         (_MACHINE,),
+    ),
+    RequestRow(
+        "capture",
+        MakeCapture,
+        LOOK,
+        "A capture file (pcapng) for Wireshark, of frames as events have them. Modbus TCP is in packets of TCP, serial lines "
+        "are as captures of an RTAC.",
+        members({"data": {**_TEXT, "contentEncoding": "base64"}}),
+        (Field("frames", _FRAMES, "In their order."),),
     ),
     RequestRow(
         "edit_configuration",

@@ -30,8 +30,9 @@ from steptwin.files.textfiles import check_writable, new_file
 from steptwin.files.writing import as_text
 from steptwin.inputfiles import open_regular
 from steptwin.machine import MILLISECOND, Nanos
+from steptwin.wire.pcapng import CapturedFrame, capture
 from steptwin.world.lanes import AxisLane, AxisViews
-from steptwin.world.trace import Trace
+from steptwin.world.trace import Trace, TraceRecord
 
 __all__ = [
     "FORMATS",
@@ -90,9 +91,12 @@ def _vcd(recording: Recording, file: IO[bytes], options: _Options) -> None:
 
 
 def _pcapng(recording: Recording, file: IO[bytes], options: _Options) -> None:
-    from steptwin.files.export.pcapng import write_pcapng
+    def captured(record: TraceRecord) -> CapturedFrame:
+        options.progress(record.time)
+        client, _, direction = record.subject.rpartition("/")
+        return CapturedFrame(record.time, record.machine, client, direction == "in", record.data())
 
-    write_pcapng(recording, file, options.progress)
+    file.writelines(capture(map(captured, recording.of("frame"))))
 
 
 def _csv(recording: Recording, file: IO[bytes], options: _Options) -> None:

@@ -1,10 +1,5 @@
-import { writeFileSync } from "node:fs";
-import { tmpdir } from "node:os";
-import { join } from "node:path";
-import { spawnSync } from "node:child_process";
 import { expect, test } from "vitest";
-import { bytesOf, csvOf, frameOf, hexOf, isTcp, Statistics, type Frame, type FrameEvent } from "./frame";
-import { pcapngOf } from "./pcapng";
+import { bytesOf, csvOf, frameOf, isTcp, sendable, Statistics, type Frame, type FrameEvent } from "./frame";
 
 let number = 0;
 function frame(time_ms: number, direction: "in" | "out", hex: string, client = "tcp-1"): Frame {
@@ -45,27 +40,13 @@ test("CSV quotes meanings", () => {
   );
 });
 
-test("a capture file has a block for each frame, of whole words", () => {
-  const bytes = pcapngOf([frame(1, "in", ASKED), frame(2, "out", ANSWERED), frame(3, "in", RTU), frame(4, "in", "")]);
-  const view = new DataView(bytes.buffer);
-  const types: number[] = [];
-  for (let at = 0; at < bytes.length; at += view.getUint32(at + 4, true)) {
-    expect(view.getUint32(at + view.getUint32(at + 4, true) - 4, true)).toBe(view.getUint32(at + 4, true));
-    types.push(view.getUint32(at, true));
-  }
-  expect(types).toEqual([0x0a0d0d0a, 1, 1, 6, 6, 6]);
-  expect(hexOf(bytes)).toContain(RTU);
-});
-
-const hasTshark = spawnSync("tshark", ["--version"]).status === 0;
-test.skipIf(!hasTshark)("Wireshark decodes it", () => {
-  const file = join(tmpdir(), `steptwin-${process.pid}.pcapng`);
-  writeFileSync(
-    file,
-    pcapngOf([frame(1, "in", ASKED), frame(2, "out", ANSWERED), frame(3, "out", REFUSED), frame(4, "in", RTU)]),
-  );
-  const decoded = spawnSync("tshark", ["-r", file, "-d", "rtacser.data,mbrtu"], { encoding: "utf-8" }).stdout;
-  expect(decoded.match(/Modbus\/TCP/g)).toHaveLength(3);
-  expect(decoded).toContain("Exception returned");
-  expect(decoded).toContain("Modbus RTU");
+test("a request has room for the newest frames", () => {
+  expect(sendable([frame(1, "in", ASKED)])).toEqual([
+    { time_ns: "1000000", machine: "bus", client: "tcp-1", direction: "in", data: ASKED.replaceAll(" ", "") },
+  ]);
+  const many = Array.from({ length: 5000 }, (_, at) => frame(at, "out", "00".repeat(260)));
+  const sent = sendable(many);
+  expect(sent.length).toBeLessThan(many.length);
+  expect(sent.at(-1)?.time_ns).toBe("4999000000");
+  expect(JSON.stringify(sent).length).toBeLessThan(1_000_001);
 });

@@ -1,4 +1,4 @@
-import type { SubjectEvent } from "../../lib/protocol/types";
+import type { Requests, SubjectEvent } from "../../lib/protocol/types";
 
 export type FrameEvent = Extract<SubjectEvent, { kind: "frame" }>;
 
@@ -44,6 +44,22 @@ export function frameOf(event: FrameEvent, isModbus: boolean): Frame {
     words: event.words,
     isError: data.length === 0 || (isModbus && event.direction === "out" && code >= 0x80),
   };
+}
+
+/** Characters of a request that the studio takes, less than its 1 MiB. */
+const ROOM = 1_000_000;
+
+/** The newest frames that a request has room for, as the request `capture` has them. */
+export function sendable(frames: readonly Frame[]): Requests["capture"]["request"]["frames"] {
+  let room = ROOM;
+  const rows = [];
+  for (const { time_ns, line, client, direction, data } of [...frames].reverse()) {
+    const row = { time_ns: String(time_ns), machine: line, client, direction, data: hexOf(data).replaceAll(" ", "") };
+    room -= JSON.stringify(row).length + 1;
+    if (room < 0) break;
+    rows.push(row);
+  }
+  return rows.reverse();
 }
 
 /** How many come, how many are errors, and how long answers take. */

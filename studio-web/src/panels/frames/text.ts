@@ -36,6 +36,7 @@ export const t = texts(
     savePcapng: "Save as pcapng",
     pcapngHelp:
       "For Wireshark. Modbus TCP is decoded at once; for serial lines choose Decode As… › Modbus RTU in Wireshark.",
+    onlyNewest: "The newest {count} of {all} frames are saved: a capture has no room for more.",
     frames: "Frames of the lines",
   },
   {
@@ -73,6 +74,7 @@ export const t = texts(
     savePcapng: "Zapisz jako pcapng",
     pcapngHelp:
       "Dla Wiresharka. Modbus TCP jest dekodowany od razu; dla linii szeregowych wybierz w Wiresharku Decode As… › Modbus RTU.",
+    onlyNewest: "Zapisano {count} najnowszych z {all} ramek: na więcej nie ma miejsca.",
     frames: "Ramki linii",
   },
 );

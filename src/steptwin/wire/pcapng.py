@@ -6,12 +6,11 @@ kept as it was, with its checksum, as a capture of an RTAC (link type 250); its 
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from struct import pack
-from typing import IO
+from typing import NamedTuple
 
-from steptwin.files.export.progress import TimeProgress
-from steptwin.files.export.recording import Recording
 from steptwin.machine import MICROSECOND, SECOND, Nanos
 
 RAW_IP = 101
@@ -28,25 +27,28 @@ _TCP, _SERIAL = 0, 1
 """Numbers of the interfaces."""
 
 
-def write_pcapng(recording: Recording, file: IO[bytes], progress: TimeProgress) -> None:
-    """Write the frames; a capture without any is complete, too."""
-    file.write(_block(0x0A0D0D0A, pack("<IHHq", 0x1A2B3C4D, 1, 0, -1)))
-    file.write(_interface(RAW_IP, b"Modbus TCP"))
-    file.write(_interface(RTAC_SERIAL, b"serial lines"))
+class CapturedFrame(NamedTuple):
+    """A frame of a line between a client and its units."""
+
+    time: Nanos
+    line: str
+    client: str
+    is_request: bool
+    data: bytes
+
+
+def capture(frames: Iterable[CapturedFrame]) -> Iterator[bytes]:
+    """The blocks of a capture file; without frames it is complete, too. Empty frames are left out."""
+    yield _block(0x0A0D0D0A, pack("<IHHq", 0x1A2B3C4D, 1, 0, -1))
+    yield _interface(RAW_IP, b"Modbus TCP")
+    yield _interface(RTAC_SERIAL, b"serial lines")
     streams: dict[str, _TcpStream] = {}
-    for record in recording.of("frame"):
-        data = record.value
-        if not isinstance(data, bytes) or not data:
-            continue
-        client, _, direction = record.subject.rpartition("/")
-        is_request = direction == "in"
+    for time, line, client, is_request, data in frames:
         if is_modbus_tcp(data):
-            name = f"{record.machine}/{client}"
-            stream = streams.setdefault(name, _TcpStream(_FIRST_CLIENT_PORT + len(streams) % 10_000))
-            file.write(_packet(_TCP, record.time, stream.packet(data, is_request=is_request)))
-        else:
-            file.write(_packet(_SERIAL, record.time, _rtac(data, record.time, is_request=is_request)))
-        progress(record.time)
+            stream = streams.setdefault(f"{line}/{client}", _TcpStream(_FIRST_CLIENT_PORT + len(streams) % 10_000))
+            yield _packet(_TCP, time, stream.packet(data, is_request=is_request))
+        elif data:
+            yield _packet(_SERIAL, time, _rtac(data, time, is_request=is_request))
 
 
 def is_modbus_tcp(data: bytes) -> bool:

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from steptwin.files.export import write_trace
-from steptwin.files.export.pcapng import is_modbus_tcp
 from steptwin.machine import MILLISECOND, SECOND
+from steptwin.wire.pcapng import is_modbus_tcp
 from steptwin.world.trace import Trace, TraceRecord
 
 READ_TCP = bytes.fromhex("000100000006 01 03 2724 0002".replace(" ", ""))
