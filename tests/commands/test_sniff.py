@@ -7,18 +7,21 @@ import os
 import socket
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from shell import Shell
 from typer.testing import CliRunner
+from virtual_loop import run_virtually
 
 from steptwin.cli import app
-from steptwin.commands.sniff import sniff
+from steptwin.commands.sniff import Tap, sniff
 from steptwin.drivers.kind import Decoder
 from steptwin.drivers.m1486.decoder import M1486Decoder
 from steptwin.drivers.mic488.decoder import ModbusDecoder
 from steptwin.drivers.place import LineAddress, parse_line_address
 from steptwin.errors import LineFailure, Misuse
+from steptwin.wire.crc import with_crc
 from steptwin.wire.frameline import FrameLine
 from steptwin.world.addresses import Address
 
@@ -75,6 +78,23 @@ def test_modbus_tcp_passes_and_is_told() -> None:
     asked, answer = bytes.fromhex("0007 0000 0006 01 03 2724 0002"), bytes.fromhex("0007 0000 0007 01 03 04 0000 4148")
     asyncio.run(through("tcp", ModbusDecoder(frames.append, "1.70", tcp=True), {asked: answer}))
     assert told(frames) == ["IN unit 1: read M1_POS_ACT", "OUT unit 1: read M1_POS_ACT = 12.5 u"]
+
+
+def test_a_silence_ends_although_the_clock_goes_on_in_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As on Windows, where timers come before the clock has gone on."""
+    frames: list[FrameLine] = []
+    unknown = with_crc(bytes.fromhex("01 41 01 02 03"))
+
+    async def play() -> None:
+        loop = asyncio.get_running_loop()
+        steps = SimpleNamespace(monotonic_ns=lambda: int(loop.time() / 0.016) * 16_000_000)
+        monkeypatch.setattr("steptwin.commands.sniff.time", steps)
+        tap = Tap(ModbusDecoder(frames.append, "1.70", tcp=False), is_relay=False)
+        tap.data_received(unknown)
+        await asyncio.sleep(1.0)
+
+    run_virtually(play())
+    assert [frame.raw for frame in frames] == [unknown]
 
 
 def test_the_m1486_passes_and_is_told() -> None:

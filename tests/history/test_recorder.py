@@ -223,6 +223,14 @@ def test_a_gap_has_the_number_of_all_lost_rows_and_everything_is_kept_behind_it(
     assert [len(batch.events) for batch in made.batches] == [1]
 
 
+def test_rows_that_are_lost_at_the_last_look_are_told_at_the_end() -> None:
+    made = RecordedWorld(CELL)
+    lost = made.look()
+    made.recorder.lost(lost)
+    (event,) = made.recorder.end().events
+    assert event.text == f"{sum(map(len, lost))} rows found no room and are missing before this moment"
+
+
 def test_a_controller_that_does_not_answer_is_not_known() -> None:
     made = RecordedWorld(CELL)
     made.look()

@@ -68,6 +68,7 @@ class Tap(asyncio.Protocol):
         self._is_relay = is_relay
         self._begin = time.monotonic_ns()
         self._transport: asyncio.Transport | None = None
+        self._silence: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = cast(asyncio.Transport, transport)  # serialx' is not a subclass
@@ -95,15 +96,18 @@ class Tap(asyncio.Protocol):
         self._wait_for_silence()
 
     def _wait_for_silence(self) -> None:
+        """Timers come before their time by as much as the clock goes on at once, 16 ms on Windows: then it is waited again."""
+        if self._silence is not None:
+            self._silence.cancel()
         due = self._decoder.deadline()
         if due is not None:
-            asyncio.get_running_loop().call_later(max(due - self._now(), 0) / SECOND, self._expire)
+            self._silence = asyncio.get_running_loop().call_later(max(due - self._now(), 0) / SECOND, self._expire)
 
     def _expire(self) -> None:
         due = self._decoder.deadline()
         if due is not None and due <= self._now():
             self._decoder.expire(self._now())
-            self._wait_for_silence()
+        self._wait_for_silence()
 
 
 async def sniff(

@@ -247,10 +247,13 @@ class Recorder:
         """Rows are kept from now on: say how many were not, and keep everything again, because the values of the last ones may be
         among them."""
         before = len(self._batch)
-        self._note_loss(now, wall, f"{self._lost} rows found no room and are missing before this moment")
+        self._tell_lost(now, wall)
         await self._take_again(now, wall)
         self._note = _GapNote(self._batch, self._lost, len(self._batch) - before)
         self._lost = 0
+
+    def _tell_lost(self, now: Nanos, wall: int) -> None:
+        self._note_loss(now, wall, f"{self._lost} rows found no room and are missing before this moment")
 
     async def _take_again(self, now: Nanos, wall: int) -> None:
         self._plans.clear()
@@ -283,6 +286,10 @@ class Recorder:
     def end(self) -> RowBatch:
         """The last batch of the run, up to the last look."""
         self._take_traffic(*self._looked_at)
+        if self._lost:
+            self._tell_lost(*self._looked_at)
+            self._note = _GapNote(self._batch, self._lost, 1)
+            self._lost = 0
         self._batch.is_last = True
         self._batch.time, self._batch.at_us = self._looked_at
         return self._batch
