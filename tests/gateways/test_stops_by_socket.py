@@ -6,34 +6,37 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 import time
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable, Generator, Mapping
+from contextlib import ExitStack
+from shutil import which
+from typing import Any, NamedTuple
 
 import httpx
 import pytest
 from asyncua.sync import Client
 from gateway_rig import running
+from mosquitto import Mosquitto, Requests
 from tests.conftest import until
 from websockets.sync.client import connect
+from world_rig import TWO_LINES
 
 from steptwin.gateways.opcua.addressspace import node_id
 from steptwin.live.remote import RemoteSubject
 from steptwin.subject import commands as command
 from steptwin.world.inputs import Download
 
-WORLD = """
+WORLD = f"""
 [world]
 name = "hall"
 [gateway.opcua]
 listen = "127.0.0.1:0"
-[[line]]
-name = "bus"
-tcp = "127.0.0.1:0"
-[[line]]
-name = "chips"
-kind = "m1486"
-tcp = "127.0.0.1:0"
+[gateway.epics]
+listen = "127.0.0.1:0"
+{TWO_LINES}
 [[mic488]]
 name = "table"
 line = "bus"
@@ -81,6 +84,13 @@ def by_opcua(machine: str, places: Places, hall: RemoteSubject) -> None:
         client.get_node(f"ns=2;s={machine}").call_method(node_id("types.Controller.Stop"))
 
 
+def by_channel_access(machine: str, places: Places, hall: RemoteSubject) -> None:
+    """Of pyepics, in a process of its own."""
+    program = f"import epics; assert epics.caput('{machine}:Stop', 1, wait=True, timeout=30) == 1"
+    where = {"EPICS_CA_ADDR_LIST": f"127.0.0.1:{places['epics']['port']}", "EPICS_CA_AUTO_ADDR_LIST": "NO"}
+    subprocess.run([sys.executable, "-c", program], env={**os.environ, **where}, check=True, timeout=100)
+
+
 def moving(hall: RemoteSubject, machine: str) -> bool:
     (reading,) = hall.read("table.M1.moving" if machine == "table" else f"{machine}.moving")
     return reading.value == 1.0
@@ -91,20 +101,48 @@ def position(hall: RemoteSubject, machine: str) -> float | None:
     return reading.value
 
 
+class Hall(NamedTuple):
+    places: Places
+    remote: RemoteSubject
+    broker: Mosquitto | None
+    """None where mosquitto is not installed."""
+
+
 @pytest.fixture(scope="module")
-def hall(tmp_path_factory: pytest.TempPathFactory) -> Any:
+def hall(tmp_path_factory: pytest.TempPathFactory) -> Generator[Hall]:
     folder = tmp_path_factory.mktemp("hall")
-    (folder / "hall.toml").write_text(WORLD)
     options = ("--open-to-local-users", "--http", "127.0.0.1:0", "--no-browser")
-    with pytest.MonkeyPatch.context() as patch, running(folder, "studio", "hall.toml", *options) as found:
-        patch.setenv("XDG_RUNTIME_DIR", str(folder))
-        with RemoteSubject("hall") as remote:
-            yield found, remote
+    with ExitStack() as stack:
+        broker = None if which("mosquitto") is None else stack.enter_context(Mosquitto(str, folder))
+        gateway = "" if broker is None else f'[gateway.mqtt]\nbroker = "127.0.0.1:{broker.port}"\n'
+        (folder / "hall.toml").write_text(WORLD + gateway)
+        places = stack.enter_context(running(folder, "studio", "hall.toml", *options))
+        stack.enter_context(pytest.MonkeyPatch.context()).setenv("XDG_RUNTIME_DIR", str(folder))
+        yield Hall(places, stack.enter_context(RemoteSubject("hall")), broker)
 
 
-@pytest.mark.parametrize("stop", [by_control, by_rest, by_websocket, by_opcua])
-def test_all_stop_and_stay_there(stop: Stop, hall: Any) -> None:
-    places, remote = hall
+@pytest.mark.parametrize("stop", [by_control, by_rest, by_websocket, by_opcua, by_channel_access])
+def test_all_stop_and_stay_there(stop: Stop, hall: Hall) -> None:
+    check_stops(stop, hall)
+
+
+def test_all_stop_by_a_broker_and_stay_there(require_peer: Callable[[str], str], hall: Hall) -> None:
+    require_peer("mosquitto")
+    broker = hall.broker
+    assert broker is not None
+    until(lambda: broker.retained("steptwin/hall/online") is True, "it is online")
+    with broker.subscribe("me/answers") as answers:
+        ask = Requests(broker, answers, "steptwin/hall")
+
+        def by_broker(machine: str, places: Places, remote: RemoteSubject) -> None:
+            assert ask("stop", machine=machine)["ok"] == {"program": "stopped"}
+
+        check_stops(by_broker, hall)
+
+
+def check_stops(stop: Stop, hall: Hall) -> None:
+    """Each controller stands when its stop has been acknowledged, and none moves again."""
+    places, remote, _ = hall
     remote.do(command.Enable("table", 1))
     for machine in MACHINES:
         remote.do(command.Jog(machine, 1, 1000.0 if machine == "table" else 64_000.0))
@@ -112,20 +150,22 @@ def test_all_stop_and_stay_there(stop: Stop, hall: Any) -> None:
         until(lambda machine=machine: moving(remote, machine), "it moves")
         stop(machine, places, remote)
         until(lambda machine=machine: not moving(remote, machine), "it stands")
+    check_rest(remote)
+
+
+def check_rest(remote: RemoteSubject) -> None:
     stood = [position(remote, machine) for machine in MACHINES]
     time.sleep(QUIET_S)
     assert [position(remote, machine) for machine in MACHINES] == stood
     assert not any(moving(remote, machine) for machine in MACHINES)
 
 
-def test_stop_all_ends_the_programs_of_the_chips(hall: Any) -> None:
-    places, remote = hall
+def test_stop_all_ends_the_programs_of_the_chips(hall: Hall) -> None:
+    places, remote, _ = hall
     for machine in CHIPS:
         remote.do(Download(machine, "program", LOOPING))
     until(lambda: moving(remote, "ram"), "one moves, and the other one is being typed")
     answer = httpx.post(f"{places['http']['url']}api/do/stop_all")
     assert (answer.status_code, answer.json()["ok"]["machines"]) == (200, ["table", "ram", "eeprom"])
     until(lambda: not moving(remote, "ram"), "it stands")
-    stood = [position(remote, machine) for machine in CHIPS]
-    time.sleep(QUIET_S)
-    assert [position(remote, machine) for machine in CHIPS] == stood
+    check_rest(remote)

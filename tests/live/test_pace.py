@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from world_rig import TWO_LINES
 
 from steptwin.commands.up_world import LiveWorld, PlacePort, UpOptions, up
 from steptwin.errors import Misuse, Refusal
@@ -398,14 +399,7 @@ def test_what_a_script_stopped_goes_on_from_its_session(tmp_path: Path, capfd: p
     assert session.replay().trace.digest() == session.digest
 
 
-TWO_LINES = """
-    [[line]]
-    name = "bus"
-    tcp = "127.0.0.1:0"
-    [[line]]
-    name = "chips"
-    kind = "m1486"
-    tcp = "127.0.0.1:0"
+ONE_ON_EACH = f"""{TWO_LINES}
     [[mic488]]
     name = "m"
     line = "bus"
@@ -419,7 +413,7 @@ def test_going_back_leaves_programs_connected_and_the_session_whole(run: Run) ->
     """A master reads the position of then; a program on a shared line receives what comes from then on, nothing twice."""
 
     async def scene() -> World:
-        rig = Rig(World.from_toml(dedent(TWO_LINES)))
+        rig = Rig(World.from_toml(dedent(ONE_ON_EACH)))
         rig.do("enable", machine="m", axis=1)
         rig.do("jog", machine="m", axis=1, velocity=40.0)
         rig.do("step", for_ns=3 * SECOND)

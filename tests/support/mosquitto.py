@@ -15,6 +15,8 @@ from typing import Any, Self
 from tests.conftest import until
 
 LONGEST_S = 20.0
+BASE = "steptwin/plant"
+"""Of the topics of a world called plant."""
 
 
 def free_port() -> int:
@@ -156,3 +158,21 @@ class Subscription:
         self._process.terminate()
         self._process.communicate(timeout=LONGEST_S)
         self._thread.join(LONGEST_S)
+
+
+class Requests:
+    """Commands of one client, and what it is answered."""
+
+    def __init__(self, broker: Mosquitto, answers: Subscription, base: str = BASE) -> None:
+        self._broker = broker
+        self._answers = answers
+        self._base = base
+        self._number = 0
+
+    def __call__(self, do: str, *options: str, **fields: Any) -> Any:
+        self._number += 1
+        name = f"r{self._number}"
+        where = ["-D", "publish", "response-topic", "me/answers", "-D", "publish", "correlation-data", name]
+        self._broker.publish(f"{self._base}/do", {"do": do, **fields}, *where, *options)
+        found = self._answers.wait_for(lambda one: one["correlation"] == name, f"{do} is answered")
+        return found["payload"]

@@ -20,6 +20,15 @@ from steptwin.world.kinds.mic488.small import mic488_world
 from steptwin.world.small import LINE, Whole
 from steptwin.world.trace import Trace
 
+TWO_LINES = """
+    [[line]]
+    name = "bus"
+    tcp = "127.0.0.1:0"
+    [[line]]
+    name = "chips"
+    kind = "m1486"
+    tcp = "127.0.0.1:0"
+"""
 SMALL = """
     [world]
     seed = 3

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 from gateway_rig import running, served
-from mosquitto import Mosquitto, Subscription
+from mosquitto import BASE, Mosquitto, Requests
 from pymodbus.client import ModbusTcpClient
 from tests.conftest import STEPTWIN, until
 from tls_files import Authority
@@ -38,7 +38,6 @@ WORLD = """
     registers = ["table.USER_REGISTER[5]"]
     role = "engineer"
 """
-BASE = "steptwin/plant"
 
 
 @pytest.fixture
@@ -49,24 +48,6 @@ def broker(require_peer: Callable[[str], str], tmp_path: Path) -> Generator[Mosq
 
 def online(broker: Mosquitto, base: str = BASE) -> None:
     until(lambda: broker.retained(f"{base}/online") is True, "it is online")
-
-
-class Requests:
-    """Commands of one client, and what it is answered."""
-
-    def __init__(self, broker: Mosquitto, answers: Subscription, base: str = BASE) -> None:
-        self._broker = broker
-        self._answers = answers
-        self._base = base
-        self._number = 0
-
-    def __call__(self, do: str, *options: str, **fields: Any) -> Any:
-        self._number += 1
-        name = f"r{self._number}"
-        where = ["-D", "publish", "response-topic", "me/answers", "-D", "publish", "correlation-data", name]
-        self._broker.publish(f"{self._base}/do", {"do": do, **fields}, *where, *options)
-        found = self._answers.wait_for(lambda one: one["correlation"] == name, f"{do} is answered")
-        return found["payload"]
 
 
 def position(broker: Mosquitto) -> Any:
