@@ -124,7 +124,7 @@ def check_what_is_switched_and_written(kind: Kind, page: Page) -> None:
         expect(velocity).to_have_value("")
         show(page, "Frames")
         page.get_by_role("searchbox").last.fill("V800")
-        page.get_by_label("Characters to send").fill("X7 V800")
+        page.get_by_label("Characters to send").fill("X7 V 800")
         button(page, "Send characters").click()
         expect(body_of(page, "Frames")).to_contain_text("V800  Velocity 800 step/s")
         return
