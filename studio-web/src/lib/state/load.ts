@@ -15,7 +15,7 @@ const STOOD_NS = 200_000_000n;
  */
 export class Load {
   /** Of the value against the plan. [pulses] */
-  private offset = NaN;
+  offset = NaN;
 
   /** `pulses_per_unit`: of the load, negative where positive pulses go down. */
   constructor(private readonly pulses_per_unit: number) {}
