@@ -121,7 +121,7 @@ class Process:
     @property
     def token(self) -> str:
         """Of an engineer, in the file of the user."""
-        lines = (Path(self.environment["XDG_STATE_HOME"]) / "steptwin/tokens").read_text().splitlines()
+        lines = Path(self.end_points["http"]["tokens"]).read_text().splitlines()
         return next(line.split()[2] for line in lines if line.startswith("engineer "))
 
     @property

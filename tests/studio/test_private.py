@@ -297,7 +297,8 @@ def test_own_tokens_are_made_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         own_tokens()
 
 
-def test_a_terminal_shows_the_address_with_the_token(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_printed_address_has_the_token_or_names_its_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The page says so where it asks for one; a token itself is shown on a terminal only."""
     token = Token(Role.ENGINEER, "anna", "anna-0123456789abcdef")
     access = AccessInfo(DEFAULT, None, (token,), Path("tokens"), Role.ENGINEER, is_demo=False)
     url = "http://127.0.0.1:8488/"
@@ -305,7 +306,8 @@ def test_a_terminal_shows_the_address_with_the_token(monkeypatch: pytest.MonkeyP
         monkeypatch.setattr("sys.stdout", io.StringIO())
         monkeypatch.setattr("sys.stdout.isatty", lambda is_terminal=is_terminal: is_terminal)
         assert access.place(url) == text
-    assert replace(access, is_demo=True).place(url) == url
+        assert replace(access, is_demo=True).place(url) == f"{url} (devices: tokens in tokens)"
+    assert replace(access, tokens=(), file=None).place(url) == url
 
 
 def test_the_browser_gets_the_token_in_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -37,18 +37,19 @@ class OpenedPage:
 
     def __init__(self, url: str, *, is_secret: bool, port: int) -> None:
         """Raises `Misuse` where the file cannot be written."""
-        self._file: Path | None = None
+        self.file: Path | None = None
+        """What the browser reads the address from; None if that is no secret."""
         if is_secret:
-            self._file = runtime_directory() / f"studio-{port}.html"
+            self.file = runtime_directory() / f"studio-{port}.html"
             try:
-                private_directory(self._file.parent)
-                self._file.unlink(missing_ok=True)
-                write_private(self._file, LEADING.format(url=escape(url)))
+                private_directory(self.file.parent)
+                self.file.unlink(missing_ok=True)
+                write_private(self.file, LEADING.format(url=escape(url)))
             except OSError as error:
-                raise Misuse(f"the page is not opened: cannot write {self._file}: {reason(error)}") from error
-            url = self._file.as_uri()
+                raise Misuse(f"the page is not opened: cannot write {self.file}: {reason(error)}") from error
+            url = self.file.as_uri()
         threading.Thread(target=webbrowser.open, args=(url,), name="browser", daemon=True).start()
 
     def close(self) -> None:
-        if self._file is not None:
-            self._file.unlink(missing_ok=True)
+        if self.file is not None:
+            self.file.unlink(missing_ok=True)

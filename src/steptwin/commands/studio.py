@@ -137,7 +137,7 @@ class AccessInfo:
     def place(self, url: str) -> str:
         """For people; a token only for those who sit at the terminal."""
         if not self.asks:
-            return url
+            return url if self.file is None else f"{url} (devices: tokens in {self.file})"
         if not sys.stdout.isatty():
             return f"{url} (tokens: {self.file})"
         if is_loopback(self.address.host):
@@ -308,7 +308,7 @@ class _Page:
         service = StudioService(hub, self._listening, origins, entrance.tls)
         service.start()
         url = f"{'http' if entrance.tls is None else 'https'}://{Address(_reached(host), port)}/"
-        details = {"host": host, "port": port, "url": url}
+        details = {"host": host, "port": port, "url": url} | ({} if entrance.file is None else {"tokens": str(entrance.file)})
         links = _Links(service, work, connections)
         server.join(links, EndPoint("http", entrance.place(url), "studio", details))
         if self._own.http is None and port != DEFAULT.port:
@@ -317,6 +317,10 @@ class _Page:
             secret = f"#token={entrance.tokens[0].text}" if entrance.asks else ""
             try:
                 links.opened = OpenedPage(url + secret, is_secret=entrance.asks, port=port)
+                if links.opened.file is not None:
+                    server.notice(
+                        f"a browser that may not read {links.opened.file} (snap, flatpak): open the address below in it"
+                    )
             except Misuse as error:
                 server.notice(str(error))
 

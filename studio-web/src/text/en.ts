@@ -6,7 +6,7 @@ export const en = {
   token: "Token of this studio",
   giveToken: "Give token",
   whereToken:
-    "It is in the file tokens in ~/.local/state/steptwin of whoever started the studio, and in the address on the terminal, but for the demo.",
+    "Where steptwin studio was started, it has printed the address of this page: with the token in it, or with the file of the tokens behind it.",
   deviceLost: "the device does not answer: {why}",
   live: "live",
   paused: "paused",

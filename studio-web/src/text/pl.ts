@@ -8,7 +8,7 @@ export const pl: Record<keyof typeof en, string> = {
   token: "Token tego studia",
   giveToken: "Podaj token",
   whereToken:
-    "Jest w pliku tokens w ~/.local/state/steptwin osoby, która uruchomiła studio, i (poza demonstracją) w adresie w terminalu.",
+    "Tam, gdzie uruchomiono steptwin studio, widać adres tej strony: z tokenem albo z plikiem tokenów za adresem.",
   deviceLost: "urządzenie nie odpowiada: {why}",
   live: "na żywo",
   paused: "pauza",
