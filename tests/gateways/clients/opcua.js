@@ -2,15 +2,23 @@
 const readline = require("node:readline");
 const {
   AttributeIds,
+  AggregateFilter,
   ClientMonitoredItem,
+  DataChangeFilter,
+  DataChangeTrigger,
   DataType,
+  HistoryData,
+  HistoryReadRequest,
   MessageSecurityMode,
   OPCUAClient,
+  ReadRawModifiedDetails,
   SecurityPolicy,
+  StatusCodes,
   TimestampsToReturn,
   UserTokenType,
   constructEventFilter,
 } = require("node-opcua-client");
+const { NumericRange } = require("node-opcua-numeric-range");
 const { OPCUACertificateManager } = require("node-opcua-certificate-manager");
 
 let client, session, subscription;
@@ -24,6 +32,20 @@ const plain = (value) => ({
   status: value.statusCode.name,
   time: value.sourceTimestamp ? value.sourceTimestamp.getTime() : null,
 });
+
+/** `{ band, type }` and `{ trigger }` are data changes, `{ average }` an aggregate over so many ms. */
+const filterOf = (filter) => {
+  if (filter === undefined) return undefined;
+  if (filter.average !== undefined)
+    return new AggregateFilter({
+      startTime: new Date(),
+      aggregateType: "ns=0;i=2342",
+      processingInterval: filter.average,
+      aggregateConfiguration: { useServerCapabilitiesDefaults: true },
+    });
+  const trigger = DataChangeTrigger[filter.trigger ?? "StatusValue"];
+  return new DataChangeFilter({ trigger, deadbandType: filter.type ?? 0, deadbandValue: filter.band ?? 0 });
+};
 
 const actions = {
   async connect({ url, mode, policy, folder, user, password }) {
@@ -45,11 +67,13 @@ const actions = {
     const found = await session.browse(node);
     return found.references.map((one) => [one.browseName.toString(), one.nodeId.toString(), one.nodeClass]);
   },
-  async read({ node, attribute }) {
-    return plain(await session.read({ nodeId: node, attributeId: AttributeIds[attribute ?? "Value"] }));
+  async read({ node, attribute, range }) {
+    const indexRange = range === undefined ? undefined : new NumericRange(range);
+    return plain(await session.read({ nodeId: node, attributeId: AttributeIds[attribute ?? "Value"], indexRange }));
   },
-  async write({ node, value }) {
-    const code = await session.write({ nodeId: node, attributeId: AttributeIds.Value, value: { value: variant(value) } });
+  async write({ node, value, status = "Good" }) {
+    const written = { statusCode: StatusCodes[status], value: variant(value) };
+    const code = await session.write({ nodeId: node, attributeId: AttributeIds.Value, value: written });
     return code.name;
   },
   async call({ object, method, given }) {
@@ -63,7 +87,27 @@ const actions = {
     const plainest = (one) => [one.sourceTimestamp.toISOString(), one.value?.value ?? null, one.statusCode.name];
     return { status: found.statusCode.name, more: !!found.continuationPoint?.length, values: values.map(plainest) };
   },
-  async subscribe({ node, period }) {
+  /** All pages; `first`: the continuation point of the first request. */
+  async pages({ node, start, end, most, first }) {
+    const pages = [];
+    let continuationPoint = first === undefined ? undefined : Buffer.from(first);
+    do {
+      const request = new HistoryReadRequest({
+        historyReadDetails: new ReadRawModifiedDetails({
+          startTime: new Date(start),
+          endTime: new Date(end),
+          numValuesPerNode: most,
+        }),
+        nodesToRead: [{ nodeId: node, continuationPoint }],
+      });
+      const [found] = (await session.historyRead(request)).results;
+      if (found.statusCode.isNot(StatusCodes.Good)) return found.statusCode.name;
+      pages.push(found.historyData.dataValues.map((one) => one.value.value));
+      continuationPoint = found.continuationPoint;
+    } while (continuationPoint?.length);
+    return pages;
+  },
+  async subscribe({ node, period, filter }) {
     subscription ??= await session.createSubscription2({
       requestedPublishingInterval: period,
       requestedMaxKeepAliveCount: 20,
@@ -72,7 +116,7 @@ const actions = {
     });
     const item = await subscription.monitor(
       { nodeId: node, attributeId: AttributeIds.Value },
-      { samplingInterval: period, queueSize: 1000, discardOldest: true },
+      { samplingInterval: period, queueSize: 1000, discardOldest: true, filter: filterOf(filter) },
       TimestampsToReturn.Both,
     );
     item.on("changed", (value) => seen.push({ node, ...plain(value) }));

@@ -190,6 +190,56 @@ def test_events_come_from_the_controller_and_the_server(client: NodeClient) -> N
     assert (message, severity, source, code) == ("program bank 0 is empty", 800, "table", "program-error")
 
 
+def test_a_dead_band_has_an_effect(client: NodeClient) -> None:
+    path = "table.registers.USER_REGISTER[5]"
+    assert client("write", node=f"ns=2;s={path}", value=double(0)) == "Good"
+    assert client("subscribe", node=f"ns=2;s={path}", period=20, filter={"type": ABSOLUTE, "band": 10}) == "Good"
+    for value in (4, 8, 12, 16, 20, 24):
+        assert client("write", node=f"ns=2;s={path}", value=double(value)) == "Good"
+        until(lambda value=value: read(client, path) == value, "the value is there")
+        time.sleep(0.1)  # several intervals of sampling: nothing says that a value was sampled and passed over
+    seen: list[float] = []
+    until(lambda: bool(seen.extend(one["value"] for one in client("seen")) or seen[-1:] == [24]), "the last one comes")
+    assert seen == [0, 12, 24]
+
+
+ABSOLUTE, PERCENT = 1, 2
+NOT_SUPPORTED = [
+    ("table.M1.position", {"type": PERCENT, "band": 5}, "BadMonitoredItemFilterUnsupported"),
+    ("table.M1.position", {"type": 7, "band": 5}, "BadDeadbandFilterInvalid"),
+    ("table.M1.position", {"type": ABSOLUTE, "band": -1}, "BadDeadbandFilterInvalid"),
+    ("table.status", {"type": ABSOLUTE, "band": 1}, "BadFilterNotAllowed"),
+    ("table.M1.position", {"average": 100}, "BadMonitoredItemFilterUnsupported"),
+]
+
+
+def test_filters_that_are_not_supported_are_refused(client: NodeClient) -> None:
+    for path, wanted, code in NOT_SUPPORTED:
+        assert client("subscribe", node=f"ns=2;s={path}", period=20, filter=wanted) == code, wanted
+
+
+def test_a_range_of_an_array_is_read(client: NodeClient) -> None:
+    path = "table.registers.USER_REGISTER"
+    assert client("write", node=f"ns=2;s={path}[5]", value=double(77)) == "Good"
+
+    def part(span: str) -> Any:
+        found = client("read", node=f"ns=2;s={path}", range=span)
+        return list(found["value"].values()) if found["status"] == "Good" else found["status"]
+
+    until(lambda: part("5") == [77], "the value is there")
+    assert part("4:6") == [0, 77, 0]
+    assert part("1998:5000") == [0, 0]
+    assert part("2000") == part("5000") == "BadIndexRangeNoData"
+
+
+def test_a_value_of_bad_quality_is_not_written(client: NodeClient) -> None:
+    for status in ("BadSensorFailure", "UncertainLastUsableValue"):
+        assert client("write", node="ns=2;s=table.registers.USER_REGISTER[5]", value=double(66), status=status) == (
+            "BadWriteNotSupported"
+        )
+    assert read(client, "table.registers.USER_REGISTER[5]") != 66
+
+
 SECURE = """
     security = "encrypt"
     certificate = "own/certificate.pem"

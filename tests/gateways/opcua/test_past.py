@@ -58,4 +58,12 @@ def test_a_client_reads_what_was(require_peer: Callable[[str], str], tmp_path: P
         assert read(STATUS)["values"][0][1] == "off"
         assert read("ns=2;s=table.Model")["status"] == "BadHistoryOperationUnsupported"
         assert read(POSITION, begin - timedelta(days=2), begin - timedelta(days=1))["values"] == []
+        for level in (False, True, False, True):
+            with ModbusTcpClient("127.0.0.1", port=points["tcp"]["port"]) as master:
+                assert not master.write_coil(2000, level, device_id=1).isError()
+            until(lambda level=level: read(ENABLED)["values"][-1][1] is level, "the edge has been kept")
+        span = {"start": begin.isoformat(), "end": (datetime.now(UTC) + timedelta(seconds=1)).isoformat()}
+        paged = client("pages", node=ENABLED, most=2, **span)
+        assert paged == [[False, True], [False, True], [False, True]]
+        assert client("pages", node=ENABLED, most=2, first="none", **span) == "BadContinuationPointInvalid"
         client("close")
