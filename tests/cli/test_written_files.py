@@ -9,15 +9,21 @@ import errno
 import os
 import shutil
 import stat
-from collections.abc import Callable
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pytest
+import typer
 from campaigns import campaign_file
 from history_rig import RecordedWorld
 from shell import Shell
+from typer.core import TyperOption
 
+from steptwin.cli import app, main
+from steptwin.cli.writtenfiles import keep_apart
 from steptwin.commands.studio_drawing import WorldArrangement
 from steptwin.errors import SteptwinError
 from steptwin.files.memory import StateDirectory
@@ -105,6 +111,16 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def needed_by(write: str) -> list[str]:
+    """The commands that make what another one reads."""
+    made = {
+        "image.wbc": "build image.prg",
+        "session.json": "run w.toml --session session.json",
+        "trace.jsonl": "run w.toml --trace trace.jsonl",
+    }
+    return [command for name, command in made.items() if name in write]
+
+
 @pytest.mark.parametrize("way", WAYS, ids=lambda way: f"{way.file}-{way.write if isinstance(way.write, str) else 'call'}")
 def test_the_file_is_the_old_one_or_the_new_one(
     way: Way, inputs: Path, tmp_path: Path, shell: Shell, monkeypatch: pytest.MonkeyPatch
@@ -113,14 +129,9 @@ def test_the_file_is_the_old_one_or_the_new_one(
     monkeypatch.chdir(tmp_path)
     far, link = tmp_path / "far" / way.file, tmp_path / way.file
     takes_links = way.file != "arranged.toml"  # requests write through no link
-    for needed, command in (
-        ("image.wbc", "build image.prg"),
-        ("session.json", "run w.toml --session session.json"),
-        ("trace.jsonl", "run w.toml --trace trace.jsonl"),
-    ):
-        if isinstance(way.write, str) and needed in way.write:
-            shell(*command.split())
-            assert shell.code == 0, shell.errors
+    for command in needed_by(way.write) if isinstance(way.write, str) else ():
+        shell(*command.split())
+        assert shell.code == 0, shell.errors
     far.parent.mkdir()
     far.write_bytes(way.old)
     far.chmod(0o640)
@@ -157,3 +168,76 @@ def test_the_file_is_the_old_one_or_the_new_one(
     assert far.read_bytes() != way.old
     assert link.is_symlink() is takes_links
     assert stat.S_IMODE(far.stat().st_mode) == 0o640
+
+
+SUFFIX_OPTIONAL = [
+    Way("e.csv", "export trace.jsonl --to csv -o e.csv --json"),
+    Way("out.svg", "explain image.prg -o out.svg --json"),
+    Way("s1.json", "run w.toml --session s1.json --json"),
+    Way("t1.jsonl", "run w.toml --trace t1.jsonl --json"),
+]
+"""The format is known without the name."""
+STREAMED = [
+    *(way for way in WAYS if isinstance(way.write, str) and way.file not in {"a.prg", "summary.json", "saved.toml"}),
+    Way("b.wbc", "build image.prg -o b.wbc --json"),
+    *SUFFIX_OPTIONAL,
+]
+
+
+@pytest.mark.skipif(not Path("/dev/stdout").exists(), reason="no /dev/stdout")
+@pytest.mark.parametrize("way", STREAMED, ids=lambda way: str(way.write))
+def test_what_is_written_to_the_standard_output_is_alone_there(
+    way: Way, inputs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfdbinary: pytest.CaptureFixture[bytes]
+) -> None:
+    shutil.copytree(inputs, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "x").mkdir()
+
+    def run(command: str) -> bytes:
+        monkeypatch.setattr("sys.argv", ["steptwin", *command.split()])
+        capfdbinary.readouterr()
+        with pytest.raises(SystemExit) as end:
+            main()
+        out, errors = capfdbinary.readouterr()
+        assert end.value.code == 0 or command.startswith("migrate"), errors
+        return out
+
+    assert isinstance(way.write, str)
+    for command in needed_by(way.write):
+        run(command)
+    run(way.write)
+    link = tmp_path / "x" / way.file
+    link.symlink_to("/dev/stdout")
+    stream = "/dev/stdout" if way in SUFFIX_OPTIONAL else f"x/{way.file}"
+    assert run(way.write.replace(way.file, stream)) == (tmp_path / way.file).read_bytes()
+
+
+READ = {"--positions", "--config", "--certificate", "--key", "--trusted", "--tokens", "--program"}
+FOLDERS_AND_LINES = {"--state", "--out", "--pty"}
+
+
+def test_every_option_that_names_a_file_to_write_keeps_it_apart() -> None:
+    """Or the test above does not hold for it."""
+
+    def options(command: Any, path: str = "") -> Iterator[tuple[str, TyperOption]]:
+        for name in getattr(command, "commands", ()):
+            yield from options(command.get_command(context, name), f"{path} {name}")
+        yield from ((path, one) for one in command.params if isinstance(one, TyperOption))
+
+    apart, other = set(), set()
+    context = typer.Context(typer.main.get_command(app))
+    for command, option in options(context.command):
+        where = apart if getattr(option.callback, "__wrapped__", None) is keep_apart else other
+        if "path" in option.display_type(context).lower() or option.opts[0] in {"--trace", "--coverage"}:
+            where.add((command.strip(), option.opts[0]))
+    assert ("decompile", "--positions") in apart
+    assert {name for _, name in other} == READ | FOLDERS_AND_LINES
+
+
+def test_a_log_of_commands_to_the_standard_output_is_not_renamed(tmp_path: Path) -> None:
+    """It was, when it was full, and over a pipe the first command failed."""
+    python = "from pathlib import Path; from steptwin.access.audit import Audit; "
+    python += "from steptwin.commands.auditfile import AuditFile\n"
+    python += "with AuditFile(Path('/dev/stdout'), 1) as file: file.add(type('E', (), {'plain': lambda self: {}})())"
+    done = subprocess.run([sys.executable, "-c", python], capture_output=True, check=True, cwd=tmp_path)
+    assert done.stdout == b"{}\n"

@@ -12,6 +12,7 @@ import typer
 
 from steptwin.cli import completion
 from steptwin.cli.device import Json, print_json
+from steptwin.cli.writtenfiles import written
 from steptwin.errors import Misuse
 
 
@@ -20,7 +21,7 @@ def command(
     positions: Annotated[
         Path | None, typer.Option(help="Position table; default: the .csv of the same name, else an empty one.")
     ] = None,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Image to write; default: FILE.wbc.")] = None,
+    output: Annotated[Path | None, written("--output", "-o", help="Image to write; default: FILE.wbc.")] = None,
     inferred: Annotated[
         bool, typer.Option("--inferred", help="Also write what has a form that is inferred, but was never seen in an image.")
     ] = False,
@@ -38,7 +39,6 @@ def command(
     from steptwin.diagnostics import Severity, render
     from steptwin.files.programfiles import CompanionFiles, read_program
     from steptwin.files.textfiles import write_bytes
-    from steptwin.files.writing import is_written_directly
     from steptwin.wbc.decompile import IMAGE
     from steptwin.wbc.dialect import dialect_for
     from steptwin.wbc.image import build as build_image
@@ -74,7 +74,6 @@ def command(
             }
         )
         return
-    is_stream = is_written_directly(target)
     if files.found:
-        typer.echo(str(files), err=is_stream)
-    typer.echo(f"{target}: {len(executable.steps)} commands, {len(table.rows)} positions", err=is_stream)
+        typer.echo(str(files))
+    typer.echo(f"{target}: {len(executable.steps)} commands, {len(table.rows)} positions")

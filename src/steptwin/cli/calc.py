@@ -16,6 +16,7 @@ import typer
 from steptwin.cli import completion
 from steptwin.cli.device import Json, table
 from steptwin.cli.optiongroups import OptionGroup, grouped, option_of
+from steptwin.cli.writtenfiles import written
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
@@ -107,7 +108,7 @@ def command(
         str | None,
         typer.Option(metavar="QUANTITY", help="The quantity that a time determines. Default: the one that is not given."),
     ] = None,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="A picture of the profile: FILE.svg or FILE.png.")] = None,
+    output: Annotated[Path | None, written("--output", "-o", help="A picture of the profile: FILE.svg or FILE.png.")] = None,
     json: Json = False,
     *,
     quantities: QuantityOptions,

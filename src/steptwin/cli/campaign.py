@@ -12,6 +12,7 @@ import typer
 
 from steptwin.cli.commandgroup import CommandGroup
 from steptwin.cli.device import Json
+from steptwin.cli.writtenfiles import written
 
 command = typer.Typer(
     cls=CommandGroup,
@@ -49,9 +50,9 @@ def run(
     ] = None,
     coverage: Annotated[
         list[str] | None,
-        typer.Option(metavar="FILE", help="Coverage of the programs: .info, .html or .json; - for a table."),
+        written(metavar="FILE", help="Coverage of the programs: .info, .html or .json; - for a table."),
     ] = None,
-    export: Annotated[Path | None, typer.Option(metavar="FILE", help="All runs as a table, .parquet.")] = None,
+    export: Annotated[Path | None, written(metavar="FILE", help="All runs as a table, .parquet.")] = None,
     json: Json = False,
 ) -> None:
     """Run a campaign, or what is left of one that was interrupted. The results are the same for any number of processes.

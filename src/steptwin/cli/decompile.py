@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from steptwin.cli.device import Json, print_json
+from steptwin.cli.writtenfiles import written
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
 
 def command(
     file: Annotated[Path, typer.Argument(help="Compiled image (.wbc).")],
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Program to write (.prg); default: print it.")] = None,
-    positions: Annotated[Path | None, typer.Option(help="Position table to write; default: beside the program, as .csv.")] = None,
+    output: Annotated[Path | None, written("--output", "-o", help="Program to write (.prg); default: print it.")] = None,
+    positions: Annotated[Path | None, written(help="Position table to write; default: beside the program, as .csv.")] = None,
     json: Json = False,
 ) -> None:
     """Turn a compiled image into a program and a position table that build to the same bytes."""
@@ -32,8 +33,7 @@ def command(
     found = decompile_image(read_bytes(file))
     rows = len(found.positions.rows)
     table = positions
-    is_stream = output is not None and is_written_directly(output)
-    if table is None and output is not None and rows and not is_stream:
+    if table is None and output is not None and rows and not is_written_directly(output):
         table = output.with_suffix(".csv")
         if table.exists():
             raise Misuse(f"{table} exists already: name the position table with --positions")
@@ -57,7 +57,7 @@ def command(
     if output is None:
         typer.echo(found.text, nl=False)
     else:
-        typer.echo(f"{output}: {_summary(found)}", err=is_stream)
+        typer.echo(f"{output}: {_summary(found)}")
     if table is None and rows:
         typer.echo(f"{file} has {rows} positions: write them with --positions", err=True)
 

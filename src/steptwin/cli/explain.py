@@ -13,13 +13,14 @@ import typer
 from steptwin.cli.device import Json
 from steptwin.cli.languageoptions import M1486FileOptions, WbcFileOptions, given_of
 from steptwin.cli.optiongroups import grouped, option_of
+from steptwin.cli.writtenfiles import written
 
 
 @grouped
 def command(
     file: Annotated[Path, typer.Argument(help="WBC program (.prg) or M1486 program.")],
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="A picture of the control flow: FILE.svg, instead of the text.")
+        Path | None, written("--output", "-o", help="A picture of the control flow: FILE.svg, instead of the text.")
     ] = None,
     json: Json = False,
     *,

@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from steptwin.cli.device import Json, print_json
+from steptwin.cli.writtenfiles import written
 from steptwin.errors import Misuse
 
 
@@ -30,7 +31,7 @@ def command(
     trace: Annotated[Path, typer.Argument(help="A trace (.jsonl), or the directory that has trace.jsonl.")],
     to: Annotated[list[ExportFormat] | None, typer.Option(help="Format; may be given more than once.")] = None,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="File or directory; default: beside the trace, named alike.")
+        Path | None, written("--output", "-o", help="File or directory; default: beside the trace, named alike.")
     ] = None,
     begin: Annotated[str, typer.Option("--from", metavar="TIME", help="Where to begin: 9.5, 500ms, 2min.")] = "0",
     until: Annotated[
@@ -76,7 +77,13 @@ def command(
             watch=bar,
         )
     if json:
-        print_json([{"file": str(path), "bytes": path.stat().st_size} for path in files])
+        print_json([{"file": str(path), "bytes": _bytes(path)} for path in files])
         return
     for path in files:
-        typer.echo(f"{path}: {path.stat().st_size:,} bytes")
+        size = _bytes(path)
+        typer.echo(f"{path}: written" if size is None else f"{path}: {size:,} bytes")
+
+
+def _bytes(path: Path) -> int | None:
+    """The size of a file; None of a pipe or device, which has none."""
+    return path.stat().st_size if path.is_file() else None

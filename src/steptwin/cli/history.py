@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from steptwin.cli.device import Json
+from steptwin.cli.writtenfiles import written
 
 
 def command(
@@ -35,7 +36,7 @@ def command(
         bool, typer.Option("--writes", help="Show what programs have written and commanded, and who they are.")
     ] = False,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Write a file: .csv, .parquet, or a picture, .png or .svg.")
+        Path | None, written("--output", "-o", help="Write a file: .csv, .parquet, or a picture, .png or .svg.")
     ] = None,
     json: Json = False,
 ) -> None:

@@ -5,13 +5,13 @@ From Python: `steptwin.m1486.migration.findings`, `steptwin.wbc.migration.findin
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from steptwin.cli.device import Json, print_json
+from steptwin.cli.writtenfiles import written
 
 
 def command(
@@ -20,17 +20,15 @@ def command(
     old: Annotated[
         str | None, typer.Option("--from", metavar="TYPE", help="The type that it is for. Default: A, firmware 1.70.")
     ] = None,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the changed program to this file.")] = None,
+    output: Annotated[Path | None, written("--output", "-o", help="Write the changed program to this file.")] = None,
     json: Json = False,
 ) -> None:
     """Show what of a program does not fit another type of M1486 or another firmware of the MIC488, and why, with changes.
 
     Exit code 1 if errors are left."""
     from steptwin.commands.migrate import migrate as migrate_file
-    from steptwin.files.writing import is_written_directly
 
-    report = partial(typer.echo, err=output is not None and is_written_directly(output))
-    fits, data = migrate_file(file, to, old, output, (lambda _: None) if json else report)
+    fits, data = migrate_file(file, to, old, output, (lambda _: None) if json else typer.echo)
     if json:
         print_json(data)
     if not fits:

@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from steptwin.cli.device import Device, LogFrames, complain, find, opened
+from steptwin.cli.writtenfiles import written
 from steptwin.errors import Misuse
 
 
@@ -18,9 +19,7 @@ def command(
     session: Annotated[
         Path, typer.Argument(help="The session: get NAME..., set NAME=VALUE, wait AXIS..., sleep SECONDS, raw HEX.")
     ],
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Where the recording goes. Default: it is printed.")
-    ] = None,
+    output: Annotated[Path | None, written("-o", "--output", help="Where the recording goes. Default: it is printed.")] = None,
     device: Device = None,
     log_frames: LogFrames = False,
 ) -> None:

@@ -11,11 +11,12 @@ from typing import Annotated
 import typer
 
 from steptwin.cli.device import Json
+from steptwin.cli.writtenfiles import written
 
 
 def command(
     file: Annotated[Path, typer.Argument(help="A session, as 'steptwin run' and 'steptwin up' write them.")],
-    trace: Annotated[Path | None, typer.Option(help="Write what happened to a file or into a directory.")] = None,
+    trace: Annotated[Path | None, written(help="Write what happened to a file or into a directory.")] = None,
     json: Json = False,
 ) -> None:
     """Run a recorded session again and compare what happens."""

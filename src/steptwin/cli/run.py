@@ -16,6 +16,7 @@ from steptwin.cli.device import Json, complain
 from steptwin.cli.languageoptions import M1486FileOptions, WbcFileOptions, given_of
 from steptwin.cli.optiongroups import OptionGroup, grouped, option_of
 from steptwin.cli.worldoptions import Coverage, ShownOptions, WorldRunOptions
+from steptwin.cli.writtenfiles import written
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
@@ -52,7 +53,7 @@ Properties = Annotated[
         help="A property that must hold, such as 'never guard.open and table.M1.moving'; exit code 1 if not; repeatable. Worlds.",
     ),
 ]
-Trace = Annotated[Path | None, typer.Option(help="Write a trace to a file (.jsonl, .html, .vcd, .csv, ...) or into a directory.")]
+Trace = Annotated[Path | None, written(help="Write a trace to a file (.jsonl, .html, .vcd, .csv, ...) or into a directory.")]
 
 
 @dataclass(frozen=True, kw_only=True)

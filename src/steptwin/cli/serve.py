@@ -13,6 +13,7 @@ from steptwin.cli import completion
 from steptwin.cli.commandgroup import CommandGroup
 from steptwin.cli.optiongroups import GroupedCommand, OptionGroup, grouped
 from steptwin.cli.worldoptions import Control, Faults, LogOptions, LogTraffic, ReadyFile, Speed
+from steptwin.cli.writtenfiles import written
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
@@ -119,9 +120,7 @@ class TwinOptions(OptionGroup):
     ] = None
     trace: Annotated[
         str | None,
-        typer.Option(
-            metavar="FILE", help="Write a trace to a file; 'ring N' keeps the last N records for 'save'; 'off' keeps none."
-        ),
+        written(metavar="FILE", help="Write a trace to a file; 'ring N' keeps the last N records for 'save'; 'off' keeps none."),
     ] = None
     fault: Faults = None
     seed: Annotated[int, typer.Option(help="Random seed for faults.")] = 0
@@ -139,7 +138,7 @@ class TwinOptions(OptionGroup):
     ] = False
     save_world: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Write that description to FILE, with the files it names beside it, and end."),
+        written(metavar="FILE", help="Write that description to FILE, with the files it names beside it, and end."),
     ] = None
 
     def on(self, line: LineOptions, kind: str, ports: Mapping[str, int], log: LogOptions) -> ServeOptions:

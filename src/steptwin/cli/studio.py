@@ -14,6 +14,7 @@ import typer
 from steptwin.cli import completion
 from steptwin.cli.optiongroups import OptionGroup, grouped
 from steptwin.cli.worldoptions import LiveOptions, LogOptions, ReadyFile, WorldRunOptions, up_options
+from steptwin.cli.writtenfiles import written
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,9 +44,9 @@ class PageOptions(OptionGroup):
         bool,
         typer.Option("--open-to-local-users", help="Ask for no token: every user of this computer is engineer."),
     ] = False
-    audit: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Append every command and its user to a file of JSON lines.")
-    ] = None
+    audit: Annotated[Path | None, written(metavar="FILE", help="Append every command and its user to a file of JSON lines.")] = (
+        None
+    )
     device: Annotated[
         list[str] | None,
         typer.Option(

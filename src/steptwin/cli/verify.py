@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 
 from steptwin.cli.device import Device, complain, find, kind_of
+from steptwin.cli.writtenfiles import written
 from steptwin.errors import Misuse
 
 
@@ -26,7 +27,7 @@ def command(
             help="Permit checks that move this axis of a MIC488, by at most this distance in its units, and return it.",
         ),
     ] = None,
-    json: Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Also write the report as JSON.")] = None,
+    json: Annotated[Path | None, written("--json", metavar="FILE", help="Also write the report as JSON.")] = None,
 ) -> None:
     """Check whether a controller behaves as the numbered interpretations say. By default nothing moves and no setting changes.
 

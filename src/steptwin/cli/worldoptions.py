@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from steptwin.cli.optiongroups import OptionGroup
+from steptwin.cli.writtenfiles import written
 
 if TYPE_CHECKING:
     from steptwin.commands.telling import Telling
@@ -20,15 +21,15 @@ Faults = Annotated[
     list[str] | None,
     typer.Option(help="Fault active from the start, such as 'crc nth=3'; repeatable. See steptwin fault --kinds."),
 ]
-ReadyFile = Annotated[Path | None, typer.Option(help="JSON file with the end points, written when all of them are open.")]
+ReadyFile = Annotated[Path | None, written(help="JSON file with the end points, written when all of them are open.")]
 ListenAny = Annotated[bool, typer.Option("--listen-any", help="Permit addresses that other computers can reach.")]
 AuditInto = Annotated[
     Path | None,
-    typer.Option("--audit", metavar="FILE", help="Append every command of a gateway and its client to a file of JSON lines."),
+    written("--audit", metavar="FILE", help="Append every command of a gateway and its client to a file of JSON lines."),
 ]
 Coverage = Annotated[
     list[str] | None,
-    typer.Option(
+    written(
         metavar="PATH",
         help="Report which statements of programs were executed, and which branches were taken: .info (lcov), .html, .json; "
         "'-' prints a table. Repeatable.",
@@ -75,7 +76,7 @@ class WorldRunOptions(OptionGroup):
         Path | None,
         typer.Option(metavar="DIR", help="Directory of the non-volatile memory. Default: that of the description, or none."),
     ] = None
-    session: Annotated[Path | None, typer.Option(help="Write a session for 'steptwin replay' when it ends.")] = None
+    session: Annotated[Path | None, written(help="Write a session for 'steptwin replay' when it ends.")] = None
     from_: Annotated[
         str | None,
         typer.Option("--from", metavar="TIME", help="Of a session: continue from this moment, such as 2.5s. Default: its end."),
@@ -120,7 +121,7 @@ class LiveOptions(OptionGroup):
     name: Annotated[str | None, typer.Option(help="Name by which --device finds it. Default: that of the file.")] = None
     trace: Annotated[
         str | None,
-        typer.Option(
+        written(
             metavar="FILE",
             help="Write a trace to a file or into a directory; 'ring N' keeps the last N records for 'save'; 'off' keeps none. "
             "Default: that of the description.",

@@ -7,12 +7,14 @@ import os
 from collections.abc import Generator
 from contextlib import contextmanager
 from datetime import UTC, datetime
+from math import inf
 from pathlib import Path
 from types import TracebackType
 from typing import Self, TextIO
 
 from steptwin.access.audit import Audit, Entry
 from steptwin.errors import Misuse
+from steptwin.files.writing import is_written_directly
 from steptwin.system import reason
 
 MOST_BYTES = 8 << 20
@@ -33,11 +35,12 @@ def audit_into(path: Path | None) -> Generator[Audit | None]:
 
 
 class AuditFile:
-    """Appends to ``path``, which only its owner can read. The file before it is ``path`` with ``.1`` behind its name."""
+    """Appends to ``path``, which only its owner can read. The file before it is ``path`` with ``.1`` behind its name; a pipe or
+    device has none."""
 
     def __init__(self, path: Path, most_bytes: int = MOST_BYTES) -> None:
         self._path = path
-        self._most = most_bytes
+        self._most = inf if is_written_directly(path) else most_bytes
         self._file: TextIO | None = None
 
     def __enter__(self) -> Self:
@@ -57,7 +60,7 @@ class AuditFile:
             return
         self._file.write(json.dumps(entry.plain(), ensure_ascii=False) + "\n")
         self._file.flush()
-        if self._file.tell() > self._most:
+        if self._most < inf and self._file.tell() > self._most:
             self._file.close()
             self._path.replace(self._path.with_name(f"{self._path.name}.1"))
             self._file = self._open()

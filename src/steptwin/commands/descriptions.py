@@ -9,6 +9,7 @@ from typing import TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.files.textfiles import check_folder, write_bytes
+from steptwin.files.writing import is_written_directly
 from steptwin.inputfiles import read_bytes
 from steptwin.world.description import read_world
 
@@ -28,6 +29,8 @@ def print_world(text: str, name: str) -> None:
 
 def save_world(describe: DescribeNamed, where: Path) -> None:
     """Write the description to a file, and copy the files it names beside it. Raises `Misuse` if another file is in the way."""
+    if is_written_directly(where):
+        raise Misuse(f"--save-world {where}: it is no file beside which others could lie; --print-world prints the description")
     check_folder(where)
     name = str(where)
     given, text = describe(str), describe(lambda path: path.name)

@@ -14,6 +14,7 @@ from steptwin.explain.picture import picture
 from steptwin.explain.plain import plain
 from steptwin.explain.text import text
 from steptwin.files.textfiles import read_text, write_bytes
+from steptwin.files.writing import is_written_directly
 
 JSON_VERSION = 1
 
@@ -36,7 +37,7 @@ def show(
     as_json: bool = False,
 ) -> None:
     """Print the explanation, or write the picture of the control flow to ``output``. Raises `Misuse`."""
-    if output is not None and output.suffix.lower() != ".svg":
+    if output is not None and output.suffix.lower() != ".svg" and not is_written_directly(output):
         raise Misuse(f"cannot write {output}: permitted is FILE.svg")
     found = explanations(path, given, option)
     if output is not None:

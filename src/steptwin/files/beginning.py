@@ -9,6 +9,7 @@ from steptwin.errors import Misuse
 from steptwin.files import session as sessions
 from steptwin.files.textfiles import check_writable
 from steptwin.files.world import World
+from steptwin.files.writing import is_written_directly
 from steptwin.machine import Nanos
 from steptwin.world import script as do
 from steptwin.world.faults import read as read_fault
@@ -24,7 +25,7 @@ def is_session(path: Path) -> bool:
 
 def check_session_target(path: Path) -> None:
     """Check that a session can be written to a path, and that its name ends as that of a session. Raises `Misuse`."""
-    if not is_session(path):
+    if not is_session(path) and not is_written_directly(path):
         raise Misuse(f"{path}: the name of a session must end with {SESSION_SUFFIX}")
     check_writable(path)
 

@@ -43,17 +43,13 @@ def new_content(path: Path, permissions: int = 0o666) -> Generator[IO[bytes]]:
     Missing folders are made. ``permissions`` are those of a file that did not exist, less the user's mask. Raises `OSError`, also
     for a file that is write-protected, or lies in a folder that takes no new file.
     """
+    if (stream := directly(path)) is not None:
+        with stream:
+            yield stream
+        return
     target = _target(path)
-    if isinstance(target, int):
-        sys.stdout.flush()  # what was printed before comes first
-        with os.fdopen(os.dup(target), "wb") as file:
-            yield file
-        return
+    assert isinstance(target, Path)  # noqa: S101
     old = _stat(target)
-    if old is not None and not stat.S_ISREG(old.st_mode):
-        with os.fdopen(_open_directly(target), "wb") as file:
-            yield file
-        return
     _refuse_protected(target, old)
     target.parent.mkdir(parents=True, exist_ok=True)
     unfinished = target.with_name(f".{secrets.token_hex(8)}{UNFINISHED}")
@@ -94,6 +90,32 @@ def remove_unfinished(folder: Path) -> None:
     """Remove what killed processes have left in a folder that belongs to this process alone. Raises `OSError`."""
     for path in folder.glob(f".*{UNFINISHED}"):
         path.unlink(missing_ok=True)
+
+
+def directly(path: Path) -> IO[bytes] | None:
+    """Open a pipe, a device or an open descriptor, without waiting for a program that reads from it; None for a path that names
+    none. Raises `OSError`."""
+    target = _target(path)
+    if isinstance(target, int):
+        sys.stdout.flush()  # what was printed before comes first
+        return os.fdopen(os.dup(target), "wb")
+    old = _stat(target)
+    if old is None or stat.S_ISREG(old.st_mode):
+        return None
+    number = os.open(target, PIPE_FLAGS)
+    if hasattr(os, "set_blocking"):
+        os.set_blocking(number, True)
+    return os.fdopen(number, "wb")
+
+
+def is_standard_output(path: Path) -> bool:
+    """Whether a path names what the standard output of this process is."""
+    try:
+        target = _target(path)
+        found = os.fstat(target) if isinstance(target, int) else target.stat()
+        return os.path.samestat(found, os.fstat(1))
+    except (OSError, ValueError):  # it is refused when it is written
+        return False
 
 
 def is_written_directly(path: Path) -> bool:
@@ -154,14 +176,6 @@ def _stat(target: Path) -> os.stat_result | None:
         return target.stat()
     except FileNotFoundError:
         return None
-
-
-def _open_directly(target: Path) -> int:
-    """A pipe or a device, opened without waiting for a program that reads from it. Raises `OSError`."""
-    number = os.open(target, PIPE_FLAGS)
-    if hasattr(os, "set_blocking"):
-        os.set_blocking(number, True)
-    return number
 
 
 def _keep(target: Path, old: os.stat_result, number: int) -> None:

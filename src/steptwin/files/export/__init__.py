@@ -27,7 +27,7 @@ from steptwin.files.export.progress import ShowExport, TimeProgress, bar, unwatc
 from steptwin.files.export.recording import Recording, sort_out
 from steptwin.files.export.records import SavedTrace, read_records, write_records
 from steptwin.files.textfiles import check_writable, new_file
-from steptwin.files.writing import as_text
+from steptwin.files.writing import as_text, is_written_directly
 from steptwin.inputfiles import open_regular
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.wire.pcapng import CapturedFrame, capture
@@ -154,7 +154,7 @@ def write_trace(
     watch: ShowExport = unwatched,
 ) -> list[Path]:
     """Write ``trace`` to a file, whose suffix selects its format, or into a directory, as ``trace.jsonl`` and so on; what was
-    written.
+    written. A pipe or device without a suffix gets JSON lines.
 
     ``views`` (`axis_views`) give units of axes, names of their terminals, and mechanics. ``title`` is the name of what ran, and
     ``ended`` (ns) when that ended; by default when all came to rest. ``formats``: by default `USUAL` for a directory,
@@ -219,7 +219,10 @@ def growing_file(where: Path) -> Path:
 def _targets(where: Path, formats: Sequence[str] | None) -> list[tuple[str, Path]]:
     """Formats and files. All of them can be written as far as libraries go."""
     suffix = where.suffix[1:].lower()
-    is_file = not where.is_dir() and (suffix in FORMATS or (suffix != "" and formats is not None and len(formats) == 1))
+    if is_written_directly(where):
+        is_file, suffix = True, suffix if suffix in FORMATS else "jsonl"
+    else:
+        is_file = not where.is_dir() and (suffix in FORMATS or (suffix != "" and formats is not None and len(formats) == 1))
     if suffix and not is_file and not where.is_dir() and formats is None:
         raise Misuse(f"{where}: formats are {', '.join(FORMATS)}")
     chosen = formats or ([suffix] if is_file else [name for name in USUAL if not FORMATS[name].missing])

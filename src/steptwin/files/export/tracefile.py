@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from io import TextIOWrapper
 from pathlib import Path
 from typing import IO, TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.files.export.axes import AxisViews
 from steptwin.files.export.records import begin_records, end_records, record_line
-from steptwin.files.writing import is_written_directly, new_text
+from steptwin.files.writing import directly, new_text
 from steptwin.machine import Nanos
 from steptwin.numerals import read_whole
 from steptwin.system import reason
@@ -64,13 +65,13 @@ class TraceFile:
         self._show = show
         self._failure: str | None = None
         try:
-            is_stream = is_written_directly(path)  # who reads from it would see its end if it were opened again
-            if not is_stream:
-                with new_text(path) as file:
-                    _begin(file, trace, views, title)
-            mode = "w" if is_stream else "a"
-            self._file: IO[str] = path.open(mode, buffering=1, encoding="utf-8", newline="")  # each line is there at once
-            if is_stream:
+            stream = directly(path)  # who reads from it would see its end if it were opened again
+            if stream is None:
+                with new_text(path) as text:
+                    _begin(text, trace, views, title)
+            file = path.open("ab") if stream is None else stream
+            self._file = TextIOWrapper(file, "utf-8", newline="", line_buffering=True)  # each line is there at once
+            if stream is not None:
                 _begin(self._file, trace, views, title)
         except OSError as error:
             raise Misuse(f"cannot write {path}: {reason(error)}") from error
