@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import select
+import signal
 import sys
 from pathlib import Path
 
@@ -21,6 +22,9 @@ READ_FLAGS = (
     os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
 )  # fmt: skip
 """Open for reading: no waiting for the other end of a pipe, not inherited by processes, no translation of line ends."""
+OWN_SIGNAL = signal.SIGBREAK if sys.platform == "win32" else signal.SIGUSR1
+"""A signal that means what a program says."""
+
 WRITE_FLAGS = os.O_WRONLY | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
 """Open for writing: not inherited by processes, no translation of line ends."""
 PIPE_FLAGS = WRITE_FLAGS | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0)

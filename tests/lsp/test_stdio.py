@@ -12,6 +12,7 @@ import pytest
 
 from steptwin.baseprotocol import message_bytes
 from steptwin.lsp.editorserver import EditorServer
+from steptwin.lsp.session import EditorSession as Session
 from steptwin.lsp.stdio import serve
 
 INITIALIZE = {"id": 1, "method": "initialize", "params": {"processId": None, "rootUri": None, "capabilities": {}}}
@@ -61,6 +62,41 @@ def test_a_request_that_is_cancelled_while_it_waits_is_not_begun(monkeypatch: py
     assert [(one["id"], one.get("error", {}).get("code")) for one in answers] == [
         (1, None), (5, -32800), (6, None), (5, None), (2, None)
     ]  # fmt: skip
+
+
+def test_a_request_that_is_cancelled_while_it_is_answered_is_interrupted(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """What it has half made goes, and the next one has its answer."""
+    hover = {"textDocument": {"uri": "file:///a.prg"}, "position": {"line": 0, "character": 1}}
+    opened = {"textDocument": {"uri": "file:///a.prg", "languageId": "mic488-wbc", "version": 1, "text": "WAITPOS\n"}}
+    requests = [{"id": number, "method": "textDocument/hover", "params": hover} for number in (5, 6)]
+    has_begun, begun = threading.Event(), []
+    hovered = Session.analysis
+
+    def analysis(session: Session, uri: str) -> Any:
+        begun.append(dict(session._kept))
+        while len(begun) == 1:
+            session._kept[uri] = {}
+            has_begun.set()
+        return hovered(session, uri)
+
+    class Source(BytesIO):
+        def read(self, size: int | None = -1, /) -> bytes:
+            body = super().read(size)
+            if b"cancelRequest" in body:
+                assert has_begun.wait(10)
+            return body
+
+    monkeypatch.setattr(Session, "analysis", analysis)
+    cancel = {"method": "$/cancelRequest", "params": {"id": 5}}
+    given = asked(INITIALIZE, {"method": "textDocument/didOpen", "params": opened}, requests[0], cancel, requests[1])
+    _, answers = served(Source(given + asked(SHUTDOWN, EXIT)))
+    by_number = {one["id"]: one for one in answers if "id" in one}
+    assert by_number[5]["error"]["code"] == -32800
+    assert "WAITPOS" in by_number[6]["result"]["contents"]["value"]
+    assert begun[1] == {}
+    assert caplog.messages == []
 
 
 @pytest.mark.parametrize(

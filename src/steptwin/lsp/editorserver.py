@@ -7,11 +7,13 @@ to check, the longer that moment.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
 from time import perf_counter
 
 from lsprotocol import types as lsp
 from pygls.capabilities import ServerCapabilitiesBuilder, get_capability
+from pygls.exceptions import JsonRpcRequestCancelled
 from pygls.lsp.server import LanguageServer
 from pygls.protocol import default_converter
 
@@ -46,6 +48,22 @@ class EditorServer(LanguageServer):
         self.snippets = False
         self._delays: dict[str, float] = {}
         self._timers: dict[str, asyncio.TimerHandle] = {}
+        self.number: int | str | None = None
+        """Of the request that is handled; None of a notification."""
+        self.is_answering = False
+        """Whether a handler is at work, which may be interrupted."""
+
+    @contextmanager
+    def answering(self) -> Generator[None]:
+        """Permit an interruption; what is half made then goes."""
+        self.is_answering = True
+        try:
+            yield
+        except JsonRpcRequestCancelled:
+            self.session.forget()
+            raise
+        finally:
+            self.is_answering = False
 
     def begin(self, params: lsp.InitializeParams) -> None:
         encoding = ServerCapabilitiesBuilder.choose_position_encoding(params.capabilities)

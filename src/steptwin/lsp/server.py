@@ -7,7 +7,7 @@ import logging
 from collections.abc import Callable
 from typing import Any
 
-from pygls.exceptions import JsonRpcInvalidParams
+from pygls.exceptions import JsonRpcInvalidParams, JsonRpcRequestCancelled
 from pygls.protocol import json_rpc
 
 from steptwin.lsp.editorserver import EditorServer
@@ -28,7 +28,7 @@ def _is_fault(record: logging.LogRecord) -> bool:
     """Refusals go to the client; pygls would log each with a traceback, too."""
     if str(record.msg).startswith("Unable to deserialize message"):
         return False
-    return record.exc_info is None or not isinstance(record.exc_info[1], JsonRpcInvalidParams)
+    return record.exc_info is None or not isinstance(record.exc_info[1], JsonRpcInvalidParams | JsonRpcRequestCancelled)
 
 
 def _bound(made: EditorServer, handler: Callable[[EditorServer, Any], Any]) -> Callable[[Any], Any]:
@@ -40,6 +40,7 @@ def _bound(made: EditorServer, handler: Callable[[EditorServer, Any], Any]) -> C
         return later
 
     def now(params: Any) -> Any:
-        return handler(made, params)
+        with made.answering():
+            return handler(made, params)
 
     return now

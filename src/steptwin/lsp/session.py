@@ -78,6 +78,12 @@ class EditorSession:
         self._worlds = None
         self._beside.clear()
 
+    def forget(self) -> None:
+        """Make everything anew that follows from the texts."""
+        for kept in (self._analysed, self._outside, self._derived, self._kept):
+            kept.clear()
+        self.refresh()
+
     @property
     def open_uris(self) -> list[str]:
         """The normal addresses of the open texts."""
