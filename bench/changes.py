@@ -29,7 +29,7 @@ from pathlib import Path
 
 from steptwin import World
 from steptwin.commands.up_world import Running, UpOptions, up_with
-from steptwin.world.script import Set
+from steptwin.simulation.script.steps import Set
 
 HERE = Path(__file__).parent
 CLIENTS = HERE.parent / "tests/gateways/clients"

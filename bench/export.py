@@ -11,8 +11,8 @@ from pathlib import Path
 from steptwin.files.export import AxisLane, write_trace
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion import MotionState, plan_position
-from steptwin.world.lanes import PhaseOutputs
-from steptwin.world.trace import Trace, TraceRecord
+from steptwin.simulation.mechanics.lanes import PhaseOutputs
+from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 
 HOUR: Nanos = 3600 * SECOND
 AXES = 4

@@ -14,9 +14,9 @@ from steptwin.live.descriptors import descriptors
 from steptwin.live.tcp_epoll import EpollConnection
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488Device
+from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.toml.addresses import Address
 from steptwin.wire.slave import TcpSlavePort
-from steptwin.world.addresses import Address
-from steptwin.world.kernel import Kernel
 
 ENABLE_ALL = bytes.fromhex("06271e000f")
 RUN = [bytes.fromhex("10") + (10068 + 2 * axis).to_bytes(2, "big") + bytes.fromhex("0002040000447a") for axis in range(4)]

@@ -9,10 +9,10 @@ from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.program_banks import load
+from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.wires import PinName, Wire
 from steptwin.wbc.check import check
 from steptwin.wbc.positions import parse_positions
-from steptwin.world.kernel import Kernel
-from steptwin.world.wires import PinName, Wire
 
 COMPUTE = """
 n = 0

@@ -9,7 +9,7 @@ from collections import defaultdict
 from functools import cache
 from pathlib import Path
 
-CORE = ("motion", "wire", "mic488", "m1486", "wbc", "world", "drivers")
+CORE = ("motion", "wire", "mic488", "m1486", "wbc", "simulation", "drivers")
 """Packages that are mutated; tests/<package> mirrors each of them."""
 USERS = (
     "calc",

@@ -35,7 +35,7 @@ from virtual_loop import VirtualLoop, run_virtually
 from steptwin.live.cell import Cell
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488Device
-from steptwin.world.kernel import Kernel
+from steptwin.simulation.scheduler.kernel import Kernel
 
 T = TypeVar("T")
 

@@ -15,11 +15,11 @@ from whole_world import everything
 
 from steptwin.motion.elastic import Response
 from steptwin.motion.profile import Profile
+from steptwin.simulation.logic.contacts import Zone
+from steptwin.simulation.mechanics.course import Course
+from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.world.plant import Plant
 from steptwin.state import Stateful
-from steptwin.world.contacts import Zone
-from steptwin.world.course import Course
-from steptwin.world.kernel import Kernel
-from steptwin.world.plant import Plant
 
 
 @pytest.fixture(scope="module", autouse=True)

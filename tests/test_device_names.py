@@ -7,7 +7,7 @@ from pathlib import Path
 
 SOURCE = Path(__file__).parents[1] / "src" / "steptwin"
 DEVICES = ("mic488", "m1486", "wbc")
-BELOW = (*DEVICES, "calc", "explain", "drivers", "verify", "world/kinds")
+BELOW = (*DEVICES, "calc", "explain", "drivers", "verify", "simulation/kinds")
 """Packages of devices, and those with a folder or a module for each device and a table of them."""
 TOOLS = {
     "bluesky/controllers.py": "the devices of Bluesky, a class for each controller",
@@ -44,6 +44,8 @@ TOOLS = {
     "lsp/textmate.py": "grammars of the two languages",
     "lsp/world/language.py": "table of the files of controllers",
     "pytest_plugin.py": "fixtures mic488 and m1486",
+    "simulation/describe/small_m1486.py": "small worlds of serve and run",
+    "simulation/describe/small_mic488.py": "small worlds of serve and run",
     "testing/__init__.py": "fixtures mic488 and m1486",
     "testing/devices.py": "fixtures mic488 and m1486",
     "testing/m1486.py": "fixtures mic488 and m1486",

@@ -103,7 +103,7 @@ FILES = {
                 a + b
             )
     """,
-    "src/steptwin/world/use.py": "def use():\n    from steptwin.wire.sums import total\n    return total(1, 2)\n",
+    "src/steptwin/simulation/use.py": "def use():\n    from steptwin.wire.sums import total\n    return total(1, 2)\n",
     "tests/conftest.py": "",
     "tests/wire/test_sums.py": """
         from steptwin.wire.sums import total
@@ -111,10 +111,10 @@ FILES = {
         def test_total(): assert total(1, 2) == 3
     """,
     "tests/test_state.py": "from steptwin.wire.sums import total\ndef test_state(): assert total(2, 2) == 4\n",
-    "tests/world/test_use.py": "from steptwin.world.use import use\ndef test_use(): assert use() == 3\n",
+    "tests/simulation/test_use.py": "from steptwin.simulation.use import use\ndef test_use(): assert use() == 3\n",
 }
 SUMS = Path("src/steptwin/wire/sums.py")
-IN_WIRE, IN_WORLD = "tests/wire/test_sums.py::test_total", "tests/world/test_use.py::test_use"
+IN_WIRE, IN_WORLD = "tests/wire/test_sums.py::test_total", "tests/simulation/test_use.py::test_use"
 IN_STATE = "tests/test_state.py::test_state"
 
 
@@ -133,7 +133,7 @@ def tree(tmp_path: Path) -> Tree:
 
 def test_tests_that_execute_a_line_are_run_for_it(tree: Tree, tmp_path: Path) -> None:
     records = {folder: tmp_path / f"{Path(folder).name}.json" for folder in folders(tree.path, ["wire"])}
-    assert list(records) == ["tests/wire", "tests/world", "tests/test_state.py"]
+    assert list(records) == ["tests/wire", "tests/simulation", "tests/test_state.py"]
     assert [tree.record(folder, file) for folder, file in records.items()] == [True, True, True]
     reach = Reach(tree.path, records)
 
@@ -160,7 +160,7 @@ def test_functions_are_mutated_in_a_process_that_has_collected_the_tests(tree: T
     def passes(before: str, after: str, tests: dict[str, float]) -> bool | None:
         return tree.passes_forked(SUMS, source, source.replace(before, after), tests)
 
-    tree.fork(["tests/wire", "tests/world"])
+    tree.fork(["tests/wire", "tests/simulation"])
     try:
         for _ in range(2):
             assert passes("a + b", "a - b", {IN_WIRE: 0.1}) is False
@@ -174,8 +174,8 @@ def test_functions_are_mutated_in_a_process_that_has_collected_the_tests(tree: T
 
 
 def test_a_record_is_valid_until_something_changes_that_its_tests_import(tree: Tree) -> None:
-    before = [digest(tree.path, folder) for folder in ("tests/wire", "tests/world")]
-    (tree.path / "src/steptwin/world/use.py").write_text("def use():\n    return 3\n")
+    before = [digest(tree.path, folder) for folder in ("tests/wire", "tests/simulation")]
+    (tree.path / "src/steptwin/simulation/use.py").write_text("def use():\n    return 3\n")
     imported_files.cache_clear()
-    after = [digest(tree.path, folder) for folder in ("tests/wire", "tests/world")]
+    after = [digest(tree.path, folder) for folder in ("tests/wire", "tests/simulation")]
     assert [before[0] == after[0], before[1] == after[1]] == [True, False]

@@ -40,9 +40,9 @@ for package in PURE:
             importlib.import_module(module.name)
 
 from steptwin.wire.crc import crc16, table_crc16
-from steptwin.world.blueprint import Blueprint
-from steptwin.world.description import read_world
-from steptwin.world.plant import Plant
+from steptwin.simulation.describe.blueprint import Blueprint
+from steptwin.simulation.describe.description import read_world
+from steptwin.simulation.world.plant import Plant
 
 assert crc16 is table_crc16
 examples = pathlib.Path(EXAMPLES)

@@ -179,7 +179,7 @@ def parts(thing: object, seen: dict[int, Stateful]) -> None:
 def product_classes() -> Iterator[type[Stateful]]:
     """Classes with state that are no base of others."""
     for module in pkgutil.walk_packages(steptwin.__path__, "steptwin."):
-        if module.name.split(".")[1] in ("machine", "m1486", "mic488", "motion", "state", "wbc", "wire", "world"):
+        if module.name.split(".")[1] in ("machine", "m1486", "mic488", "motion", "simulation", "state", "wbc", "wire"):
             importlib.import_module(module.name)
 
     def below(base: type[Stateful]) -> Iterator[type[Stateful]]:

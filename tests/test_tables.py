@@ -73,7 +73,11 @@ def test_a_complete_table_is_read_only() -> None:
             "register NEW lacks its access",
         ),
         *(
-            (f"import steptwin.world.script as t\nclass New: ...\n{change}", "steptwin.world.plant", message)
+            (
+                f"import steptwin.simulation.script.steps as t\nclass New: ...\n{change}",
+                "steptwin.simulation.world.plant",
+                message,
+            )
             for change, message in (
                 ("t.Step |= New", "step New lacks its action"),
                 (
@@ -83,13 +87,13 @@ def test_a_complete_table_is_read_only() -> None:
             )
         ),
         (
-            "import steptwin.world.inputs as t; t.FOR_SCRIPTS |= {t.Bytes}",
-            "steptwin.world.scripts",
+            "import steptwin.simulation.world.inputs as t; t.FOR_SCRIPTS |= {t.Bytes}",
+            "steptwin.simulation.world.scripts",
             "step of scripts Bytes lacks its execution",
         ),
         (
-            "import steptwin.world.inputs as t; t.ExternalInput |= int",
-            "steptwin.world.references",
+            "import steptwin.simulation.world.inputs as t; t.ExternalInput |= int",
+            "steptwin.simulation.world.references",
             "step int lacks its check",
         ),
         *(

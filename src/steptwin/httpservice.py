@@ -14,8 +14,8 @@ from typing import Any
 import uvicorn
 
 from steptwin.errors import LineFailure
+from steptwin.simulation.toml.addresses import Address
 from steptwin.system import reason
-from steptwin.world.addresses import Address
 
 PORTS_TRIED = 20
 MOST_CONNECTIONS = 256

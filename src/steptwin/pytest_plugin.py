@@ -18,11 +18,11 @@ from steptwin.errors import Misuse, SteptwinError
 if TYPE_CHECKING:
     from steptwin.campaign.summary import CampaignSummary
     from steptwin.files.coverage import CoverageReports
+    from steptwin.simulation.world.plant import Plant
     from steptwin.testing.m1486 import M1486Rig
     from steptwin.testing.mic488 import Mic488Rig
     from steptwin.testing.rig import Rig
     from steptwin.testing.world import WorldRig
-    from steptwin.world.plant import Plant
 
 T = TypeVar("T")
 

@@ -9,7 +9,7 @@ import pytest
 from steptwin.campaign.inventory import FaultyPart, PossibleFault, occasions, possible_faults
 from steptwin.files.world import World
 from steptwin.machine import SECOND
-from steptwin.world.faults import read
+from steptwin.simulation.faults import read
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
 LINE = """

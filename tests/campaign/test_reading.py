@@ -12,9 +12,9 @@ from steptwin.campaign.reading import ROWS, load_campaign, read_campaign
 from steptwin.campaign.variation import Between, Choice, Normal
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND
-from steptwin.world.check import diagnose
-from steptwin.world.pieces import no_files
-from steptwin.world.reader import WorldError
+from steptwin.simulation.describe.pieces import no_files
+from steptwin.simulation.toml.reader import WorldError
+from steptwin.simulation.world.check import diagnose
 
 HEAD = '[campaign]\nworld = "world.toml"\nend = "2 s"\nruns = 5\n'
 

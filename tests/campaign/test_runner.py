@@ -14,7 +14,7 @@ from steptwin.campaign.shrink import failures_of
 from steptwin.coverage.counts import Coverage
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND
-from steptwin.world.script import Set
+from steptwin.simulation.script.steps import Set
 
 
 @pytest.fixture

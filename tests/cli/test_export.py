@@ -10,7 +10,7 @@ from steptwin.cli.export import ExportFormat
 from steptwin.files.export import FORMATS, write_trace
 from steptwin.machine import SECOND
 from steptwin.motion import MotionState, plan_position
-from steptwin.world.trace import Trace, TraceRecord
+from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 
 Run = Callable[..., tuple[int, str, str]]
 

@@ -16,7 +16,7 @@ from steptwin.commands.serve import ServeOptions
 from steptwin.commands.serve_m1486 import ServeM1486, serve_m1486
 from steptwin.commands.serve_mic488 import ServeMic488, serve_mic488
 from steptwin.errors import Misuse
-from steptwin.world.faults import KINDS
+from steptwin.simulation.faults import KINDS
 
 Serve = Callable[..., Any]
 

@@ -15,8 +15,8 @@ from steptwin.errors import Misuse, SteptwinError
 from steptwin.live.pace import read_speed
 from steptwin.mic488.registers import register_map
 from steptwin.mic488.values import value_of
+from steptwin.simulation.faults import read as read_fault
 from steptwin.subject.commands import read_command
-from steptwin.world.faults import read as read_fault
 
 OTHERS = ("1,000", "1_000", "１２", "0x10", "9" * 5000, "nan", "inf", "1e999")
 """What is not a number."""

@@ -29,7 +29,7 @@ from steptwin.errors import SteptwinError
 from steptwin.files.memory import StateDirectory
 from steptwin.files.session import save, session_of
 from steptwin.files.world import World
-from steptwin.world.arrangement import DrawnPlace
+from steptwin.simulation.describe.arrangement import DrawnPlace
 
 OLD = b"[mic488]\n# the old one\n" * 100
 PROGRAM = "if in1=1\nmoveptp 1 2\nendif\nend\n"

@@ -12,8 +12,8 @@ from steptwin.errors import Misuse
 from steptwin.files.session import save, session_of
 from steptwin.files.world import World
 from steptwin.machine import SECOND
-from steptwin.world import script as do
-from steptwin.world.history import Past
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.world.history import Past
 
 TEXT = '[[mic488]]\nname = "table"\nprogram = "cell.prg"\nstart = true\n'
 PROGRAM = b"n = 0\nLOOP:\nn = n + 1\n$R4 = n\nDELAY 0.2\nJUMP LOOP\n"

@@ -15,7 +15,7 @@ from steptwin.files.export import read_trace
 from steptwin.files.timedinputs import parse_inputs
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND
-from steptwin.world.trace import Trace
+from steptwin.simulation.scheduler.trace import Trace
 
 EXAMPLE_6 = """
 x0

@@ -13,7 +13,7 @@ from steptwin.commands.serve_m1486 import ServeM1486, describe_m1486
 from steptwin.commands.serve_mic488 import ServeMic488, describe_mic488, serve_mic488
 from steptwin.errors import Misuse
 from steptwin.files.world import World
-from steptwin.world import script as do
+from steptwin.simulation.script import steps as do
 
 CONFIG = "[Axis0]\nUnit=3\nGear=50\n[AIN0]\nID=9\n"
 

@@ -21,9 +21,9 @@ from steptwin.drivers.m1486.decoder import M1486Decoder
 from steptwin.drivers.mic488.decoder import ModbusDecoder
 from steptwin.drivers.place import LineAddress, parse_line_address
 from steptwin.errors import LineFailure, Misuse
+from steptwin.simulation.toml.addresses import Address
 from steptwin.wire.crc import with_crc
 from steptwin.wire.frameline import FrameLine
-from steptwin.world.addresses import Address
 
 READ, ANSWER = bytes.fromhex("01 03 27 24 00 02 8E B4"), bytes.fromhex("01 03 04 00 00 41 48 CA 55")
 ANYWHERE = Address("127.0.0.1", 0)

@@ -26,9 +26,9 @@ from steptwin.commands.telemetry import exporting, traces_to
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.gateways.clients import GatewayClient
 from steptwin.live.tracedport import TracedPort, traced
+from steptwin.simulation.kinds.mic488.line import ModbusBus
 from steptwin.subject import commands as command
 from steptwin.tracing import NoSpan, is_traced, span
-from steptwin.world.kinds.mic488.line import ModbusBus
 
 WORLD = """
 [[line]]

@@ -22,9 +22,9 @@ from steptwin.live.links import Feed
 from steptwin.live.pace import Pace
 from steptwin.live.world_control import WorldControl
 from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.simulation.script import steps as do
 from steptwin.subject.following import filter_of
 from steptwin.wire.crc import with_crc
-from steptwin.world import script as do
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
 READ_POSITION = bytes.fromhex("01 03 27 24 00 02 8e b4")

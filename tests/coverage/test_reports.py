@@ -13,7 +13,7 @@ from steptwin.coverage.lcov import lcov
 from steptwin.coverage.page import page
 from steptwin.coverage.table import table
 from steptwin.diagnostics import SourceText
-from steptwin.world.programs import Statement
+from steptwin.simulation.kinds.programs import Statement
 
 TEXT = "a\n; <comment>\nb\nc & d\n\ne\n"
 STARTS = {1: 0, 3: 14, 4: 16, 6: 23}

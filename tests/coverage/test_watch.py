@@ -8,8 +8,8 @@ from steptwin.diagnostics import SourceText
 from steptwin.files.session import session_of
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND
-from steptwin.world import script as do
-from steptwin.world.inputs import Download
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.world.inputs import Download
 
 WBC = """\
 n = 0

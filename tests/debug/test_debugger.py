@@ -16,7 +16,7 @@ from steptwin.debug.values import DataPoint, Events, LabelPoint, LinePoint, Stop
 from steptwin.errors import Misuse
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND
-from steptwin.world.plant import Plant
+from steptwin.simulation.world.plant import Plant
 
 
 def line(debugger: Debugger, machine: str = "m") -> int:

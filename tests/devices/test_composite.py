@@ -12,10 +12,10 @@ from steptwin.drivers.m1486.subject import M1486Part
 from steptwin.errors import Misuse
 from steptwin.m1486.datasheet import datasheet_of
 from steptwin.m1486.variants import DEFAULT
+from steptwin.simulation.script import steps
 from steptwin.subject.contract import Description, LinePart, MachinePart
 from steptwin.subject.events import Numbering
 from steptwin.subject.following import Followers
-from steptwin.world import script as steps
 
 PLACE = "/dev/ttyUSB0"
 

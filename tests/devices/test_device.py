@@ -13,9 +13,9 @@ from steptwin.devices.device import MOST_WAITING, ConnectedDevice, DeviceSurroun
 from steptwin.drivers.subject import RawEffect
 from steptwin.errors import Refusal
 from steptwin.machine import SECOND
+from steptwin.simulation.script import steps
 from steptwin.subject import commands as command
 from steptwin.subject.following import Followers
-from steptwin.world import script as steps
 
 
 class Device:

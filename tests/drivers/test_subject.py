@@ -23,6 +23,8 @@ from steptwin.machine import SECOND
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.registers import register_map
 from steptwin.mic488.status import ControllerStatus
+from steptwin.simulation.faults import read as read_fault
+from steptwin.simulation.script import steps as do
 from steptwin.subject import commands as command
 from steptwin.subject.commands import row_of
 from steptwin.subject.contract import read_description
@@ -30,8 +32,6 @@ from steptwin.subject.events import read_event
 from steptwin.subject.following import Following, filter_of
 from steptwin.subject.payloads import FramePayload, SamplePayload
 from steptwin.subject.world import WorldSubject
-from steptwin.world import script as do
-from steptwin.world.faults import read as read_fault
 
 
 @pytest.fixture

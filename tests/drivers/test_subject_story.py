@@ -20,10 +20,10 @@ from steptwin.errors import Misuse, Refusal
 from steptwin.files.world import World
 from steptwin.live.remote import RemoteSubject
 from steptwin.machine import SECOND
+from steptwin.simulation.script import steps as do
 from steptwin.subject import commands as command
 from steptwin.subject.contract import UNKNOWN, Reading, Subject
 from steptwin.subject.world import WorldSubject
-from steptwin.world import script as do
 
 
 @pytest.fixture

@@ -16,11 +16,11 @@ from steptwin.errors import Misuse, SteptwinError
 from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND
-from steptwin.world import script as do
-from steptwin.world.control import Move
-from steptwin.world.faults import read
-from steptwin.world.inputs import Bytes, ExternalInput
-from steptwin.world.script import Steps
+from steptwin.simulation.faults import read
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.script.control import Move
+from steptwin.simulation.script.steps import Steps
+from steptwin.simulation.world.inputs import Bytes, ExternalInput
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
 GOLDEN = json.loads((Path(__file__).parent / "world_digests.json").read_text())

@@ -12,10 +12,10 @@ from steptwin.errors import Misuse
 from steptwin.files.session import session_of
 from steptwin.files.world import World
 from steptwin.machine import SECOND
+from steptwin.simulation.script import steps as do
 from steptwin.wbc.check import check
 from steptwin.wbc.image import build
 from steptwin.wbc.positions import parse_positions
-from steptwin.world import script as do
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "worlds").glob("*.toml"))
 

@@ -14,8 +14,8 @@ import pytest
 from steptwin.errors import Misuse
 from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
-from steptwin.world import script as do
-from steptwin.world import tomlplaces
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.toml import tomlplaces
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
 
@@ -106,7 +106,7 @@ def test_without_a_trace_a_world_has_no_past_to_pickle() -> None:
 def test_a_branch_reads_no_toml(monkeypatch: pytest.MonkeyPatch) -> None:
     world = running()
     monkeypatch.setattr(tomlplaces, "find_places", None)
-    monkeypatch.setattr("steptwin.world.reader.find_places", None)
+    monkeypatch.setattr("steptwin.simulation.toml.reader.find_places", None)
     assert world.branch().now == world.now
 
 

@@ -11,7 +11,7 @@ import pytest
 from steptwin.files import session as sessions
 from steptwin.files.memory import StateDirectory, StateInUse
 from steptwin.files.world import World
-from steptwin.world.script import Send, Write
+from steptwin.simulation.script.steps import Send, Write
 
 CONTROLLER = """
 [[line]]

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from steptwin.gateways.devicefile import DeviceSpec, read_device_file
-from steptwin.world.reader import WorldError
+from steptwin.simulation.toml.reader import WorldError
 
 DEVICE = '[[device]]\nname = "table"\naddress = "/dev/ttyUSB0,unit=2"\n'
 GATEWAY = '[gateway.prometheus]\nlisten = "127.0.0.1:9100"\n'

@@ -17,6 +17,8 @@ from steptwin.gateways.heldstate import HeldState, parts_only
 from steptwin.gateways.sampling import KINDS
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.motion import at_rest
+from steptwin.simulation.script.steps import PowerCycle, Send, Write
+from steptwin.simulation.world.inputs import Bytes
 from steptwin.subject.commands import Advance, Enable, Move, ReadState
 from steptwin.subject.events import Event
 from steptwin.subject.following import Filter
@@ -31,8 +33,6 @@ from steptwin.subject.payloads import (
     StatusPayload,
 )
 from steptwin.subject.world import WorldSubject
-from steptwin.world.inputs import Bytes
-from steptwin.world.script import PowerCycle, Send, Write
 
 FEEDER = Path(__file__).parents[2] / "examples/worlds/feeder.toml"
 UNTOLD = {"details": ("listens", "input_waiting")}

@@ -20,11 +20,11 @@ from steptwin.machine import SECOND
 from steptwin.mic488.registermap import DataType
 from steptwin.mic488.registers import register_map
 from steptwin.mic488.values import encoded, named
+from steptwin.simulation.describe.gateways import ModbusSpec
+from steptwin.simulation.script.steps import Request, Write
 from steptwin.subject import commands as command
 from steptwin.subject.commands import Command
 from steptwin.wire.pdu import encode_request
-from steptwin.world.gateways import ModbusSpec
-from steptwin.world.script import Request, Write
 
 ME = GatewayClient("me", Role.ENGINEER)
 MOTIONS: tuple[Command, ...] = (

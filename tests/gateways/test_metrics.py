@@ -12,8 +12,8 @@ from gateway_rig import GatewayWorld
 from steptwin.gateways.metrics import MOST_EVENTS, Metrics
 from steptwin.gateways.prometheus import Pages
 from steptwin.machine import SECOND
+from steptwin.simulation.script import steps
 from steptwin.subject import commands as command
-from steptwin.world import script as steps
 
 TEXT = """
     [world]

@@ -17,9 +17,9 @@ from steptwin.errors import LineFailure, Misuse, Refusal
 from steptwin.gateways.clients import GatewayClient
 from steptwin.gateways.devicefile import read_device_file
 from steptwin.gateways.modbus import MOST_READS, MasterGateway
+from steptwin.simulation.describe.gateways import ModbusSpec
+from steptwin.simulation.script.steps import Request
 from steptwin.subject.contract import Description, LinePart, Result
-from steptwin.world.gateways import ModbusSpec
-from steptwin.world.script import Request
 
 HALL = '[[mic488]]\nname = "one"\n[[mic488]]\nname = "two"\nunit = 2\n'
 CELL = '[[device]]\nname = "one"\naddress = "/dev/ttyUSB0"\n[gateway.modbus]\nlisten = "127.0.0.1:0"\n'

@@ -10,8 +10,8 @@ from gateway_rig import GatewayWorld
 from steptwin.errors import Misuse
 from steptwin.gateways.points import GatewayPoint, PointType, PointValue, points_of, registers_by_machine, values_of
 from steptwin.gateways.sampling import Sampler
+from steptwin.simulation.script.steps import Set, Write
 from steptwin.subject import commands as command
-from steptwin.world.script import Set, Write
 
 TEXT = """
     [[mic488]]

@@ -13,9 +13,9 @@ from steptwin.errors import LineFailure, Refusal, SteptwinError
 from steptwin.gateways.points import CLOCK, CLOCK_POINTS, State
 from steptwin.gateways.sampling import AT_ONCE, MOST_EVENTS, REST_S, TICK_S, Sampler
 from steptwin.machine import MILLISECOND, SECOND
+from steptwin.simulation.script.steps import Note, Send, Set, Turn
 from steptwin.subject import commands as command
 from steptwin.subject.contract import Result
-from steptwin.world.script import Note, Send, Set, Turn
 
 TEXT = '[[mic488]]\nname = "table"\n[[mic488]]\nname = "other"\n'
 MACHINES = ("table", "other")

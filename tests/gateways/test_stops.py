@@ -48,6 +48,7 @@ from steptwin.machine import SECOND
 from steptwin.mic488.registermap import DataType
 from steptwin.mic488.registers import register_map
 from steptwin.mic488.values import RegisterItem, encoded
+from steptwin.simulation.script import steps
 from steptwin.studio.hub import Hub
 from steptwin.studio.rest import Rest
 from steptwin.studio.session import ViewerSession
@@ -57,7 +58,6 @@ from steptwin.subject.commands import Command, plain_command
 from steptwin.subject.contract import Result
 from steptwin.subject.dispatch import respond
 from steptwin.wire import pdu
-from steptwin.world import script as steps
 
 MOTIONS = ("move", "jog", "home", "program")
 PLACES = ("gateway", "line", "sent")

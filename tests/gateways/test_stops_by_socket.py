@@ -26,8 +26,8 @@ from world_rig import TWO_LINES
 
 from steptwin.gateways.opcua.addressspace import node_id
 from steptwin.live.remote import RemoteSubject
+from steptwin.simulation.world.inputs import Download
 from steptwin.subject import commands as command
-from steptwin.world.inputs import Download
 
 WORLD = f"""
 [world]

@@ -18,8 +18,8 @@ from steptwin.history import writer as writing
 from steptwin.history.reading import HistoryDatabase
 from steptwin.history.spool import Spool
 from steptwin.history.stretches import read_stretch
+from steptwin.simulation.script.steps import Set
 from steptwin.subject.commands import Enable, Move
-from steptwin.world.script import Set
 
 CELL = """
 [world]

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from steptwin.errors import Misuse
 from steptwin.history.reading import HistoryDatabase
+from steptwin.simulation.script.steps import Note, Set
 from steptwin.subject import commands as command
 from steptwin.subject.commands import Enable, Move
-from steptwin.world.script import Note, Set
 
 CELL = """
 [world]

@@ -12,9 +12,9 @@ from steptwin.access.roles import Role
 from steptwin.gateways.clients import GatewayClient
 from steptwin.machine import SECOND
 from steptwin.motion.plain import read_plan
+from steptwin.simulation.script.steps import Note, Set, Turn, Write
 from steptwin.subject import commands as command
 from steptwin.subject.commands import Enable, Move
-from steptwin.world.script import Note, Set, Turn, Write
 
 CELL = """
 [world]

@@ -14,7 +14,7 @@ from steptwin.m1486.variants import variant
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.status import AxisStatus
-from steptwin.world.kernel import Kernel
+from steptwin.simulation.scheduler.kernel import Kernel
 
 Make = Callable[[], tuple[Cell, Mic488Device]]
 Run = Callable[..., Any]

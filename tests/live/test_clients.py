@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from steptwin.access.notices import AT_ONCE
 from steptwin.live.clients import Clients
-from steptwin.world.addresses import Address
+from steptwin.simulation.toml.addresses import Address
 
 
 def test_clients_that_make_no_sense_do_not_fill_the_log() -> None:

@@ -14,8 +14,8 @@ from control_rig import Desk, answer_to, answers_to, misuse, ok, served, turns
 
 from steptwin.live import control
 from steptwin.live.control import ControlEndpoint
+from steptwin.simulation.toml.addresses import Address
 from steptwin.subject.dispatch import FORM
-from steptwin.world.addresses import Address
 
 TOKEN_FIRST = 'the first line of a connection is {"token": TOKEN}, with the token of this twin'
 FORM_ERROR = {"error": {"code": "misuse", "message": FORM}}

@@ -18,10 +18,10 @@ from steptwin.live.pace import Pace
 from steptwin.live.world import LiveWorld, PlacePort
 from steptwin.live.world_control import WorldControl
 from steptwin.machine import MILLISECOND, SECOND
+from steptwin.simulation.world import history
 from steptwin.subject.commands import read_command
 from steptwin.subject.events import Event
 from steptwin.subject.following import filter_of
-from steptwin.world import history
 
 Run = Callable[..., Any]
 

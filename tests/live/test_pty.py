@@ -20,10 +20,10 @@ from steptwin.live.clock import Clock
 from steptwin.live.pty import PtyLink
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488Device
+from steptwin.simulation.scheduler.kernel import Kernel
 from steptwin.wire.line import SerialLine
 from steptwin.wire.slave import RtuSlavePort
 from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
-from steptwin.world.kernel import Kernel
 
 
 @pytest.fixture(params=["epoll", "timer"], autouse=True)

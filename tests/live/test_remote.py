@@ -19,8 +19,8 @@ from steptwin.live import control, remote
 from steptwin.live.control import ControlEndpoint
 from steptwin.live.remote import START, ask, running
 from steptwin.live.twins import running_twins
+from steptwin.simulation.script import steps as do
 from steptwin.subject import commands as command
-from steptwin.world import script as do
 
 
 @pytest.fixture(autouse=True)

@@ -18,8 +18,8 @@ from steptwin.live.clock import Clock
 from steptwin.live.serialport import SerialLink
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488Device
+from steptwin.simulation.scheduler.kernel import Kernel
 from steptwin.wire.slave import RtuSlavePort
-from steptwin.world.kernel import Kernel
 
 Run = Callable[..., Any]
 Make = Callable[[], tuple[Cell, Mic488Device]]

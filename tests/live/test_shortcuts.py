@@ -20,14 +20,14 @@ from steptwin.live.clock import Clock
 from steptwin.live.links import Feed
 from steptwin.live.world import LiveWorld, PlacePort
 from steptwin.machine import MILLISECOND
+from steptwin.simulation.kinds.mic488.line import ModbusBus
+from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.simulation.world.inputs import Bytes
+from steptwin.simulation.world.plantsnapshot import RecordedInput
 from steptwin.wire import mbap
 from steptwin.wire.crc import with_crc
 from steptwin.wire.pdu import READS
 from steptwin.wire.slave import FrameDirection, RtuSlavePort, TcpSlavePort
-from steptwin.world.inputs import Bytes
-from steptwin.world.kinds.mic488.line import ModbusBus
-from steptwin.world.plantsnapshot import RecordedInput
-from steptwin.world.trace import TraceRecord
 
 TEXT = """
 [[line]]

@@ -21,8 +21,8 @@ from steptwin.live.tcp_asyncio import AsyncioListener
 from steptwin.live.tcp_epoll import EpollListener
 from steptwin.machine import Nanos
 from steptwin.mic488.device import Mic488Device
+from steptwin.simulation.toml.addresses import Address
 from steptwin.wire.slave import RtuSlavePort, TcpSlavePort
-from steptwin.world.addresses import Address
 
 Run = Callable[..., Any]
 Make = Callable[[], tuple[Cell, Mic488Device]]

@@ -29,9 +29,9 @@ from steptwin.live.rfc2217 import TwinLine
 from steptwin.live.transports import TRANSPORTS, LinkArguments
 from steptwin.machine import SECOND
 from steptwin.mic488.device import Mic488Device
+from steptwin.simulation.kinds.links import TlsFiles
 from steptwin.wire.pdu import ReadRequest
 from steptwin.wire.slave import TcpSlavePort
-from steptwin.world.links import TlsFiles
 
 ILLEGAL_FUNCTION = 1
 

@@ -17,10 +17,10 @@ from steptwin.errors import Misuse
 from steptwin.files.session import load
 from steptwin.files.world import World
 from steptwin.live.transports import forget, register
+from steptwin.simulation.kinds.registry import line_kinds
+from steptwin.simulation.toml.reader import WorldError
+from steptwin.simulation.world.inputs import Bytes
 from steptwin.wire.crc import with_crc
-from steptwin.world.inputs import Bytes
-from steptwin.world.kinds import line_kinds
-from steptwin.world.reader import WorldError
 
 TEXT = """
 [world]

@@ -17,9 +17,9 @@ from steptwin.live.clients import Clients
 from steptwin.live.rfc2217 import TwinLine
 from steptwin.live.transports import TRANSPORTS, LinkArguments, OpenLink
 from steptwin.mic488.device import Mic488Device
+from steptwin.simulation.kinds.links import LINK_KEYS
+from steptwin.simulation.kinds.registry import line_kinds
 from steptwin.wire.slave import RtuSlavePort
-from steptwin.world.kinds import line_kinds
-from steptwin.world.links import LINK_KEYS
 
 Run = Callable[..., Any]
 Make = Callable[[], tuple[Cell, Mic488Device]]

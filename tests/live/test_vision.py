@@ -14,9 +14,9 @@ from steptwin.live.world import LiveWorld, PlacePort, VisionPort
 from steptwin.machine import MILLISECOND, Port
 from steptwin.mic488.present import state_of
 from steptwin.mic488.vision import uses_vision
+from steptwin.simulation.describe.small import LINE, Whole
+from steptwin.simulation.describe.small_mic488 import mic488_world
 from steptwin.wire.crc import crc16
-from steptwin.world.kinds.mic488.small import mic488_world
-from steptwin.world.small import LINE, Whole
 
 #: Copies each new record, with the number of records before it in $I0.
 PICK = """\

@@ -11,8 +11,8 @@ from steptwin.errors import Misuse
 from steptwin.live.remote import RemoteSubject
 from steptwin.live.watching import TwinWatch
 from steptwin.machine import MILLISECOND, SECOND
+from steptwin.simulation.script import steps as do
 from steptwin.subject import commands as command
-from steptwin.world import script as do
 
 PATHS = ("M1_POS_ACT", "M1.velocity", "M1_STATUS", "M1.encoder", "OUT3", "IN9", "M1_HOME")
 

@@ -23,13 +23,13 @@ from steptwin.live.world_frames import follow_frames
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488Device
+from steptwin.simulation.faults import Faults, FaultyPort
+from steptwin.simulation.faults import LineProtocol as FaultLine
+from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.world.inputs import Bytes, See
 from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection, TcpSlavePort
-from steptwin.world import script as do
-from steptwin.world.faults import Faults, FaultyPort
-from steptwin.world.faults import LineProtocol as FaultLine
-from steptwin.world.inputs import Bytes, See
-from steptwin.world.kernel import Kernel
 
 LINE = '[[line]]\nname = "bus"\ntcp = "127.0.0.1:0"\n[[mic488]]\nname = "twin"\nline = "bus"\n'
 READ = bytes.fromhex("00 01 00 00 00 06 01 03 27 24 00 0a")

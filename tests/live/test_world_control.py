@@ -18,10 +18,10 @@ from steptwin.live.pace import Pace
 from steptwin.live.world import LiveWorld
 from steptwin.live.world_control import WorldControl
 from steptwin.machine import SECOND
+from steptwin.simulation.faults import read as read_fault
+from steptwin.simulation.script import steps as do
 from steptwin.subject import commands as command
 from steptwin.subject.following import filter_of
-from steptwin.world import script as do
-from steptwin.world.faults import read as read_fault
 
 Run = Callable[..., Any]
 EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"

@@ -16,7 +16,7 @@ from steptwin.errors import Misuse
 from steptwin.lsp import navigation
 from steptwin.lsp.analysis import Analysis
 from steptwin.lsp.session import EditorSession
-from steptwin.world.tables import all_keys
+from steptwin.simulation.describe.tables import all_keys
 
 URI = "file:///m/cell.toml"
 PROGRAM_URI = "file:///m/a.prg"

@@ -9,8 +9,8 @@ from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.line import SerialChain
 from steptwin.m1486.variants import variant
 from steptwin.machine import MILLISECOND, SECOND
-from steptwin.world.kernel import Kernel
-from steptwin.world.wires import PinName, Wire
+from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.wires import PinName, Wire
 
 STEP = 64
 

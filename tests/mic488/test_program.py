@@ -16,10 +16,10 @@ from steptwin.mic488.axis_motion import MAX_SPEED_P
 from steptwin.mic488.config import AxisConfig, ControllerConfig, ProgramConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.program_banks import load, setup_of
+from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.wires import PinName, Wire
 from steptwin.wbc.check import check
 from steptwin.wbc.positions import parse_positions
-from steptwin.world.kernel import Kernel
-from steptwin.world.wires import PinName, Wire
 
 COUNTER = "n = n + 1\n$R0 = n\nWAIT 1 = 2\n"
 

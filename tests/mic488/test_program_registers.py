@@ -9,8 +9,8 @@ from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.config import AxisConfig
 from steptwin.mic488.encoder import Coupling
 from steptwin.mic488.program_registers import ACCESS, position_p
+from steptwin.simulation.scheduler.wires import PinName, Wire
 from steptwin.wbc.real import ProgramFault
-from steptwin.world.wires import PinName, Wire
 
 # ---------------------------------------------------------------------- registers
 

@@ -1,4 +1,4 @@
-"""Many worlds composed by chance: as `tests/world/test_random_compositions.py`."""
+"""Many worlds composed by chance: as `tests/simulation/test_random_compositions.py`."""
 
 from __future__ import annotations
 

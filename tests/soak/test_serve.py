@@ -19,10 +19,10 @@ from steptwin.live.links import Feed
 from steptwin.live.world import LiveWorld, PlacePort
 from steptwin.live.world_frames import follow_frames
 from steptwin.m1486.events import EVENTS_KEPT
+from steptwin.simulation.describe.small import LINE, Whole
+from steptwin.simulation.describe.small_m1486 import m1486_world
+from steptwin.simulation.describe.small_mic488 import mic488_world
 from steptwin.wire.crc import crc16
-from steptwin.world.kinds.m1486.small import m1486_world
-from steptwin.world.kinds.mic488.small import mic488_world
-from steptwin.world.small import LINE, Whole
 
 REQUESTS = 1_000_000
 PIECES = 150_000

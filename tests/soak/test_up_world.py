@@ -17,10 +17,10 @@ from steptwin.files.world import World
 from steptwin.live import world as live_world_module
 from steptwin.live.world import LiveWorld, PlacePort
 from steptwin.machine import MILLISECOND
-from steptwin.world import script as do
-from steptwin.world.inputs import Bytes
-from steptwin.world.kinds.mic488.line import ModbusBus
-from steptwin.world.lines import SCRIPTS
+from steptwin.simulation.kinds.lines import SCRIPTS
+from steptwin.simulation.kinds.mic488.line import ModbusBus
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.world.inputs import Bytes
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
 READ_RTU = bytes.fromhex("01 03 27 24 00 02 8e b4")

@@ -10,7 +10,7 @@ from soak import scaled
 
 from steptwin.files.world import World
 from steptwin.machine import SECOND
-from steptwin.world import script as do
+from steptwin.simulation.script import steps as do
 
 FEEDER = (Path(__file__).parents[2] / "examples" / "worlds" / "feeder.toml").read_text()
 DAY_S = 24 * 3600

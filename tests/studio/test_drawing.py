@@ -12,8 +12,8 @@ from playwright.sync_api import Locator, Page, expect
 from studio_page import Studio, button, downloaded, show
 from tests.studio.conftest import Process, StudioWorld
 
-from steptwin.world.arrangement import DrawnPlace
-from steptwin.world.description import read_world
+from steptwin.simulation.describe.arrangement import DrawnPlace
+from steptwin.simulation.describe.description import read_world
 
 WORLD = """
     [world]

@@ -11,6 +11,8 @@ from tests.support.studio_rig import OPERATOR, VIEWER, Studio, Tab
 from steptwin.errors import Refusal
 from steptwin.later import Later
 from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.simulation.world.history import History, Past
+from steptwin.simulation.world.worldprograms import WorldPrograms
 from steptwin.studio import looking
 from steptwin.subject.debugcommands import (
     Branch,
@@ -25,8 +27,6 @@ from steptwin.subject.debugcommands import (
 )
 from steptwin.subject.following import EventBatch, Filter
 from steptwin.subject.world import WorldSubject
-from steptwin.world.history import History, Past
-from steptwin.world.worldprograms import WorldPrograms
 
 T = TypeVar("T")
 

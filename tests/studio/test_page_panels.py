@@ -17,7 +17,7 @@ from studio_page import Studio, button, downloaded, enable, number, show, virtua
 from tests.conftest import until
 from tests.studio.conftest import Process
 
-from steptwin.world.elements import ELEMENTS
+from steptwin.simulation.components.registry import ELEMENTS
 
 # ---------------------------------------------------------------------- other panels
 

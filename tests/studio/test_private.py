@@ -25,10 +25,10 @@ from steptwin.commands.owntokens import own_tokens
 from steptwin.commands.studio import DEFAULT, AccessInfo
 from steptwin.commands.studio_drawing import WorldArrangement
 from steptwin.errors import Misuse
+from steptwin.simulation.describe.arrangement import DrawnPlace
+from steptwin.simulation.describe.description import read_world
 from steptwin.studio.rest import NO_TOKEN
 from steptwin.studio.viewers import REFUSED as CLOSED
-from steptwin.world.arrangement import DrawnPlace
-from steptwin.world.description import read_world
 
 CAMPAIGN = '[campaign]\nname = "doors"\nworld = "hall.toml"\nruns = 1\n[[property]]\nname = "n"\nnever = "table.IN1"\n'
 

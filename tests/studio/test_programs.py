@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tests.support.studio_rig import ENGINEER, OPERATOR, VIEWER, Studio
 
-from steptwin.world import script as do
+from steptwin.simulation.script import steps as do
 
 WORLD = """
     [world]

@@ -30,8 +30,8 @@ from websockets.sync.client import ClientConnection
 from steptwin.files.session import save, session_of
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND
+from steptwin.simulation.script.steps import Set
 from steptwin.subject.dispatch import LONGEST_REQUEST
-from steptwin.world.script import Set
 
 Start = Callable[..., Process]
 
@@ -294,7 +294,7 @@ def test_the_next_free_port_is_taken_and_named(start_studio: Start, monkeypatch:
     from steptwin.commands import studio as command
     from steptwin.errors import LineFailure
     from steptwin.httpservice import listen
-    from steptwin.world.addresses import Address
+    from steptwin.simulation.toml.addresses import Address
 
     assert Address("127.0.0.1", 8488) == command.DEFAULT
     with socket.create_server(("127.0.0.1", 0)) as taken:

@@ -292,7 +292,7 @@ def test_a_slow_reader_loses_the_oldest_events_and_is_told_how_many() -> None:
 
 
 def sessions_note(n: int) -> Any:
-    from steptwin.world.script import Note
+    from steptwin.simulation.script.steps import Note
 
     return Note(str(n))
 

@@ -18,10 +18,10 @@ from steptwin.m1486.variants import VARIANTS
 from steptwin.mic488 import configform
 from steptwin.mic488.points import AXIS_SHORT_NAMES, SHORT_NAMES
 from steptwin.mic488.registers import AXIS_STATUS_TEXTS, CONTROLLER_STATUS_TEXTS, ROWS
+from steptwin.simulation.faults.kinds import rows
 from steptwin.subject.events import payload_of
 from steptwin.subject.payloads import is_shown
 from steptwin.verify import m1486, mic488
-from steptwin.world.faults.kinds import rows
 
 SOURCES = ROOT / "src/steptwin"
 NUMBER = re.compile(r"(?<=General purpose )\d+")
@@ -32,11 +32,11 @@ GOLDEN = [
 ]
 FINDING = re.compile(r"^.+?:\d+:\d+: (?:error|warning|note) [MW]\d+: (.*)$|^ +\d* *= (?!suggestion:)(.*)$", re.MULTILINE)
 REFUSING = [
-    *(f"{room}/*.py" for room in ("access", "subject", "studio", "devices", "debug", "why", "world/kinds/*/[cfhmp]*")),
+    *(f"{room}/*.py" for room in ("access", "subject", "studio", "devices", "debug", "why", "simulation/kinds/*/[cfhmp]*")),
     *(f"calc/{name}.py" for name in ("calculator", "m1486", "mic488")),
     *(f"mic488/{name}.py" for name in ("core", "encoding", "program", "program_banks", "values")),
     *(f"live/{name}.py" for name in ("debugging", "lookback", "why", "world")),
-    *(f"world/faults/{name}.py" for name in ("active", "element", "fault", "machine", "places")),
+    *(f"simulation/faults/{name}.py" for name in ("active", "element", "fault", "machine", "places")),
     "m1486/*_effects.py",
     "drivers/subject.py",
     "drivers/*/subject.py",

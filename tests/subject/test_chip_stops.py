@@ -8,12 +8,12 @@ import pytest
 
 from steptwin.files.world import World
 from steptwin.machine import SECOND
+from steptwin.simulation.faults import read as read_fault
+from steptwin.simulation.script.control import ControlProgram
+from steptwin.simulation.script.steps import SetFault
+from steptwin.simulation.world.inputs import Download
 from steptwin.subject import commands as command
 from steptwin.subject.world import WorldSubject
-from steptwin.world.control import ControlProgram
-from steptwin.world.faults import read as read_fault
-from steptwin.world.inputs import Download
-from steptwin.world.script import SetFault
 
 LOOPING = "[\n@5\nF12800\nR\nW100\nB12800\nR\nW100\nJ5\n]"
 CHIP = """

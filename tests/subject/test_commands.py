@@ -11,15 +11,15 @@ from hypothesis import strategies as st
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND
+from steptwin.simulation.faults import read as read_fault
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.script.control import Halt
+from steptwin.simulation.world.actions import ACTIONS
+from steptwin.simulation.world.inputs import Bytes, Download, EndScripts, Leave, Refused, See, SetVariable
 from steptwin.subject import commands as command
 from steptwin.subject import debugcommands as debug
 from steptwin.subject.commands import COMMANDS, plain_command, read_command
 from steptwin.subject.schema import schema
-from steptwin.world import script as do
-from steptwin.world.actions import ACTIONS
-from steptwin.world.control import Halt
-from steptwin.world.faults import read as read_fault
-from steptwin.world.inputs import Bytes, Download, EndScripts, Leave, Refused, See, SetVariable
 
 EXAMPLES: list[tuple[dict[str, Any], command.Command]] = [
     ({"do": "describe"}, command.Describe()),

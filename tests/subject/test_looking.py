@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from steptwin import World
 from steptwin.machine import SECOND
+from steptwin.simulation.script.steps import Note
 from steptwin.subject import commands as command
 from steptwin.subject.following import filter_of
 from steptwin.subject.world import WorldSubject
-from steptwin.world.script import Note
 
 
 def subject_of(count: int) -> WorldSubject:

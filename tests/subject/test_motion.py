@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 from steptwin.files.world import World
+from steptwin.simulation.script.steps import Write
 from steptwin.subject.commands import Enable, Move
 from steptwin.subject.events import read_event
 from steptwin.subject.following import filter_of
 from steptwin.subject.motion import Motions
 from steptwin.subject.world import WorldSubject
-from steptwin.world.script import Write
 
 FEEDER = Path(__file__).parents[2] / "examples" / "worlds" / "feeder.toml"
 

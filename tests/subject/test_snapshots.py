@@ -8,6 +8,7 @@ from steptwin.errors import Misuse
 from steptwin.files.session import session_of
 from steptwin.files.world import World
 from steptwin.machine import SECOND
+from steptwin.simulation.script.steps import Note, Set
 from steptwin.subject.commands import (
     Advance,
     DropSnapshot,
@@ -23,7 +24,6 @@ from steptwin.subject.motion import Motions
 from steptwin.subject.payloads import PlanPayload, RestoredPayload
 from steptwin.subject.snapshots import MOST_SNAPSHOTS
 from steptwin.subject.world import WorldSubject
-from steptwin.world.script import Note, Set
 
 TEXT = '[[mic488]]\nname = "m"\n[mic488.M1]\nunit = "mm"\ngear = 100.0\nacc = 100.0\ndec = 100.0\nvel = 40.0\n'
 

@@ -13,10 +13,10 @@ import pytest
 from steptwin import World
 from steptwin.controllerstate import ProgramActivity, StatusLevel, read_state
 from steptwin.datasheet import FactType, plain
+from steptwin.simulation.script.steps import Send, Set
 from steptwin.subject.commands import Advance, Enable, Move, ReadPins, ReadState
 from steptwin.subject.schema import definitions
 from steptwin.subject.world import WorldSubject
-from steptwin.world.script import Send, Set
 
 WORLDS = sorted((Path(__file__).parents[2] / "examples/worlds").glob("*.toml"))
 VALUES: Mapping[FactType, tuple[type, ...]] = {

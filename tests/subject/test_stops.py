@@ -12,13 +12,13 @@ from steptwin.errors import Misuse, Refusal
 from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.simulation.faults import read as read_fault
+from steptwin.simulation.script.steps import SetFault
+from steptwin.simulation.world.inputs import Bytes
 from steptwin.subject import commands as command
 from steptwin.subject.following import filter_of
 from steptwin.subject.jogs import WorldJogs
 from steptwin.subject.world import WorldSubject
-from steptwin.world.faults import read as read_fault
-from steptwin.world.inputs import Bytes
-from steptwin.world.script import SetFault
 
 HOIST = """
     [world]

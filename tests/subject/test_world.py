@@ -17,6 +17,10 @@ from steptwin.files.session import session_of
 from steptwin.files.world import World
 from steptwin.later import start
 from steptwin.machine import MILLISECOND, SECOND
+from steptwin.simulation.faults import read as read_fault
+from steptwin.simulation.faults.kinds import KINDS
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.world.inputs import Bytes, Download
 from steptwin.subject import commands as command
 from steptwin.subject.commands import COMMANDS
 from steptwin.subject.contract import ConnectionPart, DrawingPart, ElementPart, SignalPart, SwitchPart, read_description
@@ -27,10 +31,6 @@ from steptwin.subject.following import filter_of
 from steptwin.subject.payloads import FramePayload, InputPayload
 from steptwin.subject.world import WorldSubject
 from steptwin.wire.crc import with_crc
-from steptwin.world import script as do
-from steptwin.world.faults import read as read_fault
-from steptwin.world.faults.kinds import KINDS
-from steptwin.world.inputs import Bytes, Download
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
 READ_POSITION = with_crc(bytes.fromhex("01 03 27 24 00 02"))

@@ -12,13 +12,13 @@ from steptwin.files.world import World
 from steptwin.machine import SECOND
 from steptwin.motion.divisions import profile_of
 from steptwin.motion.plain import read_plan
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.world.inputs import Bytes
 from steptwin.subject import commands as command
 from steptwin.subject.following import filter_of
 from steptwin.subject.payloads import PlanPayload
 from steptwin.subject.world import WorldSubject
 from steptwin.wire.crc import with_crc
-from steptwin.world import script as do
-from steptwin.world.inputs import Bytes
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
 

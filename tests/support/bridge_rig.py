@@ -27,10 +27,10 @@ from steptwin.live.cell import Cell
 from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.program import ProgramState
+from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.script.steps import Write
 from steptwin.subject.events import Numbering
 from steptwin.wire.slave import TcpSlavePort
-from steptwin.world.kernel import Kernel
-from steptwin.world.script import Write
 
 AXIS = 1
 PROGRAM = "MAIN:\nDELAY 0.1\nJUMP MAIN\n"

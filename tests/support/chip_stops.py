@@ -15,13 +15,13 @@ from steptwin.drivers.m1486 import AsyncM1486
 from steptwin.errors import SteptwinError
 from steptwin.files.world import World
 from steptwin.machine import SECOND, Nanos
+from steptwin.simulation.script.control import Seek
+from steptwin.simulation.world.inputs import Download
+from steptwin.simulation.world.motions import ordered
 from steptwin.subject import commands as command
 from steptwin.subject.following import filter_of
 from steptwin.subject.payloads import StatusPayload
 from steptwin.subject.world import WorldSubject
-from steptwin.world.control import Seek
-from steptwin.world.inputs import Download
-from steptwin.world.motions import ordered
 
 FAMILIES = ("A", "B", "C", "E1", "E2")
 ASKED = ("move", "jog", "seek", "program")

@@ -20,13 +20,13 @@ from steptwin.debug.debugger import Debugger
 from steptwin.debug.scout import Goal
 from steptwin.files.world import World
 from steptwin.machine import SECOND, Nanos
+from steptwin.simulation.kinds.mic488.build import _loaded
+from steptwin.simulation.mechanics.course import Course
+from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.simulation.toml.reader import WorldError
+from steptwin.simulation.world.history import History
 from steptwin.wire.crc import with_crc
-from steptwin.world.course import Course
-from steptwin.world.history import History
-from steptwin.world.kernel import Kernel
-from steptwin.world.kinds.mic488.build import _loaded
-from steptwin.world.reader import WorldError
-from steptwin.world.trace import TraceRecord
 
 BASE = """
 [[line]]
@@ -413,7 +413,7 @@ def general_way() -> Generator[Callable[[World], World]]:
     with ExitStack() as stack:
         stack.enter_context(patch.object(Course, "_keeps_distance", lambda course, profile: False))
         stack.enter_context(patch("steptwin.wbc.compile.straight_of", lambda codes, steps, cell: [None] * len(steps)))
-        stack.enter_context(patch("steptwin.world.kinds.mic488.build._loaded", _loaded.__wrapped__))
+        stack.enter_context(patch("steptwin.simulation.kinds.mic488.build._loaded", _loaded.__wrapped__))
         yield general
 
 

@@ -12,13 +12,13 @@ from steptwin.errors import Misuse, Refusal
 from steptwin.later import Later
 from steptwin.live.control import ControlEndpoint
 from steptwin.motion.profile import at_rest
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.toml.addresses import Address
 from steptwin.subject import commands as command
 from steptwin.subject.contract import Result
 from steptwin.subject.events import Event
 from steptwin.subject.following import Filter, Followers, Following
 from steptwin.subject.payloads import EdgePayload, PlanPayload
-from steptwin.world import script as do
-from steptwin.world.addresses import Address
 
 
 class Desk:

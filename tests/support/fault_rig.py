@@ -5,15 +5,15 @@ from __future__ import annotations
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488Device
+from steptwin.simulation.faults import ActiveFault, Faults, FaultyMachine, FaultyPort, LineProtocol, read, rig
+from steptwin.simulation.kinds.mic488.faults import Mic488Body
+from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.simulation.scheduler.wires import PinName
 from steptwin.wire.gateway import ModbusGateway, TcpGatewayPort
 from steptwin.wire.line import SerialLine
 from steptwin.wire.slave import RtuSlavePort, TcpSlavePort
 from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
-from steptwin.world.faults import ActiveFault, Faults, FaultyMachine, FaultyPort, LineProtocol, read, rig
-from steptwin.world.kernel import Kernel
-from steptwin.world.kinds.mic488.faults import Mic488Body
-from steptwin.world.trace import TraceRecord
-from steptwin.world.wires import PinName
 
 READ = bytes.fromhex("03 00 63 00 02")
 """Two user registers from 99 on; 100 holds 1234H."""

@@ -18,13 +18,13 @@ from steptwin.access.audit import CommandLog
 from steptwin.errors import LineFailure
 from steptwin.gateways.contract import PastValues
 from steptwin.gateways.sampling import SharedSamples
+from steptwin.simulation.kinds.lines import LineTraffic
 from steptwin.subject import commands as command
 from steptwin.subject.contract import Description, Reading, Result
 from steptwin.subject.events import Event
 from steptwin.subject.following import Filter, Following
 from steptwin.subject.jogs import Held, WorldJogs
 from steptwin.subject.world import WorldSubject
-from steptwin.world.lines import LineTraffic
 
 
 class GatewayWorld:

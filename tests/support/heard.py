@@ -5,12 +5,12 @@ from __future__ import annotations
 from functools import partial
 
 from steptwin.files.world import World
+from steptwin.simulation.faults import read as read_fault
+from steptwin.simulation.kinds.lines import LineWrite
+from steptwin.simulation.kinds.registry import line_kinds
+from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.simulation.world.records import describe, is_shown, names_of, shown_kind
 from steptwin.wire.frameline import FrameLine
-from steptwin.world.faults import read as read_fault
-from steptwin.world.kinds import line_kinds
-from steptwin.world.lines import LineWrite
-from steptwin.world.records import describe, is_shown, names_of, shown_kind
-from steptwin.world.trace import TraceRecord
 
 
 class Listener:

@@ -24,7 +24,7 @@ from steptwin.commands.studio_drawing import WorldArrangement
 from steptwin.files.export import write_trace
 from steptwin.files.session import save, session_of
 from steptwin.files.world import World
-from steptwin.world.arrangement import DrawnPlace
+from steptwin.simulation.describe.arrangement import DrawnPlace
 
 PROGRAM = "if in1=1\ndelay 5\nendif\n" * 800 + "end\n"
 IMAGE_OF = "IF IN1 = 1\nDELAY 5\nENDIF\n"

@@ -18,12 +18,12 @@ from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.encoder import Coupling
 from steptwin.mic488.inifile import IniFile
 from steptwin.mic488.program_banks import LoadedProgram, load
+from steptwin.simulation.logic.contacts import PositionSwitch, place
+from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.wires import PinName
 from steptwin.wbc.check import check
 from steptwin.wbc.dialect import dialect_for
 from steptwin.wbc.positions import PositionTable, parse_positions
-from steptwin.world.contacts import PositionSwitch, place
-from steptwin.world.kernel import Kernel
-from steptwin.world.wires import PinName
 
 OFFSETS = {"1.23": 1000, "1.40": 10000, "1.70": 10000}
 

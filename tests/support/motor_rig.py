@@ -7,8 +7,8 @@ from math import pi
 
 from steptwin.machine import SECOND
 from steptwin.motion import MotionState, Profile, plan_position
-from steptwin.world.course import Build, Course, MechanicalState
-from steptwin.world.motor import StepperMotor
+from steptwin.simulation.mechanics.course import Build, Course, MechanicalState
+from steptwin.simulation.mechanics.motor import StepperMotor
 
 PER_REV = 3200
 INERTIA = 1e-4 * 2 * pi / PER_REV

@@ -1,10 +1,11 @@
-"""Where mechanics are pulse by pulse: an independent way to the courses that `steptwin.world.course` has in closed form."""
+"""Where mechanics are pulse by pulse: an independent way to the courses that `steptwin.simulation.mechanics.course` has in
+closed form."""
 
 from __future__ import annotations
 
 from steptwin.machine import Nanos
 from steptwin.motion.divisions import Plan
-from steptwin.world.course import Build, MechanicalState
+from steptwin.simulation.mechanics.course import Build, MechanicalState
 
 
 def changes(plan: Plan, after: Nanos, until: Nanos) -> list[tuple[Nanos, int]]:

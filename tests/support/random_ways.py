@@ -20,18 +20,18 @@ from steptwin.motion import MotionState, at_rest, plan_position, plan_stop, plan
 from steptwin.motion.divisions import Microstepping, Plan, step_train
 from steptwin.motion.paths import Circular, circle
 from steptwin.motion.ramps import SpeedCurve, plan_distance, plan_endless
-from steptwin.world.belt import ConstantDrive, Load, Workpiece, next_change
-from steptwin.world.cam import Cam
-from steptwin.world.contacts import Zone
-from steptwin.world.course import Build, Course, MechanicalState
-from steptwin.world.curve import Curve
-from steptwin.world.expression import Truth, parse_condition
-from steptwin.world.free import FreeMotion
-from steptwin.world.motor import StepperMotor
-from steptwin.world.quantities import change_between, sides
-from steptwin.world.resonance import Resonance
-from steptwin.world.travel import Travel
-from steptwin.world.wells import Wells
+from steptwin.simulation.logic.contacts import Zone
+from steptwin.simulation.logic.curve import Curve
+from steptwin.simulation.logic.expression import Truth, parse_condition
+from steptwin.simulation.logic.quantities import change_between, sides
+from steptwin.simulation.mechanics.belt import ConstantDrive, Load, Workpiece, next_change
+from steptwin.simulation.mechanics.cam import Cam
+from steptwin.simulation.mechanics.course import Build, Course, MechanicalState
+from steptwin.simulation.mechanics.free import FreeMotion
+from steptwin.simulation.mechanics.motor import StepperMotor
+from steptwin.simulation.mechanics.resonance import Resonance
+from steptwin.simulation.mechanics.travel import Travel
+from steptwin.simulation.mechanics.wells import Wells
 
 BEGIN: Nanos = 2 * SECOND
 T = TypeVar("T")

@@ -26,23 +26,23 @@ from steptwin.files.world import World
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion.divisions import StepTrain
 from steptwin.motion.profile import Profile
+from steptwin.simulation.describe.overrides import read_overrides
+from steptwin.simulation.describe.pieces import given_files
+from steptwin.simulation.describe.steptable import read_steps
+from steptwin.simulation.kinds.programs import Place, StatementFollower
+from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.scheduler.trace import TraceRecord, encode
+from steptwin.simulation.toml.reader import TomlText
+from steptwin.simulation.world.actions import ACTIONS
+from steptwin.simulation.world.check import diagnose
+from steptwin.simulation.world.history import History, Past
+from steptwin.simulation.world.inputs import Bytes, Download, Leave, See, SetVariable
+from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.unfinished import unchanged_inputs, waiting
+from steptwin.simulation.world.views import MechanicsView
+from steptwin.simulation.world.worldprograms import WorldPrograms, program_texts
 from steptwin.subject.describe import describe
 from steptwin.wire.crc import with_crc
-from steptwin.world.actions import ACTIONS
-from steptwin.world.check import diagnose
-from steptwin.world.history import History, Past
-from steptwin.world.inputs import Bytes, Download, Leave, See, SetVariable
-from steptwin.world.overrides import read_overrides
-from steptwin.world.pieces import given_files
-from steptwin.world.plant import Plant
-from steptwin.world.programs import Place, StatementFollower
-from steptwin.world.reader import TomlText
-from steptwin.world.signal import SignalOf
-from steptwin.world.steptable import read_steps
-from steptwin.world.trace import TraceRecord, encode
-from steptwin.world.unfinished import unchanged_inputs, waiting
-from steptwin.world.views import MechanicsView
-from steptwin.world.worldprograms import WorldPrograms, program_texts
 
 STEPS = 16
 MOMENTS = 7

@@ -19,6 +19,7 @@ from steptwin.devices.worldpart import WorldPart
 from steptwin.errors import Misuse, Refusal
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.simulation.world.worldprograms import WorldPrograms, configuration_text
 from steptwin.studio.hub import Hub
 from steptwin.studio.looking import KeptPast
 from steptwin.studio.schema import schema
@@ -26,7 +27,6 @@ from steptwin.studio.session import ViewerSession
 from steptwin.studio.surroundings import PresentMoment, Surroundings
 from steptwin.subject.jogs import WorldJogs
 from steptwin.subject.world import WorldSubject
-from steptwin.world.worldprograms import WorldPrograms, configuration_text
 
 WORLD = """
     [world]

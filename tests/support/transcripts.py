@@ -30,9 +30,9 @@ from line_rig import VirtualWire
 from steptwin.drivers.blocking import finish
 from steptwin.errors import SteptwinError
 from steptwin.machine import MILLISECOND, Nanos
+from steptwin.simulation.script import steps as script
 from steptwin.subject import commands
 from steptwin.subject.following import filter_of
-from steptwin.world import script
 
 CASE, RESULT = "=== ", "---"
 PAUSE_NS = 20 * MILLISECOND

@@ -15,10 +15,10 @@ from steptwin.live.world import LiveWorld
 from steptwin.live.world_control import WorldControl
 from steptwin.machine import Nanos
 from steptwin.motion.profile import Profile
+from steptwin.simulation.world.inputs import Download
 from steptwin.subject.following import filter_of
 from steptwin.subject.jogs import WorldJogs
 from steptwin.subject.payloads import PlanPayload, StatusPayload
-from steptwin.world.inputs import Download
 
 LOOPING = "M1 = ON\nA:\nPREL M1 40\nWAITPOS\nPREL M1 -40\nWAITPOS\nJUMP A\n"
 MIC488 = """

@@ -9,9 +9,9 @@ from steptwin.machine import MILLISECOND, Nanos
 from steptwin.motion import Profile
 from steptwin.motion.divisions import Plan
 from steptwin.motion.elastic import DriveStretch
-from steptwin.world.course import Build, Course, CoursePiece, MechanicalState
-from steptwin.world.free import slow_from
-from steptwin.world.loadmotion import load_stretches
+from steptwin.simulation.mechanics.course import Build, Course, CoursePiece, MechanicalState
+from steptwin.simulation.mechanics.free import slow_from
+from steptwin.simulation.mechanics.loadmotion import load_stretches
 
 
 def piece_text(piece: CoursePiece, of: Nanos) -> str:

@@ -14,11 +14,11 @@ from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
 from steptwin.m1486.lines import STEP_DIRECTION, Interface
 from steptwin.machine import Nanos
-from steptwin.world.inputs import Bytes
-from steptwin.world.kinds.m1486.small import m1486_world
-from steptwin.world.kinds.mic488.small import mic488_world
-from steptwin.world.small import LINE, Whole
-from steptwin.world.trace import Trace
+from steptwin.simulation.describe.small import LINE, Whole
+from steptwin.simulation.describe.small_m1486 import m1486_world
+from steptwin.simulation.describe.small_mic488 import mic488_world
+from steptwin.simulation.scheduler.trace import Trace
+from steptwin.simulation.world.inputs import Bytes
 
 TWO_LINES = """
     [[line]]

@@ -8,12 +8,12 @@ from why_worlds import WAITS
 
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND
+from steptwin.simulation.faults import read
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.world.history import History
 from steptwin.why import kept, search
 from steptwin.why.kept import PastQuestions
 from steptwin.why.question import Why, finish
-from steptwin.world import script as do
-from steptwin.world.faults import read
-from steptwin.world.history import History
 
 PROGRAM = """\
 n = 0

@@ -9,11 +9,11 @@ from why_worlds import PROGRAM, WAITS
 
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.plantsnapshot import RecordedInput
 from steptwin.why import courses, log, points, states
 from steptwin.why.question import Why
-from steptwin.world import script as do
-from steptwin.world.plant import Plant
-from steptwin.world.plantsnapshot import RecordedInput
 
 COUNTS = "n = 0\n$I5 = 0\nMAIN:\n    n = n + 1\n    $I4 = n\n    DELAY 0.3\n    IF n = 7\n        $I5 = 1\n    ENDIF\nJUMP MAIN\n"
 WORLD = '[[mic488]]\nname = "m"\nprogram = "m.prg"\nstart = true\n'

@@ -8,14 +8,14 @@ from why_worlds import CHIP, CHIP_PROGRAM, LINE, PROGRAM, WAITS
 from steptwin.errors import Misuse
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND
+from steptwin.simulation.kinds.mic488.writes import encode_write
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.world.history import History
+from steptwin.simulation.world.inputs import Bytes, Download
 from steptwin.why import causes, kept
 from steptwin.why.kept import PastQuestions
 from steptwin.why.question import finish
 from steptwin.wire.rtu import encode_frame
-from steptwin.world import script as do
-from steptwin.world.history import History
-from steptwin.world.inputs import Bytes, Download
-from steptwin.world.kinds.mic488.writes import encode_write
 
 
 def waits() -> World:

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from steptwin.files.export import write_trace
 from steptwin.machine import MILLISECOND, SECOND
+from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 from steptwin.wire.pcapng import is_modbus_tcp
-from steptwin.world.trace import Trace, TraceRecord
 
 READ_TCP = bytes.fromhex("000100000006 01 03 2724 0002".replace(" ", ""))
 ANSWER_TCP = bytes.fromhex("000100000007 01 03 04 41a00000".replace(" ", ""))

@@ -36,7 +36,8 @@ class Verdict:
 
 @dataclass(frozen=True, slots=True)
 class FaultAt:
-    """A fault in words (`steptwin.world.faults.read`), set at a moment. ``table``: the number of its ``[[fault]]``, from 0."""
+    """A fault in words (`steptwin.simulation.faults.read`), set at a moment. ``table``: the number of its ``[[fault]]``, from
+    0."""
 
     at_ns: Nanos
     fault: str

@@ -16,7 +16,7 @@ from steptwin.campaign.variation import Choice
 from steptwin.durations import duration
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
-from steptwin.world.chance import Chance
+from steptwin.simulation.scheduler.chance import Chance
 
 _NAME = re.compile(r"\{([A-Za-z_][\w-]*)\}")
 

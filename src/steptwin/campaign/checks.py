@@ -16,14 +16,14 @@ from steptwin.durations import LONGEST_NS, duration
 from steptwin.errors import Misuse
 from steptwin.files.world import World, read_beside
 from steptwin.machine import SECOND
-from steptwin.world import script as do
-from steptwin.world.description import describe
-from steptwin.world.faults import read as read_fault
-from steptwin.world.overrides import override, place_of
-from steptwin.world.pieces import FILE_KEYS, USE, given_files
-from steptwin.world.reader import TomlText
-from steptwin.world.references import check_step
-from steptwin.world.tomlplaces import Path as TomlPath
+from steptwin.simulation.describe.description import describe
+from steptwin.simulation.describe.overrides import override, place_of
+from steptwin.simulation.describe.pieces import FILE_KEYS, USE, given_files
+from steptwin.simulation.faults import read as read_fault
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.toml.reader import TomlText
+from steptwin.simulation.toml.tomlplaces import Path as TomlPath
+from steptwin.simulation.world.references import check_step
 
 CAMPAIGN, VARY, FAULT, STEP, PROPERTY, MEASURE = "campaign", "vary", "fault", "step", "property", "measure"
 MATRIX = "matrix"

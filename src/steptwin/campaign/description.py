@@ -12,7 +12,7 @@ from steptwin import __version__
 from steptwin.campaign.case import digest_of
 from steptwin.campaign.variation import Varied
 from steptwin.machine import Nanos
-from steptwin.world.blueprint import FileContents
+from steptwin.simulation.describe.blueprint import FileContents
 
 SEARCHES = ("random", "exhaustive", "guided")
 SALTELLI = "saltelli"

@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 from steptwin.campaign.description import SALTELLI
 from steptwin.errors import Misuse
 from steptwin.extras import libraries_of, missing
-from steptwin.world.chance import Chance
+from steptwin.simulation.scheduler.chance import Chance
 
 Design: TypeAlias = Callable[[int], Sequence[float]]
 """The point of a number: for each dimension a number from 0 to below 1."""

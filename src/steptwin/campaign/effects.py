@@ -12,7 +12,7 @@ from steptwin.files.world import World
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion.divisions import StepTrain
 from steptwin.motion.profile import Profile
-from steptwin.world.trace import TraceRecord
+from steptwin.simulation.scheduler.trace import TraceRecord
 
 LATER = 0.01
 """A run is later if it exceeds the duration of the run without a fault by more than this share."""

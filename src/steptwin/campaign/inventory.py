@@ -7,12 +7,12 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 from steptwin.errors import Misuse
-from steptwin.world.faults import Fault, parse
-from steptwin.world.faults.kinds import KINDS
-from steptwin.world.faults.table import FaultKind, FaultValue, Layer, Occasion
-from steptwin.world.lines import SCRIPTS
-from steptwin.world.plant import Plant
-from steptwin.world.script import Repeat, Set, Step
+from steptwin.simulation.faults import Fault, parse
+from steptwin.simulation.faults.kinds import KINDS
+from steptwin.simulation.faults.table import FaultKind, FaultValue, Layer, Occasion
+from steptwin.simulation.kinds.lines import SCRIPTS
+from steptwin.simulation.script.steps import Repeat, Set, Step
+from steptwin.simulation.world.plant import Plant
 
 STUCK_INPUT, STUCK_OUTPUT = "stuck-input", "stuck-output"
 TRIED: dict[str, tuple[dict[str, FaultValue], ...]] = {

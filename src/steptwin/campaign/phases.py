@@ -11,9 +11,9 @@ from steptwin.datasheet import PinDirection
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion.divisions import StepTrain
 from steptwin.motion.profile import Profile
-from steptwin.world.elements.button import BUTTON
-from steptwin.world.plant import Plant
-from steptwin.world.trace import TraceRecord
+from steptwin.simulation.components.button import BUTTON
+from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.simulation.world.plant import Plant
 
 MOST_PHASES = 12
 SHOWN = 3

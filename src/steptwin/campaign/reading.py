@@ -28,12 +28,12 @@ from steptwin.files.textfiles import read_text
 from steptwin.files.world import World
 from steptwin.inputfiles import MOST_DESCRIPTION_BYTES
 from steptwin.machine import SECOND, Nanos
-from steptwin.world.expression import parse_condition
-from steptwin.world.reader import Key, TomlText, optional, read_table
-from steptwin.world.sense import TableRows, check_sense
-from steptwin.world.tables import SEED, tables
-from steptwin.world.tomlplaces import Path as TomlPath
-from steptwin.world.values import flag, name_value, number, positive_time, text_value, whole, word
+from steptwin.simulation.describe.tables import SEED, tables
+from steptwin.simulation.logic.expression import parse_condition
+from steptwin.simulation.toml.reader import Key, TomlText, optional, read_table
+from steptwin.simulation.toml.sense import TableRows, check_sense
+from steptwin.simulation.toml.tomlplaces import Path as TomlPath
+from steptwin.simulation.toml.values import flag, name_value, number, positive_time, text_value, whole, word
 
 MOST_RUNS = 1_000_000_000
 MOST_PHASES = 1000

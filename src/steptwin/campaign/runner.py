@@ -18,16 +18,16 @@ from steptwin.coverage.watch import WorldCoverage
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.files.world import World
 from steptwin.machine import SECOND, Nanos
-from steptwin.world import script as do
-from steptwin.world import steptable
-from steptwin.world.blueprint import Blueprint
-from steptwin.world.description import read_world
-from steptwin.world.faults import read as read_fault
-from steptwin.world.overrides import Overrides
-from steptwin.world.pieces import given_files
-from steptwin.world.plantsnapshot import PlantSnapshot
-from steptwin.world.reader import TomlText
-from steptwin.world.references import check_step
+from steptwin.simulation.describe import steptable
+from steptwin.simulation.describe.blueprint import Blueprint
+from steptwin.simulation.describe.description import read_world
+from steptwin.simulation.describe.overrides import Overrides
+from steptwin.simulation.describe.pieces import given_files
+from steptwin.simulation.faults import read as read_fault
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.toml.reader import TomlText
+from steptwin.simulation.world.plantsnapshot import PlantSnapshot
+from steptwin.simulation.world.references import check_step
 
 MOST_BLUEPRINTS = 16
 """So many descriptions that differ are kept, for cases that have the same values."""

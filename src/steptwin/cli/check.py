@@ -1,6 +1,6 @@
 """``steptwin check``: everything wrong or doubtful in a file, at once. Exit code 1 if there are errors.
 
-From Python: `steptwin.m1486.check.check`, `steptwin.wbc.check.check`, `steptwin.world.check.diagnose`.
+From Python: `steptwin.m1486.check.check`, `steptwin.wbc.check.check`, `steptwin.simulation.world.check.diagnose`.
 The JSON is described in docs/reference/check-json.md.
 """
 

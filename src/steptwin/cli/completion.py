@@ -48,7 +48,7 @@ def pins(context: typer.Context, incomplete: str) -> list[str]:
 
 def faults(context: typer.Context, incomplete: str) -> list[str]:
     """The kinds of faults, then ``NAME=`` of what the kind takes."""
-    from steptwin.world.elements import fault_kinds
+    from steptwin.simulation.components.registry import fault_kinds
 
     kinds = fault_kinds()
     words = context.params.get("words") or []

@@ -1,6 +1,6 @@
 """``steptwin datasheet``: the data sheet of a kind of controllers, or of a controller of a running twin.
 
-From Python: `steptwin.world.kind.ControllerKind.datasheet_of`, and `description` of a subject.
+From Python: `steptwin.simulation.kinds.kind.ControllerKind.datasheet_of`, and `description` of a subject.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def command(
 
 
 def _of_kind(name: str, variant: str | None, twin: str | None) -> Datasheet:
-    from steptwin.world.kinds import KINDS
+    from steptwin.simulation.kinds.registry import KINDS
 
     if twin is not None:
         raise Misuse("KIND and --device exclude each other")

@@ -30,8 +30,8 @@ def command(
         if match is None:
             raise Misuse(f"{change!r}: expected M1+40, M1-40, M1=drive, M1=free or M1=blocked")
         wanted[int(match[1])] = int(match[2]) if match[2] else match[3].lower()
+    from steptwin.simulation.script.steps import Couple, Turn
     from steptwin.subject.commands import Encoders
-    from steptwin.world.script import Couple, Turn
 
     with selected(twin) as there:
         machine = there.one()

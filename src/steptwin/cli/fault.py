@@ -1,6 +1,6 @@
 """``steptwin fault``: faults of a running twin.
 
-From Python: `steptwin.world.faults`.
+From Python: `steptwin.simulation.faults`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from steptwin.cli.selected import selected
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
-    from steptwin.world.faults.table import Parameter
+    from steptwin.simulation.faults.table import Parameter
 
 
 def command(
@@ -41,9 +41,9 @@ def command(
         return
     if clear and clear_all:
         raise Misuse("--clear and --clear-all exclude each other")
+    from steptwin.simulation.faults import read
+    from steptwin.simulation.script.steps import ClearFault, SetFault
     from steptwin.subject.commands import ListFaults
-    from steptwin.world.faults import read
-    from steptwin.world.script import ClearFault, SetFault
 
     wanted = read(" ".join(words)) if words else None
     with selected(twin) as twin_:
@@ -67,9 +67,9 @@ def command(
 
 def sections() -> list[PageSection]:
     """The table of faults for people."""
-    from steptwin.world.elements import failing, fault_kinds
-    from steptwin.world.faults.kinds import shared
-    from steptwin.world.faults.table import Layer
+    from steptwin.simulation.components.registry import failing, fault_kinds
+    from steptwin.simulation.faults.kinds import shared
+    from steptwin.simulation.faults.table import Layer
 
     def described(parameter: Parameter) -> str:
         default = "required" if parameter.is_required else _else(parameter)

@@ -50,7 +50,7 @@ def command(
 
 def _changes(there: Selected, wanted: dict[str, float]) -> list[Command]:
     """The commands for pins and buttons: one for all pins, then one for each button."""
-    from steptwin.world.script import Press, Release, Set
+    from steptwin.simulation.script.steps import Press, Release, Set
 
     levels: list[tuple[str, str, float]] = []
     buttons: list[Command] = []

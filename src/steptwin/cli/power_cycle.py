@@ -11,7 +11,7 @@ from steptwin.cli.selected import selected
 
 def command(twin: Twin = None) -> None:
     """Switch a running twin off and on again."""
-    from steptwin.world.script import PowerCycle
+    from steptwin.simulation.script.steps import PowerCycle
 
     with selected(twin) as there:
         for machine in there.shown:

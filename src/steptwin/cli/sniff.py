@@ -45,7 +45,7 @@ def command(
 
     from steptwin.commands.sniff import sniff as run
     from steptwin.drivers.place import parse_line_address
-    from steptwin.world.addresses import parse_address
+    from steptwin.simulation.toml.addresses import parse_address
 
     decoding = _decoding(language, {"firmware": firmware, "variant": variant})
     place = parse_line_address(address, baud)

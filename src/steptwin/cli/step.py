@@ -29,11 +29,11 @@ def command(
 ) -> None:
     """Advance a world by a time, to a condition or to its next event, show what happened, and pause."""
     from steptwin.files.timedinputs import parse_duration
+    from steptwin.simulation.world.records import ALL, read_selection
     from steptwin.subject.commands import Advance, Describe
     from steptwin.subject.contract import read_description
     from steptwin.subject.events import read_event
     from steptwin.subject.payloads import STEP_KINDS, named_in
-    from steptwin.world.records import ALL, read_selection
 
     selection = ALL
     if of or show:

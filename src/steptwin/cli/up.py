@@ -27,7 +27,7 @@ from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND
 
 if TYPE_CHECKING:
-    from steptwin.world.reader import Key
+    from steptwin.simulation.toml.reader import Key
 
 
 @grouped
@@ -70,8 +70,8 @@ def command(
 
 def sections() -> list[PageSection]:
     """The tables of a description, for people."""
-    from steptwin.world.steptable import ACTIONS, REPEAT, STEPS
-    from steptwin.world.tables import written_tables
+    from steptwin.simulation.describe.steptable import ACTIONS, REPEAT, STEPS
+    from steptwin.simulation.describe.tables import written_tables
 
     found = [
         PageSection(
@@ -89,7 +89,7 @@ def sections() -> list[PageSection]:
 
 
 def _default(key: Key) -> str:
-    from steptwin.world.values import positive_time, time_value, whole_seconds
+    from steptwin.simulation.toml.values import positive_time, time_value, whole_seconds
 
     value = key.default
     if value is None or value == ():

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from steptwin.commands.telling import Telling
     from steptwin.commands.up_world import UpOptions
     from steptwin.machine import Nanos
-    from steptwin.world.overrides import Overrides
+    from steptwin.simulation.describe.overrides import Overrides
 
 Faults = Annotated[
     list[str] | None,
@@ -89,7 +89,7 @@ class WorldRunOptions(OptionGroup):
     @property
     def overrides(self) -> Overrides:
         """Values that replace those of the description. Raises `Misuse`."""
-        from steptwin.world.overrides import read_overrides
+        from steptwin.simulation.describe.overrides import read_overrides
 
         return read_overrides(self.with_ or ())
 

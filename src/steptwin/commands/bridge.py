@@ -27,14 +27,14 @@ from steptwin.later import start
 from steptwin.live.server import Server
 from steptwin.live.twins import find_device
 from steptwin.machine import Nanos
+from steptwin.simulation.kinds.lines import LineTraffic
+from steptwin.simulation.toml.addresses import check_addresses
 from steptwin.subject.commands import Command, Jog
 from steptwin.subject.contract import Description, Reading, Result
 from steptwin.subject.events import Event, Numbering
 from steptwin.subject.following import Filter, Following
 from steptwin.subject.jogs import Held
 from steptwin.textcodec import decode
-from steptwin.world.addresses import check_addresses
-from steptwin.world.lines import LineTraffic
 
 
 def bridge(file: Path, *, listen_any: bool, ready_file: Path | None, audit: Path | None, telling: Telling) -> None:

@@ -13,8 +13,8 @@ from steptwin.access.roles import ROLES
 from steptwin.errors import Misuse
 from steptwin.extras import missing
 from steptwin.files.writing import PRIVATE, new_content
+from steptwin.simulation.describe.gateways import APPLICATION_URI
 from steptwin.system import reason
-from steptwin.world.gateways import APPLICATION_URI
 
 CERTIFICATE, KEY = "certificate.pem", "key.pem"
 ALWAYS = ("localhost", "127.0.0.1", "::1")

@@ -10,10 +10,10 @@ from steptwin.files.world import World
 from steptwin.inputfiles import read_bytes
 from steptwin.live.clients import listening
 from steptwin.live.directory import runtime_directory
+from steptwin.simulation.describe.description import read_world
+from steptwin.simulation.toml.addresses import Address
 from steptwin.system import HAS_PTYS
 from steptwin.textcodec import decode
-from steptwin.world.addresses import Address
-from steptwin.world.description import read_world
 
 FOLDER = Path(__file__).with_name("demo_machine")
 NAME = "demo"

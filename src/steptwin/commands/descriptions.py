@@ -11,7 +11,7 @@ from steptwin.errors import Misuse
 from steptwin.files.textfiles import check_folder, write_bytes
 from steptwin.files.writing import is_written_directly
 from steptwin.inputfiles import read_bytes
-from steptwin.world.description import read_world
+from steptwin.simulation.describe.description import read_world
 
 Named: TypeAlias = Callable[[Path], str]
 """The name of a file in a description."""

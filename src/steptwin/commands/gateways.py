@@ -15,15 +15,15 @@ from steptwin.live.server import EndPoint, Server
 from steptwin.live.world import LiveWorld
 from steptwin.live.world_control import WorldControl
 from steptwin.machine import Nanos
+from steptwin.simulation.describe.gateways import GatewaySpec
+from steptwin.simulation.describe.historytable import HISTORY, HistorySpec
+from steptwin.simulation.kinds.lines import LineTraffic
 from steptwin.subject.commands import Command, Jog, row_of
 from steptwin.subject.contract import Description, Reading, Result
 from steptwin.subject.events import Event
 from steptwin.subject.following import Filter, Following
 from steptwin.subject.jogs import Held, WorldJogs
 from steptwin.tracing import span
-from steptwin.world.gateways import GatewaySpec
-from steptwin.world.historytable import HISTORY, HistorySpec
-from steptwin.world.lines import LineTraffic
 
 if TYPE_CHECKING:
     from steptwin.history.keeper import HistoryKeeper

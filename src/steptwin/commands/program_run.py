@@ -13,9 +13,9 @@ from steptwin.files.export import axis_views, bar, write_trace
 from steptwin.files.timedinputs import TimedInput
 from steptwin.files.world import World
 from steptwin.machine import SECOND, Nanos
+from steptwin.simulation.describe.overrides import NO_OVERRIDES, Overrides
+from steptwin.simulation.describe.small import InputChange
 from steptwin.wbc.real import real_text
-from steptwin.world.overrides import NO_OVERRIDES, Overrides
-from steptwin.world.small import InputChange
 
 USUAL_LIMIT_NS: Nanos = 60 * SECOND
 LIMIT_UNTIL_IDLE_NS: Nanos = 3600 * SECOND

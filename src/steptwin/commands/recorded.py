@@ -10,7 +10,7 @@ from steptwin.files import session as sessions
 from steptwin.files.beginning import is_session
 from steptwin.files.world import World
 from steptwin.machine import SECOND, Nanos
-from steptwin.world.history import History, replay
+from steptwin.simulation.world.history import History, replay
 
 STATE_NS: Nanos = SECOND
 """A state is kept so often. [virtual time]"""

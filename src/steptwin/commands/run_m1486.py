@@ -47,13 +47,13 @@ from steptwin.m1486.present import program_words, velocity
 from steptwin.m1486.unit import counter_text
 from steptwin.m1486.variants import DEFAULT, Store, Variant, variant
 from steptwin.machine import SECOND, Nanos
+from steptwin.simulation.describe.small import InputChange, Whole
+from steptwin.simulation.describe.small_m1486 import chip_name, m1486_world
+from steptwin.simulation.kinds.lines import SCRIPTS
+from steptwin.simulation.kinds.m1486.memory import PLACE
+from steptwin.simulation.kinds.programs import StatementFollower
+from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.wire.slave import FrameDirection
-from steptwin.world.kinds.m1486.memory import PLACE
-from steptwin.world.kinds.m1486.small import chip_name, m1486_world
-from steptwin.world.lines import SCRIPTS
-from steptwin.world.programs import StatementFollower
-from steptwin.world.small import InputChange, Whole
-from steptwin.world.trace import TraceRecord
 
 JSON_VERSION = 1
 

@@ -45,16 +45,16 @@ from steptwin.mic488.inputs import index_input
 from steptwin.mic488.present import place_of, state_of
 from steptwin.mic488.program import RUNNING
 from steptwin.mic488.status import AxisStatus, ProgramState
+from steptwin.simulation.describe.overrides import NO_OVERRIDES
+from steptwin.simulation.describe.small import Whole
+from steptwin.simulation.describe.small_mic488 import mic488_world
+from steptwin.simulation.kinds.mic488.program_watch import ProgramEvent, ProgramWatch
+from steptwin.simulation.kinds.programs import StatementFollower
+from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.wbc.dialect import DEFAULT, dialect_for
 from steptwin.wbc.interpreter import STATEMENT_TIME
 from steptwin.wbc.real import real_text
 from steptwin.wbc.usage import homing_sides
-from steptwin.world.kinds.mic488.program_watch import ProgramEvent, ProgramWatch
-from steptwin.world.kinds.mic488.small import mic488_world
-from steptwin.world.overrides import NO_OVERRIDES
-from steptwin.world.programs import StatementFollower
-from steptwin.world.small import Whole
-from steptwin.world.trace import TraceRecord
 
 NAME = "mic488"
 """The name of the controller in the world."""

@@ -25,14 +25,14 @@ from steptwin.files.timedinputs import TimedInput
 from steptwin.files.world import LONGEST_RUN_NS, World
 from steptwin.live.interrupts import FirstInterrupt
 from steptwin.machine import SECOND, Nanos
-from steptwin.world import script as do
-from steptwin.world.condition import INSTEAD
-from steptwin.world.kind import ProgramAct, ProgramReport
-from steptwin.world.overrides import Overrides
-from steptwin.world.records import PROGRAM, Selection, describe, is_shown, named_in, read_selection
-from steptwin.world.references import check_step
-from steptwin.world.trace import TraceRecord
-from steptwin.world.unfinished import unchanged_inputs, waiting
+from steptwin.simulation.describe.overrides import Overrides
+from steptwin.simulation.kinds.kind import ProgramAct, ProgramReport
+from steptwin.simulation.logic.condition import INSTEAD
+from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.world.records import PROGRAM, Selection, describe, is_shown, named_in, read_selection
+from steptwin.simulation.world.references import check_step
+from steptwin.simulation.world.unfinished import unchanged_inputs, waiting
 
 USUAL_LIMIT_NS: Nanos = 60 * SECOND
 SESSION = "session.json"
@@ -78,7 +78,8 @@ class WorldRun:
     """Whether a wait that timed out counts as a failure."""
     as_json: bool = False
     names: Sequence[str] = ()
-    """What is shown of what happens: of these controllers, elements and lines only (`steptwin.world.records.Selection`)."""
+    """What is shown of what happens: of these controllers, elements and lines only
+    (`steptwin.simulation.world.records.Selection`)."""
     kinds: Sequence[str] = ()
 
 

@@ -13,10 +13,10 @@ from steptwin.files.world import World
 from steptwin.inputfiles import read_bytes
 from steptwin.live.serving import check_name
 from steptwin.live.transports import TRANSPORTS
-from steptwin.world.addresses import check_addresses
-from steptwin.world.description import read_world
-from steptwin.world.faults import read as read_fault
-from steptwin.world.small import Whole
+from steptwin.simulation.describe.description import read_world
+from steptwin.simulation.describe.small import Whole
+from steptwin.simulation.faults import read as read_fault
+from steptwin.simulation.toml.addresses import check_addresses
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,7 +13,7 @@ from steptwin.live.serving import check_line_timing
 from steptwin.m1486.lines import interface
 from steptwin.m1486.pins import baud_pins
 from steptwin.m1486.variants import DEFAULT, variant
-from steptwin.world.kinds.m1486.small import m1486_world
+from steptwin.simulation.describe.small_m1486 import m1486_world
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,8 +16,8 @@ from steptwin.machine import MILLISECOND, Nanos
 from steptwin.mic488.config import BAUDS
 from steptwin.mic488.registers import firmware as known_firmware
 from steptwin.numerals import read_whole
+from steptwin.simulation.describe.small_mic488 import mic488_world
 from steptwin.wbc.interpreter import STATEMENT_TIME
-from steptwin.world.kinds.mic488.small import mic488_world
 
 MOST_GAP_MS = 10_000.0
 

@@ -18,9 +18,9 @@ from steptwin.live.clock import Clock
 from steptwin.live.pty import PtyLink
 from steptwin.live.tcp import TcpLink
 from steptwin.machine import SECOND, Nanos, Port
+from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.toml.addresses import Address
 from steptwin.wire.slave import FrameDirection
-from steptwin.world.addresses import Address
-from steptwin.world.kernel import Kernel
 
 ARROWS = {FrameDirection.IN: "→", FrameDirection.OUT: "←"}
 

@@ -50,18 +50,18 @@ from steptwin.live.ports import serial_ports, twin_ports
 from steptwin.live.server import EndPoint, Server
 from steptwin.live.twins import find_device
 from steptwin.live.world import LiveWorld
+from steptwin.simulation.describe.blueprint import Blueprint
+from steptwin.simulation.describe.description import read_world
+from steptwin.simulation.describe.pieces import given_files
+from steptwin.simulation.toml.addresses import Address, is_loopback, parse_address
+from steptwin.simulation.world.history import History
+from steptwin.simulation.world.worldprograms import WorldPrograms, configuration_text
 from steptwin.studio.hub import Hub
 from steptwin.studio.service import StudioService
 from steptwin.studio.surroundings import PresentMoment, Surroundings
 from steptwin.studio.work import DeviceWork
 from steptwin.subject.events import Numbering
 from steptwin.subject.jogs import WorldJogs
-from steptwin.world.addresses import Address, is_loopback, parse_address
-from steptwin.world.blueprint import Blueprint
-from steptwin.world.description import read_world
-from steptwin.world.history import History
-from steptwin.world.pieces import given_files
-from steptwin.world.worldprograms import WorldPrograms, configuration_text
 
 DEFAULT = Address("127.0.0.1", 8488)
 ANY = ("0.0.0.0", "::")

@@ -18,8 +18,8 @@ from steptwin.live.cell import Cell
 from steptwin.live.lookback import Lookback
 from steptwin.live.world import LiveWorld
 from steptwin.machine import MILLISECOND, Nanos
-from steptwin.world.plantsnapshot import PlantSnapshot
-from steptwin.world.trace import Mark
+from steptwin.simulation.scheduler.trace import Mark
+from steptwin.simulation.world.plantsnapshot import PlantSnapshot
 
 MOST_BRANCHES = 4
 MODULE = "steptwin.commands.studio_branch"

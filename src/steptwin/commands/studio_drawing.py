@@ -8,8 +8,8 @@ from pathlib import Path
 from steptwin.errors import Misuse
 from steptwin.files.ownfolder import place_in
 from steptwin.files.textfiles import read_text, write_bytes
-from steptwin.world.arrangement import OTHERS, DrawnPlace, arranged
-from steptwin.world.spec import WorldSpec
+from steptwin.simulation.describe.arrangement import OTHERS, DrawnPlace, arranged
+from steptwin.simulation.describe.spec import WorldSpec
 
 
 class WorldArrangement:

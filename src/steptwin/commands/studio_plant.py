@@ -11,8 +11,8 @@ from steptwin.errors import Misuse, Refusal
 from steptwin.eventloop import later
 from steptwin.gateways.contract import OpenGateway
 from steptwin.machine import SECOND
+from steptwin.simulation.describe.historytable import HISTORY
 from steptwin.studio.plantrequests import MOST_POINTS, MOST_WRITES
-from steptwin.world.historytable import HISTORY
 
 if TYPE_CHECKING:
     from steptwin.history.reading import HistoryDatabase, KeptEvent, KeptRun, PointSeries

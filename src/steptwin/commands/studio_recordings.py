@@ -21,7 +21,7 @@ from steptwin.files.ownfolder import place_in
 from steptwin.files.savedsessions import SavedSession, path_of, read_saved, saved_sessions
 from steptwin.live.cell import Cell
 from steptwin.live.world import MOST_INPUT_BYTES, MOST_INPUTS, LiveWorld
-from steptwin.world import history
+from steptwin.simulation.world import history
 
 EXPORT_S = 300.0
 """Longest duration of an export."""

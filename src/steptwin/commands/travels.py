@@ -9,8 +9,8 @@ from steptwin.errors import Misuse
 from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.mic488.registers import AXES, INPUTS
 from steptwin.numerals import read_number, read_whole
+from steptwin.simulation.describe.small_mic488 import AxisSwitches
 from steptwin.wbc.real import real_text
-from steptwin.world.kinds.mic488.small import AxisSwitches
 
 ASSUMED_TRAVEL_S = 0.1
 """Distance of an assumed homing switch from the position at power-on, as travel time at VMAX, s."""

@@ -39,15 +39,15 @@ from steptwin.live.transports import TRANSPORTS, VISION
 from steptwin.live.world import LiveWorld, PlacePort, VisionPort, announced
 from steptwin.live.world_control import WorldControl
 from steptwin.machine import Nanos, SendingPort
+from steptwin.simulation.describe.overrides import Overrides
+from steptwin.simulation.kinds.kind import LineSpec, LinkKind
+from steptwin.simulation.kinds.lines import SCRIPTS
+from steptwin.simulation.kinds.registry import line_kinds
+from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.simulation.toml.addresses import check_addresses, parse_address
+from steptwin.simulation.world.inputs import Leave
+from steptwin.simulation.world.records import is_shown, named_in, read_selection
 from steptwin.tracing import is_traced
-from steptwin.world.addresses import check_addresses, parse_address
-from steptwin.world.inputs import Leave
-from steptwin.world.kind import LineSpec, LinkKind
-from steptwin.world.kinds import line_kinds
-from steptwin.world.lines import SCRIPTS
-from steptwin.world.overrides import Overrides
-from steptwin.world.records import is_shown, named_in, read_selection
-from steptwin.world.trace import TraceRecord
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,7 +84,7 @@ class UpOptions:
     listen_any: bool = False
     log_frames: bool = False
     names: Sequence[str] = ()
-    """What is shown: of these controllers, elements and lines only (`steptwin.world.records.Selection`)."""
+    """What is shown: of these controllers, elements and lines only (`steptwin.simulation.world.records.Selection`)."""
     kinds: Sequence[str] = ()
     audit: Audit | None = None
     """Where commands of gateways are recorded."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from steptwin.diagnostics import SourceText
-from steptwin.world.programs import Statement
+from steptwin.simulation.kinds.programs import Statement
 
 END = -1
 """Stands for the end of a program, which comes next after its last statement."""

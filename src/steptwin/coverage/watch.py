@@ -12,8 +12,8 @@ from typing import NamedTuple
 from steptwin.coverage.counts import END, Coverage, TextCoverage, Way
 from steptwin.diagnostics import SourceText
 from steptwin.machine import Nanos
-from steptwin.world.plant import Plant
-from steptwin.world.programs import Place, Programs
+from steptwin.simulation.kinds.programs import Place, Programs
+from steptwin.simulation.world.plant import Plant
 
 
 class WorldCoverage:

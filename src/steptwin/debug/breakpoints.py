@@ -13,8 +13,8 @@ from steptwin.debug.values import DataPoint, LabelPoint, LinePoint, SetPoint
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.nearmiss import NearMiss
-from steptwin.world.plant import Plant
-from steptwin.world.programs import Place, Programs
+from steptwin.simulation.kinds.programs import Place, Programs
+from steptwin.simulation.world.plant import Plant
 
 MOST_HITS = 1 << 16
 """Hits of one breakpoint that can be found again in the past; older ones are only counted."""

@@ -1,7 +1,7 @@
 """Expressions of a user at a breakpoint: ``n + 1``, ``PosM1 > 50 and IN3 = ON``, ``other.OUT2 = 1``.
 
-Their language is that of `steptwin.world.expression`. Names without a dot are those of the program; with a dot, signals of the
-world.
+Their language is that of `steptwin.simulation.logic.expression`. Names without a dot are those of the program; with a dot,
+signals of the world.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from sys import float_info
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.nearmiss import NearMiss
-from steptwin.world.expression import ReadAt, parse_expression, value_of
-from steptwin.world.plant import Plant
-from steptwin.world.quantities import unit_of_all
-from steptwin.world.signal import SignalOf
-from steptwin.world.signals import Idle
+from steptwin.simulation.components.signals import Idle
+from steptwin.simulation.logic.expression import ReadAt, parse_expression, value_of
+from steptwin.simulation.logic.quantities import unit_of_all
+from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.world.plant import Plant
 
 EXACT = 1e15
 """Whole numbers below it are shown with all their digits."""

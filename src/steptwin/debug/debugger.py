@@ -3,7 +3,7 @@
 It stands between two moments of the world. Before the world goes on, a second one, the scout, goes ahead and finds the moment at
 which the run is to stop (`steptwin.debug.scout`); then the world is run to the end of the moment before it. So the world itself
 is only run, as ever. The scout is also what is looked at in the past, to which it is brought by a state and the inputs since
-(`steptwin.world.history`).
+(`steptwin.simulation.world.history`).
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from steptwin.debug.values import Events, Location, Scope, SetPoint, ShownValue,
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
+from steptwin.simulation.kinds.programs import Place, Programs
+from steptwin.simulation.world.history import History, outside_past
+from steptwin.simulation.world.inputs import ExternalInput
+from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.plantsnapshot import PlantSnapshot
 from steptwin.subject.time import next_due
 from steptwin.why.answer import Answer
 from steptwin.why.kept import PastQuestions
-from steptwin.world.history import History, outside_past
-from steptwin.world.inputs import ExternalInput
-from steptwin.world.plant import Plant
-from steptwin.world.plantsnapshot import PlantSnapshot
-from steptwin.world.programs import Place, Programs
 
 T = TypeVar("T")
 

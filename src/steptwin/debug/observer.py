@@ -8,10 +8,10 @@ from typing import NamedTuple
 from steptwin.debug.breakpoints import Breakpoint, Breakpoints
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.simulation.kinds.programs import Place, Programs
+from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.simulation.world.plant import Plant
 from steptwin.statements import StatementHook
-from steptwin.world.plant import Plant
-from steptwin.world.programs import Place, Programs
-from steptwin.world.trace import TraceRecord
 
 
 class Begun(NamedTuple):

@@ -12,11 +12,11 @@ from steptwin.debug.values import Scope, ShownValue
 from steptwin.errors import Misuse
 from steptwin.motioncontroller import MotionController
 from steptwin.points import LivePoint
+from steptwin.simulation.kinds.kind import AnyKind
+from steptwin.simulation.script.steps import Set, Write
+from steptwin.simulation.world.inputs import ExternalInput, SetVariable
+from steptwin.simulation.world.plant import Plant
 from steptwin.subject.debugcommands import SCOPES
-from steptwin.world.inputs import ExternalInput, SetVariable
-from steptwin.world.kind import AnyKind
-from steptwin.world.plant import Plant
-from steptwin.world.script import Set, Write
 
 VARIABLES, AXES, PINS, CONTROLLER, REGISTERS, PARTS = SCOPES
 

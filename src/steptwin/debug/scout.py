@@ -16,8 +16,8 @@ from steptwin.debug.calculation import ResolvedExpression
 from steptwin.debug.observer import Begun, Logged, Observer
 from steptwin.debug.values import LabelPoint, Stopped, StopReason
 from steptwin.machine import Nanos
+from steptwin.simulation.world.history import History, Past
 from steptwin.subject.time import next_due
-from steptwin.world.history import History, Past
 
 Parts: TypeAlias = Generator[None, None, None]
 """Of what can be interrupted."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from steptwin.machine import Nanos
-from steptwin.world.programs import Place
+from steptwin.simulation.kinds.programs import Place
 
 
 class StopReason(enum.Enum):

@@ -12,13 +12,13 @@ from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
 from steptwin.later import start
 from steptwin.machine import Nanos
 from steptwin.nearmiss import NearMiss
+from steptwin.simulation.script import steps
 from steptwin.subject import commands as command
 from steptwin.subject.commands import COMMANDS, Command, row_of
 from steptwin.subject.contract import UNKNOWN, Description, Reading, Result
 from steptwin.subject.events import Event, Numbering
 from steptwin.subject.following import Filter, Followers, Following
 from steptwin.subject.jogs import Held
-from steptwin.world import script as steps
 
 TIME = "time"
 

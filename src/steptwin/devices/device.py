@@ -19,6 +19,8 @@ from steptwin.drivers.subject import AsyncDeviceSubject, DevicePart, RawEffect
 from steptwin.errors import LineFailure, Refusal, SteptwinError
 from steptwin.eventloop import later
 from steptwin.machine import SECOND, Nanos
+from steptwin.simulation.script import steps
+from steptwin.simulation.script.control import Halt, ended
 from steptwin.subject import commands as command
 from steptwin.subject.commands import Command, row_of
 from steptwin.subject.contract import UNKNOWN, Description, Reading, Result
@@ -27,8 +29,6 @@ from steptwin.subject.following import Filter, Followers
 from steptwin.subject.jogs import Held
 from steptwin.subject.payloads import NOT_ENABLED, InputPayload, StatusPayload
 from steptwin.tracing import span
-from steptwin.world import script as steps
-from steptwin.world.control import Halt, ended
 
 POLL_S = 0.1
 """A device is polled at most this often, and at most half of the time."""

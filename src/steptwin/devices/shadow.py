@@ -18,14 +18,14 @@ from typing import NamedTuple
 from steptwin.datasheet import AxisDescription, Datasheet, PinDirection
 from steptwin.errors import SteptwinError
 from steptwin.machine import SECOND, Nanos
+from steptwin.simulation.describe.blueprint import Blueprint
+from steptwin.simulation.describe.description import read_world
+from steptwin.simulation.script import steps
+from steptwin.simulation.world.plant import Plant
 from steptwin.subject import commands as command
 from steptwin.subject.commands import Command, row_of
 from steptwin.subject.devicetwin import DeviceTwin
 from steptwin.subject.world import WorldSubject
-from steptwin.world import script as steps
-from steptwin.world.blueprint import Blueprint
-from steptwin.world.description import read_world
-from steptwin.world.plant import Plant
 
 MOST_SAMPLES = 3000
 MOST_PROBLEMS = 20

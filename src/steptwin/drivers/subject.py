@@ -25,6 +25,7 @@ from steptwin.drivers.lineframes import FRAMES, LineFrames, SeenFrame
 from steptwin.errors import Misuse, Refusal
 from steptwin.machine import SECOND, Nanos
 from steptwin.nearmiss import NearMiss
+from steptwin.simulation.script import steps
 from steptwin.subject import commands as command
 from steptwin.subject.commands import COMMANDS, Command, row_of
 from steptwin.subject.contract import GOOD, UNKNOWN, Description, LinePart, MachinePart, Reading, Result
@@ -33,7 +34,6 @@ from steptwin.subject.devicetwin import DeviceTwin
 from steptwin.subject.events import Event, Numbering
 from steptwin.subject.following import EventBatch, Filter, Followers, Following
 from steptwin.subject.payloads import FramePayload, Payload, SamplePayload
-from steptwin.world import script as steps
 
 PERIOD_S = 0.2
 PERIODS_S = (0.02, 60.0)

@@ -11,9 +11,9 @@ from steptwin.files.textfiles import check_writable
 from steptwin.files.world import World
 from steptwin.files.writing import is_written_directly
 from steptwin.machine import Nanos
-from steptwin.world import script as do
-from steptwin.world.faults import read as read_fault
-from steptwin.world.overrides import NO_OVERRIDES, Overrides
+from steptwin.simulation.describe.overrides import NO_OVERRIDES, Overrides
+from steptwin.simulation.faults import read as read_fault
+from steptwin.simulation.script import steps as do
 
 SESSION_SUFFIX = ".json"
 

@@ -15,7 +15,7 @@ from steptwin.coverage.table import table
 from steptwin.coverage.watch import WorldCoverage
 from steptwin.errors import Misuse
 from steptwin.files.textfiles import check_writable, write_bytes
-from steptwin.world.plant import Plant
+from steptwin.simulation.world.plant import Plant
 
 STANDARD_OUTPUT = "-"
 """The target of the table."""

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from steptwin.errors import Misuse
-from steptwin.world.blueprint import Blueprint
+from steptwin.simulation.describe.blueprint import Blueprint
 
 MOST_KNOWN = 8
 """The blueprints that were loaded last."""

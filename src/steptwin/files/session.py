@@ -20,16 +20,16 @@ from steptwin.files.world import FailedSave, World
 from steptwin.inputfiles import read_recorded
 from steptwin.machine import SECOND, Nanos
 from steptwin.plaintypes import fitting
-from steptwin.world import script as do
-from steptwin.world.actions import ACTIONS
-from steptwin.world.blueprint import Blueprint
-from steptwin.world.description import read_world
-from steptwin.world.faults import Fault, parse
-from steptwin.world.history import replay
-from steptwin.world.inputs import ExternalInput
-from steptwin.world.overrides import Overrides
-from steptwin.world.pieces import given_files
-from steptwin.world.plantsnapshot import RecordedInput
+from steptwin.simulation.describe.blueprint import Blueprint
+from steptwin.simulation.describe.description import read_world
+from steptwin.simulation.describe.overrides import Overrides
+from steptwin.simulation.describe.pieces import given_files
+from steptwin.simulation.faults import Fault, parse
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.world.actions import ACTIONS
+from steptwin.simulation.world.history import replay
+from steptwin.simulation.world.inputs import ExternalInput
+from steptwin.simulation.world.plantsnapshot import RecordedInput
 
 FORMAT = 1
 LONGEST_NUMBER = 100

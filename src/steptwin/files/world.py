@@ -22,24 +22,24 @@ from steptwin.files.memory import StateDirectory, StateFailure
 from steptwin.files.textfiles import read_text
 from steptwin.inputfiles import MOST_DESCRIPTION_BYTES, read_bytes, shown
 from steptwin.machine import SECOND, Nanos
+from steptwin.simulation.describe.blueprint import Blueprint, memory_file
+from steptwin.simulation.describe.description import describe, read_world
+from steptwin.simulation.describe.overrides import NO_OVERRIDES, Overrides
+from steptwin.simulation.describe.pieces import given_files
+from steptwin.simulation.describe.spec import WorldSpec
+from steptwin.simulation.faults import Fault
+from steptwin.simulation.faults import read as read_fault
+from steptwin.simulation.kinds.kind import ControllerKind, M, S, V
+from steptwin.simulation.kinds.m1486.view import M1486View
+from steptwin.simulation.kinds.mic488.view import Mic488View
+from steptwin.simulation.kinds.registry import M1486, MIC488
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.plantsnapshot import PlantSnapshot
+from steptwin.simulation.world.running import Script
+from steptwin.simulation.world.views import LineView, MechanicsView, Views
 from steptwin.why.answer import Answer
 from steptwin.why.repeated import RepeatedPast
-from steptwin.world import script as do
-from steptwin.world.blueprint import Blueprint, memory_file
-from steptwin.world.description import describe, read_world
-from steptwin.world.faults import Fault
-from steptwin.world.faults import read as read_fault
-from steptwin.world.kind import ControllerKind, M, S, V
-from steptwin.world.kinds import M1486, MIC488
-from steptwin.world.kinds.m1486.view import M1486View
-from steptwin.world.kinds.mic488.view import Mic488View
-from steptwin.world.overrides import NO_OVERRIDES, Overrides
-from steptwin.world.pieces import given_files
-from steptwin.world.plant import Plant
-from steptwin.world.plantsnapshot import PlantSnapshot
-from steptwin.world.running import Script
-from steptwin.world.spec import WorldSpec
-from steptwin.world.views import LineView, MechanicsView, Views
 
 LONGEST_RUN_NS: Nanos = 3600 * SECOND
 """Default limit of a run with a condition, ns: an hour."""
@@ -292,7 +292,7 @@ class World(Plant):
         return self.start(name, partial(do.run_when, _steps(reaction), condition, once=once), is_external=True)
 
     def script(self, operator: Callable[[], do.Steps], name: str | None = None) -> Script:
-        """Start a script: a function that yields steps (`steptwin.world.script`) and is sent their results.
+        """Start a script: a function that yields steps (`steptwin.simulation.script.steps`) and is sent their results.
 
         It touches the world by its steps only; so it can be brought back to any moment.
         """

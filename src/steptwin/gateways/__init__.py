@@ -1,6 +1,6 @@
 """Gateways: protocols through which other programs see a subject, by its static description alone.
 
-Each kind has a file here and a table in `steptwin.world.gateways`.
+Each kind has a file here and a table in `steptwin.simulation.describe.gateways`.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from typing import NamedTuple, cast
 
 from steptwin.extras import libraries_of, missing
 from steptwin.gateways.contract import Gateway, GatewaySubject
+from steptwin.simulation.describe.gateways import GATEWAYS, GatewaySpec
 from steptwin.tables import complete
-from steptwin.world.gateways import GATEWAYS, GatewaySpec
 
 
 class _GatewayModule(NamedTuple):

@@ -13,6 +13,7 @@ from steptwin.access.roles import LOOK, Role
 from steptwin.datasheet import PointEffect
 from steptwin.errors import Refusal, SteptwinError
 from steptwin.gateways.contract import GatewaySubject
+from steptwin.simulation.script.steps import Request, Write
 from steptwin.subject.commands import Command, Home, Move, ReadState, StopAxes, plain_command, row_of
 from steptwin.subject.contract import MachinePart, Result
 from steptwin.subject.dispatch import code_of
@@ -21,7 +22,6 @@ from steptwin.subject.following import Filter, Following
 from steptwin.subject.payloads import NOT_ENABLED, InputPayload, StatusPayload
 from steptwin.tracing import span
 from steptwin.wire.rtu import BROADCAST
-from steptwin.world.script import Request, Write
 
 
 def address_text(address: object) -> str:

@@ -8,12 +8,12 @@ from typing import NamedTuple, Protocol
 
 from steptwin.access.audit import CommandLog
 from steptwin.gateways.sampling import SampledSubject
+from steptwin.simulation.kinds.lines import LineTraffic
 from steptwin.subject.commands import Jog
 from steptwin.subject.contract import Reading
 from steptwin.subject.events import Event
 from steptwin.subject.following import Filter
 from steptwin.subject.jogs import Held
-from steptwin.world.lines import LineTraffic
 
 
 class PastValue(NamedTuple):

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import parse_qsl, urlencode, urlsplit
 
-from steptwin.world.gateways import GATEWAY, GatewaySpec, read_gateways
-from steptwin.world.historytable import HISTORY, HistorySpec, read_history
-from steptwin.world.reader import Key, TomlText, optional, read_table
-from steptwin.world.values import name_value, text_value
+from steptwin.simulation.describe.gateways import GATEWAY, GatewaySpec, read_gateways
+from steptwin.simulation.describe.historytable import HISTORY, HistorySpec, read_history
+from steptwin.simulation.toml.reader import Key, TomlText, optional, read_table
+from steptwin.simulation.toml.values import name_value, text_value
 
 DEVICE, BRIDGE = "device", "bridge"
 DEVICE_KEYS = (

@@ -19,6 +19,9 @@ from steptwin.errors import LineFailure, Misuse, SteptwinError
 from steptwin.gateways.clients import GatewayClient, NotPermitted, address_text
 from steptwin.gateways.contract import ClientState, GatewayState, GatewaySubject
 from steptwin.machine import SECOND
+from steptwin.simulation.describe.gateways import ModbusSpec
+from steptwin.simulation.script.steps import Request
+from steptwin.simulation.toml.addresses import is_loopback, parse_address
 from steptwin.subject.contract import MachinePart, Result
 from steptwin.system import reason
 from steptwin.wire import rtu
@@ -35,9 +38,6 @@ from steptwin.wire.pdu import (
     exception_pdu,
 )
 from steptwin.wire.slave import tcp_response
-from steptwin.world.addresses import is_loopback, parse_address
-from steptwin.world.gateways import ModbusSpec
-from steptwin.world.script import Request
 
 MOST_MASTERS = 64
 MOST_READS = 16

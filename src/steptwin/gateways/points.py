@@ -16,9 +16,9 @@ from steptwin.controllerstate import StatusLevel
 from steptwin.datasheet import Access, AxisDescription, Detail, FactType, Limits, Pin, PinDirection
 from steptwin.errors import Misuse
 from steptwin.nearmiss import NearMiss
+from steptwin.simulation.script.steps import Set, Write
 from steptwin.subject.commands import Command
 from steptwin.subject.contract import Description, MachinePart
-from steptwin.world.script import Set, Write
 
 PointValue: TypeAlias = bool | int | float | str | None
 """None where it is not known."""

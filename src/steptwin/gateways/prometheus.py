@@ -18,8 +18,8 @@ from steptwin.access.roles import Role
 from steptwin.gateways.contract import ClientState, GatewayState, GatewaySubject
 from steptwin.gateways.metrics import PREFIX, Metrics
 from steptwin.httpservice import HttpService, listen
-from steptwin.world.addresses import Address, parse_address
-from steptwin.world.gateways import ListeningSpec
+from steptwin.simulation.describe.gateways import ListeningSpec
+from steptwin.simulation.toml.addresses import Address, parse_address
 
 _Send: TypeAlias = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 TEXT = "text/plain; charset=utf-8"

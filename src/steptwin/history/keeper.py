@@ -20,8 +20,8 @@ from steptwin.history.rows import RowBatch, RunHead
 from steptwin.history.spool import Spool
 from steptwin.history.writer import HistoryWriter
 from steptwin.machine import SECOND
+from steptwin.simulation.describe.historytable import HISTORY, HistorySpec
 from steptwin.system import reason
-from steptwin.world.historytable import HISTORY, HistorySpec
 
 
 class HistoryKeeper:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from steptwin.access.notices import ClientNotices
-from steptwin.world.addresses import Address
+from steptwin.simulation.toml.addresses import Address
 
 BACKLOG = 1024
 RETRY_S = 1.0

@@ -21,13 +21,13 @@ from steptwin.files.ownership import InUse, Ownership
 from steptwin.files.writing import PRIVATE, new_content
 from steptwin.later import start
 from steptwin.live.directory import private_directory, runtime_directory
+from steptwin.simulation.toml.addresses import Address
 from steptwin.subject.commands import Command, Follow, Time, Unfollow
 from steptwin.subject.contract import Result
 from steptwin.subject.dispatch import FORM, LONGEST_REQUEST, Message, failure, read_message, respond
 from steptwin.subject.events import Event
 from steptwin.subject.following import Filter, Following, filter_of
 from steptwin.system import reason
-from steptwin.world.addresses import Address
 
 HAS_LOCAL_SOCKETS = hasattr(socket, "AF_UNIX")
 TIMEOUT_S = 10.0

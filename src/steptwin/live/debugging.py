@@ -24,13 +24,13 @@ from steptwin.live.lookback import PART_S, Lookback, take_back
 from steptwin.live.pace import Pace
 from steptwin.live.world import LiveWorld
 from steptwin.machine import Nanos
+from steptwin.simulation.world.inputs import Download
+from steptwin.simulation.world.model import WORLD
+from steptwin.simulation.world.plantsnapshot import PlantSnapshot, RecordedInput
 from steptwin.subject import debugcommands as command
 from steptwin.subject.dispatch import Action
 from steptwin.subject.payloads import BreakpointsPayload, LogPayload, StoppedPayload
 from steptwin.tables import complete
-from steptwin.world.inputs import Download
-from steptwin.world.model import WORLD
-from steptwin.world.plantsnapshot import PlantSnapshot, RecordedInput
 
 _EVENTS = complete("event", command.EVENTS, "codes", {event.code: event for event in Events})
 

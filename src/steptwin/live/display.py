@@ -10,8 +10,8 @@ from steptwin.live.output import Output
 from steptwin.live.server import EndPoint, Server
 from steptwin.live.world import LiveWorld
 from steptwin.live.world_frames import follow_frames
-from steptwin.world.records import ALL, Selection
-from steptwin.world.trace import TraceRecord
+from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.simulation.world.records import ALL, Selection
 
 
 class Display(Protocol):

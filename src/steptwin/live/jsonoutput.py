@@ -8,9 +8,9 @@ from typing import Any, TextIO
 import structlog
 
 from steptwin.live.output import Output
+from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.subject.events import payload_of
 from steptwin.wire.frameline import FrameLine
-from steptwin.world.trace import TraceRecord
 
 
 class JsonOutput(Output):

@@ -15,11 +15,11 @@ from steptwin.live.cell import Cell
 from steptwin.live.pace import Pace
 from steptwin.live.world import LiveWorld
 from steptwin.machine import Nanos
+from steptwin.simulation.world.history import History, Past
+from steptwin.simulation.world.plantsnapshot import PlantSnapshot
+from steptwin.simulation.world.worldprograms import WorldPrograms
 from steptwin.subject.following import EventBatch, Filter
 from steptwin.subject.world import WorldSubject
-from steptwin.world.history import History, Past
-from steptwin.world.plantsnapshot import PlantSnapshot
-from steptwin.world.worldprograms import WorldPrograms
 
 STATE_S = 1.0
 """A state is kept so often, in real time: what is replayed from it then took no longer when it happened."""

@@ -15,9 +15,9 @@ import threading
 from collections.abc import Mapping, Sequence
 from typing import TextIO
 
+from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.simulation.world.records import describe
 from steptwin.wire.frameline import FrameLine
-from steptwin.world.records import describe
-from steptwin.world.trace import TraceRecord
 
 MOST_WAITING = 10_000
 """Pieces of text kept for a reader that has stopped; later ones are dropped."""

@@ -20,6 +20,9 @@ from steptwin.files.textfiles import check_folder
 from steptwin.live.cell import Cell
 from steptwin.machine import SECOND, Nanos
 from steptwin.numerals import read_number
+from steptwin.simulation.logic.condition import SignalCondition
+from steptwin.simulation.world.model import WORLD
+from steptwin.simulation.world.plantsnapshot import PlantSnapshot
 from steptwin.subject import commands as command
 from steptwin.subject import events
 from steptwin.subject.dispatch import Action
@@ -27,9 +30,6 @@ from steptwin.subject.events import line_of
 from steptwin.subject.fields import FASTEST, SLOWEST
 from steptwin.subject.following import Following
 from steptwin.subject.time import MOST_SHOWN, end_of, happened, shown_of
-from steptwin.world.condition import SignalCondition
-from steptwin.world.model import WORLD
-from steptwin.world.plantsnapshot import PlantSnapshot
 
 if TYPE_CHECKING:
     from steptwin.live.world import LiveWorld

@@ -27,9 +27,9 @@ from steptwin.live.rfc2217 import TwinLine
 from steptwin.live.signals import on_end
 from steptwin.live.transports import LinkArguments, Transport
 from steptwin.machine import SECOND, Nanos, Port
+from steptwin.simulation.kinds.links import TlsFiles
+from steptwin.simulation.toml.addresses import Address
 from steptwin.system import process_exists, reason
-from steptwin.world.addresses import Address
-from steptwin.world.links import TlsFiles
 
 OTHER_FILES = 32
 """Open files other than clients."""

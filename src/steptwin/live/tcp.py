@@ -13,8 +13,8 @@ from steptwin.live.clients import Clients, listening
 from steptwin.live.tcp_asyncio import AsyncioListener
 from steptwin.live.tcp_epoll import EpollListener
 from steptwin.machine import Port
+from steptwin.simulation.toml.addresses import Address
 from steptwin.system import HAS_EPOLL, reason
-from steptwin.world.addresses import Address
 
 
 class Listener(Protocol):

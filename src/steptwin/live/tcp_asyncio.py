@@ -13,7 +13,7 @@ from steptwin.live.cell import Cell
 from steptwin.live.clients import BACKLOG, Clients, set_up
 from steptwin.live.links import SLICE_BYTES, Feed
 from steptwin.machine import Port, SourcedPort
-from steptwin.world.addresses import Address
+from steptwin.simulation.toml.addresses import Address
 
 
 class AsyncioListener:

@@ -13,8 +13,8 @@ from steptwin.live.clients import RETRY_S, Clients
 from steptwin.live.descriptors import descriptors
 from steptwin.live.links import SLICE_BYTES, Feed
 from steptwin.machine import Port, SourcedPort
+from steptwin.simulation.toml.addresses import Address
 from steptwin.system import reason
-from steptwin.world.addresses import Address
 
 AT_ONCE = 64
 """Clients accepted before the existing ones are served."""

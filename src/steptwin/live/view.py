@@ -17,10 +17,10 @@ from steptwin.live.view_controller import controller_lines
 from steptwin.live.world import LiveWorld
 from steptwin.live.world_frames import follow_frames
 from steptwin.machine import SECOND
+from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.simulation.world.records import ALL, Selection, describe
 from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection
-from steptwin.world.records import ALL, Selection, describe
-from steptwin.world.trace import TraceRecord
 
 REFRESH_S = 0.1
 LINES_KEPT = 200

@@ -13,13 +13,13 @@ from steptwin.datasheet import Point
 from steptwin.errors import Misuse
 from steptwin.live.remote import RemoteSubject
 from steptwin.machine import MILLISECOND, Nanos
+from steptwin.simulation.world.model import WORLD
 from steptwin.subject import commands as command
 from steptwin.subject.contract import MachinePart
 from steptwin.subject.events import Event
 from steptwin.subject.following import USUAL, filter_of
 from steptwin.subject.motion import Motions
 from steptwin.subject.payloads import PacePayload
-from steptwin.world.model import WORLD
 
 BOUND = 10_000
 SETTLING_NS: Nanos = 100 * MILLISECOND

@@ -10,10 +10,10 @@ from steptwin.errors import Refusal, SteptwinError
 from steptwin.later import Later
 from steptwin.live.lookback import PART_S
 from steptwin.live.world import LiveWorld
+from steptwin.simulation.world.history import History
 from steptwin.subject.debugcommands import AskWhy as Wanted
 from steptwin.why.kept import PastQuestions
 from steptwin.why.question import Asking
-from steptwin.world.history import History
 
 MOST_QUESTIONS = 16
 """Questions that wait."""

@@ -15,18 +15,18 @@ from steptwin.live.cell import Cell
 from steptwin.live.sharedreads import share_reads
 from steptwin.live.tracedport import traced
 from steptwin.machine import Nanos
+from steptwin.simulation.kinds.lines import LineEndPoint
+from steptwin.simulation.kinds.registry import line_kinds
+from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.turns import Dues
+from steptwin.simulation.world.history import History
+from steptwin.simulation.world.inputs import Bytes, ExternalInput, Leave, See, size_of
+from steptwin.simulation.world.model import WORLD
+from steptwin.simulation.world.plantsnapshot import PlantSnapshot
 from steptwin.subject.payloads import StatusPayload
 from steptwin.subject.world import WorldSubject
 from steptwin.tracing import is_traced
 from steptwin.wire.slave import SlaveDevice
-from steptwin.world.history import History
-from steptwin.world.inputs import Bytes, ExternalInput, Leave, See, size_of
-from steptwin.world.kernel import Kernel
-from steptwin.world.kinds import line_kinds
-from steptwin.world.lines import LineEndPoint
-from steptwin.world.model import WORLD
-from steptwin.world.plantsnapshot import PlantSnapshot
-from steptwin.world.turns import Dues
 
 MOST_PASSED = 100
 """Stops of scripts that are passed in one advance; a script that stops once more does so for good."""

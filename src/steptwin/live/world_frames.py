@@ -6,10 +6,10 @@ from collections.abc import Callable, Collection
 from functools import partial
 
 from steptwin.live.world import LiveWorld
+from steptwin.simulation.kinds.lines import LineWords
+from steptwin.simulation.kinds.registry import line_kinds
+from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.wire.frameline import FrameLine
-from steptwin.world.kinds import line_kinds
-from steptwin.world.lines import LineWords
-from steptwin.world.trace import TraceRecord
 
 
 def follow_frames(live: LiveWorld, sink: Callable[[FrameLine], None]) -> None:

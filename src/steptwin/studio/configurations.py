@@ -8,10 +8,10 @@ from steptwin.configuration import ConfigurationFormat, ConfigurationKey, Form, 
 from steptwin.datasheet import Datasheet, plain
 from steptwin.diagnostics import SourceText, to_json
 from steptwin.errors import Refusal
+from steptwin.simulation.kinds.registry import KINDS
+from steptwin.simulation.world.worldprograms import FINDING
 from steptwin.studio.machines import Sheets
 from steptwin.subject.contract import Reading
-from steptwin.world.kinds import KINDS
-from steptwin.world.worldprograms import FINDING
 
 
 class Configurations:

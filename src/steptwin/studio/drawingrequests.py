@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any, Protocol, TypeAlias
 
 from steptwin.access.roles import LOOK, SERVICE
+from steptwin.simulation.describe.arrangement import MOST_PLACED, MOST_PX, DrawnPlace
 from steptwin.studio.requestrow import RequestRow
 from steptwin.subject.fields import LONGEST_TEXT, Field, Schema, ValueType, check_text, whole, wrong
 from steptwin.subject.shapes import members
-from steptwin.world.arrangement import MOST_PLACED, MOST_PX, DrawnPlace
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,7 @@ from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.nearmiss import NearMiss
 from steptwin.plaintypes import shown
+from steptwin.simulation.kinds.registry import KINDS as CONTROLLERS
 from steptwin.studio.branchrequests import BRANCHES, BranchRequest
 from steptwin.studio.campaignrequests import CAMPAIGNS, CampaignRequest
 from steptwin.studio.devicerequests import OF_DEVICES, DeviceRequest
@@ -31,7 +32,6 @@ from steptwin.subject.commands import COMMANDS, CommandRow
 from steptwin.subject.fields import FLAG, NAMES, PROGRAM, TEXT, TIME, Field, Schema, choices, number, read_fields, whole
 from steptwin.subject.payloads import KINDS
 from steptwin.subject.shapes import members
-from steptwin.world.kinds import KINDS as CONTROLLERS
 
 FASTEST_RATE = 30.0
 """Updates in a second of the wall clock."""

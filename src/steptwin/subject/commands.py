@@ -1,7 +1,7 @@
 """Commands as values: what can be asked of a subject. One table has their names, fields and answers.
 
-The steps of scripts that are not only for scripts (`steptwin.world.script`) are commands as they are; the others are here. A
-message of the control endpoint is a command as JSON: ``{"do": NAME, FIELD: VALUE, ...}``.
+The steps of scripts that are not only for scripts (`steptwin.simulation.script.steps`) are commands as they are; the others are
+here. A message of the control endpoint is a command as JSON: ``{"do": NAME, FIELD: VALUE, ...}``.
 """
 
 from __future__ import annotations
@@ -14,6 +14,9 @@ from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.nearmiss import NearMiss
 from steptwin.plaintypes import shown
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.script.control import ControlProgram, Enable, Home, Jog, Move, StopAxes
+from steptwin.simulation.world.inputs import Download, See
 from steptwin.subject.commandrow import MACHINE, NOTHING, CommandRow
 from steptwin.subject.debugcommands import ROWS as DEBUG_ROWS
 from steptwin.subject.debugcommands import DebugCommand
@@ -37,9 +40,6 @@ from steptwin.subject.fields import (
     whole,
 )
 from steptwin.subject.payloads import KINDS
-from steptwin.world import script as do
-from steptwin.world.control import ControlProgram, Enable, Home, Jog, Move, StopAxes
-from steptwin.world.inputs import Download, See
 
 VERSION = 1
 """Of the commands, their answers and the events; a request may name the one that it was written for."""

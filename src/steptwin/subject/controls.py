@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import get_args
 
 from steptwin.datasheet import Argument, AxisDescription, Datasheet, FactType, Limits
+from steptwin.simulation.script.control import ControllerCommand
 from steptwin.subject.commands import COMMANDS, UNITS, Command
 from steptwin.subject.fields import Field
-from steptwin.world.control import ControllerCommand
 
 _TYPES = {"integer": FactType.WHOLE.value, "number": FactType.NUMBER.value, "boolean": FactType.TRUTH.value}
 """By the types of JSON Schema."""
@@ -17,7 +17,7 @@ _TYPES = {"integer": FactType.WHOLE.value, "number": FactType.NUMBER.value, "boo
 
 @dataclass(frozen=True, slots=True)
 class ControlDescription:
-    """A command for controllers (`steptwin.world.control`) that one takes."""
+    """A command for controllers (`steptwin.simulation.script.control`) that one takes."""
 
     command: str
     axis: int | None

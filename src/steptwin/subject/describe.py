@@ -4,6 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from steptwin.simulation.components.axis import AXIS, MECHANICS
+from steptwin.simulation.components.button import BUTTON
+from steptwin.simulation.components.registry import ELEMENTS
+from steptwin.simulation.kinds.kind import Terminals
+from steptwin.simulation.mechanics.drawing import Drawing, SensorZone
+from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.wiring import connections, terminal_name
 from steptwin.subject.commands import COMMANDS
 from steptwin.subject.contract import (
     ConnectionPart,
@@ -17,13 +24,6 @@ from steptwin.subject.contract import (
     SwitchPart,
 )
 from steptwin.subject.controls import controls_of
-from steptwin.world.drawing import Drawing, SensorZone
-from steptwin.world.elements import ELEMENTS
-from steptwin.world.elements.axis import AXIS, MECHANICS
-from steptwin.world.elements.button import BUTTON
-from steptwin.world.kind import Terminals
-from steptwin.world.plant import Plant
-from steptwin.world.wiring import connections, terminal_name
 
 
 def describe(world: Plant) -> Description:

@@ -1,7 +1,7 @@
 """Events as values: what happened, with a typed payload and a cause. The text is a projection of the payload.
 
-They are made from the records of a world (`steptwin.world.trace`). Events and commands of a subject are numbered together; a
-cause is the number of the command or the event that led to it, None where it is not known.
+They are made from the records of a world (`steptwin.simulation.scheduler.trace`). Events and commands of a subject are numbered
+together; a cause is the number of the command or the event that led to it, None where it is not known.
 """
 
 from __future__ import annotations
@@ -12,6 +12,9 @@ from typing import Any
 
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion.plain import read_plan
+from steptwin.simulation.scheduler.trace import KINDS as RECORDS
+from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.simulation.world.records import owner_of
 from steptwin.subject.payloads import (
     KINDS,
     BreakpointsPayload,
@@ -38,9 +41,6 @@ from steptwin.subject.payloads import (
     is_shown,
 )
 from steptwin.tables import complete
-from steptwin.world.records import owner_of
-from steptwin.world.trace import KINDS as RECORDS
-from steptwin.world.trace import TraceRecord
 
 
 @dataclass(frozen=True, slots=True)

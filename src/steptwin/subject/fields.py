@@ -14,9 +14,9 @@ from steptwin.durations import LONGEST_NS
 from steptwin.errors import Misuse
 from steptwin.nearmiss import NearMiss
 from steptwin.plaintypes import shown
-from steptwin.world.faults import Fault
-from steptwin.world.faults import read as read_fault
-from steptwin.world.values import pin_name
+from steptwin.simulation.faults import Fault
+from steptwin.simulation.faults import read as read_fault
+from steptwin.simulation.toml.values import pin_name
 
 LONGEST_TEXT = 4096
 """Characters of a text; the longest that are meant are paths."""

@@ -7,9 +7,9 @@ from typing import Any, Protocol, TypeAlias
 
 from steptwin.errors import Refusal
 from steptwin.machine import Nanos
+from steptwin.simulation.script.heldjog import Given, HeldJog
 from steptwin.subject.commands import Jog
 from steptwin.subject.world import WorldSubject
-from steptwin.world.heldjog import Given, HeldJog
 
 
 class Held(Protocol):

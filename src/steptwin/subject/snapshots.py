@@ -6,8 +6,8 @@ from itertools import count
 
 from steptwin.errors import Misuse
 from steptwin.nearmiss import NearMiss
+from steptwin.simulation.world.plantsnapshot import PlantSnapshot
 from steptwin.subject.commands import DropSnapshot, RestoreSnapshot, TakeSnapshot
-from steptwin.world.plantsnapshot import PlantSnapshot
 
 MOST_SNAPSHOTS = 32
 

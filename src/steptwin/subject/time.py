@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
+from steptwin.simulation.world.plant import Plant
 from steptwin.subject.commands import Advance
 from steptwin.subject.following import Filter, Following, filter_of
 from steptwin.subject.payloads import SHOWN_KINDS, STEP_KINDS
-from steptwin.world.plant import Plant
 
 LONGEST_RUN_NS: Nanos = 3600 * SECOND
 """A condition that never comes true is given up after an hour, where no other limit is given."""

@@ -9,6 +9,20 @@ from typing import Any, get_args
 
 from steptwin.errors import Refusal
 from steptwin.machine import Nanos
+from steptwin.simulation.components.registry import failing
+from steptwin.simulation.faults.kinds import rows
+from steptwin.simulation.kinds.lines import LineWords, LineWrite
+from steptwin.simulation.kinds.programs import StatementFollower
+from steptwin.simulation.kinds.registry import line_kinds
+from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.simulation.script import steps
+from steptwin.simulation.script.control import ControllerCommand, Halt, Jog, StopAxes, ended, standstill
+from steptwin.simulation.script.heldjog import HeldJog
+from steptwin.simulation.world.inputs import Download, EndScripts, ExternalInput, See
+from steptwin.simulation.world.model import WORLD
+from steptwin.simulation.world.motions import ordered
+from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.plantsnapshot import PlantSnapshot
 from steptwin.subject import commands as command
 from steptwin.subject.contract import UNKNOWN, Description, Reading, Result
 from steptwin.subject.describe import describe
@@ -19,20 +33,6 @@ from steptwin.subject.payloads import FramePayload, InputPayload, PacePayload, P
 from steptwin.subject.snapshots import Snapshots
 from steptwin.subject.time import advance
 from steptwin.wire.frameline import FrameLine
-from steptwin.world import script as steps
-from steptwin.world.control import ControllerCommand, Halt, Jog, StopAxes, ended, standstill
-from steptwin.world.elements import failing
-from steptwin.world.faults.kinds import rows
-from steptwin.world.heldjog import HeldJog
-from steptwin.world.inputs import Download, EndScripts, ExternalInput, See
-from steptwin.world.kinds import line_kinds
-from steptwin.world.lines import LineWords, LineWrite
-from steptwin.world.model import WORLD
-from steptwin.world.motions import ordered
-from steptwin.world.plant import Plant
-from steptwin.world.plantsnapshot import PlantSnapshot
-from steptwin.world.programs import StatementFollower
-from steptwin.world.trace import TraceRecord
 
 STEPS = (
     steps.Set, steps.Press, steps.Release, steps.Send, steps.PowerCycle, steps.Turn, steps.Couple, steps.ClearFault,

@@ -25,13 +25,13 @@ from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.registers import AXES, DEFAULT_FIRMWARE, register_map
 from steptwin.mic488.registers import firmware as known_firmware
 from steptwin.mic488.status import AxisStatus
+from steptwin.simulation.describe.small import Whole
+from steptwin.simulation.describe.small_mic488 import mic488_world
+from steptwin.simulation.script import steps as do
 from steptwin.testing.devices import driver_of
 from steptwin.testing.realtime import RealTime, WallTime
 from steptwin.testing.rig import LineRig, Observe, check_time, check_word
 from steptwin.testing.virtualtime import MemoryEndpoint, VirtualTime, joined_driver
-from steptwin.world import script as do
-from steptwin.world.kinds.mic488.small import mic488_world
-from steptwin.world.small import Whole
 
 T = TypeVar("T")
 

@@ -20,7 +20,7 @@ from steptwin.live.links import Link
 from steptwin.live.ptys import pty_link
 from steptwin.live.tcp import TcpLink
 from steptwin.machine import SECOND, Nanos, Port
-from steptwin.world.addresses import LOOPBACK, Address
+from steptwin.simulation.toml.addresses import LOOPBACK, Address
 
 T = TypeVar("T")
 

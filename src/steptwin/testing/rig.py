@@ -19,17 +19,17 @@ from steptwin.files.world import World
 from steptwin.live.world import LiveWorld, PlacePort
 from steptwin.live.world_frames import follow_frames
 from steptwin.machine import SECOND, Nanos, Port
+from steptwin.simulation.describe.small import LINE
+from steptwin.simulation.faults import read as read_fault
+from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.world.records import describe
 from steptwin.subject import commands as command
 from steptwin.subject.commands import Command, row_of
 from steptwin.testing.realtime import RealTime, WallTime
 from steptwin.testing.virtualtime import VirtualTime
 from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection
-from steptwin.world import script as do
-from steptwin.world.faults import read as read_fault
-from steptwin.world.records import describe
-from steptwin.world.small import LINE
-from steptwin.world.trace import TraceRecord
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

@@ -20,18 +20,18 @@ from steptwin.files.world import World, read_beside
 from steptwin.inputfiles import MOST_DESCRIPTION_BYTES
 from steptwin.live.world import LiveWorld, PlacePort
 from steptwin.machine import Nanos
+from steptwin.simulation.describe.description import read_world
+from steptwin.simulation.describe.spec import WorldSpec
+from steptwin.simulation.faults import read
+from steptwin.simulation.kinds.registry import line_kinds
+from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.world.records import describe, is_shown
 from steptwin.subject.commands import Command, ListFaults
 from steptwin.testing.devices import ANY, driver_of
 from steptwin.testing.realtime import RealTime, WallTime
 from steptwin.testing.rig import Observe, Rig, check_time
 from steptwin.testing.virtualtime import MemoryEndpoint, VirtualTime, joined_driver
-from steptwin.world import script as do
-from steptwin.world.description import read_world
-from steptwin.world.faults import read
-from steptwin.world.kinds import line_kinds
-from steptwin.world.records import describe, is_shown
-from steptwin.world.spec import WorldSpec
-from steptwin.world.trace import TraceRecord
 
 T = TypeVar("T")
 

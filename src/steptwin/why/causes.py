@@ -9,18 +9,18 @@ from typing import NamedTuple, TypeAlias
 
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion.divisions import profile_of
+from steptwin.simulation.components.logic import BoardPart
+from steptwin.simulation.components.registry import ELEMENTS
+from steptwin.simulation.kinds.lines import SCRIPTS
+from steptwin.simulation.kinds.programs import Place, Resource, ResourceKind, StatementUse
+from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.simulation.scheduler.wires import PinName
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.script.control import Halt
+from steptwin.simulation.world.inputs import Download, See, SetVariable
 from steptwin.why.answer import ChainLink, since_before
 from steptwin.why.log import Act, CauseLog, Change
 from steptwin.why.sentences import Frames, statement, words_of
-from steptwin.world import script as do
-from steptwin.world.control import Halt
-from steptwin.world.elements import ELEMENTS
-from steptwin.world.elements.logic import BoardPart
-from steptwin.world.inputs import Download, See, SetVariable
-from steptwin.world.lines import SCRIPTS
-from steptwin.world.programs import Place, Resource, ResourceKind, StatementUse
-from steptwin.world.trace import TraceRecord
-from steptwin.world.wires import PinName
 
 MOST_LOOKED_BACK = 20_000
 """Limit of what is looked at for one cause."""

@@ -10,11 +10,11 @@ from typing import NamedTuple, TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.plantsnapshot import RecordedInput
 from steptwin.why.log import in_parts
 from steptwin.why.states import Interval
-from steptwin.world import script as do
-from steptwin.world.plant import Plant
-from steptwin.world.plantsnapshot import RecordedInput
 
 MOST_REMEMBERED = 200_000
 """Values after which all are forgotten before the next question."""

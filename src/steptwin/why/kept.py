@@ -1,4 +1,4 @@
-"""Questions about the past of a world, as far as that is kept (`steptwin.world.history`).
+"""Questions about the past of a world, as far as that is kept (`steptwin.simulation.world.history`).
 
 What may be a cause is noted in a second world, which runs through the past: from the newest state that is old enough, and from
 older ones where the causes are older. It stays for further questions, which only need what happened since.
@@ -12,12 +12,12 @@ from typing import Protocol
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
+from steptwin.simulation.world.history import outside_past
+from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.plantsnapshot import PlantSnapshot, RecordedInput
 from steptwin.why.answer import MOST_LINKS, Answer
 from steptwin.why.question import Asking, Why
 from steptwin.why.search import Asked, LastChanges, PastStates
-from steptwin.world.history import outside_past
-from steptwin.world.plant import Plant
-from steptwin.world.plantsnapshot import PlantSnapshot, RecordedInput
 
 FIRST_SPAN_NS: Nanos = 5 * SECOND
 """So much of the past is looked at first, and `FURTHER` times as much where the causes are older."""
@@ -29,7 +29,7 @@ MOST_NOTED = 500_000
 
 
 class StatesAndInputs(PastStates, Protocol):
-    """What `steptwin.world.history.History` has of the past of a world."""
+    """What `steptwin.simulation.world.history.History` has of the past of a world."""
 
     def keeps_inputs_from(self, number: int) -> bool: ...
     def inputs_from(self, number: int) -> Sequence[RecordedInput]: ...

@@ -14,17 +14,17 @@ from typing import NamedTuple
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
+from steptwin.simulation.components.registry import ELEMENTS
+from steptwin.simulation.faults.active import HeldLevel
+from steptwin.simulation.kinds.programs import Place, Programs
+from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.world.history import SLICE_NS, replay
+from steptwin.simulation.world.inputs import Download, ExternalInput
+from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.plantsnapshot import RecordedInput
 from steptwin.statements import StatementHook
 from steptwin.why import points
-from steptwin.world import script as do
-from steptwin.world.elements import ELEMENTS
-from steptwin.world.faults.active import HeldLevel
-from steptwin.world.history import SLICE_NS, replay
-from steptwin.world.inputs import Download, ExternalInput
-from steptwin.world.plant import Plant
-from steptwin.world.plantsnapshot import RecordedInput
-from steptwin.world.programs import Place, Programs
-from steptwin.world.trace import TraceRecord
 
 MOST_NOTED = 20_000_000
 """Limit of what is noted, because it is kept in memory."""

@@ -10,8 +10,8 @@ from typing import TypeAlias
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.points import LivePoint, MemoryCells
-from steptwin.world.eventpoints import EventPoints, points_of, stays_between_events
-from steptwin.world.plant import Plant
+from steptwin.simulation.world.eventpoints import EventPoints, points_of, stays_between_events
+from steptwin.simulation.world.plant import Plant
 
 MOST_TURNS = 1_000_000
 """Limit of the changes that are noted, which are kept in memory."""
@@ -65,7 +65,7 @@ class PointTurns:
 
 
 class _Reader:
-    """Of one controller. ``points``: the turns of each. As `steptwin.world.followers.KernelFollower`."""
+    """Of one controller. ``points``: the turns of each. As `steptwin.simulation.scheduler.followers.KernelFollower`."""
 
     def __init__(self, noted: PointTurns, world: Plant, owner: str) -> None:
         self._all = noted

@@ -11,6 +11,13 @@ from typing import TypeAlias
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.points import LivePoint
+from steptwin.simulation.kinds.programs import Resource, ResourceKind
+from steptwin.simulation.logic.condition import Signal, SignalCondition
+from steptwin.simulation.logic.expression import parse_condition
+from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.world.history import outside_past
+from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.plantsnapshot import RecordedInput
 from steptwin.why import points
 from steptwin.why.answer import MOST_LINKS, Answer, ChainLink, since_before
 from steptwin.why.causes import Cause, Causes, nothing
@@ -19,13 +26,6 @@ from steptwin.why.log import MOST_NOTED, CauseLog, in_parts
 from steptwin.why.search import Asked
 from steptwin.why.sentences import statement
 from steptwin.why.states import Interval, StatesOnTheWay, rest_of
-from steptwin.world.condition import Signal, SignalCondition
-from steptwin.world.expression import parse_condition
-from steptwin.world.history import outside_past
-from steptwin.world.plant import Plant
-from steptwin.world.plantsnapshot import RecordedInput
-from steptwin.world.programs import Resource, ResourceKind
-from steptwin.world.signal import SignalOf
 
 MOST_STATES = 5
 """Limit of the signals whose present levels are shown of what a program waits for."""
@@ -51,7 +51,7 @@ def finish(asking: Asking) -> Answer:
 
 @dataclass(frozen=True, slots=True)
 class _Level:
-    """A signal whose course is known. As `steptwin.world.condition.Signal`."""
+    """A signal whose course is known. As `steptwin.simulation.logic.condition.Signal`."""
 
     level: Callable[[Nanos], float]
     unit: str

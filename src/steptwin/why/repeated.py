@@ -7,13 +7,13 @@ from collections.abc import Callable, Sequence
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.simulation.world.history import ChangedSince, PastState, outside_past, replay
+from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.plantsnapshot import RecordedInput
 from steptwin.why.answer import Answer
 from steptwin.why.kept import PastQuestions, first_span
 from steptwin.why.log import MOST_NOTED
 from steptwin.why.question import finish
-from steptwin.world.history import ChangedSince, PastState, outside_past, replay
-from steptwin.world.plant import Plant
-from steptwin.world.plantsnapshot import RecordedInput
 
 STATES = 16
 """Number of states at equal distances; further ones are near the end, about which most questions are."""
@@ -39,7 +39,7 @@ class RepeatedPast:
 
 
 class StatesOfRun:
-    """States of a world that is run to ``end``. As `steptwin.world.history.History`, with all inputs."""
+    """States of a world that is run to ``end``. As `steptwin.simulation.world.history.History`, with all inputs."""
 
     branch = 0
 

@@ -10,18 +10,18 @@ from typing import NamedTuple, Protocol, TypeAlias
 
 from steptwin.machine import Nanos
 from steptwin.points import MemoryCells
+from steptwin.simulation.kinds.programs import Place, Programs, Resource, ResourceKind
+from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.simulation.world.history import ACTED, MOVED, PastState
+from steptwin.simulation.world.inputs import Bytes, Download
+from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.plantsnapshot import PlantSnapshot, RecordedInput
 from steptwin.statements import StatementHook
 from steptwin.why import points
 from steptwin.why.courses import CourseTurns, watch_truth
 from steptwin.why.log import in_parts, levels_of
 from steptwin.why.states import rest_of
-from steptwin.world.history import ACTED, MOVED, PastState
-from steptwin.world.inputs import Bytes, Download
-from steptwin.world.plant import Plant
-from steptwin.world.plantsnapshot import PlantSnapshot, RecordedInput
-from steptwin.world.programs import Place, Programs, Resource, ResourceKind
-from steptwin.world.signal import SignalOf
-from steptwin.world.trace import TraceRecord
 
 MOST_PARTS = 20_000
 """Limit of the parts of a past that are run again for one question: over an hour of virtual time, or 40 million statements."""
@@ -48,7 +48,7 @@ class Found(NamedTuple):
 
 
 class PastStates(Protocol):
-    """What a search needs of a world's past; see `steptwin.world.history.History`."""
+    """What a search needs of a world's past; see `steptwin.simulation.world.history.History`."""
 
     @property
     def world(self) -> Plant: ...
@@ -246,7 +246,7 @@ class _Noted:
 
 
 class _Follower:
-    """Notes the turns of a signal that has no edges. As `steptwin.world.followers.KernelFollower`."""
+    """Notes the turns of a signal that has no edges. As `steptwin.simulation.scheduler.followers.KernelFollower`."""
 
     def __init__(self, world: Plant, name: str) -> None:
         signal = world.signal(name)

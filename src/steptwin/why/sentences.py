@@ -6,16 +6,16 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from steptwin.diagnostics import visible
+from steptwin.simulation.kinds.lines import LineWords
+from steptwin.simulation.kinds.registry import line_kinds
+from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.script.control import Halt
+from steptwin.simulation.world.inputs import Bytes, Download, ExternalInput, SetVariable
+from steptwin.simulation.world.plant import Plant
 from steptwin.why.log import CauseLog, Executed
 from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection
-from steptwin.world import script as do
-from steptwin.world.control import Halt
-from steptwin.world.inputs import Bytes, Download, ExternalInput, SetVariable
-from steptwin.world.kinds import line_kinds
-from steptwin.world.lines import LineWords
-from steptwin.world.plant import Plant
-from steptwin.world.trace import TraceRecord
 
 _WORDS: Mapping[type, Callable[[Any], str]] = {
     do.Set: lambda step: "sets " + ", ".join(f"{machine}.{pin.upper()} = {value:g}" for machine, pin, value in step.levels),

@@ -9,9 +9,9 @@ from typing import NamedTuple
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.points import FARTHEST_NS
-from steptwin.world.history import PastState
-from steptwin.world.plant import Plant
-from steptwin.world.signal import SignalOf
+from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.world.history import PastState
+from steptwin.simulation.world.plant import Plant
 
 MOST_KEPT = 64
 FIRST_DISTANCE_NS: Nanos = SECOND // 2

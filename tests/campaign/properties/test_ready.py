@@ -7,7 +7,7 @@ from slides import GUARD, slide
 
 from steptwin.campaign.properties import Verdict, read_property
 from steptwin.files.world import World
-from steptwin.world.script import Send
+from steptwin.simulation.script.steps import Send
 
 # M1 goes to 100 mm from 1 ms on; a ram comes across at 60 mm when OUT1 is on.
 SLIDE = (

@@ -10,7 +10,7 @@ from slides import slide
 from steptwin.campaign.properties import Verdict, read_property
 from steptwin.files.world import World
 from steptwin.motion import Profile
-from steptwin.world.course import Course
+from steptwin.simulation.mechanics.course import Course
 
 TWO = slide("left", "left_x") + slide("right", "right_x", ramps=120.0, vel=80.0)
 JOINED = '\n[[wire]]\nfrom = "left.OUT8"\nto = "right.IN8"\n'

@@ -14,7 +14,7 @@ from steptwin.campaign.properties.text import parse_property
 from steptwin.campaign.properties.tree import Atom, nodes
 from steptwin.errors import Misuse
 from steptwin.files.world import World
-from steptwin.world.plant import Plant
+from steptwin.simulation.world.plant import Plant
 
 WORLD = (
     slide()

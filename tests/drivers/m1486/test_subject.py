@@ -17,11 +17,11 @@ from steptwin.drivers.m1486 import M1486, AsyncM1486, Busy
 from steptwin.drivers.m1486.subject import M1486Part
 from steptwin.drivers.subject import DeviceSubject, RawEffect
 from steptwin.errors import Misuse, Refusal, SteptwinError
+from steptwin.simulation.script import steps as do
 from steptwin.subject import commands as command
 from steptwin.subject.contract import UNKNOWN
 from steptwin.subject.following import filter_of
 from steptwin.subject.world import WorldSubject
-from steptwin.world import script as do
 
 
 @pytest.fixture

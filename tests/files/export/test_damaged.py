@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from steptwin.errors import Misuse
 from steptwin.files.export import axis_views, read_trace, write_trace
 from steptwin.files.world import World
-from steptwin.world.trace import Trace
+from steptwin.simulation.scheduler.trace import Trace
 
 EXAMPLES = Path(__file__).parents[3] / "examples" / "worlds"
 

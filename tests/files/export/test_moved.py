@@ -16,7 +16,7 @@ from steptwin.files.export import axis_views, read_trace, write_trace
 from steptwin.files.export.recording import sort_out
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND
-from steptwin.world.lanes import MovedLane
+from steptwin.simulation.mechanics.lanes import MovedLane
 
 MACHINE = dedent("""
     [world]

@@ -14,7 +14,7 @@ from steptwin.files.export.polyline import curve
 from steptwin.files.export.recording import sort_out
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion import MotionState, plan_position, plan_velocity
-from steptwin.world.trace import Trace, TraceRecord
+from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 
 
 def test_a_picture_names_every_lane(mic488: Run, tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from steptwin.files.export.records import _from_json, _to_json
 from steptwin.motion import MotionState, plan_position, plan_velocity
 from steptwin.motion.divisions import Microstepping, step_train
 from steptwin.motion.paths import ArcProfile, Circular, circle
-from steptwin.world.trace import Trace, TraceRecord
+from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 
 REST = MotionState(0, 0, 0.0, 0.0)
 

@@ -10,7 +10,7 @@ from world_rig import Run
 
 from steptwin.files.export import tables, write_trace
 from steptwin.machine import MILLISECOND, SECOND
-from steptwin.world.trace import Trace, TraceRecord
+from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 
 PERIOD = 7 * MILLISECOND
 

@@ -24,7 +24,7 @@ from steptwin.motion import MotionState, plan_position
 from steptwin.motion.divisions import StepTrain, profile_of
 from steptwin.motion.paths import Circular, circle
 from steptwin.motion.pulses import step_times
-from steptwin.world.trace import Trace, TraceRecord
+from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 
 WORLDS = Path(__file__).parents[3] / "examples" / "worlds"
 

@@ -13,8 +13,8 @@ from steptwin.files.export import axis_views, read_trace
 from steptwin.files.export.tracefile import Ring, TraceFile, read_kept
 from steptwin.files.world import World
 from steptwin.machine import SECOND
-from steptwin.world import script as do
-from steptwin.world.trace import TraceRecord
+from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.simulation.script import steps as do
 
 CONTROLLER = '[world]\nname = "cell"\n[[mic488]]\nname = "table"\n'
 

@@ -18,8 +18,8 @@ from steptwin.files.export.recording import sort_out
 from steptwin.files.export.timeline import write_timeline
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND
-from steptwin.world import script as do
-from steptwin.world.faults import read
+from steptwin.simulation.faults import read
+from steptwin.simulation.script import steps as do
 
 PERIOD = 10 * MILLISECOND
 PULSE = 1.001 / 640

@@ -23,7 +23,7 @@ from steptwin.machine import SECOND, Nanos
 from steptwin.motion import MotionState, Profile, plan_position
 from steptwin.motion.divisions import StepTrain
 from steptwin.motion.waveforms import PERIOD, currents
-from steptwin.world.trace import Trace, TraceRecord
+from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 
 Changes = dict[str, list[tuple[Nanos, object]]]
 """By name of the variable; the first is its value at the beginning."""

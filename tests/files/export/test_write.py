@@ -18,7 +18,7 @@ from steptwin.files.export.progress import TimeProgress
 from steptwin.files.export.recording import sort_out
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion import MotionState, plan_position
-from steptwin.world.trace import Trace, TraceRecord
+from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 
 TRACE = Trace(["a", "b"])
 TRACE.add(TraceRecord(5, "a", "edge", "OUT1", 1.0))

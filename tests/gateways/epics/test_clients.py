@@ -16,9 +16,9 @@ from tests.gateways.opcua.test_bridge import free_port
 
 from steptwin import World
 from steptwin.gateways.epics import gateway as epics
-from steptwin.world.description import read_world
-from steptwin.world.gateways import EpicsSpec
-from steptwin.world.reader import WorldError
+from steptwin.simulation.describe.description import read_world
+from steptwin.simulation.describe.gateways import EpicsSpec
+from steptwin.simulation.toml.reader import WorldError
 
 CLIENTS = Path(__file__).parents[1] / "clients"
 TABLE = """

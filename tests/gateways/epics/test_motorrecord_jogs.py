@@ -14,8 +14,8 @@ from steptwin.errors import Misuse, Refusal
 from steptwin.gateways.clients import GatewayClient
 from steptwin.gateways.leases import JogLeases
 from steptwin.machine import SECOND
+from steptwin.simulation.script.steps import Request, Write
 from steptwin.subject.commands import Command, Enable, StopAll, StopAxes
-from steptwin.world.script import Request, Write
 
 
 @pytest.mark.parametrize(("button", "sign"), [("JOGF", 1), ("JOGR", -1)])

@@ -9,9 +9,9 @@ from tls_files import Authority
 
 from steptwin.errors import Misuse
 from steptwin.gateways.mqtt.gateway import broker_of
-from steptwin.world.description import read_world
-from steptwin.world.gateways import MqttSpec
-from steptwin.world.reader import WorldError
+from steptwin.simulation.describe.description import read_world
+from steptwin.simulation.describe.gateways import MqttSpec
+from steptwin.simulation.toml.reader import WorldError
 
 
 def mqtt(keys: str) -> MqttSpec:

@@ -14,8 +14,8 @@ from tokens import tokens_file
 from steptwin.access.audit import Audit
 from steptwin.errors import Misuse
 from steptwin.gateways.mqtt.jsoncommands import REPEATED_S, Doorkeeper, JsonCommands, JsonRequest
-from steptwin.world.description import read_world
-from steptwin.world.gateways import MqttSpec
+from steptwin.simulation.describe.description import read_world
+from steptwin.simulation.describe.gateways import MqttSpec
 
 WORLD = '[[mic488]]\nname = "table"\n'
 OPERATOR = "0123456789abcdef"

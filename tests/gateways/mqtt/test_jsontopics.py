@@ -14,7 +14,7 @@ from steptwin.errors import Misuse
 from steptwin.gateways.mqtt.homeassistant import discovery
 from steptwin.gateways.mqtt.jsontopics import ControllerText, Group, Topics
 from steptwin.gateways.sampling import Sample, Sampler
-from steptwin.world.script import Set
+from steptwin.simulation.script.steps import Set
 
 TEXT = """
     [[mic488]]

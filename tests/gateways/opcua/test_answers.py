@@ -18,8 +18,8 @@ from steptwin.gateways.contract import PastValue
 from steptwin.gateways.opcua.addressspace import node_id
 from steptwin.gateways.opcua.gateway import OpcUaGateway
 from steptwin.gateways.opcua.limits import MOST_READ
-from steptwin.world.description import read_world
-from steptwin.world.gateways import OpcUaSpec
+from steptwin.simulation.describe.description import read_world
+from steptwin.simulation.describe.gateways import OpcUaSpec
 
 WORLD = """
 [[mic488]]

@@ -16,7 +16,7 @@ from steptwin import World
 from steptwin.commands.certificate import make_certificate
 from steptwin.gateways.opcua import gateway as opcua
 from steptwin.gateways.opcua import security
-from steptwin.world.gateways import OpcUaSpec
+from steptwin.simulation.describe.gateways import OpcUaSpec
 
 HALL = '[[mic488]]\nname = "table"\n[gateway.opcua]\nlisten = "127.0.0.1:0"\nsecurity = "sign"\n'
 KEYS = 'certificate = "own/certificate.pem"\nkey = "own/key.pem"\n'

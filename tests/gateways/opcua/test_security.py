@@ -18,8 +18,8 @@ from tokens import tokens_file
 from steptwin.commands.certificate import make_certificate
 from steptwin.errors import Misuse
 from steptwin.gateways.opcua.security import Security
-from steptwin.world.description import read_world
-from steptwin.world.gateways import OpcUaSpec
+from steptwin.simulation.describe.description import read_world
+from steptwin.simulation.describe.gateways import OpcUaSpec
 
 OWN = 'certificate = "certificate.pem"\nkey = "key.pem"\n'
 

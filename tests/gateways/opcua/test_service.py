@@ -17,7 +17,7 @@ from steptwin.gateways.opcua.service import NodeService, WatchedNode, WatchedNod
 from steptwin.gateways.opcua.session import GatewayServer
 from steptwin.gateways.points import GatewayPoint, PointValue, points_of
 from steptwin.gateways.sampling import Sample, Sampler
-from steptwin.world.script import Set
+from steptwin.simulation.script.steps import Set
 
 WATCHED = ("pins.IN3", "pins.IN4", "M1.position", "program.state")
 

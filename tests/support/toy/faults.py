@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
-from steptwin.world.faults import AxisLoad, FaultKind, FaultyMachine, Occasion
+from steptwin.simulation.faults import AxisLoad, FaultKind, FaultyMachine, Occasion
 
 
 class ToyBody:

@@ -13,13 +13,8 @@ from steptwin.datasheet import Access, AxisDescription, Datasheet, Detail, FactT
 from steptwin.errors import Misuse, Refusal
 from steptwin.machine import MachineEvent, Nanos
 from steptwin.points import LivePoint, turns_of
-from steptwin.wire.frameline import FrameLine
-from steptwin.wire.slave import FrameDirection as Way
-from steptwin.world import script as do
-from steptwin.world.control import Halt, Move, StopAxes
-from steptwin.world.faults import AxisLoad, Faults
-from steptwin.world.kernel import Kernel
-from steptwin.world.kind import (
+from steptwin.simulation.faults import AxisLoad, Faults
+from steptwin.simulation.kinds.kind import (
     BuildContext,
     ControllerKind,
     ControllerSpec,
@@ -30,13 +25,18 @@ from steptwin.world.kind import (
     Member,
     Terminals,
 )
-from steptwin.world.kinds import KINDS, register
-from steptwin.world.lanes import AxisLane, plain_view
-from steptwin.world.machineview import MachineView
-from steptwin.world.reader import Key, Row, TomlText, optional
-from steptwin.world.scale import FULL_STEPS, DriveScale, GivenScale
-from steptwin.world.trace import RecordSink, TraceRecord
-from steptwin.world.values import name_value, whole
+from steptwin.simulation.kinds.machineview import MachineView
+from steptwin.simulation.kinds.registry import KINDS, register
+from steptwin.simulation.mechanics.lanes import AxisLane, plain_view
+from steptwin.simulation.mechanics.scale import FULL_STEPS, DriveScale, GivenScale
+from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.trace import RecordSink, TraceRecord
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.script.control import Halt, Move, StopAxes
+from steptwin.simulation.toml.reader import Key, Row, TomlText, optional
+from steptwin.simulation.toml.values import name_value, whole
+from steptwin.wire.frameline import FrameLine
+from steptwin.wire.slave import FrameDirection as Way
 from toy.faults import ToyBody
 from toy.line import ToyLine
 from toy.machine import STEP_P, Toy

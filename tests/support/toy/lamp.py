@@ -8,19 +8,19 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from steptwin.machine import Nanos
+from steptwin.simulation.components.element import Element
+from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
+from steptwin.simulation.components.registry import forget, register
+from steptwin.simulation.components.site import Site
+from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
+from steptwin.simulation.faults.effects import ElementEffect
+from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.wires import PinName
+from steptwin.simulation.toml.reader import Key, Row, Table, TomlText, optional
+from steptwin.simulation.toml.sense import TableRows
+from steptwin.simulation.toml.values import OUTPUT, Terminal, flag, name_value, pin_name, time_value
 from steptwin.state import Stateful
-from steptwin.world.element import Element
-from steptwin.world.elements import forget, register
-from steptwin.world.elementspec import ElementSpecs, NamedSpec, Reference
-from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
-from steptwin.world.faults.effects import ElementEffect
-from steptwin.world.kernel import Kernel
-from steptwin.world.reader import Key, Row, Table, TomlText, optional
-from steptwin.world.sense import TableRows
-from steptwin.world.signal import SignalOf
-from steptwin.world.site import Site
-from steptwin.world.values import OUTPUT, Terminal, flag, name_value, pin_name, time_value
-from steptwin.world.wires import PinName
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

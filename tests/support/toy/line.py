@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from steptwin.machine import Nanos
+from steptwin.simulation.faults import Faults
+from steptwin.simulation.faults import LineProtocol as FaultLine
+from steptwin.simulation.kinds.lines import Line, LineEndPoint
+from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.trace import RecordSink
 from steptwin.state import Stateful
 from steptwin.wire.slave import FrameDirection
-from steptwin.world.faults import Faults
-from steptwin.world.faults import LineProtocol as FaultLine
-from steptwin.world.kernel import Kernel
-from steptwin.world.lines import Line, LineEndPoint
-from steptwin.world.trace import RecordSink
 from toy.machine import Toy
 
 

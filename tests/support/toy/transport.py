@@ -12,9 +12,9 @@ from typing import cast
 from steptwin.live.links import Feed
 from steptwin.live.transports import LinkArguments, OpenLink, Transport, forget, register
 from steptwin.machine import Port
-from steptwin.world.links import LinkKey
-from steptwin.world.reader import optional
-from steptwin.world.values import text_value
+from steptwin.simulation.kinds.links import LinkKey
+from steptwin.simulation.toml.reader import optional
+from steptwin.simulation.toml.values import text_value
 
 
 class UnixClient(asyncio.Protocol):

@@ -39,7 +39,7 @@ from steptwin.campaign.properties.tree import (
     Tally,
 )
 from steptwin.machine import Nanos
-from steptwin.world.expression import COMPARE
+from steptwin.simulation.logic.expression import COMPARE
 
 
 def forced(value: float, *, holds: bool) -> float:

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from steptwin.campaign.properties.text import parse_property
 from steptwin.errors import Misuse
 from steptwin.nearmiss import NearMiss
-from steptwin.world.elements.collision import COLLISION
-from steptwin.world.plant import Plant
+from steptwin.simulation.components.collision import COLLISION
+from steptwin.simulation.world.plant import Plant
 
 _NAMED = re.compile(r"\s*([A-Za-z]+(?:-[A-Za-z]+)+)\s*(?:=\s*)?(.*)\Z", re.DOTALL)
 _TIME = re.compile(r"(?:within\s+)?(\d+(?:\.\d+)?\s*(?:ns|us|ms|s|min|h))\b\s*(.*)\Z", re.DOTALL)

@@ -1,7 +1,7 @@
 """The course of one comparison in a running world, exact at every event, turn and crossing.
 
 While signals go on as they did, nothing is computed: a way is looked at as a whole once another one follows. Signals of one
-kernel are followed by that kernel (`steptwin.world.followers`).
+kernel are followed by that kernel (`steptwin.simulation.scheduler.followers`).
 """
 
 from __future__ import annotations
@@ -16,10 +16,9 @@ from steptwin.campaign.properties.slopes import TINY, Shape, Slope
 from steptwin.campaign.properties.tree import Atom
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
-from steptwin.world.expression import COMPARE, value_of
-from steptwin.world.kernel import Kernel, Source
-from steptwin.world.plant import Plant
-from steptwin.world.quantities import (
+from steptwin.simulation.components.signals import Idle
+from steptwin.simulation.logic.expression import COMPARE, value_of
+from steptwin.simulation.logic.quantities import (
     NO_NUMBER,
     Absolute,
     NumberLiteral,
@@ -31,8 +30,9 @@ from steptwin.world.quantities import (
     change_between,
     unit_of_all,
 )
-from steptwin.world.signal import SignalOf
-from steptwin.world.signals import Idle
+from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.scheduler.kernel import Kernel, Source
+from steptwin.simulation.world.plant import Plant
 
 _SIGNS = {"<": -1.0, "<=": -1.0, ">": 1.0, ">=": 1.0, "==": 0.0, "!=": 0.0}
 """Whether more of the left side is nearer to the truth, or less; 0: neither."""

@@ -9,9 +9,9 @@ from steptwin.campaign.properties.recording import ComparisonRecord
 from steptwin.campaign.properties.slopes import Shape, negative
 from steptwin.campaign.properties.tree import OPPOSITE, Atom
 from steptwin.machine import Nanos
-from steptwin.world.expression import Comparison
-from steptwin.world.kernel import Source
-from steptwin.world.plant import Plant
+from steptwin.simulation.logic.expression import Comparison
+from steptwin.simulation.scheduler.kernel import Source
+from steptwin.simulation.world.plant import Plant
 
 
 class SharedRecord:
@@ -34,7 +34,7 @@ class SharedRecord:
 
 
 class ComparisonRecords:
-    """An observer of a world (`steptwin.world.observing`). It ends once all who use it have released it."""
+    """An observer of a world (`steptwin.simulation.scheduler.observing`). It ends once all who use it have released it."""
 
     number, entry = 0, 0
     _begins = True

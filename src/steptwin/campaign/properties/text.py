@@ -12,8 +12,8 @@
             | "time" "between" either "and" either SIGN TIME
             | comparison
 
-Comparisons are those of conditions (`steptwin.world.expression`), so ``and`` and ``or`` between them are, too. A word of time
-reaches as far as it can. In ``time between A and B``, A and B with ``and`` or ``or`` need parentheses.
+Comparisons are those of conditions (`steptwin.simulation.logic.expression`), so ``and`` and ``or`` between them are, too. A word
+of time reaches as far as it can. In ``time between A and B``, A and B with ``and`` or ``or`` need parentheses.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ from steptwin.durations import UNITS, duration
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.nearmiss import NearMiss
-from steptwin.world.expression import Comparison, ConditionParser
-from steptwin.world.quantities import NumberLiteral, Quantity
+from steptwin.simulation.logic.expression import Comparison, ConditionParser
+from steptwin.simulation.logic.quantities import NumberLiteral, Quantity
 
 WORDS = (
     "always",

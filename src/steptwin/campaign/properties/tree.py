@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 from steptwin.machine import Nanos
-from steptwin.world.expression import Comparison
+from steptwin.simulation.logic.expression import Comparison
 
 OPPOSITE = {"==": "!=", "!=": "==", "<": ">=", ">=": "<", ">": "<=", "<=": ">"}
 

@@ -17,7 +17,7 @@ from steptwin.campaign.properties.tree import Atom, CycleTime, Delayed, Holding,
 from steptwin.campaign.properties.words import formula_text, found_text
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
-from steptwin.world.plant import Plant
+from steptwin.simulation.world.plant import Plant
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,8 +14,8 @@ from steptwin.campaign.properties.tree import (
     Tally,
 )
 from steptwin.durations import duration_text
-from steptwin.world.expression import Comparison
-from steptwin.world.quantities import Absolute, NumberLiteral, Product, Quantity, Remainder, SignalName, Sum
+from steptwin.simulation.logic.expression import Comparison
+from steptwin.simulation.logic.quantities import Absolute, NumberLiteral, Product, Quantity, Remainder, SignalName, Sum
 
 
 def quantity_text(node: Quantity) -> str:

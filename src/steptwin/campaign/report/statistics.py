@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from steptwin.campaign.case import Case, CaseResult
 from steptwin.campaign.search.guided import distance
-from steptwin.world.faults import read as read_fault
+from steptwin.simulation.faults import read as read_fault
 
 BINS = 24
 MOST_MATTERING = 20

@@ -15,9 +15,9 @@ from steptwin.campaign.inventory import PossibleFault, occasions, possible_fault
 from steptwin.campaign.runner import CaseRunner
 from steptwin.campaign.shrink import ADDED
 from steptwin.machine import Nanos
-from steptwin.world.faults import Fault
-from steptwin.world.programs import StatementFollower
-from steptwin.world.trace import TraceRecord
+from steptwin.simulation.faults import Fault
+from steptwin.simulation.kinds.programs import StatementFollower
+from steptwin.simulation.scheduler.trace import TraceRecord
 
 _MOMENTS = frozenset({"edge", "plan", "statement"})
 

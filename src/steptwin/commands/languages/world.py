@@ -7,7 +7,7 @@ from pathlib import Path
 from steptwin.commands.languages.contract import CheckReport, FileLanguage, GivenOptions
 from steptwin.diagnostics import SourceText
 from steptwin.files.world import read_beside
-from steptwin.world.check import diagnose
+from steptwin.simulation.world.check import diagnose
 
 
 def _check(source: SourceText, options: GivenOptions) -> CheckReport:

@@ -24,10 +24,10 @@ from steptwin.errors import Misuse, Refusal
 from steptwin.m1486.datasheet import axis, datasheet_of
 from steptwin.m1486.microsteps import FULL_STEP
 from steptwin.m1486.registers import UPLOADS
+from steptwin.simulation.script import steps
 from steptwin.subject import commands as command
 from steptwin.subject.devicetwin import DeviceTwin
 from steptwin.subject.payloads import Payload, SamplePayload, StatusPayload
-from steptwin.world import script as steps
 
 _SELECTION = re.compile(rb"\s*[Xx]\s*([0-9A-Fa-f])\s*\r")
 AXIS = 1

@@ -30,11 +30,11 @@ from steptwin.mic488.registers import CONTROLLER_STATUS_TEXTS, register_map
 from steptwin.mic488.status import AxisStatus
 from steptwin.mic488.values import halted, named
 from steptwin.nearmiss import NearMiss
+from steptwin.simulation.script import steps
 from steptwin.subject import commands as command
 from steptwin.subject.devicetwin import DeviceTwin
 from steptwin.subject.payloads import EdgePayload, Payload, SamplePayload, StatusPayload
 from steptwin.wire import pdu
-from steptwin.world import script as steps
 
 LINE, CONFIG = "line", "device.cfg"
 """Of the world of a twin."""

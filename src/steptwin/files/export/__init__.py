@@ -30,9 +30,9 @@ from steptwin.files.textfiles import check_writable, new_file
 from steptwin.files.writing import as_text, is_written_directly
 from steptwin.inputfiles import open_regular
 from steptwin.machine import MILLISECOND, Nanos
+from steptwin.simulation.mechanics.lanes import AxisLane, AxisViews
+from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 from steptwin.wire.pcapng import CapturedFrame, capture
-from steptwin.world.lanes import AxisLane, AxisViews
-from steptwin.world.trace import Trace, TraceRecord
 
 __all__ = [
     "FORMATS",

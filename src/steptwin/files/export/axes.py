@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from steptwin.motioncontroller import MotionController
-from steptwin.world.elements import ELEMENTS
-from steptwin.world.kind import AnyKind
-from steptwin.world.lanes import AxisLane, AxisViews, Mechanics, MovedLane
+from steptwin.simulation.components.registry import ELEMENTS
+from steptwin.simulation.kinds.kind import AnyKind
+from steptwin.simulation.mechanics.lanes import AxisLane, AxisViews, Mechanics, MovedLane
 
 if TYPE_CHECKING:
-    from steptwin.world.elements.axis import BuiltAxis
-    from steptwin.world.plant import Plant
+    from steptwin.simulation.components.axis import BuiltAxis
+    from steptwin.simulation.world.plant import Plant
 
 
 def axis_views(world: Plant) -> AxisViews:

@@ -1,7 +1,7 @@
 """Tracks of what axes move besides their loads, such as shafts and tools, from the true positions of the axes.
 
-A trace does not have their motion, because it follows from that of the loads, as `steptwin.world.lanes.MovedLane` says, and from
-the edges that faults record.
+A trace does not have their motion, because it follows from that of the loads, as `steptwin.simulation.mechanics.lanes.MovedLane`
+says, and from the edges that faults record.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from steptwin.machine import SECOND, Nanos
 from steptwin.motion import Profile, Segment, at_rest
 from steptwin.motion.divisions import profile_of
 from steptwin.motion.elastic import DriveStretch, Response, ResponseStretch, Spring
-from steptwin.world.lanes import LIFT_SHARE, SLIPS, SPRING_SHARE, STUCK, AxisLane, MovedLane
-from steptwin.world.loadmotion import polynomials
+from steptwin.simulation.mechanics.lanes import LIFT_SHARE, SLIPS, SPRING_SHARE, STUCK, AxisLane, MovedLane
+from steptwin.simulation.mechanics.loadmotion import polynomials
 
 SLACK_P = 0.02
 """Cubics are at most this far from the motion (pulses of its axis)."""

@@ -12,9 +12,9 @@ from steptwin.files.export.tracks import AxisTrack, PinTrack
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.motion import Profile, at_rest
 from steptwin.motion.divisions import StepTrain, profile_of
-from steptwin.world.course import LoadPiece
-from steptwin.world.lanes import AxisViews, plain_view
-from steptwin.world.trace import Trace, TraceRecord
+from steptwin.simulation.mechanics.course import LoadPiece
+from steptwin.simulation.mechanics.lanes import AxisViews, plain_view
+from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 
 
 @dataclass(slots=True)

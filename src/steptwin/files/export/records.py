@@ -22,8 +22,8 @@ from steptwin.motion import Profile
 from steptwin.motion.divisions import StepTrain
 from steptwin.motion.plain import plain_plan, read_plan
 from steptwin.plaintypes import fields_fit, fits, fitting, shown
-from steptwin.world.lanes import AxisLane, AxisViews, Mechanics, MovedLane, PhaseOutputs, StepOutputs
-from steptwin.world.trace import KINDS, Trace, TraceRecord
+from steptwin.simulation.mechanics.lanes import AxisLane, AxisViews, Mechanics, MovedLane, PhaseOutputs, StepOutputs
+from steptwin.simulation.scheduler.trace import KINDS, Trace, TraceRecord
 
 FORMAT = 2
 LONGEST_LINE = 4 << 20

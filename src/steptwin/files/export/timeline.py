@@ -19,7 +19,7 @@ from steptwin.files.export.tracks import AxisTrack, PinTrack
 from steptwin.machine import Nanos
 from steptwin.motion.divisions import Plan, StepTrain, profile_of
 from steptwin.motion.plain import plain_plan
-from steptwin.world.trace import TraceRecord
+from steptwin.simulation.scheduler.trace import TraceRecord
 
 _SCRIPTS = ("model.js", "draw.js", "timeline.js")
 _MOST_BYTES = 64

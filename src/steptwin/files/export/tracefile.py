@@ -14,8 +14,8 @@ from steptwin.files.export.records import begin_records, end_records, record_lin
 from steptwin.files.writing import directly, new_text
 from steptwin.machine import Nanos
 from steptwin.numerals import read_whole
+from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 from steptwin.system import reason
-from steptwin.world.trace import Trace, TraceRecord
 
 MOST_IN_RING = 10_000_000
 

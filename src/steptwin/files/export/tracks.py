@@ -10,8 +10,8 @@ from operator import attrgetter
 from steptwin.machine import Nanos
 from steptwin.motion import Profile, at_rest
 from steptwin.motion.divisions import Plan, profile_of
-from steptwin.world.course import LoadPiece
-from steptwin.world.lanes import AxisLane, Mechanics
+from steptwin.simulation.mechanics.course import LoadPiece
+from steptwin.simulation.mechanics.lanes import AxisLane, Mechanics
 
 
 @dataclass(slots=True)

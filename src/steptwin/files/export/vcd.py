@@ -27,7 +27,7 @@ from steptwin.motion import Profile
 from steptwin.motion.divisions import Plan, StepTrain, profile_of
 from steptwin.motion.pulses import pulse_runs, step_times
 from steptwin.motion.waveforms import PERIOD, currents
-from steptwin.world.lanes import PhaseOutputs, StepOutputs
+from steptwin.simulation.mechanics.lanes import PhaseOutputs, StepOutputs
 
 _WINDOW_CHANGES = 1 << 20
 """About how many changes are in memory at a time."""

@@ -20,8 +20,8 @@ from steptwin.gateways.leases import JogLeases
 from steptwin.gateways.points import CLOCK, registers_by_machine
 from steptwin.gateways.sampling import Sampler
 from steptwin.machine import SECOND
-from steptwin.world.addresses import Address, is_loopback, parse_address
-from steptwin.world.gateways import EpicsSpec
+from steptwin.simulation.describe.gateways import EpicsSpec
+from steptwin.simulation.toml.addresses import Address, is_loopback, parse_address
 
 if TYPE_CHECKING:
     from steptwin.gateways.epics.pvserver import PvAccessServer

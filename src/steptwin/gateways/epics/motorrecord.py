@@ -16,8 +16,8 @@ from steptwin.gateways.epics.motorputs import FIXED, PUTS, put_setting
 from steptwin.gateways.epics.motorstate import MotorState, RecordMotion
 from steptwin.gateways.epics.records import LOST, FieldValue, Putter
 from steptwin.gateways.sampling import Sample
+from steptwin.simulation.script.steps import Write
 from steptwin.subject.commands import Enable, Home, Jog, Move, StopAxes
-from steptwin.world.script import Write
 
 _LOOK_AHEAD_S = 0.3
 """Of a jog: two looks at it, and the time that a jog takes to end."""

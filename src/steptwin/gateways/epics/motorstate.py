@@ -25,11 +25,11 @@ from steptwin.gateways.epics.records import (
     RecordAlarm,
 )
 from steptwin.machine import SECOND, Nanos
+from steptwin.simulation.script.control import Halt
 from steptwin.subject.commands import Jog
 from steptwin.subject.contract import MachinePart
 from steptwin.subject.following import Following
 from steptwin.subject.payloads import InputPayload
-from steptwin.world.control import Halt
 
 ON_ITS_WAY = SECOND // 2
 """A motion that has not begun so long after its command does not begin any more."""

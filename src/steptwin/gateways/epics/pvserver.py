@@ -12,8 +12,8 @@ from steptwin.errors import LineFailure
 from steptwin.gateways.contract import ClientState
 from steptwin.gateways.epics.pvchannels import PvChannel, RecordProvider
 from steptwin.gateways.epics.records import Record
+from steptwin.simulation.toml.addresses import Address
 from steptwin.system import reason
-from steptwin.world.addresses import Address
 
 
 class PvAccessServer:

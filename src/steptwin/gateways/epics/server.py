@@ -18,8 +18,8 @@ from steptwin.errors import LineFailure
 from steptwin.gateways.clients import address_text
 from steptwin.gateways.contract import ClientState
 from steptwin.gateways.epics.channels import PvDatabase
+from steptwin.simulation.toml.addresses import Address
 from steptwin.system import reason
-from steptwin.world.addresses import Address
 
 MONITORS_S = 1.0
 """How long an answer waits for monitors, which a client that does not read can hold up."""

@@ -23,8 +23,8 @@ from paho.mqtt.subscribeoptions import SubscribeOptions
 
 from steptwin.errors import Misuse
 from steptwin.eventloop import endless
+from steptwin.simulation.toml.addresses import Address
 from steptwin.system import reason
-from steptwin.world.addresses import Address
 
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.25, 30.0
 STEADY_S = 10.0

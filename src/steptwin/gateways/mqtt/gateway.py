@@ -23,10 +23,10 @@ from steptwin.gateways.points import registers_by_machine
 from steptwin.gateways.sampling import Sampler
 from steptwin.inputfiles import read_bytes
 from steptwin.machine import SECOND
+from steptwin.simulation.describe.gateways import MqttSpec, SparkplugSpec
+from steptwin.simulation.toml.addresses import parse_address
 from steptwin.system import reason
 from steptwin.textcodec import decode
-from steptwin.world.addresses import parse_address
-from steptwin.world.gateways import MqttSpec, SparkplugSpec
 
 
 class MqttGateway:

@@ -16,10 +16,10 @@ from steptwin.files.tokenfiles import tokens_in
 from steptwin.gateways.clients import GatewayClient
 from steptwin.gateways.contract import GatewaySubject
 from steptwin.gateways.leases import JogLeases
+from steptwin.simulation.describe.gateways import MqttSpec
 from steptwin.subject.commands import Command, Jog, StopAxes, row_of
 from steptwin.subject.contract import Result
 from steptwin.subject.dispatch import Message, failure, read_message, respond
-from steptwin.world.gateways import MqttSpec
 
 COMMANDS = (
     *("read", "pins", "state", "encoders", "faults", "time", "stop", "set", "press", "release", "write", "turn", "enable"),

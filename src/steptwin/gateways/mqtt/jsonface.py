@@ -28,9 +28,9 @@ from steptwin.gateways.mqtt.jsontopics import (
 from steptwin.gateways.points import CLOCK
 from steptwin.gateways.sampling import Sample, Sampler
 from steptwin.machine import SECOND
+from steptwin.simulation.describe.gateways import MqttSpec
 from steptwin.subject.dispatch import failure
 from steptwin.subject.following import Filter
-from steptwin.world.gateways import MqttSpec
 
 KINDS = frozenset({"status", "report", "note", "fault", "button", "input"})
 """Of events that are published."""

@@ -19,8 +19,8 @@ from typing import Any
 from steptwin.errors import Misuse
 from steptwin.gateways.points import CLOCK, CLOCK_POINTS, GatewayPoint, PointValue, points_of, values_of
 from steptwin.gateways.sampling import Sample
+from steptwin.simulation.describe.gateways import UNNAMED
 from steptwin.subject.contract import Description
-from steptwin.world.gateways import UNNAMED
 
 ONLINE, INSTANCE, DESCRIPTION, EVENTS, DO, ANSWER = "online", "instance", "description", "events", "do", "answer"
 OWN = (ONLINE, INSTANCE, DESCRIPTION, EVENTS, DO, ANSWER, CLOCK)

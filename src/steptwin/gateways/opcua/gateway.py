@@ -27,9 +27,9 @@ from steptwin.gateways.opcua.session import GatewayServer
 from steptwin.gateways.points import registers_by_machine
 from steptwin.gateways.sampling import Sampler
 from steptwin.machine import SECOND
+from steptwin.simulation.describe.gateways import APPLICATION_URI, OpcUaSpec
+from steptwin.simulation.toml.addresses import Address, is_loopback, parse_address
 from steptwin.system import reason
-from steptwin.world.addresses import Address, is_loopback, parse_address
-from steptwin.world.gateways import APPLICATION_URI, OpcUaSpec
 
 LOOK_S = 60.0
 """Between looks at its certificate."""

@@ -22,7 +22,7 @@ from steptwin.files.tokenfiles import tokens_in
 from steptwin.gateways.clients import GatewayClient
 from steptwin.gateways.opcua.session import GatewayUser
 from steptwin.inputfiles import read_bytes
-from steptwin.world.gateways import OpcUaSpec
+from steptwin.simulation.describe.gateways import OpcUaSpec
 
 _SIGNED = (
     ua.SecurityPolicyType.Basic256Sha256_Sign,

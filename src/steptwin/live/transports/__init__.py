@@ -1,5 +1,5 @@
-"""Transports: the ways in which programs reach a line. Each is a file here and a row in `steptwin.world.links`. A program with a
-transport of its own registers it before it reads a description: `register`."""
+"""Transports: the ways in which programs reach a line. Each is a file here and a row in `steptwin.simulation.kinds.links`. A
+program with a transport of its own registers it before it reads a description: `register`."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from steptwin.live.transports.rfc2217 import RFC2217
 from steptwin.live.transports.serial import SERIAL
 from steptwin.live.transports.tcp import RTU_TCP, TCP, VISION
 from steptwin.live.transports.tls import TLS_TCP
+from steptwin.simulation.kinds.links import LINK_KEYS, LinkKey
 from steptwin.tables import complete
-from steptwin.world.links import LINK_KEYS, LinkKey
 
 TRANSPORTS: dict[str, Transport] = dict(
     complete(

@@ -1,4 +1,4 @@
-"""The contract of a transport, a way in which programs reach a line; one for each key in `steptwin.world.links`."""
+"""The contract of a transport, a way in which programs reach a line; one for each key in `steptwin.simulation.kinds.links`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from steptwin.live.clients import Clients
 from steptwin.live.links import Link
 from steptwin.live.rfc2217 import TwinLine
 from steptwin.machine import Port
-from steptwin.world.links import TlsFiles
+from steptwin.simulation.kinds.links import TlsFiles
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

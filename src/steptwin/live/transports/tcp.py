@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from steptwin.live.tcp import TcpLink
 from steptwin.live.transports.contract import LinkArguments, OpenLink, Transport
-from steptwin.world.addresses import parse_address
+from steptwin.simulation.toml.addresses import parse_address
 
 
 async def listen(opening: LinkArguments) -> OpenLink:

@@ -19,13 +19,13 @@ from steptwin.live.tcp import listening_at
 from steptwin.live.tcp_asyncio import AsyncioConnection, TurnedAway
 from steptwin.live.transports.contract import LinkArguments, OpenLink, Transport
 from steptwin.machine import Nanos, Port, SendingPort, SourcedPort, sends_by_itself
+from steptwin.simulation.kinds.links import TlsFiles
+from steptwin.simulation.toml.addresses import Address, parse_address
 from steptwin.system import reason
 from steptwin.wire.mbap import TcpFramer
 from steptwin.wire.pdu import ILLEGAL_FUNCTION, READS, REFUSED, WRITES, exception_pdu
 from steptwin.wire.rtu import BROADCAST
 from steptwin.wire.slave import tcp_response
-from steptwin.world.addresses import Address, parse_address
-from steptwin.world.links import TlsFiles
 
 HANDSHAKE_S = 10.0
 """Time for a client to prove who it is, s."""

@@ -13,7 +13,7 @@ from steptwin.lsp.m1486.analysis import M1486Analysis
 from steptwin.lsp.world.tables import text_of
 from steptwin.m1486.lines import STEP_DIRECTION, Interface, interface
 from steptwin.m1486.variants import DEFAULT, Variant, variant
-from steptwin.world.kinds.m1486.table import DEFAULT_VARIANT
+from steptwin.simulation.kinds.m1486.table import DEFAULT_VARIANT
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,10 +18,10 @@ from steptwin.lsp.wbc.surroundings import ProgramContext
 from steptwin.lsp.world.tables import text_of
 from steptwin.mic488.config import ControllerConfig, examine_config
 from steptwin.mic488.inifile import IniFile
+from steptwin.simulation.kinds.mic488.table import banks_value
 from steptwin.wbc.dialect import DEFAULT, Dialect, dialect_for
 from steptwin.wbc.incremental import Edited
 from steptwin.wbc.positions import PositionTable, parse_positions
-from steptwin.world.kinds.mic488.table import banks_value
 
 _SECTION = re.compile(r"^[ \t]*\[(?:Axis[0-3]|IN[0-9]|AIN[01]|WBC_PROGRAM)\]", re.MULTILINE | re.IGNORECASE)
 _BEGINNING = 4000

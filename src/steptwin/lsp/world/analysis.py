@@ -18,14 +18,14 @@ from steptwin.lsp.world.built import ElementSignals, UnitsOfSignals
 from steptwin.lsp.world.items import ItemBuilder, keys_of
 from steptwin.lsp.world.outline import TableOutline, WorldOutline
 from steptwin.lsp.world.signals import WorldSignals
+from steptwin.simulation.components.registry import ELEMENTS
+from steptwin.simulation.describe.pieces import FILE_KEYS, USE
+from steptwin.simulation.kinds.kind import AnyKind
+from steptwin.simulation.kinds.registry import KINDS
+from steptwin.simulation.toml.names import RESERVED
+from steptwin.simulation.toml.values import name_value
+from steptwin.simulation.world.check import diagnose
 from steptwin.symbols import Symbol, SymbolKind, SymbolRole, Use
-from steptwin.world.check import diagnose
-from steptwin.world.elements import ELEMENTS
-from steptwin.world.kind import AnyKind
-from steptwin.world.kinds import KINDS
-from steptwin.world.names import RESERVED
-from steptwin.world.pieces import FILE_KEYS, USE
-from steptwin.world.values import name_value
 
 _KEY = re.compile(r"[ \t]*([A-Za-z0-9_-]+)[ \t]*=")
 _FILE = re.compile(r"""(["'])([^"'\n]+\.(?:prg|csv|cfg|m1486|wbc|toml))\1""", re.IGNORECASE)

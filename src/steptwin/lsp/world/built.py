@@ -8,12 +8,12 @@ from contextlib import suppress
 from steptwin.errors import Misuse
 from steptwin.lsp.positions import LineIndex
 from steptwin.lsp.world.outline import TableOutline
-from steptwin.world.blueprint import Blueprint
-from steptwin.world.build import build
-from steptwin.world.description import describe
-from steptwin.world.elements import ELEMENTS
-from steptwin.world.kinds import KINDS
-from steptwin.world.pieces import USE
+from steptwin.simulation.components.registry import ELEMENTS
+from steptwin.simulation.describe.blueprint import Blueprint
+from steptwin.simulation.describe.build import build
+from steptwin.simulation.describe.description import describe
+from steptwin.simulation.describe.pieces import USE
+from steptwin.simulation.kinds.registry import KINDS
 
 UnitsOfSignals = Mapping[str, Mapping[str, str]]
 """By element and signal."""

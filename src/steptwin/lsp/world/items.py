@@ -10,14 +10,14 @@ from steptwin.lsp.answers import Completion, CompletionKind, Completions
 from steptwin.lsp.world.outline import TableOutline, WorldOutline
 from steptwin.lsp.world.signals import WorldSignals
 from steptwin.lsp.world.snippets import table_snippet, value_snippet
+from steptwin.simulation.components.registry import ELEMENTS
+from steptwin.simulation.describe.gateways import GATEWAY, GATEWAYS
+from steptwin.simulation.describe.steptable import ACTIONS
+from steptwin.simulation.describe.tables import all_keys, written
+from steptwin.simulation.kinds.registry import KINDS
+from steptwin.simulation.toml.reader import Key
+from steptwin.simulation.toml.values import ANALOG_INPUT, DIGITAL_INPUT, OUTPUT, NameOf, PinOf, Word, flag
 from steptwin.symbols import SymbolKind
-from steptwin.world.elements import ELEMENTS
-from steptwin.world.gateways import GATEWAY, GATEWAYS
-from steptwin.world.kinds import KINDS
-from steptwin.world.reader import Key
-from steptwin.world.steptable import ACTIONS
-from steptwin.world.tables import all_keys, written
-from steptwin.world.values import ANALOG_INPUT, DIGITAL_INPUT, OUTPUT, NameOf, PinOf, Word, flag
 
 _KEY = re.compile(r"[ \t]*([A-Za-z0-9_-]*)\Z")
 _VALUE = re.compile(r"[ \t]*([A-Za-z0-9_-]+)[ \t]*=[ \t]*([\"']?)([^\"'=,#]*)\Z")

@@ -14,7 +14,7 @@ from steptwin.lsp.positions import LineIndex
 from steptwin.lsp.wbc.language import controller_of
 from steptwin.lsp.world.analysis import WorldAnalysis
 from steptwin.lsp.world.built import ElementSignals
-from steptwin.world.kinds import KINDS
+from steptwin.simulation.kinds.registry import KINDS
 
 FILES: dict[str, Callable[[str, Mapping[str, Any]], MachineFiles | None]] = {"mic488": controller_of, "m1486": chip_of}
 """What reads the files of a controller from the address of a description and its table there, by kinds of controllers."""

@@ -10,12 +10,12 @@ from functools import cached_property
 from steptwin.diagnostics import Span
 from steptwin.errors import Misuse
 from steptwin.lsp.positions import LineIndex
+from steptwin.simulation.components.registry import ELEMENTS
+from steptwin.simulation.describe.pieces import referring_keys
+from steptwin.simulation.describe.tables import tables
+from steptwin.simulation.kinds.registry import KINDS
+from steptwin.simulation.toml.tomlplaces import Path, find_places
 from steptwin.symbols import Symbol, SymbolKind, SymbolRole, Use
-from steptwin.world.elements import ELEMENTS
-from steptwin.world.kinds import KINDS
-from steptwin.world.pieces import referring_keys
-from steptwin.world.tables import tables
-from steptwin.world.tomlplaces import Path, find_places
 
 _HEADER = re.compile(r"[ \t]*(\[\[?)[ \t]*([A-Za-z0-9_.\- \t]*)(\]?\]?)")
 _KEY = re.compile(r"[ \t]*([A-Za-z0-9_-]+)[ \t]*=[ \t]*")

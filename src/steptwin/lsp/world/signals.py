@@ -11,9 +11,9 @@ from steptwin.diagnostics import Span
 from steptwin.lsp.answers import Completion, CompletionKind, Hover
 from steptwin.lsp.world.built import UnitsOfSignals
 from steptwin.lsp.world.outline import TableOutline, WorldOutline
+from steptwin.simulation.components.axis import MECHANICS
+from steptwin.simulation.kinds.kind import AnyKind
 from steptwin.symbols import SymbolKind
-from steptwin.world.elements.axis import MECHANICS
-from steptwin.world.kind import AnyKind
 
 _CONDITION = re.compile(r"""\b(?:until|expect|when|of)[ \t]*=[ \t]*(?:"[^"]*|'[^']*)\Z""")
 _LEVELS = re.compile(r"""\b(write|set)[ \t]*=[ \t]*\{(?:[^"'}]|"[^"]*"|'[^']*')*(?:"[^"]*|'[^']*)\Z""")

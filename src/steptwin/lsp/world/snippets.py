@@ -7,8 +7,8 @@ from functools import cache
 from typing import Any
 
 from steptwin.errors import Misuse
-from steptwin.world.reader import Key
-from steptwin.world.values import Word, flag
+from steptwin.simulation.toml.reader import Key
+from steptwin.simulation.toml.values import Word, flag
 
 _TEXTS = ("x", "x.M1", "x.IN1", "x.OUT1", "x > 1", "1 s")
 """One of them is read by every key that takes text."""

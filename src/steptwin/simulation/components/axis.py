@@ -1,0 +1,292 @@
+"""``[[axis]]``: what a drive moves, with its stops, play, motor, switches and encoder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import partial
+from typing import Any
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.simulation.components.element import Element
+from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
+from steptwin.simulation.components.encoder import ENCODER, EncoderSpec, read_encoder
+from steptwin.simulation.components.motor import MOTOR, MotorSpec, motor_of, read_motor
+from steptwin.simulation.components.site import Site
+from steptwin.simulation.components.switch import SWITCH, SwitchSpec, lane_of, put_switch, read_switches, zone_of
+from steptwin.simulation.kinds.kind import EncoderInputs
+from steptwin.simulation.logic.contacts import Switch, Zone
+from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.mechanics.course import Build, Course
+from steptwin.simulation.mechanics.mechanics import EncoderBuild, Mechanism, RotorMark
+from steptwin.simulation.mechanics.scale import GivenScale, Scale, exact_fraction, scale_of
+from steptwin.simulation.scheduler.kernel import Kernel, Source
+from steptwin.simulation.toml.names import Unknown, WrongTerminal
+from steptwin.simulation.toml.reader import Key, Row, Table, TomlText, optional
+from steptwin.simulation.toml.sense import TableRows
+from steptwin.simulation.toml.values import (
+    Terminal,
+    axis_number,
+    flag,
+    name_value,
+    number,
+    pair,
+    pin_name,
+    text_value,
+    whole,
+    word,
+)
+
+MECHANICS = ("position", "lost", "stalled")
+"""What there is of the mechanics of an axis."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AxisSpec(NamedSpec):
+    drive: Terminal
+    kind: str
+    unit: str | None
+    pulses_per_unit: float | None
+    pitch: float | None
+    pulses_per_rev: int | None
+    inverted: bool
+    travel: tuple[float, float] | None
+    start: float
+    backlash: float
+    switches: tuple[SwitchSpec, ...]
+    encoder: EncoderSpec | None
+    motor: MotorSpec | None
+
+    @property
+    def scale(self) -> GivenScale:
+        return GivenScale(
+            machine=self.drive[0],
+            is_rotary=self.kind == "rotary",
+            unit=self.unit,
+            pulses_per_unit=self.pulses_per_unit,
+            pitch=self.pitch,
+            pulses_per_rev=self.pulses_per_rev,
+            full_steps=None if self.motor is None else self.motor.full_steps,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class BuiltAxis:
+    """An axis with its mechanics."""
+
+    spec: AxisSpec
+    kernel: Kernel
+    mechanism: Mechanism
+    scale: Scale
+
+    @property
+    def source(self) -> Source:
+        return self.kernel.source(self.spec.name)
+
+    def units(self, pulses: int) -> float:
+        scale = self.scale.pulses_per_unit
+        return pulses * scale.denominator / scale.numerator
+
+
+def _read(text: TomlText, row: Row, table: Table) -> AxisSpec:
+    path = row["path"]
+    spec = AxisSpec(
+        **row,
+        switches=tuple(read_switches(text, path, table)),
+        encoder=read_encoder(text, path, table),
+        motor=read_motor(text, path, table),
+    )
+    if spec.encoder is not None and spec.encoder.follows == spec.name:
+        text.wrong(
+            (*spec.encoder.path, "follows"), "D007", f"follows = {spec.name!r} is its own axis: an encoder is on it anyway"
+        )
+    start, travel = (*path, "start"), spec.travel
+    if travel is not None and not travel[0] <= spec.start <= travel[1] and not text.is_wrong(start):
+        text.wrong(start, "D007", f"start = {spec.start:g} is outside travel = {list(travel)}")
+    return spec
+
+
+def _refers(spec: AxisSpec, described: ElementSpecs) -> Iterator[Reference]:
+    yield Reference(spec.drive[0], spec.drive[0], (*spec.path, "drive"))
+    for switch in spec.switches:
+        yield Reference(spec.drive[0], switch.target[0], (*switch.path, "to"))
+    if spec.encoder is not None and spec.encoder.follows is not None:
+        drives = {axis.name: axis.drive[0] for axis in described.of(AXIS)}
+        followed = spec.encoder.follows
+        others = (one.name for specs in described.values() for one in specs if isinstance(one, NamedSpec))
+        if followed in drives or followed in others:  # one that is not an axis is joined, too: what is wrong is `follows`
+            yield Reference(spec.drive[0], drives.get(followed, followed), (*spec.encoder.path, "follows"))
+
+
+def _build(spec: AxisSpec, site: Site) -> BuiltAxis:
+    machine = spec.drive[0]
+    kernel = site.kernel(machine)
+    number, scale, build = site.memo.once(spec.path, lambda: _checked(spec, site))
+    mechanism = Mechanism(kernel, machine, number, build, spec.name)
+    kernel.add_part(mechanism, (machine,), spec.name)
+    fitted = BuiltAxis(spec, kernel, mechanism, scale)
+    for n, switch in enumerate(spec.switches, start=1):
+        site.text.unless_wrong(switch.path, partial(_put_switch, fitted, switch, lane_of(spec.name, n), site))
+    return fitted
+
+
+def _checked(spec: AxisSpec, site: Site) -> tuple[int, Scale, Build]:
+    """The number of its drive, its scale and its mechanics. Raises `Misuse`."""
+    machine, drive = spec.drive
+    number = axis_number(drive)
+    axes = len(site.machine(machine).axes)
+    if not 1 <= number <= axes:
+        there = ", ".join(f"M{n}" for n in range(1, axes + 1))
+        raise WrongTerminal(f"{machine}.{drive}", f"drive = '{machine}.{drive}': {machine} has {there}", None)
+    taken = [axis.spec.name for axis in site.parts.built(AXIS).values() if axis.spec.drive == spec.drive]
+    if taken:
+        raise Misuse(f"drive = '{machine}.{drive}' moves {taken[0]!r} already")
+    scale = scale_of(spec.scale, site.kind(machine).scale(spec.scale, site.machine(machine), number))
+    pulses = scale.nearest
+    build = Build(
+        sign=-1 if spec.inverted else 1,
+        zero=pulses(spec.start),
+        low=None if spec.travel is None else pulses(spec.travel[0]),
+        high=None if spec.travel is None else pulses(spec.travel[1]),
+        play=pulses(spec.backlash),
+        period_p=scale.period_p,
+        motor=None if spec.motor is None else motor_of(spec.motor, scale),
+        is_free=spec.motor is not None and spec.motor.when_off == "free",
+    )
+    if build.is_free and build.motor is not None:
+        build.motor.check_free()
+    return number, scale, build
+
+
+def _put_switch(axis: BuiltAxis, spec: SwitchSpec, lane: str, site: Site) -> None:
+    def zone() -> Zone:
+        usual = axis.scale.turn if axis.spec.kind == "rotary" else None
+        period = usual if spec.period is None else axis.scale.pulses(spec.period)
+        return zone_of(spec, axis.scale.nearest, period)
+
+    put_switch(axis.kernel, axis.mechanism, axis.spec.drive[0], site.memo.once(spec.path, zone), spec, lane, site)
+
+
+def _connect(spec: AxisSpec, fitted: BuiltAxis, site: Site) -> None:
+    _fit_encoder(fitted, spec.encoder, site.parts.built(AXIS), site)
+
+
+def _fit_encoder(axis: BuiltAxis, spec: EncoderSpec | None, axes: Mapping[str, BuiltAxis], site: Site) -> None:
+    """Put an encoder on an axis, or on the one that it follows. Without one, mechanics between pulses and load turn that of the
+    controller."""
+    mechanism = axis.mechanism
+    name = axis.spec.drive[0]
+    kind, machine = site.kind(name), site.machine(name)
+    encoders = kind.encoders
+    if encoders is None:
+        if spec is not None:
+            raise Misuse(f"encoder: {name} is {kind.title}, which reads none")
+        return
+    now = axis.kernel.now
+    reader = encoders.reader(machine)
+    if spec is None:
+        if not mechanism.build.ideal:
+            mechanism.fit(EncoderBuild(name, reader, mechanism.number), now)
+        return
+    turned = axis
+    if spec.follows is not None:
+        other = axes.get(spec.follows)
+        if other is None:
+            raise Unknown(spec.follows, f"encoder: follows = {spec.follows!r}: axes are {', '.join(axes)}")
+        turned = other
+    counts = _counts(spec, turned, encoders, machine, mechanism.number)
+    on_load = spec.mount == "load" or spec.follows is not None
+    numerator, denominator = (None, 1) if counts is None else (counts.numerator, counts.denominator)
+    turned.mechanism.fit(EncoderBuild(name, reader, mechanism.number, on_load, numerator, denominator), now)
+    if spec.index:
+        low = axis.scale.nearest(spec.offset)
+        target = (name, encoders.index_input(mechanism.number))
+        circuit = site.circuit(axis.kernel, target, (*spec.path, "index"), None)
+        zone = Zone(low, low + spec.index_width - 1, 0, axis.scale.pulses_per_rev)
+        axis.kernel.add_part(Switch(circuit, RotorMark(turned.mechanism), zone, now), (turned.mechanism.machine,))
+
+
+def _counts(spec: EncoderSpec, turned: BuiltAxis, encoders: EncoderInputs[Any], machine: Any, number: int) -> Fraction | None:
+    """Counts per pulse of what turns it; None: as the controller is configured."""
+    counts: Fraction | None = None
+    if spec.counts_per_unit is not None:
+        counts = exact_fraction(spec.counts_per_unit) / turned.scale.pulses_per_unit
+    elif spec.counts_per_rev is not None:
+        counts = Fraction(spec.counts_per_rev, turned.scale.pulses_per_rev)
+    if spec.slip:
+        if counts is None:
+            counts = encoders.counts_per_pulse(machine, number)
+        counts *= 1 - exact_fraction(spec.slip)
+    return counts
+
+
+def find_axis(name: str, site: Site) -> BuiltAxis:
+    """The axis called ``name``."""
+    found = site.parts.built(AXIS).get(name)
+    if found is None:
+        raise Unknown(name, f"no axis is called {name!r}")
+    return found
+
+
+def turns_of_axis(fitted: BuiltAxis, now: Nanos) -> Iterator[Nanos]:
+    """Moments after ``now`` between which its load moves one way."""
+    return iter(fitted.mechanism.course(now).turns(now))
+
+
+def _signals(fitted: BuiltAxis) -> Mapping[str, SignalOf]:
+    mechanism, turning = fitted.mechanism, partial(turns_of_axis, fitted)
+    up, down = fitted.scale.pulses_per_unit.as_integer_ratio()
+    source, version = (fitted.source,), mechanism.version
+
+    def signal(of: Callable[[Course, Nanos], float], unit: str = "") -> SignalOf:
+        return SignalOf(
+            source,
+            lambda now: of(mechanism.course(now), now),
+            turning,
+            version,
+            unit,
+            freeze=lambda now: partial(of, mechanism.course(now)),
+        )
+
+    position = signal(lambda course, now: course.load_at(now) * down / up, fitted.scale.unit)
+    lost = signal(lambda course, now: float(course.field(now) - course.at(now).rotor))
+    stalled = signal(lambda course, now: float(course.at(now).stalled))
+    return dict(zip(MECHANICS, (position, lost, stalled), strict=True))
+
+
+AXIS: Element[AxisSpec, BuiltAxis] = Element(
+    name="axis",
+    spec=AxisSpec,
+    rows=TableRows(
+        written="[[axis]]",
+        keys=(
+            Key("name", name_value, "how scripts and conditions name it"),
+            Key("drive", pin_name, "what drives it: an axis of a controller, such as table.M1"),
+            optional(word("linear", "rotary"), "kind", "what moves", "linear"),
+            optional(
+                text_value, "unit", "of its positions: mm, cm, m, degree, rev or anything; default mm, degree or its drive's"
+            ),
+            optional(
+                number(0.0, above=True),
+                "pulses_per_unit",
+                "pulses (M1486: minimum microsteps) per unit; else by pitch, by revolution, by gear",
+            ),
+            optional(number(0.0, above=True), "pitch", "units per motor revolution, instead of pulses_per_unit"),
+            optional(whole(1, 10**7), "pulses_per_rev", "pulses per motor revolution; default mot_resol; M1486: 64 × full_steps"),
+            optional(flag, "inverted", "whether positive pulses go down", False),
+            optional(pair, "travel", "hard stops, in its unit"),
+            optional(number(), "start", "where it stands when the world begins, in its unit", 0.0),
+            optional(number(0.0), "backlash", "play between motor and load, in its unit", 0.0),
+        ),
+        exclude=(("pulses_per_unit", "pitch"),),
+    ),
+    inner={"switch": SWITCH, "encoder": ENCODER, "motor": MOTOR},
+    inner_attributes={"switch": "switches"},
+    read=_read,
+    refers=_refers,
+    build=_build,
+    connect=_connect,
+    signals=_signals,
+)

@@ -1,0 +1,143 @@
+"""``[[brake]]``: a brake on the motor of an axis, closed by springs and released by current."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import ClassVar
+
+from steptwin.errors import Misuse
+from steptwin.machine import MILLISECOND, Nanos
+from steptwin.simulation.components.axis import find_axis
+from steptwin.simulation.components.elementspec import ElementSpecs
+from steptwin.simulation.components.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
+from steptwin.simulation.components.site import Site
+from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
+from steptwin.simulation.faults.effects import ElementEffect
+from steptwin.simulation.faults.table import number
+from steptwin.simulation.kinds.kind import Terminals
+from steptwin.simulation.mechanics.mechanics import Mechanism
+from steptwin.simulation.scheduler.kernel import Board
+from steptwin.simulation.toml.reader import Key, optional
+from steptwin.simulation.toml.values import OUTPUT_PIN, NameOf, Terminal, time_value
+from steptwin.simulation.toml.values import number as number_value
+
+RELEASE, RELEASED = "RELEASE", "RELEASED"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BrakeSpec(BoardSpec):
+    """``torque`` in N·m at the motor."""
+
+    axis: str
+    torque: float
+    release: Terminal | None
+    release_time: Nanos
+    apply_time: Nanos
+
+    @property
+    def terminals(self) -> Terminals:
+        return Terminals(digital_inputs=(RELEASE,), outputs=(RELEASED,))
+
+    @property
+    def joints(self) -> Iterable[Joint]:
+        if self.release is not None:
+            yield Joint("release", RELEASE, self.release)
+
+    def others(self, described: ElementSpecs) -> Iterator[tuple[str, str]]:
+        yield "axis", self.axis
+
+
+class Brake(BoardPart):
+    """Lets go ``release_time`` after RELEASE is switched on, and acts ``apply_time`` after it is switched off. A shorter pulse
+    does not move it."""
+
+    FIXED: ClassVar[tuple[str, ...]] = ("_mechanism", "_spec")
+    __slots__ = (*FIXED, "_due", "_is_released", "_was_on", "is_stuck", "share")
+
+    def __init__(self, board: Board, spec: BrakeSpec, mechanism: Mechanism) -> None:
+        super().__init__(board)
+        self._spec = spec
+        self._mechanism = mechanism
+        self._was_on = False
+        self._is_released = False
+        self._due: Nanos | None = None
+        """When it lets go, or acts."""
+        self.is_stuck = False
+        """Fault: it does not let go."""
+        self.share = 1.0
+        """Of its torque that it has; less while it is worn."""
+        if not board.kernel.is_blank:
+            mechanism.brake(spec.torque, board.kernel.now)
+
+    def acts_on(self, mechanism: Mechanism) -> bool:
+        return self._mechanism is mechanism
+
+    def update(self, now: Nanos) -> None:
+        self._move(now)  # before the input changes: an input at a moment comes after what is due then
+        is_on = self.board.is_on(RELEASE)
+        if is_on is not self._was_on:
+            self._was_on = is_on
+            wait = self._spec.release_time if is_on else self._spec.apply_time
+            self._due = None if is_on is self._is_released else now + wait
+            self._move(now)
+        is_open = self._is_released and not self.is_stuck
+        self._mechanism.brake(0.0 if is_open else self._spec.torque * self.share, now)
+        self.board.put(RELEASED, float(is_open))
+
+    def _move(self, now: Nanos) -> None:
+        """Let go or act, if that is due."""
+        if self._due is not None and self._due <= now:
+            self._due = None
+            self._is_released = self._was_on
+
+    def deadline(self) -> Nanos | None:
+        return self._due
+
+
+def _wear(active: ActiveFault, brake: Brake, begins: bool, now: Nanos) -> str:
+    brake.share = active.fault.number("share") if begins else 1.0
+    return f"{brake.board.name} is worn to {brake.share:g} of its torque" if begins else f"{brake.board.name} is as new"
+
+
+def _stick(active: ActiveFault, brake: Brake, begins: bool, now: Nanos) -> str:
+    brake.is_stuck = begins
+    return f"{brake.board.name} {'does not let go' if begins else 'lets go again'}"
+
+
+def _make(spec: BrakeSpec, site: Site) -> Brake:
+    mechanism = find_axis(spec.axis, site).mechanism
+    motor = mechanism.build.motor
+    if motor is None or not mechanism.build.is_free:
+        raise Misuse(f"axis {spec.axis!r} stands without current: a brake needs an [axis.motor] with when_off = 'free'")
+    braked = [name for name, other in site.parts.built(BRAKE).items() if other.acts_on(mechanism)]
+    if braked:
+        raise Misuse(f"axis {spec.axis!r} has the brake {braked[0]!r} already")
+    motor.check_free(spec.torque)
+    return Brake(site.board(spec.name), spec, mechanism)
+
+
+BRAKE = with_terminals(
+    "brake",
+    BrakeSpec,
+    (
+        Key("axis", NameOf("axis"), "the axis whose motor it holds"),
+        Key("torque", number_value(0.0, above=True), "N·m at the motor, of a brake that is not worn"),
+        optional(OUTPUT_PIN, "release", "output joined to RELEASE; without it a wire may be"),
+        optional(time_value, "release_time", "from RELEASE on until it lets go", 30 * MILLISECOND),
+        optional(time_value, "apply_time", "from RELEASE off until it acts", 20 * MILLISECOND),
+    ),
+    make=_make,
+    faults=(
+        *STUCK,
+        FaultKind(
+            "worn-brake",
+            Layer.ELEMENT,
+            Occasion.ALWAYS,
+            "A brake has only a share of its torque.",
+            own=(number("share", "Of its torque.", 0.0, 1.0, default=0.2),),
+            effect=ElementEffect(_wear),
+        ),
+        FaultKind("stuck-brake", Layer.ELEMENT, Occasion.ALWAYS, "A brake does not let go.", effect=ElementEffect(_stick)),
+    ),
+)

@@ -1,0 +1,75 @@
+"""``[[button]]``: a contact that a person presses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from steptwin.machine import Nanos
+from steptwin.simulation.components.contact import CONTACT_KEYS
+from steptwin.simulation.components.element import Element
+from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
+from steptwin.simulation.components.site import Site
+from steptwin.simulation.logic.contacts import Button
+from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.toml.reader import Key, Row, Table, TomlText
+from steptwin.simulation.toml.sense import TableRows
+from steptwin.simulation.toml.values import INPUT_PIN, Terminal, name_value
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ButtonSpec(NamedSpec):
+    target: Terminal
+    contact: str
+    join: str | None
+    bounce: Nanos
+    bounces: int
+
+
+def _read(text: TomlText, row: Row, table: Table) -> ButtonSpec:
+    return ButtonSpec(**row)
+
+
+def _refers(spec: ButtonSpec, described: ElementSpecs) -> Iterator[Reference]:
+    yield Reference(spec.target[0], spec.target[0], (*spec.path, "to"))
+
+
+def _build(spec: ButtonSpec, site: Site) -> tuple[Button, Kernel]:
+    kernel = site.kernel(spec.target[0])
+    circuit = site.circuit(kernel, spec.target, spec.path, spec.join)
+    button = Button(
+        circuit,
+        normally_closed=spec.contact == "NC",
+        bounce_ns=spec.bounce,
+        bounces=spec.bounces,
+        chance=site.bounce_of(circuit),
+        lane=spec.name,
+    )
+    button.rest_at(spec.contact == "NC")
+    kernel.add_part(button, (circuit.target.machine,), spec.name, circuit.target.machine)
+    return button, kernel
+
+
+def _signals(built: tuple[Button, Kernel]) -> Mapping[str, SignalOf]:
+    button, kernel = built
+    return {"pressed": SignalOf((kernel.source(button.lane),), lambda now: float(button.pressed))}
+
+
+BUTTON: Element[ButtonSpec, tuple[Button, Kernel]] = Element(
+    name="button",
+    spec=ButtonSpec,
+    rows=TableRows(
+        written="[[button]]",
+        keys=(
+            Key("name", name_value, "how scripts name it"),
+            Key("to", INPUT_PIN, "the input: MACHINE.PIN", attribute="target"),
+            *CONTACT_KEYS,
+        ),
+        need={"bounces": "bounce"},
+    ),
+    read=_read,
+    refers=_refers,
+    build=_build,
+    signals=_signals,
+)

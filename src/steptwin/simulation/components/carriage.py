@@ -1,0 +1,215 @@
+"""``[[carriage]]``: what an axis moves through an elastic belt: it lags behind, and swings after a stop."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+from math import floor
+from typing import ClassVar
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.motion.elastic import Response, Spring
+from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis
+from steptwin.simulation.components.element import Element
+from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
+from steptwin.simulation.components.site import Site
+from steptwin.simulation.components.switch import SWITCH, SwitchSpec, lane_of, put_switch, read_switches, zone_of
+from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
+from steptwin.simulation.faults.effects import ElementEffect
+from steptwin.simulation.faults.table import number as parameter
+from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.mechanics.drawing import rail
+from steptwin.simulation.mechanics.lanes import SPRING_SHARE, MovedLane
+from steptwin.simulation.mechanics.loadmotion import load_stretches
+from steptwin.simulation.toml.reader import Key, Row, Table, TomlText, optional
+from steptwin.simulation.toml.sense import TableRows
+from steptwin.simulation.toml.values import NameOf, name_value, number
+from steptwin.state import Plain, Stateful
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CarriageSpec(NamedSpec):
+    """``frequency`` in Hz; ``damping`` is the damping ratio."""
+
+    axis: str
+    frequency: float
+    damping: float
+    switches: tuple[SwitchSpec, ...]
+
+
+class Carriage(Stateful):
+    """Follows the load of its axis through a spring and a damper. Its place is the whole pulse nearest to it."""
+
+    FIXED: ClassVar[tuple[str, ...]] = ("_version", "axis", "spec")
+    __slots__ = (*FIXED, "_response", "_spring")
+
+    def __init__(self, spec: CarriageSpec, axis: BuiltAxis) -> None:
+        self.spec = spec
+        self.axis = axis
+        self._spring = Spring(spec.frequency, spec.damping)
+        now = axis.kernel.now
+        self._response = self._respond(now, float(axis.mechanism.place(now)), 0.0)
+        self._version: object = axis.mechanism.version()
+
+    def _respond(self, now: Nanos, x: float, v: float) -> Response:
+        return Response(self._spring, load_stretches(self.axis.mechanism.course(now), now), x, v)
+
+    def _renew(self, now: Nanos) -> None:
+        """Go on from the present place after a change of the motion of the axis, or of the belt."""
+        before = self._response
+        x, v = before.at(now)
+        drives = tuple(load_stretches(self.axis.mechanism.course(now), now))
+        v += 2.0 * self._spring.rate * (drives[0].p - before.stretch(now).drive.at(now)[0])
+        self._response = Response(self._spring, drives, x, v)
+        self._version = self.axis.mechanism.version()
+
+    def soften(self, share: float, now: Nanos) -> None:
+        """Let the belt have a share of its frequency."""
+        self._spring = Spring(self.spec.frequency * share, self.spec.damping)
+        self._renew(now)
+        self.axis.kernel.report(self.axis.mechanism.machine, "edge", f"{self.spec.name}.{SPRING_SHARE}", share)
+
+    # ------------------------------------------------------------------ part of a kernel
+
+    def update(self, now: Nanos) -> None:
+        if self.axis.mechanism.version() != self._version:
+            self._renew(now)
+            self.axis.kernel.mark(self.spec.name)
+
+    def deadline(self) -> Nanos | None:
+        """None: its motion is computed in advance."""
+        return None
+
+    def copy_state(self) -> Plain:
+        return super().copy_state(), self._version == self.axis.mechanism.version()
+
+    def set_state(self, plain: Plain) -> None:
+        """As `Stateful.set_state`; the axis must have been restored before."""
+        own, is_current = plain
+        super().set_state(own)
+        self._version = self.axis.mechanism.version() if is_current else None
+
+    # ------------------------------------------------------------------ the carriage of switches
+
+    def version(self) -> object:
+        return self._response
+
+    def place(self, now: Nanos) -> int:
+        return floor(self._response.at(now)[0] + 0.5)
+
+    def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
+        return self._response.reaches(position - 0.5 * direction, after, direction)
+
+    @property
+    def moved(self) -> tuple[str, MovedLane]:
+        spec, scale = self.spec, self.axis.scale
+        per_pulse = self.axis.mechanism.build.sign / float(scale.pulses_per_unit)
+        return self.axis.spec.name, MovedLane(spec.name, "position", scale.unit, per_pulse, spring=(spec.frequency, spec.damping))
+
+    # ------------------------------------------------------------------ signals
+
+    def position(self, now: Nanos) -> float:
+        return self._units(self._response.at(now)[0])
+
+    def deflection(self, now: Nanos) -> float:
+        """By how much it is ahead of its drive."""
+        return self._units(self._response.at(now)[0] - self._response.stretch(now).drive.at(now)[0])
+
+    def settled(self, now: Nanos) -> float:
+        """1 while its drive stands and it does not swing."""
+        drive = self._response.stretch(now).drive
+        return float(not (self._response.oscillates(now) or drive.v or drive.a or drive.j))
+
+    def _units(self, pulses: float) -> float:
+        return pulses / float(self.axis.scale.pulses_per_unit)
+
+    def turns(self, now: Nanos) -> Iterator[Nanos]:
+        return self._response.turns(now)
+
+    def ends(self, now: Nanos) -> Iterator[Nanos]:
+        return (end for end in self._response.ends() if end > now)
+
+
+# ---------------------------------------------------------------------- the element
+
+
+def _slacken(active: ActiveFault, carriage: Carriage, begins: bool, now: Nanos) -> str:
+    share = active.fault.number("share") if begins else 1.0
+    carriage.soften(share, now)
+    return f"the belt of {carriage.spec.name} has {share:g} of its frequency"
+
+
+def _read(text: TomlText, row: Row, table: Table) -> CarriageSpec:
+    return CarriageSpec(**row, switches=tuple(read_switches(text, row["path"], table)))
+
+
+def _refers(spec: CarriageSpec, described: ElementSpecs) -> Iterator[Reference]:
+    drives = {axis.name: axis.drive[0] for axis in described.of(AXIS)}
+    machine = drives.get(spec.axis, spec.axis)
+    yield Reference(machine, machine, (*spec.path, "axis"))
+    for switch in spec.switches:
+        yield Reference(machine, switch.target[0], (*switch.path, "to"))
+
+
+def _build(spec: CarriageSpec, site: Site) -> Carriage:
+    carriage = Carriage(spec, find_axis(spec.axis, site))
+    mechanism = carriage.axis.mechanism
+    carriage.axis.kernel.add_part(carriage, (mechanism.machine, spec.axis), spec.name)
+    for n, switch in enumerate(spec.switches, start=1):
+        site.text.unless_wrong(switch.path, partial(_put_switch, carriage, switch, lane_of(spec.name, n), site))
+    return carriage
+
+
+def _put_switch(carriage: Carriage, spec: SwitchSpec, lane: str, site: Site) -> None:
+    scale = carriage.axis.scale
+    usual = scale.turn if carriage.axis.spec.kind == "rotary" else None
+    period = usual if spec.period is None else scale.pulses(spec.period)
+    put_switch(carriage.axis.kernel, carriage, carriage.spec.name, zone_of(spec, scale.nearest, period), spec, lane, site)
+
+
+def _signals(carriage: Carriage) -> Mapping[str, SignalOf]:
+    def refuse() -> None:
+        name, axis = carriage.spec.name, carriage.spec.axis
+        raise Misuse(f"{name}.deflection swings while its axis moves: write {name}.position - {axis}.position")
+
+    source, unit = (carriage.axis.kernel.source(carriage.spec.name),), carriage.axis.scale.unit
+    return {
+        "position": SignalOf(source, carriage.position, carriage.turns, carriage.version, unit),
+        "deflection": SignalOf(source, carriage.deflection, unit=unit, check=refuse),
+        "settled": SignalOf(source, carriage.settled, carriage.ends, carriage.version),
+    }
+
+
+CARRIAGE: Element[CarriageSpec, Carriage] = Element(
+    name="carriage",
+    spec=CarriageSpec,
+    rows=TableRows(
+        written="[[carriage]]",
+        keys=(
+            Key("name", name_value, "how conditions and faults name it"),
+            Key("axis", NameOf("axis"), "the axis that moves it"),
+            Key("frequency", number(0.1, 10_000.0), "Hz at which it swings while the axis stands"),
+            optional(number(0.001, 0.99), "damping", "damping ratio: 1 would not swing", 0.05),
+        ),
+    ),
+    inner={"switch": SWITCH},
+    inner_attributes={"switch": "switches"},
+    read=_read,
+    refers=_refers,
+    build=_build,
+    signals=_signals,
+    drawing=lambda carriage: rail(carriage.axis.spec.travel, tuple(one.zone for one in carriage.spec.switches)),
+    moved=lambda carriage: (carriage.moved,),
+    faults=(
+        FaultKind(
+            "slack-belt",
+            Layer.ELEMENT,
+            Occasion.ALWAYS,
+            "The belt of a carriage is slack: it swings at a lower frequency.",
+            own=(parameter("share", "Of its frequency.", 0.01, 1.0, default=0.5),),
+            effect=ElementEffect(_slacken),
+        ),
+    ),
+)

@@ -1,0 +1,138 @@
+"""What suction cups and grippers have in common: where they pick workpieces up, and where they put them down."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from steptwin.machine import Nanos
+from steptwin.simulation.components.conveyor import find_conveyor
+from steptwin.simulation.components.elementspec import ElementSpecs
+from steptwin.simulation.components.logic import BoardPart, BoardSpec, Joint
+from steptwin.simulation.components.site import Site
+from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.mechanics.belt import Workpiece, next_change
+from steptwin.simulation.scheduler.kernel import Board
+from steptwin.simulation.toml.reader import optional
+from steptwin.simulation.toml.values import OUTPUT_PIN, NameOf, Terminal, number
+
+PICK, PLACE, HELD = "PICK", "PLACE", "HELD"
+
+CARRIER_KEYS = (
+    optional(OUTPUT_PIN, "pick", "output joined to PICK: it is where it picks up"),
+    optional(OUTPUT_PIN, "place", "output joined to PLACE: it is where it puts down"),
+    optional(
+        NameOf("conveyor"),
+        "from",
+        "conveyor that it picks from; without one a workpiece is there whenever PICK is on",
+        None,
+        "source",
+    ),
+    optional(number(0.0), "pick_at", "with from: mm from the beginning of the belt", 0.0),
+    optional(NameOf("conveyor"), "onto", "conveyor that it puts on"),
+    optional(number(0.0), "place_at", "with onto: mm from the beginning of the belt, of the front of the workpiece", 0.0),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CarrierSpec(BoardSpec):
+    pick: Terminal | None
+    place: Terminal | None
+    source: str | None
+    pick_at: float
+    onto: str | None
+    place_at: float
+
+    @property
+    @abstractmethod
+    def own_joint(self) -> Joint | None:
+        """What its own key joins, besides the places."""
+
+    @property
+    def joints(self) -> Iterable[Joint]:
+        own = self.own_joint
+        if own is not None:
+            yield own
+        for key, terminal, source in (("pick", PICK, self.pick), ("place", PLACE, self.place)):
+            if source is not None:
+                yield Joint(key, terminal, source)
+
+    def others(self, described: ElementSpecs) -> Iterable[tuple[str, str]]:
+        if self.source is not None:
+            yield "from", self.source
+        if self.onto is not None:
+            yield "onto", self.onto
+
+
+class Carrier(BoardPart):
+    """It carries a workpiece while it holds it. Then it lies on the belt below, or has fallen."""
+
+    FIXED: ClassVar[tuple[str, ...]] = ("_pick_at", "_place_at", "onto", "source")
+    __slots__ = (*FIXED, "carried", "dropped")
+
+    def __init__(self, board: Board, spec: CarrierSpec, site: Site) -> None:
+        super().__init__(board)
+        self.source, self.onto = (None if name is None else find_conveyor(name, site) for name in (spec.source, spec.onto))
+        self._pick_at, self._place_at = spec.pick_at, spec.place_at
+        self.carried: Workpiece | None = None
+        """As it was on the belt it was taken from."""
+        self.dropped = 0
+        """How many have fallen."""
+
+    @property
+    def watches(self) -> tuple[str, ...]:
+        return (self.board.name, *(() if self.source is None else (self.source.board.name,)))
+
+    def is_occupied(self, now: Nanos) -> bool:
+        """Whether it carries a workpiece, or one is where it would pick it up."""
+        return self.carried is not None or self._below(now) is not None
+
+    def _below(self, now: Nanos) -> Workpiece | None:
+        """The workpiece where it picks up. Without a conveyor there is one wherever PICK is on."""
+        if not self.board.is_on(PICK):
+            return None
+        source = self.source
+        if source is None:
+            return Workpiece("workpiece", 0, 0)
+        return source.load.covering(source.places(self._pick_at), source.drive.place(now))
+
+    def take(self, now: Nanos) -> None:
+        """It holds what is there from now on."""
+        piece = self._below(now)
+        if self.carried is None and piece is not None:
+            self.carried = piece
+            if self.source is not None:
+                self.source.take(piece)
+                self.source.report(f"{self.board.name} holds {piece.name}", piece.name, "held")
+
+    def let_go(self, now: Nanos) -> None:
+        """It does not hold anything from now on."""
+        piece, self.carried = self.carried, None
+        source, onto = self.source, self.onto
+        if piece is None or source is None:
+            return
+        if onto is not None and self.board.is_on(PLACE):
+            onto.take_over(piece, source, self._place_at, now)
+        elif self.board.is_on(PICK):
+            source.put(piece, self._pick_at, now)
+        else:
+            self.dropped += 1
+            source.report(f"{piece.name} falls from {self.board.name}", piece.name, "falls")
+
+    def passing(self, now: Nanos) -> Nanos | None:
+        """When a belt that moves brings a workpiece to where it picks up, or takes it away."""
+        source = self.source
+        if source is None or self.carried is not None or not self.board.is_on(PICK):
+            return None
+        edges = source.load.edges(source.places(self._pick_at), source.drive.place(now))
+        return next_change(source.drive, *edges, now)
+
+
+def carrier_signals(carrier: Carrier) -> Mapping[str, SignalOf]:
+    source = (carrier.board.source,)
+    return {
+        "dropped": SignalOf(source, lambda now: float(carrier.dropped)),
+        "mass": SignalOf(source, lambda now: 0.0 if carrier.carried is None else carrier.carried.mass, unit="kg"),
+    }

@@ -1,0 +1,459 @@
+"""``[[conveyor]]``: a belt that carries workpieces, with sensors that see them.
+
+A workpiece enters with its front at 0, when FEED is switched on or at a fixed period, unless another one is there; it leaves when
+its front comes to the end of the belt. Stops hold workpieces back while the belt slides below them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from fractions import Fraction
+from functools import partial
+from math import ceil, floor, nan
+from typing import ClassVar
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.simulation.components.axis import find_axis, turns_of_axis
+from steptwin.simulation.components.beltsensor import SENSOR, Sensor, SensorSpec, read_inner
+from steptwin.simulation.components.conveyortable import FEED, RUN, STOP, ConveyorSpec, StopSpec, mark_places, stop_terminal
+from steptwin.simulation.components.elementspec import Reference
+from steptwin.simulation.components.logic import STUCK_INPUT, BoardPart, Inner, with_terminals
+from steptwin.simulation.components.site import Site
+from steptwin.simulation.faults import ActiveFault, Fault, FaultKind, Layer, Occasion
+from steptwin.simulation.faults.effects import ElementEffect
+from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.mechanics.belt import BeltDrive, ConstantDrive, Load, Workpiece, next_change
+from steptwin.simulation.mechanics.drawing import BELT, Drawing, SensorZone
+from steptwin.simulation.mechanics.scale import exact_fraction
+from steptwin.simulation.scheduler.kernel import Board
+from steptwin.simulation.toml.names import Unknown
+from steptwin.simulation.toml.reader import Key, optional
+from steptwin.simulation.toml.values import OUTPUT_PIN, NameOf, number, positive_time
+
+FEEDER_STANDS = "feeder_stands"
+"""Edges ``CONVEYOR.feeder_stands`` that a fault records."""
+MOST_PLACES = 24
+"""Limit of the workpieces of a conveyor whose places are signals."""
+PICOMETRES = 10**9
+"""In a millimetre: places of a belt that no axis moves."""
+_PULSE = 1
+"""The most that an axis moves a belt within a nanosecond, in its pulses."""
+
+
+# ---------------------------------------------------------------------- what is built
+
+
+class Conveyor(BoardPart):
+    """A belt with its workpieces. ``drive`` moves it, in places of which ``per_mm`` are a millimetre.
+
+    What leaves it is put at the beginning of the following one, or is gone. Workpieces stand before a stop that is on, behind
+    one that stands, and at the end while the beginning of the following conveyor is occupied. A belt that an axis moves
+    backwards takes back what stands, and loses workpieces at its beginning.
+    """
+
+    FIXED: ClassVar[tuple[str, ...]] = (
+        "_length",
+        "_moved_by",
+        "_seen",
+        "_stops",
+        "_turns",
+        "drive",
+        "following",
+        "per_mm",
+        "spec",
+    )
+    __slots__ = (
+        *FIXED,
+        "_due",
+        "_is_fed",
+        "_next_feed",
+        "_own",
+        "_then",
+        "delivered",
+        "fed",
+        "feeder_stands",
+        "is_stopped",
+        "load",
+        "missed",
+    )
+
+    def __init__(
+        self,
+        board: Board,
+        spec: ConveyorSpec,
+        drive: BeltDrive,
+        per_mm: Fraction,
+        own: ConstantDrive | None,
+        moved_by: tuple[str, ...] = (),
+        turns: Callable[[Nanos], Iterator[Nanos]] = lambda now: iter(()),
+    ) -> None:
+        """``own``: the drive, where it is the conveyor's own; ``moved_by``: otherwise the machine that moves it, between
+        ``turns`` one way."""
+        super().__init__(board)
+        self.spec = spec
+        self.drive = drive
+        self.per_mm = per_mm
+        self._length = self.places(spec.length)
+        self._stops = tuple((stop_terminal(n), self.places(stop.at)) for n, stop in enumerate(spec.stops, start=1))
+        self._own = own
+        self._moved_by = moved_by
+        self._turns = turns
+        self._then = drive.place(board.kernel.now)
+        """The place of the belt when it was looked at last: since then it has moved one way while anything stands."""
+        self.following: Conveyor | None = None
+        self.load = Load()
+        self.fed = 0
+        """How many workpieces it was fed with."""
+        self.delivered = 0
+        """How many have left at its end."""
+        self.missed = 0
+        """How many did not come when they should: the beginning was occupied, or the feeder stood."""
+        self.is_stopped = False
+        """Fault: its own drive does not move it."""
+        self.feeder_stands = False
+        """Fault: no workpieces come onto it, but those of a conveyor before it."""
+        self._is_fed = False
+        self._next_feed = spec.feed_every
+        self._due: Nanos | None = None
+        """When a workpiece comes to an end of the belt, to what holds it, or is taken back."""
+        self._seen: object = None
+
+    @property
+    def has_own_drive(self) -> bool:
+        return self._own is not None
+
+    def places(self, mm: float) -> int:
+        """The length in places of the belt."""
+        return floor(exact_fraction(mm) * self.per_mm + Fraction(1, 2))
+
+    def version(self) -> object:
+        """Another value whenever predictions no longer hold."""
+        return self.drive.version(), self.load.version()
+
+    @property
+    def watches(self) -> tuple[str, ...]:
+        return (self.board.name, *self._moved_by, *(() if self.spec.next is None else (self.spec.next,)))
+
+    def _state(self) -> object:
+        """Another value whenever workpieces may move or stand otherwise."""
+        return self.version(), self._raised(), None if self.following is None else self.following.version()
+
+    def _raised(self) -> tuple[int, ...]:
+        """The places of the stops that are on."""
+        return tuple(place for terminal, place in self._stops if self.board.is_on(terminal))
+
+    def update(self, now: Nanos) -> None:
+        if self._own is not None:
+            self._own.run(self.board.is_on(RUN) and not self.is_stopped, now)
+        is_fed = self.board.is_on(FEED)
+        if is_fed and not self._is_fed:
+            self._feed(now)
+        self._is_fed = is_fed
+        if self._next_feed is not None and self._next_feed <= now:
+            self._feed(now)
+            self._next_feed += self.spec.feed_every or 0
+        if self._state() != self._seen or (self._due is not None and self._due <= now):
+            self._hold(now)
+            self._deliver(now)
+            self._seen = self._state()
+            self.board.kernel.mark(self.board.name)
+            self._due = self._next(now)
+
+    def _feed(self, now: Nanos) -> None:
+        """Put a workpiece at the beginning, where there is room for it."""
+        if self.feeder_stands or self.load.covering(0, self.drive.place(now)) is not None:
+            self.missed += 1
+            self.board.kernel.mark(self.board.name)
+            return
+        self.fed += 1
+        spec = self.spec
+        marks = tuple((self.places(mark), self.places(mark + spec.mark_width)) for mark in spec.marks)
+        self.put(Workpiece(f"{spec.name}.{self.fed}", 0, self.places(spec.workpiece), spec.mass, marks), 0.0, now)
+
+    def put(self, piece: Workpiece, front: float, now: Nanos) -> None:
+        """Put a workpiece, whose lengths are places of this belt, with its front ``front`` mm from the beginning."""
+        self._then = self.drive.place(now)
+        self.load.put(piece._replace(origin=self.drive.place(now) - self.places(front), held=None))
+        self.report(f"{piece.name} is on {self.spec.name}", piece.name, "on")
+        self.board.kernel.mark(self.board.name)
+
+    def take_over(self, piece: Workpiece, other: Conveyor, front: float, now: Nanos) -> None:
+        """Put a workpiece that was on another belt on this one."""
+        ratio = self.per_mm / other.per_mm
+
+        def places(length: int) -> int:
+            return floor(length * ratio + Fraction(1, 2))
+
+        marks = tuple((places(begin), places(end)) for begin, end in piece.marks)
+        self.put(piece._replace(length=places(piece.length), marks=marks), front, now)
+
+    def take(self, piece: Workpiece) -> None:
+        """Take a workpiece off the belt."""
+        self.load.take(piece)
+        self.board.kernel.mark(self.board.name)
+
+    def front(self, number: int, now: Nanos) -> float:
+        """How far the front of a workpiece is from the beginning, mm. 0 is the workpiece that was put there first; NaN if
+        there are fewer."""
+        pieces = self.load.pieces
+        return float(pieces[number].front(self.drive.place(now)) / self.per_mm) if number < len(pieces) else nan
+
+    def mass(self, now: Nanos) -> float:
+        """kg of the workpieces on it."""
+        return sum(piece.mass for piece in self.load.pieces)
+
+    def report(self, text: str, name: str, what: str) -> None:
+        """Something has happened to a workpiece."""
+        kernel = self.board.kernel
+        facts = ("workpiece", name), ("element", self.spec.name), ("what", what)
+        kernel.report(kernel.owner(self.board.name), "event", "workpiece", text, *facts)
+
+    def _hold(self, now: Nanos) -> None:
+        """Let workpieces stand where they cannot go on, and let those go on that can."""
+        belt, stride = self.drive.place(now), _PULSE if self._own is None else self._own.stride
+        back, self._then = self._then - belt, belt
+        if back > 0:
+            for piece in self.load.pieces:
+                if piece.held is not None:
+                    self.load.release(piece, belt + back)
+                    self.report(f"{piece.name} goes back on {self.spec.name}", piece.name, "goes back")
+        ahead: int | None = None
+        for piece in sorted(self.load.pieces, key=lambda one: one.front(belt), reverse=True):
+            front = piece.front(belt)
+            limit = self._limit(front, stride, ahead, now)
+            if limit is not None and front >= limit:
+                at = limit if front - limit <= stride else front
+                if piece.held != at:
+                    self.load.hold(piece, at)
+                    self.report(
+                        f"{piece.name} stands at {float(at / self.per_mm):g} mm of {self.spec.name}", piece.name, "stands"
+                    )
+                ahead = at - piece.length - 1
+                continue
+            ahead = None
+            if piece.held is not None:
+                self.load.release(piece, belt)
+                self.report(f"{piece.name} goes on on {self.spec.name}", piece.name, "goes on")
+
+    def _limit(self, front: int, stride: int, ahead: int | None, now: Nanos) -> int | None:
+        """The place up to which a workpiece can go, with its front at ``front``. ``ahead``: behind one that stands before it."""
+        limits = [place for place in self._raised() if place >= front - stride]
+        if ahead is not None:
+            limits.append(ahead)
+        if self._is_blocked(now):
+            limits.append(self._length)
+        return min(limits, default=None)
+
+    def _is_blocked(self, now: Nanos) -> bool:
+        """Whether there is no room for a workpiece at the beginning of the following conveyor."""
+        following = self.following
+        return following is not None and following.covers_beginning(now)
+
+    def covers_beginning(self, now: Nanos) -> bool:
+        return self.load.covering(0, self.drive.place(now)) is not None
+
+    def _deliver(self, now: Nanos) -> None:
+        """Let go what has come to an end of the belt."""
+        belt, length = self.drive.place(now), self._length
+        for piece in self.load.pieces:
+            front = piece.front(belt)
+            if front >= length and piece.held is None:
+                self.delivered += 1
+                self.take(piece)
+                self.report(f"{piece.name} leaves {self.spec.name}", piece.name, "leaves")
+                if self.following is not None:
+                    self.following.take_over(piece, self, 0.0, now)
+            elif front < 0:
+                self.take(piece)
+                self.report(f"{piece.name} falls off the beginning of {self.spec.name}", piece.name, "falls")
+
+    def _next(self, now: Nanos) -> Nanos | None:
+        """When the next workpiece is lost at the beginning, is delivered or cannot go on; or can again, at the end."""
+        belt = self.drive.place(now)
+        moving = [piece for piece in self.load.pieces if piece.held is None]
+        below = max((piece.origin for piece in moving), default=None)
+        above = min((piece.origin + self._way(piece, belt, now) for piece in moving), default=None)
+        due = next_change(self.drive, None if below is None else below - 1, above, now)
+        if len(moving) < len(self.load.pieces):
+            due = min(filter(None, (due, next(self._turns(now), None), self.drive.reaches(belt - 1, now, -1))), default=None)
+        following = self.following
+        if following is None or not self.load.pieces or not self._is_blocked(now):
+            return due
+        free = next_change(following.drive, *following.load.edges(0, following.drive.place(now)), now)
+        return free if due is None else due if free is None else min(due, free)
+
+    def _way(self, piece: Workpiece, belt: int, now: Nanos) -> int:
+        """Up to where a moving workpiece can go."""
+        front = piece.front(belt)
+        before = [one for one in self.load.pieces if one.held is not None and one.held > front]
+        ahead = min((one.front(belt) - one.length - 1 for one in before), default=None)
+        found = self._limit(front, 0, ahead, now)
+        return self._length if found is None else min(found, self._length)
+
+    def deadline(self) -> Nanos | None:
+        moments = (moment for moment in (self._due, self._next_feed) if moment is not None)
+        return min(moments, default=None)
+
+
+# ---------------------------------------------------------------------- the element
+
+
+def _check_stop(conveyor: Conveyor, fault: Fault) -> None:
+    if not conveyor.has_own_drive:
+        raise Misuse(f"fault {fault.kind.name}: {conveyor.spec.name!r} is moved by axis {conveyor.spec.axis!r}: let that stall")
+
+
+def _stop(active: ActiveFault, conveyor: Conveyor, begins: bool, now: Nanos) -> str:
+    conveyor.is_stopped = begins
+    return f"the drive of {conveyor.spec.name} {'fails' if begins else 'is repaired'}"
+
+
+def _stop_feeder(active: ActiveFault, conveyor: Conveyor, begins: bool, now: Nanos) -> str:
+    conveyor.feeder_stands = begins
+    kernel, name = conveyor.board.kernel, conveyor.spec.name
+    kernel.report(kernel.owner(name), "edge", f"{name}.{FEEDER_STANDS}", float(begins))
+    return f"the feeder of {name} {'stands' if begins else 'works again'}"
+
+
+def _make(spec: ConveyorSpec, site: Site) -> Conveyor:
+    board = site.board(spec.name)
+    if spec.axis is None:
+        own = ConstantDrive(exact_fraction(spec.speed), board.kernel.now)
+        conveyor = Conveyor(board, spec, own, Fraction(PICOMETRES), own)
+    else:
+        axis = find_axis(spec.axis, site)
+        per_mm = axis.scale.pulses_per_unit / exact_fraction(spec.mm_per_unit)
+        turns = partial(turns_of_axis, axis)
+        conveyor = Conveyor(board, spec, axis.mechanism, per_mm, None, (axis.mechanism.machine,), turns)
+    if conveyor.places(spec.length) < 1:
+        raise Misuse(
+            f"length = {spec.length:g} mm: the belt is shorter than one step of its drive, {float(1 / conveyor.per_mm):g} mm"
+        )
+    return conveyor
+
+
+def _connect(spec: ConveyorSpec, conveyor: Conveyor, site: Site) -> None:
+    if spec.next is not None:
+        conveyor.following = find_conveyor(spec.next, site)
+
+
+def find_conveyor(name: str, site: Site) -> Conveyor:
+    """What is built of the conveyor ``name``."""
+    found = site.parts.built(CONVEYOR).get(name)
+    if found is None:
+        raise Unknown(name, f"no conveyor is called {name!r}")
+    return found
+
+
+def _refers_of_sensors(spec: ConveyorSpec) -> Iterator[Reference]:
+    for sensor in spec.sensors:
+        yield Reference(spec.name, sensor.target[0], (*sensor.path, "to"))
+
+
+def _lane(spec: ConveyorSpec, number: int) -> str:
+    return f"{spec.name}.sensor{number}"
+
+
+def _put_sensors(spec: ConveyorSpec, conveyor: Conveyor, site: Site) -> None:
+    for n, sensor in enumerate(spec.sensors, start=1):
+        site.text.unless_wrong(sensor.path, partial(_put_sensor, conveyor, sensor, _lane(spec, n), site))
+
+
+def _put_sensor(conveyor: Conveyor, spec: SensorSpec, lane: str, site: Site) -> None:
+    kernel = conveyor.board.kernel
+    circuit = site.circuit(kernel, spec.target, (*spec.path, "to"), spec.join)
+    sensor = Sensor(circuit, conveyor, spec, site.bounce_of(circuit), lane)
+    kernel.add_part(sensor, (conveyor.board.name,), drives=circuit.target.machine)
+
+
+def _place_names(spec: ConveyorSpec) -> tuple[str, ...]:
+    """Signals with the places of as many workpieces as there is room for."""
+    return tuple(f"place{n + 1}" for n in range(ceil(min(MOST_PLACES - 1, spec.length / spec.workpiece)) + 1))
+
+
+def _drawing(conveyor: Conveyor) -> Drawing:
+    spec = conveyor.spec
+    sensors = tuple(SensorZone(sensor.target, sensor.at, sensor.at) for sensor in spec.sensors)
+    stops = tuple(SensorZone((spec.name, stop_terminal(n)), stop.at, stop.at) for n, stop in enumerate(spec.stops, start=1))
+    return Drawing(BELT, spec.length, _place_names(spec), spec.workpiece, sensors + stops)
+
+
+def _refuse_place() -> None:
+    raise Misuse("the place of a workpiece can be watched, but conditions need a sensor: [[conveyor.sensor]]")
+
+
+def _signals(conveyor: Conveyor) -> Mapping[str, SignalOf]:
+    source = (conveyor.board.source,)
+    places = {
+        name: SignalOf(source, partial(conveyor.front, n), unit="mm", bounds=(0.0, conveyor.spec.length), check=_refuse_place)
+        for n, name in enumerate(_place_names(conveyor.spec))
+    }
+    return {
+        **places,
+        "count": SignalOf(source, lambda now: float(len(conveyor.load.pieces))),
+        "fed": SignalOf(source, lambda now: float(conveyor.fed)),
+        "delivered": SignalOf(source, lambda now: float(conveyor.delivered)),
+        "missed": SignalOf(source, lambda now: float(conveyor.missed)),
+        "mass": SignalOf(source, conveyor.mass, unit="kg"),
+    }
+
+
+CONVEYOR = with_terminals(
+    "conveyor",
+    ConveyorSpec,
+    (
+        Key("length", number(0.0, above=True), "mm"),
+        optional(number(0.0, above=True), "speed", "mm/s while RUN is on"),
+        optional(OUTPUT_PIN, "run", "with speed: output joined to RUN; without it a wire may be"),
+        optional(NameOf("axis"), "axis", "the axis that moves the belt, instead of speed"),
+        optional(number(0.0, above=True), "mm_per_unit", "with axis: mm of the belt per unit of the axis", 1.0),
+        optional(OUTPUT_PIN, "feed", "output joined to FEED, which puts a workpiece on when it is switched on"),
+        optional(positive_time, "feed_every", "a workpiece comes after each such time"),
+        optional(number(0.0, above=True), "workpiece", "length of a workpiece, mm", 50.0),
+        optional(number(0.0), "mass", "kg of a workpiece", 0.0),
+        optional(mark_places, "marks", "mm from the front of a workpiece to each of its marks, such as [10, 35]", ()),
+        optional(number(0.0, above=True), "mark_width", "length of a mark, mm", 2.0),
+        optional(NameOf("conveyor"), "next", "the conveyor on which workpieces go on"),
+    ),
+    make=_make,
+    signals=_signals,
+    drawing=_drawing,
+    connect=_connect,
+    faults=(
+        STUCK_INPUT,
+        FaultKind(
+            "belt-stop",
+            Layer.ELEMENT,
+            Occasion.ALWAYS,
+            "A conveyor with a speed stands, although it is switched on.",
+            effect=ElementEffect(_stop),
+            check=_check_stop,
+        ),
+        FaultKind(
+            "empty-feeder",
+            Layer.ELEMENT,
+            Occasion.ALWAYS,
+            "The feeder of a conveyor is empty or blocked: no workpieces come onto it.",
+            effect=ElementEffect(_stop_feeder),
+        ),
+    ),
+    inner=(
+        Inner(
+            key="sensor",
+            attribute="sensors",
+            rows=SENSOR,
+            read=partial(read_inner, key="sensor", rows=SENSOR, make=SensorSpec, needed=("at", "target")),
+            refers=_refers_of_sensors,
+            build=_put_sensors,
+        ),
+        Inner(
+            key="stop",
+            attribute="stops",
+            rows=STOP,
+            read=partial(read_inner, key="stop", rows=STOP, make=StopSpec, needed=("at",)),
+            refers=lambda spec: (),
+            build=lambda spec, conveyor, site: None,
+        ),
+    ),
+)

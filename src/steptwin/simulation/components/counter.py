@@ -1,0 +1,74 @@
+"""``[[counter]]``: counts edges up and down, with an output from a preset on: CTUD of IEC 61131-3."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from steptwin.machine import Nanos
+from steptwin.simulation.components.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
+from steptwin.simulation.kinds.kind import Terminals
+from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.scheduler.kernel import Board
+from steptwin.simulation.toml.reader import Key, optional
+from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, whole
+
+UP, DOWN, RESET, OUT = "UP", "DOWN", "RESET", "OUT"
+MOST = 2**31 - 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CounterSpec(BoardSpec):
+    preset: int
+    up: Terminal | None
+    down: Terminal | None
+    reset: Terminal | None
+
+    @property
+    def terminals(self) -> Terminals:
+        return Terminals(digital_inputs=(UP, DOWN, RESET), outputs=(OUT,))
+
+    @property
+    def joints(self) -> Iterable[Joint]:
+        for key, terminal, source in (("up", UP, self.up), ("down", DOWN, self.down), ("reset", RESET, self.reset)):
+            if source is not None:
+                yield Joint(key, terminal, source)
+
+
+class Counter(BoardPart):
+    """Counts edges from 0 to 1, from 0 to `MOST`, and begins anew at 0 while RESET is on. OUT is on from ``preset`` on."""
+
+    FIXED: ClassVar[tuple[str, ...]] = ("_preset",)
+    __slots__ = (*FIXED, "_levels", "count")
+
+    def __init__(self, board: Board, preset: int) -> None:
+        super().__init__(board)
+        self._preset = preset
+        self._levels = (False, False)
+        self.count = 0
+
+    def update(self, now: Nanos) -> None:
+        before, self._levels = self._levels, (self.board.is_on(UP), self.board.is_on(DOWN))
+        up, down = (after and not level for level, after in zip(before, self._levels, strict=True))
+        self.count = 0 if self.board.is_on(RESET) else min(max(self.count + up - down, 0), MOST)
+        self.board.put(OUT, float(self.count >= self._preset))
+
+
+def _signals(counter: Counter) -> Mapping[str, SignalOf]:
+    return {"count": SignalOf((counter.board.source,), lambda now: float(counter.count))}
+
+
+COUNTER = with_terminals(
+    "counter",
+    CounterSpec,
+    (
+        Key("preset", whole(1, MOST), "the count from which OUT is on"),
+        optional(OUTPUT_PIN, "up", "output joined to UP, whose edges from 0 to 1 count up"),
+        optional(OUTPUT_PIN, "down", "output joined to DOWN, whose edges from 0 to 1 count down"),
+        optional(OUTPUT_PIN, "reset", "output joined to RESET; the count is 0 while it is on"),
+    ),
+    faults=STUCK,
+    make=lambda spec, site: Counter(site.board(spec.name), spec.preset),
+    signals=_signals,
+)

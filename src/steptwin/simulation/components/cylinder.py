@@ -1,0 +1,219 @@
+"""``[[cylinder]]``: a pneumatic cylinder with its valve and the sensors at its ends."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import partial
+from math import floor
+from typing import ClassVar
+
+from steptwin.machine import MILLISECOND, Nanos
+from steptwin.simulation.components.elementspec import Reference
+from steptwin.simulation.components.logic import STUCK, BoardPart, BoardSpec, Inner, Joint, with_terminals
+from steptwin.simulation.components.site import Site
+from steptwin.simulation.components.switch import SWITCH, SwitchSpec, lane_of, put_switch, read_switches, zone_of
+from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
+from steptwin.simulation.faults.effects import ElementEffect
+from steptwin.simulation.kinds.kind import Terminals
+from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.mechanics.drawing import ROD, Drawing
+from steptwin.simulation.mechanics.scale import exact_fraction
+from steptwin.simulation.mechanics.travel import Travel
+from steptwin.simulation.scheduler.kernel import Board
+from steptwin.simulation.toml.reader import TomlText, optional
+from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, number, positive_time, time_value, word
+
+EXTEND, RETRACT, EXTENDED, RETRACTED = "EXTEND", "RETRACT", "EXTENDED", "RETRACTED"
+SINGLE, DOUBLE = "single", "double"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CylinderSpec(BoardSpec):
+    valve: str
+    extend: Terminal | None
+    retract: Terminal | None
+    stroke: float
+    extend_time: Nanos
+    retract_time: Nanos
+    switching: Nanos
+    start: str
+    switches: tuple[SwitchSpec, ...]
+
+    @property
+    def terminals(self) -> Terminals:
+        inputs = (EXTEND,) if self.valve == SINGLE else (EXTEND, RETRACT)
+        return Terminals(digital_inputs=inputs, outputs=(EXTENDED, RETRACTED))
+
+    @property
+    def joints(self) -> Iterable[Joint]:
+        if self.extend is not None:
+            yield Joint("extend", EXTEND, self.extend)
+        if self.retract is not None and self.valve == DOUBLE:
+            yield Joint("retract", RETRACT, self.retract)
+
+    def check(self, text: TomlText) -> None:
+        if self.valve == SINGLE and self.retract is not None:
+            text.wrong((*self.path, "retract"), "D007", "a valve with a single coil has no input RETRACT", "valve = 'double' has")
+        if self.valve == SINGLE and self.start == "extended":
+            text.wrong(
+                (*self.path, "start"), "D007", "a valve with a single coil keeps its cylinder retracted until it is switched"
+            )
+
+
+class Cylinder(BoardPart):
+    """Moves between its ends at the constant speeds of its throttles.
+
+    A valve with one coil and a spring extends it while the coil is on. One with two coils stays where it was switched last; while
+    both coils are on or off it keeps its place. The spool moves ``switching`` after its coil.
+    """
+
+    FIXED: ClassVar[tuple[str, ...]] = ("_spec",)
+    __slots__ = (*FIXED, "_due", "_spool", "_wanted", "has_air", "is_jammed", "travel")
+
+    def __init__(self, board: Board, spec: CylinderSpec) -> None:
+        super().__init__(board)
+        self._spec = spec
+        starts_out = spec.start == "extended"
+        self._spool = self._wanted = 1 if starts_out and spec.valve == DOUBLE else -1
+        self._due: Nanos | None = None
+        """When the spool of the valve moves."""
+        self.has_air = True
+        self.is_jammed = False
+        self.travel = Travel(spec.extend_time, spec.retract_time, is_forth=starts_out, now=board.kernel.now)
+
+    def update(self, now: Nanos) -> None:
+        self._switch(now)  # before the coils change: an input at a moment comes after what is due then
+        wanted = self._coils()
+        if wanted != self._wanted:
+            self._wanted = wanted
+            self._due = None if wanted == self._spool else now + self._spec.switching
+            self._switch(now)
+        force = self._force()
+        if force != self.travel.direction:
+            self.travel.send(force, now)
+            self.board.kernel.mark(self.board.name)
+        place = self.travel.place(now)
+        self.board.put(EXTENDED, float(place == self.travel.full))
+        self.board.put(RETRACTED, float(place == 0))
+
+    def _switch(self, now: Nanos) -> None:
+        """Move the spool if that is due."""
+        if self._due is not None and self._due <= now:
+            self._due = None
+            self._spool = self._wanted
+
+    def _coils(self) -> int:
+        """Where the coils move the spool."""
+        extend = self.board.is_on(EXTEND)
+        if self._spec.valve == SINGLE:
+            return 1 if extend else -1
+        retract = self.board.is_on(RETRACT)
+        return self._wanted if extend is retract else 1 if extend else -1
+
+    def _force(self) -> int:
+        """Where the piston is driven: without air a spring returns it, where there is one."""
+        if self.is_jammed:
+            return 0
+        if not self.has_air:
+            return -1 if self._spec.valve == SINGLE else 0
+        return self._spool
+
+    def deadline(self) -> Nanos | None:
+        moments = (*self.travel.turns(self.board.kernel.now), *(() if self._due is None else (self._due,)))
+        return min(moments, default=None)
+
+    @property
+    def stroke(self) -> float:
+        return self._spec.stroke
+
+    @property
+    def drawing(self) -> Drawing:
+        return Drawing(ROD, self.stroke, ("position",), sensors=tuple(one.zone for one in self._spec.switches))
+
+    def position(self, now: Nanos) -> float:
+        """In units of the stroke, 0 retracted."""
+        return self._spec.stroke * (self.travel.place(now) / self.travel.full)
+
+    def places(self, units: float) -> int:
+        """The place of its travel nearest to a position in units."""
+        exact = exact_fraction(units) / exact_fraction(self._spec.stroke) * self.travel.full
+        return floor(exact + Fraction(1, 2))
+
+
+# ---------------------------------------------------------------------- faults
+
+
+def _take_air(active: ActiveFault, cylinder: Cylinder, begins: bool, now: Nanos) -> str:
+    cylinder.has_air = not begins
+    return f"{cylinder.board.name} has {'no air' if begins else 'air again'}"
+
+
+def _jam(active: ActiveFault, cylinder: Cylinder, begins: bool, now: Nanos) -> str:
+    cylinder.is_jammed = begins
+    return f"{cylinder.board.name} is {'jammed' if begins else 'free again'}"
+
+
+# ---------------------------------------------------------------------- the element
+
+
+def _refers_of_switches(spec: CylinderSpec) -> Iterator[Reference]:
+    for switch in spec.switches:
+        yield Reference(spec.name, switch.target[0], (*switch.path, "to"))
+
+
+def _put_switches(spec: CylinderSpec, cylinder: Cylinder, site: Site) -> None:
+    for n, switch in enumerate(spec.switches, start=1):
+        site.text.unless_wrong(switch.path, partial(_put_switch, cylinder, switch, lane_of(spec.name, n), site))
+
+
+def _put_switch(cylinder: Cylinder, spec: SwitchSpec, lane: str, site: Site) -> None:
+    zone = zone_of(spec, cylinder.places, None if spec.period is None else cylinder.places(spec.period))
+    put_switch(cylinder.board.kernel, cylinder.travel, cylinder.board.name, zone, spec, lane, site)
+
+
+def _signals(cylinder: Cylinder) -> Mapping[str, SignalOf]:
+    source, travel = cylinder.board.source, cylinder.travel
+    bounds = (0.0, cylinder.stroke)
+    return {"position": SignalOf((source,), cylinder.position, travel.turns, travel.version, unit="mm", bounds=bounds)}
+
+
+CYLINDER = with_terminals(
+    "cylinder",
+    CylinderSpec,
+    (
+        optional(word(SINGLE, DOUBLE), "valve", "single: one coil and a spring; double: two coils", SINGLE),
+        optional(OUTPUT_PIN, "extend", "output joined to the coil EXTEND; without it a wire may be"),
+        optional(OUTPUT_PIN, "retract", "valve double: output joined to the coil RETRACT"),
+        optional(number(0.0, above=True), "stroke", "mm", 100.0),
+        optional(positive_time, "extend_time", "from end to end", 300 * MILLISECOND),
+        optional(positive_time, "retract_time", "from end to end", 300 * MILLISECOND),
+        optional(time_value, "switching", "from a coil to the spool of the valve", 0),
+        optional(word("retracted", "extended"), "start", "where it stands when the world begins", "retracted"),
+    ),
+    make=lambda spec, site: Cylinder(site.board(spec.name), spec),
+    signals=_signals,
+    drawing=lambda cylinder: cylinder.drawing,
+    faults=(
+        *STUCK,
+        FaultKind(
+            "no-air",
+            Layer.ELEMENT,
+            Occasion.ALWAYS,
+            "A cylinder has no compressed air: a spring retracts it, without one it stands.",
+            effect=ElementEffect(_take_air),
+        ),
+        FaultKind("jam", Layer.ELEMENT, Occasion.ALWAYS, "A cylinder stands where it is.", effect=ElementEffect(_jam)),
+    ),
+    inner=(
+        Inner(
+            key="switch",
+            attribute="switches",
+            rows=SWITCH,
+            read=lambda text, path, table: tuple(read_switches(text, path, table)),
+            refers=_refers_of_switches,
+            build=_put_switches,
+        ),
+    ),
+)

@@ -1,0 +1,89 @@
+"""The interface of an element of a world's description: one value (`Element`) for each kind, in a file of its own.
+
+Elements surround the controllers: mechanics, wires, buttons, sources. Registering one
+(`steptwin.simulation.components.registry`) makes it available in descriptions, conditions, traces and faults; no other code
+distinguishes kinds of elements.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any, TypeAlias, cast
+
+from steptwin.simulation.components.elementspec import B, ElementSpec, ElementSpecs, ElementTable, NamedSpec, Reference, S
+from steptwin.simulation.components.site import Site
+from steptwin.simulation.faults.table import FaultKind, Layer
+from steptwin.simulation.kinds.kind import Terminals
+from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.mechanics.drawing import Drawing
+from steptwin.simulation.mechanics.lanes import MovedLane
+from steptwin.simulation.toml.reader import Row, Table, TomlText
+from steptwin.simulation.toml.sense import TableRows
+from steptwin.tables import IncompleteTable
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Element(ElementTable[S, B]):
+    """A kind of element. ``S`` is its table as a value, ``B`` the built object. Raises `IncompleteTable` for missing entries."""
+
+    spec: type[S]
+    rows: TableRows
+    """The keys of its table, with meanings, units and ranges."""
+    inner: Mapping[str, TableRows] = field(default_factory=dict)
+    """Nested tables by key; ``spec`` has an attribute for each."""
+    inner_attributes: Mapping[str, str] = field(default_factory=dict)
+    """Attributes of nested tables whose names differ from their keys."""
+    read: Callable[[TomlText, Row, Table], S]
+    """Makes ``S``. Reports inconsistent combinations of keys, and errors in nested tables."""
+    refers: Callable[[S, ElementSpecs], Iterable[Reference]]
+    """All machines, lines and elements with terminals that it names. Names that do not exist are reported at the path."""
+    build: Callable[[S, Site], B]
+    """Adds it to its kernel. Raises `Misuse` if it does not fit."""
+    connect: Callable[[S, B, Site], None] | None = None
+    """Called after all elements of this kind were built, because they may refer to each other."""
+    terminals: Callable[[S], Terminals] | None = None
+    """Its own inputs and outputs, as pins of a machine: others join ``NAME.TERMINAL``. `Site.board` has their levels."""
+    signals: Callable[[B], Mapping[str, SignalOf]] | None = None
+    """Signals for conditions, by name. Exactly the elements with a ``name`` have signals."""
+    drawing: Callable[[B], Drawing] | None = None
+    """How it is drawn, where there is more to see than levels and numbers."""
+    function: Callable[[B], str] | None = None
+    """The word that says what it does among those of its kind, such as ``and``."""
+    moved: Callable[[B], Iterable[tuple[str, MovedLane]]] | None = None
+    """The lanes of its motion, each of which follows from that of an axis, by name."""
+    faults: tuple[FaultKind, ...] = ()
+    """Its faults (`Layer.ELEMENT`), which act on the built object."""
+    is_named: bool = field(init=False)
+    """Whether its table has a ``name``."""
+
+    @property
+    def needs_name(self) -> bool:
+        """Whether none of its tables is without a name."""
+        return any(key.name == "name" and key.is_required for key in self.rows.keys)
+
+    def named(self, specs: Sequence[ElementSpec]) -> Sequence[NamedSpec]:
+        """Those of ``specs`` that have a name; none of a kind without names."""
+        return [spec for spec in cast("Sequence[NamedSpec]", specs) if spec.name] if self.is_named else ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "is_named", any(key.name == "name" for key in self.rows.keys))
+        where = f"element {self.name}"
+        attributes = {*self.rows.attributes, *(self.inner_attributes.get(key, key) for key in self.inner), "path"}
+        having = {one.name for one in fields(self.spec)}
+        if lacking := sorted(attributes - having):
+            raise IncompleteTable(f"{where}: {self.spec.__name__} lacks {', '.join(lacking)}")
+        if left_over := sorted(having - attributes):
+            raise IncompleteTable(f"{where}: no key becomes {', '.join(left_over)} of {self.spec.__name__}")
+        if self.is_named and self.signals is None:
+            raise IncompleteTable(f"{where} has a name and lacks its signals")
+        if not self.is_named and self.signals is not None:
+            raise IncompleteTable(f"{where} has signals and lacks a name that they could be asked for by")
+        if not self.is_named and self.terminals is not None:
+            raise IncompleteTable(f"{where} has terminals and lacks a name that they could be joined by")
+        for fault in self.faults:
+            if fault.layer is not Layer.ELEMENT or not self.is_named:
+                raise IncompleteTable(f"{where}: fault {fault.name} is of the layer {Layer.ELEMENT}, and its element has a name")
+
+
+AnyElement: TypeAlias = Element[Any, Any]

@@ -1,0 +1,266 @@
+"""``[[follower]]``: a slide or lever that a cam disc on a shaft moves: its place is a table over the angle of the shaft."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import partial
+from math import floor
+from typing import ClassVar
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.simulation.components.axis import AXIS, turns_of_axis
+from steptwin.simulation.components.element import Element
+from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
+from steptwin.simulation.components.shaft import SHAFT, TURN, GearedShaft
+from steptwin.simulation.components.site import Site
+from steptwin.simulation.components.switch import SWITCH, SwitchSpec, lane_of, put_switch, read_switches, zone_of
+from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
+from steptwin.simulation.faults.effects import ElementEffect
+from steptwin.simulation.faults.table import number
+from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.mechanics.cam import Cam
+from steptwin.simulation.mechanics.drawing import ROD, Drawing
+from steptwin.simulation.mechanics.lanes import LIFT_SHARE, STUCK, MovedLane
+from steptwin.simulation.mechanics.scale import exact_fraction
+from steptwin.simulation.toml.names import Unknown
+from steptwin.simulation.toml.reader import Key, Row, Table, TomlText, optional
+from steptwin.simulation.toml.sense import TableRows
+from steptwin.simulation.toml.values import NameOf, name_value, points, text_value
+from steptwin.state import Stateful
+
+PLACES = 10**6
+"""Places of a unit of the follower: nanometres of a millimetre."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FollowerSpec(NamedSpec):
+    shaft: str
+    points: tuple[tuple[float, float], ...]
+    unit: str
+    switches: tuple[SwitchSpec, ...]
+
+    @property
+    def highest(self) -> float:
+        return max(lift for _, lift in self.points)
+
+
+class Follower(Stateful):
+    """Is where the cam lifts it at the whole pulse of the axis that turns the shaft; it never leaves the cam."""
+
+    FIXED: ClassVar[tuple[str, ...]] = ("_cam", "shaft", "spec")
+    __slots__ = (*FIXED, "_held", "_share")
+
+    def __init__(self, spec: FollowerSpec, shaft: GearedShaft, cam: Cam) -> None:
+        self.spec = spec
+        self.shaft = shaft
+        self._cam = cam
+        self._held: Fraction | None = None
+        """Fault: the place at which it is stuck."""
+        self._share = Fraction(1)
+        """Fault: of its lift that a worn cam gives it."""
+
+    # ------------------------------------------------------------------ part of a kernel
+
+    def update(self, now: Nanos) -> None:
+        """It has no state of its own: the kernel looks again at what depends on it."""
+
+    def deadline(self) -> Nanos | None:
+        """None: its motion is that of its axis."""
+        return None
+
+    # ------------------------------------------------------------------ the carriage of switches
+
+    def version(self) -> object:
+        return self.shaft.version(), self._held, self._share
+
+    def lift(self, now: Nanos) -> Fraction:
+        return self._cam.lift(self.shaft.place(now)) * self._share if self._held is None else self._held
+
+    def place(self, now: Nanos) -> int:
+        if self._held is None and self._share == 1:
+            return self._cam.nearest(self.shaft.place(now), PLACES)
+        return floor(self.lift(now) * PLACES + Fraction(1, 2))
+
+    def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
+        if self._held is not None or self._share == 0:
+            return None
+        level = Fraction(2 * position - direction, 2 * PLACES) / self._share
+        here, found = self.shaft.place(after), []
+        for way in (1, -1):
+            place = self._cam.next(level, here, direction, way)
+            if place is not None and (due := self.shaft.reaches(place, after, way)) is not None:
+                found.append(due)
+        return min(found, default=None)
+
+    # ------------------------------------------------------------------ signals and faults
+
+    def position(self, now: Nanos) -> float:
+        return float(self.lift(now))
+
+    def turns(self, now: Nanos) -> Iterator[Nanos]:
+        """Moments after ``now`` between which it moves one way."""
+        if self._held is not None:
+            return
+        for leg in (*turns_of_axis(self.shaft.axis, now), None):
+            yield from self._corners(now, leg)
+            if leg is not None:
+                yield leg
+                now = leg
+
+    def _corners(self, begin: Nanos, end: Nanos | None) -> Iterator[Nanos]:
+        """When its axis, which goes one way from ``begin`` to ``end``, passes points of the cam, in one revolution."""
+        here = self.shaft.place(begin)
+        for way in (1, -1):
+            now = begin
+            for place in self._cam.corners(here, way):
+                due = self.shaft.reaches(place, now, way)
+                if due is None or (end is not None and due >= end):
+                    break
+                if due > now + 1:
+                    yield due - 1
+                yield due
+                now = due
+
+    def hold(self, holds: bool, now: Nanos) -> None:
+        self._held = self.lift(now) if holds else None
+        self._report(STUCK, float(holds))
+
+    def wear(self, share: float) -> None:
+        self._share = exact_fraction(share)
+        self._report(LIFT_SHARE, share)
+
+    def _report(self, what: str, level: float) -> None:
+        axis = self.shaft.axis
+        axis.kernel.report(axis.mechanism.machine, "edge", f"{self.spec.name}.{what}", level)
+
+    @property
+    def moved(self) -> tuple[str, MovedLane]:
+        axis, lane = self.shaft.moved
+        points = tuple(sorted(self.spec.points))
+        return axis, lane._replace(name=self.spec.name, signal="position", unit=self.spec.unit, points=points)
+
+    @property
+    def drawing(self) -> Drawing:
+        return Drawing(ROD, self.spec.highest, ("position",), sensors=tuple(one.zone for one in self.spec.switches))
+
+
+def _stick(active: ActiveFault, follower: Follower, begins: bool, now: Nanos) -> str:
+    follower.hold(begins, now)
+    return f"{follower.spec.name} {'is stuck' if begins else 'follows its cam again'}"
+
+
+def _wear(active: ActiveFault, follower: Follower, begins: bool, now: Nanos) -> str:
+    share = active.fault.number("share") if begins else 1.0
+    follower.wear(share)
+    return f"the cam of {follower.spec.name} has {share:g} of its lift"
+
+
+# ---------------------------------------------------------------------- the element
+
+
+def _read(text: TomlText, row: Row, table: Table) -> FollowerSpec:
+    spec = FollowerSpec(**row, switches=tuple(read_switches(text, row["path"], table)))
+    angles = [angle for angle, _ in spec.points]
+    where = (*spec.path, "points")
+    if len(angles) < 2 or not (angles[0] >= 0.0 and angles[-1] < TURN):
+        text.wrong(where, "D007", f"{len(angles)} angles: a cam has at least two, from 0 to below {TURN} degrees")
+    if min(lift for _, lift in spec.points) < 0.0 or spec.highest == 0.0:
+        text.wrong(where, "D007", "lifts are counted from 0, and one of them is above 0")
+    return spec
+
+
+def _machine(spec: FollowerSpec, described: ElementSpecs) -> str:
+    """What drives the axis of its shaft; otherwise the name that does not exist."""
+    axes = {shaft.name: shaft.axis for shaft in described.of(SHAFT)}
+    drives = {axis.name: axis.drive[0] for axis in described.of(AXIS)}
+    axis = axes.get(spec.shaft)
+    return spec.shaft if axis is None else drives.get(axis, axis)
+
+
+def _refers(spec: FollowerSpec, described: ElementSpecs) -> Iterator[Reference]:
+    machine = _machine(spec, described)
+    yield Reference(machine, machine, (*spec.path, "shaft"))
+    for switch in spec.switches:
+        yield Reference(machine, switch.target[0], (*switch.path, "to"))
+
+
+def _build(spec: FollowerSpec, site: Site) -> Follower:
+    shaft = site.parts.built(SHAFT).get(spec.shaft)
+    if shaft is None:
+        raise Unknown(spec.shaft, f"no shaft is called {spec.shaft!r}")
+    follower = Follower(spec, shaft, site.memo.once(spec.path, lambda: _cam(spec, shaft)))
+    kernel = shaft.axis.kernel
+    kernel.add_part(follower, (shaft.axis.mechanism.machine, shaft.axis.spec.name, spec.shaft, spec.name), spec.name)
+    for n, switch in enumerate(spec.switches, start=1):
+        site.text.unless_wrong(switch.path, partial(_put_switch, follower, switch, lane_of(spec.name, n), site))
+    return follower
+
+
+def _cam(spec: FollowerSpec, shaft: GearedShaft) -> Cam:
+    turn = abs(shaft.pulses_per_turn)
+    if turn < 2 * len(spec.points):
+        raise Misuse(f"points: a turn of {spec.shaft!r} has {float(turn):g} imp, too few for so many")
+    found = ((shaft.place_of(angle), exact_fraction(lift)) for angle, lift in spec.points)
+    return Cam(((place - floor(place / turn) * turn, lift) for place, lift in found), turn)
+
+
+def _put_switch(follower: Follower, spec: SwitchSpec, lane: str, site: Site) -> None:
+    if spec.period is not None:
+        raise Misuse(f"period = {spec.period:g}: a follower moves between two ends, its switches have one zone")
+
+    def places(units: float) -> int:
+        return floor(exact_fraction(units) * PLACES + Fraction(1, 2))
+
+    zone = site.memo.once(spec.path, lambda: zone_of(spec, places))
+    mechanism = follower.shaft.axis.mechanism
+    kernel = follower.shaft.axis.kernel
+    put_switch(kernel, follower, (mechanism.machine, follower.spec.shaft, follower.spec.name), zone, spec, lane, site)
+
+
+def _signals(follower: Follower) -> Mapping[str, SignalOf]:
+    source, spec = (follower.shaft.axis.kernel.source(follower.spec.name),), follower.spec
+    bounds = 0.0, spec.highest
+    return {"position": SignalOf(source, follower.position, follower.turns, follower.version, spec.unit, bounds)}
+
+
+FOLLOWER: Element[FollowerSpec, Follower] = Element(
+    name="follower",
+    spec=FollowerSpec,
+    rows=TableRows(
+        written="[[follower]]",
+        keys=(
+            Key("name", name_value, "how conditions and faults name it"),
+            Key("shaft", NameOf("shaft"), "the shaft that its cam disc is on"),
+            Key("points", points, "[[degrees, lift], ...], linear between, also from the last to the first"),
+            optional(text_value, "unit", "of its lift: mm, cm, m, degree or anything", "mm"),
+        ),
+    ),
+    inner={"switch": SWITCH},
+    inner_attributes={"switch": "switches"},
+    read=_read,
+    refers=_refers,
+    build=_build,
+    signals=_signals,
+    drawing=lambda follower: follower.drawing,
+    moved=lambda follower: (follower.moved,),
+    faults=(
+        FaultKind(
+            "stuck-follower",
+            Layer.ELEMENT,
+            Occasion.ALWAYS,
+            "A follower stays where it is; afterwards it is on its cam again at once.",
+            effect=ElementEffect(_stick),
+        ),
+        FaultKind(
+            "worn-cam",
+            Layer.ELEMENT,
+            Occasion.ALWAYS,
+            "A cam lifts its follower by a share only.",
+            own=(number("share", "Of its lift.", 0.0, 1.0, default=0.9),),
+            effect=ElementEffect(_wear),
+        ),
+    ),
+)

@@ -1,0 +1,195 @@
+"""``[[gantry]]``: a beam that two axes move, one at each end; what one of them does not move, the other one has to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.simulation.components.axis import BuiltAxis, find_axis
+from steptwin.simulation.components.coordinate import Coordinate, Pulled
+from steptwin.simulation.components.elementspec import ElementSpecs
+from steptwin.simulation.components.logic import STUCK, BoardSpec, Joint, with_terminals
+from steptwin.simulation.components.site import Site
+from steptwin.simulation.components.touch import JAM, REPORT, RESET, Touch
+from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
+from steptwin.simulation.faults.effects import ElementEffect
+from steptwin.simulation.faults.table import number
+from steptwin.simulation.kinds.kind import Terminals
+from steptwin.simulation.logic.condition import SignalCondition
+from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.mechanics.drawing import Drawing, rail
+from steptwin.simulation.mechanics.lanes import MovedLane
+from steptwin.simulation.mechanics.scale import Loading, burden_of
+from steptwin.simulation.scheduler.kernel import Board
+from steptwin.simulation.toml.reader import Key, TomlText, optional
+from steptwin.simulation.toml.values import OUTPUT_PIN, NameOf, Terminal, word
+from steptwin.simulation.toml.values import number as number_value
+
+SKEWED = "SKEWED"
+SKEW = "skew"
+SHARES = {SKEW: (1.0, -1.0), "position": (0.5, 0.5)}
+"""Of the ends, in how far the one on its axis is ahead, and in where the middle is."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GantrySpec(BoardSpec):
+    """``limit`` in the unit of its axes, ``mass`` in kg, ``friction_force`` in N."""
+
+    axis: str
+    other: str
+    limit: float
+    mass: float
+    friction_force: float
+    effect: str
+    reset: Terminal | None
+
+    @property
+    def terminals(self) -> Terminals:
+        return Terminals(digital_inputs=(RESET,), outputs=(SKEWED,))
+
+    @property
+    def joints(self) -> Iterable[Joint]:
+        if self.reset is not None:
+            yield Joint("reset", RESET, self.reset)
+
+    def others(self, described: ElementSpecs) -> Iterator[tuple[str, str]]:
+        yield "axis", self.axis
+        yield "other", self.other
+
+    def check(self, text: TomlText) -> None:
+        if self.axis == self.other:
+            text.wrong((*self.path, "other"), "D007", f"other = {self.other!r} is its axis already: a gantry has two")
+
+
+class Gantry(Touch):
+    """Each motor moves half of the beam while both follow their fields; while one does not, the other one moves all of it.
+
+    SKEWED is on while the ends are further apart than the limit; then the beam is stuck in its guides, with `JAM`.
+    """
+
+    FIXED: ClassVar[tuple[str, ...]] = ("_loads", "ends", "signals")
+    __slots__ = (*FIXED, "_failed", "_looked_at", "_pulling", "is_stiff")
+
+    def __init__(self, board: Board, spec: GantrySpec, ends: tuple[BuiltAxis, BuiltAxis]) -> None:
+        self.ends = ends
+        self.signals = dict(_moving(ends))
+        skewed = SignalCondition(f"abs({SKEW}) > {spec.limit!r}", self.signals.__getitem__)
+        super().__init__(board, spec.effect == JAM, skewed, {end.spec.name: end.mechanism for end in ends})
+        beam = Loading(mass=spec.mass, friction_force=spec.friction_force)
+        self._loads = tuple(burden_of(beam, end.scale, "gantry") for end in ends)
+        """The whole beam, for each motor."""
+        self._pulling = (True, True)
+        self._looked_at: Nanos = -1
+        self._failed = (False, False)
+        """Which motor has stalled at that moment: without its load it could pull at once, and fail again, without end."""
+        self.is_stiff = 1.0
+        """Fault: factor of its friction."""
+
+    @property
+    def output(self) -> str:
+        return SKEWED
+
+    def touching(self) -> str:
+        skew = self.signals[SKEW].value(self.board.kernel.now)
+        return f"the ends of {self.board.name} are skewed by {skew:g} {self.unit}"
+
+    def update(self, now: Nanos) -> None:
+        one, other = (end.mechanism for end in self.ends)
+        pulls = one.pulls(now), other.pulls(now)
+        if now != self._looked_at:
+            self._looked_at, self._failed = now, (False, False)
+        stalled = one.at(now).stalled, other.at(now).stalled
+        failed = [has or (did and lost) for has, did, lost in zip(self._failed, self._pulling, stalled, strict=True)]
+        self._failed = failed[0], failed[1]
+        self._pulling = pulls[0] and not failed[0], pulls[1] and not failed[1]
+        shares = (0.5, 0.5) if self._pulling[0] is self._pulling[1] else tuple(map(float, self._pulling))
+        for end, whole, share in zip(self.ends, self._loads, shares, strict=True):
+            held = whole.times(share)
+            end.mechanism.burden(self.board.name, held._replace(friction=held.friction * self.is_stiff), now)
+        super().update(now)
+
+    def deadline(self) -> Nanos | None:
+        now = self.board.kernel.now
+        dues = (super().deadline(), *(end.mechanism.next_stall(now) for end in self.ends))
+        return min((due for due in dues if due is not None), default=None)
+
+    @property
+    def drawing(self) -> Drawing:
+        return rail(self.ends[0].spec.travel)
+
+    @property
+    def moved(self) -> tuple[str, MovedLane]:
+        half, other_half = (end.mechanism.build.sign / (2.0 * float(end.scale.pulses_per_unit)) for end in self.ends)
+        other = self.ends[1].mechanism
+        place = other.machine, str(other.number)
+        return self.ends[0].spec.name, MovedLane(
+            self.board.name, "position", self.unit, half, other=place, other_per_pulse=other_half
+        )
+
+    @property
+    def unit(self) -> str:
+        return self.ends[0].scale.unit
+
+
+def _moving(ends: tuple[BuiltAxis, BuiltAxis]) -> Iterator[tuple[str, SignalOf]]:
+    """The signals that also change between events."""
+    sources, unit = tuple(end.source for end in ends), ends[0].scale.unit
+    for name, shares in SHARES.items():
+        its = Coordinate(ends, shares, (Pulled(), Pulled()))
+        yield name, SignalOf(sources, its.value, its.turns, its.version, unit)
+
+
+def _stiffen(active: ActiveFault, gantry: Gantry, begins: bool, now: Nanos) -> str:
+    gantry.is_stiff = active.fault.number("factor") if begins else 1.0
+    return f"the guides of {gantry.board.name} have {gantry.is_stiff:g} times their friction"
+
+
+def _make(spec: GantrySpec, site: Site) -> Gantry:
+    board = site.board(spec.name)
+    one, other = find_axis(spec.axis, site), find_axis(spec.other, site)
+    for end in (one, other):
+        if end.mechanism.build.motor is None:
+            raise Misuse(f"axis {end.spec.name!r} has no [axis.motor]: a gantry shares the load of two")
+    if one.scale.unit != other.scale.unit:
+        raise Misuse(f"{spec.axis!r} is in {one.scale.unit} and {spec.other!r} in {other.scale.unit}: a gantry has one unit")
+    for name, gantry in site.parts.built(GANTRY).items():
+        if taken := [end.spec.name for end in (one, other) if gantry.is_moved_by(end.mechanism)]:
+            raise Misuse(f"axis {taken[0]!r} moves the gantry {name!r} already")
+    return Gantry(board, spec, (one, other))
+
+
+def _signals(gantry: Gantry) -> Mapping[str, SignalOf]:
+    return {**gantry.signals, "count": SignalOf((gantry.board.source,), lambda now: float(gantry.count))}
+
+
+_GANTRY = with_terminals(
+    "gantry",
+    GantrySpec,
+    (
+        Key("axis", NameOf("axis"), "the axis that moves one end"),
+        Key("other", NameOf("axis"), "the axis that moves the other end"),
+        Key("limit", number_value(0.0, above=True), "skew in the unit of the axes, beyond which SKEWED is on"),
+        optional(number_value(0.0), "mass", "kg of the beam and what is on it; each motor moves half", 0.0),
+        optional(number_value(0.0), "friction_force", "N against its motion; each motor moves half", 0.0),
+        optional(word(REPORT, JAM), "effect", "of too much skew: report, or jam (both axes stand)", JAM),
+        optional(OUTPUT_PIN, "reset", "output joined to RESET, which frees jammed axes"),
+    ),
+    make=_make,
+    signals=_signals,
+    drawing=lambda gantry: gantry.drawing,
+    faults=(
+        *STUCK,
+        FaultKind(
+            "stiff-guides",
+            Layer.ELEMENT,
+            Occasion.ALWAYS,
+            "The guides of a gantry have a multiple of their friction.",
+            own=(number("factor", "Of its friction.", 1.0, 1000.0, default=3.0),),
+            effect=ElementEffect(_stiffen),
+        ),
+    ),
+)
+GANTRY = replace(_GANTRY, moved=lambda gantry: (gantry.moved,))

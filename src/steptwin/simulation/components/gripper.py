@@ -1,0 +1,142 @@
+"""``[[gripper]]``: two jaws that close on a workpiece, carry it and put it down, with sensors for opened, closed and held."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import floor
+from typing import ClassVar
+
+from steptwin.machine import MILLISECOND, Nanos
+from steptwin.simulation.components.carrier import CARRIER_KEYS, HELD, PICK, PLACE, Carrier, CarrierSpec, carrier_signals
+from steptwin.simulation.components.logic import STUCK, Joint, with_terminals
+from steptwin.simulation.components.site import Site
+from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
+from steptwin.simulation.faults.effects import ElementEffect
+from steptwin.simulation.kinds.kind import Terminals
+from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.mechanics.drawing import ROD, Drawing
+from steptwin.simulation.mechanics.scale import exact_fraction
+from steptwin.simulation.mechanics.travel import Travel
+from steptwin.simulation.scheduler.kernel import Board
+from steptwin.simulation.toml.reader import TomlText, optional
+from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, number, positive_time
+
+CLOSE, OPENED, CLOSED = "CLOSE", "OPENED", "CLOSED"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GripperSpec(CarrierSpec):
+    close: Terminal | None
+    stroke: float
+    width: float
+    close_time: Nanos
+    open_time: Nanos
+
+    @property
+    def terminals(self) -> Terminals:
+        return Terminals(digital_inputs=(CLOSE, PICK, PLACE), outputs=(OPENED, CLOSED, HELD))
+
+    @property
+    def own_joint(self) -> Joint | None:
+        return None if self.close is None else Joint("close", CLOSE, self.close)
+
+    def check(self, text: TomlText) -> None:
+        if self.width >= self.stroke:
+            message = f"width = {self.width:g} mm is not below stroke = {self.stroke:g} mm: open jaws must go over a workpiece"
+            text.wrong((*self.path, "width"), "D007", message)
+
+
+class Gripper(Carrier):
+    """The jaws move at constant speeds. They hold a workpiece that is between them when they come to its width, until they open.
+    Without one they close."""
+
+    FIXED: ClassVar[tuple[str, ...]] = ("_at", "_spec")
+    __slots__ = (*FIXED, "_is_narrow", "is_held", "slips", "travel")
+
+    def __init__(self, board: Board, spec: GripperSpec, site: Site) -> None:
+        super().__init__(board, spec, site)
+        self._spec = spec
+        self.travel = Travel(spec.close_time, spec.open_time, is_forth=False, now=board.kernel.now)
+        share = 1 - exact_fraction(spec.width) / exact_fraction(spec.stroke)
+        self._at = floor(share * self.travel.full)
+        """The place of the jaws at a workpiece."""
+        self._is_narrow = False
+        """Whether the jaws are closer than a workpiece is wide, or hold one."""
+        self.is_held = False
+        self.slips = False
+        """Fault: the jaws hold nothing."""
+
+    def update(self, now: Nanos) -> None:
+        closes = self.board.is_on(CLOSE)
+        is_narrow = self.travel.place(now) >= self._at
+        if self.is_held and (not closes or self.slips):
+            self.is_held = False
+            self.let_go(now)
+        elif closes and is_narrow and not self._is_narrow and not self.slips and self.is_occupied(now):
+            self.is_held = True
+            self.take(now)
+        self._is_narrow = is_narrow
+        direction = 0 if self.is_held else 1 if closes else -1
+        if direction != self.travel.direction:
+            self.travel.send(direction, now)
+            self.board.kernel.mark(self.board.name)
+        place = self.travel.place(now)
+        self.board.put(OPENED, float(place == 0))
+        self.board.put(CLOSED, float(place == self.travel.full))
+        self.board.put(HELD, float(self.is_held))
+
+    def deadline(self) -> Nanos | None:
+        now = self.board.kernel.now
+        touches = self.travel.reaches(self._at, now, 1)
+        moments = (*self.travel.turns(now), *(() if touches is None else (touches,)))
+        return min(moments, default=None)
+
+    @property
+    def stroke(self) -> float:
+        return self._spec.stroke
+
+    def position(self, now: Nanos) -> float:
+        """How far the jaws are closed, mm."""
+        return self._spec.stroke * (self.travel.place(now) / self.travel.full)
+
+
+def _slip(active: ActiveFault, gripper: Gripper, begins: bool, now: Nanos) -> str:
+    gripper.slips = begins
+    return f"{gripper.board.name} {'lets workpieces slip' if begins else 'holds again'}"
+
+
+def _signals(gripper: Gripper) -> Mapping[str, SignalOf]:
+    source, travel = gripper.board.source, gripper.travel
+    bounds = (0.0, gripper.stroke)
+    return {
+        "position": SignalOf((source,), gripper.position, travel.turns, travel.version, unit="mm", bounds=bounds),
+        **carrier_signals(gripper),
+    }
+
+
+GRIPPER = with_terminals(
+    "gripper",
+    GripperSpec,
+    (
+        optional(OUTPUT_PIN, "close", "output joined to CLOSE, which closes the jaws while it is on; without it a wire may be"),
+        *CARRIER_KEYS,
+        optional(number(0.0, above=True), "stroke", "mm between the open jaws", 20.0),
+        optional(number(0.0), "width", "mm of a workpiece between the jaws", 10.0),
+        optional(positive_time, "close_time", "from open to closed, without a workpiece", 100 * MILLISECOND),
+        optional(positive_time, "open_time", "from closed to open", 100 * MILLISECOND),
+    ),
+    make=lambda spec, site: Gripper(site.board(spec.name), spec, site),
+    signals=_signals,
+    drawing=lambda gripper: Drawing(ROD, gripper.stroke, ("position",)),
+    faults=(
+        *STUCK,
+        FaultKind(
+            "worn-jaws",
+            Layer.ELEMENT,
+            Occasion.ALWAYS,
+            "The jaws of a gripper let workpieces slip.",
+            effect=ElementEffect(_slip),
+        ),
+    ),
+)

@@ -1,0 +1,67 @@
+"""``[[latch]]``: an output that is set by one input and reset by another."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import ClassVar
+
+from steptwin.machine import Nanos
+from steptwin.simulation.components.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
+from steptwin.simulation.kinds.kind import Terminals
+from steptwin.simulation.scheduler.kernel import Board
+from steptwin.simulation.toml.reader import optional
+from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, word
+
+SET, RESET, OUT = "SET", "RESET", "OUT"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LatchSpec(BoardSpec):
+    set: Terminal | None
+    reset: Terminal | None
+    priority: str
+
+    @property
+    def terminals(self) -> Terminals:
+        return Terminals(digital_inputs=(SET, RESET), outputs=(OUT,))
+
+    @property
+    def joints(self) -> Iterable[Joint]:
+        if self.set is not None:
+            yield Joint("set", SET, self.set)
+        if self.reset is not None:
+            yield Joint("reset", RESET, self.reset)
+
+
+class Latch(BoardPart):
+    """On once SET is on, off once RESET is on; while both are, ``priority`` decides."""
+
+    FIXED: ClassVar[tuple[str, ...]] = ("_reset_wins",)
+    __slots__ = (*FIXED, "_is_on")
+
+    def __init__(self, board: Board, priority: str) -> None:
+        super().__init__(board)
+        self._reset_wins = priority == "reset"
+        self._is_on = False
+
+    def update(self, now: Nanos) -> None:
+        is_set, is_reset = self.board.is_on(SET), self.board.is_on(RESET)
+        if is_set and is_reset:
+            self._is_on = not self._reset_wins
+        elif is_set or is_reset:
+            self._is_on = is_set
+        self.board.put(OUT, float(self._is_on))
+
+
+LATCH = with_terminals(
+    "latch",
+    LatchSpec,
+    (
+        optional(OUTPUT_PIN, "set", "output joined to SET; without it wires and contacts may be"),
+        optional(OUTPUT_PIN, "reset", "output joined to RESET; without it wires and contacts may be"),
+        optional(word("set", "reset"), "priority", "what wins while both are on", "reset"),
+    ),
+    faults=STUCK,
+    make=lambda spec, site: Latch(site.board(spec.name), spec.priority),
+)

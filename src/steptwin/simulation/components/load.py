@@ -1,0 +1,197 @@
+"""``[[load]]``: a further load on the motor of an axis: while a condition holds, or as much of it as a table gives."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import ClassVar
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.simulation.components.axis import BuiltAxis, find_axis
+from steptwin.simulation.components.elementspec import ElementSpecs
+from steptwin.simulation.components.logic import BoardPart, BoardSpec, Joint, with_terminals
+from steptwin.simulation.components.quantity import (
+    TIME,
+    check_condition,
+    check_owners,
+    condition_of,
+    owner_of,
+    owners_of,
+    signal_of,
+)
+from steptwin.simulation.components.site import Site
+from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
+from steptwin.simulation.faults.effects import ElementEffect
+from steptwin.simulation.faults.table import number
+from steptwin.simulation.kinds.kind import Terminals
+from steptwin.simulation.logic.condition import SignalCondition
+from steptwin.simulation.logic.curve import Stepped
+from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.mechanics.motor import Burden
+from steptwin.simulation.mechanics.scale import Loading, burden_of
+from steptwin.simulation.scheduler.kernel import Board
+from steptwin.simulation.toml.reader import Key, TomlText, optional
+from steptwin.simulation.toml.values import NameOf, points, text_value
+from steptwin.simulation.toml.values import number as number_value
+from steptwin.state import Plain
+
+ACTS = "ACTS"
+MOST_SHARE = 1000.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoadSpec(BoardSpec):
+    """``mass`` in kg, ``force`` and ``friction_force`` in N on a linear axis, the others in kg·m² and N·m at the motor."""
+
+    axis: str
+    when: str | None
+    mass: float
+    force: float
+    friction_force: float
+    inertia: float
+    load: float
+    friction: float
+    of: str | None
+    points: tuple[tuple[float, float], ...] | None
+    resolution: float
+
+    @property
+    def terminals(self) -> Terminals:
+        return Terminals(outputs=(ACTS,))
+
+    @property
+    def joints(self) -> Iterable[Joint]:
+        return ()
+
+    @property
+    def loading(self) -> Loading:
+        return Loading(self.inertia, self.mass, self.friction, self.friction_force, self.load, self.force)
+
+    def others(self, described: ElementSpecs) -> Iterator[tuple[str, str]]:
+        yield "axis", self.axis
+        named = () if self.of is None else (owner_of(self.of),)
+        for key, owners in (("when", () if self.when is None else owners_of(self.when)), ("of", named)):
+            yield from ((key, owner) for owner in owners if owner != TIME)
+
+    def check(self, text: TomlText) -> None:
+        if self.when is not None:
+            check_condition(text, self.path, self.name, self.when)
+        if self.of is not None:
+            check_owners(text, (*self.path, "of"), self.name, (owner_of(self.of),))
+        if not any(self.loading):
+            text.wrong(self.path, "D007", f"{self.name!r} weighs nothing: give it a mass, a force, a friction or an inertia")
+        if (self.of is None) is not (self.points is None):
+            key, other = ("of", "points") if self.points is None else ("points", "of")
+            text.means_nothing((*self.path, key), f"{key} means nothing without {other}")
+        shares = [share for _, share in self.points or ()]
+        if not all(0.0 <= share <= MOST_SHARE for share in shares):
+            there = f"{min(shares):g} to {max(shares):g}"
+            text.wrong((*self.path, "points"), "D003", f"shares of {there}: permitted are 0 to {MOST_SHARE:g}")
+
+
+class FurtherLoad(BoardPart):
+    """Loads the motor while its condition holds, with the share of its curve. ACTS is on while there is any."""
+
+    FIXED: ClassVar[tuple[str, ...]] = ("_axis", "_condition", "_whole")
+    __slots__ = (*FIXED, "_curve", "_due", "_share", "factor")
+
+    def __init__(
+        self, board: Board, axis: BuiltAxis, whole: Burden, condition: SignalCondition | None, curve: Stepped | None
+    ) -> None:
+        super().__init__(board)
+        self._axis = axis
+        self._whole = whole
+        self._condition = condition
+        self._curve = curve
+        self._share = 0.0
+        """How much of it there is."""
+        self._due: Nanos | None = None
+        """When that may change without an event."""
+        self.factor = 1.0
+        """Fault: how much of it there is instead of all."""
+
+    @property
+    def watches(self) -> tuple[str, ...] | None:
+        """What its condition and its curve are over may be anything."""
+        return super().watches if self._condition is None and self._curve is None else None
+
+    @property
+    def most(self) -> float:
+        """The greatest share, but for faults."""
+        return 1.0 if self._curve is None else self._curve.most
+
+    def share(self, now: Nanos) -> float:
+        return self._share
+
+    def update(self, now: Nanos) -> None:
+        share = self.factor
+        if self._curve is not None:
+            self._curve.update(now)
+            share *= self._curve.value
+        self._share = share if self._condition is None or self._condition.holds(now) else 0.0
+        self._axis.mechanism.burden(self.board.name, self._whole.times(self._share), now)
+        self.board.put(ACTS, float(self._share > 0.0))
+        self._due = None if self._condition is None else self._condition.change(now)
+
+    def deadline(self) -> Nanos | None:
+        dues = (self._due, None if self._curve is None else self._curve.due)
+        return min((due for due in dues if due is not None), default=None)
+
+    def set_state(self, plain: Plain) -> None:
+        super().set_state(plain)
+        if self._condition is not None:
+            self._condition.forget()
+
+
+def _change(active: ActiveFault, load: FurtherLoad, begins: bool, now: Nanos) -> str:
+    load.factor = active.fault.number("factor") if begins else 1.0
+    return f"{load.board.name} is {load.factor:g} times what it should be"
+
+
+def _make(spec: LoadSpec, site: Site) -> FurtherLoad:
+    board, axis = site.board(spec.name), find_axis(spec.axis, site)
+    build = axis.mechanism.build
+    if build.motor is None:
+        raise Misuse(f"axis {spec.axis!r} has no [axis.motor]: without, it moves any load")
+    whole = burden_of(spec.loading, axis.scale, "load")
+    if build.is_free:
+        most = max((share for _, share in spec.points or ()), default=1.0)
+        build.motor.check_free(most * (abs(whole.load) + whole.friction))
+    curve = None
+    if spec.of is not None and spec.points is not None:
+        curve = Stepped(signal_of("of", board, site, spec.of), spec.points, spec.resolution)
+    return FurtherLoad(board, axis, whole, None if spec.when is None else condition_of(spec.when, board, site), curve)
+
+
+_not_negative = number_value(0.0)
+
+LOAD = with_terminals(
+    "load",
+    LoadSpec,
+    (
+        Key("axis", NameOf("axis"), "the axis whose motor moves it"),
+        optional(text_value, "when", "the condition under which it is there, such as 'cup.held'; default always"),
+        optional(_not_negative, "mass", "kg moved by a linear axis", 0.0),
+        optional(number_value(), "force", "N on a linear axis; positive pulls towards lower positions", 0.0),
+        optional(_not_negative, "friction_force", "N against motion of a linear axis", 0.0),
+        optional(_not_negative, "inertia", "kg·m² at the motor", 0.0),
+        optional(number_value(), "load", "N·m at the motor; positive pulls towards lower positions", 0.0),
+        optional(_not_negative, "friction", "N·m against motion, at the motor", 0.0),
+        optional(text_value, "of", "the signal that points are over, such as x.position or time"),
+        optional(points, "points", "[[value, share], ...] of all its values there is, linear between; default 1"),
+        optional(number_value(0.0001, 1.0), "resolution", "steps in which the share changes", 0.01),
+    ),
+    make=_make,
+    signals=lambda load: {"share": SignalOf((load.board.source,), load.share, bounds=(0.0, load.most))},
+    faults=(
+        FaultKind(
+            "other-load",
+            Layer.ELEMENT,
+            Occasion.ALWAYS,
+            "A load is a multiple of what it should be.",
+            own=(number("factor", "Of its mass, forces and torques; 0: it is missing.", 0.0, MOST_SHARE, default=2.0),),
+            effect=ElementEffect(_change),
+        ),
+    ),
+)

@@ -1,0 +1,242 @@
+"""What elements with terminals have in common: a board, keys that join outputs of others to it, its levels as signals,
+and the faults of terminals that are stuck."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Generic, NamedTuple, TypeVar
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.simulation.components.element import Element
+from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
+from steptwin.simulation.components.site import Site
+from steptwin.simulation.faults import ActiveFault, Fault, FaultKind, Layer, Occasion
+from steptwin.simulation.faults.effects import ElementEffect
+from steptwin.simulation.faults.table import Parameter, ParameterForm, whole
+from steptwin.simulation.kinds.kind import Terminals
+from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.mechanics.drawing import Drawing
+from steptwin.simulation.scheduler.kernel import Board
+from steptwin.simulation.scheduler.wires import PinName, Wire
+from steptwin.simulation.toml.reader import Key, Row, Table, TomlText
+from steptwin.simulation.toml.sense import TableRows
+from steptwin.simulation.toml.tomlplaces import Path
+from steptwin.simulation.toml.values import Terminal, name_value
+from steptwin.state import Stateful
+
+
+class Joint(NamedTuple):
+    """An output, which the key ``key`` names, joined to an input of the element."""
+
+    key: str
+    input: str
+    source: Terminal
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoardSpec(NamedSpec, ABC):
+    """The table of an element with terminals."""
+
+    @property
+    @abstractmethod
+    def terminals(self) -> Terminals:
+        """Its inputs and outputs."""
+
+    @property
+    @abstractmethod
+    def joints(self) -> Iterable[Joint]:
+        """What its keys join to its inputs."""
+
+    def others(self, described: ElementSpecs) -> Iterable[tuple[str, str]]:
+        """Keys that name other elements, and the names of these or of what they are in one kernel with."""
+        return ()
+
+    def check(self, text: TomlText) -> None:
+        """Report keys that do not fit together."""
+
+
+class BoardPart(Stateful, ABC):
+    """The part of a kernel that gives the outputs of a board their levels."""
+
+    __slots__ = ("board",)
+
+    def __init__(self, board: Board) -> None:
+        self.board = board
+
+    @property
+    def watches(self) -> tuple[str, ...] | None:
+        """The machines and elements whose changes concern it; None: all."""
+        return (self.board.name,)
+
+    @property
+    def delays(self) -> tuple[Nanos, ...]:
+        """How much later than an input an output may change."""
+        return ()
+
+    @abstractmethod
+    def update(self, now: Nanos) -> None:
+        """As `KernelPart.update`."""
+
+    def deadline(self) -> Nanos | None:
+        """As `KernelPart.deadline`; none for an element whose outputs follow its inputs alone."""
+        return None
+
+
+S = TypeVar("S", bound=BoardSpec)
+P = TypeVar("P", bound=BoardPart)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Inner(Generic[S, P]):
+    """A kind of table in the table of an element: ``[[ELEMENT.KEY]]``."""
+
+    key: str
+    attribute: str
+    """Of the element's value, a tuple."""
+    rows: TableRows
+    read: Callable[[TomlText, Path, Table], tuple[Any, ...]]
+    refers: Callable[[S], Iterable[Reference]]
+    build: Callable[[S, P, Site], None]
+
+
+def _wires(spec: BoardSpec) -> Iterator[tuple[Wire, Path]]:
+    """To its inputs, with the keys that name their sources."""
+    for joint in spec.joints:
+        yield Wire(PinName(*joint.source), PinName(spec.name, joint.input)), (*spec.path, joint.key)
+
+
+# ---------------------------------------------------------------------- faults
+
+
+def _check_terminal(part: BoardPart, fault: Fault, key: str, permitted: tuple[str, ...]) -> None:
+    board, given = part.board, str(fault.get(key))
+    if given.upper() not in permitted:
+        there = ", ".join(name.lower() for name in permitted) or "none"
+        raise Misuse(f"fault {fault.kind.name}: {key} = {given!r}: {key}s of {board.name!r} are {there}")
+
+
+def _check_output(part: BoardPart, fault: Fault) -> None:
+    _check_terminal(part, fault, "output", part.board.outputs)
+
+
+def _check_input(part: BoardPart, fault: Fault) -> None:
+    _check_terminal(part, fault, "input", part.board.inputs)
+
+
+def _stick(active: ActiveFault, part: BoardPart, begins: bool, now: Nanos) -> str:
+    terminal, level = str(active.fault.get("output") or active.fault.get("input")), active.fault.whole("level") or 0
+    part.board.hold(terminal.upper(), float(level) if begins else None)
+    name = f"{part.board.name}.{terminal.lower()}"
+    return f"{name} is stuck at {level}" if begins else f"{name} is free again"
+
+
+STUCK_OUTPUT = FaultKind(
+    "stuck-output",
+    Layer.ELEMENT,
+    Occasion.ALWAYS,
+    "An output of an element keeps its level.",
+    own=(
+        Parameter("output", ParameterForm.TEXT, "Which output.", default="out"),
+        whole("level", "The level it keeps.", 0, 1, default=0),
+    ),
+    effect=ElementEffect(_stick, holds="output"),
+    check=_check_output,
+)
+"""Of elements with outputs."""
+STUCK_INPUT = FaultKind(
+    "stuck-input",
+    Layer.ELEMENT,
+    Occasion.ALWAYS,
+    "An input of an element keeps a level, whatever its contacts or its wire do.",
+    own=(
+        Parameter("input", ParameterForm.TEXT, "Which input.", is_required=True),
+        whole("level", "The level it keeps.", 0, 1, default=0),
+    ),
+    effect=ElementEffect(_stick, holds="input"),
+    check=_check_input,
+)
+"""Of elements with inputs."""
+STUCK = (STUCK_OUTPUT, STUCK_INPUT)
+"""Of elements with both."""
+
+
+# ---------------------------------------------------------------------- an element
+
+
+def with_terminals(
+    name: str,
+    spec: type[S],
+    keys: Sequence[Key],
+    *,
+    make: Callable[[S, Site], P],
+    signals: Callable[[P], Mapping[str, SignalOf]] = lambda part: {},
+    faults: Sequence[FaultKind] = (),
+    inner: Sequence[Inner[S, P]] = (),
+    connect: Callable[[S, P, Site], None] | None = None,
+    drawing: Callable[[P], Drawing] | None = None,
+) -> Element[S, P]:
+    """An element with a name and terminals. Each terminal is a signal, each output a lane.
+
+    ``signals`` are those besides. ``connect`` and ``drawing`` are as in `Element`.
+    """
+
+    def read(text: TomlText, row: Row, table: Table) -> S:
+        more: dict[str, Any] = {one.attribute: one.read(text, row["path"], table) for one in inner}
+        found = spec(**row, **more)
+        found.check(text)
+        return found
+
+    def refers(found: S, described: ElementSpecs) -> Iterator[Reference]:
+        yield from _references(found, described)
+        for one in inner:
+            yield from one.refers(found)
+
+    def build(found: S, site: Site) -> P:
+        part = make(found, site)
+        part.board.kernel.add_part(part, part.watches, found.name)
+        for wire, path in site.memo.once((*found.path, "wires"), lambda: tuple(_wires(found))):
+            site.join(wire, path)
+        for one in inner:
+            one.build(found, part, site)
+        return part
+
+    return Element(
+        name=name,
+        spec=spec,
+        rows=TableRows(written=f"[[{name}]]", keys=(Key("name", name_value, "how others name it"), *keys)),
+        inner={one.key: one.rows for one in inner},
+        inner_attributes={one.key: one.attribute for one in inner},
+        read=read,
+        refers=refers,
+        build=build,
+        connect=connect,
+        terminals=lambda found: found.terminals,
+        signals=lambda part: {**_terminal_signals(part.board), **signals(part)},
+        drawing=drawing,
+        faults=tuple(faults),
+    )
+
+
+def _references(found: BoardSpec, described: ElementSpecs) -> Iterator[Reference]:
+    """Of the terminals and keys of an element."""
+    yield Reference(found.name, found.name, found.path)
+    for joint in found.joints:
+        yield Reference(found.name, joint.source[0], (*found.path, joint.key))
+    for key, other in found.others(described):
+        yield Reference(found.name, other, (*found.path, key))
+
+
+def _terminal_signals(board: Board) -> Mapping[str, SignalOf]:
+    return {terminal.lower(): level_signal(board, terminal) for terminal in board.levels}
+
+
+def level_signal(board: Board, terminal: str) -> SignalOf:
+    return SignalOf((board.source,), partial(_level, board, terminal))
+
+
+def _level(board: Board, terminal: str, now: Nanos) -> float:
+    return board.levels[terminal]

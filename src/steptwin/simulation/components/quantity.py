@@ -1,0 +1,59 @@
+"""Signals and conditions that elements depend on, in keys such as ``when`` and ``of``."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from steptwin.errors import Misuse
+from steptwin.simulation.components.signals import Idle, find_signal
+from steptwin.simulation.components.site import Site
+from steptwin.simulation.logic.condition import SignalCondition
+from steptwin.simulation.logic.expression import parse_condition
+from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.scheduler.kernel import Board
+from steptwin.simulation.toml.reader import TomlText
+from steptwin.simulation.toml.tomlplaces import Path
+
+TIME = "time"
+"""The signal that belongs to no machine and no element."""
+
+
+def owners_of(condition: str) -> tuple[str, ...]:
+    """Machines and elements whose signals are in a condition; none for one that is wrong."""
+    try:
+        return tuple(dict.fromkeys(owner_of(name) for name in parse_condition(condition).names()))
+    except Misuse:
+        return ()
+
+
+def check_condition(text: TomlText, path: Path, name: str, condition: str) -> None:
+    """Report a condition of the element ``name`` that cannot be read, or is over itself."""
+    try:
+        parse_condition(condition)
+    except Misuse as error:
+        text.wrong((*path, "when"), "D003", str(error))
+    check_owners(text, (*path, "when"), name, owners_of(condition))
+
+
+def check_owners(text: TomlText, path: Path, name: str, owners: tuple[str, ...]) -> None:
+    """Report a key of the element ``name`` that is over its own signals."""
+    if name in owners:
+        text.wrong(path, "D007", f"{name!r} depends on itself")
+
+
+def owner_of(signal: str) -> str:
+    """The machine or element that has a signal."""
+    return signal.partition(".")[0]
+
+
+def signal_of(key: str, board: Board, site: Site, name: str) -> SignalOf | Idle:
+    """A signal of what is in one kernel with a board. Raises `Misuse`."""
+    found = find_signal(site.parts, name)
+    if isinstance(found, Idle) or any(source.kernel is not board.kernel for source in found.sources):
+        raise Misuse(f"{key}: {name!r} is no quantity of a machine or an element")
+    found.watch(name)
+    return found
+
+
+def condition_of(text: str, board: Board, site: Site) -> SignalCondition:
+    return SignalCondition(text, partial(signal_of, "when", board, site))

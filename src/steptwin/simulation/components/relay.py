@@ -1,0 +1,114 @@
+"""``[[relay]]``: a coil with a change-over contact, whose terminals NO and NC may be wired to any number of inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import ClassVar
+
+from steptwin.machine import Nanos
+from steptwin.simulation.components.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
+from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
+from steptwin.simulation.faults.effects import ElementEffect
+from steptwin.simulation.kinds.kind import Terminals
+from steptwin.simulation.scheduler.kernel import Board
+from steptwin.simulation.toml.reader import optional
+from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, time_value
+
+COIL, NO, NC = "COIL", "NO", "NC"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RelaySpec(BoardSpec):
+    coil: Terminal | None
+    pull_in: Nanos
+    drop_out: Nanos
+
+    @property
+    def terminals(self) -> Terminals:
+        return Terminals(digital_inputs=(COIL,), outputs=(NO, NC))
+
+    @property
+    def joints(self) -> Iterable[Joint]:
+        if self.coil is not None:
+            yield Joint("coil", COIL, self.coil)
+
+
+class Relay(BoardPart):
+    """NO is on and NC off from ``pull_in`` after its coil is energised until ``drop_out`` after it is not. A shorter pulse, or a
+    shorter gap, does not move the contact."""
+
+    FIXED: ClassVar[tuple[str, ...]] = ("_drop_out", "_pull_in")
+    __slots__ = (*FIXED, "_due", "_was_on", "is_on", "is_open", "is_welded")
+
+    def __init__(self, board: Board, pull_in: Nanos, drop_out: Nanos) -> None:
+        super().__init__(board)
+        self._pull_in = pull_in
+        self._drop_out = drop_out
+        self._was_on = False
+        self._due: Nanos | None = None
+        """When the contact moves."""
+        self.is_on = False
+        self.is_open = False
+        """Fault: its coil is interrupted."""
+        self.is_welded = False
+        """Fault: the contact NO stays closed once it is."""
+
+    @property
+    def delays(self) -> tuple[Nanos, ...]:
+        return self._pull_in, self._drop_out
+
+    def update(self, now: Nanos) -> None:
+        self._move(now)  # before the coil changes: an input at a moment comes after what is due then
+        is_on = self.board.is_on(COIL) and not self.is_open
+        if is_on is not self._was_on:
+            self._was_on = is_on
+            self._due = None if is_on is self.is_on else now + (self._pull_in if is_on else self._drop_out)
+            self._move(now)
+        closed = self.is_on or (self.is_welded and self.board.is_on(NO))
+        self.board.put(NO, float(closed))
+        self.board.put(NC, float(not closed))
+
+    def _move(self, now: Nanos) -> None:
+        """Move the contact if that is due."""
+        if self._due is not None and self._due <= now:
+            self._due = None
+            self.is_on = self._was_on
+
+    def deadline(self) -> Nanos | None:
+        return self._due
+
+
+def _weld(active: ActiveFault, relay: Relay, begins: bool, now: Nanos) -> str:
+    relay.is_welded = begins
+    return f"the contact of {relay.board.name} {'welds once it is closed' if begins else 'is free again'}"
+
+
+def _interrupt(active: ActiveFault, relay: Relay, begins: bool, now: Nanos) -> str:
+    relay.is_open = begins
+    return f"the coil of {relay.board.name} is {'interrupted' if begins else 'connected'}"
+
+
+RELAY = with_terminals(
+    "relay",
+    RelaySpec,
+    (
+        optional(OUTPUT_PIN, "coil", "output joined to COIL; without it wires and contacts may be, such as emergency stops"),
+        optional(time_value, "pull_in", "from energising the coil to the contact", 0),
+        optional(time_value, "drop_out", "from switching the coil off to the contact", 0),
+    ),
+    make=lambda spec, site: Relay(site.board(spec.name), spec.pull_in, spec.drop_out),
+    faults=(
+        *STUCK,
+        FaultKind(
+            "welded-contact",
+            Layer.ELEMENT,
+            Occasion.ALWAYS,
+            "The contact NO of a relay stays closed once it is.",
+            effect=ElementEffect(_weld),
+        ),
+        FaultKind(
+            "open-coil", Layer.ELEMENT, Occasion.ALWAYS, "The coil of a relay is interrupted.", effect=ElementEffect(_interrupt)
+        ),
+    ),
+)

@@ -1,0 +1,244 @@
+"""``[[shaft]]``: a shaft that an axis turns through a gear, with cams that actuate contacts in every revolution."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import partial
+from math import floor
+from typing import Any, ClassVar
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis, turns_of_axis
+from steptwin.simulation.components.contact import CONTACT_KEYS
+from steptwin.simulation.components.element import Element
+from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
+from steptwin.simulation.components.site import Site
+from steptwin.simulation.components.switch import lane_of, put_switch
+from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
+from steptwin.simulation.faults.effects import ElementEffect
+from steptwin.simulation.logic.contacts import Zone
+from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.mechanics.drawing import DIAL, Drawing, SensorZone
+from steptwin.simulation.mechanics.lanes import SLIPS, MovedLane
+from steptwin.simulation.mechanics.scale import exact_fraction
+from steptwin.simulation.toml.reader import Key, Row, Table, TomlText, optional, read_table
+from steptwin.simulation.toml.sense import TableRows, check_sense
+from steptwin.simulation.toml.tomlplaces import Path
+from steptwin.simulation.toml.values import INPUT_PIN, NameOf, Terminal, name_value, number, permitting
+from steptwin.state import Stateful
+
+TURN = 360
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CamSpec:
+    """On from ``begin`` to ``end`` degrees of the shaft; through 0 where the end is not above the beginning."""
+
+    begin: float
+    end: float
+    target: Terminal
+    contact: str
+    join: str | None
+    bounce: Nanos
+    bounces: int
+    path: Path = ()
+
+    @property
+    def zone(self) -> SensorZone:
+        """Where it is on, as it is drawn."""
+        return SensorZone(self.target, self.begin, self.end if self.end > self.begin else self.end + TURN)
+
+
+CAM = TableRows(
+    written="[[shaft.cam]]",
+    keys=(
+        Key("from", number(0.0, 360.0), "degrees, from which it is on", attribute="begin"),
+        Key("until", number(0.0, 360.0), "degrees, to which it is on; below from: through 0", attribute="end"),
+        Key("to", INPUT_PIN, "the input: MACHINE.PIN", attribute="target"),
+        *CONTACT_KEYS,
+    ),
+    need={"bounces": "bounce"},
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShaftSpec(NamedSpec):
+    axis: str
+    ratio: float
+    offset: float
+    cams: tuple[CamSpec, ...]
+
+
+class GearedShaft(Stateful):
+    """Turns with its axis, a moving part for cams: its place is in whole pulses of the axis."""
+
+    FIXED: ClassVar[tuple[str, ...]] = ("axis", "spec")
+    __slots__ = (*FIXED, "_behind", "_held")
+
+    def __init__(self, spec: ShaftSpec, axis: BuiltAxis) -> None:
+        self.spec = spec
+        self.axis = axis
+        self._held: int | None = None
+        """Fault: the place at which it stands while its coupling slips."""
+        self._behind = 0
+        """Pulses of the axis that slipping has cost it; negative: it is ahead."""
+
+    # ------------------------------------------------------------------ part of a kernel
+
+    def update(self, now: Nanos) -> None:
+        """Its motion is that of its axis: the kernel looks again at what depends on it."""
+
+    def deadline(self) -> Nanos | None:
+        """None: its motion is that of its axis."""
+        return None
+
+    # ------------------------------------------------------------------ the moving part of cams
+
+    def version(self) -> object:
+        return self.axis.mechanism.version(), self._held, self._behind
+
+    def place(self, now: Nanos) -> int:
+        return self.axis.mechanism.place(now) - self._behind if self._held is None else self._held
+
+    def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
+        if self._held is not None:
+            return None
+        return self.axis.mechanism.reaches(position + self._behind, after, direction)
+
+    def slip(self, slips: bool, now: Nanos) -> None:
+        """Let the coupling slip, or grip again where the shaft is then."""
+        kernel, mechanism = self.axis.kernel, self.axis.mechanism
+        kernel.report(mechanism.machine, "edge", f"{self.spec.name}.{SLIPS}", float(slips))
+        if slips:
+            self._held = self.place(now)
+        elif self._held is not None:
+            self._behind = mechanism.place(now) - self._held
+            self._held = None
+        kernel.mark(self.spec.name)
+
+    @property
+    def moved(self) -> tuple[str, MovedLane]:
+        sign, name = self.axis.mechanism.build.sign, self.spec.name
+        return self.axis.spec.name, MovedLane(
+            name, "angle", "degree", float(sign * TURN / self.pulses_per_turn), self.spec.offset, name
+        )
+
+    @property
+    def behind(self) -> float:
+        """Degrees."""
+        return float(self._behind / self.pulses_per_turn * TURN)
+
+    # ------------------------------------------------------------------ gear
+
+    @property
+    def pulses_per_turn(self) -> Fraction:
+        """Of the axis; negative where the shaft turns backwards."""
+        return self.axis.scale.pulses_per_unit / exact_fraction(self.spec.ratio)
+
+    def place_of(self, degrees: float) -> Fraction:
+        """The place, not always whole, at an angle of the first turn."""
+        return (exact_fraction(degrees) - exact_fraction(self.spec.offset)) / TURN * self.pulses_per_turn
+
+    def angle(self, now: Nanos) -> float:
+        """Degrees, more than 360 after more than a turn."""
+        return float(self.place(now) / self.pulses_per_turn * TURN + exact_fraction(self.spec.offset))
+
+    def zone(self, cam: CamSpec) -> Zone:
+        """Places while a cam is on."""
+        end = cam.end if cam.end > cam.begin else cam.end + TURN
+        low, high = sorted((self.place_of(cam.begin), self.place_of(end)))
+        half = Fraction(1, 2)
+        return Zone(floor(low + half), floor(high + half), 0, abs(self.pulses_per_turn))
+
+
+def _read(text: TomlText, row: Row, table: Table) -> ShaftSpec:
+    return ShaftSpec(**row, cams=tuple(_read_cams(text, row["path"], table)))
+
+
+def _read_cams(text: TomlText, path: Path, table: Table) -> Iterator[CamSpec]:
+    given = table.get("cam", [])
+    for n, cam in enumerate(given if isinstance(given, list) else [given]):
+        of_cam = (*path, "cam", n)
+        values = read_table(text, of_cam, cam, CAM.keys)
+        if all(name in values for name in ("begin", "end", "target")):
+            check_sense(text, of_cam, CAM, cam)
+            if values["begin"] == values["end"]:
+                text.wrong((*of_cam, "until"), "D007", f"from and until are {values['end']:g} degrees: the cam has no width")
+            yield CamSpec(**values, path=of_cam)
+
+
+def _refers(spec: ShaftSpec, described: ElementSpecs) -> Iterator[Reference]:
+    drives = {axis.name: axis.drive[0] for axis in described.of(AXIS)}
+    machine = drives.get(spec.axis, spec.axis)
+    yield Reference(machine, machine, (*spec.path, "axis"))
+    for cam in spec.cams:
+        yield Reference(machine, cam.target[0], (*cam.path, "to"))
+
+
+def _build(spec: ShaftSpec, site: Site) -> GearedShaft:
+    shaft = GearedShaft(spec, find_axis(spec.axis, site))
+    mechanism = shaft.axis.mechanism
+    shaft.axis.kernel.add_part(shaft, (mechanism.machine, spec.axis, spec.name), spec.name)
+    for n, cam in enumerate(spec.cams, start=1):
+        site.text.unless_wrong(cam.path, partial(_put_cam, shaft, cam, lane_of(spec.name, n), site))
+    return shaft
+
+
+def _put_cam(shaft: GearedShaft, cam: CamSpec, lane: str, site: Site) -> None:
+    moved_by = shaft.axis.mechanism.machine, shaft.spec.name
+    put_switch(shaft.axis.kernel, shaft, moved_by, shaft.zone(cam), cam, lane, site)
+
+
+def _signals(shaft: GearedShaft) -> Mapping[str, SignalOf]:
+    turning = partial(turns_of_axis, shaft.axis)
+    source = (shaft.axis.kernel.source(shaft.spec.name),)
+    return {"angle": SignalOf(source, shaft.angle, turning, shaft.version, "degree")}
+
+
+def _slip(active: ActiveFault, shaft: GearedShaft, begins: bool, now: Nanos) -> str:
+    shaft.slip(begins, now)
+    name = shaft.spec.name
+    return f"the coupling of {name} slips" if begins else f"the coupling of {name} grips, {shaft.behind:g} degrees behind"
+
+
+@permitting("number other than 0")
+def _ratio(value: Any) -> float:
+    found = number()(value)
+    if found == 0.0:
+        raise Misuse(f"{value!r}: permitted are numbers other than 0")
+    return found
+
+
+SHAFT: Element[ShaftSpec, GearedShaft] = Element(
+    name="shaft",
+    spec=ShaftSpec,
+    rows=TableRows(
+        written="[[shaft]]",
+        keys=(
+            Key("name", name_value, "how conditions and faults name it"),
+            Key("axis", NameOf("axis"), "the axis that turns it"),
+            Key("ratio", _ratio, "turns of the shaft per unit of the axis; negative: backwards"),
+            optional(number(), "offset", "degrees of the shaft while the axis is at 0", 0.0),
+        ),
+    ),
+    inner={"cam": CAM},
+    inner_attributes={"cam": "cams"},
+    read=_read,
+    refers=_refers,
+    build=_build,
+    signals=_signals,
+    drawing=lambda shaft: Drawing(DIAL, float(TURN), ("angle",), sensors=tuple(one.zone for one in shaft.spec.cams)),
+    moved=lambda shaft: (shaft.moved,),
+    faults=(
+        FaultKind(
+            "slipping-coupling",
+            Layer.ELEMENT,
+            Occasion.ALWAYS,
+            "A shaft stands while its axis turns; afterwards it goes on from where it stands.",
+            effect=ElementEffect(_slip),
+        ),
+    ),
+)

@@ -1,0 +1,153 @@
+"""Signals by name. Those of a controller are the points of its data sheet."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from typing import TypeVar
+
+from steptwin.errors import Misuse
+from steptwin.machine import SECOND, Nanos
+from steptwin.motioncontroller import MotionController
+from steptwin.nearmiss import NearMiss, alike
+from steptwin.simulation.components.parts import WorldParts
+from steptwin.simulation.kinds.kind import AnyKind
+from steptwin.simulation.kinds.lines import Line
+from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.scheduler.kernel import Source
+from steptwin.simulation.toml.names import Unknown, UnknownSignal
+
+T = TypeVar("T")
+
+MOST_NAMED = 8
+"""Number of points listed in a message."""
+MOST_COMPARED = 40
+"""Characters of an unknown name that are compared with others."""
+
+
+class Idle:
+    """The signal ``idle``: all machines are idle and no transmission is pending. It is tested on one busy machine at a time."""
+
+    continuous = False
+    is_readable = True
+    unit = ""
+    freeze = None
+
+    def __init__(self, plan: WorldParts) -> None:
+        at_rest: dict[str, Callable[[Nanos], bool]] = {
+            **{name: partial(plan.kind_of[name].is_idle, machine) for name, machine in plan.machines.items()},
+            **{name: partial(_is_quiet, line) for name, line in plan.lines.items()},
+        }
+        self._things = [(plan.kernel_of[name].source(name), is_at_rest) for name, is_at_rest in at_rest.items()]
+        self._sources = tuple(source for source, _ in self._things)
+        self._busy: int | None = None
+        """Index of the machine or line that was busy last."""
+
+    def bring(self, now: Nanos) -> tuple[Source, ...]:
+        """As `SignalOf.bring`: a busy machine or line, or all if none is busy."""
+        for n in (*(() if self._busy is None else (self._busy,)), *range(len(self._things))):
+            source, is_at_rest = self._things[n]
+            source.kernel.advance(now)
+            if not is_at_rest(now):
+                self._busy = n
+                return (source,)
+        self._busy = None
+        return self._sources
+
+    def watch(self, name: str) -> None:
+        """Conditions can always use it."""
+
+    def value(self, now: Nanos) -> float:
+        """1 if idle, otherwise 0; after `bring`."""
+        return float(self._busy is None)
+
+    def turns(self, now: Nanos) -> Iterator[Nanos]:
+        yield from ()
+
+    def version(self) -> object:
+        return None
+
+
+def find_signal(plan: WorldParts, name: str) -> SignalOf | Idle:
+    """The signal called ``name``. Raises `Misuse` with the existing names."""
+    if name == "time":
+        return SignalOf((), _seconds, lambda now: (), lambda: name, unit="s", freeze=lambda now: _seconds)
+    if name == "idle":
+        return Idle(plan)
+    owner, _, rest = name.partition(".")
+    of_element = plan.element_signals(owner)
+    if of_element is not None:
+        return _chosen(of_element, rest, name)
+    line = plan.lines.get(owner)
+    if line is not None:
+        return _chosen({"idle": _quiet(line, plan.kernel_of[owner].source(owner))}, rest, name)
+    machine = plan.machines.get(owner)
+    if machine is None:
+        later = plan.unbuilt(owner)
+        if later is not None:
+            raise Unknown(
+                owner, f"no signal {name!r} yet: [[{later}]] {owner!r} is built later; elements cannot depend on each other"
+            )
+        known = [*plan.machines, *plan.element_names, "time", "idle"]
+        near = NearMiss()
+        text = f"no signal {name!r}: nothing is called {owner!r}{near.hint(owner, known)}; there are {', '.join(known)}"
+        raise Unknown(owner, text, near.of(owner, known))
+    return _of_machine(plan.kind_of[owner], machine, plan.kernel_of[owner].source(owner), rest, name)
+
+
+def _seconds(now: Nanos) -> float:
+    return now / SECOND
+
+
+def _of_machine(kind: AnyKind, machine: MotionController, source: Source, rest: str, name: str) -> SignalOf:
+    """The signal of a pin, otherwise of a point of the data sheet."""
+    pin = rest.upper()
+    if pin in machine.pins():
+        unit = kind.pins(machine)[pin].unit
+        read = partial(kind.state.pin, machine, pin)
+        return SignalOf((source,), read, unit=unit, check=partial(kind.refuse_taken, machine, pin))
+    point = kind.point(machine, rest) if rest else None
+    if point is None:
+        raise _unknown([point.path for point in kind.datasheet(machine).points], rest, name, ", and pins")
+    return SignalOf(
+        (source,), point.read, point.turns, point.version, point.point.unit, is_kept=point.is_kept, freeze=point.freeze
+    )
+
+
+def _quiet(line: Line, source: Source) -> SignalOf:
+    """The signal ``idle`` of a line."""
+    return SignalOf((source,), lambda now: float(_is_quiet(line, now)))
+
+
+def _is_quiet(line: Line, now: Nanos) -> bool:
+    """Whether no transmission is pending on a line."""
+    return line.deadline() is None
+
+
+def _chosen(known: Mapping[str, T], rest: str, name: str) -> T:
+    found = known.get(rest.lower())
+    if found is None:
+        raise _unknown(list(known), rest, name)
+    return found
+
+
+def _unknown(known: Sequence[str], rest: str, name: str, others: str = "") -> Misuse:
+    """The error for an unknown name, with the names of the same axis if it names one; otherwise similar ones of an element come
+    first, and numbered ones last."""
+    axis, dot, _ = rest.rpartition(".")
+    of_axis = [path for path in known if dot and path.upper().startswith(f"{axis.upper()}.")]
+    similar = [] if others else alike(rest[:MOST_COMPARED], known)
+    in_order = dict.fromkeys([*similar, *sorted(known, key=_is_numbered)])
+    shown = of_axis or list(in_order)[:MOST_NAMED]
+    more = "" if of_axis or len(shown) == len(known) else f" and more, {len(known)} in all"
+    near = NearMiss()
+    meant = near.of(rest, known)
+    return UnknownSignal(
+        name,
+        f"no signal {name!r}{near.hint(rest, known)}; there are {', '.join(shown)}{more}{'' if of_axis else others}",
+        None if meant is None else f"{name.removesuffix(rest)}{meant}",
+    )
+
+
+def _is_numbered(name: str) -> bool:
+    return name[-1].isdigit()

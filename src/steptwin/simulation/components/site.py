@@ -1,0 +1,119 @@
+"""The context in which elements are built: machines and kernels by name, inputs and their drivers, shared contacts."""
+
+from __future__ import annotations
+
+from steptwin.errors import Misuse
+from steptwin.motioncontroller import MotionController
+from steptwin.simulation.components.buildmemo import BuildMemo
+from steptwin.simulation.components.parts import WorldParts
+from steptwin.simulation.kinds.kind import AnyKind
+from steptwin.simulation.logic.contacts import Circuit
+from steptwin.simulation.scheduler.chance import Chance
+from steptwin.simulation.scheduler.kernel import Board, Kernel
+from steptwin.simulation.scheduler.wires import PinName, Wire
+from steptwin.simulation.toml.names import Unknown
+from steptwin.simulation.toml.reader import TomlText
+from steptwin.simulation.toml.tomlplaces import Path
+from steptwin.simulation.toml.values import DIGITAL_INPUT, OUTPUT, Terminal
+
+
+class Site:
+    """The context for building an element. Every method raises `Misuse` for a name that does not exist or does not fit."""
+
+    def __init__(self, text: TomlText, seed: int, memo: BuildMemo, parts: WorldParts) -> None:
+        """``text``: the description; ``seed``: that of the world."""
+        self.text = text
+        self.memo = memo
+        self.parts = parts
+        self._seed = seed
+        self._joins: dict[PinName, str | None] = {}
+        """``join`` of each input with contacts."""
+
+    # ------------------------------------------------------------------ machines and kernels
+
+    def machine(self, name: str) -> MotionController:
+        """The machine called ``name``, which is not a line."""
+        found = self.parts.machines.get(name)
+        if found is None and name not in self.parts.kernel_of:
+            raise Unknown(name, f"nothing is called {name!r}")
+        if found is None:
+            what = "an element" if name in self.parts.terminals else "a line"
+            raise Misuse(f"{name!r} is {what}; machines are {', '.join(self.parts.machines)}")
+        return found
+
+    def kind(self, name: str) -> AnyKind:
+        """The kind of a machine."""
+        self.machine(name)
+        return self.parts.kind_of[name]
+
+    def kernel(self, name: str) -> Kernel:
+        """The kernel of a machine, a line or an element with terminals."""
+        found = self.parts.kernel_of.get(name)
+        if found is None:
+            raise Unknown(name, f"nothing is called {name!r}")
+        return found
+
+    # ------------------------------------------------------------------ terminals
+
+    def board(self, name: str) -> Board:
+        """The terminals of the element ``name``."""
+        return self.kernel(name).boards[name]
+
+    def join(self, wire: Wire, path: Path) -> None:
+        """Join an output to an input that nothing else drives. ``path``: the table of the wire, or the key of its source."""
+        kernel = self.kernel(wire.source.machine)
+        if self.memo.is_checked:
+            self.parts.driven[wire.target] = path
+        else:
+            self.terminal(wire.source, OUTPUT)
+            self.input(wire.target, path)
+        kernel.connect(wire)
+
+    def terminal(self, name: Terminal, kind: str) -> PinName:
+        """A terminal of a machine or an element; ``kind`` is one of those of `steptwin.simulation.toml.values`."""
+        pin = PinName(*name)
+        if self.memo.is_checked:
+            return pin
+        of_element = self.parts.terminals.get(pin.machine)
+        if of_element is not None:
+            of_element.check(pin, kind)
+            return pin
+        machine, its = self.machine(pin.machine), self.kind(pin.machine)
+        its.terminals.check(pin, kind)
+        its.refuse_taken(machine, pin.pin)
+        return pin
+
+    def input(self, name: Terminal, path: Path, kind: str = DIGITAL_INPUT) -> PinName:
+        """An input, reserved for one driver."""
+        target = PinName(*name)
+        if target in self.parts.driven and not self.memo.is_checked:
+            raise Misuse(f"{target} is driven already, from {self.text.where(self.parts.driven[target])}")
+        self.terminal(name, kind)
+        self.parts.driven[target] = path
+        return target
+
+    def circuit(self, kernel: Kernel, name: Terminal, path: Path, join: str | None) -> Circuit:
+        """The circuit of a contact: an input of its own, or one shared with contacts that have the same ``join``."""
+        target = PinName(*name)
+        there = self.parts.circuits.get(target)
+        if there is None:
+            circuit = Circuit(kernel, self.input(name, path), in_series=join == "series")
+            self.parts.circuits[target], self._joins[target] = circuit, join
+            return circuit
+        if join is None or join != self._joins[target]:
+            where = self.text.where(self.parts.driven[target])
+            raise Misuse(
+                f"{target} is driven already, from {where}: contacts that share an input all have join = 'parallel', "
+                "or all join = 'series'"
+            )
+        return there
+
+    def bounce_of(self, circuit: Circuit) -> Chance:
+        """The random stream for the bounce of the next contact in a circuit."""
+        number = f" {len(circuit.contacts) + 1}" if circuit.contacts else ""
+        return Chance(self._seed, f"bounce {circuit.target}{number}")
+
+    def close_circuits(self) -> None:
+        """Drive all inputs with contacts to their initial levels."""
+        for circuit in self.parts.circuits.values():
+            circuit.close()

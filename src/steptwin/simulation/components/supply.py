@@ -1,0 +1,254 @@
+"""``[[supply]]``: a power supply of controllers: its voltage rises and falls, and controllers are on while it is sufficient."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from math import ceil
+from typing import Any, ClassVar, NamedTuple
+
+from steptwin.errors import Misuse
+from steptwin.machine import MILLISECOND, Nanos
+from steptwin.simulation.components.elementspec import ElementSpecs
+from steptwin.simulation.components.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
+from steptwin.simulation.components.rigging import Rigging
+from steptwin.simulation.components.site import Site
+from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
+from steptwin.simulation.faults.effects import ElementEffect
+from steptwin.simulation.faults.machine import FaultyMachine
+from steptwin.simulation.faults.table import number as parameter
+from steptwin.simulation.kinds.kind import Terminals
+from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.scheduler.kernel import Board
+from steptwin.simulation.toml.reader import Key, TomlText, optional
+from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, flag, name_value, number, permitting, time_value
+
+ON, GOOD = "ON", "GOOD"
+USUAL_SHARE = 0.75
+"""Of the voltage, from which on controllers are on by default."""
+MOST_FED = 1000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SupplySpec(BoardSpec):
+    """Voltages in V."""
+
+    feeds: tuple[str, ...]
+    on: Terminal | None
+    switched: bool
+    volts: float
+    enough: float | None
+    delay: Nanos
+    rise: Nanos
+    hold_up: Nanos
+    fall: Nanos
+
+    @property
+    def is_switched(self) -> bool:
+        return self.switched or self.on is not None
+
+    @property
+    def threshold(self) -> float:
+        return USUAL_SHARE * self.volts if self.enough is None else self.enough
+
+    @property
+    def terminals(self) -> Terminals:
+        return Terminals(digital_inputs=(ON,) if self.is_switched else (), outputs=(GOOD,))
+
+    @property
+    def joints(self) -> Iterable[Joint]:
+        if self.on is not None:
+            yield Joint("on", ON, self.on)
+
+    def others(self, described: ElementSpecs) -> Iterator[tuple[str, str]]:
+        yield from (("feeds", name) for name in self.feeds)
+
+    def check(self, text: TomlText) -> None:
+        if self.enough is not None and self.enough > self.volts:
+            message = f"enough = {self.enough:g} V is more than volts = {self.volts:g}"
+            text.wrong((*self.path, "enough"), "D007", message)
+
+
+class Ramp(NamedTuple):
+    """A voltage from ``begin`` on, ``volts`` then, that goes to ``target`` at ``rate`` V/ns (0: at once)."""
+
+    begin: Nanos
+    volts: float
+    target: float
+    rate: float
+
+    @property
+    def end(self) -> Nanos:
+        return self.begin + (ceil(abs(self.target - self.volts) / self.rate) if self.rate else 0)
+
+    def at(self, now: Nanos) -> float:
+        if now >= self.end:
+            return self.target
+        way = self.rate * (now - self.begin)
+        return self.volts + way if self.target > self.volts else self.volts - way
+
+    def crosses(self, level: float, after: Nanos) -> Nanos | None:
+        """First moment after one at which it is on the other side of a level: at or above it, or below."""
+        high = self.at(after) >= level
+        if (self.target >= level) is high:
+            return None
+        low, found = after, max(self.end, after + 1)
+        while found - low > 1:
+            middle = (low + found) // 2
+            low, found = (middle, found) if (self.at(middle) >= level) is high else (low, middle)
+        return found
+
+
+class Supply(BoardPart):
+    """GOOD is on, and so are the controllers, while its voltage is sufficient."""
+
+    FIXED: ClassVar[tuple[str, ...]] = ("_fed", "_spec")
+    __slots__ = (*FIXED, "_is_on", "_is_wanted", "_ramp", "_switch_due", "is_good", "sag")
+
+    def __init__(self, board: Board, spec: SupplySpec, fed: tuple[FaultyMachine, ...]) -> None:
+        super().__init__(board)
+        self._spec = spec
+        self._fed = fed
+        self._ramp = Ramp(board.kernel.now, 0.0, 0.0, 0.0)
+        self._is_wanted = False
+        self._is_on = False
+        self._switch_due: Nanos | None = None
+        self.is_good = False
+        self.sag: float | None = None
+        """Fault: the voltage that it has at most."""
+        for machine in fed:
+            machine.supply(False, board.kernel.now)
+
+    def volts(self, now: Nanos) -> float:
+        return self._ramp.at(now)
+
+    def turns(self, now: Nanos) -> Iterator[Nanos]:
+        if self._ramp.end > now:
+            yield self._ramp.end
+
+    def version(self) -> object:
+        return self._ramp
+
+    @property
+    def full(self) -> float:
+        return self._spec.volts
+
+    def update(self, now: Nanos) -> None:
+        self._switch(now)  # before the input changes: an input at a moment comes after what is due then
+        is_wanted = not self._spec.is_switched or self.board.is_on(ON)
+        if is_wanted is not self._is_wanted:
+            self._is_wanted = is_wanted
+            wait = self._spec.delay if is_wanted else self._spec.hold_up
+            self._switch_due = None if is_wanted is self._is_on else now + wait
+            self._switch(now)
+        self._aim(now)
+        is_good = self.volts(now) >= self._spec.threshold
+        if is_good is not self.is_good:
+            self.is_good = is_good
+            self._feed(now)
+        self.board.put(GOOD, float(is_good))
+
+    def _switch(self, now: Nanos) -> None:
+        if self._switch_due is not None and self._switch_due <= now:
+            self._switch_due = None
+            self._is_on = self._is_wanted
+
+    def _aim(self, now: Nanos) -> None:
+        """Let the voltage go to where it has to be."""
+        spec = self._spec
+        target = (spec.volts if self.sag is None else min(spec.volts, self.sag)) if self._is_on else 0.0
+        if target == self._ramp.target:
+            return
+        volts = self.volts(now)
+        takes = spec.rise if target > volts else spec.fall
+        self._ramp = Ramp(now, volts, target, spec.volts / takes if takes else 0.0)
+
+    def _feed(self, now: Nanos) -> None:
+        for machine in self._fed:
+            machine.supply(self.is_good, now)
+        kernel, name = self.board.kernel, self.board.name
+        names = ", ".join(self._spec.feeds)
+        text = f"{name} is {'on' if self.is_good else 'off'}, with {names}"
+        facts = ("element", name), ("on", self.is_good), ("fed", names)
+        kernel.report(kernel.owner(name), "event", "supply", text, *facts)
+
+    def deadline(self) -> Nanos | None:
+        now = self.board.kernel.now
+        dues = (self._switch_due, self._ramp.crosses(self._spec.threshold, now), next(self.turns(now), None))
+        return min((due for due in dues if due is not None), default=None)
+
+
+def _sag(active: ActiveFault, supply: Supply, begins: bool, now: Nanos) -> str:
+    supply.sag = active.fault.number("volts") if begins else None
+    return f"{supply.board.name} has {'all of its voltage again' if supply.sag is None else f'{supply.sag:g} V at most'}"
+
+
+def _check_order(spec: SupplySpec, site: Site) -> None:
+    """Raises `Misuse` for supplies that wait for one another."""
+    waits_for = {one.name: one.on[0] for one in site.parts.described.of(SUPPLY) if one.on is not None and one.on[1] == GOOD}
+    way = [spec.name]
+    while (before := waits_for.get(way[-1])) is not None and before not in way[1:]:
+        way.append(before)
+        if before == spec.name:
+            raise Misuse(f"on: {' waits for '.join(way)}, so that it never comes on")
+
+
+def _make(spec: SupplySpec, site: Site) -> Supply:
+    site.memo.once((*spec.path, "order"), lambda: _check_order(spec, site))
+    rigging = Rigging(site.parts)
+    site.parts.faults.expect_supplies()
+    fed = []
+    for name in spec.feeds:
+        site.machine(name)
+        other = site.parts.supplied.get(name)
+        if other is not None:
+            raise Misuse(f"feeds: {name!r} has the supply {other!r} already")
+        site.parts.supplied[name] = spec.name
+        fed.append(rigging.rig(name))
+    return Supply(site.board(spec.name), spec, tuple(fed))
+
+
+def _signals(supply: Supply) -> Mapping[str, SignalOf]:
+    of = SignalOf((supply.board.source,), supply.volts, supply.turns, supply.version, "V", (0.0, supply.full))
+    return {"volts": of}
+
+
+@permitting("name, or list of names")
+def _names(value: Any) -> tuple[str, ...]:
+    names = value if isinstance(value, list) else [value]
+    if not 1 <= len(names) <= MOST_FED:
+        raise Misuse(f"{len(names)} controllers: permitted are 1 to {MOST_FED}")
+    found = tuple(name_value(name) for name in names)
+    if len(set(found)) < len(found):
+        raise Misuse(f"{value!r}: a controller is named twice")
+    return found
+
+
+SUPPLY = with_terminals(
+    "supply",
+    SupplySpec,
+    (
+        Key("feeds", _names, "the controllers that it feeds: a name, or a list of them"),
+        optional(OUTPUT_PIN, "on", "output joined to ON, such as the output good of another supply"),
+        optional(flag, "switched", "whether wires or contacts switch ON; without it and on: it is on from the beginning", False),
+        optional(number(0.0, above=True), "volts", "V of its output", 24.0),
+        optional(number(0.0, above=True), "enough", "V from which on its controllers are on; default three quarters of volts"),
+        optional(time_value, "delay", "from ON until the voltage rises", 0),
+        optional(time_value, "rise", "from 0 to all of the voltage", 50 * MILLISECOND),
+        optional(time_value, "hold_up", "after ON until the voltage falls", 20 * MILLISECOND),
+        optional(time_value, "fall", "from all of the voltage to 0", 100 * MILLISECOND),
+    ),
+    make=_make,
+    signals=_signals,
+    faults=(
+        *STUCK,
+        FaultKind(
+            "brown-out",
+            Layer.ELEMENT,
+            Occasion.ALWAYS,
+            "A power supply has less voltage; its controllers are off while that is not enough.",
+            own=(parameter("volts", "V that it has at most.", 0.0, 1000.0, default=12.0),),
+            effect=ElementEffect(_sag),
+        ),
+    ),
+)

@@ -1,0 +1,95 @@
+"""``[[timer]]``: an output that follows an input later, or for a time: TON, TOF and TP of IEC 61131-3."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+from steptwin.machine import Nanos
+from steptwin.simulation.components.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
+from steptwin.simulation.kinds.kind import Terminals
+from steptwin.simulation.scheduler.kernel import Board
+from steptwin.simulation.toml.reader import Key, optional
+from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, positive_time, word
+
+IN, OUT = "IN", "OUT"
+ON_DELAY, OFF_DELAY, PULSE = "on-delay", "off-delay", "pulse"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TimerSpec(BoardSpec):
+    kind: str
+    input: Terminal | None
+    time: Nanos
+
+    @property
+    def terminals(self) -> Terminals:
+        return Terminals(digital_inputs=(IN,), outputs=(OUT,))
+
+    @property
+    def joints(self) -> Iterable[Joint]:
+        if self.input is not None:
+            yield Joint("input", IN, self.input)
+
+
+class Timer(BoardPart):
+    """On-delay (TON): on once the input has been on for ``time``. Off-delay (TOF): off once it has been off for ``time``.
+    Pulse (TP): on for ``time`` from an edge of the input from 0 to 1; edges meanwhile do nothing."""
+
+    FIXED: ClassVar[tuple[str, ...]] = ("_time", "kind")
+    __slots__ = (*FIXED, "_due", "_was_on")
+
+    def __init__(self, board: Board, kind: str, time: Nanos) -> None:
+        super().__init__(board)
+        self.kind = kind
+        self._time = time
+        self._was_on = False
+        self._due: Nanos | None = None
+        """When the time has passed, while it runs."""
+
+    @property
+    def delays(self) -> tuple[Nanos, ...]:
+        return (self._time,)
+
+    def update(self, now: Nanos) -> None:
+        is_on = self.board.is_on(IN)
+        if self._due is not None and self._due <= now:
+            self._due = None
+        if is_on is not self._was_on:
+            self._was_on = is_on
+            self._turn(is_on, now)
+        runs = self._due is not None
+        if self.kind == ON_DELAY:
+            level = is_on and not runs
+        elif self.kind == OFF_DELAY:
+            level = is_on or runs
+        else:
+            level = runs
+        self.board.put(OUT, float(level))
+
+    def _turn(self, is_on: bool, now: Nanos) -> None:
+        if self.kind == PULSE:
+            if is_on and self._due is None:
+                self._due = now + self._time
+        elif is_on is (self.kind == ON_DELAY):
+            self._due = now + self._time
+        else:
+            self._due = None
+
+    def deadline(self) -> Nanos | None:
+        return self._due
+
+
+_TIMER = with_terminals(
+    "timer",
+    TimerSpec,
+    (
+        Key("kind", word(ON_DELAY, OFF_DELAY, PULSE), "on-delay (TON), off-delay (TOF) or pulse (TP)"),
+        Key("time", positive_time, "such as '200 ms'"),
+        optional(OUTPUT_PIN, "input", "output joined to IN; without it wires and contacts may be"),
+    ),
+    faults=STUCK,
+    make=lambda spec, site: Timer(site.board(spec.name), spec.kind, spec.time),
+)
+TIMER = replace(_TIMER, function=lambda timer: timer.kind)

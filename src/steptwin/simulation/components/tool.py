@@ -1,0 +1,234 @@
+"""``[[tool]]``: what two axes move together in a plane, by sums and differences of their positions, as in a CoreXY drive."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, ClassVar
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis
+from steptwin.simulation.components.coordinate import PLACES, Coordinate, Pulled, pulled_to
+from steptwin.simulation.components.element import Element
+from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
+from steptwin.simulation.components.site import Site
+from steptwin.simulation.components.switch import SWITCH, SwitchSpec, put_switch, read_switches, zone_of
+from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
+from steptwin.simulation.faults.effects import ElementEffect
+from steptwin.simulation.faults.table import Parameter, ParameterForm
+from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.mechanics.drawing import PLANE, Drawing, rail
+from steptwin.simulation.mechanics.lanes import SLIPS, MovedLane
+from steptwin.simulation.mechanics.scale import exact_fraction
+from steptwin.simulation.toml.reader import Key, Row, Table, TomlText, optional
+from steptwin.simulation.toml.sense import TableRows
+from steptwin.simulation.toml.values import NameOf, name_value, number, pair, permitting
+from steptwin.state import Plain, Stateful
+
+COORDINATES = ("x", "y")
+BELTS = ("axis", "other")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ToolSpec(NamedSpec):
+    """``x`` and ``y``: the shares of ``axis`` and ``other`` in each coordinate."""
+
+    axis: str
+    other: str
+    x: tuple[float, float]
+    y: tuple[float, float]
+    x_travel: tuple[float, float] | None
+    y_travel: tuple[float, float] | None
+    x_switches: tuple[SwitchSpec, ...]
+    y_switches: tuple[SwitchSpec, ...]
+
+    @property
+    def switches(self) -> Iterator[tuple[str, int, SwitchSpec]]:
+        """The coordinate of each, its number there, from 1, and itself."""
+        for name, those in zip(COORDINATES, (self.x_switches, self.y_switches), strict=True):
+            yield from ((name, n, one) for n, one in enumerate(those, start=1))
+
+
+class Tool(Stateful):
+    """Is where its axes have it, also between their pulses. The belt of one that slips stands while its axis turns."""
+
+    FIXED: ClassVar[tuple[str, ...]] = ("axes", "coordinates", "spec")
+    __slots__ = (*FIXED, "_pulled")
+
+    def __init__(self, spec: ToolSpec, axes: tuple[BuiltAxis, BuiltAxis]) -> None:
+        self.spec = spec
+        self.axes = axes
+        self._pulled = [Pulled(), Pulled()]
+        self.coordinates = {
+            name: Coordinate(axes, shares, self._pulled) for name, shares in zip(COORDINATES, (spec.x, spec.y), strict=True)
+        }
+
+    # ------------------------------------------------------------------ part of a kernel
+
+    def update(self, now: Nanos) -> None:
+        """Its motion is that of its axes: the kernel looks again at what depends on it."""
+
+    def deadline(self) -> Nanos | None:
+        """None: its motion is that of its axes."""
+        return None
+
+    def slip(self, belt: str, slips: bool, now: Nanos) -> float:
+        """Let the belt of an axis slip, or grip again where it is then; gives by how much it is behind."""
+        n = BELTS.index(belt)
+        axis, its = self.axes[n], self._pulled[n]
+        if slips:
+            self._pulled[n] = Pulled(pulled_to(axis, its, now))
+        elif its.held is not None:
+            self._pulled[n] = Pulled(None, pulled_to(axis, Pulled(), now) - its.held)
+        kernel = axis.kernel
+        kernel.report(self.axes[0].mechanism.machine, "edge", f"{self.spec.name}.{belt}.{SLIPS}", float(slips))
+        kernel.mark(self.spec.name)
+        return self._pulled[n].behind
+
+    def copy_state(self) -> Plain:
+        return tuple(self._pulled)
+
+    def set_state(self, plain: Plain) -> None:
+        """As `Stateful.set_state`. Its coordinates keep the same list."""
+        self._pulled[:] = [Pulled(*its) for its in plain]
+
+    # ------------------------------------------------------------------ how it is shown
+
+    @property
+    def unit(self) -> str:
+        return self.axes[0].scale.unit
+
+    @property
+    def drawing(self) -> Drawing:
+        spec = self.spec
+        x = rail(spec.x_travel, tuple(one.zone for one in spec.x_switches))
+        y = rail(spec.y_travel, tuple(one.zone for one in spec.y_switches))
+        return Drawing(PLANE, x.length, COORDINATES, sensors=x.sensors, low=x.low, across=y.length, across_low=y.low)
+
+    @property
+    def moved(self) -> Iterator[tuple[str, MovedLane]]:
+        other = self.axes[1].mechanism
+        for name, shares in zip(COORDINATES, (self.spec.x, self.spec.y), strict=True):
+            factors = [
+                share * axis.mechanism.build.sign / float(axis.scale.pulses_per_unit)
+                for share, axis in zip(shares, self.axes, strict=True)
+            ]
+            yield (
+                self.axes[0].spec.name,
+                MovedLane(
+                    self.spec.name,
+                    name,
+                    self.unit,
+                    factors[0],
+                    coupling=f"{self.spec.name}.{BELTS[0]}",
+                    other=(other.machine, str(other.number)),
+                    other_per_pulse=factors[1],
+                    other_coupling=f"{self.spec.name}.{BELTS[1]}",
+                ),
+            )
+
+
+# ---------------------------------------------------------------------- the element
+
+
+@permitting("[share of axis, share of other], not both 0")
+def _shares(value: Any) -> tuple[float, float]:
+    if not isinstance(value, list) or len(value) != 2:
+        raise Misuse(f"{value!r}: expected [share of axis, share of other]")
+    one, other = (number()(share) for share in value)
+    if one == other == 0.0:
+        raise Misuse(f"{value!r}: one of the shares is not 0")
+    return one, other
+
+
+def _read(text: TomlText, row: Row, table: Table) -> ToolSpec:
+    path = row["path"]
+    x, y = (tuple(read_switches(text, path, table, f"{name}_switch")) for name in COORDINATES)
+    spec = ToolSpec(**row, x_switches=x, y_switches=y)
+    if spec.axis == spec.other:
+        text.wrong((*path, "other"), "D007", f"other = {spec.other!r} is its axis already: a tool has two")
+    if spec.x[0] * spec.y[1] == spec.x[1] * spec.y[0]:
+        text.wrong((*path, "y"), "D007", f"y = {list(spec.y)} is a multiple of x = {list(spec.x)}: it moves along one line")
+    return spec
+
+
+def _refers(spec: ToolSpec, described: ElementSpecs) -> Iterator[Reference]:
+    drives = {axis.name: axis.drive[0] for axis in described.of(AXIS)}
+    machine, other = (drives.get(name, name) for name in (spec.axis, spec.other))
+    yield Reference(machine, machine, (*spec.path, "axis"))
+    yield Reference(machine, other, (*spec.path, "other"))
+    for _, _, switch in spec.switches:
+        yield Reference(machine, switch.target[0], (*switch.path, "to"))
+
+
+def _build(spec: ToolSpec, site: Site) -> Tool:
+    one, other = find_axis(spec.axis, site), find_axis(spec.other, site)
+    if one.scale.unit != other.scale.unit:
+        raise Misuse(f"{spec.axis!r} is in {one.scale.unit} and {spec.other!r} in {other.scale.unit}: a tool has one unit")
+    tool = Tool(spec, (one, other))
+    one.kernel.add_part(tool, (*_machines(tool), spec.axis, spec.other, spec.name), spec.name)
+    for name, n, switch in spec.switches:
+        lane = f"{spec.name}.{name}_switch{n}"
+        site.text.unless_wrong(switch.path, partial(_put_switch, tool, name, switch, lane, site))
+    return tool
+
+
+def _machines(tool: Tool) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(axis.mechanism.machine for axis in tool.axes))
+
+
+def _put_switch(tool: Tool, name: str, spec: SwitchSpec, lane: str, site: Site) -> None:
+    def places(units: float) -> int:
+        return round(exact_fraction(units) * PLACES)
+
+    zone = zone_of(spec, places, None if spec.period is None else places(spec.period))
+    put_switch(tool.axes[0].kernel, tool.coordinates[name], (*_machines(tool), tool.spec.name), zone, spec, lane, site)
+
+
+def _signals(tool: Tool) -> Mapping[str, SignalOf]:
+    source = (tool.axes[0].kernel.source(tool.spec.name),)
+    return {name: SignalOf(source, its.value, its.turns, its.version, tool.unit) for name, its in tool.coordinates.items()}
+
+
+def _slip(active: ActiveFault, tool: Tool, begins: bool, now: Nanos) -> str:
+    belt, name = str(active.fault.get("belt")), tool.spec.name
+    behind = tool.slip(belt, begins, now)
+    return f"the belt of {belt} of {name} {'slips' if begins else f'grips, {behind:g} {tool.unit} behind'}"
+
+
+TOOL: Element[ToolSpec, Tool] = Element(
+    name="tool",
+    spec=ToolSpec,
+    rows=TableRows(
+        written="[[tool]]",
+        keys=(
+            Key("name", name_value, "how conditions and faults name it"),
+            Key("axis", NameOf("axis"), "an axis that moves it"),
+            Key("other", NameOf("axis"), "the other axis that moves it, in the same unit"),
+            optional(_shares, "x", "units of its x per unit of axis, and of other; default that of CoreXY", (0.5, 0.5)),
+            optional(_shares, "y", "units of its y per unit of axis, and of other; default that of CoreXY", (0.5, -0.5)),
+            optional(pair, "x_travel", "where its x may be, in the unit of the axes: it is drawn so"),
+            optional(pair, "y_travel", "where its y may be, in the unit of the axes: it is drawn so"),
+        ),
+    ),
+    inner={f"{name}_switch": replace(SWITCH, written=f"[[tool.{name}_switch]]") for name in COORDINATES},
+    inner_attributes={f"{name}_switch": f"{name}_switches" for name in COORDINATES},
+    read=_read,
+    refers=_refers,
+    build=_build,
+    signals=_signals,
+    drawing=lambda tool: tool.drawing,
+    moved=lambda tool: tool.moved,
+    faults=(
+        FaultKind(
+            "slipping-belt",
+            Layer.ELEMENT,
+            Occasion.ALWAYS,
+            "A belt of a tool stands while its axis turns; afterwards it goes on from where it stands.",
+            own=(Parameter("belt", ParameterForm.WORD, "Whose belt.", words=BELTS, default=BELTS[0]),),
+            effect=ElementEffect(_slip),
+        ),
+    ),
+)

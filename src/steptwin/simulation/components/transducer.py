@@ -1,0 +1,121 @@
+"""``[[transducer]]``: an analog sensor, whose voltage at an analog input follows a signal of the world by a table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import ClassVar
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.simulation.components.element import Element
+from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
+from steptwin.simulation.components.quantity import check_owners, owner_of
+from steptwin.simulation.components.signals import find_signal
+from steptwin.simulation.components.site import Site
+from steptwin.simulation.components.voltage import BROKEN_WIRE, DRIFT
+from steptwin.simulation.logic.condition import Signal
+from steptwin.simulation.logic.curve import Stepped
+from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.logic.sources import HIGHEST_V, LOWEST_V
+from steptwin.simulation.scheduler.kernel import Kernel, Source
+from steptwin.simulation.scheduler.wires import PinName
+from steptwin.simulation.toml.reader import Key, Row, Table, TomlText, optional
+from steptwin.simulation.toml.sense import TableRows
+from steptwin.simulation.toml.values import ANALOG_INPUT, PinOf, Terminal, name_value, points, text_value
+from steptwin.simulation.toml.values import number as number_value
+from steptwin.state import Stateful
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TransducerSpec(NamedSpec):
+    of: str
+    target: Terminal
+    points: tuple[tuple[float, float], ...]
+    resolution: float
+
+
+class Transducer(Stateful):
+    """Drives an analog input. It is due whenever its signal comes to a value at which the voltage is another one."""
+
+    FIXED: ClassVar[tuple[str, ...]] = ("_kernel", "_spec")
+    __slots__ = (*FIXED, "_level", "is_broken", "offset")
+
+    def __init__(self, kernel: Kernel, spec: TransducerSpec, signal: Signal) -> None:
+        self._kernel = kernel
+        self._spec = spec
+        self._level = Stepped(signal, spec.points, spec.resolution)
+        self.is_broken = False
+        """Fault: its wire is broken."""
+        self.offset = 0.0
+        """Fault: volts by which it reads too high."""
+
+    @property
+    def name(self) -> str:
+        return self._spec.name
+
+    @property
+    def source(self) -> Source:
+        return self._kernel.source(self.name)
+
+    def volts(self, now: Nanos) -> float:
+        """The voltage that it gives."""
+        if self.is_broken:
+            return LOWEST_V
+        return min(max(self._level.value + self.offset, LOWEST_V), HIGHEST_V)
+
+    def update(self, now: Nanos) -> None:
+        self._level.update(now)
+        self._kernel.drive(PinName(*self._spec.target), self.volts(now))
+
+    def deadline(self) -> Nanos | None:
+        return self._level.due
+
+
+def _read(text: TomlText, row: Row, table: Table) -> TransducerSpec:
+    spec = TransducerSpec(**row)
+    check_owners(text, (*spec.path, "of"), spec.name, (owner_of(spec.of),))
+    volts = [volts for _, volts in spec.points]
+    if not all(LOWEST_V <= one <= HIGHEST_V for one in volts):
+        there = f"{min(volts):g} to {max(volts):g} V"
+        message = f"{there}: an analog input takes {LOWEST_V:g} to {HIGHEST_V:g} V"
+        text.wrong((*spec.path, "points"), "D007", message)
+    return spec
+
+
+def _refers(spec: TransducerSpec, described: ElementSpecs) -> Iterator[Reference]:
+    yield Reference(spec.target[0], spec.target[0], (*spec.path, "to"))
+    yield Reference(spec.target[0], owner_of(spec.of), (*spec.path, "of"))
+
+
+def _build(spec: TransducerSpec, site: Site) -> Transducer:
+    kernel = site.kernel(spec.target[0])
+    site.input(spec.target, (*spec.path, "to"), ANALOG_INPUT)
+    found = find_signal(site.parts, spec.of)
+    found.watch(spec.of)
+    if all(source.kernel is not kernel for source in found.bring(kernel.now)):
+        raise Misuse(f"of = {spec.of!r} is no quantity of what {spec.target[0]!r} is joined to")
+    transducer = Transducer(kernel, spec, found)
+    kernel.add_part(transducer, name=spec.name)
+    return transducer
+
+
+TRANSDUCER: Element[TransducerSpec, Transducer] = Element(
+    name="transducer",
+    spec=TransducerSpec,
+    rows=TableRows(
+        written="[[transducer]]",
+        keys=(
+            Key("name", name_value, "how conditions and faults name it"),
+            Key("of", text_value, "the signal that it measures, such as x.position, clamp.position, cup.pressure"),
+            Key("to", PinOf(ANALOG_INPUT), "the analog input: MACHINE.AIN1 or AIN2", attribute="target"),
+            Key("points", points, "[[value, volts], ...] in the unit of the signal, linear between"),
+            optional(number_value(0.0001, 10.0), "resolution", "V: steps in which the voltage changes", 0.01),
+        ),
+    ),
+    read=_read,
+    refers=_refers,
+    build=_build,
+    signals=lambda built: {"volts": SignalOf((built.source,), built.volts, unit="V", bounds=(LOWEST_V, HIGHEST_V))},
+    faults=(BROKEN_WIRE, DRIFT),
+)

@@ -1,0 +1,159 @@
+"""``[[vacuum]]``: a suction cup with its ejector and its vacuum switch, which picks workpieces up and puts them down."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from math import ceil
+from typing import ClassVar
+
+from steptwin.machine import MILLISECOND, Nanos
+from steptwin.motion.exponential import decay, logarithm
+from steptwin.simulation.components.carrier import CARRIER_KEYS, HELD, PICK, PLACE, Carrier, CarrierSpec, carrier_signals
+from steptwin.simulation.components.logic import STUCK, Joint, with_terminals
+from steptwin.simulation.components.site import Site
+from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
+from steptwin.simulation.faults.effects import ElementEffect
+from steptwin.simulation.kinds.kind import Terminals
+from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.scheduler.kernel import Board
+from steptwin.simulation.toml.reader import TomlText, optional
+from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, number, positive_time
+
+EJECTOR = "EJECTOR"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VacuumSpec(CarrierSpec):
+    ejector: Terminal | None
+    vacuum: float
+    threshold: float
+    build_up: Nanos
+    release: Nanos
+
+    @property
+    def terminals(self) -> Terminals:
+        return Terminals(digital_inputs=(EJECTOR, PICK, PLACE), outputs=(HELD,))
+
+    @property
+    def own_joint(self) -> Joint | None:
+        return None if self.ejector is None else Joint("ejector", EJECTOR, self.ejector)
+
+    def check(self, text: TomlText) -> None:
+        if self.threshold >= self.vacuum:
+            text.wrong(
+                (*self.path, "threshold"),
+                "D007",
+                f"threshold = {self.threshold:g} kPa is not below vacuum = {self.vacuum:g} kPa: nothing would ever be held",
+            )
+
+
+class Vacuum(Carrier):
+    """The pressure in the cup, below that of the air, goes exponentially to ``vacuum`` while the ejector is on and a workpiece
+    closes the cup, else to 0. From 0 it takes ``build_up`` to the threshold, from ``vacuum`` it takes ``release``. HELD is on
+    from the threshold on.
+    """
+
+    FIXED: ClassVar[tuple[str, ...]] = ("spec",)
+    __slots__ = (*FIXED, "_begin", "_due", "_first", "_goal", "_is_held", "leaks")
+
+    def __init__(self, board: Board, spec: VacuumSpec, site: Site) -> None:
+        super().__init__(board, spec, site)
+        self.spec = spec
+        self.leaks = False
+        self._is_held = False
+        self._begin: Nanos = board.kernel.now
+        self._first = 0.0
+        """Pressure at `_begin`, kPa below that of the air."""
+        self._goal = 0.0
+        self._due: Nanos | None = None
+        """When the pressure comes to the threshold."""
+
+    # ------------------------------------------------------------------ pressure
+
+    def pressure(self, now: Nanos) -> float:
+        """kPa below that of the air."""
+        time = self._time(self._goal > 0.0)
+        return self._goal + (self._first - self._goal) * decay((now - self._begin) / time)
+
+    @property
+    def version(self) -> object:
+        """Another value whenever the pressure goes another way."""
+        return self._begin, self._goal
+
+    def _time(self, is_evacuating: bool) -> float:
+        """The time constant, ns."""
+        spec = self.spec
+        if is_evacuating:
+            return spec.build_up / logarithm(spec.vacuum / (spec.vacuum - spec.threshold))
+        return spec.release / logarithm(spec.vacuum / spec.threshold)
+
+    def _go(self, goal: float, now: Nanos) -> None:
+        """Let the pressure go to another value."""
+        self._first, self._begin, self._goal = self.pressure(now), now, goal
+        threshold = self.spec.threshold
+        self._due = None
+        if (goal > threshold) is not self._is_held:
+            ratio = (self._first - goal) / (threshold - goal)
+            self._due = now if ratio <= 1.0 else now + ceil(logarithm(ratio) * self._time(goal > 0.0))
+
+    # ------------------------------------------------------------------ time
+
+    def update(self, now: Nanos) -> None:
+        goal = self.spec.vacuum if self.board.is_on(EJECTOR) and self.is_occupied(now) and not self.leaks else 0.0
+        if goal != self._goal:
+            self._go(goal, now)
+        if self._due is not None and self._due <= now:
+            self._due = None
+            self._is_held = not self._is_held
+            if self._is_held:
+                self.take(now)
+            else:
+                self.let_go(now)
+        self.board.put(HELD, float(self._is_held))
+
+    def deadline(self) -> Nanos | None:
+        passing = self.passing(self.board.kernel.now) if self.board.is_on(EJECTOR) else None
+        moments = (moment for moment in (self._due, passing) if moment is not None)
+        return min(moments, default=None)
+
+
+# ---------------------------------------------------------------------- the element
+
+
+def _leak(active: ActiveFault, vacuum: Vacuum, begins: bool, now: Nanos) -> str:
+    vacuum.leaks = begins
+    return f"{vacuum.board.name} {'leaks' if begins else 'is tight again'}"
+
+
+def _signals(vacuum: Vacuum) -> Mapping[str, SignalOf]:
+    source = (vacuum.board.source,)
+
+    def turning(now: Nanos) -> Iterator[Nanos]:
+        yield from ()
+
+    bounds = (0.0, vacuum.spec.vacuum)
+    return {
+        "pressure": SignalOf(source, vacuum.pressure, turning, lambda: vacuum.version, unit="kPa", bounds=bounds),
+        **carrier_signals(vacuum),
+    }
+
+
+VACUUM = with_terminals(
+    "vacuum",
+    VacuumSpec,
+    (
+        optional(OUTPUT_PIN, "ejector", "output joined to EJECTOR; without it a wire may be"),
+        *CARRIER_KEYS,
+        optional(number(0.0, 101.0, above=True), "vacuum", "kPa below the pressure of the air, with a closed cup", 70.0),
+        optional(number(0.0, 101.0, above=True), "threshold", "kPa, from which HELD is on", 50.0),
+        optional(positive_time, "build_up", "from 0 to the threshold", 100 * MILLISECOND),
+        optional(positive_time, "release", "from vacuum to the threshold", 40 * MILLISECOND),
+    ),
+    make=lambda spec, site: Vacuum(site.board(spec.name), spec, site),
+    signals=_signals,
+    faults=(
+        *STUCK,
+        FaultKind("leak", Layer.ELEMENT, Occasion.ALWAYS, "A suction cup does not hold a vacuum.", effect=ElementEffect(_leak)),
+    ),
+)

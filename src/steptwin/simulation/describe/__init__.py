@@ -1,0 +1,1 @@
+"""Descriptions read from TOML, and models built from them. Sees all rooms but the running world."""

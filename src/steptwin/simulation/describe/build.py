@@ -1,0 +1,184 @@
+"""Builds machines and kernels from a description: one kernel for all that is connected by wires, lines and mechanics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+from typing import Any
+
+from steptwin.errors import Misuse
+from steptwin.machine import MachineEvent, Nanos
+from steptwin.simulation.components.element import AnyElement
+from steptwin.simulation.components.elementspec import ElementSpec, NamedSpec
+from steptwin.simulation.components.parts import WorldParts
+from steptwin.simulation.components.registry import ELEMENTS
+from steptwin.simulation.components.site import Site
+from steptwin.simulation.describe.blueprint import Blueprint, memory_file
+from steptwin.simulation.describe.joined import joined_names
+from steptwin.simulation.faults import Faults
+from steptwin.simulation.faults.element import FaultyElement
+from steptwin.simulation.kinds.kind import ControllerSpec, LineSpec, Member, Terminals
+from steptwin.simulation.kinds.registry import line_kinds
+from steptwin.simulation.scheduler.kernel import Board, Kernel
+from steptwin.simulation.scheduler.trace import RecordSink, TraceRecord
+
+Keep = Callable[[str, bytes, Nanos], None]
+"""Stores the non-volatile memory of a controller (name, contents, moment); returns when it is on disk. Raises `OSError`."""
+
+
+def build(blueprint: Blueprint, record: RecordSink, keep: Keep | None = None, *, is_blank: bool = False) -> WorldParts:
+    """The machines of a description at time 0. Raises `WorldError` where its parts do not fit together.
+
+    ``keep`` is called whenever a controller has a new non-volatile memory. ``is_blank``: as for `Kernel`.
+    """
+    return _Builder(blueprint, record, keep, is_blank=is_blank).parts
+
+
+class _Builder:
+    def __init__(self, blueprint: Blueprint, record: RecordSink, keep: Keep | None, *, is_blank: bool) -> None:
+        self.spec = spec = blueprint.spec
+        self.blueprint = blueprint
+        self._keep = keep
+        self._is_blank = is_blank
+        self.parts = WorldParts(spec.lines, spec.elements, Faults(spec.seed), record)
+        self.parts.faults.sinks.append(record)
+        self.site = Site(spec.text, spec.seed, blueprint.memo, self.parts)
+        self._make_machines()
+        self._make_kernels()
+        self._make_lines()
+        self._make_elements()
+
+    # ------------------------------------------------------------------ machines
+
+    def _make_machines(self) -> None:
+        for spec in self.spec.controllers:
+            if spec.name in self.blueprint.makers:
+                self.spec.text.unless_wrong(spec.path, partial(self._add_machine, spec))
+
+    def _add_machine(self, spec: ControllerSpec) -> None:
+        memory = self.blueprint.files.get(memory_file(spec.name))
+        machine = self.blueprint.makers[spec.name](memory)
+        self.parts.machines[spec.name] = machine
+        self.parts.kind_of[spec.name] = spec.kind
+        spec.kind.watch_events(machine, partial(_record_event, self.parts.record, spec.name))
+        keep = self._keep
+        if keep is not None:
+            spec.kind.keep_memory(machine, memory, lambda data: keep(spec.name, data, machine.now))
+
+    # ------------------------------------------------------------------ kernels
+
+    def _make_kernels(self) -> None:
+        """Machines connected by a line, a wire or mechanics share a kernel; kernels are ordered by their first machine."""
+        memo = self.blueprint.memo
+        boards = memo.once(("boards",), lambda: {spec.name: (spec, terminals) for spec, terminals in self._boards()})
+        if self.blueprint.joined is None:
+            self.blueprint.joined = joined_names(self.spec, self.parts.machines)
+        for names in self.blueprint.joined:
+            kernel = Kernel(record=self.parts.record, is_checked=memo.is_checked, is_blank=self._is_blank)
+            self.parts.kernels.append(kernel)
+            for name in names:
+                self.parts.kernel_of[name] = kernel
+                if name in self.parts.machines:
+                    kernel.add(name, self.parts.machines[name])
+                elif name in boards:
+                    spec, terminals = boards[name]
+                    self._add_board(spec, terminals, kernel)
+
+    def _boards(self) -> Iterator[tuple[NamedSpec, Terminals]]:
+        for element in ELEMENTS.values():
+            if element.terminals is not None:
+                for spec in element.named(self.spec.elements[element.name]):
+                    yield spec, element.terminals(spec)
+
+    def _add_board(self, spec: NamedSpec, terminals: Terminals, kernel: Kernel) -> None:
+        if not kernel.machines and not self.spec.text.findings:
+            self.spec.text.wrong(spec.path, "D009", f"nothing joins {spec.name!r} to a controller")
+        self.parts.terminals[spec.name] = terminals
+        kernel.add_board(Board(kernel, spec.name, (*terminals.digital_inputs, *terminals.analog_inputs), terminals.outputs))
+
+    # ------------------------------------------------------------------ lines
+
+    def _make_lines(self) -> None:
+        for spec in self.spec.lines:
+            self.spec.text.unless_wrong(spec.path, partial(self._line, spec))
+
+    def _line(self, spec: LineSpec) -> None:
+        parts, kind = self.parts, line_kinds()[spec.kind]
+        members: list[Member] = []
+        for controller in self.spec.controllers:
+            if controller.line != spec.name or controller.name not in parts.machines:
+                continue
+            if controller.kind.line is not kind:
+                raise Misuse(f"{controller.name!r} cannot be on a line of kind {kind.name}")
+            machine = parts.machines[controller.name]
+            members.append(Member(spec=controller, machine=machine, address=controller.kind.address(controller, machine)))
+        if not members and self.spec.text.is_any_wrong(*self.spec.text.controllers):
+            self.spec.text.leave_out(spec.name)
+            return
+        if not members:
+            raise Misuse("nothing is on this line")
+        kernel = self.site.kernel(spec.name)
+        line = kind.make(spec, members, kernel, parts.record, parts.faults)
+        kernel.add_part(line, (spec.name, *(member.spec.name for member in members)), spec.name)
+        parts.lines[spec.name] = line
+        for member in members:
+            parts.line_of[member.spec.name] = line, member.address
+
+    # ------------------------------------------------------------------ elements
+
+    def _make_elements(self) -> None:
+        """In the order of `ELEMENTS`, but behind those whose signals they are over (`_waits`)."""
+        later: list[tuple[AnyElement, ElementSpec]] = []
+        for element in ELEMENTS.values():
+            specs = self.spec.elements[element.name]
+            waiting = [spec for spec in specs if self._waits(element, spec)]
+            later += [(element, spec) for spec in waiting]
+            self._build_elements(element, [spec for spec in specs if all(spec is not one for one in waiting)])
+        while later:
+            # Where all wait for each other, the first one says so.
+            turn = next((turn for turn, one in enumerate(later) if not self._waits(*one)), 0)
+            element, spec = later.pop(turn)
+            self._build_elements(element, [spec])
+        if not self.spec.text.findings:
+            self.site.close_circuits()
+            for number, kernel in enumerate(self.parts.kernels):
+                if order := self.blueprint.memo.once(("order", number), kernel.order):
+                    kernel.arrange(order)
+
+    def _waits(self, element: AnyElement, spec: ElementSpec) -> bool:
+        """Whether it is over a signal of an element that is not built yet."""
+        references = element.refers(spec, self.spec.elements)
+        over = (reference.other for reference in references if reference.path[-1:] in (("of",), ("when",)))
+        return any(self.parts.unbuilt(owner) is not None for owner in over)
+
+    def _build_elements(self, element: AnyElement, specs: Iterable[ElementSpec]) -> None:
+        built = [(spec, self._element(element, spec)) for spec in specs]
+        if element.connect is not None:
+            for spec, part in built:
+                if part is not None:
+                    self.spec.text.unless_wrong(spec.path, partial(element.connect, spec, part, self.site))
+
+    def _element(self, element: AnyElement, spec: ElementSpec) -> Any:
+        """The built element; None if it has errors."""
+        found = self.spec.text.unless_wrong(spec.path, partial(element.build, spec, self.site))
+        if found is None:
+            return None
+        for named in element.named((spec,)):
+            self.parts.elements.setdefault(element.name, {})[named.name] = found
+            if element.signals is not None:
+                self.parts.signals_of[named.name] = partial(element.signals, found)
+            if element.faults:
+                kernel = self._kernel_of(element, named)
+                failing = FaultyElement(kernel, named.name, self.parts.faults, element.faults, found)
+                self.parts.faults.elements[named.name] = failing
+                kernel.add_part(failing, ())
+        return found
+
+    def _kernel_of(self, element: AnyElement, spec: NamedSpec) -> Kernel:
+        """The kernel that an element is in: its own, or that of the first thing it refers to."""
+        name = next(iter(element.refers(spec, self.spec.elements))).one if element.terminals is None else spec.name
+        return self.site.kernel(name)
+
+
+def _record_event(record: RecordSink, machine: str, event: MachineEvent) -> None:
+    record(TraceRecord(event.time, machine, "event", event.code, event.text, event.facts))

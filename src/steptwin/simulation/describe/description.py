@@ -1,0 +1,198 @@
+"""Reads the TOML file of a world: its content as values, or all errors in it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+from steptwin.errors import Misuse
+from steptwin.simulation.components.element import AnyElement
+from steptwin.simulation.components.elementspec import ElementSpec, ElementSpecs, NamedSpec
+from steptwin.simulation.components.registry import ELEMENTS
+from steptwin.simulation.describe.arrangement import DRAWING, check_places, read_places
+from steptwin.simulation.describe.gateways import GATEWAY, read_gateways
+from steptwin.simulation.describe.historytable import read_history
+from steptwin.simulation.describe.overrides import NO_OVERRIDES, Overrides, override
+from steptwin.simulation.describe.pieces import PARAMETERS, USE, Pieces, ReadFile, is_piece, no_files
+from steptwin.simulation.describe.spec import ScriptSpec, WorldSpec
+from steptwin.simulation.describe.steptable import STEPS, read_steps
+from steptwin.simulation.describe.tables import KEYS, SEED, tables
+from steptwin.simulation.faults import Fault, FaultMistake, parse
+from steptwin.simulation.kinds.kind import LineSpec
+from steptwin.simulation.kinds.links import LINK_KEYS, TLS_KEYS, TlsFiles
+from steptwin.simulation.kinds.registry import KINDS
+from steptwin.simulation.toml.names import RESERVED
+from steptwin.simulation.toml.reader import TomlText, read_table
+from steptwin.simulation.toml.sense import check_sense
+
+CAMPAIGN = "campaign"
+"""The table that only a campaign has (`steptwin.campaign`)."""
+
+
+def read_world(
+    name: str, text: str, seed: int | None = None, overrides: Overrides = NO_OVERRIDES, read: ReadFile = no_files
+) -> WorldSpec:
+    """The world that a TOML text called ``name`` describes. Raises `WorldError` with everything that is wrong with it.
+
+    ``seed`` and ``overrides`` replace values of the text; `Misuse` for what is no seed, or is not there to be replaced. ``read``
+    gives the content of files of tables that it uses.
+    """
+    spec = describe(name, text, seed, overrides, read)
+    spec.text.check()
+    return spec
+
+
+def describe(
+    name: str, text: str, seed: int | None = None, overrides: Overrides = NO_OVERRIDES, read: ReadFile = no_files
+) -> WorldSpec:
+    """As `read_world`, but raises `WorldError` only for text that is not TOML. Other errors are kept in ``text`` of the result,
+    because building the world may find more."""
+    named = ("line", *(element.name for element in ELEMENTS.values() if element.needs_name))
+    toml = TomlText(name, text, tuple(KINDS), named)
+    data = toml.data
+    if is_piece(toml):
+        toml.wrong((PARAMETERS,), "D004", "a file with [parameters] is for [[use]] of a description")
+        raise toml.error()
+    if CAMPAIGN in data:
+        toml.wrong((CAMPAIGN,), "D004", "this is a campaign, not a world", "steptwin campaign run checks it and runs its world")
+        raise toml.error()
+    late = override(data, overrides, USE)
+    pieces = Pieces(read, tables(), toml.controllers, named)
+    pieces.put_into(toml)
+    override(data, late)
+    inner = {key for element in ELEMENTS.values() for key in element.inner}
+    known = [*(key for key in tables() if key not in inner), "fault", GATEWAY]
+    for key in data:
+        if key not in known:
+            near = toml.near(key, known)
+            fix = toml.key_replacement((key,) if isinstance(data[key], dict) else (key, 0), key, known)
+            toml.wrong((key,), "D004", f"the file has no [{key}]{near}", f"permitted: {', '.join(known)}", fix)
+            toml.leave_out_all(key)
+    placed = _rows(toml, DRAWING)
+    world = read_table(toml, ("world",), data.get("world", {}), KEYS["world"])
+    spec = WorldSpec(
+        **world,
+        lines=tuple(map(_line, _rows(toml, "line"))),
+        controllers=tuple(
+            kind.read(toml, row | {"kind": kind}, table)
+            for kind in KINDS.values()
+            for row, table in _tables(toml, kind.name, kind.inner_tables)
+        ),
+        elements=ElementSpecs({element.name: tuple(_elements(toml, element)) for element in ELEMENTS.values()}),
+        scripts=(*_events(toml), *_scripts(toml)),
+        gateways=tuple(read_gateways(toml)),
+        history=read_history(toml),
+        drawing=read_places(placed),
+        faults=tuple(_faults(toml)),
+        text=toml,
+        overrides=dict(overrides),
+        pieces=pieces.files,
+    )
+    named_elements = [one for element in ELEMENTS.values() for one in element.named(spec.elements[element.name])]
+    _check_names(spec, named_elements)
+    check_places(toml, placed, [one.name for one in named_elements])
+    return spec if seed is None else replace(spec, seed=_seed(seed))
+
+
+def _seed(value: object) -> int:
+    try:
+        return SEED(value)
+    except Misuse as error:
+        raise Misuse(f"seed {error}") from None
+
+
+def _tables(toml: TomlText, kind: str, also: tuple[str, ...] = ()) -> list[tuple[dict[str, Any], Mapping[str, Any]]]:
+    """Values of every ``[[kind]]`` that has all it needs, and the table itself."""
+    found: list[tuple[dict[str, Any], Mapping[str, Any]]] = []
+    given = toml.data.get(kind)
+    if given is None:
+        return found
+    rows = tables()[kind]
+    if not isinstance(given, list):
+        toml.stands_once(kind)
+        given = []
+    names: set[str] = set()
+    for number_, table in enumerate(given):
+        path = (kind, number_)
+        values = read_table(toml, path, table, rows.keys, also)
+        if any(key.is_required and (key.attribute or key.name) not in values for key in rows.keys):
+            continue
+        check_sense(toml, path, rows, table)
+        if values.get("name") and values["name"] in names:
+            toml.wrong((*path, "name"), "D006", f"there is a [[{kind}]] named {values['name']!r} already")
+        names.add(values.get("name", ""))
+        found.append((values | {"path": path}, table))
+    return found
+
+
+def _rows(toml: TomlText, kind: str) -> list[dict[str, Any]]:
+    return [row for row, _ in _tables(toml, kind)]
+
+
+def _elements(toml: TomlText, element: AnyElement) -> Iterator[ElementSpec]:
+    for row, table in _tables(toml, element.name, tuple(element.inner)):
+        yield element.read(toml, row, table)
+
+
+def _line(row: dict[str, Any]) -> LineSpec:
+    found = {name: row.pop(name) for name in LINK_KEYS}
+    files = [row.pop(key.name) for key in TLS_KEYS]
+    tls = None if None in files else TlsFiles(*files)
+    return LineSpec(**row, links={name: value for name, value in found.items() if value is not None}, tls=tls)
+
+
+def _events(toml: TomlText) -> list[ScriptSpec]:
+    found: list[ScriptSpec] = []
+    for row, table in _tables(toml, "event"):
+        path = row["path"]
+        name = row.pop("name") or f"event-{path[1] + 1}"
+        steps = read_steps(toml, (*path, STEPS.name), row.pop(STEPS.name))
+        if sum(key in table for key in ("at", "every", "when")) != 1:
+            toml.wrong(path, "D007", "an event needs one of at, every and when")
+        found.append(ScriptSpec(name=name, repeat=1, steps=steps, **row))
+    return found
+
+
+def _scripts(toml: TomlText) -> list[ScriptSpec]:
+    found: list[ScriptSpec] = []
+    for row in _rows(toml, "script"):
+        steps = read_steps(toml, (*row["path"], STEPS.name), row.pop(STEPS.name))
+        found.append(ScriptSpec(**row, every=None, when=None, once=True, steps=steps))
+    return found
+
+
+def _faults(toml: TomlText) -> list[Fault | None]:
+    """One for each table; None for one that is wrong."""
+    found: list[Fault | None] = []
+    tables = toml.data.get("fault", [])
+    if not isinstance(tables, list):
+        toml.stands_once("fault")
+        tables = []
+    for n, table in enumerate(tables):
+        if not isinstance(table, Mapping):
+            toml.wrong(("fault", n), "D002", f"[[fault]] is {table!r}", "expected a table")
+            found.append(None)
+            continue
+        try:
+            found.append(parse(table, "[[fault]]"))
+        except FaultMistake as error:
+            toml.wrong(("fault", n, error.key), "D003", str(error))
+            found.append(None)
+    return found
+
+
+def _check_names(spec: WorldSpec, elements: Iterable[NamedSpec]) -> None:
+    """Report names of lines, machines and elements that hide each other. The command line ignores case."""
+    text = spec.text
+    taken: dict[str, str] = {}
+    for one in (*spec.lines, *spec.controllers, *elements):
+        path = (*one.path, "name")
+        kind = one.path[0]
+        key = one.name.lower()
+        owner = f"[[{kind}]] {one.name!r}"
+        if key in RESERVED:
+            text.wrong(path, "D006", f"{one.name!r} is {RESERVED[key]}: choose another name")
+        elif key in taken and taken[key] != owner:  # this one is reported already
+            text.wrong(path, "D006", f"{one.name!r} is taken by {taken[key]}", "upper and lower case are the same here")
+        taken.setdefault(key, owner)

@@ -1,0 +1,82 @@
+"""Which machines, lines and elements with terminals of a description share a kernel: those that anything connects."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+
+from steptwin.simulation.components.elementspec import Reference
+from steptwin.simulation.components.registry import ELEMENTS
+from steptwin.simulation.describe.spec import WorldSpec
+from steptwin.simulation.toml.tomlplaces import Path
+from steptwin.simulation.toml.values import NameOf
+
+
+def joined_names(spec: WorldSpec, machines: Iterable[str]) -> list[list[str]]:
+    """The names in each kernel. Kernels, and names in them, are in order: machines, lines, elements.
+
+    Names that do not exist are reported in the text of the description.
+    """
+    with_terminals = [element for element in ELEMENTS.values() if element.terminals is not None]
+    boards = [one.name for element in with_terminals for one in element.named(spec.elements[element.name])]
+    joined = {name: name for name in [*machines, *(line.name for line in spec.lines), *boards]}
+
+    def root(name: str) -> str:
+        while joined[name] != name:
+            joined[name] = joined[joined[name]]
+            name = joined[name]
+        return name
+
+    placed = _placed(spec)
+    for reference in _joints(spec):
+        one, other = (placed.get(name, name) for name in reference[:2])
+        if other not in joined:
+            _report(spec, reference.path, other, joined)
+        elif one in joined:
+            joined[root(other)] = root(one)
+    groups: dict[str, list[str]] = {}
+    for name in joined:
+        groups.setdefault(root(name), []).append(name)
+    return list(groups.values())
+
+
+def _report(spec: WorldSpec, path: Path, name: str, joined: Iterable[str]) -> None:
+    """Report a name that nothing has, with those that may stand there: of one kind of element for some keys."""
+    text, element = spec.text, _element_named_by(path)
+    if text.may_be_broken(name):
+        return
+    if element is None:
+        what, there = "nothing", list(joined)
+        elements = (one.name for element in ELEMENTS.values() for one in element.named(spec.elements[element.name]))
+        known = [*there, *elements]
+    else:
+        what = f"no {element}"
+        there = known = [one.name for one in ELEMENTS[element].named(spec.elements[element])]
+    fix = text.replacement(path, name, text.meant(name, known))
+    message = f"{what} is called {name!r}{text.near(name, known)}"
+    text.wrong(path, "D009", message, f"there are {', '.join(there) or 'none'}", fix)
+
+
+def _element_named_by(path: Path) -> str | None:
+    """The kind of element that the key at ``path`` names; None for a key that names others, or anything."""
+    element = ELEMENTS.get(str(path[0]))
+    read = next((key.read for key in element.rows.keys if key.name == path[-1]), None) if element is not None else None
+    return read.element if isinstance(read, NameOf) else None
+
+
+def _placed(spec: WorldSpec) -> Mapping[str, str]:
+    """For each element without terminals of its own the first thing that it refers to, in whose kernel it is."""
+    return {
+        one.name: next(iter(element.refers(one, spec.elements))).one
+        for element in ELEMENTS.values()
+        if element.terminals is None
+        for one in element.named(spec.elements[element.name])
+    }
+
+
+def _joints(spec: WorldSpec) -> Iterator[Reference]:
+    for controller in spec.controllers:
+        if controller.line is not None:
+            yield Reference(controller.name, controller.line, (*controller.path, "line"))
+    for element in ELEMENTS.values():
+        for one in spec.elements[element.name]:
+            yield from element.refers(one, spec.elements)

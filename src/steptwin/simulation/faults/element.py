@@ -1,0 +1,74 @@
+"""Faults of elements of a world: each lasts from one moment to another."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Any, ClassVar
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.simulation.faults.active import ActiveFault, Faults, HeldLevel
+from steptwin.simulation.faults.table import Fault, FaultKind
+from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.state import Stateful
+
+
+class FaultyElement(Stateful):
+    """A part of the kernel beside an element, which applies the effects of its faults to the built object."""
+
+    FIXED: ClassVar[tuple[str, ...]] = ("_faults", "_kernel", "_kinds", "_part", "name")
+    __slots__ = (*FIXED, "_lasting")
+
+    def __init__(self, kernel: Kernel, name: str, faults: Faults, kinds: Iterable[FaultKind], part: Any) -> None:
+        self.name = name
+        self._kernel = kernel
+        self._faults = faults
+        self._kinds = tuple(kinds)
+        self._part = part
+        self._lasting: tuple[str, ...] = ()
+        """Names of the faults that have begun."""
+
+    def check(self, fault: Fault) -> None:
+        """`Misuse` for a fault of another kind of element."""
+        if fault.kind not in self._kinds:
+            there = ", ".join(kind.name for kind in self._kinds) or "none"
+            raise Misuse(f"fault {fault.kind.name}: element = {self.name!r}, whose faults are {there}")
+        if fault.kind.check is not None:
+            fault.kind.check(self._part, fault)
+
+    def begin(self, active: ActiveFault) -> None:
+        """A fault has been set."""
+        self._kernel.mark()
+
+    def end(self, active: ActiveFault, now: Nanos) -> None:
+        """A fault has been removed."""
+        if active.name in self._lasting:
+            self._turn(active, now, begins=False)
+        self._kernel.mark()
+
+    def held(self) -> Iterator[tuple[str, HeldLevel]]:
+        """The terminals that faults hold, in small letters."""
+        for active in self._faults.of_element(self.name):
+            holds = active.fault.kind.effect.holds
+            if holds and active.name in self._lasting:
+                yield str(active.fault.get(holds)).lower(), HeldLevel(active.name, active.fault.number("level"))
+
+    def update(self, now: Nanos) -> None:
+        for active in self._faults.of_element(self.name):
+            lasts = active.begin <= now and (active.end is None or now < active.end)
+            if lasts is not (active.name in self._lasting):
+                self._turn(active, now, begins=lasts)
+
+    def _turn(self, active: ActiveFault, now: Nanos, *, begins: bool) -> None:
+        others = tuple(name for name in self._lasting if name != active.name)
+        self._lasting = (*others, active.name) if begins else others
+        if begins:
+            active.struck += 1
+        text = active.fault.kind.effect.act(active, self._part, begins, now)
+        self._kernel.mark()  # the part may have been updated already at this moment
+        self._faults.report(active, self.name, now, text)
+
+    def deadline(self) -> Nanos | None:
+        now = self._kernel.now
+        moments = (moment for active in self._faults.of_element(self.name) for moment in (active.begin, active.end))
+        return min((moment for moment in moments if moment is not None and moment > now), default=None)

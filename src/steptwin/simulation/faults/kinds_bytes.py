@@ -1,0 +1,112 @@
+"""The kinds of faults of bytes."""
+
+from __future__ import annotations
+
+from steptwin.machine import Nanos
+from steptwin.simulation.faults.active import ActiveFault, FaultReporter
+from steptwin.simulation.faults.effects import ByteEffect, InsertEffect, PiecesEffect, Run
+from steptwin.simulation.faults.table import ALL_LINES, LONGEST_MS, SERIAL, FaultKind, Layer, Occasion, number, whole
+
+
+def _flip(active: ActiveFault, byte: int, run: Run, report: FaultReporter) -> int:
+    bit = active.fault.whole("bit")
+    turned = byte ^ 1 << (active.chance.below(8) if bit is None else bit)
+    report(active, f"{byte:02X} becomes {turned:02X}")
+    return turned
+
+
+def _drop(active: ActiveFault, byte: int, run: Run, report: FaultReporter) -> None:
+    active.left = int(active.fault.number("length")) - 1
+    report(active, f"{byte:02X} is lost" + (f" and {active.left} more" if active.left else ""))
+
+
+def _insert(active: ActiveFault, byte: int, run: Run, report: FaultReporter) -> int:
+    value = active.fault.whole("value")
+    extra = active.chance.below(256) if value is None else value
+    report(active, f"{extra:02X} comes before it")
+    run.put((extra,))
+    return byte
+
+
+def _gap(active: ActiveFault, byte: int, run: Run, report: FaultReporter) -> int:
+    report(active, f"{active.fault.number('for_ms'):g} ms of silence before it")
+    run.pause(active.ns("for_ms"))
+    return byte
+
+
+def _split(active: ActiveFault, run: Run, count: int, report: FaultReporter) -> list[tuple[Nanos, bytes]]:
+    length = int(active.fault.number("length"))
+    report(active, f"{count} bytes in pieces of {length}")
+    pause = active.ns("for_ms")
+    pieces: list[tuple[Nanos, bytes]] = []
+    for delay, piece in run.pieces:
+        for start in range(0, len(piece), length):
+            pieces.append((delay + pause * len(pieces), bytes(piece[start : start + length])))
+    return pieces
+
+
+def _noise(active: ActiveFault, run: Run, report: FaultReporter) -> None:
+    noise = active.chance.some_bytes(int(active.fault.number("length")))
+    report(active, f"{len(noise)} bytes of noise: {noise.hex(' ')}")
+    run.put(noise)
+
+
+BYTES = (
+    FaultKind(
+        "flip",
+        Layer.BYTES,
+        Occasion.BYTE,
+        "A bit of a byte arrives turned round.",
+        (whole("bit", "Which bit, 0 is the lowest.", 0, 7, otherwise="any"),),
+        SERIAL,
+        effect=ByteEffect(_flip),
+    ),
+    FaultKind(
+        "drop",
+        Layer.BYTES,
+        Occasion.BYTE,
+        "Bytes are lost.",
+        (whole("length", "How many.", 1, 10_000, default=1),),
+        SERIAL,
+        effect=ByteEffect(_drop),
+    ),
+    FaultKind(
+        "insert",
+        Layer.BYTES,
+        Occasion.BYTE,
+        "A byte too much comes before a byte.",
+        (whole("value", "Which.", 0, 255, otherwise="any"),),
+        SERIAL,
+        effect=ByteEffect(_insert),
+    ),
+    FaultKind(
+        "gap",
+        Layer.BYTES,
+        Occasion.BYTE,
+        "The line is silent before a byte.",
+        (number("for_ms", "How long.", 1e-3, LONGEST_MS, default=30.0),),
+        ALL_LINES,
+        effect=ByteEffect(_gap),
+    ),
+    FaultKind(
+        "split",
+        Layer.BYTES,
+        Occasion.DELIVERY,
+        "Bytes come in pieces, as USB adapters deliver them.",
+        (
+            whole("length", "Bytes in a piece.", 1, 10_000, default=1),
+            number("for_ms", "How long after each other pieces come.", 1e-3, LONGEST_MS, default=1.0),
+        ),
+        ALL_LINES,
+        effect=PiecesEffect(_split),
+    ),
+    FaultKind(
+        "noise",
+        Layer.BYTES,
+        Occasion.DELIVERY,
+        "Bytes of no meaning come before what was sent.",
+        (whole("length", "How many.", 1, 10_000, default=8),),
+        SERIAL,
+        effect=InsertEffect(_noise),
+    ),
+)

@@ -1,0 +1,155 @@
+"""The kinds of faults of frames and of the protocol."""
+
+from __future__ import annotations
+
+from steptwin.simulation.faults.active import ActiveFault, FaultReporter
+from steptwin.simulation.faults.answers import NEVER_SENT, AlteredAnswer, Exchange
+from steptwin.simulation.faults.effects import AnswerEffect, RequestEffect
+from steptwin.simulation.faults.table import (
+    LONGEST_MS,
+    MODBUS,
+    Fault,
+    FaultKind,
+    Layer,
+    LineProtocol,
+    Occasion,
+    Parameter,
+    ParameterForm,
+    number,
+    whole,
+)
+from steptwin.wire.crc import with_crc
+from steptwin.wire.pdu import DEVICE_BUSY
+
+_UNITS = 248
+"""Unit 247 is followed by 0."""
+
+
+def _delay(active: ActiveFault, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
+    report(active, f"{active.fault.number('for_ms'):g} ms later: {sent.answer.hex(' ')}")
+    return sent._replace(delay=sent.delay + active.ns("for_ms"))
+
+
+def _is_request_lost(fault: Fault) -> bool:
+    return fault.get("lost") == "request"
+
+
+def _lose_request(active: ActiveFault) -> tuple[int, str]:
+    return NEVER_SENT, "request lost on its way"
+
+
+def _lose_answer(active: ActiveFault, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
+    report(active, f"lost on its way: {sent.answer.hex(' ')}")
+    return sent._replace(answer=b"")
+
+
+def _hold_back(active: ActiveFault, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
+    report(active, f"held back: {sent.answer.hex(' ')}")
+    return sent._replace(answer=b"", later=sent.answer)
+
+
+def _answer_as(active: ActiveFault, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
+    other = active.fault.whole("answers_as")
+    other = (unit + 1) % _UNITS if other is None else other
+    report(active, f"answered as unit {other}: {sent.answer.hex(' ')}")
+    return sent._replace(answer=_as_unit(exchange.line, sent.answer, other))
+
+
+def _as_unit(line: LineProtocol, raw: bytes, unit: int) -> bytes:
+    if line is LineProtocol.RTU:
+        return with_crc(bytes((unit,)) + raw[1:-2])
+    return raw[:6] + bytes((unit,)) + raw[7:]
+
+
+def _spoil_crc(active: ActiveFault, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
+    raw = sent.answer
+    wrong = int.from_bytes(raw[-2:], "little") ^ 1 + active.chance.below(0xFFFF)
+    raw = raw[:-2] + wrong.to_bytes(2, "little")
+    report(active, f"wrong CRC: {raw.hex(' ')}")
+    return sent._replace(answer=raw)
+
+
+def _echo(active: ActiveFault, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
+    report(active, f"echo: {exchange.request.hex(' ')}")
+    return sent._replace(before=exchange.request)
+
+
+def _refuse(active: ActiveFault) -> tuple[int, str]:
+    code = active.fault.whole("code") or DEVICE_BUSY
+    return code, f"refused with exception {code:02X}"
+
+
+FRAMES = (
+    FaultKind(
+        "delay",
+        Layer.FRAMES,
+        Occasion.ANSWER,
+        "The answer takes longer; the ones behind it wait.",
+        (number("for_ms", "How much longer.", 1e-3, LONGEST_MS, default=500.0),),
+        MODBUS,
+        effect=AnswerEffect(_delay),
+    ),
+    FaultKind(
+        "no-answer",
+        Layer.FRAMES,
+        Occasion.REQUEST,
+        "There is no answer: the request was lost on its way, or was carried out and the answer lost.",
+        (Parameter("lost", ParameterForm.WORD, "What was lost.", words=("answer", "request"), default="answer"),),
+        MODBUS,
+        effect=RequestEffect(_lose_request, _is_request_lost, _lose_answer),
+    ),
+    FaultKind(
+        "late",
+        Layer.FRAMES,
+        Occasion.ANSWER,
+        "The answer is held back and comes before the next one.",
+        (),
+        MODBUS,
+        effect=AnswerEffect(_hold_back),
+    ),
+    FaultKind(
+        "wrong-unit",
+        Layer.FRAMES,
+        Occasion.ANSWER,
+        "The answer carries the address of another unit.",
+        (whole("answers_as", "Which.", 0, 255, otherwise="the next one"),),
+        MODBUS,
+        effect=AnswerEffect(_answer_as),
+    ),
+    FaultKind(
+        "crc",
+        Layer.FRAMES,
+        Occasion.ANSWER,
+        "The answer has a wrong CRC.",
+        (),
+        (LineProtocol.RTU,),
+        effect=AnswerEffect(_spoil_crc),
+    ),
+    FaultKind(
+        "echo",
+        Layer.FRAMES,
+        Occasion.ANSWER,
+        "The request comes back before its answer.",
+        (),
+        (LineProtocol.RTU,),
+        effect=AnswerEffect(_echo),
+    ),
+    FaultKind(
+        "exception",
+        Layer.PROTOCOL,
+        Occasion.REQUEST,
+        "The request is refused and not carried out.",
+        (whole("code", "The exception code.", 1, 255, default=4),),
+        MODBUS,
+        effect=RequestEffect(_refuse),
+    ),
+    FaultKind(
+        "busy",
+        Layer.PROTOCOL,
+        Occasion.REQUEST,
+        "The request is refused with exception 6, device busy, and not carried out.",
+        (),
+        MODBUS,
+        effect=RequestEffect(_refuse),
+    ),
+)

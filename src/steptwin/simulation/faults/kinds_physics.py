@@ -1,0 +1,173 @@
+"""The kinds of faults of physics."""
+
+from __future__ import annotations
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.simulation.faults.active import ActiveFault
+from steptwin.simulation.faults.effects import ChangeEffect, MomentEffect, SaveEffect, WindowEffect
+from steptwin.simulation.faults.machine import FaultyMachine
+from steptwin.simulation.faults.table import (
+    AXIS,
+    LONGEST_MS,
+    LONGEST_S,
+    OFF,
+    PIN,
+    Fault,
+    FaultKind,
+    Layer,
+    Need,
+    Occasion,
+    number,
+    whole,
+)
+
+
+def _axis(active: ActiveFault) -> int:
+    return int(active.fault.number("axis"))
+
+
+def _stall(active: ActiveFault, machine: FaultyMachine, now: Nanos) -> None:
+    axis = _axis(active)
+    machine.report(active, now, f"M{axis} is blocked for {active.fault.number('for_s'):g} s")
+    machine.block(active, axis, now, now + active.ns("for_s"))
+
+
+def _lose_steps(active: ActiveFault, machine: FaultyMachine, now: Nanos) -> None:
+    axis, pulses = _axis(active), int(active.fault.number("pulses"))
+    machine.report(active, now, f"M{axis} loses {pulses} pulses")
+    machine.body.shafts[axis - 1].lose(pulses, now)
+
+
+def _slip(active: ActiveFault, machine: FaultyMachine, now: Nanos) -> None:
+    axis, counts = _axis(active), int(active.fault.number("counts"))
+    machine.report(active, now, f"the encoder of M{axis} slips by {counts} counts")
+    machine.body.shafts[axis - 1].slip(counts, now)
+
+
+def _drop_supply(active: ActiveFault, machine: FaultyMachine, now: Nanos) -> None:
+    machine.report(active, now, f"no supply for {active.fault.number('for_s'):g} s")
+    machine.drop_supply(now, now + active.ns("for_s"))
+
+
+def _stick(active: ActiveFault, machine: FaultyMachine, now: Nanos) -> None:
+    machine.stick(active, now)
+
+
+def _fail_master(active: ActiveFault, machine: FaultyMachine, now: Nanos) -> None:
+    machine.fail_master(active, now)
+
+
+def _bounce(active: ActiveFault, machine: FaultyMachine, pin: str, levels: tuple[float, float], now: Nanos) -> None:
+    """To the second level it has gone; back and there again some times, the last time at the end of the bouncing."""
+    bounces, within = active.fault.whole("bounces") or 1, active.ns("for_ms")
+    moments = sorted(1 + active.chance.below(within) for _ in range(2 * bounces - 1))
+    changes = [(now + at, pin, to) for at, to in zip((*moments, within), levels * bounces, strict=True)]
+    machine.report(active, now, f"{pin} bounces {bounces} times in {active.fault.number('for_ms'):g} ms")
+    machine.bounce(changes)
+
+
+def _needs_switch(machine: FaultyMachine, fault: Fault) -> None:
+    pin = machine.pin_of(fault)
+    if pin.startswith("AIN"):
+        raise Misuse(f"fault bounce: pin = {pin!r} is an analog input, which has no switch")
+
+
+def _cut_power(active: ActiveFault, machine: FaultyMachine, old: bytes, kept: bytearray, now: Nanos) -> None:
+    written = active.fault.whole("written")
+    written = active.chance.below(len(kept) + 1) if written is None else min(written, len(kept))
+    kept[written:] = old[written:]
+    machine.report(active, now, f"no supply after {written} of {len(kept)} bytes were saved")
+    machine.cut_supply(now, now + active.ns("for_s"))
+
+
+def _wear(active: ActiveFault, machine: FaultyMachine, old: bytes, kept: bytearray, now: Nanos) -> None:
+    good = active.fault.whole("writes") or 0
+    if active.struck > good and len(active.worn) < len(kept):
+        sound = [place for place in range(len(kept)) if place not in active.worn]
+        active.worn.append(sound[active.chance.below(len(sound))])
+        machine.report(active, now, f"after {active.struck} saves byte {active.worn[-1]} is worn out")
+    for place in active.worn:
+        kept[place] = old[place]
+
+
+PHYSICS = (
+    FaultKind(
+        "stall",
+        Layer.PHYSICS,
+        Occasion.MOMENT,
+        "The shaft is blocked: pulses go on and turn nothing.",
+        (AXIS, number("for_s", "How long.", 1e-6, LONGEST_S, default=1.0)),
+        effect=MomentEffect(_stall),
+    ),
+    FaultKind(
+        "lost-steps",
+        Layer.PHYSICS,
+        Occasion.MOMENT,
+        "The shaft falls behind the pulses and stays there.",
+        (AXIS, whole("pulses", "By how many pulses; negative: ahead.", -(10**9), 10**9, default=4)),
+        effect=MomentEffect(_lose_steps),
+    ),
+    FaultKind(
+        "slip",
+        Layer.PHYSICS,
+        Occasion.MOMENT,
+        "The encoder slips on the shaft.",
+        (AXIS, whole("counts", "By how many counts.", -(10**9), 10**9, default=4)),
+        effect=MomentEffect(_slip),
+        needs=Need.ENCODER,
+    ),
+    FaultKind(
+        "stuck",
+        Layer.PHYSICS,
+        Occasion.ALWAYS,
+        "An input keeps a level, whatever its switch does.",
+        (PIN, number("value", "The level; volts on analog inputs.", 0, 10, otherwise="the one it has")),
+        effect=WindowEffect(_stick),
+    ),
+    FaultKind(
+        "master-error",
+        Layer.PHYSICS,
+        Occasion.ALWAYS,
+        "A slave of the controller's own Modbus master does not answer: M_STATUS is 3.",
+        effect=WindowEffect(_fail_master),
+        needs=Need.MODBUS_MASTER,
+    ),
+    FaultKind(
+        "bounce",
+        Layer.PHYSICS,
+        Occasion.CHANGE,
+        "A switch bounces: its input changes to and fro before it settles.",
+        (
+            PIN,
+            whole("bounces", "How often it goes back.", 1, 1000, default=3),
+            number("for_ms", "How long that takes.", 1e-3, LONGEST_MS, default=5.0),
+        ),
+        effect=ChangeEffect(_bounce),
+        check=_needs_switch,
+    ),
+    FaultKind(
+        "supply-drop",
+        Layer.PHYSICS,
+        Occasion.MOMENT,
+        "The supply fails and comes back: nothing answers, drives and outputs are off, then it is as after power-on.",
+        (OFF,),
+        effect=MomentEffect(_drop_supply),
+    ),
+    FaultKind(
+        "power-cut",
+        Layer.PHYSICS,
+        Occasion.SAVE,
+        "The supply fails while memory is being saved: what was not yet written keeps its old content.",
+        (OFF, whole("written", "Bytes written until then.", 0, None, otherwise="any number")),
+        effect=SaveEffect(_cut_power),
+    ),
+    FaultKind(
+        "wear",
+        Layer.PHYSICS,
+        Occasion.SAVE,
+        "The memory is worn out: with each save one more byte, chosen by chance, keeps what it has for ever.",
+        (whole("writes", "Saves that go well.", 0, None, default=100_000),),
+        effect=SaveEffect(_wear),
+    ),
+)

@@ -1,0 +1,403 @@
+"""Faults of physics: inputs, shafts, supply and memory of a machine; and requests that it refuses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, ClassVar, NamedTuple, Protocol
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos, PinEdge
+from steptwin.motioncontroller import Drive, MotionController
+from steptwin.simulation.faults.active import ActiveFault, Faults, HeldLevel
+from steptwin.simulation.faults.answers import NEVER_SENT
+from steptwin.simulation.faults.table import Fault, FaultKind, Occasion
+from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.simulation.scheduler.wires import PinName
+from steptwin.state import Plain, Stateful
+from steptwin.wire.pdu import exception_pdu
+
+
+class AxisLoad(Protocol):
+    """The load of an axis, for faults. All methods take the moment."""
+
+    def block(self, blocked: bool, now: Nanos) -> None:
+        """Block the shaft, so that pulses are lost, or release it."""
+        ...
+
+    def lose(self, pulses: int, now: Nanos) -> None:
+        """Move the shaft ``pulses`` behind the drive (negative: ahead)."""
+        ...
+
+    def slip(self, counts: int, now: Nanos) -> None:
+        """Let the encoder slip by ``counts`` on the shaft."""
+        ...
+
+
+class Body(Protocol):
+    """The parts of a machine that can fail, besides its pins."""
+
+    shafts: list[AxisLoad]
+    """By axis. Mechanics replace the loads of their axes."""
+
+    def lacks(self, kind: FaultKind) -> str | None:
+        """The reason why faults of a kind are impossible, as the end of a message after its name; None if they are possible."""
+        ...
+
+    def show_master_error(self, shown: bool, now: Nanos) -> None:
+        """Set or clear the error that a slave of its own Modbus master does not answer."""
+        ...
+
+    def watch(self, owner: FaultyMachine) -> None:
+        """Call ``owner`` before requests are served (`FaultyMachine.refusal`) and memory is saved (`FaultyMachine.kept`)."""
+        ...
+
+    def pin_name(self, pin: str) -> str:
+        """The one name of a pin with several names."""
+        ...
+
+    def check_pin(self, pin: str, level: float) -> None:
+        """`Misuse` unless ``pin`` is an input that can take ``level``."""
+        ...
+
+
+class FaultySnapshot(NamedTuple):
+    """State of the faults of a machine, and of the machine."""
+
+    faults: Plain
+    machine: Any
+
+
+class FaultyMachine(Stateful):
+    """Wraps a machine in its kernel and applies faults to its inputs, shafts, supply and memory.
+
+    Inputs are set through it, so that a stuck switch remains stuck.
+    """
+
+    FIXED: ClassVar[tuple[str, ...]] = ("_faults", "_fresh", "_on_edge", "body", "changed", "inner", "name")
+    __slots__ = (*FIXED, "_bounces", "_cut", "_mute", "_off_until", "_outer", "_released", "_stuck", "_unsupplied")
+
+    def __init__(
+        self, inner: MotionController, name: str, faults: Faults, body: Body, on_edge: Callable[[str, Nanos, float], None]
+    ) -> None:
+        """``on_edge`` is called for each edge of an input that a fault makes; the edge is recorded here."""
+        self._on_edge = on_edge
+        self.inner = inner
+        self.changed = inner.changed
+        inner.changed = self._pass_on
+        self.name = name
+        self.body = body
+        self._faults = faults
+        self._outer: dict[str, float] = {}
+        """The level of each input with a fault, without the fault."""
+        self._bounces: list[tuple[Nanos, str, float]] = []
+        """Scheduled levels."""
+        self._stuck: dict[str, str] = {}
+        """The fault that holds each input."""
+        self._mute: list[str] = []
+        """Faults because of which a slave of the machine does not answer."""
+        self._released: list[tuple[Nanos, str, int]] = []
+        """The moment at which each fault releases its axis."""
+        self._off_until: Nanos | None = None
+        self._unsupplied = False
+        """Whether its power supply is off, or too low."""
+        self._cut: Nanos | None = None
+        """The moment of a supply failure during an action that ends first; None without one."""
+        self._fresh = self.copy_state()
+        body.watch(self)
+
+    # ------------------------------------------------------------------ the machine's own
+
+    @property
+    def axes(self) -> Sequence[Drive]:
+        return self.inner.axes
+
+    def _pass_on(self) -> None:
+        self.changed()
+
+    def take_edges(self) -> list[PinEdge]:
+        return self.inner.take_edges()
+
+    def pins(self) -> Mapping[str, float]:
+        """Levels at the machine, with the faults."""
+        return self.inner.pins()
+
+    def pin(self, name: str) -> float:
+        return self.inner.pin(name)
+
+    def power_off(self, now: Nanos) -> None:
+        self.inner.power_off(now)
+
+    def power_cycle(self, now: Nanos) -> None:
+        self.inner.power_cycle(now)
+
+    # ------------------------------------------------------------------ snapshots
+
+    def snapshot(self) -> FaultySnapshot:
+        return FaultySnapshot(self.copy_state(), self.inner.snapshot())
+
+    def restore(self, snapshot: Any) -> None:
+        """A snapshot taken before the machine could have faults is one without faults."""
+        if not isinstance(snapshot, FaultySnapshot):
+            snapshot = FaultySnapshot(self._fresh, snapshot)
+        self.set_state(snapshot.faults)
+        self.inner.restore(snapshot.machine)
+
+    # ------------------------------------------------------------------ time
+
+    def advance(self, now: Nanos) -> None:
+        while (due := self._own()) is not None and due <= now:
+            self.inner.advance(due)
+            self._run(due)
+        self.inner.advance(now)
+
+    def advance_to_change(self, until: Nanos) -> Nanos:
+        """See `steptwin.motioncontroller.MotionController.advance_to_change`."""
+        own, due = self._own(), self.inner.deadline()
+        if own is None or own > until:
+            return self.inner.advance_to_change(until)
+        if due is not None and due < own:
+            return self.inner.advance_to_change(own - 1)
+        self.advance(own)
+        return own
+
+    def deadline(self) -> Nanos | None:
+        dues = (self.inner.deadline(), self._own())
+        return min((due for due in dues if due is not None), default=None)
+
+    def _own(self) -> Nanos | None:
+        dues = [a.due for a in self._mine() if a.due is not None]
+        dues += [at for at, *_ in self._bounces] + [at for at, *_ in self._released]
+        dues += [at for at in (self._off_until, self._cut) if at is not None]
+        return min(dues, default=None)
+
+    def _run(self, now: Nanos) -> None:
+        if self._cut is not None:
+            self.after_request(now)
+        if self._off_until is not None and self._off_until <= now:
+            self._off_until = None
+            if not self._unsupplied:
+                self.inner.power_cycle(now)
+        for active in self._mine():
+            while active.due is not None and active.due <= now:
+                self._moment(active, now)
+        for bounce in [b for b in self._bounces if b[0] <= now]:
+            self._bounces.remove(bounce)
+            self._put(bounce[1], bounce[2], now)
+        for released in [r for r in self._released if r[0] <= now]:
+            self._let_go(released, now)
+        self.changed()
+
+    def _moment(self, active: ActiveFault, now: Nanos) -> None:
+        """Process the moment of a timed fault."""
+        kind = active.fault.kind
+        if kind.occasion is Occasion.ALWAYS:
+            kind.effect.act(active, self, now)
+            return
+        if active.strikes(now):
+            kind.effect.act(active, self, now)
+        active.step()
+
+    def block(self, active: ActiveFault, axis: int, now: Nanos, until: Nanos) -> None:
+        """Block the shaft of an axis (from 1)."""
+        self.body.shafts[axis - 1].block(True, now)
+        self._released.append((until, active.name, axis))
+
+    def drop_supply(self, now: Nanos, until: Nanos) -> None:
+        """Switch the supply off until a moment, or longer if it is off already."""
+        if self._off_until is None and not self._unsupplied:
+            self.inner.power_off(now)
+        self._off_until = max(until, self._off_until or 0)
+
+    def supply(self, on: bool, now: Nanos) -> None:
+        """Its power supply comes on, or goes off: then nothing answers until it is on again, as after power-on."""
+        self._unsupplied = not on
+        if self._off_until is None:
+            self.inner.power_cycle(now) if on else self.inner.power_off(now)
+        self.changed()
+
+    def cut_supply(self, now: Nanos, until: Nanos) -> None:
+        """As `drop_supply`, at the end of the present action."""
+        self._cut, self._off_until = now, until
+        self.changed()
+
+    def _let_go(self, released: tuple[Nanos, str, int], now: Nanos) -> None:
+        self._released.remove(released)
+        axis = released[2]
+        if not any(other == axis for *_, other in self._released):
+            self.body.shafts[axis - 1].block(False, now)
+
+    def _mine(self) -> tuple[ActiveFault, ...]:
+        return self._faults.of(self.name)
+
+    def report(self, active: ActiveFault, now: Nanos, text: str) -> None:
+        self._faults.report(active, self.name, now, text)
+
+    # ------------------------------------------------------------------ setting and removing
+
+    def check(self, fault: Fault) -> None:
+        """`Misuse` unless the machine has the axis or input."""
+        lacks = self.body.lacks(fault.kind)
+        if lacks is not None:
+            raise Misuse(f"fault {fault.kind.name}: {self.name!r} {lacks}")
+        axis = fault.whole("axis")
+        if axis is not None and axis > len(self.body.shafts):
+            raise Misuse(f"fault {fault.kind.name}: axis = {axis}: permitted are 1 to {len(self.body.shafts)}")
+        if fault.kind.check is not None:
+            fault.kind.check(self, fault)
+        if fault.kind.parameter("pin") is None:
+            return
+        pin = self.pin_of(fault)
+        levels = self.inner.pins()
+        if "." in pin:
+            raise Misuse(f"fault {fault.kind.name}: pin = {pin!r}: name the machine as machine=NAME, and the pin alone")
+        if pin not in levels:
+            raise Misuse(f"fault {fault.kind.name}: pin = {pin!r}: {self.name!r} has {', '.join(levels)}")
+        level = fault.get("value")
+        self.body.check_pin(pin, level if isinstance(level, float) else levels[pin])
+
+    def begin(self, active: ActiveFault) -> None:
+        """A fault of this machine was set."""
+        if active.fault.kind.parameter("pin") is not None:
+            pin = self.pin_of(active.fault)
+            self._outer.setdefault(pin, self.inner.pin(pin))
+        if active.fault.kind.occasion is Occasion.ALWAYS:
+            active.due = active.begin
+        self.changed()
+
+    def end(self, active: ActiveFault, now: Nanos) -> None:
+        """Remove a fault of this machine and release what it holds."""
+
+        if active.fault.kind.parameter("pin") is not None:
+            pin = self.pin_of(active.fault)
+            self._bounces = [b for b in self._bounces if b[1] != pin]
+            if self._stuck.get(pin, active.name) == active.name:
+                self._stuck.pop(pin, None)
+                self._put(pin, self._outer[pin], now)
+            if not any(other.fault.get("pin") and self.pin_of(other.fault) == pin for other in self._mine()):
+                del self._outer[pin]
+        for released in [r for r in self._released if r[1] == active.name]:
+            self._let_go(released, now)
+        if active.name in self._mute:
+            self._mute.remove(active.name)
+            self.body.show_master_error(bool(self._mute), now)
+        self.changed()
+
+    # ------------------------------------------------------------------ inputs
+
+    def held(self) -> Iterator[tuple[str, HeldLevel]]:
+        """The inputs that faults hold."""
+        for pin, fault in self._stuck.items():
+            yield pin, HeldLevel(fault, self.inner.pin(pin))
+
+    def pin_of(self, fault: Fault) -> str:
+        """The pin that a fault names, under its one name."""
+        return self.body.pin_name(str(fault.get("pin")))
+
+    def _put(self, pin: str, level: float, now: Nanos) -> None:
+        """A fault gives an input a level; what that changes is recorded."""
+        before = self.inner.pin(pin)
+        self.inner.set_pin(pin, level, now)
+        after = self.inner.pin(pin)
+        if after != before:
+            self._on_edge(pin, now, after)
+            self._faults.record(TraceRecord(now, self.name, "edge", pin, after))
+
+    def set_pin(self, pin: str, value: float, now: Nanos) -> None:
+        """Change the level before the faults; a held input takes it when it is released."""
+        name = self.body.pin_name(pin)
+        before = self._outer.get(name)
+        if before is None:
+            self.inner.set_pin(pin, value, now)
+            return
+        self.body.check_pin(name, value)
+        self._outer[name] = value
+        if name in self._stuck:
+            return
+        self._bounces = [b for b in self._bounces if b[1] != name]
+        self.inner.set_pin(name, value, now)
+        if value != before:
+            for active in self._mine():
+                if active.fault.kind.occasion is Occasion.CHANGE and self.pin_of(active.fault) == name and active.strikes(now):
+                    active.fault.kind.effect.act(active, self, name, (before, value), now)
+
+    def bounce(self, changes: list[tuple[Nanos, str, float]]) -> None:
+        """Levels of inputs to come, each with its moment and pin."""
+        self._bounces += changes
+        self.changed()
+
+    def stick(self, active: ActiveFault, now: Nanos) -> None:
+        """The first moment sticks, the second lets go."""
+        pin = self.pin_of(active.fault)
+        if self._stuck.get(pin) != active.name:
+            wanted = active.fault.get("value")
+            level = wanted if isinstance(wanted, float) else self.inner.pin(pin)
+            self._bounces = [b for b in self._bounces if b[1] != pin]
+            self._stuck[pin] = active.name
+            self._put(pin, level, now)
+            active.struck += 1
+            self.report(active, now, f"{pin} is stuck at {level:g}")
+            active.due = active.end
+        else:
+            active.due = None
+            del self._stuck[pin]
+            self._put(pin, self._outer[pin], now)
+            self.report(active, now, f"{pin} is free")
+
+    def fail_master(self, active: ActiveFault, now: Nanos) -> None:
+        """The first moment sets the error, the second clears it."""
+        if active.struck == 0:
+            self._mute.append(active.name)
+            active.struck = 1
+            active.due = active.end
+            self.report(active, now, "a slave of its Modbus master does not answer")
+        else:
+            self._mute.remove(active.name)
+            active.due = None
+            self.report(active, now, "the slave of its Modbus master answers again")
+        self.body.show_master_error(bool(self._mute), now)
+
+    # ------------------------------------------------------------------ what the body asks
+
+    def refusal(self, unit: int, line: str, pdu: bytes, now: Nanos) -> bytes | None:
+        """The answer to a request on ``line`` that a fault refuses; None if it is executed."""
+        function = pdu[0] if pdu else 0
+        if self._off_until is not None or self._unsupplied:
+            return exception_pdu(function, NEVER_SENT)
+        for active in self._faults.refusing():
+            if active.matches(unit, pdu) and active.is_on(self._faults.link, line) and active.strikes(now):
+                code, text = active.fault.kind.effect.refusal(active)
+                self.report(active, now, f"{text}: {pdu.hex(' ')}")
+                return exception_pdu(function, code)
+        return None
+
+    def kept(self, old: bytes, new: bytes, now: Nanos) -> bytes:
+        """The content of the memory after ``new`` was saved over ``old`` of the same length."""
+        kept = bytearray(new)
+        saves = [active for active in self._mine() if active.fault.kind.occasion is Occasion.SAVE]
+        for active in saves:
+            if active.strikes(now):
+                active.fault.kind.effect.act(active, self, old, kept, now)
+        return bytes(kept)
+
+    def after_request(self, now: Nanos) -> bool:
+        """Whether the supply has failed during a request; it is off then."""
+        if self._cut is None:
+            return False
+        self._cut = None
+        self.inner.power_off(now)
+        return True
+
+
+def rig(kernel: Kernel, name: str, faults: Faults, body: Body) -> FaultyMachine:
+    """Apply faults of physics and protocol to the machine ``name`` of a kernel."""
+
+    def on_edge(pin: str, now: Nanos, level: float) -> None:
+        kernel.mark_recorded(PinName(name, pin), now, level)
+
+    machine = kernel.machines[name]
+    if isinstance(machine, FaultyMachine):
+        return machine
+    failing = faults.machines[name] = FaultyMachine(machine, name, faults, body, on_edge)
+    kernel.replace(name, failing)
+    return failing

@@ -1,0 +1,49 @@
+"""Faults of bytes on the line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from steptwin.machine import Nanos
+from steptwin.simulation.faults.active import ActiveFault, FaultReporter
+from steptwin.simulation.faults.effects import ByteEffect, InsertEffect, PiecesEffect, Run
+
+
+def spoil(data: bytes, actives: Sequence[ActiveFault], now: Nanos, report: FaultReporter) -> list[tuple[Nanos, bytes]]:
+    """The pieces that ``data`` arrives in, each with its delay; faults of the order in which they were set."""
+    run = Run()
+    bytewise = []
+    for active in actives:
+        effect = active.fault.kind.effect
+        if isinstance(effect, ByteEffect):
+            bytewise.append(active)
+        elif isinstance(effect, InsertEffect) and active.strikes(now):
+            effect.act(active, run, report)
+    if bytewise:
+        for place, byte in enumerate(data):
+            _pass(
+                run, byte, bytewise, now, lambda active, what, at=place: report(active, f"byte {at + 1} of {len(data)}: {what}")
+            )
+    else:
+        run.put(data)
+    for active in actives:
+        effect = active.fault.kind.effect
+        if isinstance(effect, PiecesEffect) and active.strikes(now):
+            return effect.act(active, run, len(data), report)
+    return [(delay, bytes(piece)) for delay, piece in run.pieces if piece]
+
+
+def _pass(run: Run, byte: int, actives: Sequence[ActiveFault], now: Nanos, report: FaultReporter) -> None:
+    lost = False
+    for active in actives:
+        if active.left:
+            active.left -= 1
+            lost = True
+        elif active.strikes(now):
+            arrives = active.fault.kind.effect.act(active, byte, run, report)
+            if arrives is None:
+                lost = True
+            else:
+                byte = arrives
+    if not lost:
+        run.put((byte,))

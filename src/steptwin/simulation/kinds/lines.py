@@ -1,0 +1,360 @@
+"""Lines of a world: controllers on a serial line or a network, and the programs connected to them.
+
+Each program has its own place on the line. Responses are collected at the moment they arrive, so that each has its time.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Callable, Collection, Mapping
+from functools import partial
+from typing import Any, ClassVar, NamedTuple, Protocol
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos, Port, sends_by_itself
+from steptwin.simulation.faults import Faults, FaultyPort, FaultySendingPort
+from steptwin.simulation.faults import LineProtocol as FaultLine
+from steptwin.simulation.kinds.master import Master
+from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.trace import RecordSink, TraceRecord
+from steptwin.state import Plain, Stateful
+from steptwin.wire.slave import FrameDirection, FrameObserver, SlaveDevice, SlavePort
+
+SCRIPTS = "script"
+"""The place of the world's own scripts on every line."""
+
+MOST_RECEIVED = 1 << 16
+"""Limit of received pieces kept for a program that does not fetch them; the oldest are dropped."""
+
+
+class FrameFollower(Protocol):
+    """Observes the traffic of a line."""
+
+    def frame(self, now: Nanos, place: str, direction: FrameDirection, data: bytes) -> None:
+        """Take a frame, or characters; ``place`` is ``"chips"`` for characters that M1486 chips send."""
+        ...
+
+    def unframed(self, now: Nanos, place: str, count: int) -> None:
+        """Take the number of bytes that belong to no frame."""
+        ...
+
+
+class LineTraffic(NamedTuple):
+    """Numbers of what the programs on a line have sent since the beginning; no state, so a restore leaves them."""
+
+    requests: int = 0
+    errors: int = 0
+    """Answers with an exception, and requests lost because the controller was busy; of characters, those lost on the wire."""
+    unframed: int = 0
+    """Bytes that belonged to no frame."""
+
+    def plus(self, other: LineTraffic) -> LineTraffic:
+        return LineTraffic(self.requests + other.requests, self.errors + other.errors, self.unframed + other.unframed)
+
+
+class LineWrite(NamedTuple):
+    """What a program has sent that is no read. ``units``: the controllers that it addresses; empty where that is not known.
+
+    ``outcome``: ``done``, ``refusal``; empty where there is no answer.
+    """
+
+    time: Nanos
+    place: str
+    units: tuple[int, ...]
+    words: str
+    outcome: str
+
+
+class LineWords(FrameFollower, Protocol):
+    """Decodes the traffic of a line into text."""
+
+    def recorded(self, record: TraceRecord) -> None:
+        """Take a trace record of a controller on the line."""
+        ...
+
+    def changes(self, place: str, data: bytes) -> Collection[int]:
+        """The addresses of the controllers that a request or characters of a program may change."""
+        ...
+
+
+class LineEndPoint(Stateful):
+    """The connection of one program. ``received``: pieces not fetched yet, with their moments."""
+
+    FIXED: ClassVar[tuple[str, ...]] = (
+        "framed",
+        "inner",
+        "is_connected",
+        "kind",
+        "on_output",
+        "port",
+        "talks",
+        "unframed",
+    )
+    __slots__ = (*FIXED, "received")
+
+    def __init__(self, kind: str, port: FaultyPort, inner: Any, framed: SlavePort | None, *, talks: bool) -> None:
+        self.kind = kind
+        self.port = port
+        self.inner = inner
+        """The port without the faults of the line."""
+        self.framed = framed
+        """The port that reports Modbus frames."""
+        self.unframed = 0
+        """Number of reported bytes that belonged to no frame."""
+        self.is_connected = True
+        """False after the program has disconnected."""
+        self.talks = talks
+        """Whether the port may send without a request."""
+        self.received: deque[tuple[Nanos, bytes]] = deque(maxlen=MOST_RECEIVED)
+        self.on_output: Callable[[], None] | None = None
+
+    def take(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
+        """Remove and return the pieces received by ``now``."""
+        taken = []
+        while self.received and self.received[0][0] <= now:
+            taken.append(self.received.popleft())
+        return taken
+
+
+class Line(Stateful, ABC):
+    """Base class of lines; a part of its kernel."""
+
+    FIXED: ClassVar[tuple[str, ...]] = ("_before", "_busy", "_faults", "_followers", "_kernel", "_record", "name", "places")
+    __slots__ = (*FIXED,)
+
+    kinds: ClassVar[tuple[str, ...]]
+    """Kinds of places; the first is that of scripts."""
+    fault_kinds: ClassVar[Mapping[str, FaultLine]]
+    is_shared: ClassVar[bool] = False
+    """Whether every program on it receives all that is sent, requested or not."""
+
+    def __init__(self, kernel: Kernel, name: str, record: RecordSink | None, faults: Faults) -> None:
+        self._kernel = kernel
+        self._record = record
+        self._faults = faults
+        self.name = name
+        self.places: dict[str, LineEndPoint] = {}
+        self._followers: list[FrameFollower] = []
+        self._before = LineTraffic()
+        """Of programs that have disconnected."""
+        self._busy: dict[str, LineEndPoint] = {}
+        """Places that may send without a request, or later."""
+
+    # ------------------------------------------------------------------ implemented by kinds of lines
+
+    @abstractmethod
+    def _port(self, place: str, kind: str) -> Port:
+        """A new port for a program. Its state is copied by `_port_state`."""
+
+    def _framed(self, port: Any) -> SlavePort | None:
+        """The port that reports Modbus frames, for a port made by `_port`."""
+        return None
+
+    @property
+    def master(self) -> Master:
+        """Sends the Modbus requests of scripts. Raises `Misuse` for a line without Modbus."""
+        raise Misuse(f"line {self.name!r} carries no Modbus: requests need a line of kind modbus")
+
+    def recall(self, unit: int, now: Nanos) -> None:
+        """Drop what scripts have asked of the controller with an address and is not executed yet."""
+
+    def serve_by(self, served: Callable[[Mapping[int, SlaveDevice]], Mapping[int, SlaveDevice]]) -> None:
+        """Replace the devices that execute external Modbus requests: ``served`` maps those by unit to their wrappers."""
+
+    @property
+    @abstractmethod
+    def units(self) -> tuple[int, ...]:
+        """The addresses of its controllers."""
+
+    @property
+    @abstractmethod
+    def baud(self) -> int:
+        """The present rate of the line, bit/s."""
+
+    @property
+    @abstractmethod
+    def is_timed(self) -> bool:
+        """Whether characters take transmission time."""
+
+    # ------------------------------------------------------------------ places
+
+    def connect(self, place: str, kind: str | None = None) -> LineEndPoint:
+        """The place of a program, made on first use. Raises `Misuse` for a kind the line does not have."""
+        found = self.places.get(place)
+        if found is not None:
+            return found
+        kind = self.kinds[0] if kind is None else kind
+        if kind not in self.kinds:
+            raise Misuse(f"line {self.name!r} takes no connection of kind {kind!r}: permitted are {', '.join(self.kinds)}")
+        port = self._port(place, kind)
+        framed = self._framed(port)
+        if sends_by_itself(port):
+            faulty: FaultyPort = FaultySendingPort(
+                port, place, self._faults, self.fault_kinds[kind], line_name=self.name, is_read=place != SCRIPTS
+            )
+            port.on_output = partial(self._kernel.mark, self.name)
+            is_busy = True
+        else:
+            faulty = FaultyPort(
+                port,
+                place,
+                self._faults,
+                self.fault_kinds[kind],
+                framed=framed,
+                units=self.units,
+                line_name=self.name,
+            )
+            is_busy = False
+        found = self.places[place] = LineEndPoint(kind, faulty, port, framed, talks=is_busy)
+        if is_busy:
+            self._busy[place] = found
+        return found
+
+    def leave(self, place: str) -> None:
+        """Remove the place of a program that has disconnected."""
+        found = self.places.pop(place, None)
+        self._busy.pop(place, None)
+        if found is not None:
+            found.is_connected = False
+            self._before = self._before.plus(self._traffic_of(found))
+            found.port.close()
+
+    @property
+    def traffic(self) -> LineTraffic:
+        """Of all programs, scripts included."""
+        traffic = self._before
+        for place in self.places.values():
+            traffic = traffic.plus(self._traffic_of(place))
+        return traffic
+
+    def _traffic_of(self, place: LineEndPoint) -> LineTraffic:
+        framed = place.framed
+        if framed is None:
+            return LineTraffic()
+        return LineTraffic(framed.requests, framed.exceptions + framed.lost, framed.unframed)
+
+    def _count_unframed(self, name: str, place: LineEndPoint, now: Nanos) -> None:
+        """Report bytes that belonged to no frame."""
+        if place.framed is None:
+            return
+        unframed = place.framed.unframed
+        if unframed > place.unframed:
+            for follower in self._followers:
+                follower.unframed(now, name, unframed - place.unframed)
+        place.unframed = unframed
+
+    def exchange(self, place: str, found: LineEndPoint, data: bytes, now: Nanos) -> bytes:
+        """Take bytes of the program at ``place``, connected as ``found``; the kernel is at ``now``. Returns the immediate answer;
+        later answers go to `LineEndPoint.received`."""
+        answer = found.port.exchange(data, now)
+        if place in self._busy or found.port.deadline() is not None:
+            self._busy[place] = found
+            self._kernel.mark(self.name)
+        if self._kernel.is_attentive or self._kernel.hears_requests:
+            self._kernel.mark()
+        if self._followers:
+            self._count_unframed(place, found, now)
+        return answer
+
+    def is_idle_read(self, place: LineEndPoint, data: bytes) -> bool:
+        """Whether bytes of a program are a read without side effects, which need not be recorded for a replay."""
+        return False
+
+    def exchange_unrecorded(self, place: str, found: LineEndPoint, data: bytes, now: Nanos) -> bytes:
+        """As `exchange`; followers see the frames, the trace does not."""
+        record, self._record = self._record, None
+        try:
+            return self.exchange(place, found, data, now)
+        finally:
+            self._record = record
+
+    def receive(self, place: str, data: bytes, now: Nanos) -> None:
+        """Take bytes of the program at ``place``; all answers go to `LineEndPoint.received`. The kernel is at ``now``."""
+        found = self.connect(place)
+        answer = self.exchange(place, found, data, now)
+        if answer:
+            self._came(place, found, [(now, answer)])
+        self._kernel.mark(self.name)
+
+    def _came(self, place: str, found: LineEndPoint, pieces: list[tuple[Nanos, bytes]]) -> None:
+        found.received.extend(pieces)
+        if found.on_output is not None:
+            found.on_output()
+
+    # ------------------------------------------------------------------ time
+
+    def update(self, now: Nanos) -> None:
+        for name, place in tuple(self._busy.items()):
+            pieces = place.port.to_send(now)
+            if pieces:
+                self._came(name, place, pieces)
+            if self._followers:
+                self._count_unframed(name, place, now)
+            if not place.talks and place.port.deadline() is None:
+                self._busy.pop(name, None)
+
+    def deadline(self) -> Nanos | None:
+        dues = [due for place in self._busy.values() if (due := place.port.deadline()) is not None]
+        return min(dues, default=None)
+
+    def stop_recording(self) -> None:
+        """Record no frames from now on."""
+        self._record = None
+
+    def _report(self, now: Nanos, place: str, direction: FrameDirection, data: bytes) -> None:
+        if self._record is not None:
+            self._record(TraceRecord(now, self.name, "frame", f"{place}/{direction.value}", data))
+        for follower in self._followers:
+            follower.frame(now, place, direction, data)
+
+    def follow_frames(self, follower: FrameFollower) -> None:
+        """Call ``follower`` with every frame from now on."""
+        self._followers.append(follower)
+        self._watch_ports()
+
+    def unfollow_frames(self, follower: FrameFollower) -> None:
+        """Stop calling ``follower``."""
+        self._followers.remove(follower)
+        self._watch_ports()
+
+    def _watch_ports(self) -> None:
+        for name, place in self.places.items():
+            place.port.watch(self._observer(name))
+
+    def _observer(self, place: str) -> FrameObserver | None:
+        """The observer of frames for the port at ``place``; None if frames are not observed, or the line has none."""
+
+        return None
+
+    @property
+    def _is_followed(self) -> bool:
+        return self._record is not None or bool(self._followers)
+
+    # ------------------------------------------------------------------ snapshots
+
+    def copy_state(self) -> Plain:
+        places = tuple(
+            (name, place.kind, place.copy_state(), place.port.copy_state(), self._port_state(place))
+            for name, place in self.places.items()
+        )
+        return super().copy_state(), places, tuple(self._busy)
+
+    def set_state(self, plain: Plain) -> None:
+        own, places, busy = plain
+        kept = {name for name, *_ in places}
+        for name in [name for name in self.places if name not in kept]:
+            self.leave(name)
+        for name, kind, state, faulty, port_state in places:
+            place = self.connect(name, kind)
+            place.set_state(state)
+            place.port.set_state(faulty)
+            self._set_port_state(place, port_state)
+        super().set_state(own)  # at last: who connects may collect what is on the wire
+        self._busy = {name: self.places[name] for name in busy}  # in their order, which is that of simultaneous answers
+
+    def _port_state(self, place: LineEndPoint) -> Plain:
+        return place.inner.copy_state()
+
+    def _set_port_state(self, place: LineEndPoint, state: Plain) -> None:
+        place.inner.set_state(state)

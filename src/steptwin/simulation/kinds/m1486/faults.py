@@ -1,0 +1,63 @@
+"""The M1486 as something that can fail. What its shaft does is for mechanics: the chip has no encoder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+
+from steptwin.errors import Misuse
+from steptwin.m1486.chip import M1486Chip
+from steptwin.m1486.pins import ALIASES, known_pin, refuse_taken
+from steptwin.m1486.variants import Store
+from steptwin.machine import Nanos
+from steptwin.simulation.faults.machine import AxisLoad, FaultyMachine
+from steptwin.simulation.faults.table import FaultKind, Need, Occasion
+from steptwin.simulation.kinds.kind import LineUnit
+
+
+class M1486Body:
+    """A file is of no use unless it is whole: one whose saving was cut off, or that meets a worn byte, is lost."""
+
+    def __init__(self, chip: M1486Chip, shafts: Iterable[AxisLoad] = ()) -> None:
+        self._chip = chip
+        self.shafts = list(shafts)
+
+    def lacks(self, kind: FaultKind) -> str | None:
+        if kind.parameter("axis") is not None and not self.shafts:
+            return "has no shaft: an M1486 has one where a world has its [[axis]]"
+        if kind.needs is Need.ENCODER:
+            return "is an M1486, which reads no encoder"
+        if kind.needs is Need.MODBUS_MASTER:
+            return "is an M1486, which is not a Modbus master"
+        if kind.occasion is Occasion.SAVE and self._chip.variant.store is not Store.EEPROM:
+            return "saves nothing: it has no memory that survives power-off"
+        return None
+
+    def show_master_error(self, shown: bool, now: Nanos) -> None:
+        """There is none."""
+
+    def watch(self, owner: FaultyMachine) -> None:
+        chip = self._chip
+        store = chip.store
+        chip.store = lambda image: _keep(chip, store, owner, image)
+
+    def pin_name(self, pin: str) -> str:
+        name = pin.strip().upper()
+        return ALIASES.get(name, name)
+
+    def check_pin(self, pin: str, level: float) -> None:
+        refuse_taken(known_pin(pin), self._chip.interface)
+        if level not in (0.0, 1.0):
+            raise Misuse(f"{pin} = {level:g}: a digital input is 0 or 1")
+
+
+def _keep(chip: M1486Chip, store: Callable[[bytes], bytes | None] | None, owner: FaultyMachine, image: bytes) -> bytes:
+    size = max(len(image), len(chip.image))
+    old, new = chip.image.ljust(size, b"\xff"), image.ljust(size, b"\xff")
+    kept = owner.kept(old, new, chip.now)
+    image = image if kept == new else chip.image if kept == old else b""
+    stored = store(image) if store is not None else None
+    return image if stored is None else stored
+
+
+def body(chip: M1486Chip, service: LineUnit, shafts: Mapping[int, AxisLoad]) -> M1486Body:
+    return M1486Body(chip, shafts.values())

@@ -1,0 +1,116 @@
+"""A held jog of an M1486: a row of short moves (F or B), each of which begins when the one before it has ended.
+
+G+ and G- are never used: nothing ends them. No move is cut short, because Kill makes the position counter wrong (M-16).
+"""
+
+from __future__ import annotations
+
+from steptwin.errors import Misuse, Refusal
+from steptwin.m1486.chip import M1486Chip
+from steptwin.m1486.drive import speed_curve
+from steptwin.m1486.microsteps import FULL_STEP, UNIT
+from steptwin.m1486.present import program_words
+from steptwin.m1486.ranges import out_of_range
+from steptwin.m1486.syntax import ChipCommand
+from steptwin.m1486.variants import SLOWEST_JOG, Store
+from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.motion.ramps import longest_within
+from steptwin.simulation.kinds.m1486.control import typed
+from steptwin.simulation.script.control import Jog
+from steptwin.simulation.script.heldjog import REST_NS, STOP_NS, Given
+
+LINK_NS: Nanos = 100 * MILLISECOND
+"""A move takes at most this, unless a single microstep takes longer."""
+TYPED = 12
+"""Characters that are typed for a move."""
+LOOK_NS: Nanos = MILLISECOND
+"""How often a chip that is not yet at rest is looked at."""
+PATIENCE_NS: Nanos = 2 * SECOND
+"""A chip that is busy for so long does something else."""
+
+
+class M1486HeldJog:
+    """See `steptwin.simulation.script.heldjog.HeldJog`. Raises `Misuse` for a velocity, `Refusal` for a chip that cannot be
+    jogged now."""
+
+    def __init__(self, chip: M1486Chip, line: str | None, wanted: Jog) -> None:
+        name = wanted.machine
+        if wanted.axis != 1:
+            raise Misuse(f"{name}: no axis {wanted.axis}: an M1486 has one, 1")
+        if line is None:
+            raise Refusal(f"{name} is on no line, so no commands can be sent to it")
+        if chip.variant.store is Store.EEPROM:
+            raise Refusal(f"{name}: {chip.variant.title} writes every command into its EEPROM, so it is not jogged")
+        if chip.is_timed and chip.uart.baud < SLOWEST_JOG:
+            raise Refusal(f"{name}: a jog needs a line of at least {SLOWEST_JOG} bit/s; this one has {chip.uart.baud} bit/s")
+        if not chip.is_idle():
+            raise Refusal(f"{name} is not at rest ({program_words(chip, chip.now)}): wait, or stop it")
+        self.lasts_ns: Nanos = min(STOP_NS, REST_NS - TYPED * chip.uart.character_ns) - LINK_NS
+        self._chip = chip
+        self._line = line
+        self._direction = 1 if wanted.velocity > 0.0 else -1
+        self._velocity = round(abs(wanted.velocity) / (FULL_STEP * chip.variant.clock))
+        why = out_of_range(ChipCommand("V", self._velocity), chip.variant)
+        if why is not None:
+            raise Misuse(f"velocity {wanted.velocity:g} {UNIT}/s, V{self._velocity}: {why}")
+        self._before = chip.drive.velocity
+        self._distance_u = self._distance()
+        self.over: str | None = None
+        self._extended: Nanos | None = None
+        self._begun: Nanos = 0
+        self._target_u = 0
+        self._due: Nanos | None = None
+
+    def _distance(self) -> int:
+        """Microsteps that a move with its ramps makes in the time of a link; one at least."""
+        drive = self._chip.drive
+        settings = drive.start_stop, drive.acceleration, drive.profile_speed, self._velocity
+        curve = speed_curve(settings, drive.qualification, self._chip.variant.clock)
+        return longest_within(LINK_NS, drive.grid_u, curve)
+
+    # ------------------------------------------------------------------ as `HeldJog`
+
+    def extend(self, now: Nanos) -> Given:
+        if self.over is not None:
+            return ()
+        is_first, self._extended = self._extended is None, now
+        if is_first:
+            return self._go(now, f"v{self._velocity}")
+        return self.advance(now)
+
+    def release(self, now: Nanos) -> Given:
+        self.over = self.over or "let go"
+        return self.advance(now)
+
+    drop = release  # it has a move left that ends in time
+
+    def cut(self) -> None:
+        self.over = self.over or "stopped"
+
+    def deadline(self) -> Nanos | None:
+        return self._due
+
+    def advance(self, now: Nanos) -> Given:
+        """The next move where the one before has ended and there is time for it; else the end."""
+        if self._due is None:
+            return ()
+        if not self._chip.is_idle():
+            if now - self._begun > PATIENCE_NS:
+                self.over, self._due = self.over or f"the chip {program_words(self._chip, now)}", None
+            else:
+                self._due = max(self._chip.drive.deadline() or 0, now + LOOK_NS)
+            return ()
+        if self.over is None and self._chip.drive.true_u(now) != self._target_u:
+            self.over = "stopped"
+        if self.over is None and self._extended is not None and now <= self._extended + self.lasts_ns:
+            return self._go(now)
+        self.over, self._due = self.over or "lapsed", None
+        return self._typed(f"v{self._before}")
+
+    def _go(self, now: Nanos, *before: str) -> Given:
+        self._begun, self._due = now, now + LOOK_NS
+        self._target_u = self._chip.drive.true_u(now) + self._direction * self._distance_u
+        return self._typed(*before, f"{'f' if self._direction > 0 else 'b'}{self._distance_u}", "r")
+
+    def _typed(self, *texts: str) -> Given:
+        return (typed(self._chip, self._line, *texts),)

@@ -1,0 +1,86 @@
+"""Lines of M1486 chips."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+from steptwin.errors import Misuse
+from steptwin.m1486.chip import M1486Chip
+from steptwin.m1486.line import SerialChain
+from steptwin.machine import Nanos, Port
+from steptwin.simulation.faults import Faults
+from steptwin.simulation.faults import LineProtocol as FaultLine
+from steptwin.simulation.kinds.kind import LineSpec, Member
+from steptwin.simulation.kinds.lines import SCRIPTS, Line, LineEndPoint, LineTraffic
+from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.trace import RecordSink
+from steptwin.state import Plain
+from steptwin.wire.slave import FrameDirection
+
+
+class ChipLine(Line):
+    """M1486 chips on one serial line. All chips receive all programs, and all programs receive all chips."""
+
+    FIXED: ClassVar[tuple[str, ...]] = ("_commands",)
+    __slots__ = (*FIXED, "chain")
+
+    kinds = ("raw",)
+    fault_kinds: ClassVar[Mapping[str, FaultLine]] = {"raw": FaultLine.CHARACTERS}
+    is_shared = True
+
+    def __init__(self, kernel: Kernel, name: str, record: RecordSink | None, faults: Faults, chips: list[M1486Chip]) -> None:
+        super().__init__(kernel, name, record, faults)
+        self.chain = SerialChain(chips)
+        self._commands = 0
+        """Number of lines that programs have sent."""
+        self.connect(SCRIPTS)
+
+    @property
+    def units(self) -> tuple[int, ...]:
+        return ()
+
+    @property
+    def baud(self) -> int:
+        return next(iter(self.chain.chips.values())).uart.baud
+
+    @property
+    def is_timed(self) -> bool:
+        return next(iter(self.chain.chips.values())).is_timed
+
+    def _port(self, place: str, kind: str) -> Port:
+        return self.chain.port()
+
+    def exchange(self, place: str, found: LineEndPoint, data: bytes, now: Nanos) -> bytes:
+        if data:
+            self._report(now, place, FrameDirection.IN, data)
+            self._commands += data.count(b"\r")
+        return super().exchange(place, found, data, now)
+
+    def recall(self, unit: int, now: Nanos) -> None:
+        """Bytes that a fault holds up come to the chips at once, where a stop drops them."""
+        self.places[SCRIPTS].port.hasten(now)
+
+    @property
+    def traffic(self) -> LineTraffic:
+        return LineTraffic(self._commands, self.chain.collisions)
+
+    def _came(self, place: str, found: LineEndPoint, pieces: list[tuple[Nanos, bytes]]) -> None:
+        if place == SCRIPTS:  # output is recorded here; scripts do not read it
+            for moment, data in pieces:
+                self._report(moment, "chips", FrameDirection.OUT, data)
+        else:
+            super()._came(place, found, pieces)
+
+    def _port_state(self, place: LineEndPoint) -> Plain:
+        return tuple(place.inner.pending)
+
+    def _set_port_state(self, place: LineEndPoint, state: Plain) -> None:
+        place.inner.pending = list(state)
+
+
+def make(spec: LineSpec, members: Sequence[Member], kernel: Kernel, record: RecordSink, faults: Faults) -> ChipLine:
+    """The line of a description. Raises `Misuse` for addresses that are taken, and for strict timing."""
+    if spec.timing == "strict":
+        raise Misuse("timing = 'strict' is for lines of kind modbus: an M1486 has no time-out between characters")
+    return ChipLine(kernel, spec.name, record, faults, [member.machine for member in members])

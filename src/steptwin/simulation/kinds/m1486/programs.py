@@ -1,0 +1,228 @@
+"""The program of an M1486 while it is executed: what it was given or downloaded last, not what a host has typed since."""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable, Collection, Mapping, Sequence
+
+from steptwin.controlflow import ControlFlow
+from steptwin.diagnostics import SourceText
+from steptwin.errors import Misuse
+from steptwin.m1486.chip import M1486Chip
+from steptwin.m1486.commands import When, when
+from steptwin.m1486.encoding import decode, encode
+from steptwin.m1486.points import live_point
+from steptwin.m1486.program import WaitReason
+from steptwin.m1486.registers import GENERAL
+from steptwin.m1486.structure import CommandStream, streams
+from steptwin.m1486.successors import flow_of
+from steptwin.m1486.syntax import ChipCommand, parse
+from steptwin.m1486.unit import MASK
+from steptwin.machine import Nanos
+from steptwin.simulation.kinds.kind import TextContext
+from steptwin.simulation.kinds.m1486.memory import PLACE as TEXT
+from steptwin.simulation.kinds.m1486.memory import given_text
+from steptwin.simulation.kinds.m1486.statement_use import use_of
+from steptwin.simulation.kinds.m1486.table import M1486Spec
+from steptwin.simulation.kinds.programs import Frame, Place, Statement, StatementUse
+from steptwin.statements import StatementHook
+
+BEGIN = "program"
+"""The name of what is executed before the first label."""
+REGISTER_MAX = 0xFFFF
+RESET = "\\"
+
+
+def programs(spec: M1486Spec, chip: M1486Chip, context: TextContext) -> ChipPrograms:
+    """See `steptwin.simulation.kinds.kind.ControllerKind.programs`."""
+    given = given_text(spec, context)
+    return ChipPrograms(chip, lambda: context.downloaded(spec.name, TEXT) or given)
+
+
+class _Text:
+    """A program with what is known of its text: the commands of one chip of a chain."""
+
+    def __init__(self, source: SourceText | None, chip: M1486Chip) -> None:
+        self.source = source
+        self._chip = chip
+        self._stream: CommandStream | None = None
+        self._indices: list[int] = []
+        """Of the stream, where each command stands."""
+        self.commands: list[ChipCommand] = []
+        self.offsets: list[int] = []
+        """Where each command lies."""
+        self.labels: dict[str, int] = {}
+        self.end = 0
+        self.statements: tuple[Statement, ...] = ()
+        if source is not None:
+            self._read(source)
+        self.numbers: dict[int, list[int]] = {}
+        """Of the commands that come to lie at a place, one after the other where a reset empties the memory."""
+        for number, place in enumerate(self.offsets):
+            self.numbers.setdefault(place, []).append(number)
+        self._named = sorted((number, name) for name, number in self.labels.items())
+
+    def _read(self, source: SourceText) -> None:
+        found = streams(parse(source.text).program)
+        self._stream = stream = next((one for one in found if one.address in (None, self._chip.address)), None)
+        if stream is None:
+            return
+        for index, command in enumerate(stream.commands):
+            if command.key == "@":
+                self.labels[f"label {command.number}"] = len(self.commands)
+            elif command.key == RESET and stream.in_file[index] is None:
+                self.end = 0
+            elif when(command.key, command.number) is When.QUEUED:
+                self._indices.append(index)
+                self.commands.append(command)
+                self.offsets.append(self.end)
+                self.end = (self.end + len(encode(command))) % self._chip.memory.span
+        self.statements = tuple(
+            Statement(command.span.start, command.span.end, source.position(command.span.start)[0]) for command in self.commands
+        )
+
+    def after(self) -> Mapping[int, Sequence[int]]:
+        if self._stream is None:
+            return {}
+        flow = self._flow(self._stream)
+        return {
+            number: tuple(bisect_left(self._indices, target) for target in flow.calls.get(index, flow.after[index]))
+            for number, index in enumerate(self._indices)
+        }
+
+    def reached(self, starts: Collection[int]) -> Collection[int]:
+        if self._stream is None:
+            return ()
+        found = self._flow(self._stream).reached([self._indices[number] for number in starts if number < len(self._indices)])
+        return [number for number, index in enumerate(self._indices) if index in found]
+
+    def _flow(self, stream: CommandStream) -> ControlFlow:
+        return flow_of(stream, self._chip.variant, self._chip.interface)
+
+    def name(self, number: int) -> str:
+        """Of the label at or before a statement."""
+        found = bisect_right(self._named, number, key=lambda row: row[0])
+        return self._named[found - 1][1] if found else BEGIN
+
+
+class ChipPrograms:
+    """See `steptwin.simulation.kinds.programs.Programs`. ``source`` gives the present text.
+
+    A command is known by its place in the memory. Once something else lies there (M-12) it comes from no text.
+    """
+
+    def __init__(self, chip: M1486Chip, source: Callable[[], SourceText | None]) -> None:
+        self._chip = chip
+        self._source = source
+        self._known = _Text(None, chip)
+
+    @property
+    def _text(self) -> _Text:
+        source = self._source()
+        if source is not self._known.source:
+            self._known = _Text(source, self._chip)
+        return self._known
+
+    @property
+    def texts(self) -> Mapping[str, SourceText]:
+        source = self._source()
+        return {} if source is None else {TEXT: source}
+
+    @property
+    def statement_time(self) -> Nanos:
+        return self._chip.program.statement_ns
+
+    def statements(self, text: str) -> Sequence[Statement]:
+        return self._text.statements
+
+    def after(self, text: str) -> Mapping[int, Sequence[int]]:
+        return self._text.after()
+
+    def reached(self, text: str, starts: Collection[int]) -> Collection[int]:
+        return self._text.reached(starts)
+
+    def labels(self, text: str) -> Mapping[str, int]:
+        return self._text.labels
+
+    def hook(self, hook: StatementHook, places: Collection[Place] | None = None) -> None:
+        offsets = self._text.offsets
+        numbers = None if places is None else frozenset(offsets[place.number] for place in places if place.number < len(offsets))
+        self._chip.program.hook(hook, numbers)
+
+    def unhook(self, hook: StatementHook) -> None:
+        self._chip.program.unhook(hook)
+
+    def place(self, number: int) -> Place | None:
+        text = self._text
+        found = text.numbers.get(number)
+        stored = None if found is None else decode(self._chip.memory.fetch(number))
+        if found is None or stored is None:
+            return None
+        there = (Place(TEXT, one) for one in found if text.commands[one] == stored.command)
+        return next(there, None)
+
+    def begun(self, now: Nanos) -> Sequence[int]:
+        program = self._chip.program
+        has_begun = now == 0 and program.statement_ns > 0 and (program.ready > 0 or program.waiting is not WaitReason.NOTHING)
+        begin = self._chip.memory.begin
+        return (begin,) if has_begun and begin is not None and self._chip.memory.end != begin else ()
+
+    def depth(self) -> int:
+        return 0 if self._chip.program.back is None else 1
+
+    def has_name(self, name: str) -> bool:
+        return self.read(name, 0) is not None
+
+    def point(self, name: str) -> str | None:
+        return None
+
+    def comes_back(self, place: Place) -> bool:
+        return True
+
+    def use(self, place: Place) -> StatementUse:
+        return use_of(self._text.commands[place.number])
+
+    def stack(self, now: Nanos) -> Sequence[Frame]:
+        program = self._chip.program
+        present = self._place_in_progress() if self._is_in_progress(now) else self.place(program.pc)
+        back = None if program.back is None else self.place(program.back)
+        return [Frame(self._text.name(place.number), place) for place in (present, back) if place is not None]
+
+    def _is_in_progress(self, now: Nanos) -> bool:
+        """Whether the command before the place of the program is not over."""
+        program = self._chip.program
+        return program.waiting is not WaitReason.NOTHING or program.ready - now > program.statement_ns
+
+    def _place_in_progress(self) -> Place | None:
+        """What waits goes on at the command after it."""
+        pc, text = self._chip.program.pc, self._text
+        before = bisect_right(text.offsets, pc - 1) - 1
+        return self.place(text.offsets[before]) if before >= 0 and pc <= text.end else None
+
+    def variables(self, now: Nanos) -> Mapping[str, float]:
+        registers = {f"register{number}": float(self._chip.memory.register(number)) for number in GENERAL}
+        return {"variable": float(self._chip.unit.variable), **registers}
+
+    def read(self, name: str, now: Nanos) -> float | None:
+        pin = name.upper()
+        levels = self._chip.pins()
+        if pin in levels:
+            return levels[pin]
+        point = live_point(self._chip, name)
+        return None if point is None or point.read is None else float(point.read(now))
+
+    def set_variable(self, name: str, value: float, now: Nanos) -> None:
+        chip = self._chip
+        names = self.variables(now)
+        if name not in names:
+            raise Misuse(f"the chip has no variable {name!r}: there are {', '.join(names)}")
+        highest = MASK if name == "variable" else REGISTER_MAX
+        if value != int(value) or not 0 <= value <= highest:
+            raise Misuse(f"{name} = {value:g}: permitted are whole numbers from 0 to {highest}")
+        if name == "variable":
+            chip.unit.variable = int(value)
+        else:
+            chip.memory.set_register(int(name.removeprefix("register")), int(value))
+
+    def execute_all(self, on: bool, now: Nanos) -> None:
+        """A chip executes every command in any case."""

@@ -1,0 +1,59 @@
+"""What goes over a line of M1486 chips in words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from functools import partial
+
+from steptwin.m1486.characterlog import CharacterLog, LineSplitter, changes_nothing
+from steptwin.machine import Nanos
+from steptwin.simulation.kinds.lines import LineWrite
+from steptwin.simulation.kinds.m1486.line import ChipLine
+from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.wire.frameline import FrameLine
+from steptwin.wire.slave import FrameDirection
+
+
+class ChipLineWords:
+    """The characters of a line in words. As `steptwin.simulation.kinds.lines.LineWords`."""
+
+    def __init__(self, line: ChipLine, prefix: str, sink: Callable[[FrameLine], None]) -> None:
+        self._line = line
+        self._log = CharacterLog(next(iter(line.chain.chips.values())).variant)
+        self._log.sinks.append(lambda shown: sink(shown._replace(link=prefix + shown.link)))
+        self._splitters: dict[str, LineSplitter] = {}
+
+    def frame(self, now: Nanos, place: str, direction: FrameDirection, data: bytes) -> None:
+        if direction is FrameDirection.OUT:
+            for byte in data:
+                self._log.sent(now, byte)
+            return
+        splitter = self._splitters.get(place)
+        if splitter is None:
+            for gone in [name for name in self._splitters if name not in self._line.places]:
+                del self._splitters[gone]
+            splitter = self._splitters[place] = LineSplitter(self._log, place)
+        splitter.take(data, now)
+
+    def unframed(self, now: Nanos, place: str, count: int) -> None:
+        """Every character is one of the line."""
+
+    def changes(self, place: str, data: bytes) -> Collection[int]:
+        return self._line.units
+
+    def recorded(self, record: TraceRecord) -> None:
+        """A chip announces the byte that it sends."""
+        if record.kind == "event" and record.subject == "upload":
+            self._log.upload(**dict(record.facts))
+
+
+def follow_writes(line: ChipLine, take: Callable[[LineWrite], None]) -> Callable[[], None]:
+    """See `steptwin.simulation.kinds.kind.LineKind.writes`. Every chip receives what a host sends, and none answers."""
+
+    def sent(shown: FrameLine) -> None:
+        if shown.direction is FrameDirection.IN and not changes_nothing(shown.raw):
+            take(LineWrite(shown.time, shown.link, (), shown.meaning, ""))
+
+    words = ChipLineWords(line, "", sent)
+    line.follow_frames(words)
+    return partial(line.unfollow_frames, words)

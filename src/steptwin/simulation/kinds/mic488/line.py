@@ -1,0 +1,178 @@
+"""Modbus lines with MIC488 controllers on them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import ClassVar
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos, Port
+from steptwin.mic488.config import BAUDS
+from steptwin.mic488.device import Mic488Device, pause_observer
+from steptwin.mic488.vision import Com1Port, uses_vision
+from steptwin.simulation.faults import Faults
+from steptwin.simulation.faults import LineProtocol as FaultLine
+from steptwin.simulation.kinds.kind import LineSpec, Member
+from steptwin.simulation.kinds.lines import SCRIPTS, Line, LineEndPoint
+from steptwin.simulation.kinds.master import Master
+from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.trace import RecordSink
+from steptwin.wire.gateway import ModbusGateway, ScriptPort, TcpGatewayPort
+from steptwin.wire.line import SerialLine
+from steptwin.wire.pdu import READS
+from steptwin.wire.rtu import BROADCAST, BURSTY_GAP_NS, UART_GAP_NS
+from steptwin.wire.slave import FrameDirection, FrameObserver, RtuSlavePort, SlaveDevice, SlavePort, TcpSlavePort
+from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
+
+SILENT_CHARACTERS = 4
+"""Between an answer and the next request of a master: Modbus RTU asks for 3.5."""
+
+
+class ModbusBus(Line):
+    """Controllers with different units on one line. With ``timing`` requests take the time of a wire and of the controllers."""
+
+    FIXED: ClassVar[tuple[str, ...]] = ("_baud", "_gap", "_on_write", "_seeing", "_served", "devices")
+    __slots__ = (*FIXED, "_master", "_timed")
+
+    kinds = ("rtu", "serial", "tcp")
+    """``serial``: a real serial port, on which characters take their time whatever the line timing is."""
+    fault_kinds: ClassVar[Mapping[str, FaultLine]] = {"rtu": FaultLine.RTU, "serial": FaultLine.RTU, "tcp": FaultLine.TCP}
+
+    def __init__(
+        self,
+        kernel: Kernel,
+        name: str,
+        record: RecordSink | None,
+        faults: Faults,
+        *,
+        devices: Mapping[int, Mic488Device],
+        timing: LineTiming | None,
+        baud: int = 38400,
+        gap: Nanos | None = None,
+    ) -> None:
+        super().__init__(kernel, name, record, faults)
+        self.devices = devices
+        self._served: Mapping[int, SlaveDevice] = devices
+        self._on_write: Callable[[str, Nanos, int, bytes, bytes], None] | None = None
+        self._baud = baud
+        self._gap = gap
+        # WBC-15: a vision system belongs to one controller; without its registers in a program it costs nothing.
+        device = next(iter(devices.values()))
+        sees = len(devices) == 1 and any(map(uses_vision, device.program.banks.programs.values()))
+        self._seeing = device if sees else None
+        self._timed: tuple[TimedUnits, ModbusGateway] | None = None
+        if timing is not None:
+            units = TimedUnits(devices, timing)
+            self._timed = units, ModbusGateway(units)
+        self._master = Master(self._ask, 0 if timing is None else timing.line.duration(SILENT_CHARACTERS))
+
+    @property
+    def master(self) -> Master:
+        return self._master
+
+    def serve_by(self, served: Callable[[Mapping[int, SlaveDevice]], Mapping[int, SlaveDevice]]) -> None:
+        """Without line timing; ports that are made from now on use it."""
+        self._served = served(self.devices)
+
+    def watch_writes(self, observer: Callable[[str, Nanos, int, bytes, bytes], None] | None) -> None:
+        """Call ``observer`` with the place and what `steptwin.wire.slave.WriteObserver` says, from now on; None ends that."""
+        self._on_write = observer
+        for name, place in self.places.items():
+            if place.framed is not None:
+                place.framed.on_write = None if observer is None else partial(observer, name)
+
+    def connect(self, place: str, kind: str | None = None) -> LineEndPoint:
+        is_new = place not in self.places
+        found = super().connect(place, kind)
+        if is_new and self._on_write is not None and found.framed is not None:
+            found.framed.on_write = partial(self._on_write, place)
+        return found
+
+    def is_idle_read(self, place: LineEndPoint, data: bytes) -> bool:
+        # With timing a request takes the line and the controller; faults count requests.
+        is_free = self._timed is None and not self._faults.interfere and place.framed is place.inner
+        return is_free and place.framed is not None and place.framed.is_lone_read(data)
+
+    def recall(self, unit: int, now: Nanos) -> None:
+        if self._master.recall(lambda frame: frame[0] in (unit, BROADCAST) and frame[1] not in READS, now):
+            self.leave(SCRIPTS)  # what is on its way there is lost with the connection
+        self._master.update(now)  # requests for others go on
+
+    def _ask(self, frame: bytes, now: Nanos) -> None:
+        self.receive(SCRIPTS, frame, now)
+
+    def _came(self, place: str, found: LineEndPoint, pieces: list[tuple[Nanos, bytes]]) -> None:
+        if place == SCRIPTS:
+            self._master.answered(b"".join(data for _, data in pieces), pieces[-1][0])
+        else:
+            super()._came(place, found, pieces)
+
+    def update(self, now: Nanos) -> None:
+        super().update(now)
+        self._master.update(now)
+
+    def deadline(self) -> Nanos | None:
+        own, masters = super().deadline(), self._master.deadline()
+        return own if masters is None else masters if own is None else min(own, masters)
+
+    @property
+    def units(self) -> tuple[int, ...]:
+        return tuple(self.devices)
+
+    def _observer(self, place: str) -> FrameObserver | None:
+        def report(now: Nanos, direction: FrameDirection, data: bytes) -> None:
+            self._report(now, place, direction, data)
+
+        return report if self._is_followed else None
+
+    def _port(self, place: str, kind: str) -> Port:
+        observe = self._observer(place)
+        if self._timed is None and kind == "tcp":
+            return TcpSlavePort(self._served, on_frame=observe)
+        if self._timed is not None and kind == "tcp":
+            return TcpGatewayPort(self._timed[1], on_frame=observe)
+        if self._timed is not None and place == SCRIPTS:
+            return ScriptPort(self._timed[1], on_frame=observe)
+        usual = UART_GAP_NS if kind == "serial" else BURSTY_GAP_NS
+        gap = usual if self._gap is None else self._gap
+        on_pause = pause_observer(self.devices)
+        port: RtuSlavePort | TimedRtuSlavePort
+        if self._timed is not None:
+            port = TimedRtuSlavePort(self._timed[0], gap_ns=gap, on_frame=observe, on_pause=on_pause)
+        else:
+            devices = self.devices if place == SCRIPTS else self._served
+            wire = SerialLine(self._baud) if kind == "serial" else None
+            port = RtuSlavePort(devices, gap_ns=gap, line=wire, on_frame=observe, on_pause=on_pause)
+        return port if self._seeing is None or place == SCRIPTS else Com1Port(self._seeing, port)
+
+    @property
+    def baud(self) -> int:
+        return self._baud
+
+    @property
+    def is_timed(self) -> bool:
+        return self._timed is not None
+
+    def _framed(self, port: SlavePort | Com1Port) -> SlavePort | None:
+        return port.modbus if isinstance(port, Com1Port) else port
+
+
+def make(spec: LineSpec, members: Sequence[Member], kernel: Kernel, record: RecordSink, faults: Faults) -> ModbusBus:
+    """The line of a description. Raises `Misuse` for units that are taken, and rates that no MIC488 has."""
+    devices: dict[int, Mic488Device] = {}
+    names: dict[int, str] = {}
+    for member in members:
+        if member.address in devices:
+            raise Misuse(f"unit {member.address} is both {names[member.address]!r} and {member.spec.name!r}")
+        devices[member.address] = member.machine
+        names[member.address] = member.spec.name
+    if spec.baud is not None and spec.baud not in BAUDS:
+        raise Misuse(f"baud = {spec.baud}: a MIC488 has {', '.join(map(str, BAUDS))} bit/s")
+    baud = spec.baud or next(iter(devices.values())).config.ports[0].baud
+    timing = None if spec.timing == "off" else timing_of(baud, strict=spec.timing == "strict")
+    return ModbusBus(kernel, spec.name, record, faults, devices=devices, timing=timing, baud=baud, gap=spec.gap)
+
+
+def timing_of(baud: int, *, strict: bool) -> LineTiming:
+    return LineTiming(SerialLine(baud), strict=strict)

@@ -1,0 +1,210 @@
+"""The programs of a MIC488 while they are executed."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Collection, Mapping, Sequence
+from functools import cached_property
+
+from steptwin.controlflow import ControlFlow
+from steptwin.diagnostics import SourceText
+from steptwin.machine import Nanos
+from steptwin.mic488.device import Mic488Device
+from steptwin.mic488.program_banks import LoadedProgram
+from steptwin.mic488.program_registers import ACCESS
+from steptwin.simulation.kinds.kind import TextContext
+from steptwin.simulation.kinds.mic488.statement_use import use_of
+from steptwin.simulation.kinds.mic488.table import Mic488Spec
+from steptwin.simulation.kinds.programs import Frame, Place, Statement, StatementUse
+from steptwin.simulation.kinds.programtexts import bank_text
+from steptwin.statements import StatementHook
+from steptwin.wbc.dialect import Dialect
+from steptwin.wbc.flow import flow_of
+from steptwin.wbc.registers import parts
+from steptwin.wbc.scope import ProgramScope
+from steptwin.wbc.steps import BLOCK_MARKS, Literal, RegisterOperand, ValueSource, Variable
+from steptwin.wbc.syntax import parse
+from steptwin.wbc.tree import Identifier, ProgramTree
+
+BEGIN = "program"
+"""The name of what is executed before the first label."""
+
+
+def programs(spec: Mic488Spec, device: Mic488Device, context: TextContext) -> WbcPrograms:
+    """See `steptwin.simulation.kinds.kind.ControllerKind.programs`."""
+    return WbcPrograms(device)
+
+
+class WbcPrograms:
+    """See `steptwin.simulation.kinds.programs.Programs`. Numbers of statements are those of steps, the last one the end of the
+    program."""
+
+    def __init__(self, device: Mic488Device) -> None:
+        self._device = device
+        self._banks: dict[str, _Bank] = {}
+        """Their content at the last request."""
+        self._places: dict[tuple[int, int], Place] = {}
+        """By bank and number."""
+
+    @property
+    def statement_time(self) -> Nanos:
+        return self._device.program.interpreter.statement_time
+
+    @property
+    def texts(self) -> Mapping[str, SourceText]:
+        return {bank_text(bank): program.source for bank, program in self._device.program.banks.programs.items()}
+
+    def _bank(self, text: str) -> _Bank:
+        program = self._device.program.banks.programs[int(text.rpartition(" ")[2])]
+        found = self._banks.get(text)
+        if found is None or found.program is not program:
+            found = self._banks[text] = _Bank(program)
+        return found
+
+    def statements(self, text: str) -> Sequence[Statement]:
+        return self._bank(text).statements
+
+    def after(self, text: str) -> Mapping[int, Sequence[int]]:
+        return self._bank(text).after
+
+    def reached(self, text: str, starts: Collection[int]) -> Collection[int]:
+        return self._bank(text).reached(starts)
+
+    def labels(self, text: str) -> Mapping[str, int]:
+        return self._bank(text).labels
+
+    def hook(self, hook: StatementHook, places: Collection[Place] | None = None) -> None:
+        numbers = None if places is None else frozenset(place.number for place in places)
+        self._device.program.interpreter.hook(hook, numbers)
+
+    def unhook(self, hook: StatementHook) -> None:
+        self._device.program.interpreter.unhook(hook)
+
+    def begun(self, now: Nanos) -> Sequence[int]:
+        return ()  # the first statement is executed one statement time after power-on
+
+    def place(self, number: int) -> Place | None:
+        control = self._device.program
+        if control.running is None:
+            return None
+        bank = control.running_bank
+        found = self._places.get((bank, number))
+        if found is None:
+            found = self._places[bank, number] = Place(bank_text(bank), number)
+        return found
+
+    def depth(self) -> int:
+        return len(self._device.program.interpreter.stack)
+
+    def comes_back(self, place: Place) -> bool:
+        return self._bank(place.text).comes_back(place.number)
+
+    def use(self, place: Place) -> StatementUse:
+        return use_of(self._bank(place.text).program.steps, place.number)
+
+    def stack(self, now: Nanos) -> Sequence[Frame]:
+        control = self._device.program
+        if control.running is None:
+            return ()
+        text, interpreter = bank_text(control.running_bank), control.interpreter
+        bank = self._bank(text)
+        back = [step for step, _ in reversed(interpreter.stack)]
+        interrupted, calls = (back[:1], back[1:]) if interpreter.handling else ([], back)
+        # A JUMP that never comes back, such as the last one of a main loop, is no call (WBC-1 keeps its step nevertheless).
+        numbers = [interpreter.place(now), *interrupted, *(step for step in calls if step == 0 or bank.comes_back(step - 1))]
+        return [Frame(bank.name(number), Place(text, number)) for number in numbers]
+
+    def variables(self, now: Nanos) -> Mapping[str, float]:
+        return self._device.program.variables(now)
+
+    def read(self, name: str, now: Nanos) -> float | None:
+        control = self._device.program
+        if control.running is None:
+            return None
+        source = self._bank(bank_text(control.running_bank)).meaning(name, control.dialect)
+        match source:
+            case Literal(value):
+                return float(value)
+            case Variable(index):
+                return control.interpreter.cells_at(now)[index]
+            case RegisterOperand(row, number):
+                return float(ACCESS[row.key].read(number)(control, now))
+        return None
+
+    def has_name(self, name: str) -> bool:
+        dialect = self._device.program.dialect
+        return any(self._bank(text).meaning(name, dialect) is not None for text in self.texts)
+
+    def point(self, name: str) -> str | None:
+        found = parts(name.upper())
+        if found is None:
+            return None
+        row, number = found
+        return _POINTS[row.key].format(number) if row.key in _POINTS else None
+
+    def set_variable(self, name: str, value: float, now: Nanos) -> None:
+        self._device.command(lambda now: self._device.program.set_variable(name, value, now), now)
+
+    def execute_all(self, on: bool, now: Nanos) -> None:
+        self._device.command(lambda now: self._device.program.rest_in_loops(not on, now), now)
+
+
+_POINTS = {
+    "$I": "USER_REGISTER[{}]:int",
+    "$D": "USER_REGISTER[{}]:dint",
+    "$R": "USER_REGISTER[{}]:real",
+    "ACCM": "M{}_ACC",
+    "DECM": "M{}_DEC",
+    "VMAXM": "M{}_VMAX",
+    "LIMLM": "M{}_POSLIM_L",
+    "LIMRM": "M{}_POSLIM_R",
+    "STATM": "M{}_STATUS",
+}
+"""Registers of the controller, by the registers of the language."""
+
+
+class _Bank:
+    """A program with what is known of its text."""
+
+    def __init__(self, program: LoadedProgram) -> None:
+        self.program = program
+        source, end = program.source, len(program.source.text)
+        spans = [*((step.start, step.end) for step in program.steps), (end, end)]
+        self.statements = tuple(Statement(start, end, source.position(start)[0]) for start, end in spans)
+        self.labels = program.labels
+        self._scope: ProgramScope | None = None
+        self._named = sorted((number, name) for name, number in self.labels.items())
+
+    @cached_property
+    def after(self) -> Mapping[int, Sequence[int]]:
+        following = self._flow.after
+        return {number: following[number] for number, step in enumerate(self.program.steps) if not isinstance(step, BLOCK_MARKS)}
+
+    def reached(self, starts: Collection[int]) -> Collection[int]:
+        return self._flow.reached((*starts, *self._flow.interrupts))
+
+    @cached_property
+    def _flow(self) -> ControlFlow:
+        return flow_of(self.program.steps)
+
+    @cached_property
+    def _tree(self) -> ProgramTree:
+        return parse(self.program.source.text)[0]
+
+    def meaning(self, name: str, dialect: Dialect) -> ValueSource | None:
+        """What a name in the text is; its place in the text does not matter."""
+        key = name.upper()
+        for index, variable in enumerate(self.program.variables):
+            if variable.upper() == key:
+                return Variable(index, variable)
+        if self._scope is None:
+            self._scope = ProgramScope(self._tree, None, dialect, [])
+        return self._scope.value(Identifier(0, 0, name, key))
+
+    def comes_back(self, number: int) -> bool:
+        return self._flow.comes_back(number)
+
+    def name(self, number: int) -> str:
+        """Of the label at or before a statement."""
+        found = bisect_right(self._named, number, key=lambda row: row[0])
+        return self._named[found - 1][1] if found else BEGIN

@@ -1,0 +1,65 @@
+"""What goes over a Modbus line in words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from functools import partial
+
+from steptwin.machine import Nanos
+from steptwin.mic488.framelog import FrameLog
+from steptwin.simulation.kinds.lines import LineWrite
+from steptwin.simulation.kinds.mic488.line import ModbusBus
+from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.wire.frameline import FrameLine
+from steptwin.wire.pdu import REFUSED, WRITES
+from steptwin.wire.slave import FrameDirection, FrameObserver
+
+
+class ModbusWords:
+    """The frames of a line in words. As `steptwin.simulation.kinds.lines.LineWords`."""
+
+    def __init__(self, line: ModbusBus, prefix: str, sink: Callable[[FrameLine], None]) -> None:
+        self._line = line
+        self._prefix = prefix
+        self._log = FrameLog(line.devices)
+        self._log.sinks.append(sink)
+        self._observers: dict[str, FrameObserver] = {}
+
+    def frame(self, now: Nanos, place: str, direction: FrameDirection, data: bytes) -> None:
+        observer = self._observers.get(place)
+        if observer is None:
+            for gone in [name for name in self._observers if name not in self._line.places]:
+                del self._observers[gone]
+            observer = self._observers[place] = self._log.observer(self._prefix + place, tcp=self._is_tcp(place))
+        observer(now, direction, data)
+
+    def _is_tcp(self, place: str) -> bool:
+        there = self._line.places.get(place)
+        return there is not None and there.kind == "tcp"
+
+    def changes(self, place: str, data: bytes) -> Collection[int]:
+        unit, function = (data[6], data[7]) if self._is_tcp(place) else (data[0], data[1])
+        if function not in WRITES:
+            return ()
+        return (unit,) if unit in self._line.units else self._line.units
+
+    def unframed(self, now: Nanos, place: str, count: int) -> None:
+        self._log.unframed(now, self._prefix + place, count)
+
+    def recorded(self, record: TraceRecord) -> None:
+        """Only frames are shown of what goes over the line."""
+
+
+def follow_writes(line: ModbusBus, take: Callable[[LineWrite], None]) -> Callable[[], None]:
+    """See `steptwin.simulation.kinds.kind.LineKind.writes`."""
+    log = FrameLog(line.devices)
+
+    def seen(place: str, now: Nanos, unit: int, request: bytes, response: bytes) -> None:
+        there = line.places.get(place)
+        words = log.request(unit, request, tcp=there is not None and there.kind == "tcp")
+        units = (unit,) if unit in line.devices else line.units
+        outcome = "" if not response else "refusal" if response[0] & REFUSED else "done"
+        take(LineWrite(now, place, units, words, outcome))
+
+    line.watch_writes(seen)
+    return partial(line.watch_writes, None)

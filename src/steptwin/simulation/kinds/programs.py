@@ -1,0 +1,183 @@
+"""The programs of controllers while they are executed: their statements, where they stand, their variables.
+
+One contract for all languages: traces, followers and the debugger ask for no more. A place is a statement of a text; texts are
+named as in `steptwin.simulation.kinds.programtexts`.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+from steptwin.diagnostics import SourceText
+from steptwin.machine import Nanos
+from steptwin.simulation.scheduler.trace import RecordSink, TraceRecord
+from steptwin.statements import StatementHook
+
+
+class Place(NamedTuple):
+    """A statement of a text. ``number`` counts the statements of the text from 0."""
+
+    text: str
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
+class Statement:
+    """``start`` and ``end`` are its characters in the text, ``line`` counts from 1."""
+
+    start: int
+    end: int
+    line: int
+
+
+class Frame(NamedTuple):
+    """A place to which the execution has come, or to which it returns; ``name``: the label or interrupt before it."""
+
+    name: str
+    place: Place
+
+
+class ResourceKind(enum.Enum):
+    """What a statement reads or changes."""
+
+    PIN = "pin"
+    AXIS = "axis"
+    """By its number; empty: any axis."""
+    VALUE = "value"
+    """A variable or register of the program."""
+
+
+class Resource(NamedTuple):
+    kind: ResourceKind
+    name: str
+
+
+class StatementUse(NamedTuple):
+    """What a statement reads and changes, and which statements depend on it."""
+
+    reads: tuple[Resource, ...] = ()
+    writes: tuple[Resource, ...] = ()
+    waits: bool = False
+    """Whether the program goes on only when what it reads permits it, or, if it reads nothing, after a time."""
+    governs: range = range(0)
+    """Numbers of the statements of which it decides whether they are executed."""
+    is_loop: bool = False
+    """Whether it also decides when those after them are executed."""
+    jumps: int | None = None
+    """Where the program goes on, if that depends on nothing."""
+    keeps: bool = False
+    """Whether it may change a point of the controller without an event of that (`steptwin.points.LivePoint.is_kept`)."""
+
+
+class Programs(Protocol):
+    """The programs of one controller."""
+
+    @property
+    def statement_time(self) -> Nanos:
+        """What a statement takes."""
+        ...
+
+    @property
+    def texts(self) -> Mapping[str, SourceText]:
+        """The present ones: a download replaces them."""
+        ...
+
+    def statements(self, text: str) -> Sequence[Statement]:
+        """All statements of a text, in its order."""
+        ...
+
+    def after(self, text: str) -> Mapping[int, Sequence[int]]:
+        """The statements that do something, by number, with the numbers of those that can come next in the text, of which a
+        branch has several; the number after the last statement is the end. What calls come to does not count, nor do words that
+        only close a block."""
+        ...
+
+    def reached(self, text: str, starts: Collection[int]) -> Collection[int]:
+        """The statements of a text, by number, that can be executed after those at ``starts``, by any way and in interrupts;
+        these included."""
+        ...
+
+    def labels(self, text: str) -> Mapping[str, int]:
+        """Numbers of the statements at labels and interrupts, by name."""
+        ...
+
+    def hook(self, hook: StatementHook, places: Collection[Place] | None = None) -> None:
+        """Call ``hook`` before each statement (`steptwin.statements`), or before those at places, and at others by chance."""
+        ...
+
+    def unhook(self, hook: StatementHook) -> None: ...
+
+    def begun(self, now: Nanos) -> Sequence[int]:
+        """The numbers of statements that were executed at power-on, before there could be a hook; empty after 0 s, and where
+        statements take no time."""
+        ...
+
+    def place(self, number: int) -> Place | None:
+        """Of a statement that a hook was called for, at that moment; None where it comes from no text."""
+        ...
+
+    def depth(self) -> int:
+        """How many calls and interrupts have not returned yet."""
+        ...
+
+    def comes_back(self, place: Place) -> bool:
+        """Whether what the statement calls returns to the one after it; True for what calls nothing."""
+        ...
+
+    def use(self, place: Place) -> StatementUse: ...
+
+    def stack(self, now: Nanos) -> Sequence[Frame]:
+        """The statement that is executed, or comes next, then those to which it returns; empty where no program runs."""
+        ...
+
+    def variables(self, now: Nanos) -> Mapping[str, float]: ...
+
+    def read(self, name: str, now: Nanos) -> float | None:
+        """What a name of the program means to the statement of this moment; None where it means nothing."""
+        ...
+
+    def has_name(self, name: str) -> bool:
+        """Whether a name means something in one of the texts, whether or not the program runs."""
+        ...
+
+    def point(self, name: str) -> str | None:
+        """The point of the controller that a name of the language means, such as ``USER_REGISTER[10]:real`` for ``$R10``; None
+        for others."""
+        ...
+
+    def set_variable(self, name: str, value: float, now: Nanos) -> None:
+        """Raises `Misuse` for a name or value that is not permitted."""
+        ...
+
+    def execute_all(self, on: bool, now: Nanos) -> None:
+        """Whether every statement of a loop is executed even where nothing can change by it: a debugger stops at each."""
+        ...
+
+
+class StatementFollower:
+    """Reports each statement that a program of the world executes as a record of kind ``statement``, until `close`."""
+
+    def __init__(self, programs_of: Mapping[str, Programs], report: RecordSink) -> None:
+        """``programs_of``: by controller."""
+        self._hooks: list[tuple[Programs, StatementHook]] = []
+        for name, programs in programs_of.items():
+            hook = _reporting(name, programs, report)
+            programs.hook(hook)
+            self._hooks.append((programs, hook))
+
+    def close(self) -> None:
+        for programs, hook in self._hooks:
+            programs.unhook(hook)
+        self._hooks.clear()
+
+
+def _reporting(name: str, programs: Programs, report: RecordSink) -> StatementHook:
+    def hook(now: Nanos, number: int) -> None:
+        place = programs.place(number)
+        if place is not None:
+            report(TraceRecord(now, name, "statement", place.text, programs.statements(place.text)[place.number].line))
+
+    return hook

@@ -1,0 +1,70 @@
+"""Texts in the program memories of controllers, and how they come there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from steptwin.diagnostics import Diagnostic, SourceText
+from steptwin.explain.model import MemoryPart
+from steptwin.machine import Nanos
+from steptwin.simulation.script.steps import Step
+
+
+class TextLanguage(NamedTuple):
+    """A language of the texts in the program memory of a kind of controllers."""
+
+    name: str
+    """For editors."""
+    suffix: str
+    """Of files in it."""
+    key: str
+    """Of the table of a controller, which names these files."""
+    in_banks: bool = False
+    """Whether the value of the key is a table with the number of the bank of each."""
+    is_shared: bool = False
+    """Whether one file that is alone in its key is that of all banks."""
+
+
+def bank_text(bank: int) -> str:
+    """The place of the program in a bank."""
+    return f"program {bank}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProgramText:
+    """A place in the program memory of a controller, and the text there."""
+
+    place: str
+    """Unlike all others of the controller: ``program 0``, ``positions 0``, ``program``."""
+    language: TextLanguage
+    """One of those of the kind of its controller."""
+    source: SourceText
+    check: Callable[[], Sequence[Diagnostic]]
+    """What the checker of its language finds, in the order of the text."""
+    memory: Callable[[str], Sequence[MemoryPart]]
+    """What another text would take of the memory at this place; empty for one with errors."""
+    is_empty: bool = False
+    """Whether nothing is there; the text is empty then."""
+    is_running: bool = False
+    line: int | None = None
+    """Of the present statement, from 1, while it runs or is paused; None where that is not known."""
+
+
+class Destination(NamedTuple):
+    """Where a text goes."""
+
+    machine: str
+    line: str | None
+    """The name of its line; None where it is on none."""
+    place: str
+
+
+class Downloading(NamedTuple):
+    """How a text that was checked comes to its place."""
+
+    put: Callable[[Nanos], None] = lambda now: None
+    """What happens at once."""
+    typed: tuple[Step, ...] = ()
+    """What a host types after that."""

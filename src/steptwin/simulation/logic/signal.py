@@ -1,0 +1,66 @@
+"""A signal: a named quantity that conditions use, and that scripts and external programs read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.simulation.scheduler.kernel import Source
+
+
+@dataclass(frozen=True, slots=True)
+class SignalOf:
+    """A signal, and the machines, lines and elements that compute it: their kernels must be advanced before it is read."""
+
+    sources: tuple[Source, ...]
+    read: Callable[[Nanos], float] | None
+    """None if it is write-only."""
+    turning: Callable[[Nanos], Iterable[Nanos]] | None = None
+    versions: Callable[[], object] | None = None
+    unit: str = ""
+    bounds: tuple[float, float] | None = None
+    """The lowest and highest value, where that is known."""
+    is_kept: bool = False
+    """Whether a request may change it without an event of its kernel."""
+    freeze: Callable[[Nanos], Callable[[Nanos], float]] | None = None
+    """Gives the course at a moment as a function that stays as it is, also when the signal goes another way; None: it cannot."""
+    check: Callable[[], None] = lambda: None
+    """Raises `Misuse` if conditions cannot use it, because it changes between events at unknown moments."""
+
+    @property
+    def is_readable(self) -> bool:
+        return self.read is not None
+
+    @property
+    def continuous(self) -> bool:
+        return self.turning is not None
+
+    def bring(self, now: Nanos) -> tuple[Source, ...]:
+        """Advance what the value depends on to ``now`` and return it. Until one of these changes, the value is constant or
+        follows its course."""
+        for source in self.sources:
+            source.kernel.advance(now)
+        return self.sources
+
+    def value(self, now: Nanos) -> float:
+        """The value, after `bring`. Raises `Misuse` for a write-only signal."""
+        if self.read is None:
+            raise Misuse("it can only be written")
+        return self.read(now)
+
+    def watch(self, name: str) -> None:
+        """Prepare for use in a condition. Raises `Misuse` if that is impossible."""
+        if self.read is None:
+            raise Misuse(f"{name} can only be written")
+        self.check()
+        if self.is_kept:
+            for source in self.sources:
+                source.kernel.is_attentive = True
+
+    def turns(self, now: Nanos) -> Iterator[Nanos]:
+        return iter(() if self.turning is None else self.turning(now))
+
+    def version(self) -> object:
+        return None if self.versions is None else self.versions()

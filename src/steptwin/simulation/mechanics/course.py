@@ -1,0 +1,462 @@
+"""The true position of an axis while its drive follows one plan, in closed form from its initial state.
+
+All positions are whole pulses in the frame of the mechanics, whose zero is given by the description of the axis. The *field* is
+the commanded position. The *rotor* follows the field, less the lost pulses, and stops where a hard stop or insufficient torque
+holds it. The *load* follows the rotor through backlash of ``play`` pulses: it is at the rotor after upward motion, and ``play``
+above it after downward motion.
+
+A rotor that was held synchronises at the nearest position with the electrical angle of the field as soon as the field stops or
+reverses: the loss is a whole number of electrical periods (four full steps). If that position is up to two full steps before a
+stop, the rotor springs back to it; if it is beyond the stop, the rotor leaves the stop when the field has returned that far.
+
+Between two reversals of the field, rotor and load are constant or have a constant distance to the field: a course is a list of
+such pieces. While no current drives the rotor of a `Build.is_free` axis, its motion (`steptwin.simulation.mechanics.free`) is in
+the place of the field, and the load keeps its distance to the rotor.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from dataclasses import dataclass
+from math import ceil, inf
+from operator import attrgetter
+from typing import NamedTuple
+
+from steptwin.machine import SECOND, Nanos
+from steptwin.motion import Profile, Segment
+from steptwin.motion.divisions import Plan, profile_of
+from steptwin.points import turns_of
+from steptwin.simulation.mechanics.motor import StepperMotor
+from steptwin.simulation.mechanics.resonance import Spell, spells
+
+UNFOLLOWED = "it no longer follows its field"
+
+
+@dataclass(frozen=True, slots=True)
+class Build:
+    """Construction data of an axis, in pulses of the mechanics."""
+
+    sign: int = 1
+    """Direction for positive pulses."""
+    zero: int = 0
+    """Position of the axis at count 0 of its drive."""
+    low: int | None = None
+    high: int | None = None
+    """Hard stops of the load."""
+    play: int = 0
+    period_p: int = 1
+    """Electrical period of the motor (four full steps): pulses are lost in multiples of it."""
+    motor: StepperMotor | None = None
+    is_free: bool = False
+    """Whether the load moves the rotor while no current does."""
+
+    @property
+    def is_loose(self) -> bool:
+        """Whether the rotor may move otherwise than its field."""
+        return self.is_free or (self.motor is not None and self.motor.overruns)
+
+    @property
+    def ideal(self) -> bool:
+        """Whether the load is always at the position of the field."""
+        return self.low is None and self.high is None and self.play == 0 and self.motor is None
+
+
+class MechanicalState(NamedTuple):
+    """State of an axis at a moment."""
+
+    rotor: int
+    load: int
+    stalled: bool = False
+    """Whether the motor has stalled."""
+    behind: int = 0
+    """Distance of the rotor's equilibrium position behind the field. The rotor is there unless something holds it."""
+
+
+class CoursePiece(NamedTuple):
+    """From ``begin`` on the rotor is the field (or the free motion) and ``rotor``, or at ``rotor``; likewise the load."""
+
+    begin: Nanos
+    direction: int
+    rotor_follows: bool
+    rotor: int
+    load_follows: bool
+    load: int
+    stalled: bool
+    behind: int
+    stop: int = 0
+    """The hard stop against which the field draws the rotor: 1 upper, -1 lower, 0 neither."""
+
+
+class LoadPiece(NamedTuple):
+    """From ``begin`` on the load is ``pulses`` from where the drive has counted to (``follows``), or stands at ``pulses``.
+
+    In pulses of the drive, whose direction and zero it has.
+    """
+
+    begin: Nanos
+    follows: bool
+    pulses: int
+
+
+class Course:
+    """The way of an axis from ``begin`` on while ``plan`` is in force; immutable.
+
+    ``blocked``: nothing moves the rotor. ``free``: its motion without current, in pulses of the drive.
+    """
+
+    __slots__ = ("_amplitude", "_laid", "_now", "_shaken", "_spells", "_state", "begin", "blocked", "build", "free", "plan")
+
+    def __init__(
+        self,
+        build: Build,
+        plan: Plan,
+        begin: Nanos,
+        state: MechanicalState,
+        *,
+        blocked: bool = False,
+        jump: float = 0.0,
+        free: Profile | None = None,
+        vibration: float = 0.0,
+    ) -> None:
+        """``jump``: by how much (pulses/s) the speed of the field changes at once at ``begin``. ``vibration`` in full steps."""
+        self.build = build
+        self.plan = plan
+        self.begin = begin
+        self.blocked = blocked
+        self.free = free
+        self._laid: list[CoursePiece] = []
+        motor = build.motor
+        self._spells: list[Spell] = []
+        self._amplitude = vibration if motor is None or motor.resonance is None else max(vibration, motor.resonance.least)
+        self._shaken: list[Nanos] = []
+        if motor is not None and not motor.follows(jump) and profile_of(plan).moving(begin):
+            state = state._replace(stalled=True)
+        self._state = self._now = state
+
+    # ------------------------------------------------------------------ questions
+
+    @property
+    def pieces(self) -> list[CoursePiece]:
+        """Computed on first use."""
+        if not self._laid:
+            self._lay(self.begin)
+        return self._laid
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether not a pulse is lost, before or on this course."""
+        begin = self._state
+        if self.blocked or self.free is not None or begin.rotor != self.field(self.begin):
+            return False
+        build, profile = self.build, profile_of(self.plan)
+        if build.ideal or not profile.segments:
+            return True
+        return all(p.rotor_follows or (profile.end is not None and p.begin >= profile.end) for p in self.pieces) and (
+            profile.end is None or self.at(profile.end).rotor == self.field(profile.end)
+        )
+
+    def field(self, now: Nanos) -> int:
+        return self.build.sign * self.plan.count(now) + self.build.zero
+
+    def moves(self, now: Nanos) -> bool:
+        """Whether what the rotor follows moves."""
+        return (profile_of(self.plan) if self.free is None else self.free).moving(now)
+
+    def leads(self, now: Nanos) -> bool:
+        """Whether the rotor goes with that."""
+        return self._piece(now).rotor_follows
+
+    def _lead(self, now: Nanos) -> int:
+        """What the rotor follows: the field, or the free motion."""
+        return self.field(now) if self.free is None else self.build.sign * self.free.count(now) + self.build.zero
+
+    def at(self, now: Nanos) -> MechanicalState:
+        """Where everything is at ``now``, not before ``begin``."""
+        piece = self._piece(now)
+        lead = self._lead(now) if piece.rotor_follows or piece.load_follows else 0
+        rotor = piece.rotor + lead if piece.rotor_follows else piece.rotor
+        load = piece.load + lead if piece.load_follows else piece.load
+        return MechanicalState(rotor, load, piece.stalled, piece.behind)
+
+    def load_at(self, now: Nanos) -> int:
+        """The load of `at` alone, which is read most."""
+        piece = self._piece(now)
+        if not piece.load_follows:
+            return piece.load
+        plan = self.plan if self.free is None else self.free
+        return piece.load + self.build.sign * plan.count(now) + self.build.zero
+
+    def position(self, now: Nanos) -> float:
+        """Where the load is, between whole pulses as well."""
+        piece = self._piece(now)
+        if not piece.load_follows:
+            return float(piece.load)
+        lead = profile_of(self.plan) if self.free is None else self.free
+        return piece.load + (self.build.zero + self.build.sign * lead.position(now))
+
+    def reaches(self, position: int, after: Nanos, direction: int, *, rotor: bool = False) -> Nanos | None:
+        """First moment > ``after`` at which the load (or the rotor) has come to ``position`` in ``direction``, or beyond."""
+        first = max(bisect_right(self.pieces, after, key=attrgetter("begin")) - 1, 0)
+        for i in range(first, len(self.pieces)):
+            piece = self.pieces[i]
+            end = self.pieces[i + 1].begin if i + 1 < len(self.pieces) else None
+            follows, value = (piece.rotor_follows, piece.rotor) if rotor else (piece.load_follows, piece.load)
+            if piece.begin > after:
+                here = value + self._lead(piece.begin) if follows else value
+                if (here - position) * direction >= 0:
+                    return piece.begin
+            if follows and piece.direction == direction:
+                time = self._time(position - value, max(after, piece.begin))
+                if time is not None and (end is None or time < end):
+                    return time
+        return None
+
+    def turns(self, now: Nanos) -> list[Nanos]:
+        """Moments after ``now``, in order, between which field, rotor and load each go one way."""
+        found = {piece.begin for piece in self.pieces if piece.begin > now}  # a segment of the field begins one at least
+        if self.free is not None:
+            found.update(turns_of(lambda: profile_of(self.plan))(now))
+        return sorted(found)
+
+    def next_stall(self, after: Nanos) -> Nanos | None:
+        """First moment > ``after`` at which the rotor loses the field or is caught again."""
+        stalled = self._piece(after).stalled
+        return next((piece.begin for piece in self.pieces if piece.begin > after and piece.stalled is not stalled), None)
+
+    def stop(self, now: Nanos) -> int:
+        """The hard stop against which the field draws the rotor, as in `CoursePiece`."""
+        return self._piece(now).stop
+
+    def next_stop(self, after: Nanos) -> Nanos | None:
+        """First moment > ``after`` at which that changes."""
+        stop = self._piece(after).stop
+        return next((piece.begin for piece in self.pieces if piece.begin > after and piece.stop != stop), None)
+
+    def vibration(self, now: Nanos) -> float:
+        """The amplitude of the rotor about the field, full steps; 0 where no resonance is described."""
+        motor = self.build.motor
+        if motor is None or motor.resonance is None or not self.pieces or not self._spells:
+            return self._amplitude
+        now_s = (now - profile_of(self.plan).start) / SECOND
+        before = max(bisect_right(self._spells, now_s, key=attrgetter("begin_s")) - 1, 0)
+        return self._spells[before].at(max(now_s, self._spells[before].begin_s), motor.resonance.least)
+
+    def why_stalled(self, now: Nanos) -> str:
+        """Why the rotor loses the field in this moment, for a sentence."""
+        motor, profile = self.build.motor, profile_of(self.plan)
+        if now in self._shaken:
+            return " by resonance"
+        part = bisect_right(profile.ends, now - profile.start)
+        if motor is None or part >= len(profile.segments):
+            return f": {UNFOLLOWED}"
+        lack = motor.lack(profile.segments[part], (now - profile.start) / SECOND, self.build.sign)
+        return f": {lack or UNFOLLOWED}"
+
+    def load_pieces(self) -> tuple[LoadPiece, ...]:
+        """Where the load is, with as few entries as possible; for a drive at rest the distance of the load from it."""
+        build, end = self.build, profile_of(self.plan).end
+        found: list[LoadPiece] = []
+        for piece in self.pieces:
+            if piece.load_follows:
+                now = LoadPiece(piece.begin, True, piece.load * build.sign)
+            elif end is not None and piece.begin >= end:
+                now = LoadPiece(piece.begin, True, (piece.load - self.field(piece.begin)) * build.sign)
+            else:
+                now = LoadPiece(piece.begin, False, (piece.load - build.zero) * build.sign)
+            if found and found[-1].begin == now.begin:
+                found.pop()
+            if not found or found[-1][1:] != now[1:]:
+                found.append(now)
+        return tuple(found)
+
+    def _piece(self, now: Nanos) -> CoursePiece:
+        pieces = self._laid or self.pieces
+        after = bisect_left(pieces, (now + 1,))
+        return pieces[after - 1 if after else 0]
+
+    def _time(self, lead: int, after: Nanos) -> Nanos | None:
+        return (self.plan if self.free is None else self.free).pulse_time((lead - self.build.zero) * self.build.sign, after)
+
+    # ------------------------------------------------------------------ laying out the pieces
+
+    def _lay(self, begin: Nanos) -> None:
+        if self.free is not None:
+            self._lay_free(self.free)
+            return
+        profile = profile_of(self.plan)
+        if self._keeps_distance(profile):
+            self._lay_at_distance(profile)
+            return
+        at = profile.start
+        for s, end in zip(profile.segments, profile.ends, strict=True):
+            until = None if end == inf else profile.start + int(end)
+            if until is None or until > begin:
+                self._segment(s, max(at, begin), until)
+            at = at if until is None else until
+        if profile.end is not None:
+            rest = max(profile.end, begin)
+            motor = self.build.motor
+            if motor is not None and motor.resonance is not None:
+                self._spells.append(Spell((rest - profile.start) / SECOND, self._amplitude, -motor.resonance.fading))
+            if not self.blocked and (not self._now.stalled or motor is None or motor.holds()):
+                self._catch(rest)
+            self._stand(rest, 1)
+
+    def _keeps_distance(self, profile: Profile) -> bool:
+        """Whether rotor and load are one, keep their distance to the field and meet no stop."""
+        build, (rotor, load, stalled, behind) = self.build, self._state
+        if build.motor is not None or build.play or self.blocked or stalled or rotor != load:
+            return False
+        if self.field(self.begin) - behind != rotor:
+            return False
+        if build.low is None and build.high is None:
+            return True
+        if profile.end is None:
+            return False
+        places = [build.sign * (profile.base + count) + build.zero - behind for count in profile.counts]
+        return (build.low is None or min(places) >= build.low) and (build.high is None or max(places) <= build.high)
+
+    def _lay_at_distance(self, profile: Profile) -> None:
+        """What the pieces are where nothing can come between field, rotor and load: most axes, most of the time."""
+        behind = self._state.behind
+        for begin, direction in profile.legs(self.begin):
+            self._laid.append(CoursePiece(begin, direction * self.build.sign, True, -behind, True, -behind, False, behind))
+        if profile.end is not None:
+            rest = max(profile.end, self.begin)
+            here = self.field(rest) - behind
+            self._laid.append(CoursePiece(rest, 1, False, here, False, here, False, behind))
+
+    def _lay_free(self, free: Profile) -> None:
+        """The rotor goes with the free motion, the load keeps its distance to it."""
+        rotor, load, stalled, behind = self._state
+        away = load - rotor
+        for moment, direction in free.legs(self.begin):
+            self._laid.append(CoursePiece(moment, direction * self.build.sign, True, 0, True, away, stalled, behind))
+        if free.end is not None:
+            rest = self._lead(free.end)
+            self._laid.append(CoursePiece(max(free.end, self.begin), 1, False, rest, False, rest + away, stalled, behind))
+
+    def _segment(self, s: Segment, begin: Nanos, end: Nanos | None) -> None:
+        """What happens while the field goes one way."""
+        direction = s.direction * self.build.sign
+        motor, start = self.build.motor, profile_of(self.plan).start
+        if self.blocked:
+            self._stand(begin, direction)
+            return
+        if motor is None:
+            self._follow(begin, end, direction)
+            return
+        end_s = inf if end is None else (end - start) / SECOND
+        now, caught = begin, None
+        is_steady = isinstance(s, Segment) and s.c2 == s.c3 == 0.0
+        while True:
+            before, now_s = now, (now - start) / SECOND
+            if self._now.stalled:
+                found = motor.catches(s, now_s, end_s, self.build.sign)
+                if found is None:
+                    self._stand(now, direction)
+                    return
+                now = caught = max(now, start + ceil(found * SECOND))
+                if now > before:
+                    self._stand(before, direction)
+                self._catch(now)
+            else:
+                found = self._loses(motor, s, now_s, end_s)
+                if found is None:
+                    self._follow(now, end, direction)
+                    return
+                now = max(now, start + ceil(found * SECOND))
+                if now != caught:
+                    self._follow(before, now, direction)
+                self._now = self._now._replace(stalled=True)
+                if now == caught or is_steady:
+                    # It would be caught and lost for ever, in one moment or again and again.
+                    self._stand(now, direction)
+                    return
+
+    def _loses(self, motor: StepperMotor, s: Segment, now_s: float, end_s: float) -> float | None:
+        """When the rotor loses the field in a segment, because it is too weak or vibrates too much."""
+        weak = motor.loses(s, now_s, end_s, self.build.sign)
+        resonance = motor.resonance
+        if resonance is None:
+            return weak
+        least = resonance.least
+        for spell, lost in spells(resonance, motor.parts(s, now_s, end_s, self.build.sign), self._amplitude):
+            if weak is not None and spell.begin_s >= weak:
+                break
+            self._spells.append(spell)
+            if lost is not None and (weak is None or lost < weak):
+                self._shaken.append(max(self.begin, profile_of(self.plan).start + ceil(lost * SECOND)))
+                weak = lost
+        if weak is not None:
+            self._spells.append(Spell(weak, least, -resonance.fading))
+            self._amplitude = least
+        elif self._spells:
+            self._amplitude = self._spells[-1].at(end_s, least) if end_s < inf else least
+        return weak
+
+    def _follow(self, begin: Nanos, end: Nanos | None, direction: int) -> None:
+        """The rotor goes with the field until a stop holds it, the load when its play is used up."""
+        build = self.build
+        if self._is_pushed(begin, direction):
+            self._stand(begin, direction, stop=direction)
+            return
+        self._catch(begin)
+        rotor, load, _, behind = self._now
+        if self.field(begin) - behind != rotor:
+            # Drawn against a stop from which the field comes back.
+            left = self._time(rotor + behind, begin)
+            self._stand(begin, direction, stop=-direction)
+            if left is None or (end is not None and left >= end):
+                return
+            begin, rotor = left, self.field(left) - behind
+        offset = -behind
+        slack = 0 if direction > 0 else build.play
+        stop = build.high if direction > 0 else None if build.low is None else build.low - build.play
+        held = None if stop is None else self._time(stop + direction - offset, begin)
+        if held is not None and end is not None and held >= end:
+            held = None
+        touches = (rotor + slack - load) * direction >= 0
+        met = begin if touches else self._time(load - slack + direction - offset, begin)
+        if met is not None and ((end is not None and met >= end) or (held is not None and met >= held)):
+            met = None
+        if held != begin:
+            if met != begin:
+                self._laid.append(CoursePiece(begin, direction, True, offset, False, load, False, behind))
+            if met is not None:
+                self._laid.append(CoursePiece(met, direction, True, offset, True, offset + slack, False, behind))
+        if held is not None and stop is not None:
+            self._laid.append(CoursePiece(held, direction, False, stop, False, stop + slack, False, behind, direction))
+        if end is not None:
+            rotor = offset + self.field(end)
+            if stop is not None and (rotor - stop) * direction > 0:
+                rotor = stop
+            carried = rotor + slack
+            self._now = MechanicalState(rotor, carried if (carried - load) * direction > 0 else load, False, behind)
+
+    def _is_pushed(self, now: Nanos, direction: int) -> bool:
+        """Whether the field goes on against the stop at which the rotor stands."""
+        build, rotor = self.build, self._now.rotor
+        drawn = self.field(now) - self._now.behind - rotor
+        if direction > 0:
+            return build.high is not None and rotor >= build.high and drawn > 0
+        return build.low is not None and rotor <= build.low - build.play and drawn < 0
+
+    def _stand(self, now: Nanos, direction: int, *, stop: int = 0) -> None:
+        rotor, load, stalled, behind = self._now
+        self._laid.append(CoursePiece(now, direction, False, rotor, False, load, stalled, behind, stop))
+
+    def _catch(self, now: Nanos) -> None:
+        """The rotor goes to the nearest place that has the electrical angle of the field, or towards it as far as a stop."""
+        build, (rotor, load, _, behind) = self.build, self._now
+        drawn = self.field(now) - behind
+        if drawn != rotor:
+            periods = (2 * (drawn - rotor) + build.period_p) // (2 * build.period_p)
+            behind += periods * build.period_p
+            rotor = drawn - periods * build.period_p
+            if build.low is not None:
+                rotor = max(rotor, build.low - build.play)
+            if build.high is not None:
+                rotor = min(rotor, build.high)
+            load = min(max(load, rotor), rotor + build.play)
+        self._now = MechanicalState(rotor, load, False, behind)

@@ -1,0 +1,62 @@
+"""The motion of the load of an axis between whole pulses, as polynomials of time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import inf
+from typing import Any
+
+from steptwin.machine import SECOND, Nanos
+from steptwin.motion import Profile, Segment
+from steptwin.motion.divisions import profile_of
+from steptwin.motion.elastic import DriveStretch
+from steptwin.simulation.mechanics.course import Course
+
+LOOK_NS: Nanos = 1_000_000
+"""Motions along arcs are no polynomials: their acceleration is taken as constant for so long."""
+MOST_LOOKS = 100_000
+"""Limit of the parts of an arc."""
+
+
+def load_stretches(course: Course, now: Nanos) -> Iterator[DriveStretch]:
+    """The motion of the load of an axis from a moment on."""
+    profile = profile_of(course.plan) if course.free is None else course.free
+    sign, zero = course.build.sign, course.build.zero
+    begun = [piece for piece in course.pieces if piece.begin <= now]
+    pieces = [*begun[-1:], *course.pieces[len(begun) :]]
+    for n, piece in enumerate(pieces):
+        begin = max(piece.begin, now)
+        end = pieces[n + 1].begin if n + 1 < len(pieces) else None
+        if not piece.load_follows:
+            yield DriveStretch(begin, float(piece.load), 0.0, 0.0, 0.0)
+            continue
+        offset = piece.load + zero
+        for at, p, v, a, j in polynomials(profile, begin, end):
+            yield DriveStretch(at, offset + sign * p, sign * v, sign * a, sign * j)
+
+
+def polynomials(profile: Profile, begin: Nanos, end: Nanos | None) -> Iterator[tuple[Nanos, float, float, float, float]]:
+    """Moment, position, velocity, acceleration and jerk at the beginning of each part of a profile between two moments."""
+    at = profile.start
+    for segment, segment_end in zip(profile.segments, profile.ends, strict=True):
+        until = None if segment_end == inf else profile.start + int(segment_end)
+        if (until is None or until > begin) and (end is None or at < end):
+            yield from _of_segment(profile, segment, max(at, begin), until if end is None or (until and until < end) else end)
+        at = at if until is None else until
+    if profile.end is not None and (end is None or profile.end < end):
+        yield max(profile.end, begin), profile.base + profile.final_p, 0.0, 0.0, 0.0
+
+
+def _of_segment(profile: Profile, s: Any, begin: Nanos, end: Nanos | None) -> Iterator[tuple[Nanos, float, float, float, float]]:
+    t = (begin - profile.start) / SECOND
+    if isinstance(s, Segment):
+        u = t - s.anchor_s
+        yield begin, profile.base + s.position(t), s.velocity(t), 2.0 * s.c2 + 6.0 * s.c3 * u, 6.0 * s.c3
+        return
+    for look in range(MOST_LOOKS):
+        now = begin + look * LOOK_NS
+        if end is not None and now >= end:
+            return
+        t, step = (now - profile.start) / SECOND, LOOK_NS / SECOND
+        v = s.velocity(t)
+        yield now, profile.base + s.position(t), v, (s.velocity(t + step) - v) / step, 0.0

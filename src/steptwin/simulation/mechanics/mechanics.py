@@ -1,0 +1,456 @@
+"""The mechanics of an axis: rotor and load with hard stops, backlash and motor, and the encoders on them.
+
+A `Mechanism` follows the plans of one drive. An ideal one, whose load always is at the commanded position, costs no computing
+time; otherwise each plan gives a `Course` in closed form. Positions in pulses of the mechanics.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from dataclasses import dataclass, replace
+from operator import attrgetter
+from typing import ClassVar, NamedTuple, Protocol
+
+from steptwin.errors import Misuse
+from steptwin.machine import MILLISECOND, Nanos
+from steptwin.motion import Profile
+from steptwin.motion.divisions import profile_of
+from steptwin.motioncontroller import Drive
+from steptwin.simulation.mechanics.course import Build, Course, LoadPiece, MechanicalState
+from steptwin.simulation.mechanics.loose import Looseness
+from steptwin.simulation.mechanics.motor import NO_BURDEN, Burden
+from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.state import Plain, Stateful
+
+_OUTDATED = -1
+"""A revision that no drive has."""
+FOLLOW_NS: Nanos = 10 * MILLISECOND
+"""Interval at which a controller that follows an encoder is notified while the encoder turns."""
+
+
+class Shaft(NamedTuple):
+    """The motion of an encoder shaft: a course, in the frame of the drive's counted position. Immutable."""
+
+    course: Course
+    on_load: bool
+
+    def count(self, now: Nanos) -> int:
+        state = self.course.at(now)
+        build = self.course.build
+        return ((state.load if self.on_load else state.rotor) - build.zero) * build.sign
+
+
+class EncoderReader(Protocol):
+    """A controller that reads encoders. Axes count from 1."""
+
+    def gear_encoder(self, axis: int, counts: int, pulses: int, now: Nanos, /) -> None:
+        """Set the resolution: ``counts`` of the encoder per ``pulses`` of its shaft."""
+        ...
+
+    def follow_shaft(self, axis: int, shaft: Shaft, now: Nanos, /) -> None:
+        """Couple the encoder to ``shaft`` from now on."""
+        ...
+
+    def turn_encoder(self, axis: int, counts: int, now: Nanos, /) -> None:
+        """Turn the encoder by ``counts`` at once."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class EncoderBuild:
+    """An encoder that the controller ``device``, called ``machine`` in the kernel, reads for its axis ``axis`` (from 1).
+
+    ``counts`` (negative: backwards) per ``pulses`` of the drive that turns it; None: as the controller is configured.
+    """
+
+    machine: str
+    device: EncoderReader
+    axis: int
+    on_load: bool = False
+    counts: int | None = None
+    pulses: int = 1
+
+
+class Mechanism(Stateful):
+    """The mechanics of axis ``number`` (from 1) of a machine in ``kernel``: a part of the kernel, and a carriage for switches."""
+
+    FIXED: ClassVar[tuple[str, ...]] = ("_encoders", "_kernel", "_name", "_revision", "build", "machine", "number")
+    __slots__ = (
+        *FIXED,
+        "_blockers",
+        "_brake",
+        "_burden",
+        "_burdens",
+        "_changed",
+        "_changes",
+        "_coupled",
+        "_course",
+        "_due",
+        "_falls",
+        "_loose",
+        "_reported",
+        "_reported_course",
+        "_rest_due",
+        "_simple",
+        "_stall_due",
+        "_stalled",
+        "_stop",
+        "_stop_due",
+    )
+
+    def __init__(self, kernel: Kernel, machine: str, number: int, build: Build, name: str = "axis") -> None:
+        self._kernel = kernel
+        self._name = name
+        self.machine = machine
+        self.number = number
+        self.build = build
+        self._encoders: list[EncoderBuild] = []
+        self._coupled = False
+        """Whether the encoders were coupled to a course instead of the drive."""
+        self._due: Nanos | None = None
+        """The next notification of controllers that follow an encoder."""
+        self._stalled = False
+        self._stall_due: Nanos | None = None
+        """The next moment at which the motor stalls or synchronises again."""
+        self._stop = 0
+        """The hard stop against which the motor pushes, as reported: 1 upper, -1 lower, 0 neither."""
+        self._stop_due: Nanos | None = None
+        """When that changes next."""
+        self._blockers: tuple[str, ...] = ()
+        """What blocks the rotor."""
+        self._brake = 0.0
+        """Torque of the brake, N·m."""
+        self._burdens: dict[str, Burden] = {}
+        """Further loads, by the names of their elements."""
+        self._burden = NO_BURDEN
+        """All of them together."""
+        self._changed: tuple[int, Burden] | None = None
+        """Where the rotor was when they changed, and what it carried until then."""
+        self._loose = None if build.motor is None or not build.is_loose else Looseness(build, build.motor, kernel.now)
+        """None for a rotor that always goes with its field, or stands."""
+        self._falls = False
+        self._rest_due: Nanos | None = None
+        """When a free rotor that moves comes to rest."""
+        self._changes = 0
+        self._reported: tuple[LoadPiece, ...] | None = (LoadPiece(kernel.now, True, 0),)
+        """The position of the load as reported last; None while it moves freely."""
+        self._reported_course: Course | None = None
+        """The course that was reported."""
+        self._simple = build.ideal
+        """Whether the load always was, and always will be, at the commanded position."""
+        drive = kernel.drive_of(machine, number)
+        here = 0 if kernel.is_blank else build.sign * drive.plan.count(kernel.now) + build.zero
+        if kernel.is_blank:
+            pass  # it is restored, where another one has been
+        elif (build.low is not None and here < build.low) or (build.high is not None and here > build.high):
+            raise Misuse(f"{machine} axis {number} stands at {here} imp, outside its hard stops {build.low} to {build.high} imp")
+        self._revision = drive.revision
+        self._course = Course(build, drive.plan, kernel.now, MechanicalState(here, here))
+        if self._loose is not None and not kernel.is_blank:
+            self._renew(drive, kernel.now)
+
+    @property
+    def _drive(self) -> Drive:
+        return self._kernel.machines[self.machine].axes[self.number - 1]
+
+    # ------------------------------------------------------------------ position
+
+    def course(self, now: Nanos) -> Course:
+        """The course at ``now``, which is the kernel's moment or later. What is looked at in advance changes nothing: a course is
+        renewed at the kernel's moment."""
+        drive = self._drive
+        if drive.revision != self._revision or (self._loose is not None and self._loose.is_switched(drive, self._kernel.now)):
+            self._renew(drive, self._kernel.now)
+        return self._course
+
+    def at(self, now: Nanos) -> MechanicalState:
+        return self.course(now).at(now)
+
+    def lost(self, now: Nanos) -> int:
+        """The number of pulses by which the rotor is below the field; negative: above it."""
+        course = self.course(now)
+        return course.field(now) - course.at(now).rotor
+
+    def version(self) -> object:
+        return self._kernel.machines[self.machine].axes[self.number - 1].revision, self._changes
+
+    def place(self, now: Nanos) -> int:
+        return self.course(now).load_at(now)
+
+    def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
+        return self.course(after).reaches(position, after, direction)
+
+    # ------------------------------------------------------------------ time
+
+    def update(self, now: Nanos) -> None:
+        if not self._simple:
+            drive = self._drive
+            if drive.revision != self._revision or (self._loose is not None and self._loose.is_switched(drive, now)):
+                self._renew(drive, now)
+                self._kernel.mark(self.machine)  # switches on it look ahead
+            elif self._due is not None and self._due <= now:
+                self._turn_encoders(now)
+            if self._stall_due is not None and self._stall_due <= now:
+                self._watch_motor(now)
+            if self._stop_due is not None and self._stop_due <= now:
+                self._watch_stops(now)
+            if self._rest_due is not None and self._rest_due <= now:
+                self._watch_fall(now, None)
+            self._report_load(now)
+
+    def _report_load(self, now: Nanos) -> None:
+        """Report the position of the load, unless it follows from earlier reports or from the plan of the drive."""
+        course = self._course
+        if course is self._reported_course:
+            return
+        self._reported_course = course
+        free = course.free
+        if free is not None and free.segments:
+            self._reported = None
+            state = course.at(now)
+            moved = Profile(free.start, free.base + (state.load - state.rotor) * self.build.sign, free.segments, free.final_p)
+            self._kernel.report(self.machine, "free", str(self.number), moved)
+            return
+        pieces = _from(course.load_pieces(), now)
+        if self._reported is None or pieces != _from(self._reported, now):
+            self._reported = pieces
+            self._kernel.report(self.machine, "load", str(self.number), pieces)
+
+    def deadline(self) -> Nanos | None:
+        """Courses are computed in advance: what is due is to be reported, or concerns followers and the current of the axis."""
+        first = None if self._loose is None else self._loose.due
+        for due in (self._due, self._stall_due, self._stop_due, self._rest_due):
+            if due is not None and (first is None or due < first):
+                first = due
+        return first
+
+    def _watch_motor(self, now: Nanos) -> None:
+        """Report that the motor has stalled or has synchronised again."""
+        stalled = self._course.at(now).stalled
+        if stalled is not self._stalled:
+            self._stalled = stalled
+            caught = f"{self._name} is caught, {self.lost(now)} pulses behind"
+            text = f"{self._name} stalls{self._course.why_stalled(now)}" if stalled else caught
+            facts = (
+                ("axis", self.number),
+                ("element", self._name),
+                ("stalled", stalled),
+                ("lost", 0 if stalled else self.lost(now)),
+            )
+            self._kernel.report(self.machine, "event", "stall", text, *facts)
+        self._stall_due = self._course.next_stall(now)
+
+    def _watch_stops(self, now: Nanos) -> None:
+        """Report that the motor begins to push against a hard stop, and that it no longer does."""
+        stop = self._course.stop(now)
+        if stop != self._stop:
+            pushes, side = stop != 0, "upper" if (stop or self._stop) > 0 else "lower"
+            lost = self.lost(now)
+            ended = f"{self._name} no longer pushes against its {side} hard stop, {lost} pulses behind"
+            text = f"{self._name} pushes against its {side} hard stop" if pushes else ended
+            facts = ("axis", self.number), ("element", self._name), ("stop", side), ("pushes", pushes), ("lost", lost)
+            self._kernel.report(self.machine, "event", "hard-stop", text, *facts)
+            self._stop = stop
+        self._stop_due = self._course.next_stop(now)
+
+    def _renew(self, drive: Drive, now: Nanos, state: MechanicalState | None = None, *, rests: bool = False) -> None:
+        """Compute a new course after a change of the drive's plan or of the mechanics. ``rests``: a free rotor stands now."""
+        before, plan = self._course, drive.plan
+        if state is None:
+            if self._simple:
+                here = self.build.sign * plan.count(now) + self.build.zero
+                state = MechanicalState(here, here)
+            else:
+                state = before.at(now)
+                # After power-off a controller counts from 0 again.
+                counted_anew = self.build.sign * (plan.count(now) - before.plan.count(now))
+                state = state._replace(behind=state.behind + counted_anew)
+        led = profile_of(before.plan) if before.free is None else before.free
+        jump = profile_of(plan).velocity(now) - led.velocity(now)
+        is_new = drive.revision != self._revision
+        self._revision = drive.revision
+        free = None
+        if self._loose is not None:
+            free, state = self._loose.motion(
+                drive, before, state, now, is_new=is_new, burden=self._carried, stands=self._blocked or rests
+            )
+        vibration = before.vibration(now)
+        self._course = Course(self._loaded(), plan, now, state, blocked=self._blocked, jump=jump, free=free, vibration=vibration)
+        self._changes += 1
+        if self._encoders:
+            self._turn_encoders(now)
+        if self.build.motor is not None:
+            self._watch_motor(now)
+        if self.build.low is not None or self.build.high is not None:
+            self._watch_stops(now)
+        if self._loose is not None:
+            self._watch_fall(now, free)
+
+    # ------------------------------------------------------------------ load
+
+    @property
+    def _carried(self) -> Burden:
+        """What the motor moves besides its own: a further load, and the friction of the brake."""
+        return self._burden.plus(Burden(0.0, self._brake))
+
+    def _loaded(self) -> Build:
+        """What a powered motor has to move."""
+        motor, more = self.build.motor, self._carried
+        if motor is None or more == NO_BURDEN:
+            return self.build
+        own = Burden(motor.inertia, motor.friction, motor.load).plus(more)
+        return replace(self.build, motor=replace(motor, inertia=own.inertia, friction=own.friction, load=own.load))
+
+    def _watch_fall(self, now: Nanos, free: Profile | None) -> None:
+        """Report that a rotor that its field does not hold begins to move, and that it rests again."""
+        falls = free is not None and free.moving(now)
+        if falls is not self._falls and self._loose is not None:
+            self._falls = falls
+            lost = self.lost(now)
+            text = f"{self._name} {self._loose.why}" if falls else f"{self._name} stands, {lost} pulses behind"
+            facts = ("axis", self.number), ("element", self._name), ("falls", falls), ("lost", lost)
+            self._kernel.report(self.machine, "event", "fall", text, *facts)
+        self._rest_due = free.end if free is not None and falls else None
+
+    def brake(self, torque: float, now: Nanos) -> None:
+        """Let a brake act on the rotor with ``torque`` N·m."""
+        if torque == self._brake:
+            return
+        state = self.at(now)
+        self._brake = torque
+        self._renew(self._drive, now, state)
+        self._kernel.mark(self.machine)
+
+    def burden(self, by: str, more: Burden, now: Nanos) -> None:
+        """Let the element ``by`` load the rotor with ``more``, in place of what it did before."""
+        if more == self._burdens.get(by, NO_BURDEN):
+            return
+        course, before = self.course(now), self._carried
+        self._burdens[by] = more
+        self._burden = NO_BURDEN
+        for one in self._burdens.values():
+            self._burden = self._burden.plus(one)
+        state = course.at(now)
+        rests = self._loose is not None and self._settles(self._loose, course, before, now)
+        self._renew(self._drive, now, state, rests=rests)
+        self._kernel.mark(self.machine)
+
+    def _settles(self, loose: Looseness, course: Course, before: Burden, now: Nanos) -> bool:
+        """Whether a free rotor stands whose load changes from ``before`` where it changed the other way the last time."""
+        rotor = course.at(now).rotor
+        last, self._changed = self._changed, (rotor, before)
+        is_again = last is not None and last[1] == self._carried and 4 * abs(last[0] - rotor) <= self.build.period_p
+        return is_again and loose.settles(course, before, self._carried, now)
+
+    def pulls(self, now: Nanos) -> bool:
+        """Whether the motor follows its field, or would: it has current, has not stalled, and nothing blocks it."""
+        return self._drive.is_energised and not self._blocked and not self.at(now).stalled
+
+    def next_stall(self, now: Nanos) -> Nanos | None:
+        """First moment after ``now`` at which the motor stalls or synchronises again."""
+        return self.course(now).next_stall(now)
+
+    # ------------------------------------------------------------------ encoders
+
+    def fit(self, encoder: EncoderBuild, now: Nanos) -> None:
+        """Mount an encoder on the rotor or the load."""
+        self._encoders.append(encoder)
+        if encoder.counts is not None:
+            encoder.device.gear_encoder(encoder.axis, encoder.counts, encoder.pulses, now)
+        if not self._is_own(encoder):
+            self._simple = False
+        self._turn_encoders(now)
+
+    @property
+    def may_turn(self) -> set[str]:
+        """Machines whose encoders it may turn without an event of theirs."""
+        return {encoder.machine for encoder in self._encoders if self.build.is_loose or encoder.machine != self.machine}
+
+    def _turn_encoders(self, now: Nanos) -> None:
+        course = self._course
+        self._due = None
+        for encoder in self._encoders:
+            own = self._is_own(encoder)
+            exact = own and course.is_exact and not (encoder.on_load and self.build.play)
+            if not exact or self._coupled:
+                self._coupled = True
+                encoder.device.follow_shaft(encoder.axis, Shaft(course, encoder.on_load), now)
+            if not own and course.moves(now):
+                self._due = now + FOLLOW_NS
+
+    def _is_own(self, encoder: EncoderBuild) -> bool:
+        """Whether an encoder belongs to the same axis of the same controller."""
+        return (encoder.machine, encoder.axis) == (self.machine, self.number)
+
+    # ------------------------------------------------------------------ faults
+
+    @property
+    def _blocked(self) -> bool:
+        return bool(self._blockers)
+
+    def block(self, blocked: bool, now: Nanos, by: str = "") -> None:
+        """Block the rotor, so that pulses are lost, or release it. It is free when nothing blocks it any more."""
+        others = tuple(name for name in self._blockers if name != by)
+        if not blocked and others:
+            self._blockers = others
+            return
+        state = self.at(now)
+        self._simple = False
+        self._blockers = (*others, by) if blocked else ()
+        stalled = state.stalled or (not blocked and self.build.motor is not None)
+        self._renew(self._drive, now, state._replace(stalled=stalled))
+        self._kernel.mark(self.machine)
+
+    def lose(self, pulses: int, now: Nanos) -> None:
+        """Move the rotor ``pulses`` behind the field (negative: ahead), within the hard stops."""
+        build, (rotor, load, stalled, _) = self.build, self.at(now)
+        rotor -= pulses
+        if build.low is not None:
+            rotor = max(rotor, build.low - build.play)
+        if build.high is not None:
+            rotor = min(rotor, build.high)
+        self._simple = False
+        behind = self.course(now).field(now) - rotor
+        self._renew(self._drive, now, MechanicalState(rotor, min(max(load, rotor), rotor + build.play), stalled, behind))
+        self._kernel.mark(self.machine)
+
+    def slip(self, counts: int, now: Nanos) -> None:
+        """Let the encoders slip by ``counts`` on their shaft."""
+        for encoder in self._encoders:
+            encoder.device.turn_encoder(encoder.axis, counts, now)
+        self._kernel.mark(self.machine)
+
+    # Revisions of a drive are not restored, so the state only holds whether the course belongs to the drive's present plan.
+
+    def copy_state(self) -> Plain:
+        return super().copy_state(), self._revision == self._drive.revision
+
+    def set_state(self, plain: Plain) -> None:
+        """As `Stateful.set_state`; the drive must have been restored before."""
+        own, is_current = plain
+        super().set_state(own)
+        self._revision = self._drive.revision if is_current else _OUTDATED
+
+
+def _from(reported: tuple[LoadPiece, ...], now: Nanos) -> tuple[LoadPiece, ...]:
+    """The part of a report that concerns ``now`` and later."""
+    past = max(bisect_right(reported, now, key=attrgetter("begin")) - 1, 0)
+    return (reported[past]._replace(begin=now), *reported[past + 1 :])
+
+
+class RotorMark:
+    """The rotor of a mechanism as a carriage, for the index of an encoder."""
+
+    __slots__ = ("_mechanism",)
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self._mechanism = mechanism
+
+    def version(self) -> object:
+        return self._mechanism.version()
+
+    def place(self, now: Nanos) -> int:
+        return self._mechanism.at(now).rotor
+
+    def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
+        return self._mechanism.course(after).reaches(position, after, direction, rotor=True)

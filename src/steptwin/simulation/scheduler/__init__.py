@@ -1,0 +1,1 @@
+"""Kernels in virtual time, wires, parts and records of what happens. Sees `toml`."""

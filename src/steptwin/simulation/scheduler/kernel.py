@@ -1,0 +1,556 @@
+"""The event-driven kernel: machines, the wires between their pins, and the parts (mechanics, switches, lines) between them.
+
+A kernel is itself a machine in virtual time. Machines without a common wire are put into separate kernels, so that each one is
+advanced only when an event concerns it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from typing import ClassVar, NamedTuple
+
+from steptwin.errors import Misuse, Runaway, TimeReversal
+from steptwin.machine import Fact, Nanos, PinEdge
+from steptwin.motioncontroller import Drive, MotionController
+from steptwin.simulation.scheduler.followers import KernelFollower, KernelFollowers
+from steptwin.simulation.scheduler.kernelpart import KernelPart, KernelState
+from steptwin.simulation.scheduler.kernelparts import KernelParts
+from steptwin.simulation.scheduler.recordedplans import RecordedPlans
+from steptwin.simulation.scheduler.trace import RecordSink, TraceRecord
+from steptwin.simulation.scheduler.turns import Dues, Turns
+from steptwin.simulation.scheduler.wires import PinName, Wire, Wires
+from steptwin.state import Stateful
+
+MAX_ROUNDS_PER_INSTANT = 1000
+"""Signals propagate in zero time; more rounds than this at one moment mean a feedback loop of wires."""
+
+
+class Source(NamedTuple):
+    """A machine, a line or an element of a kernel, on which a value depends."""
+
+    kernel: Kernel
+    name: str
+
+
+class Board(Stateful):
+    """Terminals of the element ``name``: levels that wires, contacts and other elements join as they join pins of controllers.
+    All levels are 0 until something drives them.
+
+    Its element reads inputs in `KernelPart.update`, never earlier, so that a loop of elements is found by the kernel.
+    """
+
+    FIXED: ClassVar[tuple[str, ...]] = ("inputs", "kernel", "name", "outputs")
+    __slots__ = (*FIXED, "_held", "_recorded", "_wanted", "levels")
+
+    def __init__(self, kernel: Kernel, name: str, inputs: Iterable[str], outputs: Iterable[str]) -> None:
+        self.kernel = kernel
+        self.name = name
+        self.inputs, self.outputs = tuple(inputs), tuple(outputs)
+        self.levels: dict[str, float] = dict.fromkeys((*self.inputs, *self.outputs), 0.0)
+        self._wanted: dict[str, float] = {}
+        """What the element gives its outputs, and its inputs are driven to."""
+        self._held: dict[str, float] = {}
+        """Terminals that faults hold."""
+        self._recorded: tuple[str, ...] = ()
+        """Outputs whose first level has been recorded."""
+
+    @property
+    def source(self) -> Source:
+        """What its levels, and the signals of its element, depend on."""
+        return self.kernel.source(self.name)
+
+    def set_pin(self, pin: str, level: float, now: Nanos) -> None:
+        """Drive an input. The element sees it when signals settle."""
+        self._wanted[pin] = level
+        self.levels[pin] = self._held.get(pin, level)
+
+    def is_on(self, terminal: str) -> bool:
+        return self.levels[terminal] != 0.0
+
+    def put(self, output: str, level: float) -> None:
+        """Give an output a level now; its first level and every change are recorded and carried along wires."""
+        self._wanted[output] = level
+        self._show(output, self._held.get(output, level))
+
+    def hold(self, terminal: str, level: float | None) -> None:
+        """Hold a terminal at a level, whatever its element gives it, or drives it; None lets it go."""
+        if level is None:
+            self._held.pop(terminal, None)
+        else:
+            self._held[terminal] = level
+        shown = self._held.get(terminal, self._wanted.get(terminal, 0.0))
+        if terminal in self.outputs:
+            self._show(terminal, shown)
+        else:
+            self.levels[terminal] = shown
+
+    def _show(self, output: str, level: float) -> None:
+        if level == self.levels[output] and output in self._recorded:
+            return
+        self.levels[output] = level
+        if output not in self._recorded:
+            self._recorded = (*self._recorded, output)
+        self.kernel.put(self.name, output, level)
+
+
+class Kernel:
+    """Runs machines together. Ties in time are broken by the order in which machines and parts were added.
+
+    An event costs what it changes: only machines and parts that are due, or that something they watch has changed (`mark`), are
+    looked at.
+
+    Before a machine is changed directly (by a request or a pin), the kernel must be advanced to that moment, so that delayed
+    levels arrive in order; the effects propagate with the next `advance`, `deadline` or `settle`.
+
+    ``record`` gets the first level of each driven input, every edge of an output and of an input, and every new plan of an axis.
+    """
+
+    def __init__(
+        self, now: Nanos = 0, record: RecordSink | None = None, *, is_checked: bool = False, is_blank: bool = False
+    ) -> None:
+        """``is_checked``: its wires join what exists, because they do so in another kernel of the same description. ``is_blank``:
+        `restore` comes next, with all levels; until then it drives and records nothing."""
+        self.now = now
+        self.machines: dict[str, MotionController] = {}
+        self.boards: dict[str, Board] = {}
+        """Terminals of elements."""
+        self._parts = KernelParts()
+        self.observers: list[Callable[[str, PinEdge], None]] = []
+        """Called with machine name and edge, in order, for every output edge."""
+        self.stale = False
+        """Whether something changed since the signals last settled."""
+        self.is_attentive = False
+        """Whether a condition depends on values that a request or a statement may change without an event; then each of them
+        counts as one."""
+        self.hears_requests = False
+        """Whether every request counts as an event, because what one may change is noted."""
+        self.on_change: Callable[[Kernel], None] | None = None
+        """Called with the kernel after each of its events and after each change from outside."""
+        self.followers: KernelFollowers | None = None
+        """What is notified of each event; None: there has been nothing yet."""
+        self._changed: set[str] = set()
+        """The machines, lines and elements that were looked at since the last `take_changed`."""
+        self._is_checked, self.is_blank = is_checked, is_blank
+        self._record = record
+        self.wires = Wires(self.drive)
+        self._levels: dict[PinName, float] = {}
+        """The level last driven to each input."""
+        self._recorded: dict[PinName, tuple[Nanos, float]] = {}
+        """The last recorded edge of each driven input."""
+        self._plans: list[RecordedPlans] = []
+        """The plans of each machine that were recorded last."""
+        self._names: list[str] = []
+        """The names of the machines, by number."""
+        self._pin_names: dict[str, tuple[str, ...]] = {}
+        """Of machines and elements whose pins were asked for."""
+        self._numbers: dict[str, int] = {}
+        """The numbers of the machines, by name."""
+        self._sources: dict[str, Source] = {}
+        """The machines, and the lines and elements with a part that computes their signals."""
+        self._machine_turns = Turns()
+        """Those whose edges have to be taken when the signals settle."""
+        self._machine_dues = Dues()
+        self._machines_looked_at: set[int] = set()
+        """Those whose deadlines may have changed since the signals last settled."""
+        self._due: Nanos | None = None
+        self._alone: tuple[str, RecordedPlans] | None = None
+        """The only machine of a kernel without parts and wires, for which nothing has to be scheduled."""
+
+    # ------------------------------------------------------------------ what is in it
+
+    @property
+    def parts(self) -> Sequence[KernelPart]:
+        """In the order in which they are updated."""
+        return self._parts.parts
+
+    def add(self, name: str, machine: MotionController) -> None:
+        """Add a machine and set its ``changed`` hook. Raises `TimeReversal` if its time is after the kernel's."""
+        if name in self.machines:
+            raise Misuse(f"there is a machine {name!r} already")
+        if not self.is_blank:
+            machine.advance(self.now)
+        self.machines[name] = machine
+        self._numbers[name] = len(self._names)
+        self._names.append(name)
+        self._sources[name] = Source(self, name)
+        self._plans.append(RecordedPlans(name, machine))
+        machine.changed = partial(self.mark, name)
+        self._join()
+        if len(self._names) == 1 and not self.parts and not self.wires:
+            self._alone = name, self._plans[0]
+        self.mark(name)
+
+    def _join(self) -> None:
+        """Something joins the machines: from now on it is scheduled what has to be looked at."""
+        if self._alone is not None:
+            self._alone = None
+            self.mark()
+
+    def replace(self, name: str, machine: MotionController) -> None:
+        """Replace the machine ``name`` by a wrapper with the same pins and axes."""
+        if name not in self.machines:
+            raise Misuse(f"no machine {name!r}: there are {', '.join(self.machines) or 'none'}")
+        self.machines[name] = machine
+        machine.changed = partial(self.mark, name)
+        self.mark(name)
+
+    def add_board(self, board: Board) -> None:
+        """Add the terminals of an element, whose part has their state."""
+        self.boards[board.name] = board
+
+    def add_part(
+        self, part: KernelPart, watches: Iterable[str] | None = None, name: str | None = None, drives: str | None = None
+    ) -> None:
+        """Add a part; it is first updated when the signals settle next, then whenever it is due or something that it watches has
+        changed.
+
+        ``watches``: names of machines, lines and elements; None: every change. ``name``: the line or element whose signals it
+        computes; they may change with each of its updates, and only then. ``drives``: the machine or element whose input
+        it drives.
+        """
+        self._join()
+        number = self._parts.add(part, watches, name, drives)
+        if name is not None:
+            self._sources[name] = Source(self, name)
+        if not self.is_blank:
+            self._parts.turns.add(number)
+        self.stale = True
+        if self.on_change is not None:
+            self.on_change(self)
+
+    def order(self) -> Sequence[int]:
+        """The numbers of its parts in the order in which they should be updated (`arrange`); empty if they are in that order."""
+        return self._parts.order(self.wires)
+
+    def arrange(self, order: Sequence[int]) -> None:
+        """Update its parts in another order from now on, before the first moment. ``order``: their present numbers."""
+        self._parts = self._parts.arranged(order)
+        self.mark()
+
+    def source(self, name: str) -> Source:
+        """The machine, line or element ``name`` as what a value depends on."""
+        found = self._sources.get(name)
+        if found is None:
+            raise Misuse(f"nothing computes signals of {name!r}: there are {', '.join(self._sources) or 'none'}")
+        return found
+
+    def connect(self, wire: Wire) -> None:
+        """Add a wire. The target takes the present level of the source at once, without the delay."""
+        self.check(wire.source)
+        self.check(wire.target)
+        self._join()
+        if not self.is_blank:
+            self.drive(wire.target, wire.transmitted(self._level(wire.source)))
+        self.wires.add(wire)
+        self.mark(wire.target.machine)
+
+    def wire_to(self, target: PinName) -> Wire | None:
+        """The wire that drives an input, if one does."""
+        return next((wire for wire in self.wires if wire.target == target), None)
+
+    def check(self, name: PinName) -> None:
+        """Raises `Misuse` if the machine or its pin does not exist."""
+        if self._is_checked:
+            return
+        if name.machine not in self.machines and name.machine not in self.boards:
+            raise Misuse(f"no machine {name.machine!r}: there are {', '.join(self.machines) or 'none'}")
+        pins = self._pin_names.get(name.machine)
+        if pins is None:
+            board = self.boards.get(name.machine)
+            pins = self._pin_names[name.machine] = tuple(self.machines[name.machine].pins() if board is None else board.levels)
+        if name.pin not in pins:
+            raise Misuse(f"{name.machine!r} has no pin {name.pin!r}: pins are {', '.join(pins)}")
+
+    def _level(self, name: PinName) -> float:
+        board = self.boards.get(name.machine)
+        return self.machines[name.machine].pin(name.pin) if board is None else board.levels[name.pin]
+
+    def drive_of(self, machine: str, axis: int) -> Drive:
+        """The drive of ``axis`` (from 1). Raises `Misuse` if it does not exist."""
+        found = self.machines.get(machine)
+        axes = () if found is None else found.axes
+        if not 1 <= axis <= len(axes):
+            raise Misuse(f"no axis {axis} of {machine!r}, which has {len(axes)} axes")
+        return axes[axis - 1]
+
+    def follow(self, follower: KernelFollower, names: Iterable[str], *, leaves: bool = False) -> None:
+        """Tell it of events from now on, as `KernelFollowers.add`."""
+        if self.followers is None:
+            self.followers = KernelFollowers()
+        self.followers.add(follower, names, leaves=leaves)
+
+    def unfollow(self, follower: KernelFollower) -> None:
+        """Tell it no more."""
+        if self.followers is not None:
+            self.followers.remove(follower)
+
+    def take_changed(self) -> set[str]:
+        """The machines, lines and elements whose signals may have changed since the last call, as far as signals have settled."""
+        changed, self._changed = self._changed, set()
+        return changed
+
+    def mark(self, name: str | None = None) -> None:
+        """Register a change of a machine, a line or an element, or of anything: the signals have to settle."""
+        if self._alone is not None or self.is_blank:
+            pass  # it is looked at whenever the kernel settles, all of it after `restore`
+        elif name is None:
+            for number in range(len(self._names)):
+                self._machine_turns.add(number)
+            for number in range(len(self.parts)):
+                self._parts.turns.add(number)
+        else:
+            of_machine = self._numbers.get(name)
+            if of_machine is not None:
+                self._machine_turns.add(of_machine)
+            for number in self._parts.by_name.get(name, ()):
+                self._parts.turns.add(number)
+        self.stale = True
+        if self.on_change is not None:
+            self.on_change(self)
+
+    # ------------------------------------------------------------------ levels
+
+    def drive(self, target: PinName, level: float) -> None:
+        """Drive an input to a level now; an unchanged level has no effect."""
+        before = self._levels.get(target)
+        if before == level or self.is_blank:
+            return
+        self._levels[target] = level
+        self.set_input(target, level, is_first=before is None)
+
+    def set_input(self, target: PinName, level: float, *, is_first: bool = False) -> None:
+        """Drive an input now. Its resulting level, which a fault may hold, is recorded where it changes or ``is_first``.
+
+        The machine's own report of the same edge is not recorded again.
+        """
+        board = self.boards.get(target.machine)
+        if board is not None:
+            board.set_pin(target.pin, level, self.now)
+            self.mark(target.machine)
+            return
+        machine, (_, pin) = self.machines[target.machine], target
+        if self._record is None:
+            machine.set_pin(pin, level, self.now)
+            return
+        known = self._recorded.get(target)
+        before = machine.pin(pin) if known is None else known[1]
+        machine.set_pin(pin, level, self.now)
+        after = machine.pin(pin)
+        if is_first or after != before:
+            self.mark_recorded(target, self.now, after)
+            self._record(TraceRecord(self.now, target.machine, "edge", pin, after))
+
+    def mark_recorded(self, target: PinName, now: Nanos, level: float) -> None:
+        """Mark an edge of an input as recorded, in case its machine reports it too."""
+        self._recorded[target] = now, level
+
+    def owner(self, name: str) -> str:
+        """The machine under which ``name`` is recorded: itself, or the first one for an element with terminals."""
+        return next(iter(self.machines), name) if name in self.boards else name
+
+    def put(self, element: str, output: str, level: float) -> None:
+        """An output of an element has another level now, or its first one."""
+        self.report(self.owner(element), "edge", f"{element}.{output.lower()}", level)
+        self.wires.transmit(PinName(element, output), level, self.now)
+        self.mark(element)
+
+    def report(self, machine: str, kind: str, subject: str, value: object, *facts: Fact) -> None:
+        """Record an event of a machine at the present moment."""
+        if self._record is not None and not self.is_blank:
+            self._record(TraceRecord(self.now, machine, kind, subject, value, facts))
+
+    # ------------------------------------------------------------------ time
+
+    def advance(self, now: Nanos) -> None:
+        if now < self.now:
+            raise TimeReversal(self.now, now)
+        if self.stale:
+            self.settle()
+        due = self._due
+        if due is not None and due <= now:
+            self._run(now)
+        if self.followers is not None and self.followers.leaving and now > self.now:
+            self.followers.leave(now)  # something may come from outside next
+        self.now = now
+
+    def _run(self, now: Nanos) -> None:
+        """Process all events due by ``now``, in order."""
+        if self._alone is not None:
+            self._advance_alone(*self._alone, now)
+            if self.on_change is not None:
+                self.on_change(self)
+            return
+        while self._due is not None and self._due <= now:
+            if self.followers is not None and self.followers.leaving:
+                self.followers.leave(self._due)
+            self.now = self._due
+            self._advance_machines(now)
+            for number in self._parts.dues.take(self.now):
+                self._parts.turns.add(number)
+            if self.wires.delayed:
+                self.wires.arrive(self.now)
+            self.settle()
+
+    def _advance_machines(self, now: Nanos) -> None:
+        """Advance the machines that are due; a single one to where it changes something, or where anything else is due."""
+        due = self._machine_dues.take(self.now)
+        until = self._nothing_else_until(now) if len(due) == 1 and not self.is_attentive else self.now
+        for number in due:
+            name = self._names[number]
+            self.stale = False
+            if until > self.now:
+                self.now = self.machines[name].advance_to_change(until)
+            else:
+                self.machines[name].advance(self.now)
+            if not self.stale:  # the machine has not called its hook
+                self.mark(name)
+
+    def _nothing_else_until(self, now: Nanos) -> Nanos:
+        """The last moment, at most ``now``, before anything is due besides a machine that is due now."""
+        until, dues = now, (self._machine_dues.first(), self._parts.dues.first())
+        for due in (*dues, self.wires.next_arrival()) if self.wires.delayed else dues:
+            if due is not None and due <= until:
+                until = due - 1
+        return until
+
+    def _advance_alone(self, name: str, plans: RecordedPlans, now: Nanos) -> None:
+        machine, due = self.machines[name], self._due
+        self._changed.add(name)
+        while due is not None and due <= now:
+            if self.followers is not None:
+                self.followers.leave(due)
+            if self.is_attentive:
+                machine.advance(due)
+                self.now = due
+            else:
+                self.now = machine.advance_to_change(now)
+            self._settle_alone(name, plans)
+            if self.followers is not None:
+                self.followers.news |= self.followers.by_name.get(name, {})
+                self.followers.tell(self.now)
+            due = self._due
+            if self.is_attentive and self.on_change is not None:
+                self.on_change(self)
+
+    def _settle_alone(self, name: str, plans: RecordedPlans) -> None:
+        """As `settle`, for a single machine without parts and wires."""
+        machine = self.machines[name]
+        for edge in machine.take_edges():
+            self._edge(name, edge)
+        if self._record is not None:
+            plans.report(self._record, self.now)
+        self._due = machine.deadline()
+        self.stale = False
+
+    def deadline(self) -> Nanos | None:
+        """The time of the next event; None if there is none."""
+        if self.stale:
+            self.settle()
+        return self._due
+
+    def settle(self) -> None:
+        """Propagate edges along wires and update parts until nothing changes; then find the next deadline."""
+        if self._alone is not None:
+            self._changed.add(self._alone[0])
+            self._settle_alone(*self._alone)
+            if self.followers is not None:
+                self.followers.news |= self.followers.by_name.get(self._alone[0], {})
+        else:
+            self._settle_joined()
+        if self.followers is not None and self.followers.news:
+            self.followers.tell(self.now)
+        if self.on_change is not None:
+            self.on_change(self)
+
+    def _settle_joined(self) -> None:
+        for _ in range(MAX_ROUNDS_PER_INSTANT):
+            self.stale = False
+            for number in self._parts.all:
+                self._parts.turns.add(number)
+            self._update_parts()
+            self._take_edges()
+            if not self.stale:
+                break
+        else:
+            raise Runaway(f"signals did not settle after {MAX_ROUNDS_PER_INSTANT} rounds at {self.now} ns: a loop of wires")
+        self._find_deadlines()
+
+    def _update_parts(self) -> None:
+        parts, turns, looked_at = self._parts.parts, self._parts.turns, self._parts.looked_at
+        while (number := turns.take()) is not None:
+            looked_at.add(number)
+            parts[number].update(self.now)
+
+    def _take_edges(self) -> None:
+        while (number := self._machine_turns.take()) is not None:
+            self._machines_looked_at.add(number)
+            name = self._names[number]
+            for edge in self.machines[name].take_edges():
+                self._edge(name, edge)
+
+    def _find_deadlines(self) -> None:
+        """Record new plans of the machines that were looked at, and find when anything is due next."""
+        followers = self.followers
+        for number in sorted(self._machines_looked_at):
+            if self._record is not None:
+                self._plans[number].report(self._record, self.now)
+            name = self._names[number]
+            self._changed.add(name)
+            if followers is not None and name in followers.by_name:
+                followers.news |= followers.by_name[name]
+            self._machine_dues.put(number, self.machines[name].deadline())
+        parts = self._parts
+        for number in parts.looked_at:
+            of = parts.computes[number]
+            if of is not None:
+                self._changed.add(of)
+                if followers is not None and of in followers.by_name:
+                    followers.news |= followers.by_name[of]
+            parts.dues.put(number, parts.parts[number].deadline())
+        self._machines_looked_at.clear()
+        parts.looked_at.clear()
+        due, of_parts = self._machine_dues.first(), parts.dues.first()
+        if due is None or (of_parts is not None and of_parts < due):
+            due = of_parts
+        arrival = self.wires.next_arrival() if self.wires.delayed else None
+        self._due = arrival if due is None or (arrival is not None and arrival < due) else due
+
+    def _edge(self, name: str, edge: PinEdge) -> None:
+        pin = PinName(name, edge.pin)
+        if self._record is not None and self._recorded.get(pin) != (edge.time, edge.value):
+            self._record(TraceRecord(edge.time, name, "edge", edge.pin, edge.value))
+            if pin in self._recorded:
+                self._recorded[pin] = edge.time, edge.value
+        for observer in self.observers:
+            observer(name, edge)
+        self.wires.transmit(pin, edge.value, self.now)
+
+    # ------------------------------------------------------------------ snapshots
+
+    def snapshot(self) -> KernelState:
+        """State of everything at the kernel's moment."""
+        if self.stale:
+            self.settle()
+        return KernelState(
+            self.now,
+            tuple(machine.snapshot() for machine in self.machines.values()),
+            tuple(part.copy_state() for part in self.parts),
+            self._levels.copy(),
+            tuple(self.wires.delayed),
+        )
+
+    def restore(self, state: KernelState) -> None:
+        """Restore the state of a kernel with the same machines and parts."""
+        self.now, self.is_blank = state.now, False
+        for machine, its_state in zip(self.machines.values(), state.machines, strict=True):
+            machine.restore(its_state)
+        for part, its_state in zip(self.parts, state.parts, strict=True):
+            part.set_state(its_state)
+        self._levels = dict(state.levels)
+        self._recorded.clear()
+        self.wires.delayed = list(state.delayed)
+        for plans in self._plans:
+            plans.mark_reported()
+        self.mark()
+        self.settle()

@@ -1,0 +1,36 @@
+"""What a kernel runs between its machines, and the state of a kernel as plain values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple, Protocol
+
+from steptwin.machine import Nanos
+from steptwin.simulation.scheduler.wires import DelayedLevel, PinName
+from steptwin.state import Plain
+
+
+class KernelPart(Protocol):
+    """A part between machines: mechanics, a switch, a source, a line. Its state is plain (`steptwin.state.Stateful`)."""
+
+    def deadline(self) -> Nanos | None:
+        """The time of its next event of its own, as for a machine."""
+        ...
+
+    def update(self, now: Nanos) -> None:
+        """Process events due by ``now`` and changes of what it watches, repeatedly until nothing changes. Levels go to
+        `Kernel.drive`."""
+        ...
+
+    def copy_state(self) -> Plain: ...
+    def set_state(self, plain: Plain) -> None: ...
+
+
+class KernelState(NamedTuple):
+    """State of a kernel, its machines and its parts."""
+
+    now: Nanos
+    machines: tuple[Any, ...]
+    parts: tuple[Plain, ...]
+    levels: Mapping[PinName, float]
+    delayed: tuple[DelayedLevel, ...]

@@ -1,0 +1,65 @@
+"""The parts of a kernel, and everything that is kept by their numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from steptwin.simulation.scheduler.kernelpart import KernelPart
+from steptwin.simulation.scheduler.order import successors, update_order
+from steptwin.simulation.scheduler.turns import Dues, Turns
+from steptwin.simulation.scheduler.wires import Wire
+
+
+class KernelParts:
+    """Parts with numbers in the order in which they are updated: what each watches, computes and drives, and when it has a turn.
+
+    All that is kept by number is here, and `arranged` makes it anew, so that nothing of one numbering gets into another.
+    """
+
+    __slots__ = ("_drives", "_watched", "all", "by_name", "computes", "dues", "looked_at", "parts", "turns")
+
+    def __init__(self) -> None:
+        self.parts: list[KernelPart] = []
+        self.by_name: dict[str, list[int]] = {}
+        """The parts that watch a machine, a line or an element, by its name."""
+        self._watched: list[tuple[str, ...] | None] = []
+        """The names that each part watches; None: everything."""
+        self.all: list[int] = []
+        """Those that watch everything."""
+        self.computes: list[str | None] = []
+        """The line or element whose signals each part computes."""
+        self._drives: dict[int, str] = {}
+        """The machine or element whose input a part drives."""
+        self.turns = Turns()
+        """Those that are updated when the signals settle."""
+        self.dues = Dues()
+        self.looked_at: set[int] = set()
+        """Those whose deadlines may have changed since the signals last settled."""
+
+    def add(self, part: KernelPart, watches: Iterable[str] | None, computes: str | None, drives: str | None) -> int:
+        """The number of another part, the last one. ``watches``: None is everything."""
+        number = len(self.parts)
+        self.parts.append(part)
+        self.computes.append(computes)
+        if drives is not None:
+            self._drives[number] = drives
+        watched = None if watches is None else tuple(dict.fromkeys(watches))
+        self._watched.append(watched)
+        if watched is None:
+            self.all.append(number)
+        else:
+            for name in watched:
+                self.by_name.setdefault(name, []).append(number)
+        return number
+
+    def order(self, wires: Iterable[Wire]) -> Sequence[int]:
+        """Their numbers in the order in which they should be updated; empty if they are in that order."""
+        found = update_order(successors(self.computes, self.by_name, self._drives, wires), self.all)
+        return () if found == sorted(found) else found
+
+    def arranged(self, order: Sequence[int]) -> KernelParts:
+        """The same parts, added in another order; none has a turn yet. ``order``: their present numbers."""
+        found = KernelParts()
+        for old in order:
+            found.add(self.parts[old], self._watched[old], self.computes[old], self._drives.get(old))
+        return found

@@ -1,0 +1,111 @@
+"""Commands for controllers, in the units of their data sheets. Each kind of controller determines what a master sends for
+them (`steptwin.simulation.kinds.kind.ControllerKind.control`)."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from steptwin.errors import Misuse
+
+
+@dataclass(frozen=True, slots=True)
+class Enable:
+    """Switch a drive on or off."""
+
+    machine: str
+    axis: int
+    on: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """Begin to move to a position, or by a distance."""
+
+    machine: str
+    axis: int
+    to: float | None = None
+    by: float | None = None
+
+    def __post_init__(self) -> None:
+        if (self.to is None) is (self.by is None):
+            raise Misuse("move: give either to (a position) or by (a distance)")
+
+
+@dataclass(frozen=True, slots=True)
+class Home:
+    """Begin to home; the sign of the velocity chooses the switch."""
+
+    machine: str
+    axis: int
+    velocity: float
+
+
+@dataclass(frozen=True, slots=True)
+class Seek:
+    """Begin to home a controller that does not know its switch: move in ``direction`` (1 or -1) until the input ``pin`` ends it,
+    which is then the position 0."""
+
+    machine: str
+    axis: int
+    direction: int
+    pin: str
+
+
+@dataclass(frozen=True, slots=True)
+class Jog:
+    """Begin to move at a velocity, without end."""
+
+    machine: str
+    axis: int
+    velocity: float
+
+
+@dataclass(frozen=True, slots=True)
+class StopAxes:
+    """Stop an axis as fast as the controller does; without one, all axes of the machine."""
+
+    machine: str
+    axis: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ControlProgram:
+    """Start, pause or stop the program of a machine."""
+
+    machine: str
+    action: str
+
+
+@dataclass(frozen=True, slots=True)
+class Halt:
+    """Stop a controller at the controller itself, whatever its line does: an axis (None: all of them), or with ``program``
+    ("pause" or "stop") its program and no axis. What scripts and commands have sent it over its line before is dropped."""
+
+    machine: str
+    axis: int | None = None
+    program: str | None = None
+
+    @property
+    def scope(self) -> str:
+        """What it stops, in the words of records and events (`steptwin.subject.payloads.InputPayload`)."""
+        if self.program is not None:
+            return "program, paused" if self.program == "pause" else "program"
+        return "all axes" if self.axis is None else f"axis {self.axis}"
+
+
+def ended(machine: str, numbers: Iterable[int]) -> list[Halt]:
+    """What a write of registers ends, by the numbers of axes, and 0 for the program."""
+    return [Halt(machine, number) if number else Halt(machine, program="stop") for number in sorted(numbers)]
+
+
+def standstill(machine: str, program_actions: Collection[str]) -> tuple[Halt, ...]:
+    """Stop everything of a controller whose program takes these actions. A program is paused where that can be done, because its
+    end may switch drives off (MIC-31), and a load would fall; axes are stopped again, because it may have begun a motion."""
+    if not program_actions:
+        return (Halt(machine),)
+    return Halt(machine), Halt(machine, program="pause" if "pause" in program_actions else "stop"), Halt(machine)
+
+
+ControllerCommand: TypeAlias = Enable | Move | Home | Jog | StopAxes | ControlProgram

@@ -1,0 +1,1 @@
+"""A running world: model, scripts, actions, history and views. Sees all other rooms."""

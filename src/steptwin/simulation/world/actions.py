@@ -1,0 +1,262 @@
+"""The actions of steps and of external programs on a world, at the present moment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Mapping
+from contextlib import contextmanager
+from typing import Any, get_args
+
+from steptwin.diagnostics import SourceText
+from steptwin.errors import Misuse
+from steptwin.simulation.kinds.kind import lacks
+from steptwin.simulation.kinds.lines import SCRIPTS
+from steptwin.simulation.kinds.master import ANSWER_NS
+from steptwin.simulation.kinds.programtexts import Destination
+from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.simulation.scheduler.wires import PinName
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.script.control import Halt
+from steptwin.simulation.world.inputs import (
+    FOR_SCRIPTS,
+    Bytes,
+    Download,
+    EndScripts,
+    ExternalInput,
+    Leave,
+    Refused,
+    See,
+    SetVariable,
+)
+from steptwin.simulation.world.model import Model
+from steptwin.simulation.world.scripts import Scripts
+from steptwin.simulation.world.worldprograms import name_of_text
+from steptwin.tables import complete
+from steptwin.wire.rtu import encode_frame
+
+
+def act(model: Model, scripts: Scripts, what: ExternalInput) -> None:
+    """Execute an external input. Raises `Misuse` for unknown names, and for steps that only scripts can execute."""
+    action = ACTIONS.get(type(what))
+    if action is None:
+        raise Misuse(f"{what}: only scripts can execute this step")
+    action(model, scripts, what)
+
+
+def _record(model: Model, machine: str, what: str, value: object) -> None:
+    model.trace.add(TraceRecord(model.now, machine, "input", what, value))
+
+
+@contextmanager
+def _now(model: Model, name: str) -> Generator[Kernel]:
+    """The kernel of a machine or line, advanced to the present; it settles after the action."""
+    kernel = model.touch(name)
+    yield kernel
+    kernel.mark(name)
+    kernel.settle()
+
+
+def _set(model: Model, scripts: Scripts, step: do.Set) -> None:
+    for name, pin, value in step.levels:
+        known = model.input_pin(name, pin, value)
+        kernel = model.touch(name)  # as `_now`, but with hundreds of levels at a moment
+        kernel.set_input(PinName(name, known), value)
+        kernel.mark(name)
+        kernel.settle()
+
+
+def _press(model: Model, scripts: Scripts, step: do.Press) -> None:
+    _move_button(model, scripts, step.button, pressed=True)
+    if step.duration is not None:
+        scripts.schedule(_releasing(step.button), (do.Wait(step.duration), do.Release(step.button)))
+
+
+def _release(model: Model, scripts: Scripts, step: do.Release) -> None:
+    _move_button(model, scripts, step.button, pressed=False)
+
+
+_RELEASE = "release "
+
+
+def _releasing(button: str) -> str:
+    """The name of the script that releases a button after a time. Scripts of a description have no blank in their names."""
+    return f"{_RELEASE}{button}"
+
+
+def _downloading(machine: str) -> str:
+    """The name of the script that types a text into a controller."""
+    return f"download {machine}"
+
+
+def _is_release(script: str) -> bool:
+    return script.startswith(_RELEASE)
+
+
+def _move_button(model: Model, scripts: Scripts, name: str, *, pressed: bool) -> None:
+    button, _ = model.button(name)
+    scripts.unschedule(_releasing(name))
+    with _now(model, button.machine):
+        _record(model, button.machine, name, "pressed" if pressed else "released")
+        button.press(pressed, model.now)
+
+
+def _write(model: Model, scripts: Scripts, step: do.Write) -> None:
+    parts, now = model.parts, model.now
+    for name, values in model.by_machine(step):
+        registers = model.registers(name)
+        kernel = model.touch(name)  # as `_now` does: every write of every script comes here
+        machine, on = parts.machines[name], parts.line_of.get(name)
+        for pdu in model.requests(name, registers, values):
+            if on is not None:
+                line, unit = on
+                line.master.ask(encode_frame(unit, pdu), ANSWER_NS, now)
+            else:
+                _record(model, name, "request", pdu)
+                registers.execute(machine, pdu, now)
+        kernel.mark(name if on is None else on[0].name)
+        kernel.settle()
+
+
+def _halt(model: Model, scripts: Scripts, given: Halt) -> None:
+    with _now(model, given.machine):
+        on = model.parts.line_of.get(given.machine)
+        if on is not None:
+            line, unit = on
+            line.recall(unit, model.now)
+        _record(model, given.machine, "stop", given.scope)
+        scripts.unschedule(_downloading(given.machine))
+        model.kind(given.machine).halt(model.machine(given.machine), given, model.now)
+
+
+def _end_scripts(model: Model, scripts: Scripts, given: EndScripts) -> None:
+    scripts.end_described(_is_release)
+
+
+def _request(model: Model, scripts: Scripts, step: do.Request) -> None:
+    line = model.line_called(step.line)
+    with _now(model, step.line):
+        line.master.ask(encode_frame(step.unit, step.pdu), step.within, model.now)
+
+
+def _send(model: Model, scripts: Scripts, step: do.Send) -> None:
+    line = model.line_called(step.line)
+    with _now(model, step.line):
+        line.receive(SCRIPTS, step.data, model.now)
+
+
+def _bytes(model: Model, scripts: Scripts, given: Bytes) -> None:
+    line = model.line_called(given.line)
+    with _now(model, given.line):
+        line.connect(given.place, given.kind)
+        line.receive(given.place, given.data, model.now)
+
+
+def _see(model: Model, scripts: Scripts, given: See) -> None:
+    vision = model.vision(given.machine)
+    with _now(model, given.machine):
+        _record(model, given.machine, "vision", given[1:])
+        vision.see(model.machine(given.machine), given[1:], model.now)
+
+
+def _download(model: Model, scripts: Scripts, given: Download) -> None:
+    kind = model.kind(given.machine)
+    if kind.download is None:
+        raise lacks(given.machine, kind, "program memory")
+    with _now(model, given.machine):
+        on = model.parts.line_of.get(given.machine)
+        source = SourceText(name_of_text(model, given.machine, given.place), given.text)
+        to = Destination(given.machine, None if on is None else on[0].name, given.place)
+        found = kind.download(model.machine(given.machine), to, source)
+        found.put(model.now)
+        _record(model, given.machine, "download", given.place)
+        model.downloaded[given.machine, given.place] = source
+    if found.typed:
+        scripts.schedule(_downloading(given.machine), found.typed)
+
+
+def _set_variable(model: Model, scripts: Scripts, given: SetVariable) -> None:
+    with _now(model, given.machine):
+        model.programs_of(given.machine).set_variable(given.name, given.value, model.now)
+
+
+def _leave(model: Model, scripts: Scripts, given: Leave) -> None:
+    line = model.line_called(given.line)
+    model.touch(given.line)
+    line.leave(given.place)
+
+
+def _refused(model: Model, scripts: Scripts, given: Refused) -> None:
+    model.report_refused(given.text)
+
+
+def _power_cycle(model: Model, scripts: Scripts, step: do.PowerCycle) -> None:
+    machine = model.machine(step.machine)
+    with _now(model, step.machine):
+        _record(model, step.machine, "power-cycle", "")
+        machine.power_cycle(model.now)
+
+
+def _turn(model: Model, scripts: Scripts, step: do.Turn) -> None:
+    encoders = model.encoders(step.machine)
+    with _now(model, step.machine):
+        _record(model, step.machine, f"M{step.axis} turned", step.counts)
+        encoders.reader(model.machine(step.machine)).turn_encoder(step.axis, step.counts, model.now)
+
+
+def _couple(model: Model, scripts: Scripts, step: do.Couple) -> None:
+    encoders = model.encoders(step.machine)
+    with _now(model, step.machine):
+        _record(model, step.machine, f"M{step.axis} coupled", step.coupling)
+        encoders.couple(model.machine(step.machine), step.axis, step.coupling, model.now)
+
+
+def _set_fault(model: Model, scripts: Scripts, step: do.SetFault) -> None:
+    model.put_fault(step.fault)
+
+
+def _clear_fault(model: Model, scripts: Scripts, step: do.ClearFault) -> None:
+    faults = model.parts.faults
+    if step.name in (active.name for active in faults.active):  # otherwise it was cleared already or is not set yet
+        model.settle_all()
+        faults.remove(step.name, model.now)
+
+
+def _expect(model: Model, scripts: Scripts, step: do.Expect) -> None:
+    model.expect(step.condition)
+
+
+def _note(model: Model, scripts: Scripts, step: do.Note) -> None:
+    if model.trace.watchers:
+        model.settle_all()  # earlier events are shown first
+
+    model.trace.add(TraceRecord(model.now, "world", "event", "note", step.text))
+
+
+ACTIONS: Mapping[type, Callable[[Model, Scripts, Any], None]] = complete(
+    "step",
+    [kind for kind in get_args(ExternalInput) if kind not in FOR_SCRIPTS],
+    "action",
+    {
+        do.Set: _set,
+        do.Press: _press,
+        do.Release: _release,
+        do.Write: _write,
+        do.Request: _request,
+        do.Send: _send,
+        do.PowerCycle: _power_cycle,
+        do.Turn: _turn,
+        do.Couple: _couple,
+        do.SetFault: _set_fault,
+        do.ClearFault: _clear_fault,
+        do.Expect: _expect,
+        do.Note: _note,
+        Bytes: _bytes,
+        See: _see,
+        Download: _download,
+        SetVariable: _set_variable,
+        Leave: _leave,
+        Refused: _refused,
+        Halt: _halt,
+        EndScripts: _end_scripts,
+    },
+)

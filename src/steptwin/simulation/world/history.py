@@ -1,0 +1,331 @@
+"""The past of a running world: snapshots at intervals and the external inputs since, from which the world at any moment since the
+oldest snapshot is computed again.
+
+Memory is bounded. If there are too many snapshots, those whose neighbours are close for their age are removed first, so that the
+distance between two snapshots grows with their age. With the oldest snapshot, the inputs before the next one are removed.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from itertools import islice
+from typing import NamedTuple, TypeAlias
+
+from steptwin.durations import duration_text
+from steptwin.errors import Misuse
+from steptwin.machine import SECOND, Nanos
+from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.simulation.world.eventpoints import EventPoints, points_of, stays_between_events
+from steptwin.simulation.world.inputs import ExternalInput, size_of
+from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.plantsnapshot import PlantSnapshot, RecordedInput
+
+MOST_STATES = 256
+MOST_CONTROLLER_STATES = 4096
+"""Limit of the states of controllers in all snapshots: a world of more than 16 controllers keeps fewer snapshots."""
+LEAST_STATES = 16
+MOST_NEAR = 128
+MOST_INPUTS = 100_000
+MOST_INPUT_BYTES = 16 << 20
+SLICE_NS: Nanos = SECOND // 4
+"""Interval of virtual time after which a replay can be interrupted, ns."""
+
+
+def replay(world: Plant, inputs: Iterable[RecordedInput], end: Nanos, slice_ns: Nanos | None = None) -> Iterator[bool]:
+    """Advance a world to ``end``, ns, and apply the inputs until then; stops of scripts do not end it.
+
+    Yields after each input (True) and after each slice of time (False), so that the caller can interrupt it. Raises `Misuse` for
+    an input that does not fit the world.
+    """
+    for time, what, settled in inputs:
+        if time > end:
+            break
+        for _ in _bring(world, time, slice_ns):
+            yield False
+        if settled:
+            world.advance(time)
+        world.apply_input(what)
+        yield True
+    for _ in _bring(world, end, slice_ns):
+        yield False
+    world.advance(world.now)
+    world.settle_all()
+
+
+def _bring(world: Plant, moment: Nanos, slice_ns: Nanos | None) -> Iterator[None]:
+    while world.now < moment:
+        world.go_on()
+        world.advance(moment if slice_ns is None else min(moment, world.now + slice_ns))
+        if slice_ns is not None:
+            world.settle_all()
+        yield
+
+
+def outside_past(moment: Nanos, begin: Nanos, end: Nanos) -> str:
+    """The message about a moment of which nothing is known, ns."""
+    return f"{duration_text(moment)}: the past is kept from {duration_text(begin)} to {duration_text(end)}"
+
+
+MOVED = ""
+"""Instead of a subject: an axis got another plan or position, or a fault began or ended."""
+_MOTIONS = frozenset({"plan", "load", "free", "coordinate", "fault", "input"})
+
+Changed: TypeAlias = tuple[str, str]
+"""Machine and subject of the records of what has edges, machine and path of a point, or machine and `MOVED`."""
+
+ACTED: Changed = ("", "")
+"""A script acted, or something came from outside."""
+
+
+class PastState(NamedTuple):
+    snapshot: PlantSnapshot
+    inputs: int
+    """Number of inputs before it."""
+    changed: frozenset[Changed] = frozenset()
+    """What has changed since the state before, or may have."""
+
+
+class ChangedSince:
+    """Notes what changes in ``world``, from one state to the next."""
+
+    def __init__(self, world: Plant) -> None:
+        self._world = world
+        self._names: set[Changed] = set()
+        world.trace.watchers.append(self._take)
+        world.act_watchers.append(self._act)
+        self._points = [_ChangedPoints(world, owner, self._names.add) for owner in world.machines]
+
+    def close(self) -> None:
+        self._world.trace.watchers.remove(self._take)
+        self._world.act_watchers.remove(self._act)
+        for points in self._points:
+            points.close()
+
+    def _take(self, record: TraceRecord) -> None:
+        if record.kind == "edge":
+            self._names.add((record.machine, record.subject))
+        elif record.kind in _MOTIONS:
+            self._names.add((record.machine, MOVED))
+
+    def _act(self, script: str, what: ExternalInput) -> None:
+        self._names.add(ACTED)
+
+    def gone_back(self, names: Iterable[Changed]) -> None:
+        """The world has another state; ``names``: what had changed since the last one that is kept."""
+        self._names.update(names)
+        for points in self._points:
+            points.read()
+
+    def take(self) -> frozenset[Changed]:
+        """The names since the last call."""
+        names = frozenset(self._names)
+        self._names.clear()
+        return names
+
+
+class _ChangedPoints:
+    """Those of one controller that have the same value between events, and are not only kept (`LivePoint.is_kept`). As
+    `steptwin.simulation.scheduler.followers.KernelFollower`."""
+
+    def __init__(self, world: Plant, owner: str, note: Callable[[Changed], None]) -> None:
+        self._world, self._owner, self._note = world, owner, note
+        found = {path: point for path, point in points_of(world, owner) if point is not None and not point.is_kept}
+        self._points = EventPoints(world, owner, {path: point for path, point in found.items() if stays_between_events(point)})
+        world.parts.kernel_of[owner].follow(self, (owner,))
+
+    def close(self) -> None:
+        self._world.parts.kernel_of[self._owner].unfollow(self)
+
+    def read(self) -> None:
+        """The present values, whatever they were before."""
+        self._points.read(self._world.now)
+
+    def leave(self, moment: Nanos) -> None:
+        """It need not know."""
+
+    def look(self, now: Nanos) -> None:
+        for path in self._points.changed(now):
+            self._note((self._owner, path))
+
+
+class History:
+    """The past of ``world`` from the present on. Inputs are recorded automatically, snapshots by `take`.
+
+    Each snapshot has all records of a trace that is kept: for a long run, drop them before (`Trace.let_go`).
+    """
+
+    def __init__(self, world: Plant) -> None:
+        self.world = world
+        self.branch = 0
+        """Counts how often the world has gone back; each time, the past after that moment is replaced."""
+        self._most = max(LEAST_STATES, min(MOST_STATES, MOST_CONTROLLER_STATES // max(1, len(world.machines))))
+        self._states: list[PastState] = []
+        self._inputs: deque[RecordedInput] = deque()
+        self._bytes = 0
+        self._dropped = 0
+        """Number of inputs that were removed."""
+        self._changed = ChangedSince(world)
+        world.input_watchers.append(self._noted)
+        self.take()
+
+    def close(self) -> None:
+        """End the recording."""
+        self.world.input_watchers.remove(self._noted)
+        self._changed.close()
+
+    def __len__(self) -> int:
+        """The number of snapshots."""
+        return len(self._states)
+
+    @property
+    def kept_inputs(self) -> int:
+        """The number of inputs, at most `MOST_INPUTS`."""
+        return len(self._inputs)
+
+    @property
+    def begin(self) -> Nanos:
+        """The oldest moment that can be restored, ns; the present if there is no snapshot."""
+        return self._states[0].snapshot.now if self._states else self.world.now
+
+    def take(self) -> None:
+        """Take a snapshot, unless there is one of this moment."""
+        if self._states and self._states[-1].snapshot.now == self.world.now:
+            return
+        self._states.append(PastState(self.world.snapshot(with_inputs=False), self.inputs_so_far, self._changed.take()))
+        if len(self._states) > self._most:
+            index = self._least_missed()
+            missed = self._states.pop(index)
+            after = self._states[index]
+            self._states[index] = after._replace(changed=after.changed | missed.changed)
+
+    def _least_missed(self) -> int:
+        """Index of the snapshot whose neighbours are closest for their age; never the oldest or the newest."""
+        times = [state.snapshot.now for state in self._states]
+        now = times[-1]
+        return min(range(1, len(times) - 1), key=lambda i: (times[i + 1] - times[i - 1]) / (now - times[i]))
+
+    def _noted(self, given: RecordedInput) -> None:
+        self._inputs.append(given)
+        self._bytes += size_of(given.what)
+        while len(self._inputs) > MOST_INPUTS or self._bytes > MOST_INPUT_BYTES:
+            self._forget_oldest()
+
+    def _forget_oldest(self) -> None:
+        if self._states:
+            del self._states[0]
+        until = self._states[0].inputs if self._states else self.inputs_so_far
+        while self._dropped < until:
+            self._bytes -= size_of(self._inputs.popleft().what)
+            self._dropped += 1
+
+    def gone_back(self) -> None:
+        """Must be called after the world has gone back: snapshots and inputs of its present moment and later are removed."""
+        now = self.world.now
+        changed: set[Changed] = set()
+        while self._states and self._states[-1].snapshot.now >= now:
+            changed |= self._states.pop().changed
+        self._changed.gone_back(changed)
+        while self._inputs and self._inputs[-1].time >= now:
+            self._bytes -= size_of(self._inputs.pop().what)
+        self.branch += 1
+        self.take()
+
+    def state_at(self, moment: Nanos) -> PastState:
+        """The newest snapshot at or before a moment, and the number of inputs before it. Raises `Misuse` if there is none."""
+        index = bisect_right(self._states, moment, key=lambda state: state.snapshot.now)
+        if not index:
+            raise Misuse(outside_past(moment, self.begin, self.world.now))
+        return self._states[index - 1]
+
+    @property
+    def inputs_so_far(self) -> int:
+        """How many there have been."""
+        return self._dropped + len(self._inputs)
+
+    def keeps_inputs_from(self, number: int) -> bool:
+        """Whether the inputs after the first ``number`` are still kept."""
+        return number >= self._dropped
+
+    def inputs_from(self, number: int) -> list[RecordedInput]:
+        """The inputs after the first ``number``. Raises `Misuse` if they are no longer kept."""
+        if not self.keeps_inputs_from(number):
+            raise Misuse(f"the past is kept from {duration_text(self.begin)} to {duration_text(self.world.now)}")
+        newest = list(islice(reversed(self._inputs), self.inputs_so_far - number))
+        newest.reverse()
+        return newest
+
+
+class Past:
+    """A second world without ports, which shows a moment of the past of the first. It takes as much memory as the first."""
+
+    def __init__(self, history: History) -> None:
+        self._history = history
+        world = history.world
+        self.world = Plant(world.blueprint, keep_trace=world.trace.is_kept, keep_inputs=False)
+        if not world.trace.is_recorded:
+            self.world.stop_recording()
+        self._branch: int | None = None
+        """Of the history, when it was brought there."""
+        self._inputs = 0
+        """Number of inputs applied to it."""
+        self._near: deque[PastState] = deque(maxlen=MOST_NEAR)
+        """Snapshots on the way to the last moment, because those of the history may be far apart."""
+
+    def forget(self) -> None:
+        """Let the next `go` begin with a snapshot, because the world was used for something else."""
+        self._branch = None
+
+    @property
+    def is_in_step(self) -> bool:
+        """Whether it is at the present moment and has been brought there; inputs of this moment may be missing still."""
+        history = self._history
+        return self._branch == history.branch and self.world.now == history.world.now
+
+    @property
+    def lacks_inputs(self) -> bool:
+        """Whether inputs have come since."""
+        return self._inputs != self._history.inputs_so_far
+
+    @property
+    def can_go_on(self) -> bool:
+        """Whether the inputs since are still kept."""
+        return self._history.keeps_inputs_from(self._inputs)
+
+    def go(self, moment: Nanos) -> Iterator[None]:
+        """Go to a moment, in parts: it yields after each.
+
+        Raises `Misuse` for a moment before the oldest snapshot or after the present.
+        """
+        history = self._history
+        if moment > history.world.now:
+            raise Misuse(outside_past(moment, history.begin, history.world.now))
+        if self._branch != history.branch:
+            self._near.clear()
+        state = self._state_at(moment)
+        if not self.can_go_on or self._branch != history.branch or not state.snapshot.now <= self.world.now <= moment:
+            self.world.restore(state.snapshot)
+            self._branch, self._inputs = history.branch, state.inputs
+        kept = state.snapshot.now
+        for _ in self.go_on(moment):
+            if kept + SLICE_NS <= self.world.now < moment:
+                kept = self.world.now
+                self._near.append(PastState(self.world.snapshot(), self._inputs))
+            yield
+
+    def go_on(self, moment: Nanos) -> Iterator[None]:
+        """Go on from its present moment to a later one, without using snapshots."""
+        for is_input in replay(self.world, self._history.inputs_from(self._inputs), moment, SLICE_NS):
+            self._inputs += is_input
+            yield
+
+    def _state_at(self, moment: Nanos) -> PastState:
+        """The newest snapshot at or before a moment whose inputs are kept. Raises `Misuse` if there is none."""
+        kept = self._history.state_at(moment)
+        near = [
+            state
+            for state in self._near
+            if kept.snapshot.now < state.snapshot.now <= moment and self._history.keeps_inputs_from(state.inputs)
+        ]
+        return max(near, key=lambda state: state.snapshot.now, default=kept)

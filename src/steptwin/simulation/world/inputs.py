@@ -1,0 +1,79 @@
+"""What comes from outside a world: steps, and what programs on lines, debuggers and vision systems do."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, TypeAlias
+
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.script.control import Halt
+
+
+class Bytes(NamedTuple):
+    """Bytes that an external program sends at its place on a line."""
+
+    line: str
+    place: str
+    kind: str
+    data: bytes
+
+
+class See(NamedTuple):
+    """A record of a vision system arrives at a controller."""
+
+    machine: str
+    number: float
+    x: float
+    y: float
+    angle: float
+
+
+class Download(NamedTuple):
+    """A text goes into the program memory of a controller."""
+
+    machine: str
+    place: str
+    """One of the places of `steptwin.simulation.world.worldprograms.program_texts`."""
+    text: str
+
+
+class SetVariable(NamedTuple):
+    """A debugger sets a variable of a controller's program."""
+
+    machine: str
+    name: str
+    value: float
+
+
+class Leave(NamedTuple):
+    """An external program has disconnected."""
+
+    line: str
+    place: str
+
+
+class EndScripts(NamedTuple):
+    """Scripts of the description, and texts that are being typed into controllers, end. Buttons that are held are released when
+    their time is over."""
+
+
+class Refused(NamedTuple):
+    """A controller could not do what a script from outside commanded; a replay has the command no more."""
+
+    text: str
+
+
+ExternalInput: TypeAlias = do.Step | Bytes | See | SetVariable | Download | Leave | Refused | Halt | EndScripts
+"""An input from outside a world. Recorded with its moment, it can be replayed."""
+
+
+def size_of(what: ExternalInput) -> int:
+    """Bytes of a program outside in it, which have no bound of their own."""
+    if isinstance(what, Download):
+        return len(what.text)
+    return len(what.data) if isinstance(what, Bytes) else 0
+
+
+FOR_SCRIPTS = frozenset(
+    {do.Wait, do.At, do.Until, do.Stop, do.Read, do.Call, do.Order, do.UntilOver, do.ExpectReached, do.Repeat}
+)
+"""Steps that only scripts can execute; all others have an action (`steptwin.simulation.world.actions`)."""

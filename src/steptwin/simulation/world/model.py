@@ -1,0 +1,264 @@
+"""The model of a world at the present moment: its parts by name, its signals and conditions, and what is reported of it.
+
+Steps, checks and texts of programs need no more of a world. `steptwin.simulation.world.plant.Plant` runs it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cached_property
+from itertools import groupby
+from operator import itemgetter
+from typing import Any
+
+from steptwin.diagnostics import SourceText
+from steptwin.machine import Nanos
+from steptwin.motioncontroller import MotionController
+from steptwin.nearmiss import NearMiss
+from steptwin.simulation.components.axis import AXIS, BuiltAxis
+from steptwin.simulation.components.button import BUTTON
+from steptwin.simulation.components.parts import WorldParts
+from steptwin.simulation.components.rigging import Rigging
+from steptwin.simulation.components.signals import Idle, find_signal
+from steptwin.simulation.describe.blueprint import Blueprint
+from steptwin.simulation.describe.build import Keep, build
+from steptwin.simulation.faults import Fault
+from steptwin.simulation.kinds.givenfiles import GivenFiles
+from steptwin.simulation.kinds.kind import AnyKind, EncoderInputs, NamedRegisters, NewValues, Vision, lacks
+from steptwin.simulation.kinds.lines import Line
+from steptwin.simulation.kinds.programs import Programs
+from steptwin.simulation.logic.condition import SignalCondition
+from steptwin.simulation.logic.contacts import Button
+from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.trace import Trace, TraceRecord
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.toml.names import Unknown
+from steptwin.simulation.world.reports import Reports
+
+WORLD = "world"
+"""The machine name in records that belong to no machine."""
+MOST_REMEMBERED = 10_000
+"""Size limit of each cache of requests, signals and conditions, which scripts use repeatedly."""
+
+
+class Model:
+    """The kernels, machines, lines and elements of a description. A kernel is advanced to the present before it is read or
+    changed."""
+
+    def __init__(self, blueprint: Blueprint, *, keep_trace: bool, keep_memory: Keep | None, is_blank: bool) -> None:
+        """``is_blank``: a snapshot is restored next."""
+        self.blueprint, spec = blueprint, blueprint.spec
+        names = [*(controller.name for controller in spec.controllers), *(line.name for line in spec.lines), WORLD]
+        self.spec = spec
+        self.files = blueprint.files
+        self.trace = Trace(names, keep=keep_trace)
+        self.parts: WorldParts = build(blueprint, self.trace.add, keep_memory, is_blank=is_blank)
+        self.trace.read_together(blueprint.joined or ())
+        self.now: Nanos = 0
+        self.stopped: str | None = None
+        """The reason a script gave for ending the run; None if none did."""
+        self.failures = Reports()
+        """Expectations that did not hold."""
+        self.overdue = Reports()
+        """Conditions that scripts of the description waited for until their time-out."""
+        self.settled_first: Sequence[Kernel] = ()
+        """Kernels that are advanced before the others where the order is free, so that what observes them can read the others."""
+        self._encoded: dict[object, tuple[bytes, ...]] = {}
+        self._signals: dict[str, SignalOf | Idle] = {}
+        self._conditions: dict[str, SignalCondition] = {}
+        self.downloaded: dict[tuple[str, str], SourceText] = {}
+        """What has been put into controllers since the beginning, by machine and place, as it was written."""
+        self.given = GivenFiles(spec.lines, self.files, self.downloaded)
+        self.rigging = Rigging(self.parts)
+
+    # ------------------------------------------------------------------ what is in it
+
+    @property
+    def machines(self) -> Mapping[str, MotionController]:
+        return self.parts.machines
+
+    @property
+    def lines(self) -> Mapping[str, Line]:
+        return self.parts.lines
+
+    @property
+    def axes(self) -> Mapping[str, BuiltAxis]:
+        return self.parts.built(AXIS)
+
+    @property
+    def kernels(self) -> list[Kernel]:
+        return self.parts.kernels
+
+    def touch(self, name: str) -> Kernel:
+        """The kernel of a machine or line, advanced to the present. Raises `Misuse` with the existing names."""
+        kernel = self.parts.kernel_of.get(name)
+        if kernel is None:
+            raise self.unknown("machine or line", name, self.parts.kernel_of)
+        kernel.advance(self.now)
+        return kernel
+
+    @staticmethod
+    def unknown(what: str, name: str, known: Iterable[str]) -> Unknown:
+        near = NearMiss()
+        text = f"no {what} is called {name!r}{near.hint(name, known)}; there are {', '.join(known) or 'none'}"
+        return Unknown(name, text, near.of(name, known))
+
+    def condition(self, text: str) -> SignalCondition:
+        """The condition with this text. Raises `Misuse` for invalid text and for unknown signals."""
+        found = self._conditions.get(text)
+        if found is None:
+            if len(self._conditions) >= MOST_REMEMBERED:
+                self._conditions.clear()
+            found = self._conditions[text] = SignalCondition(text, self.watched)
+        return found
+
+    def watched(self, name: str) -> SignalOf | Idle:
+        """A signal for a condition. Raises `Misuse` with the existing names, and for one that conditions cannot use."""
+        found = self.signal(name)
+        found.watch(name)
+        return found
+
+    def signal(self, name: str) -> SignalOf | Idle:
+        """The signal called ``name``. Raises `Misuse` with the existing names."""
+        found = self._signals.get(name)
+        if found is None:
+            if len(self._signals) >= MOST_REMEMBERED:
+                self._signals.clear()
+            found = self._signals[name] = find_signal(self.parts, name)
+        return found
+
+    def read(self, name: str) -> float:
+        """The present value of a signal. Raises `Misuse` for a write-only one."""
+        found = self.signal(name)
+        found.bring(self.now)
+        return float(found.value(self.now))
+
+    @cached_property
+    def programs(self) -> Mapping[str, Programs]:
+        """The programs of controllers that have any, by name of the controller."""
+        found = {one.name: one.kind.programs(one, self.machines[one.name], self.given) for one in self.spec.controllers}
+        return {name: programs for name, programs in found.items() if programs is not None}
+
+    def settle_all(self) -> None:
+        """Advance every kernel to the present."""
+        for kernel in (*self.settled_first, *self.kernels):
+            kernel.advance(self.now)
+
+    # ------------------------------------------------------------------ by name
+
+    def machine(self, name: str) -> MotionController:
+        """The machine called ``name``. Raises `Misuse` with the existing ones."""
+        machine = self.machines.get(name)
+        if machine is None:
+            raise self.unknown("machine", name, self.machines)
+        return machine
+
+    def kind(self, name: str) -> AnyKind:
+        """The kind of a machine. Raises `Misuse` with the existing machines."""
+        kind = self.parts.kind_of.get(name)
+        if kind is None:
+            raise self.unknown("machine", name, self.machines)
+        return kind
+
+    def input_pin(self, name: str, pin: str, level: float) -> str:
+        """The name of the input that ``pin`` means. Raises `Misuse` with the existing inputs, and for a level out of range."""
+        kind = self.kind(name)
+        found = kind.input_pin(pin, level)
+        kind.refuse_taken(self.machine(name), found)
+        return found
+
+    def registers(self, name: str) -> NamedRegisters[Any]:
+        """The registers of a machine. Raises `Misuse` if it has none."""
+        kind = self.kind(name)
+        if kind.registers is None:
+            raise lacks(name, kind, "registers")
+        return kind.registers
+
+    def encoders(self, name: str) -> EncoderInputs[Any]:
+        """The encoder inputs of a machine. Raises `Misuse` if it has none."""
+        kind = self.kind(name)
+        if kind.encoders is None:
+            raise lacks(name, kind, "encoder")
+        return kind.encoders
+
+    def vision(self, name: str) -> Vision[Any, Any]:
+        """The vision registers of a machine. Raises `Misuse` if it has none."""
+        kind = self.kind(name)
+        if kind.vision is None:
+            raise lacks(name, kind, "vision registers")
+        return kind.vision
+
+    @staticmethod
+    def by_machine(step: do.Write) -> Iterator[tuple[str, NewValues]]:
+        """The values that a step writes, grouped by machine."""
+        for name, group in groupby(step.values, key=itemgetter(0)):
+            yield name, tuple([(register, value) for _, register, value in group])
+
+    def requests(self, name: str, registers: NamedRegisters[Any], values: NewValues) -> tuple[bytes, ...]:
+        """The PDUs that write ``values`` to `registers` of a machine. Raises `Misuse` for values that one does not accept."""
+        machine = self.parts.machines[name]
+        key = (self.parts.kind_of[name].name, registers.dialect(machine), values)
+        found = self._encoded.get(key)
+        if found is None:
+            if len(self._encoded) >= MOST_REMEMBERED:
+                self._encoded.clear()
+            found = self._encoded[key] = registers.requests(machine, values)
+        return found
+
+    def programs_of(self, name: str) -> Programs:
+        """The programs of a machine. Raises `Misuse` for a machine without."""
+        kind = self.kind(name)
+        if name not in self.programs:
+            raise lacks(name, kind, "program whose text is known")
+        return self.programs[name]
+
+    def button(self, name: str) -> tuple[Button, Kernel]:
+        """The button called ``name`` and its kernel. Raises `Misuse` with the existing buttons."""
+        found = self.parts.built(BUTTON).get(name)
+        if found is None:
+            raise self.unknown("button", name, self.parts.built(BUTTON))
+        return found
+
+    def line_called(self, name: str) -> Line:
+        """The line called ``name``. Raises `Misuse` with the existing lines."""
+        line = self.lines.get(name)
+        if line is None:
+            raise self.unknown("line", name, self.lines)
+        return line
+
+    def put_fault(self, fault: Fault) -> None:
+        """Set a fault now. Raises `Misuse` for one that cannot occur in this world."""
+        self.settle_all()
+        self.rigging.put(fault, self.now)
+
+    # ------------------------------------------------------------------ reports
+
+    def expect(self, text: str) -> None:
+        """Report a condition that does not hold, with the values that it has instead."""
+        if not self.holds(self.condition(text)):
+            self._report(self.failures, "expectation", self.told(text))
+
+    def holds(self, condition: SignalCondition) -> bool:
+        """Whether a condition is true now."""
+        condition.bring(self.now)
+        return condition.holds(self.now)
+
+    def told(self, text: str) -> str:
+        """A condition with what its signals are now: ``lift.count == 3; lift.count is 0``."""
+        condition = self.condition(text)
+        condition.bring(self.now)
+        return condition.told(self.now)
+
+    def report_refused(self, text: str) -> None:
+        """Report a command of a script that cannot be done."""
+        self._report(self.failures, "expectation", text)
+
+    def report_overdue(self, text: str) -> None:
+        """Report that a wait of a script of the description timed out."""
+        self._report(self.overdue, "overdue", text)
+
+    def _report(self, reports: Reports, code: str, text: str) -> None:
+        record = TraceRecord(self.now, WORLD, "event", code, text)
+        reports.add(record)
+        self.trace.add(record)

@@ -1,0 +1,251 @@
+"""A running world: its kernels, each advanced on demand, and its scripts.
+
+Machines without a connection are in separate kernels. A kernel is advanced to the present before it is read or changed; the
+kernels that a condition depends on are advanced event by event. The result therefore does not depend on the order in which
+kernels are advanced.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+from steptwin.errors import Misuse, Runaway, TimeReversal
+from steptwin.machine import Nanos
+from steptwin.simulation.describe.blueprint import Blueprint, FileContents
+from steptwin.simulation.describe.build import Keep
+from steptwin.simulation.describe.overrides import Overrides
+from steptwin.simulation.describe.spec import ScriptSpec
+from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.observing import WorldObserver
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.world.actions import act
+from steptwin.simulation.world.inputs import ExternalInput
+from steptwin.simulation.world.model import Model
+from steptwin.simulation.world.plantsnapshot import PlantSnapshot, RecordedInput
+from steptwin.simulation.world.references import check_faults, check_scripts, check_step
+from steptwin.simulation.world.reports import Reports
+from steptwin.simulation.world.running import Script
+from steptwin.simulation.world.scripts import MOST_STEPS_PER_INSTANT, Scripts
+
+
+class Plant(Model):
+    """A world, independent of files and clocks."""
+
+    def __init__(
+        self,
+        blueprint: Blueprint,
+        *,
+        keep_trace: bool = True,
+        keep_inputs: bool = True,
+        keep_memory: Keep | None = None,
+        at: PlantSnapshot | None = None,
+    ) -> None:
+        """The world of a description at time 0, or ``at`` a snapshot of one with the same description."""
+        super().__init__(blueprint, keep_trace=keep_trace, keep_memory=keep_memory, is_blank=at is not None)
+        spec = self.spec
+        self.keeps_inputs = keep_inputs
+        """Whether external inputs are kept, as a session needs; off for worlds that run for weeks, where memory would fill up."""
+        self.inputs: list[RecordedInput] = []
+        """All external inputs so far, if they are kept."""
+        self.input_watchers: list[Callable[[RecordedInput], None]] = []
+        """Called with everything from outside as it comes."""
+        self.act_watchers: list[Callable[[str, ExternalInput], None]] = []
+        """Called before each action at the present moment, with the script that does it; empty: what comes from outside."""
+        self.is_settled = False
+        """Whether the scripts of the description have run since the last external input."""
+        self._scripts = Scripts(self, self.perform, self.apply_input)
+        if at is None:
+            check_faults(self, spec.faults)
+        if not blueprint.memo.is_checked:
+            check_scripts(self, spec.scripts)
+        spec.text.check()
+        blueprint.memo.is_checked = True
+        if at is not None:
+            self.restore(at)
+            return
+        for line in spec.scripts:
+            self._begin(line)
+
+    # ------------------------------------------------------------------ what is in it
+
+    @property
+    def scripts(self) -> list[Script]:
+        """The scripts that have not ended: those of the description, then those started later, in order."""
+        return list(self._scripts)
+
+    # ------------------------------------------------------------------ scripts
+
+    def _begin(self, spec: ScriptSpec) -> None:
+        if spec.when is not None:
+            text, once = spec.when, spec.once
+            self.start(spec.name, partial(do.run_when, spec.steps, text, once=once))
+        elif spec.every is not None:
+            period = spec.every
+            self.start(spec.name, partial(do.run_every, spec.steps, period, 0))
+        else:
+            steps = (do.At(spec.at or 0), *spec.steps)
+            self.start(spec.name, partial(do.run_through, steps, spec.repeat))
+
+    def observe(self, observer: WorldObserver) -> None:
+        """Let it look at the world from now on, until `unobserve`."""
+        self._scripts.observe(observer)
+
+    def unobserve(self, observer: WorldObserver) -> None:
+        self._scripts.unobserve(observer)
+
+    def start(self, name: str, make: Callable[[], do.Steps | do.Walk], *, is_external: bool = False) -> Script:
+        """Start a script now. ``make`` creates its steps; it is called again when a snapshot is restored."""
+        return self._scripts.start(name, make, is_external=is_external)
+
+    # ------------------------------------------------------------------ external inputs
+
+    def apply_input(self, what: ExternalInput) -> None:
+        """Apply an external input at the present moment and record it for replay. If it raises `Misuse`, nothing has changed."""
+        check_step(self, what)
+        self.perform(what)
+        self.note(what)
+
+    @property
+    def notes_inputs(self) -> bool:
+        """Whether anything wants to know of what comes from outside."""
+        return self.keeps_inputs or bool(self.input_watchers)
+
+    def note(self, what: ExternalInput) -> None:
+        """Keep what was done from outside at the present moment, where inputs are kept, and tell watchers."""
+        if self.notes_inputs:
+            given = RecordedInput(self.now, what, self.is_settled)
+            if self.keeps_inputs:
+                self.inputs.append(given)
+            for watcher in self.input_watchers:
+                watcher(given)
+        self.is_settled = False
+
+    def perform(self, what: ExternalInput, by: str = "") -> None:
+        """Execute an action at the present moment; ``by``: its script. Raises `Misuse` for names that do not exist."""
+        for watcher in self.act_watchers:
+            watcher(by, what)
+        act(self, self._scripts, what)
+
+    # ------------------------------------------------------------------ time
+
+    def next(self) -> Nanos | None:
+        """The time of the next event of a script; None if there is none."""
+        return _first(_first(*self._scripts.first()), self._scripts.first_observed(), None)
+
+    def advance(self, now: Nanos) -> None:
+        """Advance the scripts, and the kernels they depend on, to ``now``, or to the moment at which a script stops the run.
+
+        All events of that moment are processed, so that the result depends on the duration of a run only.
+        """
+        if now < self.now:
+            raise TimeReversal(self.now, now)
+        rounds, at = 0, -1
+        while True:
+            kernels, own, guests = self._scripts.first()
+            due = _first(kernels, own, guests)
+            observed = self._scripts.first_observed()
+            if observed is not None and (due is None or observed < due):
+                due = observed
+            if due is None or due > (now if self.stopped is None else self.now):
+                break
+            if due > self.now:
+                self._scripts.leave(due)
+                self.now = due
+            rounds, at = (rounds + 1, at) if self.now == at else (0, self.now)
+            if rounds > MOST_STEPS_PER_INSTANT:
+                raise Runaway(f"scripts loop without end at {self.now} ns")
+            if kernels is not None and kernels <= self.now:
+                self._scripts.advance_kernels()
+            elif own is not None and own <= self.now:
+                self._scripts.run_described()
+            elif guests is not None and guests <= self.now:
+                self.is_settled = True
+                self._scripts.run_external()
+            else:
+                self._scripts.look()
+        self.is_settled = True
+        if self.stopped is None:
+            if now > self.now:
+                self._scripts.leave(now)
+            self.now = now
+
+    def watch_kernels(self, watch: Callable[[Kernel], None]) -> None:
+        """Call ``watch`` from now on with every kernel that has changed, as `Kernel.on_change`."""
+        self._scripts.watch_kernels(self.kernels, watch)
+
+    def stop_recording(self) -> None:
+        """Record nothing from now on: no trace, digest or session. Watchers of the trace are called, but not with frames."""
+        self.keeps_inputs = False
+        self.inputs.clear()
+        self.trace.stop()
+        for line in self.lines.values():
+            line.stop_recording()
+
+    def run_to(self, end: Nanos, until: str | None = None) -> str | None:
+        """Run to the moment ``end``, or until a condition is true. Returns the reason for ending before ``end``, or None."""
+        self.go_on()
+        watch = None
+        if until is not None:
+            steps = (do.Until(until), do.Stop(until))
+            watch = self.start("until", partial(do.run_through, steps))
+        self.advance(end)
+        if watch is not None:
+            self._scripts.end(watch)
+        self.settle_all()
+        return self.stopped
+
+    def go_on(self) -> None:
+        """Let a stopped world continue."""
+        self.stopped = None
+
+    # ------------------------------------------------------------------ snapshots
+
+    def snapshot(self, *, with_inputs: bool = True) -> PlantSnapshot:
+        """Everything at the present moment, ``with_inputs`` also what came from outside before, where it is kept."""
+        self.settle_all()
+        return PlantSnapshot(
+            self._description(),
+            self.now,
+            tuple(kernel.snapshot() for kernel in self.kernels),
+            tuple((active.fault, active.name, active.since) for active in self.parts.faults.active),
+            tuple(self.parts.faults.machines),
+            self.parts.faults.copy_state(),
+            self._scripts.state(),
+            tuple(self.inputs) if with_inputs else (),
+            self.is_settled,
+            self.failures.state(),
+            self.overdue.state(),
+            self.trace.mark(),
+            self._scripts.scheduled,
+            tuple(self.downloaded.items()),
+        )
+
+    def _description(self) -> tuple[str, int, Overrides, FileContents]:
+        return self.spec.text.source.text, self.spec.seed, self.spec.overrides, self.files
+
+    def restore(self, snapshot: PlantSnapshot) -> None:
+        """Continue from a snapshot of this world, or of one with the same description.
+
+
+        Raises `Misuse` for a snapshot of another world.
+        """
+        if snapshot.description != self._description():
+            raise Misuse("the snapshot is of another world")
+        self.now = snapshot.now
+        self.stopped = None
+        self.trace.rewind(snapshot.trace)
+        self.rigging.put_back(snapshot.faults, snapshot.rigged, snapshot.faults_state)
+        for kernel, state in zip(self.kernels, snapshot.kernels, strict=True):
+            kernel.restore(state)
+        self.inputs, self.is_settled = list(snapshot.inputs), snapshot.is_settled
+        self.failures, self.overdue = Reports(snapshot.failures), Reports(snapshot.overdue)
+        self.downloaded.clear()
+        self.downloaded.update(snapshot.downloaded)
+        self._conditions.clear()
+        self._scripts.restore(snapshot.scripts, snapshot.scheduled)
+
+
+def _first(one: Nanos | None, other: Nanos | None, third: Nanos | None) -> Nanos | None:
+    due = other if one is None or (other is not None and other < one) else one
+    return third if due is None or (third is not None and third < due) else due

@@ -1,0 +1,218 @@
+"""Checks of names and values in steps, before a world runs or a step is executed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from typing import Any, get_args
+
+from steptwin.errors import Misuse, Refusal
+from steptwin.simulation.describe.spec import ScriptSpec
+from steptwin.simulation.describe.steptable import STEPS
+from steptwin.simulation.faults import Fault
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.script.control import Halt, Seek
+from steptwin.simulation.toml.tomlplaces import Path
+from steptwin.simulation.world.inputs import Bytes, Download, EndScripts, ExternalInput, Leave, Refused, See, SetVariable
+from steptwin.simulation.world.model import Model
+from steptwin.simulation.world.motions import motion_ends, ordered
+from steptwin.tables import complete
+
+
+def check_scripts(model: Model, scripts: Sequence[ScriptSpec]) -> None:
+    """Report every invalid step in the text of the description."""
+    text = model.spec.text
+    set_somewhere = [step.fault for script in scripts for step in _all(script.steps) if isinstance(step, do.SetFault)]
+    for script in scripts:
+        if script.when is not None:
+            try:
+                model.condition(script.when)
+            except Misuse as error:
+                text.wrong_reference((*script.path, "when"), error)
+        _check(model, script.steps, (*script.path, STEPS.name), set_somewhere)
+
+
+def check_faults(model: Model, faults: Sequence[Fault | None]) -> None:
+    """Set the faults of the description; report impossible ones."""
+    for n, fault in enumerate(faults):
+        if fault is not None and not _is_on_something_broken(model, fault):
+            try:
+                model.put_fault(fault)
+            except Misuse as error:
+                model.spec.text.wrong_reference(("fault", n), error)
+
+
+def _is_on_something_broken(model: Model, fault: Fault) -> bool:
+    """Whether a fault concerns, or may concern, a machine or line whose own table has errors."""
+    text = model.spec.text
+    named = [str(name) for key in ("machine", "line", "element") if (name := fault.get(key)) is not None]
+    return any(map(text.may_be_broken, named)) if named else text.is_any_wrong(*text.controllers, "line", "axis")
+
+
+def _all(steps: Iterable[do.Step]) -> Iterator[do.Step]:
+    for step in steps:
+        if isinstance(step, do.Repeat):
+            yield from _all(step.steps)
+        else:
+            yield step
+
+
+def _check(model: Model, steps: Iterable[do.Step], path: Path, set_somewhere: Sequence[Fault]) -> None:
+    text = model.spec.text
+    for n, step in enumerate(steps):
+        if isinstance(step, do.Repeat) and not step.is_one:
+            _check(model, step.steps, (*path, n, STEPS.name), set_somewhere)
+            continue
+        if isinstance(step, do.ClearFault) and (
+            any(_may_be_called(fault, step.name) for fault in set_somewhere) or text.is_any_wrong("fault", "event", "script")
+        ):
+            continue
+        if isinstance(step, do.SetFault) and _is_on_something_broken(model, step.fault):
+            continue
+        for part in _parts(step):
+            try:
+                check_step(model, part)
+            except Misuse as error:
+                text.wrong_reference((*path, n), error, f"step {n + 1}: ")
+
+
+def _parts(step: do.Step) -> Sequence[do.Step]:
+    """A step split into parts that are checked separately."""
+    if isinstance(step, do.Repeat):
+        return step.steps[:1]
+    if isinstance(step, do.Set):
+        return [replace(step, levels=(level,)) for level in step.levels]
+    if isinstance(step, do.Write):
+        return [replace(step, values=(value,)) for value in step.values]
+    return [step]
+
+
+def _may_be_called(fault: Fault, name: str) -> bool:
+    """Whether a fault may have this name: its own, or its kind with a number if it has none."""
+    kind, _, number = name.rpartition("-")
+    return name == fault.name or (not fault.name and fault.kind.name in (name, kind if number.isdecimal() else name))
+
+
+def check_step(model: Model, step: object) -> None:
+    """Raises `Misuse` for a step with unknown names or invalid values."""
+    check = _CHECKS.get(type(step))
+    if check is not None:
+        check(model, step)
+
+
+def _condition(model: Model, step: do.Until | do.Expect) -> None:
+    model.condition(step.condition)
+
+
+def _order(model: Model, step: do.Order) -> None:
+    command = step.command
+    motion_ends(model, command.machine, command.axis)
+    with suppress(Refusal):  # what cannot be done now may be possible later
+        check_step(model, ordered(model, command))
+    if isinstance(command, Seek):
+        model.condition(motion_ends(model, command.machine, command.axis, command).reached)
+
+
+def _motion(model: Model, step: do.UntilOver | do.ExpectReached) -> None:
+    motion_ends(model, step.machine, step.axis)
+
+
+def _set(model: Model, step: do.Set) -> None:
+    for name, pin, level in step.levels:
+        model.input_pin(name, pin, level)
+
+
+def _button(model: Model, step: do.Press | do.Release) -> None:
+    model.button(step.button)
+
+
+def _write(model: Model, step: do.Write) -> None:
+    for name, values in model.by_machine(step):
+        model.requests(name, model.registers(name), values)
+
+
+def _request(model: Model, step: do.Request) -> None:
+    _ = model.line_called(step.line).master
+
+
+def _send(model: Model, step: do.Send) -> None:
+    model.line_called(step.line)
+
+
+def _power_cycle(model: Model, step: do.PowerCycle) -> None:
+    model.machine(step.machine)
+    supply = model.parts.supplied.get(step.machine)
+    if supply is not None:
+        raise Misuse(f"{step.machine!r} is switched by its supply {supply!r}: switch that, or let it have a brown-out")
+
+
+def _halt(model: Model, given: Halt) -> None:
+    kind = model.kind(given.machine)
+    axes = len(model.machine(given.machine).axes)
+    if given.program not in (None, "pause", "stop"):
+        raise Misuse(f"program = {given.program!r}: permitted are pause and stop")
+    if given.axis is not None and not 1 <= given.axis <= axes:
+        raise Misuse(f"axis = {given.axis}: {given.machine!r} is {kind.title}, which has axes 1 to {axes}")
+
+
+def _turn(model: Model, step: do.Turn) -> None:
+    model.encoders(step.machine).check_turn(step.axis, step.counts)
+
+
+def _couple(model: Model, step: do.Couple) -> None:
+    model.encoders(step.machine).check_turn(step.axis, 0)
+    drive = step.machine, f"M{step.axis}"
+    for axis in model.axes.values():
+        if axis.spec.drive == drive:
+            raise Misuse(f"{'.'.join(drive)}: its encoder is part of the mechanics of axis {axis.spec.name!r}")
+
+
+def _see(model: Model, step: See) -> None:
+    model.vision(step.machine)
+
+
+def _set_variable(model: Model, step: SetVariable) -> None:
+    model.programs_of(step.machine)
+
+
+def _fault(model: Model, step: do.SetFault) -> None:
+    model.rigging.check(step.fault)
+
+
+def _clear_fault(model: Model, step: do.ClearFault) -> None:
+    model.parts.faults.called(step.name)
+
+
+def _nothing(model: Model, step: object) -> None:
+    """No check: the step has no names, or is checked when it is executed."""
+
+
+_CHECKS: Mapping[type, Callable[[Model, Any], None]] = complete(
+    "step",
+    get_args(ExternalInput),
+    "check",
+    {
+        do.Until: _condition,
+        do.Expect: _condition,
+        do.Order: _order,
+        do.UntilOver: _motion,
+        do.ExpectReached: _motion,
+        do.Set: _set,
+        do.Press: _button,
+        do.Release: _button,
+        do.Write: _write,
+        do.Request: _request,
+        do.Send: _send,
+        do.PowerCycle: _power_cycle,
+        do.Turn: _turn,
+        do.Couple: _couple,
+        Halt: _halt,
+        See: _see,
+        SetVariable: _set_variable,
+        do.SetFault: _fault,
+        do.ClearFault: _clear_fault,
+        **dict.fromkeys((do.Wait, do.At, do.Note, do.Stop, do.Read, do.Call, do.Repeat), _nothing),
+        **dict.fromkeys((Bytes, Download, Leave, Refused, EndScripts), _nothing),
+    },
+)

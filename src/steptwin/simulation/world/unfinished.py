@@ -1,0 +1,94 @@
+"""What stands still in a world: what its programs and scripts wait for, and which inputs never changed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from steptwin.diagnostics import visible
+from steptwin.machine import Nanos
+from steptwin.simulation.faults.active import HeldLevel
+from steptwin.simulation.kinds.programs import Place, Resource, ResourceKind
+from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.wiring import Connection, connections
+
+
+class Waiting(NamedTuple):
+    """``who``: a controller with its program, or a script of the description; ``what`` it waits for."""
+
+    who: str
+    what: str
+
+
+def waiting(plant: Plant) -> Iterator[Waiting]:
+    """The programs that wait for something other than time, then the scripts, but for events, which wait for the next time."""
+    drivers, held = _drivers(plant), _held(plant)
+    for name, programs in plant.programs.items():
+        stack = programs.stack(plant.now)
+        if not stack:
+            continue
+        use = programs.use(stack[0].place)
+        if use.waits and use.reads:
+            states = ", ".join(state for resource in use.reads for state in _states(plant, name, resource, drivers, held))
+            where = _statement(plant, name, stack[0].place)
+            yield Waiting(name, f"{where}: {states}" if states else where)
+    events = {script.name for script in plant.spec.scripts if script.when is not None or script.every is not None}
+    for script in plant.scripts:
+        if script.waiting is not None and script.name not in events:
+            asked = ", ".join(f"the answer on {pending.line}" for pending in script.waiting.asked)
+            if what := script.waiting.condition or asked:
+                yield Waiting(script.name, what)
+
+
+def _statement(plant: Plant, machine: str, place: Place) -> str:
+    programs = plant.programs[machine]
+    found, source = programs.statements(place.text)[place.number], programs.texts[place.text]
+    return f"{source.name}:{found.line} {visible(source.text[found.start : found.end].strip())}"
+
+
+def _states(
+    plant: Plant, machine: str, resource: Resource, drivers: dict[str, list[Connection]], held: dict[str, HeldLevel]
+) -> Iterator[str]:
+    """The present level of a pin that a statement reads, and what drives it; where the axes are that it waits for."""
+    if resource.kind is ResourceKind.AXIS:
+        for axis in plant.kind(machine).state(plant.machine(machine), plant.now).axes:
+            if axis.moving and resource.name in ("", str(axis.number)):
+                place = "" if axis.position is None else f" at {axis.position:g} {axis.unit}"
+                yield f"{machine}.{axis.name} moves{place}"
+    elif resource.kind is ResourceKind.PIN and resource.name:
+        yield from _level(plant, machine, resource.name, drivers, held)
+
+
+def _level(
+    plant: Plant, machine: str, name: str, drivers: dict[str, list[Connection]], held: dict[str, HeldLevel]
+) -> Iterator[str]:
+    pin = f"{machine}.{name}"
+    level = plant.read(pin)
+    terminals = plant.kind(machine).terminals
+    if pin in held:
+        yield f"{pin} is {held[pin].words()}"
+    elif name not in (*terminals.digital_inputs, *terminals.analog_inputs):
+        yield f"{pin} is {level:g}"
+    else:
+        sources = (one.source for one in drivers.get(pin, ()))
+        by = " and ".join(f"{one} ({held[one].words()})" if one in held else one for one in sources) or "nothing"
+        yield f"{pin} is {level:g}, driven by {by}"
+
+
+def _held(plant: Plant) -> dict[str, HeldLevel]:
+    faults = plant.parts.faults
+    return {signal: held for owner in (*faults.machines, *faults.elements) for signal, held in faults.held(owner).items()}
+
+
+def _drivers(plant: Plant) -> dict[str, list[Connection]]:
+    found: dict[str, list[Connection]] = {}
+    for one in connections(plant.parts):
+        found.setdefault(str(one.target), []).append(one)
+    return found
+
+
+def unchanged_inputs(plant: Plant, since: Nanos) -> list[str]:
+    """The inputs of controllers that something drives and that have had one level since a moment, as far as the trace is kept."""
+    changed = {(record.machine, record.subject) for record in plant.trace.edges() if record.time > since}
+    driven = dict.fromkeys(one.target for one in connections(plant.parts) if one.target.machine in plant.machines)
+    return [str(pin) for pin in driven if (pin.machine, pin.pin) not in changed]

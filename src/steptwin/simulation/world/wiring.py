@@ -1,0 +1,47 @@
+"""The wiring of a world as it was built: what drives each input."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from steptwin.machine import Nanos
+from steptwin.simulation.components.elementspec import NamedSpec
+from steptwin.simulation.components.parts import WorldParts
+from steptwin.simulation.scheduler.wires import PinName
+
+
+@dataclass(frozen=True, slots=True)
+class Connection:
+    """One of the sources of an input."""
+
+    source: str
+    """An output, a switch of an axis or element, a button, or the name of an element; the table of an element without a name."""
+    target: PinName
+    inverted: bool = False
+    """The input is 0 while the source is 1: an inverted wire, a contact that is normally closed."""
+    delay: Nanos = 0
+    join: str | None = None
+    """``parallel`` or ``series`` where several contacts share the input."""
+
+
+def connections(parts: WorldParts) -> Iterator[Connection]:
+    """The connections in the order in which the description has them."""
+    wires = {wire.target: wire for kernel in parts.kernels for wire in kernel.wires}
+    for target, path in parts.driven.items():
+        circuit, wire = parts.circuits.get(target), wires.get(target)
+        if wire is not None:
+            yield Connection(terminal_name(parts, wire.source), target, wire.inverted, wire.delay)
+        elif circuit is not None:
+            join = None if len(circuit.contacts) < 2 else "series" if circuit.in_series else "parallel"
+            for contact in circuit.contacts:
+                yield Connection(contact.lane, target, contact.normally_closed, join=join)
+        else:
+            kind, number = str(path[0]), path[1]
+            spec = parts.described[kind][int(number)]
+            yield Connection((spec.name if isinstance(spec, NamedSpec) else "") or kind, target)
+
+
+def terminal_name(parts: WorldParts, pin: PinName) -> str:
+    """A pin as conditions name it: terminals of elements in small letters."""
+    return f"{pin.machine}.{pin.pin.lower()}" if pin.machine in parts.terminals else str(pin)

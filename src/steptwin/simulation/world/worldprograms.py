@@ -1,0 +1,127 @@
+"""The texts in the program memories of the controllers of a world, at its present moment."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from steptwin.diagnostics import SourceText, to_json
+from steptwin.errors import Misuse
+from steptwin.simulation.kinds.kind import ControllerSpec
+from steptwin.simulation.kinds.programtexts import ProgramText, TextLanguage
+from steptwin.simulation.world.model import Model
+
+FINDING = ("line", "column", "end_line", "end_column", "severity", "code", "message", "hint")
+"""Of a diagnostic as plain values (`steptwin.diagnostics.to_json`)."""
+
+
+def address_of(machine: str, place: str, language: TextLanguage) -> str:
+    """The address under which editors know a text."""
+    return f"steptwin:///{machine}/{place.replace(' ', '-')}{language.suffix}"
+
+
+def program_texts(model: Model, machine: str) -> Sequence[ProgramText]:
+    """Of a controller by name, at the present moment of the world; empty without any. Raises `Misuse` for another name."""
+    if machine not in model.machines:
+        raise Misuse(f"there is no controller {machine!r}: there are {', '.join(model.machines)}")
+    model.touch(machine)
+    spec = next(one for one in model.spec.controllers if one.name == machine)
+    return spec.kind.texts(spec, model.machines[machine], model.given)
+
+
+def text_at(model: Model, machine: str, place: str) -> ProgramText:
+    """Raises `Misuse` with the places there are."""
+    there = {text.place: text for text in program_texts(model, machine)}
+    if place not in there:
+        raise Misuse(f"{machine} has no place {place!r} for a program: places are {', '.join(there) or 'none'}")
+    return there[place]
+
+
+def name_of_text(model: Model, machine: str, place: str) -> str:
+    """Of the text at a place, or of the place where nothing is there yet. Raises `Misuse`."""
+    return text_at(model, machine, place).source.name
+
+
+def configuration_text(model: Model, machine: str) -> SourceText | None:
+    """The configuration file of a controller by name; None for a kind that has none. Raises `Misuse` for another name."""
+    if machine not in model.machines:
+        raise Misuse(f"there is no controller {machine!r}: there are {', '.join(model.machines)}")
+    spec = next(one for one in model.spec.controllers if one.name == machine)
+    return spec.kind.configuration(spec, model.machines[machine], model.given)
+
+
+class WorldPrograms:
+    """Of a world, as plain values."""
+
+    def __init__(self, model: Model) -> None:
+        self._model = model
+
+    def list(self) -> Sequence[Mapping[str, object]]:
+        """The texts of all controllers."""
+        return [_plain(name, text) for name in self._model.machines for text in program_texts(self._model, name)]
+
+    def text(self, machine: str, place: str) -> Mapping[str, object]:
+        """One of them, with what its checker finds. Raises `Misuse`."""
+        text = text_at(self._model, machine, place)
+        findings = [{key: row[key] for key in FINDING} for row in to_json(text.source, text.check())]
+        return {**_plain(machine, text), "text": text.source.text, "diagnostics": findings}
+
+    def memory(self, machine: str, place: str, text: str) -> Sequence[Mapping[str, object]]:
+        """What a text takes of the memory at a place; empty for one with errors. Raises `Misuse`."""
+        return [part._asdict() for part in text_at(self._model, machine, place).memory(text)]
+
+    def files(self) -> Mapping[str, bytes]:
+        """What an editor server needs by address: texts, configurations, and a description of their controllers."""
+        model = self._model
+        data: Any = model.spec.text.data
+        found: dict[str, bytes] = {}
+        tables: list[str] = []
+        for spec in model.spec.controllers:
+            kind, index = spec.path
+            table = data[kind][index]
+            known = [key for key in ("name", *spec.kind.dialect_keys) if key in table]
+            lines = [f"[[{kind}]]", *(f"{key} = {json.dumps(table[key])}" for key in known)]
+            for name, key in spec.kind.files(spec):
+                if key == "config":
+                    found[f"steptwin:///{spec.name}/config.cfg"] = model.files[name]
+                    lines.append(f'config = "{spec.name}/config.cfg"')
+            texts = program_texts(model, spec.name)
+            for text in texts:
+                if not text.is_empty:
+                    found[address_of(spec.name, text.place, text.language)] = text.source.text.encode()
+            tables += [*lines, *_keys(spec, texts)]
+        found["steptwin:///world.toml"] = "\n".join(tables).encode()
+        return found
+
+
+def _keys(spec: ControllerSpec, texts: Sequence[ProgramText]) -> Iterator[str]:
+    """The keys of a table that name the places of its program memory. A file that is alone in its key may be that of all banks,
+    so empty ones are left out there."""
+    for language in spec.kind.languages:
+        of_key = [text for text in texts if text.language == language]
+        if language.is_shared:
+            of_key = [text for text in of_key if not text.is_empty] or of_key[:1]
+        if language.in_banks and of_key:
+            banks = (f'{text.place.rpartition(" ")[2]} = "{_name(spec.name, text)}"' for text in of_key)
+            yield f"{language.key} = {{ {', '.join(banks)} }}"
+        elif of_key:
+            yield f'{language.key} = "{_name(spec.name, of_key[0])}"'
+
+
+def _name(machine: str, text: ProgramText) -> str:
+    """Of a text, seen from the description."""
+    return address_of(machine, text.place, text.language).removeprefix("steptwin:///")
+
+
+def _plain(machine: str, text: ProgramText) -> Mapping[str, object]:
+    return {
+        "machine": machine,
+        "place": text.place,
+        "name": text.source.name,
+        "language": text.language.name,
+        "address": address_of(machine, text.place, text.language),
+        "empty": text.is_empty,
+        "running": text.is_running,
+        "line": text.line,
+    }

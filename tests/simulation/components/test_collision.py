@@ -1,0 +1,206 @@
+"""Collisions and forbidden zones: their moments against positions that the test integrates itself, in two controllers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from world_rig import check_it_can_be_restored
+
+from steptwin.files.world import World
+from steptwin.machine import SECOND
+from steptwin.simulation.toml.reader import WorldError
+
+TEXT = """
+[[mic488]]
+name = "a"
+[mic488.M1]
+unit = "mm"
+gear = 640.0
+acc = 100.0
+dec = 100.0
+vel = 50.0
+mot_resol = 3200
+[[mic488]]
+name = "b"
+[mic488.M1]
+unit = "mm"
+gear = 320.0
+acc = 40.0
+dec = 40.0
+vel = 80.0
+mot_resol = 3200
+[[axis]]
+name = "left"
+drive = "a.M1"
+pitch = 5.0
+[[axis]]
+name = "right"
+drive = "b.M1"
+pitch = 10.0
+inverted = true
+start = 300.0
+[[collision]]
+name = "carriages"
+when = "left.position + 42.5 >= right.position"
+effect = "jam"
+reset = "a.OUT3"
+[[wire]]
+from = "carriages.hit"
+to = "a.IN1"
+"""
+
+
+def travelled(seconds: float, acceleration: float, speed: float) -> float:
+    """Millimetres from rest, up to a constant speed."""
+    ramp = min(seconds, speed / acceleration)
+    return acceleration * ramp * ramp / 2 + speed * (seconds - ramp)
+
+
+def meeting(gap: float) -> float:
+    """Seconds until both have used up the gap, by halving."""
+    low, high = 0.0, 20.0
+    for _ in range(60):
+        middle = (low + high) / 2
+        if travelled(middle, 100.0, 50.0) + travelled(middle, 40.0, 80.0) < gap:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def start(world: World) -> None:
+    for name in ("a", "b"):
+        world.mic488[name].write("M1_EN", 1)
+        world.mic488[name].write("M1_POS_ABS", 300.0)
+
+
+def hits(world: World) -> list[tuple[float, str]]:
+    return [(record.time / SECOND, str(record.value)) for record in world.trace.of("event") if record.subject == "collision"]
+
+
+def test_carriages_of_two_controllers_meet_at_the_exact_moment() -> None:
+    world = World.from_toml(TEXT)
+    start(world)
+    world.run(until="carriages.hit")
+    # Positions are whole pulses: a pulse of 1/640 and one of 1/320 mm may be lacking, at 130 mm/s.
+    assert world.now / SECOND == pytest.approx(meeting(300.0 - 42.5), abs=0.0047 / 130)
+    assert world.axis["left"].position + 42.5 >= world.axis["right"].position
+    moment = world.now
+    before = World.from_toml(TEXT)
+    start(before)
+    before.run(until=(moment - 1) / SECOND)
+    assert before.now == moment - 1
+    assert before.axis["left"].position + 42.5 < before.axis["right"].position
+    assert world.read("a.IN1") == 1
+
+
+def test_what_jams_stands_until_it_is_reset() -> None:
+    world = World.from_toml(TEXT)
+    start(world)
+    world.run(until=10.0)
+    left, right = world.axis["left"], world.axis["right"]
+    stood = left.position, right.position
+    assert left.position + 42.5 == pytest.approx(right.position, abs=0.01)
+    assert world.mic488["a"].axis[1].position == 300.0
+    assert left.lost == round((300.0 - left.position) * 640)
+    world.mic488["a"].write("OUT3", 1)
+    world.mic488["a"].write("M1_POS_ABS", 250.0)
+    world.run(until=14.0)
+    assert left.position == pytest.approx(stood[0] - 50.0, abs=0.06)
+    assert [text for _, text in hits(world)] == ["carriages: left and right touch", "carriages: apart again"]
+    assert world.read("carriages.count") == 1
+
+
+def test_a_forbidden_zone_is_reported() -> None:
+    more = """
+    [[collision]]
+    name = "table"
+    when = "left.position > 6 cm and right.position < 25 cm"
+    """
+    world = World.from_toml(TEXT.replace("42.5", "0.5") + more)
+    world.mic488["a"].write("M1_EN", 1)
+    world.mic488["a"].write("M1_POS_ABS", 100.0)
+    world.run(until=5.0)
+    world.mic488["b"].write("M1_EN", 1)
+    world.mic488["b"].write("M1_POS_ABS", 200.0)
+    world.run(until=9.0)
+    world.mic488["a"].write("M1_POS_ABS", 20.0)
+    world.run(until=14.0)
+    first, last = hits(world)
+    # 50 mm of the way after √(2·50/40) s, and a pulse.
+    assert first == (pytest.approx(5.0 + (2 * (50 + 1 / 320) / 40) ** 0.5, abs=2e-8), "table: left and right touch")
+    # 40 mm back: 0.5 s to 12.5 mm, then 50 mm/s.
+    assert last == (pytest.approx(9.0 + 0.5 + 27.5 / 50, abs=2e-8), "table: apart again")
+    assert world.axis["left"].lost == world.axis["right"].lost == 0
+
+
+def test_a_gantry_has_a_limit_of_skew() -> None:
+    text = TEXT.replace('when = "left.position + 42.5 >= right.position"', 'when = "abs(left.position - right.position) > 0.5"')
+    text = text.replace("inverted = true\nstart = 300.0\n", "").replace("= 40.0", "= 100.0").replace("vel = 80.0", "vel = 50.0")
+    world = World.from_toml(text)
+    start(world)
+    world.run(until=2.0)
+    assert hits(world) == []
+    world.fault("stall machine=b at_s=0.5 for_s=0.001")
+    world.run(until=3.0)
+    assert hits(world) == []  # 0.05 mm behind, and caught where its angle fits
+    world.fault("stall machine=b at_s=0.5 for_s=2")
+    world.run(until=6.0)
+    # 0.5 mm at 50 mm/s, less what was lost before.
+    assert hits(world)[0][0] == pytest.approx(3.51, abs=0.002)
+    assert abs(world.axis["left"].position - world.axis["right"].position) == pytest.approx(0.5, abs=0.11)
+
+
+@pytest.mark.parametrize("moment_s", [0.0, 1.0, 3.2, 4.1, 8.0])
+def test_snapshots_and_sessions_have_it(moment_s: float, tmp_path: Path) -> None:
+    text = TEXT + (
+        '[[script]]\nname = "s"\nsteps = [{ write = { "a.M1_EN" = 1, "b.M1_EN" = 1, "a.M1_POS_ABS" = 200.0 } },'
+        '{ write = { "b.M1_POS_ABS" = 200.0 } }, { until = "a.IN1" }, { wait = "1 s" }, { write = { "a.OUT3" = 1 } },'
+        '{ write = { "a.M1_POS_ABS" = 20.0 } }]\n'
+    )
+    check_it_can_be_restored(World.from_toml(text), World.from_toml(text), moment_s, 9.0, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "text"),
+    [
+        ('effect = "jam"', 'effect = "jamm"', r"t.toml:33.*'jamm' \(did you mean 'jam'\?\): permitted are report, jam"),
+        ("left.position + 42.5", "left.position + ", "t.toml:32.*expected a signal or a number"),
+        ("left.position + 42.5", "lft.position + 42.5", r"nothing is called 'lft' \(did you mean 'left'\?\)"),
+        ("left.position + 42.5", "left.positon + 42.5", r"no signal 'left.positon' \(did you mean 'position'\?\)"),
+        ("42.5", "42.5 s", "42.5 s is compared with 'mm'"),
+        ("when", "if", "has no 'if'"),
+        ('reset = "a.OUT3"', 'reset = "a.IN3"', "a.IN3 is not an output"),
+    ],
+)
+def test_mistakes_have_their_places(old: str, new: str, text: str) -> None:
+    with pytest.raises(WorldError, match=f"(?s){text}"):
+        World.from_toml(TEXT.replace(old, new, 1), name="t.toml")
+
+
+def test_a_restored_snapshot_of_another_past_has_its_own_moment() -> None:
+    """The cylinder has been sent once in both pasts."""
+    cylinder = '[[cylinder]]\nname = "arm"\nextend = "a.OUT1"\nstroke = 100.0\n'
+    cylinder += "extend_time = 0.5\nretract_time = 0.5\nswitching = 0\n"
+    world = World.from_toml(f'[[mic488]]\nname = "a"\n{cylinder}[[collision]]\nname = "zone"\nwhen = "arm.position >= 60"')
+
+    def sent_at(seconds: float) -> None:
+        world.run(until=seconds)
+        world.mic488["a"].write("OUT1", 1)
+        world.run(until=0.3)
+
+    begin = world.snapshot()
+    sent_at(0.1)
+    early = world.snapshot()
+    world.restore(begin)
+    sent_at(0.2)
+    world.restore(early)
+    world.run(until=1.0)
+    assert hits(world) == [(0.4, "zone: parts touch")]
+
+
+def test_a_controller_with_the_name_of_a_signal_is_no_quantity() -> None:
+    text = TEXT.replace("left.position + 42.5", "idle + 42.5")
+    with pytest.raises(WorldError, match="when: 'idle' is no quantity of a machine or an element"):
+        World.from_toml(f'[[mic488]]\nname = "idle"\n{text}')

@@ -1,0 +1,142 @@
+"""What every element has, from the list of elements itself: faults, signals, a drawing, a section with a picture, tests of its
+own, and its lanes in exports. A new element that lacks one fails here."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import pytest
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from pyarrow import parquet
+from toy import lamp
+from whole_world import everything
+
+from steptwin.files.export import axis_views, plot, write_trace
+from steptwin.files.export.recording import sort_out
+from steptwin.motion.divisions import profile_of
+from steptwin.simulation.components.registry import ELEMENTS
+from steptwin.simulation.mechanics.lanes import AxisViews
+from steptwin.simulation.world.plant import Plant
+
+ROOT = Path(__file__).parents[3]
+NAMES = sorted(ELEMENTS)
+NO_OWN_FAULTS = {
+    "axis": "stall, lost-steps and slip are faults of its drive",
+    "button": "its input can be stuck or bounce",
+    "wire": "its input can be stuck; the output before it, too",
+}
+DRAWN_ELSEWHERE = {"axis": "Axis.svelte", "button": "Machine.svelte", "wire": "../io/Wiring.svelte"}
+"""In the page, those that are no symbol and no track."""
+TESTS = {
+    "axis": "../mechanics/test_mechanics.py",
+    "button": "../logic/test_contacts.py",
+    "wire": "../world/test_wiring.py",
+    "source": "../logic/test_sources.py",
+    **dict.fromkeys(("gate", "latch", "timer", "counter", "relay"), "test_logic.py"),
+}
+"""Where they are not in the file of its name."""
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_has_faults_or_a_reason(name: str) -> None:
+    assert bool(ELEMENTS[name].faults) is not (name in NO_OWN_FAULTS)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_is_in_the_world_of_all_elements_with_its_signals(name: str) -> None:
+    """There snapshots, branches, states and signals are compared."""
+    with lamp.registered():
+        world = everything()
+        assert world.spec.elements[name]
+        for spec in ELEMENTS[name].named(world.spec.elements[name]):
+            assert world.parts.element_signals(spec.name)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_page_draws_it(name: str) -> None:
+    panel = ROOT / "studio-web" / "src" / "panels" / "machine"
+    if name in DRAWN_ELSEWHERE:
+        assert (panel / DRAWN_ELSEWHERE[name]).is_file()
+        return
+    symbols = (panel / "Symbol.svelte").read_text("utf-8")
+    logic = re.search(r"const LOGIC[^=]*= \{(.*?)\}", symbols)
+    assert logic is not None
+    has_symbol = f'kind === "{name}"' in symbols or f"{name}:" in logic[1]
+    assert (ELEMENTS[name].drawing is not None) is not has_symbol
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_its_section_has_a_picture(name: str) -> None:
+    pages = [(ROOT / "docs" / page).read_text("utf-8") for page in ("elements.md", "motors.md", "worlds.md")]
+    sections = [section for page in pages for section in re.split(r"^## ", page, flags=re.MULTILINE) if f"[[{name}]]" in section]
+    assert any("](images/" in section for section in sections)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_has_tests_of_its_own(name: str) -> None:
+    assert (Path(__file__).parent / TESTS.get(name, f"test_{name}.py")).is_file()
+
+
+Recorded: TypeAlias = "tuple[Plant, AxisViews, set[str], set[str]]"
+
+
+@pytest.fixture(scope="module")
+def recorded() -> Recorded:
+    """The world of all elements after 0.6 s, its views, lanes of terminals, contacts and faults, and what axes move besides."""
+    with lamp.registered():
+        world = everything()
+        world.run(for_=0.6)
+        pins = {pin for machine in world.machines.values() for pin in machine.pins()}
+        moved = {
+            spec.name
+            for element in ELEMENTS.values()
+            if element.moved is not None
+            for spec in element.named(world.spec.elements[element.name])
+        }
+        return world, axis_views(world), {record.subject for record in world.trace.edges()} - pins, moved
+
+
+def lacking(text: str, lanes: set[str], moved: set[str]) -> set[str]:
+    """The lanes that a text does not have."""
+    return {lane for lane in lanes if lane not in text and lane.replace(".", "_") not in text} | {
+        name for name in moved if not re.search(rf"{name}[ _](position|angle|x)|\"{name}\"", text)
+    }
+
+
+@pytest.mark.parametrize("form", ["jsonl", "html", "vcd", "csv", "parquet"])
+def test_every_lane_is_in_every_export(recorded: Recorded, form: str, tmp_path: Path) -> None:
+    world, views, lanes, moved = recorded
+    (file,) = write_trace(world.trace, tmp_path / f"t.{form}", views=views, ended=world.now)
+    text = "\n".join(parquet.read_schema(file).names) if form == "parquet" else file.read_text("utf-8")
+    assert lacking(text, lanes, moved) == set()
+
+
+@pytest.mark.parametrize("form", ["svg", "png"])
+def test_every_lane_that_changes_is_in_the_pictures(
+    recorded: Recorded, form: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    world, views, lanes, moved = recorded
+    monkeypatch.setattr(plot, "MOST_ROWS", 1000)
+    drawn: list[str] = []
+    saved = Figure.savefig
+
+    def save(figure: Figure, *args: Any, **kwargs: Any) -> None:
+        drawn.extend(one.get_text() for one in figure.findobj(Text))
+        saved(figure, *args, **kwargs)
+
+    monkeypatch.setattr(Figure, "savefig", save)
+    (file,) = write_trace(world.trace, tmp_path / f"t.{form}", views=views, ended=world.now)
+    changed = {record.subject for record in world.trace.edges() if record.time > 0} & lanes
+    recording = sort_out(world.trace, views, until=world.now)
+    moving = {
+        track.view.name.split()[0]
+        for track in recording.moved
+        if any(profile_of(plan).moving(after) for plan, after, _ in track.stretches(0, world.now))
+    } & moved
+    assert len(changed) > 3
+    assert lacking("\n".join(drawn), changed, moving) == set()
+    if form == "svg":
+        assert lacking(file.read_text("utf-8"), changed, moving) == set()

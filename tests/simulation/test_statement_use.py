@@ -1,0 +1,117 @@
+"""What statements of programs read and change: worked out by hand from what each of them does."""
+
+from __future__ import annotations
+
+import pytest
+from mic488_rig import loaded
+
+from steptwin.m1486.syntax import parse
+from steptwin.simulation.kinds.m1486.statement_use import use_of as use_of_chip
+from steptwin.simulation.kinds.mic488.statement_use import use_of
+from steptwin.simulation.kinds.programs import Resource, ResourceKind, StatementUse
+
+
+def axis(number: int | str) -> Resource:
+    return Resource(ResourceKind.AXIS, str(number))
+
+
+def pin(name: str) -> Resource:
+    return Resource(ResourceKind.PIN, name)
+
+
+def value(name: str) -> Resource:
+    return Resource(ResourceKind.VALUE, name)
+
+
+ANY_AXIS, ANY_PIN = axis(""), pin("")
+
+WBC = """\
+x = AIN2 + $D4
+OUT3 = IN5
+PULSE(OUT2, x)
+PABS M2 x
+BRAKE M4
+MOVEPTP @A
+IF IN1 = ON
+    OUTPUTS = INPUTS
+ELSE
+    ACCM3 = 5
+ENDIF
+WHILE POSM1 < x
+    DELAY x
+ENDWHILE
+WAIT STATM2 = 4
+WAITPOS
+JUMP L
+L:
+PROGRESET
+END
+INT_IN6:
+x = 1
+RETURN
+INT_M3:
+RETURN
+INT_MODBUS:
+x = 2
+RETURN
+"""
+WBC_USES = [
+    StatementUse((pin("AIN2"), value("$D4")), (value("x"),)),
+    StatementUse((pin("IN5"),), (pin("OUT3"),)),
+    StatementUse((value("x"),), (pin("OUT2"),)),
+    StatementUse((value("x"),), (axis(2),)),
+    StatementUse((), (axis(4),)),
+    StatementUse((), (ANY_AXIS,)),
+    StatementUse((pin("IN1"),), governs=range(7, 10)),  # IF: up to its ENDIF
+    StatementUse((ANY_PIN,), (ANY_PIN,)),
+    StatementUse(),
+    StatementUse((), (axis(3), value("AccM3")), keeps=True),
+    StatementUse(),
+    StatementUse((axis(1), value("x")), governs=range(12, 13), is_loop=True),
+    StatementUse((value("x"),), waits=True),
+    StatementUse((axis(1), value("x")), governs=range(12, 13), is_loop=True),  # ENDWHILE
+    StatementUse((axis(2),), waits=True),
+    StatementUse((ANY_AXIS,), waits=True),
+    StatementUse(jumps=17),
+    StatementUse((), (ANY_AXIS, ANY_PIN)),
+    StatementUse((), (ANY_AXIS, ANY_PIN)),
+    StatementUse((pin("IN6"),), waits=True, governs=range(20, 22)),  # an interrupt: up to its RETURN
+    StatementUse((), (value("x"),)),
+    StatementUse(),
+    StatementUse((axis(3),), waits=True, governs=range(23, 24)),
+    StatementUse(),
+    StatementUse((), waits=True, governs=range(25, 27)),
+    StatementUse((), (value("x"),)),
+    StatementUse(),
+    StatementUse(),  # the end
+]
+
+
+def test_statements_of_wbc() -> None:
+    steps = loaded(WBC, "A;1;2;3;4\n")[0].steps
+    assert [use_of(steps, number) for number in range(len(steps) + 1)] == WBC_USES
+
+
+@pytest.mark.parametrize(
+    ("text", "use"),
+    [
+        ("O3", StatementUse((pin("B3"),), waits=True)),
+        ("Z21", StatementUse((pin("B21"),), waits=True)),
+        ("T2", StatementUse(writes=(pin("B2"),))),
+        ("C1", StatementUse(writes=(pin("B1"),))),
+        ("T40", StatementUse()),  # a function
+        ("!12", StatementUse((value("variable"),), (ANY_PIN,))),
+        ("?12", StatementUse((ANY_PIN,), (value("variable"),))),
+        *((text, StatementUse(writes=(value("variable"),))) for text in (":5", "+5", "-5", "*5", "/5", "<1")),
+        ("I3H1", StatementUse((pin("B3"),), governs=range(1 << 16))),
+        ("W100", StatementUse(waits=True)),
+        ("R", StatementUse((axis(1),), (axis(1),), waits=True)),
+        (")4", StatementUse((axis(1), pin("B4")), (axis(1),), waits=True)),
+        ("(4", StatementUse((axis(1), pin("B4")), (axis(1),), waits=True)),
+        ("V300", StatementUse()),
+        ("@7", StatementUse()),
+    ],
+)
+def test_commands_of_a_chip(text: str, use: StatementUse) -> None:
+    (command,) = parse(text).program.all_commands
+    assert use_of_chip(command) == use
