@@ -112,6 +112,7 @@ def test_files_that_vary_are_read(tmp_path: Path) -> None:
         (HEAD + '[[vary]]\nname = "a"\nbetween = [1, "2 s"]\n', "expected two numbers or two times"),
         (HEAD + '[[vary]]\nname = "a"\nbetween = [0, 1]\nlog = true\n', "log needs numbers above 0"),
         (HEAD + '[[vary]]\nname = "a"\nbetween = [0, 1.5]\nwhole = true\n', "whole needs whole numbers"),
+        (HEAD + '[[vary]]\nname = "a"\nbetween = [0.5, 2]\nwhole = true\n', "whole needs whole numbers"),
         (HEAD + '[[vary]]\nname = "a"\nnormal = { mean = 1, deviation = 0 }\n', "deviation = 0: must be more than 0"),
         (HEAD + '[[vary]]\nname = "a"\nnormal = { mean = 1 }\n', "expected { mean = NUMBER, deviation = NUMBER }"),
         (HEAD + '[[vary]]\nname = "a"\nchoose = []\n', "expected a list of numbers, texts or truth values"),

@@ -31,6 +31,7 @@ from steptwin.subject.payloads import (
     PlanPayload,
     RestoredPayload,
     StatusPayload,
+    WritePayload,
 )
 from steptwin.subject.world import WorldSubject
 
@@ -149,6 +150,17 @@ def test_levels_of_a_driver_interface_have_no_edges(payload: Payload, wanted: se
     held = Holder(World.from_toml(CURRENTS.format(interface="dual"))).held["chip"]
     held.take(Event(1, 0, "chip", payload))
     assert set(held.wanted(is_due=False)) == wanted
+
+
+def test_what_was_sent_may_have_effects_for_a_second_after_the_last_one() -> None:
+    held = Holder(World.from_toml(CURRENTS.format(interface="dual"))).held["chip"]
+    assert held.state is not None
+    held.take(Event(1, 0, "chip", WritePayload("tcp-1", "host", "t1", "")))
+    held.put({"status": {**held.state["status"], "new": 1}}, SECOND // 2)
+    held.put({}, SECOND)
+    assert held.is_active
+    held.put({}, SECOND + SECOND // 2)
+    assert not held.is_active
 
 
 class Holder:

@@ -269,6 +269,13 @@ def test_over_tcp_the_first_line_is_the_token() -> None:
     assert by_tcp(b'{"token": "TOKEN"}', b'{"do": "note", "text": "a"}') == [{"ok": None}, ok("a")]
 
 
+def test_without_an_address_it_listens_on_a_local_socket_only() -> None:
+    async def play(endpoint: ControlEndpoint) -> None:
+        assert (endpoint.listening, endpoint.path.exists()) == (None, True)
+
+    served(play)
+
+
 @pytest.mark.parametrize(
     "first",
     [

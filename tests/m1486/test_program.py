@@ -144,6 +144,15 @@ def test_m_19_the_time_of_a_command_can_be_chosen() -> None:
     assert [event.time for event in bench.events("upload")] == [0, 250_000, 500_000]
 
 
+def test_m_19_wrong_data_take_the_time_of_a_command_each_time() -> None:
+    bench = Bench()
+    bench.do("t44")
+    begun = bench.now
+    bench.file("@1", "u4", "j5", "j1")
+    bench.run(ms=12)
+    assert [event.time - begun for event in bench.events("upload")] == [3 * n * MILLISECOND for n in range(5)]
+
+
 def test_m_19_without_time_many_commands_happen_at_once_and_an_endless_loop_lets_time_go_on() -> None:
     bench = Bench(statement_ns=0)
     bench.file(":0", "@1", "+1", "j1")

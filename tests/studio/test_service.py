@@ -147,6 +147,7 @@ def test_what_is_wrong_is_named_with_its_status(shared: Process, path: str, body
 def test_there_is_no_request_about_a_connection_over_rest(shared: Process) -> None:
     described = httpx.get(f"{shared.url}/openapi.json").json()["paths"]
     assert described["/api/do/move"]["post"]["operationId"] == "move"
+    assert described["/api/do/move"]["post"]["description"].endswith(" Role operator, and control.")
     lease = described["/api/do/jog"]["post"]["responses"]["200"]["content"]["application/json"]["schema"]["properties"]["ok"]
     assert lease["required"] == ["lease", "lasts_ms"]
     for name in ("follow", "unfollow", "watch", "unwatch", "hello", "resync"):

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -12,6 +14,7 @@ from tests.support.studio_rig import ENGINEER, OPERATOR, TOKENS, VIEWER, Studio,
 
 from steptwin.access.roles import Role
 from steptwin.access.tokens import AccessGate
+from steptwin.errors import Refusal
 from steptwin.machine import MILLISECOND
 from steptwin.studio import session as sessions
 from steptwin.studio.hub import MOST_VIEWERS
@@ -236,6 +239,31 @@ def test_a_wrong_point_is_named() -> None:
     code, message = Studio().open().error("watch", points=["table.M1.position", "table.M1.colour"])
     assert code == "misuse"
     assert "colour" in message
+
+
+class _Bounds(Mock):
+    """A history that says between which moments it is read."""
+
+    async def values(self, points: object, run: int, begin_s: float, end_s: float | None) -> None:
+        raise Refusal(f"{begin_s} to {end_s}")
+
+    async def writes(self, run: int, begin_s: float, end_s: float | None) -> None:
+        raise Refusal(f"{begin_s} to {end_s}")
+
+    async def compare(self, points: object, runs: object, begin_s: float, end_s: float | None) -> None:
+        raise Refusal(f"{begin_s} to {end_s}")
+
+
+@pytest.mark.parametrize(
+    ("name", "fields"),
+    [("history_values", {"points": ["x"]}), ("history_writes", {}), ("compare_history", {"run": 1, "other": 2})],
+)
+def test_a_stretch_of_the_history_goes_from_its_beginning_to_its_end(name: str, fields: dict[str, Any]) -> None:
+    studio = Studio()
+    studio.hub.around = replace(studio.hub.around, plant=_Bounds())
+    tab = studio.open()
+    assert tab.error(name, **fields, from_s=1, to_s=2.5) == ("refusal", "1.0 to 2.5")
+    assert tab.error(name, **fields) == ("refusal", "0.0 to None")
 
 
 def test_events_come_once_however_many_follows_want_them() -> None:

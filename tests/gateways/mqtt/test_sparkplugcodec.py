@@ -89,6 +89,11 @@ def test_what_is_cut_off_is_refused(wrong: str) -> None:
         decode_payload(bytes.fromhex(wrong))
 
 
+def test_a_text_that_is_not_utf_8_is_refused() -> None:
+    with pytest.raises(Misuse, match="a text is not UTF-8"):
+        decode_payload(bytes.fromhex("12030a01ff"))
+
+
 def test_a_value_of_another_type_is_refused() -> None:
     for kind, value in (
         (SparkplugType.INT32, "x"),
