@@ -2,31 +2,30 @@
 
 A random sample. For each mutation the tests run that execute its lines, the fastest first, until one fails: those of the mirrored
 folder, then others. Results are written after each mutation to ``build/mutants/results.md``.
+
+``make mutants ARGS="faults 3 7"`` tries recorded faults again: see `mutants.faults`.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
-import queue
 import random
 import signal
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor, as_completed
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice
 from pathlib import Path
-from typing import TypeVar
 
+from mutants import faults
 from mutants.mutations import Mutation, compiles, mutations
 from mutants.reach import CORE, Reach, digest, folders
 from mutants.trial import Tree
-
-T = TypeVar("T")
+from mutants.workers import Workers
 
 ROOT = Path(__file__).parent.parent
 BUILD = ROOT / "build/mutants"
@@ -91,35 +90,6 @@ def report(results: list[tuple[Mutant, str]], seed: int) -> str:
     return "\n".join(lines)
 
 
-class Workers:
-    """Several trees, each with its thread."""
-
-    def __init__(self, trees: list[Tree]) -> None:
-        self._trees = trees
-        self._free: queue.SimpleQueue[Tree] = queue.SimpleQueue()
-        for tree in trees:
-            self._free.put(tree)
-        self._pool = ThreadPoolExecutor(len(trees))
-
-    def each(self, tasks: Iterable[Callable[[Tree], T]]) -> Iterator[T]:
-        """The results in the order in which they come."""
-        futures: list[Future[T]] = [self._pool.submit(self._do, task) for task in tasks]
-        return (future.result() for future in as_completed(futures))
-
-    def end(self) -> None:
-        """End the tests that run."""
-        self._pool.shutdown(wait=False, cancel_futures=True)
-        for tree in self._trees:
-            tree.end()
-
-    def _do(self, task: Callable[[Tree], T]) -> T:
-        tree = self._free.get()
-        try:
-            return task(tree)
-        finally:
-            self._free.put(tree)
-
-
 def recorded(workers: Workers, root: Path, chosen: list[str]) -> Reach:
     """What the tests of these folders execute; recorded where sources or tests have changed since the last time."""
     records = {folder: BUILD / f"{Path(folder).name}-{digest(root, folder)}.json" for folder in chosen}
@@ -144,6 +114,9 @@ def _tried(reach: Reach, mutant: Mutant, tree: Tree) -> tuple[Mutant, str]:
 
 
 def main() -> None:
+    if sys.argv[1:2] == ["faults"]:
+        faults.main(sys.argv[2:])
+        return
     parser = argparse.ArgumentParser(prog="make mutants", description="Mutation testing of the core.")
     parser.add_argument("-n", type=int, default=60, metavar="N", help="number of mutations (default: 60)")
     parser.add_argument("--seed", type=int, default=1, help="random seed of the sample (default: 1)")

@@ -86,6 +86,10 @@ class Tree:
         arguments = ["-p", "mutants.choice", *files]
         return self._passed(self._pytest(arguments, {CHOICE: str(choice)}), _limit(seconds))
 
+    def fails(self, tests: Iterable[str], limit_s: float) -> bool:
+        """Whether one of these tests fails, by node id, or they take longer."""
+        return not self._passed(self._pytest(list(tests), {}), limit_s)
+
     def fork(self, folders: Iterable[str]) -> None:
         """Collect the tests of these folders once, for `passes_forked`."""
         requests, answers = os.pipe(), os.pipe()

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from mutants.__main__ import sources
+from mutants.faults import Fault, Lost, find_test
 from mutants.mutations import compiles, mutations
 from mutants.reach import CORE, FOLDERS, Reach, digest, folders, imported_files
 from mutants.trial import Tree
@@ -179,3 +180,32 @@ def test_a_record_is_valid_until_something_changes_that_its_tests_import(tree: T
     imported_files.cache_clear()
     after = [digest(tree.path, folder) for folder in ("tests/wire", "tests/simulation")]
     assert [before[0] == after[0], before[1] == after[1]] == [True, False]
+
+
+def fault(function: str, old: str, new: str) -> Fault:
+    return Fault(1, "it adds wrongly", "wire/sums.py", function, old, new, {"plain": [IN_WIRE]})
+
+
+def test_a_recorded_fault_is_found_where_its_function_is_now(tree: Tree) -> None:
+    one = fault("total", "( a + b )", "(a - b)")
+    assert one.put_into(tree.path)[0] == SUMS
+    assert "return (a - b)" in one.put_into(tree.path)[1]
+    (tree.path / "src/steptwin/world/sums.py").write_text((tree.path / SUMS).read_text())
+    assert one.put_into(tree.path)[0] == SUMS, "where it was first"
+    (tree.path / SUMS).write_text("")
+    assert one.put_into(tree.path)[0] == Path("src/steptwin/world/sums.py")
+    (tree.path / "src/steptwin/world/other.py").write_text((tree.path / "src/steptwin/world/sums.py").read_text())
+    for lost in (one, fault("total", "a", "b"), fault("sum", "a + b", "a - b"), fault("use", "3", "(")):
+        with pytest.raises(Lost):
+            lost.put_into(tree.path)
+
+
+def test_a_test_is_found_where_it_is_now(tree: Tree) -> None:
+    assert find_test(tree.path, IN_WIRE) == IN_WIRE
+    (tree.path / "tests/wire/test_sums.py").rename(tree.path / "tests/world/test_sums.py")
+    assert find_test(tree.path, IN_WIRE) == "tests/world/test_sums.py::test_total"
+    (tree.path / "tests/world/test_sums.py").rename(tree.path / "tests/world/test_added.py")
+    assert find_test(tree.path, IN_WIRE) == "tests/world/test_added.py::test_total"
+    (tree.path / "tests/world/test_added.py").unlink()
+    with pytest.raises(Lost):
+        find_test(tree.path, IN_WIRE)
