@@ -141,7 +141,7 @@ def test_tests_that_execute_a_line_are_run_for_it(tree: Tree, tmp_path: Path) ->
     def stages(line: int) -> list[tuple[str, list[str]]]:
         return [(name, sorted(seconds)) for name, seconds in reach.stages(SUMS, line, line)]
 
-    everything = [("folder", ["tests/wire/test_sums.py::test_nothing", IN_WIRE]), ("others", [IN_STATE, IN_WORLD])]
+    everything = [("folder", ["tests/wire/test_sums.py::test_nothing", IN_WIRE]), ("others", [IN_WORLD, IN_STATE])]
     assert stages(1) == everything, "executed on import"
     assert stages(2) == everything, "executed on import"
     assert stages(4) == stages(5) == stages(6) == [], "executed by no test"

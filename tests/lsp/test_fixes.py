@@ -143,7 +143,7 @@ NOT_FIXED = {
 def _codes() -> set[str]:
     """All codes of the tables and, of configurations and descriptions, in the sources that report them."""
     found = {*FINDINGS, *(finding.code for finding in findings.TABLE), UNUSED_ROW}
-    for folder, letter in (("mic488", "C0"), ("world", "D0")):
+    for folder, letter in (("mic488", "C0"), ("simulation", "D0")):
         for file in (SOURCES / folder).rglob("*.py"):
             found.update(re.findall(rf'"({letter}\d\d)"', file.read_text()))
     return found
