@@ -38,7 +38,7 @@ def test_answers_are_those_of_a_run_from_the_beginning(question: str, monkeypatc
     past = counting()
     moments = [number * 450 * MILLISECOND for number in range(1, 17)]
     found = [past.ask(question, at) for at in moments]
-    monkeypatch.setattr(states, "FIRST_DISTANCE_NS", 3600 * SECOND)
+    monkeypatch.setattr(states, "LEAST_DISTANCE_NS", 3600 * SECOND)
     whole = counting()
     assert found == [whole.ask(question, at) for at in moments]
     assert len({answer.since for answer in found}) > 1

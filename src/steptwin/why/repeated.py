@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Callable, Sequence
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
-from steptwin.simulation.world.history import ChangedSince, PastState, outside_past, replay
+from steptwin.simulation.world.history import MOST_STATES, ChangedSince, PastState, StatesByAge, outside_past, replay
 from steptwin.simulation.world.plant import Plant
 from steptwin.simulation.world.plantsnapshot import RecordedInput
 from steptwin.why.answer import Answer
@@ -48,7 +47,8 @@ class StatesOfRun:
         self.begin = world.now
         self._inputs = inputs
         self._end = end
-        self._states = [PastState(world.snapshot(with_inputs=False), 0)]
+        self._states = StatesByAge(MOST_STATES)
+        self._states.add(PastState(world.snapshot(with_inputs=False), 0))
 
     def run(self) -> None:
         """Run the world."""
@@ -57,7 +57,7 @@ class StatesOfRun:
         done = 0
         for moment in self._moments():
             done += sum(replay(self.world, self._inputs[done:], moment))
-            self._states.append(PastState(self.world.snapshot(with_inputs=False), done, changed.take()))
+            self._states.add(PastState(self.world.snapshot(with_inputs=False), done, changed.take()))
 
     def _moments(self) -> Sequence[Nanos]:
         """Those of the states after the first one."""
@@ -69,10 +69,10 @@ class StatesOfRun:
         return sorted(moments)
 
     def state_at(self, moment: Nanos) -> PastState:
-        index = bisect_right(self._states, moment, key=lambda state: state.snapshot.now)
-        if not index:
+        state = self._states.at(moment)
+        if state is None:
             raise Misuse(outside_past(moment, self.begin, self._end))
-        return self._states[index - 1]
+        return state
 
     def keeps_inputs_from(self, number: int) -> bool:
         return True

@@ -10,12 +10,12 @@ from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.points import FARTHEST_NS
 from steptwin.simulation.logic.signal import SignalOf
-from steptwin.simulation.world.history import PastState
+from steptwin.simulation.world.history import PastState, StatesByAge
 from steptwin.simulation.world.plant import Plant
 
 MOST_KEPT = 64
-FIRST_DISTANCE_NS: Nanos = SECOND // 2
-"""Of states in time; twice as much whenever there would be too many."""
+LEAST_DISTANCE_NS: Nanos = SECOND // 2
+"""Of states in time; longer in a long run, of which about `MOST_KEPT` states are taken while it doubles."""
 
 
 class Interval(NamedTuple):
@@ -38,22 +38,22 @@ class StatesOnTheWay:
     def __init__(self, world: Plant) -> None:
         self._world = world
         self._moving = dict(_moving(world))
-        self._distance: Nanos = FIRST_DISTANCE_NS
-        self._states: list[PastState] = []
+        self._begin = world.now
+        self._states = StatesByAge(MOST_KEPT)
         self._rests: dict[Nanos, Mapping[str, Standing]] = {}
         """What stands at the moments of the states."""
         self.pass_by(0)
 
     def pass_by(self, inputs: int) -> None:
         """Keep the present state, unless the last one is near. ``inputs``: how many have been applied."""
-        if self._states and self._world.now < self._states[-1].snapshot.now + self._distance:
+        now, newest = self._world.now, self._states.newest
+        distance = max(LEAST_DISTANCE_NS, (now - self._begin) // MOST_KEPT)
+        if newest is not None and now < newest.snapshot.now + distance:
             return
-        self._states.append(PastState(self._world.snapshot(with_inputs=False), inputs))
-        now = self._world.now
+        removed = self._states.add(PastState(self._world.snapshot(with_inputs=False), inputs))
+        if removed is not None:
+            del self._rests[removed.snapshot.now]
         self._rests[now] = {name: rest for name, signal in self._moving.items() if (rest := rest_of(signal, now)) is not None}
-        if len(self._states) > MOST_KEPT:
-            del self._states[1::2]
-            self._distance *= 2
 
     def rest(self, name: str, interval: Interval) -> float | None:
         """The value of a moving quantity that stands during an interval; None where it does not, or that is not known."""
@@ -64,11 +64,12 @@ class StatesOnTheWay:
 
     def until(self, moment: Nanos) -> Iterator[PastState]:
         """The states by a moment, the last one first."""
-        return (state for state in reversed(self._states) if state.snapshot.now <= moment)
+        return self._states.back_from(moment)
 
     def intervals(self, moment: Nanos, present: Nanos) -> Iterator[Interval]:
         """From the one with a moment back to the first one."""
-        end = next((state.snapshot.now for state in self._states if state.snapshot.now > moment), present)
+        after = self._states.after(moment)
+        end = present if after is None else after.snapshot.now
         for state in self.until(moment):
             yield Interval(state, end)
             end = state.snapshot.now

@@ -13,7 +13,7 @@ from steptwin.files.world import World
 from steptwin.machine import SECOND, Nanos
 from steptwin.simulation.script.steps import Set, Write
 from steptwin.simulation.world import history as module
-from steptwin.simulation.world.history import History, Past
+from steptwin.simulation.world.history import History, Past, PastState
 from steptwin.simulation.world.inputs import Bytes, size_of
 from steptwin.simulation.world.plant import Plant
 
@@ -41,6 +41,10 @@ def make() -> World:
 def shown(world: Plant) -> tuple[object, ...]:
     found = world.snapshot(with_inputs=False)
     return world.now, world.machine("m").pins(), world.read("m.M1.position"), world.read("m.M1.velocity"), repr(found.kernels)
+
+
+def states(history: History) -> list[PastState]:
+    return [*history._states.back_from(history.world.now)][::-1]
 
 
 def go(past: Past, moment: Nanos) -> Plant:
@@ -251,7 +255,7 @@ def test_what_a_snapshot_that_goes_had_seen_changed_stays_with_the_next(monkeypa
         world.settle_all()
         history.take()
     assert len(history) == 16
-    changed = [name for state in history._states for machine, name in state.changed if name.startswith("IN")]
+    changed = [name for state in states(history) for machine, name in state.changed if name.startswith("IN")]
     assert sorted(changed) == sorted(f"IN{count + 1}" for count in range(20))
 
 
@@ -373,7 +377,7 @@ def test_what_has_changed_in_what_is_undone_may_have_changed_where_it_goes_on() 
         history.take()
     world.restore(snapshot)
     history.gone_back()
-    assert {("m", "IN3"), ("m", "IN4")} <= history._states[-1].changed
+    assert {("m", "IN3"), ("m", "IN4")} <= states(history)[-1].changed
 
 
 def test_the_snapshot_that_is_missed_least_may_be_the_first_after_the_oldest(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -383,7 +387,7 @@ def test_the_snapshot_that_is_missed_least_may_be_the_first_after_the_oldest(mon
     for moment in (0.001, *range(1, 16)):
         world.run(until=float(moment))
         history.take()
-    assert [state.snapshot.now for state in history._states] == [moment * SECOND for moment in range(16)]
+    assert [state.snapshot.now for state in states(history)] == [moment * SECOND for moment in range(16)]
 
 
 def test_a_value_that_changes_again_after_it_was_undone_is_noted_again() -> None:
@@ -398,7 +402,7 @@ def test_a_value_that_changes_again_after_it_was_undone_is_noted_again() -> None
         world.apply_input(Write((("m", "M1_EN", 1.0),)))
         world.run(for_=1)
         history.take()
-        found.append(history._states[-1].changed)
+        found.append(states(history)[-1].changed)
     assert ("m", "M1.enabled") in found[0]
     assert found[0] <= found[1]
 
@@ -413,4 +417,4 @@ def test_the_snapshot_that_is_missed_least_may_be_the_last_before_the_newest(mon
     for age in (*ages, 2 / 3, 0):
         world.run(until=round((3**14 - age) * 1.5, 3))
         history.take()
-    assert [(world.now - state.snapshot.now) / SECOND for state in history._states] == [*(1.5 * age for age in ages), 0]
+    assert [(world.now - state.snapshot.now) / SECOND for state in states(history)] == [*(1.5 * age for age in ages), 0]

@@ -1,8 +1,7 @@
 """The past of a running world: snapshots at intervals and the external inputs since, from which the world at any moment since the
 oldest snapshot is computed again.
 
-Memory is bounded. If there are too many snapshots, those whose neighbours are close for their age are removed first, so that the
-distance between two snapshots grows with their age. With the oldest snapshot, the inputs before the next one are removed.
+Memory is bounded (`StatesByAge`). With the oldest snapshot, the inputs before the next one are removed.
 """
 
 from __future__ import annotations
@@ -87,6 +86,75 @@ class PastState(NamedTuple):
     """What has changed since the state before, or may have."""
 
 
+class StatesByAge:
+    """States of a world in the order of their moments, at most ``most`` (3 or more).
+
+    If there are too many, those whose neighbours are close for their age are removed first, so that the distance between two
+    states grows with their age; never the oldest or the newest.
+    """
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._states: list[PastState] = []
+
+    def __len__(self) -> int:
+        return len(self._states)
+
+    @property
+    def oldest(self) -> PastState | None:
+        return self._states[0] if self._states else None
+
+    @property
+    def newest(self) -> PastState | None:
+        return self._states[-1] if self._states else None
+
+    def add(self, state: PastState) -> PastState | None:
+        """Add a state, unless there is one of its moment; the state that was removed for it."""
+        index = self._count_until(state.snapshot.now)
+        if index and self._states[index - 1].snapshot.now == state.snapshot.now:
+            return None
+        self._states.insert(index, state)
+        if len(self._states) <= self._most:
+            return None
+        times = [state.snapshot.now for state in self._states]
+        now = times[-1]
+        index = min(range(1, len(times) - 1), key=lambda i: (times[i + 1] - times[i - 1]) / (now - times[i]))
+        removed = self._states.pop(index)
+        after = self._states[index]
+        self._states[index] = after._replace(changed=after.changed | removed.changed)
+        return removed
+
+    def at(self, moment: Nanos) -> PastState | None:
+        """The newest state at or before a moment, ns."""
+        index = self._count_until(moment)
+        return self._states[index - 1] if index else None
+
+    def after(self, moment: Nanos) -> PastState | None:
+        """The oldest state after a moment, ns."""
+        index = self._count_until(moment)
+        return self._states[index] if index < len(self._states) else None
+
+    def back_from(self, moment: Nanos) -> Iterator[PastState]:
+        """The states at or before a moment (ns), the newest first."""
+        return reversed(self._states[: self._count_until(moment)])
+
+    def _count_until(self, moment: Nanos) -> int:
+        return bisect_right(self._states, moment, key=lambda state: state.snapshot.now)
+
+    def remove_oldest(self) -> None:
+        del self._states[:1]
+
+    def remove_from(self, moment: Nanos) -> frozenset[Changed]:
+        """Remove the states of a moment (ns) and later; what had changed by them."""
+        changed: frozenset[Changed] = frozenset()
+        while self._states and self._states[-1].snapshot.now >= moment:
+            changed |= self._states.pop().changed
+        return changed
+
+    def clear(self) -> None:
+        self._states.clear()
+
+
 class ChangedSince:
     """Notes what changes in ``world``, from one state to the next."""
 
@@ -160,8 +228,8 @@ class History:
         self.world = world
         self.branch = 0
         """Counts how often the world has gone back; each time, the past after that moment is replaced."""
-        self._most = max(LEAST_STATES, min(MOST_STATES, MOST_CONTROLLER_STATES // max(1, len(world.machines))))
-        self._states: list[PastState] = []
+        most = max(LEAST_STATES, min(MOST_STATES, MOST_CONTROLLER_STATES // max(1, len(world.machines))))
+        self._states = StatesByAge(most)
         self._inputs: deque[RecordedInput] = deque()
         self._bytes = 0
         self._dropped = 0
@@ -187,24 +255,14 @@ class History:
     @property
     def begin(self) -> Nanos:
         """The oldest moment that can be restored, ns; the present if there is no snapshot."""
-        return self._states[0].snapshot.now if self._states else self.world.now
+        oldest = self._states.oldest
+        return self.world.now if oldest is None else oldest.snapshot.now
 
     def take(self) -> None:
         """Take a snapshot, unless there is one of this moment."""
-        if self._states and self._states[-1].snapshot.now == self.world.now:
-            return
-        self._states.append(PastState(self.world.snapshot(with_inputs=False), self.inputs_so_far, self._changed.take()))
-        if len(self._states) > self._most:
-            index = self._least_missed()
-            missed = self._states.pop(index)
-            after = self._states[index]
-            self._states[index] = after._replace(changed=after.changed | missed.changed)
-
-    def _least_missed(self) -> int:
-        """Index of the snapshot whose neighbours are closest for their age; never the oldest or the newest."""
-        times = [state.snapshot.now for state in self._states]
-        now = times[-1]
-        return min(range(1, len(times) - 1), key=lambda i: (times[i + 1] - times[i - 1]) / (now - times[i]))
+        newest = self._states.newest
+        if newest is None or newest.snapshot.now != self.world.now:
+            self._states.add(PastState(self.world.snapshot(with_inputs=False), self.inputs_so_far, self._changed.take()))
 
     def _noted(self, given: RecordedInput) -> None:
         self._inputs.append(given)
@@ -213,9 +271,9 @@ class History:
             self._forget_oldest()
 
     def _forget_oldest(self) -> None:
-        if self._states:
-            del self._states[0]
-        until = self._states[0].inputs if self._states else self.inputs_so_far
+        self._states.remove_oldest()
+        oldest = self._states.oldest
+        until = self.inputs_so_far if oldest is None else oldest.inputs
         while self._dropped < until:
             self._bytes -= size_of(self._inputs.popleft().what)
             self._dropped += 1
@@ -223,10 +281,7 @@ class History:
     def gone_back(self) -> None:
         """Must be called after the world has gone back: snapshots and inputs of its present moment and later are removed."""
         now = self.world.now
-        changed: set[Changed] = set()
-        while self._states and self._states[-1].snapshot.now >= now:
-            changed |= self._states.pop().changed
-        self._changed.gone_back(changed)
+        self._changed.gone_back(self._states.remove_from(now))
         while self._inputs and self._inputs[-1].time >= now:
             self._bytes -= size_of(self._inputs.pop().what)
         self.branch += 1
@@ -234,10 +289,10 @@ class History:
 
     def state_at(self, moment: Nanos) -> PastState:
         """The newest snapshot at or before a moment, and the number of inputs before it. Raises `Misuse` if there is none."""
-        index = bisect_right(self._states, moment, key=lambda state: state.snapshot.now)
-        if not index:
+        state = self._states.at(moment)
+        if state is None:
             raise Misuse(outside_past(moment, self.begin, self.world.now))
-        return self._states[index - 1]
+        return state
 
     @property
     def inputs_so_far(self) -> int:
@@ -270,8 +325,8 @@ class Past:
         """Of the history, when it was brought there."""
         self._inputs = 0
         """Number of inputs applied to it."""
-        self._near: deque[PastState] = deque(maxlen=MOST_NEAR)
-        """Snapshots on the way to the last moment, because those of the history may be far apart."""
+        self._near = StatesByAge(MOST_NEAR)
+        """States on the way to the last moment, because those of the history may be far apart."""
 
     def forget(self) -> None:
         """Let the next `go` begin with a snapshot, because the world was used for something else."""
@@ -301,17 +356,19 @@ class Past:
         history = self._history
         if moment > history.world.now:
             raise Misuse(outside_past(moment, history.begin, history.world.now))
-        if self._branch != history.branch:
-            self._near.clear()
-        state = self._state_at(moment)
+        state = near = self._nearest(moment) if self._branch == history.branch else None
+        if state is None:
+            state = history.state_at(moment)
         if not self.can_go_on or self._branch != history.branch or not state.snapshot.now <= self.world.now <= moment:
+            if near is None:
+                self._near.clear()
             self.world.restore(state.snapshot)
             self._branch, self._inputs = history.branch, state.inputs
         kept = state.snapshot.now
         for _ in self.go_on(moment):
             if kept + SLICE_NS <= self.world.now < moment:
                 kept = self.world.now
-                self._near.append(PastState(self.world.snapshot(), self._inputs))
+                self._near.add(PastState(self.world.snapshot(), self._inputs))
             yield
 
     def go_on(self, moment: Nanos) -> Iterator[None]:
@@ -320,12 +377,9 @@ class Past:
             self._inputs += is_input
             yield
 
-    def _state_at(self, moment: Nanos) -> PastState:
-        """The newest snapshot at or before a moment whose inputs are kept. Raises `Misuse` if there is none."""
-        kept = self._history.state_at(moment)
-        near = [
-            state
-            for state in self._near
-            if kept.snapshot.now < state.snapshot.now <= moment and self._history.keeps_inputs_from(state.inputs)
-        ]
-        return max(near, key=lambda state: state.snapshot.now, default=kept)
+    def _nearest(self, moment: Nanos) -> PastState | None:
+        """The newest state on the way at or before a moment; None where the history has a newer one or its inputs are gone."""
+        kept, near = self._history.state_at(moment), self._near.at(moment)
+        if near is None or near.snapshot.now <= kept.snapshot.now or not self._history.keeps_inputs_from(near.inputs):
+            return None
+        return near
