@@ -32,7 +32,6 @@ _ALIASES = {"pulse": PULSE, "pulses": PULSE, "microstep": PULSE, "microsteps": P
 _OF_TIME = {"s": 1.0, "ms": 1e-3, "min": 60.0}
 _IN_REV = {REV: 1.0, DEGREE: 1.0 / 360.0}
 _IN_MM = {MM: 1.0, CM: 10.0, M: 1000.0}
-DEGREES_IN_A_TURN = 360.0
 LARGEST_RATIO = 1e6
 _TEXT = re.compile(r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:e[+-]?\d{1,3})?) *(\S*)\Z", re.ASCII | re.IGNORECASE)
 

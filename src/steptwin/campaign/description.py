@@ -112,11 +112,6 @@ class CampaignDescription:
             plain["runs"] = self.runs
         return plain | {"files": {name: content.hex() for name, content in self.files.items()}}
 
-    @property
-    def has_paths(self) -> bool:
-        """Whether the description of the world varies."""
-        return any(one.is_path for one in self.vary)
-
 
 def step_text(table: Mapping[str, Any]) -> str:
     """A step as `StepAt` has it."""

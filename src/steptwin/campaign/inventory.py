@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from steptwin.errors import Misuse
 from steptwin.simulation.faults import Fault, parse
 from steptwin.simulation.faults.kinds import KINDS
-from steptwin.simulation.faults.table import FaultKind, FaultValue, Layer, Occasion
+from steptwin.simulation.faults.table import FaultKind, FaultValue, Layer
 from steptwin.simulation.kinds.lines import SCRIPTS
 from steptwin.simulation.script.steps import Repeat, Set, Step
 from steptwin.simulation.world.plant import Plant
@@ -212,8 +212,3 @@ def occasions(world: Plant, possible: Iterable[PossibleFault], end_ns: int, unti
             counted.append((one.text, world.parts.faults.active[-1].name))
     world.run_to(end_ns, until)
     return {text: world.parts.faults.called(name).seen for text, name in counted}
-
-
-def is_lasting(fault: Fault) -> bool:
-    """Whether it lasts from the moment at which it is set, instead of happening then, or now and then."""
-    return fault.kind.occasion is Occasion.ALWAYS

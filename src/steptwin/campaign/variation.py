@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 from math import exp, log
 from statistics import NormalDist
-from typing import Protocol
 
 from steptwin.campaign.case import VariedValue
 
@@ -15,24 +14,6 @@ TIME_DIGITS = 9
 SIGNIFICANT = 9
 """Digits of other numbers."""
 MOST_LEVELS = 1_000_000
-
-
-class Spread(Protocol):
-    """The values of something that varies."""
-
-    def value(self, u: float) -> VariedValue:
-        """The value at ``u``, from 0 to below 1: so much of all cases has a lower one."""
-        ...
-
-    @property
-    def levels(self) -> tuple[VariedValue, ...]:
-        """All its values, where they are few; else empty."""
-        ...
-
-    @property
-    def is_grid(self) -> bool:
-        """Whether each value is tried with each value of other grids, in every design."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,9 +1,8 @@
 import { expect, test } from "vitest";
 import type { Datasheet } from "../../lib/state/model";
-import { changedKeys, changesOf, keysOf, pointsOf, settingsOf, shownText, type Form, type Setting } from "./form";
+import { changedKeys, changesOf, keysOf, pointsOf, settingsOf, type Form, type Setting } from "./form";
 
-const setting = (name: string, text: string, value: number, choices = {}): Setting =>
-  ({ name, text, value, choices }) as unknown as Setting;
+const setting = (name: string, text: string, value: number): Setting => ({ name, text, value }) as unknown as Setting;
 
 const form = (...settings: Setting[]): Form => ({ sections: [{ name: "Axis0", settings }] }) as unknown as Form;
 
@@ -16,11 +15,6 @@ test("registers that have the value of the file, in single precision, are not wr
     { point: "M1_DEC", value: 6, old: 5 },
     { point: "M1_VMAX", value: 7, old: null },
   ]);
-});
-
-test("a choice is shown by its word", () => {
-  expect(shownText(setting("Unit", "3", 3, { "3": "mm" }))).toBe("mm");
-  expect(shownText(setting("Gear", "", 1))).toBe("1");
 });
 
 test("what differs from the file as it was read", () => {

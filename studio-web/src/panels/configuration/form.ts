@@ -35,10 +35,6 @@ export function pointsOf(form: Form, keys: ReadonlySet<string>): { points: Form[
 export const keysOf = (form: Form): Set<string> =>
   new Set(form.sections.flatMap((one) => one.settings.filter(({ text }) => text).map((each) => keyOf(one, each))));
 
-/** The value as people see it: the word of a choice, else what is written. */
-export const shownText = ({ text, value, choices }: Setting): string =>
-  choices[String(value)] ?? (text || String(value));
-
 /** Keys of settings that are not as in another form. */
 export function changedKeys(before: Form, now: Form): Set<string> {
   const old = new Map(before.sections.flatMap((one) => one.settings.map((each) => [keyOf(one, each), each.text])));
