@@ -12,7 +12,7 @@ from mic488_rig import PAUSED, RUNNING, STOPPED, Rig, controller, loaded, progra
 from steptwin.diagnostics import Span
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, SECOND, PinEdge
-from steptwin.mic488.axis_motion import MAX_SPEED_P
+from steptwin.mic488.axis import MAX_SPEED_P
 from steptwin.mic488.config import AxisConfig, ControllerConfig, ProgramConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.program_banks import load, setup_of

@@ -8,7 +8,7 @@ from steptwin.calc.contract import ACCELERATION, DECELERATION, DISTANCE, VELOCIT
 from steptwin.calc.units import Dimension
 from steptwin.datasheet import Limits
 from steptwin.errors import Misuse
-from steptwin.mic488.axis_motion import MAX_SPEED_P
+from steptwin.mic488.axis import MAX_SPEED_P
 from steptwin.mic488.encoding import REAL_MAX
 from steptwin.motion import MotionState, Profile, plan_position
 

@@ -16,8 +16,8 @@ import typer
 from steptwin.cli.languageoptions import M1486FileOptions, WbcFileOptions, given_of
 from steptwin.cli.optiongroups import grouped, option_of
 
-#: Raised when a member of the JSON changes its meaning or goes away.
 JSON_VERSION = 1
+"""Raised when a member of the JSON changes its meaning or goes away."""
 
 
 @dataclass(frozen=True, kw_only=True)

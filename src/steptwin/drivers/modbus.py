@@ -110,15 +110,20 @@ class RtuMaster:
         self.on_frame = on_frame
         self.echo = False
         """Whether the adapter echoes the bytes sent."""
+        self._late_answers: list[_LateAnswer]
+        self._asked: ModbusQuery | None
+        self._then: ModbusQuery | None
+        self.free_ns: Nanos
+        self._busy_until: Nanos
         self.reset()
 
     def reset(self) -> None:
-        self._late_answers: list[_LateAnswer] = []
-        self._asked: ModbusQuery | None = None
-        self._then: ModbusQuery | None = None  # what a marker was sent for
+        self._late_answers = []
+        self._asked = None
+        self._then = None  # what a marker was sent for
         self._held = b""
-        self.free_ns: Nanos = 0
-        self._busy_until: Nanos = 0  # how long noise can keep the line
+        self.free_ns = 0
+        self._busy_until = 0  # how long noise can keep the line
 
     @property
     def wary(self) -> bool:
@@ -266,10 +271,11 @@ class TcpMaster:
         self._place = place
         self._number = 0
         self._number_bytes = b"\0\0"
+        self._asked: ModbusQuery | None
         self.reset()
 
     def reset(self) -> None:
-        self._asked: ModbusQuery | None = None
+        self._asked = None
         self._no_answer = b""  # what came instead of an answer
         self._framer = mbap.TcpFramer()
 

@@ -15,7 +15,7 @@ from steptwin.errors import Misuse
 from steptwin.explain.blocks import Timing
 from steptwin.explain.model import FlowBlock
 from steptwin.machine import MILLISECOND, Nanos
-from steptwin.mic488.axis_motion import MAX_SPEED_P, SLOWEST_RAMP_P
+from steptwin.mic488.axis import MAX_SPEED_P, SLOWEST_RAMP_P
 from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.motion.planner import MotionState, plan_position
 from steptwin.wbc import steps as s

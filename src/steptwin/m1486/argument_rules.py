@@ -15,8 +15,8 @@ from steptwin.m1486.syntax import ChipCommand, JumpCondition
 from steptwin.m1486.variants import VARIANTS, Variant
 
 _REFUSES_OCCUPIED = frozenset("CT!OZ()")
-#: Zero is no distance and no position; other commands express the intention.
 _INSTEAD_OF_ZERO = {"=": "C100", "G": "H"}
+"""Zero is no distance and no position; other commands express the intention."""
 
 
 def free_labels(commands: Iterable[ChipCommand], variant: Variant) -> Mapping[int, int]:

@@ -36,12 +36,12 @@ class ChipMemory:
     A file in ``[ ]`` must fit ``limit`` as a whole; commands outside pass through the ring and never fill it.
     """
 
-    #: None for a program without ``X``.
     address: int | None
+    """None for a program without ``X``."""
     limit: int
     total: int
-    #: Bits of each file in ``[ ]``, in order.
     files: tuple[int, ...]
+    """Bits of each file in ``[ ]``, in order."""
     commands: tuple[CommandSize, ...]
 
 

@@ -37,12 +37,12 @@ class ArgType(enum.Enum):
 class When(enum.Enum):
     """The time at which a command acts."""
 
-    #: As soon as it has been received, ahead of everything that waits (M-27).
     RECEIVED = "when received"
-    #: When it leaves the input buffer; it is not stored.
+    """As soon as it has been received, ahead of everything that waits (M-27)."""
     COMPRESSED = "when compressed"
-    #: In program order, from the command memory.
+    """When it leaves the input buffer; it is not stored."""
     QUEUED = "in program order"
+    """In program order, from the command memory."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,16 +75,16 @@ class CommandSpec:
 _24_BIT = range(2**24)
 _DISTANCE = range(1, 16_000_001)
 _BYTE = range(1, 256)
-#: Larger values of P than the range of parabolic acceleration switch it off; two bytes hold no more.
 PROFILE_RANGE = range(20, 7_001)
+"""Larger values of P than the range of parabolic acceleration switch it off; two bytes hold no more."""
 _PROFILE = range(PROFILE_RANGE.start, 2**16)
 _LINE_GROUPS = tuple(n for n in _BYTE if line_group(n) is not None)
-#: Arguments of ``I``: a line or a flag.
 CONDITIONS = (*LINES, *USER_FLAGS, CARRY)
+"""Arguments of ``I``: a line or a flag."""
 CLEAR_KILL = 75
 CLEAR_POSITION = 100
-#: Largest internal variable that may be divided, except by these numbers (chapter VII.7, Divide).
 DIVIDEND_LIMIT = 65_000
+"""Largest internal variable that may be divided, except by these numbers (chapter VII.7, Divide)."""
 FREE_DIVISORS = frozenset((2, 4, 8, 16, 32, 64))
 
 _PROGRAM, _MOTION, _IO, _SEQUENCER = "VII.1", "VII.2", "VII.3", "VII.4"
@@ -167,13 +167,13 @@ _ROWS: tuple[CommandSpec, ...] = (
     _C("/", "Divide", ArgType.NUMBER, _BYTE, "Divides the internal variable; the remainder goes to register 10.", _NUMERIC),
 )  # fmt: skip
 
-#: Sizes the manual states by themselves (chapter II, Memory): four commands take no memory; ``I`` holds line, level and label.
 _STATED_BITS = {"@": 0, "[": 0, "]": 0, "\\": 0, "I": 32}
-#: Keys whose number may not be left out: it is not numeric, or the command has no meaning without it.
+"""Sizes the manual states by themselves (chapter II, Memory): four commands take no memory; ``I`` holds line, level and label."""
 _NEEDS_ARGUMENT = frozenset("@IX")
+"""Keys whose number may not be left out: it is not numeric, or the command has no meaning without it."""
 
-#: Of all variants; it decides the size of a label in the memory of each.
 LARGEST_LABEL = 80
+"""Of all variants; it decides the size of a label in the memory of each."""
 _LARGEST_ADDRESS = 15
 
 
@@ -208,8 +208,8 @@ TABLE: tuple[CommandSpec, ...] = _ROWS
 _BY_KEY = _index()
 _BITS = {letter: _letter_bits(letter) for letter in dict.fromkeys(s.letter for s in _ROWS)}
 
-#: Every character that can begin a command; letters stand here as capitals.
 LETTERS: frozenset[str] = frozenset(_BITS)
+"""Every character that can begin a command; letters stand here as capitals."""
 
 
 def rows(key: str) -> tuple[CommandSpec, ...]:

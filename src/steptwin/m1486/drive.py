@@ -31,24 +31,24 @@ from steptwin.motion.ramps import SpeedCurve, plan_distance, plan_endless
 from steptwin.motion.waveforms import currents
 from steptwin.state import Stateful
 
-#: Function 52: a seek ends on a multiple of four full steps, one electrical period.
 SEEK_LANDING_U = 4 * FULL_STEP
-#: M-18: a jog pulse gives one step, as fast as the chip steps at all (40 000 a second); pulses that come faster are missed.
+"""Function 52: a seek ends on a multiple of four full steps, one electrical period."""
 JOG_NS: Nanos = 25 * MICROSECOND
+"""M-18: a jog pulse gives one step, as fast as the chip steps at all (40 000 a second); pulses that come faster are missed."""
 
 
 class MotionMode(enum.Enum):
     REST = "at rest"
-    #: F, B, G and H: the distance is known.
     MOVE = "move"
-    #: G+ and G-.
+    """F, B, G and H: the distance is known."""
     ENDLESS = "endless"
+    """G+ and G-."""
     SEEK = "seek"
     JOG = "jog"
 
 
-#: Motions of R and the seeks: they stall the compression, hold BOOST low and keep jog pulses out.
 BUSY = frozenset({MotionMode.MOVE, MotionMode.ENDLESS, MotionMode.SEEK})
+"""Motions of R and the seeks: they stall the compression, hold BOOST low and keep jog pulses out."""
 
 
 def speed_curve(settings: tuple[float, float, float, float], qualification: int, clock: int) -> SpeedCurve:
@@ -112,8 +112,8 @@ class ChipDrive(Stateful):
         self.set_microstep(interface.microstep)
         self.qualification = 1
         self.characteristic = 1
-        #: The next move: its signed distance, or its direction if it is endless (else 0).
         self.distance_u = DEFAULT_DISTANCE_U
+        """The next move: its signed distance, or its direction if it is endless (else 0)."""
         self.endless = 0
 
     def set_acceleration(self, number: int) -> None:

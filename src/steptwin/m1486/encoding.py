@@ -17,8 +17,8 @@ FROM_VARIABLE = 0x80
 _ENDLESS = {"G+": 0xFFFFFF, "G-": 0xFFFFFE}
 _ENDLESS_KEYS = {number: key for key, number in _ENDLESS.items()}
 
-#: Bytes of one command, by its letter; letters that are never stored are missing.
 SIZES = {letter: memory_bits(letter) // 8 for letter in LETTERS if any(spec.when is When.QUEUED for spec in rows(letter))}
+"""Bytes of one command, by its letter; letters that are never stored are missing."""
 LONGEST = max(SIZES.values())
 
 

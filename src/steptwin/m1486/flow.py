@@ -20,10 +20,10 @@ from steptwin.m1486.structure import CommandStream
 from steptwin.m1486.syntax import ChipCommand, JumpCondition
 from steptwin.m1486.variants import Variant
 
-#: Enough for a line group of five lines; more settings at one place are merged.
 MOST_STATES = 32
-#: The number of the call for commands outside every call.
+"""Enough for a line group of five lines; more settings at one place are merged."""
 _MAIN = -1
+"""The number of the call for commands outside every call."""
 
 
 class Settings(NamedTuple):
@@ -35,11 +35,11 @@ class Settings(NamedTuple):
     velocity: int | None
     profile: int | None
     acceleration: int | None
-    #: Of the next move; None also for a move to a position.
     distance: int | None
+    """Of the next move; None also for a move to a position."""
     variable: int | None
-    #: Functions 40, 46 and 58: 1 is ON, 0 is OFF.
     runsign: int | None
+    """Functions 40, 46 and 58: 1 is ON, 0 is OFF."""
     lines_operand: int | None
     register_operand: int | None
 
@@ -81,8 +81,8 @@ class FlowAnalysis:
 
     states: dict[int, set[Settings]] = field(default_factory=dict)
     targets: dict[int, set[int]] = field(default_factory=dict)
-    #: Calls inside a subroutine, dots outside one, calls that no dot ends.
     nested_calls: set[int] = field(default_factory=set)
+    """Calls inside a subroutine, dots outside one, calls that no dot ends."""
     lone_returns: set[int] = field(default_factory=set)
     endless_calls: list[int] = field(default_factory=list)
 

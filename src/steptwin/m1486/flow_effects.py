@@ -7,8 +7,8 @@ from steptwin.m1486.functions import CARRY, USER_FLAGS
 from steptwin.m1486.syntax import JumpCondition
 from steptwin.machine import MILLISECOND, Nanos
 
-#: M-5: most levels of nested loops.
 LOOP_LEVELS = 4
+"""M-5: most levels of nested loops."""
 
 MAKERS = Makers()
 

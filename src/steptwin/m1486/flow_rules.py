@@ -21,14 +21,14 @@ from steptwin.m1486.successors import flow_of
 from steptwin.m1486.syntax import ChipCommand
 from steptwin.m1486.variants import Variant
 
-#: Ratio of acceleration to start/stop speed above which the missing table would be needed (M-4).
 ACCELERATION_PER_START_STOP = 65
+"""Ratio of acceleration to start/stop speed above which the missing table would be needed (M-4)."""
 
 _MOVES = frozenset("R)(")
 _DISTANCES = frozenset("FBG=")
 _ARITHMETIC = frozenset("+-*/")
-#: An error because of a setting: the finding, the message, the hint.
 _Fault = tuple[ChipFinding, str, str | None]
+"""An error because of a setting: the finding, the message, the hint."""
 _Rule = Callable[[ChipCommand, Settings], _Fault | None]
 
 

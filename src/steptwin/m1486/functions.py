@@ -67,8 +67,8 @@ _NAMED = (
 
 _BY_NUMBER = {function.number: function for function in _NAMED}
 
-#: Every function from 40 to 63 in order, reserved ones included.
 TABLE: tuple[AuxiliaryFunction, ...] = tuple(_BY_NUMBER.get(number, AuxiliaryFunction(number)) for number in FUNCTIONS)
+"""Every function from 40 to 63 in order, reserved ones included."""
 
 
 def function(number: int) -> AuxiliaryFunction:

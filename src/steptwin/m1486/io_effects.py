@@ -10,8 +10,8 @@ from steptwin.m1486.lines import LINES, line_group
 from steptwin.m1486.registers import UPLOADS
 from steptwin.machine import Nanos
 
-#: M-15: the byte of U16.
 PRODUCTION_SERIES = 1
+"""M-15: the byte of U16."""
 
 MAKERS = Makers()
 

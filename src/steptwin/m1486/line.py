@@ -38,8 +38,8 @@ class SerialChain(Stateful):
     __slots__ = (*FIXED, "_wire_free", "collisions")
 
     def __init__(self, chips: Iterable[M1486Chip]) -> None:
-        #: By the address each had when the line was made.
         self.chips: dict[int, M1486Chip] = {}
+        """By the address each had when the line was made."""
         for chip in chips:
             if chip.address in self.chips:
                 raise Misuse(f"two chips with address {chip.address:X} on one line")

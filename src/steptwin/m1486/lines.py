@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from steptwin.errors import Misuse
 
-#: Lines B1 to B21.
 LINES = range(1, 22)
+"""Lines B1 to B21."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,12 +17,12 @@ class Interface:
 
     name: str
     title: str
-    #: The byte of U15 (M-15).
     code: int
-    #: Lines whose pins the interface needs for itself.
+    """The byte of U15 (M-15)."""
     occupied: range
-    #: Microsteps per full step after power-up.
+    """Lines whose pins the interface needs for itself."""
     microstep: int
+    """Microsteps per full step after power-up."""
 
 
 STEP_DIRECTION = Interface("sd", "Step & Direction", 2, range(0), 1)
@@ -40,13 +40,12 @@ def interface(name: str) -> Interface:
     raise Misuse(f"no driver interface is called {name!r}; there are {', '.join(i.name for i in INTERFACES)}")
 
 
-#: Lines that end a seek when they are low; the others end it when they are high (chapter VII.2, Seek).
 SEEK_ENDS_LOW = frozenset((1, 2, 3, 8, 9, 10, 11, 16, 17, 18, 19))
+"""Lines that end a seek when they are low; the others end it when they are high (chapter VII.2, Seek)."""
 
-#: Line that function 40 (Runsign) drives.
 RUNSIGN_LINE = 1
+"""Line that function 40 (Runsign) drives."""
 
-#: Other functions on the pin of a line, beside the driver interface.
 SHARED_PINS = {
     5: "BR0, read when RST goes high",
     6: "BR1, read when RST goes high",
@@ -56,6 +55,7 @@ SHARED_PINS = {
     20: "ADDR2, read when RST goes high",
     21: "ADDR3, read when RST goes high",
 }
+"""Other functions on the pin of a line, beside the driver interface."""
 
 
 def line_group(argument: int) -> range | None:

@@ -23,10 +23,10 @@ class FileState(enum.Enum):
     """The destination of received commands."""
 
     CLOSED = "closed"
-    #: Between ``[`` and ``]``: they are stored.
     OPEN = "open"
-    #: The same, but the file is not to run: they are dropped.
+    """Between ``[`` and ``]``: they are stored."""
     REFUSED = "refused"
+    """The same, but the file is not to run: they are dropped."""
 
 
 class StoredFile(NamedTuple):
@@ -52,10 +52,14 @@ class CommandMemory(Stateful):
     def __init__(self, variant: Variant, reader: MemoryObserver) -> None:
         self._reader = reader
         self.size = variant.memory_bits // 8
-        #: Number of places.
         self.span = 2 * self.size
-        #: First byte of the registers that share the memory; None where they have a place of their own.
+        """Number of places."""
         self._shared = self.size - variant.shared_bits // 8 if variant.shared_bits else None
+        """First byte of the registers that share the memory; None where they have a place of their own."""
+        self.begin: int | None
+        """Beginning of the program that a restart runs (M-23); None once it is overwritten."""
+        self.labels: dict[int, int]
+        self._file_labels: dict[int, int]
         self._clear()
 
     def reset(self) -> None:
@@ -66,15 +70,14 @@ class CommandMemory(Stateful):
     def _clear(self) -> None:
         self._bytes = array("B", bytes(self.size))
         self._own = array("H", [0] * len(GENERAL))
-        #: Place of the next command.
         self.write = 0
-        #: Commands before this place may run.
+        """Place of the next command."""
         self.end = 0
-        #: Beginning of the program that a restart runs (M-23); None once it is overwritten.
-        self.begin: int | None = 0
+        """Commands before this place may run."""
+        self.begin = 0
         self.file = FileState.CLOSED
-        self.labels: dict[int, int] = {}
-        self._file_labels: dict[int, int] = {}
+        self.labels = {}
+        self._file_labels = {}
 
     # ------------------------------------------------------------------ commands
 

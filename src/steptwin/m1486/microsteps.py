@@ -6,16 +6,15 @@ motor turns twice as fast with the same argument, and the limits double with it.
 
 from __future__ import annotations
 
-#: Minimum microsteps in a full step, and their symbol as a unit.
 FULL_STEP = 64
+"""Minimum microsteps in a full step, and their symbol as a unit."""
 UNIT = "min. microsteps"
 
-#: Settings at power-on: the distance is that of F and B (chapter VII.2, Backward).
 DEFAULT_DISTANCE_U = 64_000
+"""Settings at power-on: the distance is that of F and B (chapter VII.2, Backward)."""
 DEFAULT_VELOCITY = 1_000
 DEFAULT_PROFILE = 25_000
 
-#: Values of Q that may stand with each M. M1 Q1 is missing in the manual's list and is its default for Step & Direction.
 PAIRS: dict[int, tuple[int, ...]] = {
     1: (1,),
     2: (2,),
@@ -25,9 +24,10 @@ PAIRS: dict[int, tuple[int, ...]] = {
     32: (1, 2, 4),
     64: (1, 2, 4),
 }
+"""Values of Q that may stand with each M. M1 Q1 is missing in the manual's list and is its default for Step & Direction."""
 
-#: Highest speed with each Q; with Q1 the largest V.
 HIGHEST_SPEED = {1: 20_000, 2: 6_000, 4: 3_000}
+"""Highest speed with each Q; with Q1 the largest V."""
 
 MICROSTEPS = tuple(PAIRS)
 QUALIFICATIONS = tuple(HIGHEST_SPEED)

@@ -15,14 +15,14 @@ from steptwin.machine import Nanos
 from steptwin.state import Stateful
 
 LINE_PINS = {f"B{line}": line for line in LINES}
-#: Pins that are inputs only.
 CONTROL_PINS = ("JOG", "LIMIT", "SD", "RST", "S&D", "DUAL")
+"""Pins that are inputs only."""
 OUTPUT_PINS = ("BOOST", "DIRECTION")
-#: Second names of pins with two functions.
 ALIASES = {
     "BR0": "B5", "BR1": "B6", "JOG DIRECTION": "B7", "JOGDIR": "B7", "SHUTDOWN": "SD",
     "ADDR0": "B18", "ADDR1": "B19", "ADDR2": "B20", "ADDR3": "B21",
 }  # fmt: skip
+"""Second names of pins with two functions."""
 
 OPEN_ADDRESS = 15
 """Open address pins; a chip alone needs no other address (chapter II, Serial interface)."""
@@ -42,23 +42,23 @@ class ChipPins(Stateful):
     def __init__(self, address: int, baud_code: int, interface: Interface, on_change: Callable[[str, int, Nanos], None]) -> None:
         self._on_change = on_change
         # Index 0 of these lists is not a line.
-        #: Levels applied from outside; by default all are open (1).
         self.external = [1] * (LINES.stop)
+        """Levels applied from outside; by default all are open (1)."""
         for bit, line in enumerate(_ADDRESS_LINES):
             self.external[line] = address >> bit & 1
         for bit, line in enumerate(_BAUD_LINES):
             self.external[line] = baud_code >> bit & 1
-        #: Outputs of the program.
         self.latches = [1] * (LINES.stop)
-        #: Output of function 40 on its line; None while it is OFF.
+        """Outputs of the program."""
         self.runsign: int | None = None
-        #: The chip is shut down with function 45 OFF.
+        """Output of function 40 on its line; None while it is OFF."""
         self.tied_low = False
+        """The chip is shut down with function 45 OFF."""
         self.others = dict.fromkeys((*CONTROL_PINS, *OUTPUT_PINS), 1)
         self.others |= {"RST": 0, "DIRECTION": 0, "S&D": int(interface != STEP_DIRECTION)}
         self.others["DUAL"] = int(interface != DUAL_DAC)
-        #: Levels that are read on the lines.
         self.levels = list(self.external)
+        """Levels that are read on the lines."""
 
     def __getitem__(self, name: str) -> int:
         return self.others[name]

@@ -17,9 +17,9 @@ from steptwin.m1486.structure import CommandStream
 from steptwin.m1486.syntax import ChipCommand, JumpCondition
 from steptwin.m1486.variants import Variant
 
-#: Most commands followed along all paths together, of those that move, jump or are about a position; beyond it the rest of a
-#: program is not followed.
 MOST_COMMANDS = 2_000
+"""Most commands followed along all paths together, of those that move, jump or are about a position; beyond it the rest of a
+program is not followed."""
 _COUNTER = range(2**24)
 
 

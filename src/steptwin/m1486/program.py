@@ -18,9 +18,9 @@ from steptwin.machine import MILLISECOND, Nanos
 from steptwin.state import Plain, Stateful
 from steptwin.statements import HookedStatements, StatementHook, StatementHooks, hook_before, without
 
-#: If commands take no time, this number of them is executed at one moment; then this time passes, so that an endless loop does
-#: not stop time. The time is long enough for a chip that polls a line to cost little.
 BURST = 1000
+"""If commands take no time, this number of them is executed at one moment; then this time passes, so that an endless loop does
+not stop time. The time is long enough for a chip that polls a line to cost little."""
 BURST_NS: Nanos = MILLISECOND
 
 LOST = -1
@@ -82,27 +82,31 @@ class ProgramExecution(Stateful):
         self._chip = chip
         self._code: list[Effect] = [_look] * places
         self._compiled: dict[int, _Compiled] = {}
-        #: Places of commands whose closures know where labels are.
         self._linked: set[int] = set()
+        """Places of commands whose closures know where labels are."""
         self._hooks: StatementHooks = ()
         self.statement_ns = statement_ns
         self._burst = 0
         self._burst_at: Nanos = 0
+        self.ready: Nanos
+        """The earliest moment of the next command; a reset ends a wait."""
+        self.loop_starts: list[int]
+        self.loop_counts: list[int]
+        self.back: int | None
         self.reset(0)
 
     def reset(self, now: Nanos) -> None:
         """As after power-up, with an empty memory."""
         self.pc = 0
-        #: The earliest moment of the next command; a reset ends a wait.
-        self.ready: Nanos = now
+        self.ready = now
         self.is_killed = False
         self.is_limited = False
         self._forget_nesting()
 
     def _forget_nesting(self) -> None:
-        self.loop_starts: list[int] = []
-        self.loop_counts: list[int] = []
-        self.back: int | None = None
+        self.loop_starts = []
+        self.loop_counts = []
+        self.back = None
         self.waiting = WaitReason.NOTHING
         self.line = 0
         self.line_level = 0

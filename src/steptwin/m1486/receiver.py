@@ -28,16 +28,16 @@ _SEMICOLON = ord(";")
 NO_ROOM = 0x5E
 THREE_FREE = 0x7E
 EMPTY = 0x7F
-#: A character that leaves fewer free than this behind it is sent back inverted.
 _LAST_BYTES = 3
+"""A character that leaves fewer free than this behind it is sent back inverted."""
 _HEX = "0123456789ABCDEF"
 _CLEAR_KILL = f"C{CLEAR_KILL}"
-#: Characters of a line that are examined as they arrive; the longest command that acts then has three.
 _MOST_SEEN = 4
-#: Stands for the beginning of a line that was dropped: no command begins so.
+"""Characters of a line that are examined as they arrive; the longest command that acts then has three."""
 _DROPPED = "%"
-#: Lines that are read only once.
+"""Stands for the beginning of a line that was dropped: no command begins so."""
 _LINES_KEPT = 4096
+"""Lines that are read only once."""
 
 
 class StoredProgram(Protocol):
@@ -94,19 +94,21 @@ class Receiver(Stateful):
     def __init__(self, chip: ReceiverHost) -> None:
         self._chip = chip
         self._capacity = chip.variant.input_bits // 8
+        self._buffer: deque[int]
+        self.busy_until: Nanos | None
+        """End of the present EEPROM write or erasure; no command is compressed meanwhile."""
         self.reset()
 
     def reset(self) -> None:
         """As after power-up: empty, and all chips of a chain listen."""
-        self._buffer: deque[int] = deque()
-        #: Whole lines in the buffer.
+        self._buffer = deque()
         self._lines = 0
+        """Whole lines in the buffer."""
         self._begin_line()
         self.is_listening = True
-        #: End of the present EEPROM write or erasure; no command is compressed meanwhile.
-        self.busy_until: Nanos | None = None
-        #: Characters that arrive meanwhile are lost.
+        self.busy_until = None
         self.is_deaf = False
+        """Characters that arrive meanwhile are lost."""
 
     def discard(self, arriving: bytes, now: Nanos) -> None:
         """Execute nothing of what is in the buffer or ``arriving``, but K and X, so that the same chips listen as without it. The

@@ -10,8 +10,8 @@ class ChipRegister:
     number: int
     bits: int
     name: str
-    #: May stand as operand of + - * / while function 58 is ON.
     is_operand: bool
+    """May stand as operand of + - * / while function 58 is ON."""
 
 
 POSITION_REGISTER = 9
@@ -23,10 +23,9 @@ REGISTERS: tuple[ChipRegister, ...] = (
     ChipRegister(REMAINDER_REGISTER, 8, "remainder of the last division", False),
 )
 
-#: The registers that share the command memory on some variants.
 GENERAL = range(1, 9)
+"""The registers that share the command memory on some variants."""
 
-#: Bytes that ``U`` can request; the heading of the section says 18, its table goes to 20. The others are reserved.
 UPLOADS: dict[int, str] = {
     1: "position, low byte",
     2: "position, middle byte",
@@ -42,4 +41,5 @@ UPLOADS: dict[int, str] = {
     19: "functions 56 to 63",
     20: "type letter in ASCII",
 }
+"""Bytes that ``U`` can request; the heading of the section says 18, its table goes to 20. The others are reserved."""
 UPLOAD_RANGE = range(1, 21)

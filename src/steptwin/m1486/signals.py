@@ -12,23 +12,23 @@ from steptwin.motion.waveforms import currents
 if TYPE_CHECKING:
     from steptwin.motion.pulses import PulseTimes
 
-#: Chapter IV: a STEP pulse is at least this long, and data are valid for at least this long before STROBE goes low.
 STEP_PULSE_NS: Nanos = 1_800
+"""Chapter IV: a STEP pulse is at least this long, and data are valid for at least this long before STROBE goes low."""
 DATA_VALID_NS: Nanos = 960
 
-#: Lines that are data pins: B8 and B9 share D1.0 and D1.1, B10 to B16 share D2.0 to D2.6, B17 shares PHASE2.
 _FIRST_D1, _FIRST_D2, _PHASE2 = 8, 10, 17
+"""Lines that are data pins: B8 and B9 share D1.0 and D1.1, B10 to B16 share D2.0 to D2.6, B17 shares PHASE2."""
 
 
 class Strobe(NamedTuple):
     """One value for the dual converter, taken over when STROBE goes low."""
 
     time: Nanos
-    #: 1 or 2: DIR is 0 for channel 1 and 1 for channel 2.
     channel: int
+    """1 or 2: DIR is 0 for channel 1 and 1 for channel 2."""
     magnitude: int
-    #: Level of PHASE2; M-25: high is negative current.
     phase: int
+    """Level of PHASE2; M-25: high is negative current."""
 
 
 def step_pulses(train: StepTrain, after: Nanos, until: Nanos) -> PulseTimes:

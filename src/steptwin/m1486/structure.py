@@ -46,26 +46,26 @@ class CommandStream:
     address: int | None
     commands: tuple[ChipCommand, ...]
     files: list[CommandFile] = field(default_factory=list)
-    #: ``[`` inside ``[ ]`` and ``]`` outside.
     nested_opens: list[int] = field(default_factory=list)
+    """``[`` inside ``[ ]`` and ``]`` outside."""
     lone_closes: list[int] = field(default_factory=list)
-    #: Index of E to index of its L; then the commands without a counterpart.
     loops: dict[int, int] = field(default_factory=dict)
+    """Index of E to index of its L; then the commands without a counterpart."""
     open_loops: list[int] = field(default_factory=list)
     lone_ends: list[int] = field(default_factory=list)
-    #: For each command its innermost loop, by the L; for each L the loop around it, and its own depth.
     innermost: list[int | None] = field(default_factory=list)
+    """For each command its innermost loop, by the L; for each L the loop around it, and its own depth."""
     outer: dict[int, int | None] = field(default_factory=dict)
     depth: dict[int, int] = field(default_factory=dict)
-    #: For each command its file, as an index into ``files``.
     in_file: list[int | None] = field(default_factory=list)
-    #: Bits stored before each command, and after the last.
+    """For each command its file, as an index into ``files``."""
     bits_before: list[int] = field(default_factory=list)
-    #: For each command: how many resets came before it.
+    """Bits stored before each command, and after the last."""
     resets: list[int] = field(default_factory=list)
+    """For each command: how many resets came before it."""
     labels: dict[int, list[int]] = field(default_factory=dict)
-    #: Whether every jump stays in its loop, so that the loops in progress are always those around a command.
     are_loops_nested: bool = True
+    """Whether every jump stays in its loop, so that the loops in progress are always those around a command."""
 
     @property
     def bits(self) -> int:

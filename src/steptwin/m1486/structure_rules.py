@@ -11,8 +11,8 @@ from steptwin.m1486.structure import CommandStream, written_label
 from steptwin.m1486.syntax import JumpCondition
 from steptwin.m1486.variants import VARIANTS, Store, Variant
 
-#: Levels of loop that work (M-5).
 LOOP_LEVELS = 4
+"""Levels of loop that work (M-5)."""
 
 
 def structure_rules(stream: CommandStream, variant: Variant) -> Iterator[Diagnostic]:

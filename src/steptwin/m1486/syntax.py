@@ -24,10 +24,10 @@ _HEX = frozenset("0123456789ABCDEF")
 _WORD = re.compile(r"[A-Za-z]{2}")
 _BLANKS = frozenset(" \t")
 _LEVELS = frozenset("HL")
-#: More digits than any number of the language has; longer ones are no numbers.
 _MOST_DIGITS = 18
-#: Characters that word processors, scanners and eyes put for others.
+"""More digits than any number of the language has; longer ones are no numbers."""
 _MEANT = {"’": "'", "‘": "'", "`": "'", "–": "-", "−": "-", "×": "*", "÷": "/", "1": "L", "|": "L", "0": "O"}
+"""Characters that word processors, scanners and eyes put for others."""
 _MEANT_DIGIT = {"l": "1", "I": "1", "|": "1", "O": "0", "o": "0"}
 
 

@@ -11,8 +11,8 @@ from steptwin.machine import SECOND, Nanos
 from steptwin.state import Stateful
 from steptwin.wire.line import CharacterClock, SerialLine
 
-#: More characters than this never wait in one place: towards the chip, towards the host, or for a host that does not read.
 MOST_WAITING = 1 << 16
+"""More characters than this never wait in one place: towards the chip, towards the host, or for a host that does not read."""
 
 
 class Uart(Stateful):

@@ -5,11 +5,11 @@ from __future__ import annotations
 from steptwin.m1486.functions import FUNCTIONS, INPUT, REGISTER, TABLE, USER_FLAGS
 from steptwin.state import Stateful
 
-#: M-13: the internal variable and the position counter have 24 bits and begin anew after the last.
 MASK = 0xFFFFFF
+"""M-13: the internal variable and the position counter have 24 bits and begin anew after the last."""
 _SIGN = 0x800000
-#: Source of the operand of + - * /.
 NUMBER, FROM_LINES, FROM_REGISTER = range(3)
+"""Source of the operand of + - * /."""
 
 _DEFAULTS = tuple(function.default for function in TABLE)
 
@@ -28,12 +28,12 @@ class NumericUnit(Stateful):
     def reset(self) -> None:
         self.variable = 0
         self.carry = False
-        #: Of the last division: register 10.
         self.remainder = 0
-        #: User flags from 80 on.
+        """Of the last division: register 10."""
         self.flags = [False] * len(USER_FLAGS)
-        #: Functions from 40 on.
+        """User flags from 80 on."""
         self.functions = list(_DEFAULTS)
+        """Functions from 40 on."""
         self.operand_source = NUMBER
 
     def on(self, function: int) -> bool:

@@ -25,26 +25,26 @@ class Variant:
     """One member of the family (manual chapters II and X)."""
 
     name: str
-    #: Labels are numbered from 1 to this.
     labels: int
+    """Labels are numbered from 1 to this."""
     input_bits: int
     memory_bits: int
     store: Store
-    #: What U20 sends; the letter of C is interpretation M-15.
     type_letter: int
-    #: Addresses the pins can give and ``X`` can name.
+    """What U20 sends; the letter of C is interpretation M-15."""
     addresses: range = range(16)
-    #: Last bits of the command memory that numeric registers 1 to 8 occupy; 0 where they have a place of their own.
+    """Addresses the pins can give and ``X`` can name."""
     shared_bits: int = 0
-    #: Time ``\\`` takes while nothing is received. Not scaled by the clock: it is the EEPROM's own.
+    """Last bits of the command memory that numeric registers 1 to 8 occupy; 0 where they have a place of their own."""
     erase_ns: Nanos = 0
-    #: Least time from one command to the next on the line, for the EEPROM write.
+    """Time ``\\`` takes while nothing is received. Not scaled by the clock: it is the EEPROM's own."""
     write_ns: Nanos = 0
-    #: Shutdown by the SD pin.
+    """Least time from one command to the next on the line, for the EEPROM write."""
     has_shutdown: bool = True
+    """Shutdown by the SD pin."""
     pwm_outputs: int = 0
-    #: 1 at 12 MHz, 2 at 24 MHz.
     clock: int = 1
+    """1 at 12 MHz, 2 at 24 MHz."""
     # M-3: the pages with the defaults of S and A are missing.
     start_stop: int = 200
     acceleration: int = 5_000
@@ -78,8 +78,8 @@ _TWELVE = (_A, _B, _C, _E1, _E2)
 
 VARIANTS: tuple[Variant, ...] = _TWELVE + tuple(replace(v, name=f"{v.name}2x", clock=2) for v in _TWELVE)
 
-#: The manual speaks of this one wherever it names no other (chapter X).
 DEFAULT = _A
+"""The manual speaks of this one wherever it names no other (chapter X)."""
 
 
 def variant(name: str) -> Variant:

@@ -149,6 +149,8 @@ class ControllerCore(Stateful):
         self.error_led = False
         self.master_error = False
         """Whether a slave of the controller's own Modbus master does not respond; only a fault sets it (WBC-13)."""
+        self.written: dict[tuple[str, int | None], float]
+        """Last values of write-only registers by key and number, in pulses where they have a unit; kept when lenient."""
         self._power_on()
 
     def _power_on(self) -> None:
@@ -158,8 +160,7 @@ class ControllerCore(Stateful):
         self.triggered = dict.fromkeys(MOTION_REGISTERS, 0)
         self.jog_speed_u = self.config.axes[0].vel
         self.user = array("H", bytes(2 * self.firmware.user_registers))
-        self.written: dict[tuple[str, int | None], float] = {}
-        """Last values of write-only registers by key and number, in pulses where they have a unit; kept when lenient."""
+        self.written = {}
         self.program.power_on(self.now)
         self._settle()
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import lru_cache
 
 from steptwin.datasheet import Argument, AxisDescription, CommandDescription, Datasheet, Limits, Pin, PinDirection, PointEffect
-from steptwin.mic488.axis_motion import MAX_SPEED_P
+from steptwin.mic488.axis import MAX_SPEED_P
 from steptwin.mic488.core import ANALOG_PINS, ENABLE_PINS, INPUT_PINS, OUTPUT_PINS
 from steptwin.mic488.details import DETAILS
 from steptwin.mic488.device import Mic488Device

@@ -40,14 +40,16 @@ class Inputs(Stateful):
     def __init__(self, settings: Sequence[InputSettings]) -> None:
         self._settings = settings
         self.pins = [False] * len(settings)
+        self._pending: dict[int, Nanos]
+        self._due: Nanos | None
         self.power_on()
 
     def power_on(self) -> None:
         """Terminals stay as they are, and registers show them at once."""
         self.raw = [pin != (s.level == 1) for pin, s in zip(self.pins, self._settings, strict=True)]
         self.filtered = self.raw.copy()
-        self._pending: dict[int, Nanos] = {}
-        self._due: Nanos | None = None
+        self._pending = {}
+        self._due = None
 
     def set_pin(self, number: int, high: bool, now: Nanos) -> bool:
         """A level on a terminal; True when it changed."""

@@ -1,6 +1,6 @@
 """A line, circle or arc on which M1 and M2 move together, and its end on a soft limit.
 
-Suffixes as in `steptwin.mic488.axis_motion`; ``w`` positions along a path, in configured units of M1.
+Suffixes as in `steptwin.mic488.axis`; ``w`` positions along a path, in configured units of M1.
 """
 
 from __future__ import annotations

@@ -84,6 +84,10 @@ class ProgramControl(Stateful):
             self.load_program(bank, program)
         for bank, table in positions.items():
             self.load_positions(bank, table)
+        self.fault: ProgramError | None
+        """The last program error; it is kept until the next start."""
+        self._pulses: dict[int, Nanos]
+        """The moment at which PULSE inverts each output (from 0)."""
 
     # ------------------------------------------------------------------ banks
 
@@ -117,10 +121,8 @@ class ProgramControl(Stateful):
         self._stop()
         self.error = False
         """A program error is pending; cleared by the next start or stop (MIC-26)."""
-        self.fault: ProgramError | None = None
-        """The last program error; it is kept until the next start."""
-        self._pulses: dict[int, Nanos] = {}
-        """The moment at which PULSE inverts each output (from 0)."""
+        self.fault = None
+        self._pulses = {}
         self.registers.forget_record()
         self.registers.begin(self.device.config, now)
         if configured.activate:

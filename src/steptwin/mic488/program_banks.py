@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
-from steptwin.mic488.axis_motion import MAX_SPEED_P
+from steptwin.mic488.axis import MAX_SPEED_P
 from steptwin.mic488.config import NO_INPUT, ControllerConfig
 from steptwin.mic488.homing import Homing
 from steptwin.mic488.program_registers import ACCESS

@@ -1,6 +1,6 @@
 """The motion statements of a program: single axes, rows of the position table, lines and arcs of M1 (X) and M2 (Y).
 
-Suffixes as in `steptwin.mic488.axis_motion`; ``w`` positions along a path, in configured units of M1.
+Suffixes as in `steptwin.mic488.axis`; ``w`` positions along a path, in configured units of M1.
 """
 
 from __future__ import annotations
@@ -11,8 +11,7 @@ from typing import NamedTuple, TypeAlias
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.mic488 import path
-from steptwin.mic488.axis import Axis
-from steptwin.mic488.axis_motion import MAX_SPEED_P, SLOWEST_RAMP_P
+from steptwin.mic488.axis import MAX_SPEED_P, SLOWEST_RAMP_P, Axis
 from steptwin.mic488.path import Path
 from steptwin.mic488.program_device import ProgramDevice
 from steptwin.mic488.program_registers import position_p

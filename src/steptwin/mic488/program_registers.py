@@ -10,8 +10,7 @@ from types import MappingProxyType
 from typing import Protocol, TypeAlias
 
 from steptwin.machine import MILLISECOND, SECOND, Nanos
-from steptwin.mic488.axis import Axis
-from steptwin.mic488.axis_motion import MAX_SPEED_P
+from steptwin.mic488.axis import MAX_SPEED_P, Axis
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.encoder import Coupling
 from steptwin.mic488.encoding import DINT_MAX, DINT_MIN
@@ -48,6 +47,11 @@ class ProgramRegisters(Stateful):
     def __init__(self) -> None:
         self.row_0: tuple[float | None, ...] | None = None
         """Row 0 of the position table, which programs can write; None: there is none yet."""
+        self.ticks: dict[int, Nanos]
+        """Next moment of the ticks that are switched on."""
+        self.timers: dict[str, tuple[tuple[int, Nanos], ...]]
+        """Of each family: the number at a moment, from which it counts on."""
+        self.lin_acc_u: float | None
 
     def forget_record(self) -> None:
         self.vision = array("f", bytes(4 * len(VISION)))
@@ -58,11 +62,9 @@ class ProgramRegisters(Stateful):
         """CFGINT_… by number of the event in `EVENTS`."""
         for number, of_input in _OF_INPUTS:
             self.switches[number] = config.inputs[of_input].interrupt
-        self.ticks: dict[int, Nanos] = {}
-        """Next moment of the ticks that are switched on."""
-        self.timers: dict[str, tuple[tuple[int, Nanos], ...]] = dict.fromkeys(TIMER_PERIODS, ((0, now),) * TIMERS)
-        """Of each family: the number at a moment, from which it counts on."""
-        self.lin_acc_u: float | None = None
+        self.ticks = {}
+        self.timers = dict.fromkeys(TIMER_PERIODS, ((0, now),) * TIMERS)
+        self.lin_acc_u = None
 
     def timer(self, name: str, number: int, at: Nanos) -> int:
         """Timer ``number`` from 0."""

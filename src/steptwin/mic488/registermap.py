@@ -31,7 +31,6 @@ class Space(enum.Enum):
     HOLDING = "holding register"
 
 
-#: Function codes the device implements (manual section 2), with the space each works on.
 FUNCTION_SPACES: Mapping[int, Space] = MappingProxyType(
     {
         pdu.READ_COILS: Space.COIL,
@@ -42,6 +41,7 @@ FUNCTION_SPACES: Mapping[int, Space] = MappingProxyType(
         pdu.WRITE_MULTIPLE_REGISTERS: Space.HOLDING,
     }
 )
+"""Function codes the device implements (manual section 2), with the space each works on."""
 
 
 class DataType(enum.IntEnum):

@@ -47,8 +47,8 @@ FIRMWARES: Mapping[str, Firmware] = MappingProxyType(
 )
 DEFAULT_FIRMWARE = "1.70"
 
-#: Bits of a mask register that mean something: bit 0 = M1 … bit 3 = M4.
 AXIS_MASK = 0x000F
+"""Bits of a mask register that mean something: bit 0 = M1 … bit 3 = M4."""
 
 
 AXIS_STATUS_TEXTS: Mapping[int, str] = MappingProxyType(

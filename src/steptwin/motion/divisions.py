@@ -47,8 +47,8 @@ class StepTrain:
         self.profile = profile
         self.microstepping = microstepping
         self.divisions = divisions
-        #: +1, −1, or 0 at rest
         self.direction = profile.segments[0].direction if profile.segments else 0
+        """+1, −1, or 0 at rest"""
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, StepTrain):

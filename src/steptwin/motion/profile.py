@@ -106,12 +106,12 @@ class Profile:
         self.base = base
         self.segments = segments
         self.final_p = final_p
-        #: first whole nanosecond, from ``start``, that no longer belongs to each segment
         self.ends: list[float] = []
-        #: counted position, relative to ``base``, when each segment begins, and at the end
+        """first whole nanosecond, from ``start``, that no longer belongs to each segment"""
         self.counts: list[int] = [0]
-        #: first whole nanosecond at which the motion is finished; None when endless
+        """counted position, relative to ``base``, when each segment begins, and at the end"""
         self.end: Nanos | None = start
+        """first whole nanosecond at which the motion is finished; None when endless"""
         if not segments:
             return
         count = 0

@@ -104,14 +104,22 @@ class Interpreter(Stateful):
         self._moment: Nanos = -1
         self._spent = 0
         """Statements executed at that moment, also before a restart by the program itself."""
+        self.stack: deque[tuple[int, Nanos]]
+        """Steps to which RETURN goes, each with its earliest moment (a DELAY that was interrupted, WBC-19)."""
+        self.not_before: Nanos
+        self._trail: list[Visit] | None
+        self._mark: Nanos
+        self._resting: RestingLoop | None
+        self.paused_at: Nanos | None
+        self.due: Nanos | None
+        """The moment of the next statement; None if only an event leads to one."""
         self.stop()
         self.clear()
 
     def clear(self) -> None:
         """Reset the state to that before the first statement."""
         self.pc = 0
-        self.stack: deque[tuple[int, Nanos]] = deque(maxlen=RETURNS)
-        """Steps to which RETURN goes, each with its earliest moment (a DELAY that was interrupted, WBC-19)."""
+        self.stack = deque(maxlen=RETURNS)
         self.forgotten = False
         """A step for RETURN was dropped since the stack was last empty (WBC-1)."""
         self.handling = False
@@ -120,16 +128,16 @@ class Interpreter(Stateful):
         """Events that wait, one bit each."""
         self.waiting = False
         """The statement at ``pc`` is in progress: its condition was false."""
-        self.not_before: Nanos = 0
+        self.not_before = 0
         self._marks = 0
         self._unmarked = 0
         self._forget()
 
     def _forget(self) -> None:
         """End the recording and the rest of loops."""
-        self._trail: list[Visit] | None = None
-        self._mark: Nanos = 0
-        self._resting: RestingLoop | None = None
+        self._trail = None
+        self._mark = 0
+        self._resting = None
 
     # ------------------------------------------------------------------ start, stop, pause
 
@@ -148,9 +156,8 @@ class Interpreter(Stateful):
 
     def stop(self) -> None:
         self.running = False
-        self.paused_at: Nanos | None = None
-        self.due: Nanos | None = None
-        """The moment of the next statement; None if only an event leads to one."""
+        self.paused_at = None
+        self.due = None
         self._forget()
 
     def pause(self, now: Nanos) -> None:

@@ -110,25 +110,38 @@ class CharacterTalk:
         """The chip of the last request."""
         self._stored: Counter[int | None] = Counter()  # bits of commands for one chip
         self._stored_by_all = 0  # bits of commands sent while several may listen
+        self.free_ns: Nanos
+        self._busy_until: Nanos
+        self.selected: int | None
+        """The selected chip; None: all, as after power-up."""
+        self.echoing: set[int | None]
+        self.only: int | None
+        """The address of the chip that is addressed without one; None until it was found."""
+        self.owed: dict[int | None, int]
+        self.arrived: dict[int | None, int]
+        """Pending letters that arrived between exchanges."""
+        self.spoilt: dict[int | None, int]
+        """Number of lines that each chip has dropped as wrong data, which ends its program (M-11)."""
+        self.uploads: bytearray | None
+        """Bytes uploaded by a program in a chip, while one may run."""
+        self.letters: int | None
+        """Letters from any chip while several chips are watched (`steptwin.drivers.m1486.watching`)."""
+        self._request: ChipRequest | None
+        self._lines: list[bytes]
+        self._answer: int | None
         self.reset()
 
     def reset(self) -> None:
-        self.free_ns: Nanos = 0
-        self._busy_until: Nanos = 0
-        self.selected: int | None = ALL
-        """The selected chip; None: all, as after power-up."""
-        self.echoing: set[int | None] = set()
-        self.only: int | None = None
-        """The address of the chip that is addressed without one; None until it was found."""
-        self.owed: dict[int | None, int] = {}
-        self.arrived: dict[int | None, int] = {}
-        """Pending letters that arrived between exchanges."""
-        self.spoilt: dict[int | None, int] = {}
-        """Number of lines that each chip has dropped as wrong data, which ends its program (M-11)."""
-        self.uploads: bytearray | None = None
-        """Bytes uploaded by a program in a chip, while one may run."""
-        self.letters: int | None = None
-        """Letters from any chip while several chips are watched (`steptwin.drivers.m1486.watching`)."""
+        self.free_ns = 0
+        self._busy_until = 0
+        self.selected = ALL
+        self.echoing = set()
+        self.only = None
+        self.owed = {}
+        self.arrived = {}
+        self.spoilt = {}
+        self.uploads = None
+        self.letters = None
         self.surplus = 0
         """Number of late type letters that may still arrive."""
         self.dirty = False
@@ -136,11 +149,11 @@ class CharacterTalk:
         self.nearly_full = False
         """Whether the last command took one of the last three places of the input buffer."""
         self._is_stuck = False  # the buffer had no room for the invalid command, which is sent again
-        self._request: ChipRequest | None = None
-        self._lines: list[bytes] = []  # characters still to be sent; the first is being sent
+        self._request = None
+        self._lines = []  # characters still to be sent; the first is being sent
         self._sent = b""
         self._echoed = b""
-        self._answer: int | None = None
+        self._answer = None
 
     wary = True
 

@@ -10,7 +10,7 @@ from steptwin.drivers.mic488.motion import MotionCommand, MotionKind, MoveEnd
 from steptwin.drivers.mic488.unit import URGENT_TRIES, ControlRegisters, Unit, check_axis
 from steptwin.drivers.mic488.waiting import AxisWait, wait_for
 from steptwin.errors import LineFailure, Misuse
-from steptwin.mic488.axis_motion import MAX_SPEED_P
+from steptwin.mic488.axis import MAX_SPEED_P
 from steptwin.mic488.encoding import DINT_MAX, DINT_MIN
 
 _KEYS = {

@@ -99,6 +99,8 @@ class Unit:
         self.timeout_ns = timeout_ns
         self.tries = tries
         self.notes: UnitNotes = line.notes.setdefault(("mic488", number), UnitNotes())
+        self._queries: dict[tuple[int, int, int], ModbusQuery]
+        self._plans: dict[tuple[RegisterItem, ...], list[Block]]
         self.use(registers)
 
     def use(self, registers: RegisterMap) -> None:
@@ -108,8 +110,8 @@ class Unit:
         frames = self.line.notes.get("frames")
         if isinstance(frames, FrameWords):
             frames.know(self.number, self.wording)
-        self._queries: dict[tuple[int, int, int], ModbusQuery] = {}
-        self._plans: dict[tuple[RegisterItem, ...], list[Block]] = {}
+        self._queries = {}
+        self._plans = {}
         keys = ("DATA_TYPE", "PROGRAM_CTRL", "AXIS_CTR_MODE")
         self._control_items = [RegisterItem(registers.of(key)) for key in keys]
         self._has_status = "M_STATUS" in {row.key for row in registers.rows}
