@@ -40,7 +40,7 @@ ROUND_MS = 10_000
 TICK_S = 0.01
 SETTLE_S = 5.0
 CLIENT_ENDED = "the client of OPC UA has ended: make tests/gateways/clients/node_modules/.steptwin installs it"
-BATCH, BATCHES, PAUSE_S = 200, 50, 0.2
+BATCH, BATCHES, PAUSE_S = 100, 50, 0.1
 """At 10 changes of 1000 controllers in a second so many come in the publishing interval of a client, 20 ms."""
 
 
@@ -212,7 +212,7 @@ def measure(gateways: list[str], controllers: int, rate: int, seconds: int) -> N
 def main() -> None:
     if shutil.which("node") is None or shutil.which("mosquitto") is None:
         raise SystemExit("node and mosquitto are needed")
-    controllers, rate = size("CONTROLLERS", 1000), size("RATE", 10)
+    controllers, rate = size("CONTROLLERS", 100), size("RATE", 10)
     for some in ([], ["opcua"], ["mqtt"], ["opcua", "mqtt"]):
         measure(some, controllers, 0, 0)
     if rate:

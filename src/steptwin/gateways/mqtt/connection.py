@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 from aiomqtt import Client, Message, MqttError, ProtocolVersion, Will
-from paho.mqtt.enums import MessageType, MQTTErrorCode
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 from paho.mqtt.subscribeoptions import SubscribeOptions
@@ -31,8 +30,8 @@ STEADY_S = 10.0
 """After a session of this length the pauses begin anew."""
 MOST_INCOMING = 1000
 """Messages that wait to be looked at; more are dropped."""
-AT_ONCE = 512
-"""Messages that are on their way to the broker at the same time."""
+AT_ONCE = 32
+"""Messages that wait at the same time until they have left."""
 CANCEL_AGAIN_S = 0.1
 LONGEST_CLOSE_S = 2.0
 """A broker that does not answer is not waited for when the gateway is closed."""
@@ -58,7 +57,7 @@ class BrokerLink(Protocol):
         ...
 
     async def publish_all(self, all_of: Iterable[Publication]) -> None:
-        """In their order; those with QoS 0 together. Raises as `publish`, for some of them."""
+        """In their order. Raises as `publish`, for some of them."""
         ...
 
     async def subscribe(self, topic: str, *, retained: bool) -> None:
@@ -172,7 +171,7 @@ class BrokerConnection:
         """One session. Raises what ended it; nothing where the gateway is closed."""
         will = self._face.will()
         broker = self._broker
-        client = _SendingClient(
+        client = Client(
             broker.address.host,
             broker.address.port,
             username=broker.user,
@@ -195,7 +194,7 @@ class BrokerConnection:
         finally:
             self._face.lost()
 
-    async def _use(self, client: _SendingClient) -> None:
+    async def _use(self, client: Client) -> None:
         link = _ClientLink(client)
         tasks = [
             asyncio.create_task(self._face.run(link)),
@@ -221,36 +220,9 @@ class BrokerConnection:
             self._face.take(link, message)
 
 
-class _SendingClient(Client):
-    def send(self, all_of: Iterable[Publication]) -> bool:
-        """Publish with QoS 0, without waiting until they have left. Whether that is possible.
-
-        The library makes locks, properties and a result for each message: together they are one piece of bytes for it. QoS 1
-        tells it that nobody waits for this piece."""
-        if not self._client.is_connected():
-            return False
-        packets = b"".join(map(publish_packet, all_of))
-        return self._client._packet_queue(MessageType.PUBLISH, packets, 0, 1) == MQTTErrorCode.MQTT_ERR_SUCCESS
-
-
-def publish_packet(one: Publication) -> bytes:
-    """The packet PUBLISH of a message with QoS 0 and without properties (MQTT 5, 3.3)."""
-    topic = one.topic.encode()
-    rest, length = len(topic) + len(one.payload) + 3, bytearray()
-    while True:
-        rest, seven = divmod(rest, 128)
-        length.append(seven | (128 if rest else 0))
-        if not rest:
-            break
-    head = MessageType.PUBLISH | one.retain
-    return b"".join((bytes((head,)), length, len(topic).to_bytes(2), topic, b"\0", one.payload))
-
-
 class _ClientLink:
-    def __init__(self, client: _SendingClient) -> None:
+    def __init__(self, client: Client) -> None:
         self._client = client
-        self._on_their_way = 0
-        """Messages since one was waited for."""
 
     async def publish(self, one: Publication) -> None:
         properties: Properties | None = None
@@ -260,23 +232,11 @@ class _ClientLink:
         await self._client.publish(one.topic, one.payload, one.qos, one.retain, properties)
 
     async def publish_all(self, all_of: Iterable[Publication]) -> None:
-        """The library waits for each message by itself, which takes longer than the message. They leave in their order, so when
-        one has left, all before it have."""
-        together: list[Publication] = []
-        for one in all_of:
-            if one.qos == 0 and one.correlation is None and self._on_their_way < AT_ONCE:
-                together.append(one)
-                self._on_their_way += 1
-            else:
-                await self._send(together)
-                await self.publish(one)
-                self._on_their_way = 0
-        await self._send(together)
-
-    async def _send(self, together: list[Publication]) -> None:
-        if together and not self._client.send(together):
-            await self.publish(together[0])  # raises what is wrong
-        together.clear()
+        """The library takes each into its queue and then waits for turns of the event loop. It counts those that wait each time,
+        so not all are given to it at once."""
+        publications = list(all_of)
+        for first in range(0, len(publications), AT_ONCE):
+            await asyncio.gather(*map(self.publish, publications[first : first + AT_ONCE]))
 
     async def subscribe(self, topic: str, *, retained: bool) -> None:
         handling = SubscribeOptions.RETAIN_SEND_ON_SUBSCRIBE if retained else SubscribeOptions.RETAIN_DO_NOT_SEND
