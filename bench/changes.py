@@ -41,7 +41,7 @@ TICK_S = 0.01
 SETTLE_S = 5.0
 CLIENT_ENDED = "the client of OPC UA has ended: make tests/gateways/clients/node_modules/.steptwin installs it"
 BATCH, BATCHES, PAUSE_S = 100, 50, 0.1
-"""At 10 changes of 1000 controllers in a second so many come in the publishing interval of a client, 20 ms."""
+"""One change of each of 100 controllers."""
 
 
 def size(name: str, usual: int) -> int:

@@ -155,6 +155,6 @@ def master(requests: int) -> None:
 
 
 def main() -> None:
-    start(size("CONTROLLERS", 1000))
+    start(size("CONTROLLERS", 100))
     history(size("ROWS", 300_000))
     master(size("REQUESTS", 4000))

@@ -4,22 +4,26 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, cast
 
-from asyncua import ua
-from asyncua.server.address_space import AttributeValue
-from asyncua.server.server import Server
+from asyncua import Server
 from gateway_rig import GatewayWorld
 
-from steptwin.gateways.opcua.addressspace import NAMESPACE_URI, AddressSpaceBuilder, node_id
-from steptwin.gateways.opcua.nodes import NodeMaker
-from steptwin.gateways.opcua.service import NodeService, WatchedNode, WatchedNodes
-from steptwin.gateways.opcua.session import GatewayServer
-from steptwin.gateways.points import GatewayPoint, PointValue, points_of
+from steptwin.gateways.opcua.addressspace import NAMESPACE_URI, AddressSpaceBuilder, PointNode, node_id
+from steptwin.gateways.opcua.service import NodeService, WatchedNodes
+from steptwin.gateways.points import PointValue, points_of
 from steptwin.gateways.sampling import Sample, Sampler
 from steptwin.simulation.script.steps import Set
 
 WATCHED = ("pins.IN3", "pins.IN4", "M1.position", "program.state")
+
+
+class Seen:
+    def __init__(self) -> None:
+        self.values: list[object] = []
+
+    def datachange_notification(self, node: object, value: object, data: object) -> None:
+        self.values.append(value)
 
 
 class Rig:
@@ -28,22 +32,15 @@ class Rig:
         self.sampler = Sampler(self.world, {})
         self.nodes = WatchedNodes()
         points = {point.name: point for point in points_of(self.world.description.machines[0], self.world.description)}
-        self.all_of: dict[str, tuple[GatewayPoint, Any]] = {
-            name: (points[name], AttributeValue(ua.DataValue())) for name in WATCHED
-        }
-        self.notified: list[Any] = []
-        for point, attribute in self.all_of.values():
-            attribute.datachange_callbacks[1] = self._notified
-            self.nodes.add(point, attribute)
-
-    async def _notified(self, handle: int, value: Any) -> None:
-        self.notified.append((handle, value.Value.Value))
+        self.all_of = {name: PointNode(node_id(f"table.{name}"), points[name]) for name in WATCHED}
+        for node in self.all_of.values():
+            self.nodes.add(node)
 
     def sample(self) -> Sample:
         return asyncio.run(self.sampler.take("table"))
 
     def changes(self) -> dict[str, PointValue]:
-        found: Iterator[tuple[WatchedNode, PointValue]] = self.nodes.changes(self.sample())
+        found: Iterator[tuple[PointNode, PointValue]] = self.nodes.changes(self.sample())
         return {node.point.name: value for node, value in found}
 
 
@@ -53,7 +50,7 @@ def test_only_what_has_changed() -> None:
     assert rig.changes() == {}
     rig.world.inner.do(Set((("table", "IN3", 1.0),)))
     assert rig.changes() == {"pins.IN3": 1.0}
-    rig.nodes.add(*rig.all_of["pins.IN4"])
+    rig.nodes.add(rig.all_of["pins.IN4"])
     assert rig.changes() == {}
 
 
@@ -68,45 +65,27 @@ def test_what_is_not_known_and_is_known_again() -> None:
 
 def test_what_nobody_follows_is_left_out() -> None:
     rig = Rig()
-    for name in ("pins.IN4", "M1.position", "program.state"):
-        rig.all_of[name][1].datachange_callbacks.clear()
-    assert rig.nodes.keep_followed()
+    assert rig.nodes.keep({rig.all_of["pins.IN3"].id})
     assert rig.changes() == {"pins.IN3": 0.0}
-    rig.all_of["pins.IN3"][1].datachange_callbacks.clear()
-    assert not rig.nodes.keep_followed()
-
-
-def test_who_follows_is_told_and_who_reads_gets_the_same_value() -> None:
-    rig = Rig()
-    sample = rig.sample()
-    for node, value in rig.nodes.changes(sample):
-        asyncio.run(node.notify(sample, value))
-    assert rig.notified == [(1, False), (1, False), (1, 0.0), (1, "stopped")]
-    assert rig.all_of["program.state"][1].value.Value.Value == "stopped"
+    assert not rig.nodes.keep(())
 
 
 def test_who_follows_a_variable_is_told_what_it_is_after_somebody_has_read_it() -> None:
     """It was another value for a moment, in which it was read."""
     world = GatewayWorld('[[mic488]]\nname = "table"\n')
-    told: list[object] = []
-
-    async def notified(_: int, value: ua.DataValue) -> None:
-        told.append(None if value.Value is None else value.Value.Value)
+    seen = Seen()
 
     async def scene() -> None:
-        server = Server(GatewayServer())
+        server = Server()
         await server.init()
         await server.register_namespace(NAMESPACE_URI)
-        space = server.iserver.aspace
         builder = AddressSpaceBuilder(world.description, {})
-        maker = NodeMaker(space)
-        maker.add(builder.items)
-        maker.refer(builder.references)
-        service = NodeService(space, world, Sampler(world, {}), builder.points, builder.methods, builder.arrays, None)
+        await builder.add_to(server)
+        service = NodeService(server, world, Sampler(world, {}), builder, None)
         await service.refresh_all()
         node = node_id("table.pins.IN3")
-        attribute = space[node].attributes[ua.AttributeIds.Value]
-        attribute.datachange_callbacks[1] = notified
+        subscription = await server.create_subscription(0, cast("Any", seen))
+        await subscription.subscribe_data_change(server.get_node(node))
         service.watch([node])
         await service.publish(1.0)
         world.inner.do(Set((("table", "IN3", 1.0),)))
@@ -114,10 +93,12 @@ def test_who_follows_a_variable_is_told_what_it_is_after_somebody_has_read_it() 
         world.inner.do(Set((("table", "IN3", 0.0),)))
         for _ in range(3):
             await service.publish(0.2)
-        assert attribute.value is not None
-        assert attribute.value.Value is not None
-        assert attribute.value.Value.Value is False
+        value = server.read_attribute_value(node).Value
+        assert value is not None
+        assert value.Value is False
         service.close()
+        await subscription.delete()
+        await server.iserver.isession.close_session()
 
     asyncio.run(scene())
-    assert told == [False, True, False]
+    assert seen.values == [False, True, False]

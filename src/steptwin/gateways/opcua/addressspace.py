@@ -6,12 +6,12 @@ Node ids are texts: ``table.M1.position``, as the control endpoint names points.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
-from asyncua import ua
+from asyncua import Server, ua
 
 from steptwin.gateways.methods import METHODS, MethodArgument, MethodRow, methods_of
 from steptwin.gateways.opcua.nodetypes import VARIANTS, ZEROS, engineering_unit, standard, value_range
@@ -55,14 +55,6 @@ class ArrayNode:
         return tuple(f"{self.machine}.{self.path}[{number}]" for number in range(self.count))
 
 
-class NodeReference(NamedTuple):
-    """A forward reference of ``source``."""
-
-    source: ua.NodeId
-    kind: ua.NodeId
-    target: ua.NodeId
-
-
 @dataclass(frozen=True, slots=True)
 class BoundMethod:
     """A method of an object, which is a controller, its program, or one of its axes."""
@@ -83,12 +75,9 @@ class AddressSpaceBuilder:
 
     def __init__(self, description: Description, registers: Mapping[str, Iterable[str]], *, is_kept: bool = False) -> None:
         self._is_kept = is_kept
-        self._shared: dict[object, Any] = {}
         self.items: list[ua.AddNodesItem] = []
-        self.references: list[NodeReference] = []
-        """To nodes that several nodes share: methods of types, units, ranges, profiles of motion."""
-        self._properties: set[str] = set()
-        """Paths of those that are shared."""
+        self.references: list[ua.AddReferencesItem] = []
+        """To the methods of types, which their objects share."""
         self.points: dict[str, tuple[PointNode, ...]] = {}
         """By controller, and of the clock."""
         self.arrays: dict[ua.NodeId, ArrayNode] = {}
@@ -103,6 +92,13 @@ class AddressSpaceBuilder:
             self.points[CLOCK] = tuple(self._point(CLOCK, point, is_of_axis=False) for point in CLOCK_POINTS)
         for part in description.machines:
             self._controller(part, registers.get(part.name, ()))
+
+    async def add_to(self, server: Server) -> None:
+        session = server.iserver.isession
+        for result in await session.add_nodes(self.items):
+            result.StatusCode.check()
+        for code in await session.add_references(self.references):
+            code.check()
 
     def nodes(self) -> dict[ua.NodeId, tuple[str, PointNode]]:
         """The variables, with the controller (or the clock) of each."""
@@ -165,21 +161,22 @@ class AddressSpaceBuilder:
         self._item(path, node_id(f"{node.machine}.registers"), node.path, ua.ObjectIds.HasComponent, kind)
         self.items[-1].NodeClass = ua.NodeClass.Variable
         nothing = ua.Variant([], ua.VariantType.UInt16, is_array=True)
-        self.items[-1].NodeAttributes = self._alike(
-            (node.path, meaning, "array"), lambda: _variable(node.path, meaning, nothing, rank=1)
-        )
+        self.items[-1].NodeAttributes = _variable(node.path, meaning, nothing, rank=1)
         self.arrays[node_id(path)] = node
 
     def _axis(self, path: str, kind: str | None) -> None:
         self._object(f"{path}.ParameterSet", node_id(path), "ParameterSet", ua.ObjectIds.BaseObjectType)
         profile = ua.Variant(_MOTION_PROFILES.get(kind or "", _OTHER_PROFILE), ua.VariantType.Int32)
-        self._shared_property(path, "MotionProfile", str(profile.Value), lambda: profile, ua.ObjectIds.Int32)
+        self._property(f"{path}.MotionProfile", node_id(path), "MotionProfile", profile, ua.ObjectIds.Int32)
 
     def _bind(self, part: MachinePart, path: str, kind: str, axis: int | None) -> None:
         """Give an object those methods of its type that its controller takes."""
         for row in methods_of(part, METHODS[kind], axis):
             method = node_id(f"types.{kind}.{row.name}")
-            self.references.append(NodeReference(node_id(path), standard(ua.ObjectIds.HasComponent), method))
+            reference = ua.AddReferencesItem(IsForward=True, TargetNodeClass=ua.NodeClass.Method)
+            reference.SourceNodeId, reference.TargetNodeId = node_id(path), method
+            reference.ReferenceTypeId = standard(ua.ObjectIds.HasComponent)
+            self.references.append(reference)
             self.methods[node_id(path), method] = BoundMethod(row, part, axis)
 
     def _point(self, machine: str, point: GatewayPoint, *, is_of_axis: bool) -> PointNode:
@@ -202,19 +199,14 @@ class AddressSpaceBuilder:
         if self._is_kept:
             access |= ua.AccessLevel.HistoryRead.mask
         self.items[-1].NodeClass = ua.NodeClass.Variable
-        self.items[-1].NodeAttributes = self._alike(
-            (name, point.meaning, point.type, access),
-            lambda: _variable(name, point.meaning, ua.Variant(ZEROS[point.type], VARIANTS[point.type]), access=access),
-        )
+        zero = ua.Variant(ZEROS[point.type], VARIANTS[point.type])
+        self.items[-1].NodeAttributes = _variable(name, point.meaning, zero, access=access)
         if has_unit:
-            unit, limits = point.unit, point.limits
-            self._shared_property(
-                path, "EngineeringUnits", unit, lambda: _extension(engineering_unit(unit)), ua.ObjectIds.EUInformation
-            )
-            bounds = None if limits is None else value_range(limits)
+            unit = _extension(engineering_unit(point.unit))
+            self._property(f"{path}.EngineeringUnits", node_id(path), "EngineeringUnits", unit, ua.ObjectIds.EUInformation)
+            bounds = None if point.limits is None else value_range(point.limits)
             if bounds is not None:
-                text = f"{bounds.Low!r} to {bounds.High!r}"
-                self._shared_property(path, "EURange", text, lambda: _extension(bounds), ua.ObjectIds.Range)
+                self._property(f"{path}.EURange", node_id(path), "EURange", _extension(bounds), ua.ObjectIds.Range)
         return PointNode(node_id(path), point)
 
     # ------------------------------------------------------------------ nodes
@@ -223,9 +215,7 @@ class AddressSpaceBuilder:
         reference = ua.ObjectIds.Organizes if path == ROOT or parent == node_id(ROOT) else ua.ObjectIds.HasComponent
         self._item(path, parent, name, reference, node_id(kind) if isinstance(kind, str) else standard(kind))
         self.items[-1].NodeClass = ua.NodeClass.Object
-        self.items[-1].NodeAttributes = self._alike(
-            (name, meaning), lambda: _attributes(ua.ObjectAttributes, name, meaning, EventNotifier=0)
-        )
+        self.items[-1].NodeAttributes = _attributes(ua.ObjectAttributes, name, meaning, EventNotifier=0)
 
     def _property(self, path: str, parent: ua.NodeId, name: str, value: ua.Variant, kind: int, *, rank: int = -1) -> None:
         self._item(path, parent, name, ua.ObjectIds.HasProperty, standard(ua.ObjectIds.PropertyType))
@@ -234,22 +224,6 @@ class AddressSpaceBuilder:
             item.BrowseName = _name(name, 0)
         item.NodeClass = ua.NodeClass.Variable
         item.NodeAttributes = _variable(name, "", value, data_type=kind, rank=rank)
-
-    def _shared_property(self, owner: str, name: str, text: str, make: Callable[[], ua.Variant], kind: int) -> None:
-        """A property that nodes share for which ``text`` is the same: a fifth of the nodes of a controller would be such ones."""
-        path = f"types.{name}.{text}"
-        if path not in self._properties:
-            self._properties.add(path)
-            self._property(path, node_id(owner), name, make(), kind)
-            return
-        self.references.append(NodeReference(node_id(owner), standard(ua.ObjectIds.HasProperty), node_id(path)))
-
-    def _alike(self, key: object, make: Callable[[], Any]) -> Any:
-        """The attributes of nodes that differ in nothing else: many controllers are of the same kind."""
-        found = self._shared.get(key)
-        if found is None:
-            found = self._shared[key] = make()
-        return found
 
     def _item(self, path: str, parent: ua.NodeId, name: str, reference: int, kind: ua.NodeId) -> None:
         item = ua.AddNodesItem()

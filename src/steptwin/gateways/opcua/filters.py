@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import isfinite
 from typing import Any, NamedTuple
 
 from asyncua import ua
-from asyncua.server.address_space import AddressSpace
-from asyncua.ua import uaprotocol_auto
 
-_CHANGES = (ua.DataChangeFilter, uaprotocol_auto.DataChangeFilter)
-"""The class that the library exports, and the one that it decodes."""
 _NUMBERS = range(ua.ObjectIds.SByte, ua.ObjectIds.Double + 1)
 """Types of numbers; the types of variants have the same numbers (OPC 10000-6, 5.1.2)."""
+
+Reading = Callable[[ua.NodeId, ua.AttributeIds], ua.DataValue]
+"""Gives the value of an attribute."""
 
 
 class ChangeFilter(NamedTuple):
@@ -21,11 +21,15 @@ class ChangeFilter(NamedTuple):
     trigger: Any = ua.DataChangeTrigger.StatusValue
     band: float = 0.0
 
+    def trigger_only(self) -> ua.DataChangeFilter:
+        """What the library is to look at."""
+        return ua.DataChangeFilter(self.trigger)
+
 
 EVERY_CHANGE = ChangeFilter()
 
 
-def change_filter(space: AddressSpace, item: ua.ReadValueId, wanted: Any) -> ChangeFilter:
+def change_filter(read: Reading, item: ua.ReadValueId, wanted: Any) -> ChangeFilter:
     """The filter ``wanted`` for the attribute of ``item``; none for events, which the library filters. Raises
     `ua.UaStatusCodeError` for one that is not supported, not valid, or not for this attribute or type."""
     is_none = wanted is None or (isinstance(wanted, ua.ExtensionObject) and wanted.TypeId == ua.NodeId())
@@ -39,7 +43,7 @@ def change_filter(space: AddressSpace, item: ua.ReadValueId, wanted: Any) -> Cha
         return EVERY_CHANGE
     if isinstance(wanted, ua.EventFilter):
         raise ua.UaStatusCodeError(ua.StatusCodes.BadFilterNotAllowed)
-    if not isinstance(wanted, _CHANGES):
+    if type(wanted).__name__ != "DataChangeFilter":  # the class that the library decodes is not the one that it exports
         raise ua.UaStatusCodeError(ua.StatusCodes.BadMonitoredItemFilterUnsupported)
     if wanted.DeadbandType == ua.DeadbandType.None_:
         return ChangeFilter(wanted.Trigger)
@@ -48,16 +52,16 @@ def change_filter(space: AddressSpace, item: ua.ReadValueId, wanted: Any) -> Cha
     band = float(wanted.DeadbandValue)
     if wanted.DeadbandType != ua.DeadbandType.Absolute or not isfinite(band) or band < 0.0:
         raise ua.UaStatusCodeError(ua.StatusCodes.BadDeadbandFilterInvalid)
-    if item.AttributeId != ua.AttributeIds.Value or not _is_number(space, item.NodeId):
+    if item.AttributeId != ua.AttributeIds.Value or not _is_number(read, item.NodeId):
         raise ua.UaStatusCodeError(ua.StatusCodes.BadFilterNotAllowed)
     return ChangeFilter(wanted.Trigger, band)
 
 
-def _is_number(space: AddressSpace, node: Any) -> bool:
-    value = space.read_attribute_value(node, ua.AttributeIds.Value).Value
+def _is_number(read: Reading, node: Any) -> bool:
+    value = read(node, ua.AttributeIds.Value).Value
     if value is not None and value.VariantType != ua.VariantType.Null:
         return value.VariantType.value in _NUMBERS
-    kind = space.read_attribute_value(node, ua.AttributeIds.DataType).Value
+    kind = read(node, ua.AttributeIds.DataType).Value
     return kind is not None and kind.Value.NamespaceIndex == 0 and kind.Value.Identifier in _NUMBERS
 
 

@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 import asyncio
-import gc
 import logging
-from collections.abc import Callable, Generator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from asyncua.server.server import Server
+from asyncua import Server
 
 from steptwin import __version__
 from steptwin.errors import LineFailure, SteptwinError
 from steptwin.eventloop import endless
 from steptwin.gateways.contract import GatewayState, GatewaySubject
 from steptwin.gateways.opcua.addressspace import NAMESPACE, NAMESPACE_URI, AddressSpaceBuilder
-from steptwin.gateways.opcua.connections import ListeningServer
 from steptwin.gateways.opcua.limits import tell_limits
-from steptwin.gateways.opcua.nodes import NodeMaker
 from steptwin.gateways.opcua.notifications import Notifications
 from steptwin.gateways.opcua.past import PastNodes
 from steptwin.gateways.opcua.security import Security
@@ -67,28 +63,24 @@ class OpcUaGateway:
         logging.getLogger("asyncua").addHandler(logging.NullHandler())
         logging.getLogger("asyncua").propagate = False
         inside = GatewayServer(user_manager=security)
-        server = ListeningServer(inside)
+        server = Server(inside)
+        inside.connections = lambda: () if server.bserver is None else server.bserver.clients
         server.set_endpoint(f"opc.tcp://{address}/")
         server.set_server_name(f"steptwin {self._subject.description.name}")
         await server.init()
-        await tell_limits(inside.aspace)
+        await tell_limits(server)
         await server.set_application_uri(APPLICATION_URI)
         await server.set_build_info(PRODUCT_URI, "steptwin", "steptwin", __version__, "", security.began)
         if await server.register_namespace(NAMESPACE_URI) != NAMESPACE:
             raise AssertionError
         await security.apply(server)
-        with _uncollected():
-            builder = AddressSpaceBuilder(self._subject.description, registers, is_kept=self._subject.past is not None)
-            maker = NodeMaker(inside.aspace)
-            maker.add(builder.items)
-            maker.refer(builder.references)
-            self._sampler = Sampler(self._subject, registers, self._spec.interval)
-            past = None if self._subject.past is None else PastNodes(self._subject.past, builder.nodes())
-            service = NodeService(
-                inside.aspace, self._subject, self._sampler, builder.points, builder.methods, builder.arrays, past
-            )
-            inside.service = self._service = service
-            await service.refresh_all()
+        builder = AddressSpaceBuilder(self._subject.description, registers, is_kept=self._subject.past is not None)
+        await builder.add_to(server)
+        self._sampler = Sampler(self._subject, registers, self._spec.interval)
+        past = None if self._subject.past is None else PastNodes(self._subject.past, builder.nodes())
+        service = NodeService(server, self._subject, self._sampler, builder, past)
+        inside.service = self._service = service
+        await service.refresh_all()
         self._notifications = await Notifications.open(server, self._subject)
         try:
             await server.start()
@@ -101,7 +93,7 @@ class OpcUaGateway:
             self._failed = text
             notice(f"[gateway.opcua]: {text}")
 
-        self._task = endless(self._publish(service, self._notifications), failed)
+        self._task = endless(self._publish(inside, service, self._notifications), failed)
         port = _port(server)
         self._address = Address(address.host, port)
         if security.valid_until is not None and self._guard is None:
@@ -127,13 +119,14 @@ class OpcUaGateway:
     def _registers(self) -> dict[str, list[str]]:
         return registers_by_machine("[gateway.opcua]", self._spec.registers, self._subject.description)
 
-    async def _publish(self, service: NodeService, notifications: Notifications) -> None:
+    async def _publish(self, inside: GatewayServer, service: NodeService, notifications: Notifications) -> None:
         loop, interval_s = asyncio.get_running_loop(), self._spec.interval / SECOND
         at = loop.time() + interval_s
         while True:
             await service.publish(max(at - loop.time(), 0.0))
             if loop.time() >= at:
                 at = loop.time() + interval_s
+                service.keep_followed(inside.followed())
                 await service.publish_arrays()
                 await notifications.publish()
 
@@ -162,18 +155,6 @@ class OpcUaGateway:
 
 
 make = OpcUaGateway
-
-
-@contextmanager
-def _uncollected() -> Generator[None]:
-    """What is made here stays: to look through it again and again for garbage takes a third of the time."""
-    was_enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_enabled:
-            gc.enable()
 
 
 def _port(server: Server) -> int:

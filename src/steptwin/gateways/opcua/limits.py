@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from asyncua import ua
-from asyncua.server.address_space import AddressSpace
-
-from steptwin.gateways.opcua.nodetypes import standard
+from asyncua import Server, ua
 
 MOST_READ = 1000
 """Nodes in a read (MaxNodesPerRead)."""
@@ -15,7 +10,7 @@ AT_ONCE = 100
 """Values that are read or shown before others get their turn."""
 
 
-async def tell_limits(space: AddressSpace) -> None:
+async def tell_limits(server: Server) -> None:
     """Show clients what this server permits; the library says 10 000."""
-    node: Any = standard(ua.ObjectIds.Server_ServerCapabilities_OperationLimits_MaxNodesPerRead)
-    await space.write_attribute_value(node, ua.AttributeIds.Value, ua.DataValue(ua.Variant(MOST_READ, ua.VariantType.UInt32)))
+    node = server.get_node(ua.ObjectIds.Server_ServerCapabilities_OperationLimits_MaxNodesPerRead)
+    await node.write_value(ua.Variant(MOST_READ, ua.VariantType.UInt32))

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from copy import copy
 
-from asyncua import ua
+from asyncua import Server, ua
 from asyncua.server.event_generator import EventGenerator
-from asyncua.server.server import Server
 
 from steptwin.datasheet import EventSeverity
 from steptwin.gateways.contract import GatewaySubject

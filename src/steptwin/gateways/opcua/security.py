@@ -7,10 +7,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from asyncua import ua
+from asyncua import Server, ua
 from asyncua.crypto.truststore import TrustStore
 from asyncua.crypto.validator import CertificateValidator, CertificateValidatorOptions
-from asyncua.server.server import Server
 from asyncua.server.user_managers import UserManager
 from cryptography.hazmat.primitives.serialization import load_pem_private_key
 from cryptography.x509 import load_pem_x509_certificate
@@ -125,7 +124,7 @@ class Security(UserManager):
                 raise Misuse(f"[gateway.opcua]: trusted: {where} has a file that is no certificate: {error}") from None
             checks |= CertificateValidatorOptions.TRUSTED
         if options.certificate is not None:
-            server.iserver.certificate_validator = CertificateValidator(checks, trusted)
+            server.set_certificate_validator(CertificateValidator(checks, trusted))
 
     def get_user(
         self, iserver: object, username: str | None = None, password: str | None = None, certificate: Any = None

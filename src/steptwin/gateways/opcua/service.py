@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any
 
-from asyncua import ua
-from asyncua.server.address_space import AddressSpace, AttributeValue
+from asyncua import Server, ua
 
 from steptwin.datasheet import Argument, Limits
 from steptwin.errors import LineFailure, Refusal
 from steptwin.gateways.clients import GatewayClient
 from steptwin.gateways.contract import GatewaySubject
 from steptwin.gateways.leases import JogLeases
-from steptwin.gateways.opcua.addressspace import ArrayNode, BoundMethod, PointNode
+from steptwin.gateways.opcua.addressspace import AddressSpaceBuilder, BoundMethod, PointNode
 from steptwin.gateways.opcua.limits import AT_ONCE
 from steptwin.gateways.opcua.nodetypes import data_value, number_of, status
 from steptwin.gateways.opcua.past import PastNodes
-from steptwin.gateways.points import GatewayPoint, PointValue, State
+from steptwin.gateways.points import PointValue, State
 from steptwin.gateways.sampling import Sample, Sampler
 from steptwin.subject.commands import Jog, ReadPoints, StopAxes
 
@@ -31,104 +29,73 @@ ARRAY_PAUSE = 10
 _NOTHING = object()
 
 
-class WatchedNode:
-    """A variable that clients follow: ``attribute`` has its value in the address space, ``shown`` is the last one."""
-
-    __slots__ = ("attribute", "point", "shown")
-
-    def __init__(self, point: GatewayPoint, attribute: AttributeValue) -> None:
-        self.point = point
-        self.attribute = attribute
-        self.shown: object = _NOTHING
-
-    @property
-    def is_followed(self) -> bool:
-        return bool(self.attribute.datachange_callbacks)
-
-    async def notify(self, sample: Sample, value: PointValue) -> None:
-        """As the library's `write_attribute_value`, which looks for the node and checks the type of each value."""
-        fresh = data_value(value, self.point.type, sample.at, is_answered=sample.state is not None)
-        self.attribute.value = fresh
-        for handle, call in list(self.attribute.datachange_callbacks.items()):
-            with suppress(KeyError):  # a client has just ended this subscription
-                await call(handle, fresh)
-
-
 class WatchedNodes:
-    """Variables of one controller that clients follow."""
+    """Variables of one controller to which clients subscribe."""
 
     def __init__(self) -> None:
-        self._groups: dict[str, list[WatchedNode]] = {}
+        self._groups: dict[str, dict[ua.NodeId, PointNode]] = {}
+        self._notified: dict[ua.NodeId, PointValue] = {}
+        """The last value of each; missing: the next one is notified, whatever it is."""
         self._state: State | None = None
         """Of the last sample; None: everything has to be looked at."""
 
-    def add(self, point: GatewayPoint, attribute: AttributeValue) -> None:
-        group = self._groups.setdefault(point.group, [])
-        if not any(node.point is point for node in group):
-            group.append(WatchedNode(point, attribute))
+    def add(self, node: PointNode) -> None:
+        self._groups.setdefault(node.point.group, {})[node.id] = node
         self._state = None
 
-    def forget(self, points: Iterable[GatewayPoint]) -> None:
-        """Whoever follows these has been told values that were read: the next ones are told, whatever they are."""
-        for point in points:
-            for node in self._groups.get(point.group, ()):
-                if node.point is point:
-                    node.shown = _NOTHING
+    def forget(self, nodes: Iterable[PointNode]) -> None:
+        """These have got values from a direct read: always notify the next sample."""
+        for node in nodes:
+            self._notified.pop(node.id, None)
 
-    def keep_followed(self) -> bool:
-        """Only those that are followed; whether there are any."""
-        groups = {name: [node for node in nodes if node.is_followed] for name, nodes in self._groups.items()}
+    def keep(self, followed: Collection[ua.NodeId]) -> bool:
+        """Keep those that are in ``followed``; return whether there are any."""
+        groups = {
+            name: {identity: node for identity, node in nodes.items() if identity in followed}
+            for name, nodes in self._groups.items()
+        }
         self._groups = {name: nodes for name, nodes in groups.items() if nodes}
         return bool(self._groups)
 
-    def changes(self, sample: Sample) -> Iterator[tuple[WatchedNode, PointValue]]:
+    def changes(self, sample: Sample) -> Iterator[tuple[PointNode, PointValue]]:
         """Those with another value than before, and this value."""
         before, self._state = self._state, sample.state
         for nodes in self._groups.values():
             if sample.state is None:
-                for node in nodes:
-                    node.shown = _NOTHING
+                for node in nodes.values():
+                    self._notified.pop(node.id, None)
                     yield node, None
                 continue
-            point = nodes[0].point
+            point = next(iter(nodes.values())).point
             part = point.part(sample.state)
             if before is not None and point.part(before) is part:
                 continue
-            for node in nodes:
+            for node in nodes.values():
                 value = node.point.of(part)
-                if node.shown != value:
-                    node.shown = value
+                if self._notified.get(node.id, _NOTHING) != value:
+                    self._notified[node.id] = value
                     yield node, value
 
 
 class NodeService:
-    """The `Service` of sessions, for variables ``points`` by controller and ``methods`` by object and method."""
+    """The `SessionRequests` of sessions, for the nodes that ``builder`` has added to ``server``."""
 
     def __init__(
-        self,
-        space: AddressSpace,
-        subject: GatewaySubject,
-        sampler: Sampler,
-        points: Mapping[str, Sequence[PointNode]],
-        methods: Mapping[tuple[ua.NodeId, ua.NodeId], BoundMethod],
-        arrays: Mapping[ua.NodeId, ArrayNode],
-        past: PastNodes | None,
+        self, server: Server, subject: GatewaySubject, sampler: Sampler, builder: AddressSpaceBuilder, past: PastNodes | None
     ) -> None:
-        self._space = space
+        self._server = server
         self._subject = subject
         self._sampler = sampler
-        self._points = points
-        self._methods = methods
-        self._arrays = arrays
+        self._points = builder.points
+        self._methods = builder.methods
+        self._arrays = builder.arrays
         self._past = past
         self._watched_arrays: dict[ua.NodeId, int] = {}
         """What has been subscribed to, and publications until it is read again."""
-        self._of_node = {node.id: (machine, node) for machine, nodes in points.items() for node in nodes}
+        self._of_node = builder.nodes()
         self._leases = JogLeases(subject)
         self._watched: dict[str, WatchedNodes] = {}
         """What has been subscribed to, by controller."""
-        self._has_gone = False
-        """Whether a subscription has ended since the last publication."""
 
     # ------------------------------------------------------------------ values
 
@@ -154,43 +121,31 @@ class NodeService:
             found = self._of_node.get(node)
             if found is not None:
                 machine, point = found
-                attribute = self._space[node].attributes[ua.AttributeIds.Value]
-                self._watched.setdefault(machine, WatchedNodes()).add(point.point, attribute)
+                self._watched.setdefault(machine, WatchedNodes()).add(point)
                 self._sampler.hasten(machine)
         self._sampler.watch(self._watched)
 
-    def unwatched(self) -> None:
-        self._has_gone = True
+    def keep_followed(self, followed: Collection[ua.NodeId]) -> None:
+        """Forget nodes to which no client subscribes any more."""
+        self._watched_arrays = {node: left for node, left in self._watched_arrays.items() if node in followed}
+        kept = {machine: nodes for machine, nodes in self._watched.items() if nodes.keep(followed)}
+        if len(kept) < len(self._watched):
+            self._watched = kept
+            self._sampler.watch(kept)
 
     async def publish(self, within_s: float) -> None:
         """Notify the clients of what has changed, or of nothing ``within_s``."""
-        if self._has_gone:
-            self._has_gone = False
-            self._forget()
         for sample in await self._sampler.changed(within_s):
             watched = self._watched.get(sample.machine)
             if watched is not None:
                 for node, value in watched.changes(sample):
-                    await node.notify(sample, value)
+                    await self._write(sample, node, value)
 
     async def publish_arrays(self) -> None:
         for node, left in list(self._watched_arrays.items()):
             self._watched_arrays[node] = left - 1 if left > 0 else ARRAY_PAUSE
             if left <= 0:
                 await self._show_array(node)
-
-    def _forget(self) -> None:
-        """Nodes that have no subscription any more."""
-        for node in list(self._watched_arrays):
-            if not self._is_followed(node):
-                del self._watched_arrays[node]
-        for machine, nodes in list(self._watched.items()):
-            if not nodes.keep_followed():
-                del self._watched[machine]
-        self._sampler.watch(self._watched)
-
-    def _is_followed(self, node: ua.NodeId) -> bool:
-        return bool(self._space[node].attributes[ua.AttributeIds.Value].datachange_callbacks)
 
     async def _show(self, sample: Sample, points: Sequence[PointNode]) -> None:
         for number, node in enumerate(points, 1):
@@ -199,11 +154,11 @@ class NodeService:
                 await asyncio.sleep(0)
         watched = self._watched.get(sample.machine)
         if watched is not None:
-            watched.forget(node.point for node in points)
+            watched.forget(points)
 
     async def _write(self, sample: Sample, node: PointNode, value: PointValue) -> None:
         fresh = data_value(value, node.point.type, sample.at, is_answered=sample.state is not None)
-        await self._space.write_attribute_value(node.id, ua.AttributeIds.Value, fresh)
+        await self._server.write_attribute_value(node.id, fresh)
 
     async def _show_array(self, node: ua.NodeId) -> None:
         array = self._arrays[node]
@@ -215,7 +170,7 @@ class NodeService:
         else:
             words = [int(one["value"] or 0) & 0xFFFF for one in found]
             fresh = ua.DataValue(ua.Variant(words, ua.VariantType.UInt16, is_array=True), SourceTimestamp=at)
-        await self._space.write_attribute_value(node, ua.AttributeIds.Value, fresh)
+        await self._server.write_attribute_value(node, fresh)
 
     async def history(self, params: ua.HistoryReadParameters, one: ua.HistoryReadValueId) -> ua.HistoryReadResult:
         if self._past is None:
@@ -227,8 +182,9 @@ class NodeService:
     async def write(self, client: GatewayClient, node: ua.NodeId, value: ua.Variant | None) -> None:
         found = self._of_node.get(node)
         if found is None or found[1].point.write is None:
-            known = node in self._space
-            raise ua.UaStatusCodeError(ua.StatusCodes.BadNotWritable if known else ua.StatusCodes.BadNodeIdUnknown)
+            known = self._server.read_attribute_value(node, ua.AttributeIds.NodeClass).StatusCode
+            is_known = known is not None and known.is_good()
+            raise ua.UaStatusCodeError(ua.StatusCodes.BadNotWritable if is_known else ua.StatusCodes.BadNodeIdUnknown)
         machine, there = found
         point = there.point
         number = number_of(value, point.type)

@@ -1,25 +1,35 @@
-"""The sessions of clients: they read present values, write points and call methods. Everything else is the library's."""
+"""Sessions of clients: they read present values, write points, call methods and subscribe. Everything else is the library's.
+
+The public interface of asyncua gives the role of a client neither to a method nor to what sets a value, one status code for
+neither of several writes, and reads the next request of a connection when the one before has been answered: a stop would wait
+for the motion before it. It accepts filters that it does not know, and counts a dead band from the last value rather than from
+the one that was notified. So this module derives from its internal server and session, and nothing else does: it replaces
+services of OPC UA (those that `AbstractSession` names), ``process_message`` of a connection, and ``isub`` of monitored items.
+"""
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import count
 from typing import Any, Protocol
 
 from asyncua import ua
+from asyncua.common.utils import Buffer
 from asyncua.crypto.permission_rules import User, UserRole
 from asyncua.server.internal_server import InternalServer
 from asyncua.server.internal_session import InternalSession
+from asyncua.ua.ua_binary import nodeid_from_binary, struct_from_binary
 
 from steptwin.access.roles import Role
 from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
 from steptwin.gateways.clients import GatewayClient, NotPermitted, address_text
 from steptwin.gateways.contract import ClientState
-from steptwin.gateways.opcua.indexranges import part_of
+from steptwin.gateways.opcua.filters import ChangeFilter, change_filter, differs
+from steptwin.gateways.opcua.indexranges import check_range, part_of
 from steptwin.gateways.opcua.limits import AT_ONCE, MOST_READ
-from steptwin.gateways.opcua.nodetypes import status
-from steptwin.gateways.opcua.subscriptions import MonitoredItems, Publish, packing
+from steptwin.gateways.opcua.nodetypes import standard, status
 
 CODES: tuple[tuple[type[SteptwinError], int], ...] = (
     (NotPermitted, ua.StatusCodes.BadUserAccessDenied),
@@ -29,10 +39,21 @@ CODES: tuple[tuple[type[SteptwinError], int], ...] = (
     (SteptwinError, ua.StatusCodes.BadUnexpectedError),
 )
 """Status codes of errors, the first that fits."""
-
-
+MOST_AT_ONCE = 64
+"""Requests of one connection that wait. Calls are bounded by their devices: a stop among them is never refused here."""
 NOBODY = GatewayClient("nobody", Role.VIEWER)
 """Before a session is activated."""
+
+_CALL = standard(ua.ObjectIds.CallRequest_Encoding_DefaultBinary)
+_MAY_WAIT = frozenset(
+    {
+        _CALL,
+        standard(ua.ObjectIds.ReadRequest_Encoding_DefaultBinary),
+        standard(ua.ObjectIds.WriteRequest_Encoding_DefaultBinary),
+        standard(ua.ObjectIds.HistoryReadRequest_Encoding_DefaultBinary),
+        standard(ua.ObjectIds.CreateMonitoredItemsRequest_Encoding_DefaultBinary),
+    }
+)
 
 
 @dataclass
@@ -62,11 +83,11 @@ class SessionRequests(Protocol):
     async def call(
         self, client: GatewayClient, session: object, node: ua.NodeId, method: ua.NodeId, given: Sequence[ua.Variant]
     ) -> None:
-        """As `write`."""
+        """Raises as `write`."""
         ...
 
     async def history(self, params: ua.HistoryReadParameters, one: ua.HistoryReadValueId) -> ua.HistoryReadResult:
-        """The past of one node. Raises `ua.UaStatusCodeError`."""
+        """The past values of a node. Raises `ua.UaStatusCodeError`."""
         ...
 
     def refused(self, client: GatewayClient, do: str, fields: Mapping[str, object]) -> None:
@@ -81,28 +102,152 @@ class SessionRequests(Protocol):
         """Clients subscribe to these."""
         ...
 
-    def unwatched(self) -> None:
-        """Some of them have no subscription any more."""
-        ...
-
 
 class GatewayServer(InternalServer):
     """The library's server with sessions of this gateway."""
 
     service: SessionRequests
+    connections: Callable[[], Iterable[Any]]
+    """Gives those of the binary protocol."""
 
-    def create_session(
-        self,
-        name: str,
-        user: User = ANONYMOUS,
-        external: bool = False,
-    ) -> InternalSession:
+    def __init__(self, *arguments: Any, **named: Any) -> None:
+        super().__init__(*arguments, **named)
+        self._sessions: set[GatewaySession] = set()
+        self._queues: dict[int, NotificationQueue] = {}
+        """By subscription."""
+
+    def create_session(self, name: str, user: User = ANONYMOUS, external: bool = False) -> InternalSession:
+        self._answer_concurrently()
         return GatewaySession(self, self.aspace, self.subscription_service, name, user=user, external=external)
+
+    def lookup_external_session(self, auth_token: ua.NodeId) -> InternalSession | None:
+        """Called for a client that comes back over another connection."""
+        self._answer_concurrently()
+        return super().lookup_external_session(auth_token)
+
+    def _answer_concurrently(self) -> None:
+        for one in self.connections():
+            if one.processor is not None and "process_message" not in vars(one.processor):
+                ConcurrentRequests(one)
+
+    def register_external_session(self, session: InternalSession) -> None:
+        super().register_external_session(session)
+        if isinstance(session, GatewaySession):
+            self._sessions.add(session)
+
+    def unregister_external_session(self, session: InternalSession) -> None:
+        super().unregister_external_session(session)
+        if isinstance(session, GatewaySession):
+            self._sessions.discard(session)
+
+    def queue_notifications(self, number: int) -> None:
+        """Put a queue between the monitored items of a new subscription and its notifications."""
+        subscription = self.subscription_service.subscriptions[number]
+        queue: Any = NotificationQueue(subscription)
+        subscription.monitored_item_srv.isub = self._queues[number] = queue
+
+    def queue(self, number: int) -> NotificationQueue | None:
+        """That of a subscription, which ends also by its time-out."""
+        return self._queues.get(number) if number in self.subscription_service.subscriptions else None
+
+    def followed(self) -> set[ua.NodeId]:
+        """The nodes to which clients subscribe."""
+        self._queues = {number: queue for number, queue in self._queues.items() if self.queue(number) is queue}
+        return {item.what.NodeId for queue in self._queues.values() for item in queue.items.values()}
 
     def clients(self) -> list[ClientState]:
         """Those whose sessions have been activated."""
-        sessions = self._external_sessions.values()
-        return [one.present() for one in sessions if isinstance(one, GatewaySession) and one.is_activated()]
+        return [one.present() for one in self._sessions if one.is_activated()]
+
+
+class ConcurrentRequests:
+    """The requests of a connection, begun in the order in which they come and answered in that in which they are done.
+
+    The protocol permits it (OPC 10000-4, 4.3). Decryption and sequence numbers stay those of the library.
+    """
+
+    def __init__(self, connection: Any) -> None:
+        processor = self._processor = connection.processor
+        self._transport = connection.transport
+        self._process = processor.process_message
+        self._close = processor.close
+        self._answers: set[asyncio.Task[None]] = set()
+        processor.process_message, processor.close = self.process_message, self.close
+
+    async def process_message(self, seqhdr: Any, body: Buffer) -> bool:
+        head = body.copy()
+        service = nodeid_from_binary(head)
+        if service not in _MAY_WAIT:
+            return bool(await self._process(seqhdr, body))
+        if service != _CALL and len(self._answers) >= MOST_AT_ONCE:
+            fault = ua.ServiceFault()
+            fault.ResponseHeader.ServiceResult = status(ua.StatusCodes.BadTooManyOperations)
+            self._processor.send_response(struct_from_binary(ua.RequestHeader, head).RequestHandle, seqhdr, fault)
+            return True
+        task = asyncio.create_task(self._answer(seqhdr, body))
+        self._answers.add(task)
+        task.add_done_callback(self._answers.discard)
+        return True
+
+    async def _answer(self, seqhdr: Any, body: Buffer) -> None:
+        if not await self._process(seqhdr, body):
+            self._transport.close()  # as the library does
+
+    async def close(self) -> None:
+        """The connection is lost: what waits is not answered any more."""
+        for task in self._answers:
+            task.cancel()
+        await self._close()
+
+
+@dataclass(slots=True)
+class MonitoredItem:
+    what: ua.ReadValueId
+    handle: int
+    """The client's."""
+    filter: ChangeFilter
+    notified: ua.DataValue | None = None
+    """The value that the client knows."""
+
+
+class NotificationQueue:
+    """The queue of ``subscription``, into which only comes what the filters of its items let through.
+
+    The library notifies every change that the trigger of a filter selects; items have their numbers here for the handle of the
+    client, because the first value comes before the library says how it calls an item.
+    """
+
+    def __init__(self, subscription: Any) -> None:
+        self.subscription = subscription
+        self.items: dict[int, MonitoredItem] = {}
+        self.numbers: dict[int, int] = {}
+        """By the ids of the library."""
+        self._numbers = count(1)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.subscription, name)
+
+    def add(self, request: ua.MonitoredItemCreateRequest, what: ChangeFilter) -> tuple[int, ua.MonitoredItemCreateRequest]:
+        """The number of a new item, and what the library is to be asked for."""
+        number, asked = next(self._numbers), request.RequestedParameters
+        self.items[number] = MonitoredItem(request.ItemToMonitor, asked.ClientHandle, what)
+        if request.ItemToMonitor.AttributeId == ua.AttributeIds.EventNotifier:
+            return number, request
+        return number, replace(request, RequestedParameters=replace(asked, ClientHandle=number, Filter=what.trigger_only()))
+
+    def item(self, identity: int) -> MonitoredItem | None:
+        return self.items.get(self.numbers.get(identity, 0))
+
+    def forget(self, identity: int) -> None:
+        self.items.pop(self.numbers.pop(identity, 0), None)
+
+    async def enqueue_datachange_event(self, identity: int, one: ua.MonitoredItemNotification, size: int) -> None:
+        item = self.items[int(one.ClientHandle)]
+        value = part_of(one.Value, item.what.IndexRange)
+        if item.notified is None or differs(item.notified, value, item.filter):
+            item.notified = value
+            notification = ua.MonitoredItemNotification(item.handle, value)
+            await self.subscription.enqueue_datachange_event(identity, notification, size)
 
 
 class GatewaySession(InternalSession):
@@ -110,6 +255,7 @@ class GatewaySession(InternalSession):
 
     def __init__(self, server: GatewayServer, *arguments: Any, **named: Any) -> None:
         super().__init__(server, *arguments, **named)
+        self._server = server
         self._service = server.service
 
     @property
@@ -118,11 +264,12 @@ class GatewaySession(InternalSession):
         return replace(client, place=f"OPC UA, {address_text(self.name)}")
 
     def present(self) -> ClientState:
-        client = self._client
-        own = (one for one in self.subscription_service.subscriptions.values() if one.session_id == self.session_id)
-        items = [item for one in own for item in one.monitored_item_srv._monitored_items.values()]  # no other way in the library
-        names = [str(item.read_value_id.NodeId.Identifier) for item in items if item.read_value_id is not None]
+        client, subscriptions = self._client, self.subscription_service.subscriptions
+        own = (self._server.queue(number) for number, one in subscriptions.items() if one.session_id == self.session_id)
+        names = (str(item.what.NodeId.Identifier) for queue in own if queue is not None for item in queue.items.values())
         return ClientState(client.name, address_text(self.name), client.role.title, tuple(dict.fromkeys(names)))
+
+    # ------------------------------------------------------------------ values
 
     async def read(self, params: ua.ReadParameters) -> list[ua.DataValue]:
         wanted = params.NodesToRead
@@ -145,6 +292,8 @@ class GatewaySession(InternalSession):
             result = ua.HistoryReadResult()
             result.StatusCode = ua.StatusCode(error.code)
             return result
+
+    # ------------------------------------------------------------------ commands
 
     async def write(self, params: ua.WriteParameters) -> list[ua.StatusCode]:
         """As `call`."""
@@ -188,28 +337,82 @@ class GatewaySession(InternalSession):
         self._service.leave(self)
         await super().close_session(delete_subs)
 
+    # ------------------------------------------------------------------ subscriptions
+
     async def create_subscription(
         self,
         params: ua.CreateSubscriptionParameters,
-        callback: Publish,
+        callback: Callable[..., Any],
         request_callback: Callable[..., Any] | None = None,
     ) -> ua.CreateSubscriptionResult:
-        result = await super().create_subscription(params, packing(callback), request_callback)
-        subscription = self.subscription_service.subscriptions[result.SubscriptionId]
-        subscription.monitored_item_srv = MonitoredItems(subscription, self.aspace, self._service.unwatched)
+        result = await super().create_subscription(params, callback, request_callback)
+        self._server.queue_notifications(result.SubscriptionId)
         return result
 
-    async def transfer_subscriptions(
-        self, params: ua.TransferSubscriptionsParameters, callback: Publish
-    ) -> list[ua.TransferResult]:
-        return await super().transfer_subscriptions(params, packing(callback))
-
     async def create_monitored_items(self, params: ua.CreateMonitoredItemsParameters) -> list[ua.MonitoredItemCreateResult]:
+        queue = self._server.queue(params.SubscriptionId)
+        if queue is None:
+            return await super().create_monitored_items(params)  # raises what is wrong
         wanted = [one.ItemToMonitor.NodeId for one in params.ItemsToCreate]
         await self._service.refresh(wanted)
-        results = await super().create_monitored_items(params)
+        results: list[ua.MonitoredItemCreateResult] = []
+        for one in params.ItemsToCreate:
+            results.append(await self._monitor(queue, params, one))
+            if len(results) % AT_ONCE == 0:
+                await asyncio.sleep(0)
         self._service.watch(node for node, result in zip(wanted, results, strict=True) if result.StatusCode.is_good())
         return results
+
+    async def _monitor(
+        self, queue: NotificationQueue, params: ua.CreateMonitoredItemsParameters, one: ua.MonitoredItemCreateRequest
+    ) -> ua.MonitoredItemCreateResult:
+        try:
+            check_range(one.ItemToMonitor.IndexRange)
+            what = change_filter(self._server.read_attribute_value, one.ItemToMonitor, one.RequestedParameters.Filter)
+        except ua.UaStatusCodeError as error:
+            refused = ua.MonitoredItemCreateResult()
+            refused.StatusCode = ua.StatusCode(error.code)
+            return refused
+        number, asked = queue.add(one, what)
+        (result,) = await super().create_monitored_items(replace(params, ItemsToCreate=[asked]))
+        if result.StatusCode.is_good():
+            queue.numbers[result.MonitoredItemId] = number
+        else:
+            del queue.items[number]
+        return result
+
+    async def modify_monitored_items(self, params: ua.ModifyMonitoredItemsParameters) -> list[ua.MonitoredItemModifyResult]:
+        queue = self._server.queue(params.SubscriptionId)
+        if queue is None:
+            return await super().modify_monitored_items(params)  # raises what is wrong
+        return [await self._modify(queue, params, one) for one in params.ItemsToModify]
+
+    async def _modify(
+        self, queue: NotificationQueue, params: ua.ModifyMonitoredItemsParameters, one: ua.MonitoredItemModifyRequest
+    ) -> ua.MonitoredItemModifyResult:
+        item, asked = queue.item(one.MonitoredItemId), one.RequestedParameters
+        refused = ua.MonitoredItemModifyResult()
+        if item is None:
+            refused.StatusCode = status(ua.StatusCodes.BadMonitoredItemIdInvalid)
+            return refused
+        try:
+            what = change_filter(self._server.read_attribute_value, item.what, asked.Filter)
+        except ua.UaStatusCodeError as error:
+            refused.StatusCode = ua.StatusCode(error.code)
+            return refused
+        if item.what.AttributeId != ua.AttributeIds.EventNotifier:
+            item.filter, item.handle = what, asked.ClientHandle
+            one = replace(one, RequestedParameters=replace(asked, Filter=what.trigger_only()))
+        (result,) = await super().modify_monitored_items(replace(params, ItemsToModify=[one]))
+        return result
+
+    async def delete_monitored_items(self, params: ua.DeleteMonitoredItemsParameters) -> list[ua.StatusCode]:
+        codes = await super().delete_monitored_items(params)
+        queue = self._server.queue(params.SubscriptionId)
+        if queue is not None:
+            for identity in params.MonitoredItemIds:
+                queue.forget(identity)
+        return codes
 
 
 def _asked(asked: ua.WriteValue | ua.CallMethodRequest) -> dict[str, object]:
