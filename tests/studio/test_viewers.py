@@ -1,142 +1,159 @@
-"""Connections of viewers: what is written when, and to whom nothing more is written."""
+"""Connections of viewers: what is sent when, and to whom nothing more is sent."""
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
-from collections.abc import Iterable
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 import pytest
 from tests.support.studio_rig import Studio, check_message
+from virtual_loop import run_virtually
 
-from steptwin.machine import SECOND
-from steptwin.studio.viewers import MOST_UNREAD, PATIENCE_S, ViewerConnection
+from steptwin.studio.viewers import MOST_UNSENT, PATIENCE_S, ViewerConnection
 
-PATIENCE_NS = int(PATIENCE_S * SECOND)
-
-
-class Writer:
-    """A connection whose other end reads when it is told to."""
-
-    def __init__(self) -> None:
-        self.writes: list[list[dict[str, Any]]] = []
-        self.unread = 0
-        self.is_aborted = False
-
-    def write(self, texts: Iterable[str]) -> None:
-        messages = [json.loads(text) for text in texts]
-        for message in messages:
-            check_message(message)
-        self.writes.append(messages)
-
-    def abort(self) -> None:
-        self.is_aborted = True
+ASKED = {"type": "websocket.receive", "text": '{"do": "time"}'}
 
 
 class Viewer:
-    """A viewer of the studio behind a writer, which watches the time and follows events."""
+    """A viewer of the studio, which watches the time, follows events, and reads as long as ``reads`` is set."""
 
     def __init__(self, studio: Studio) -> None:
         self.studio = studio
-        self.writer = Writer()
+        self.sent: list[dict[str, Any]] = []
+        self.reads = asyncio.Event()
+        self.reads.set()
+        self.requests: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
         self.tab = studio.open()
-        self.connection = ViewerConnection(self.tab.session, self.writer, lambda: studio.now, studio.errors.append)
+        self.connection = ViewerConnection(self.tab.session, lambda: studio.now, studio.errors.append)
         self.tab.ok("watch", points=["time"], rate=30)
         self.tab.ok("follow", id=1)
-        self.look()
+        self.serving = asyncio.create_task(self.connection.serve(self.requests.get, self._send))
 
-    def look(self, after_ms: float = 100) -> list[dict[str, Any]]:
-        """What is written at the next tick."""
+    async def _send(self, message: Any) -> None:
+        await self.reads.wait()
+        self.sent.append(json.loads(message["text"]))
+        check_message(self.sent[-1])
+
+    async def look(self, after_ms: float = 100) -> list[dict[str, Any]]:
+        """What is sent at the next tick."""
         self.studio.run(after_ms)
-        self.writer.writes.clear()
+        self.sent.clear()
         self.connection.look(self.studio.now)
-        return [message for messages in self.writer.writes for message in messages]
+        for _ in range(3):
+            await asyncio.sleep(0)
+        return list(self.sent)
+
+    async def fill(self) -> None:
+        """Let more wait than is sent to a viewer that does not read."""
+        self.reads.clear()
+        for _ in range(MOST_UNSENT // 4000 + 1):
+            self.tab.ok("note", text="x" * 4000)
+        await self.look()
 
 
-@pytest.fixture
-def viewer() -> Viewer:
-    return Viewer(Studio())
+def with_viewer(story: Callable[[Viewer], Awaitable[None]]) -> None:
+    async def told() -> None:
+        viewer = Viewer(Studio())
+        viewer.requests.put_nowait(ASKED)  # the connection notices that it has entered
+        await viewer.look()
+        await asyncio.sleep(1)
+        await story(viewer)
+        viewer.serving.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await viewer.serving
+
+    run_virtually(told())
 
 
 def kinds(messages: list[dict[str, Any]]) -> set[str]:
     return {name for message in messages for name in message} - {"seq", "time_ns", "missed"}
 
 
-def test_all_messages_of_a_tick_are_one_write_and_none_is_none(viewer: Viewer) -> None:
-    viewer.tab.ok("note", text="here")
-    assert kinds(viewer.look(2000)) == {"values", "events", "clock", "control"}
-    assert len(viewer.writer.writes) == 1
-    assert viewer.look(0) == []
-    assert viewer.writer.writes == []
+def test_messages_of_a_tick_and_none_where_nothing_has_changed() -> None:
+    async def story(viewer: Viewer) -> None:
+        viewer.tab.ok("note", text="here")
+        assert kinds(await viewer.look(2000)) == {"values", "events", "clock", "control"}
+        assert await viewer.look(0) == []
+
+    with_viewer(story)
 
 
-def test_a_viewer_that_does_not_read_is_sent_nothing_more_and_the_present_when_it_reads_again(viewer: Viewer) -> None:
-    viewer.writer.unread = MOST_UNREAD + 1
-    for _ in range(20):
-        viewer.tab.ok("note", text="missed by nobody")
-        assert viewer.look() == []
-    viewer.writer.unread = MOST_UNREAD
-    written = viewer.look()
-    (values,) = [message["values"] for message in written if "values" in message]
-    assert values == {"1": [[0, pytest.approx(viewer.studio.value("time"), abs=1e-6)]]}
-    (events,) = [message["events"] for message in written if "events" in message]
-    assert len(events) == 20
-    assert not viewer.writer.is_aborted
-
-
-def test_the_connection_of_a_viewer_that_reads_nothing_for_long_ends(viewer: Viewer) -> None:
-    viewer.writer.unread = MOST_UNREAD + 3
-    viewer.look()
-    began = viewer.studio.now
-    while not viewer.writer.is_aborted:
-        viewer.look()
-    assert PATIENCE_NS < viewer.studio.now - began < PATIENCE_NS + SECOND
-
-
-def test_one_that_reads_slowly_has_time(viewer: Viewer) -> None:
-    for unread in range(MOST_UNREAD + 5, MOST_UNREAD, -1):
-        viewer.writer.unread = unread
-        viewer.look()
-        viewer.look(PATIENCE_S * 900)
-    assert not viewer.writer.is_aborted
-
-
-def test_requests_of_one_that_does_not_read_its_answers_wait(viewer: Viewer) -> None:
-    asked: list[str] = []
-
-    async def receive() -> dict[str, Any]:
-        if len(asked) == 3:
-            return {"type": "websocket.disconnect"}
-        asked.append("time")
-        return {"type": "websocket.receive", "text": '{"do": "time"}'}
-
-    async def send(message: Any) -> None:
-        pytest.fail(f"sent {message}")
-
-    async def serve() -> None:
-        viewer.writer.unread = MOST_UNREAD + 1
-        serving = asyncio.create_task(viewer.connection.serve(receive, send))
+def test_a_viewer_that_does_not_read_is_sent_nothing_more_and_the_present_when_it_reads_again() -> None:
+    async def story(viewer: Viewer) -> None:
+        await viewer.fill()
+        for _ in range(20):
+            viewer.tab.ok("note", text="missed by nobody")
+            assert await viewer.look() == []
+        viewer.reads.set()
         for _ in range(5):
             await asyncio.sleep(0)
-        assert len(asked) == 1
-        viewer.writer.unread = 0
-        viewer.look()
-        await serving
+        written = await viewer.look()
+        (values,) = [message["values"] for message in written if "values" in message]
+        assert values == {"1": [[0, pytest.approx(viewer.studio.value("time"), abs=1e-6)]]}
+        (events,) = [message["events"] for message in written if "events" in message]
+        assert len(events) == 20
 
-    asyncio.run(serve())
-    assert len(asked) == 3
+    with_viewer(story)
 
 
-def test_an_error_in_one_connection_ends_that_connection_only(viewer: Viewer, monkeypatch: pytest.MonkeyPatch) -> None:
-    other = Viewer(viewer.studio)
+def test_the_connection_of_a_viewer_that_reads_nothing_for_long_ends() -> None:
+    async def story(viewer: Viewer) -> None:
+        await viewer.fill()
+        began = asyncio.get_running_loop().time()
+        await viewer.serving
+        assert asyncio.get_running_loop().time() - began == pytest.approx(PATIENCE_S, abs=0.1)
 
+    with_viewer(story)
+
+
+def test_one_that_reads_slowly_has_time() -> None:
+    async def story(viewer: Viewer) -> None:
+        await viewer.fill()
+        for _ in range(3):
+            await asyncio.sleep(0.9 * PATIENCE_S)
+            viewer.reads.set()
+            await asyncio.sleep(0)
+            viewer.reads.clear()
+            viewer.tab.ok("note", text="more")
+            await viewer.look()
+        assert not viewer.serving.done()
+
+    with_viewer(story)
+
+
+def test_requests_of_one_that_does_not_read_its_answers_wait() -> None:
+    async def story(viewer: Viewer) -> None:
+        await viewer.fill()
+        for _ in range(3):
+            viewer.requests.put_nowait(ASKED)
+        for _ in range(5):
+            await asyncio.sleep(0)
+        assert viewer.requests.qsize() == 2
+        viewer.reads.set()
+        for _ in range(20):
+            await asyncio.sleep(0)
+        assert viewer.requests.empty()
+        viewer.requests.put_nowait({"type": "websocket.disconnect"})
+        await viewer.serving
+
+    with_viewer(story)
+
+
+def test_an_error_in_one_connection_ends_that_connection_only(monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(now: int) -> list[str]:
         raise ValueError(str(now))
 
-    monkeypatch.setattr(viewer.tab.session, "take", fail)
-    assert viewer.look() == []
-    assert viewer.writer.is_aborted
-    assert [type(error) for error in viewer.studio.errors] == [ValueError]
-    assert kinds(other.look())
-    assert not other.writer.is_aborted
+    async def story(viewer: Viewer) -> None:
+        other = Viewer(viewer.studio)
+        monkeypatch.setattr(viewer.tab.session, "take", fail)
+        assert await viewer.look() == []
+        await viewer.serving
+        assert [type(error) for error in viewer.studio.errors] == [ValueError]
+        assert kinds(await other.look())
+        assert not other.serving.done()
+        other.serving.cancel()
+
+    with_viewer(story)

@@ -19,7 +19,7 @@ from steptwin.access.tokens import AccessGate
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.machine import Nanos
 from steptwin.studio.requests import REQUESTS
-from steptwin.studio.viewers import HELLO_S, PATIENCE_S, REFUSED, SILENT, AsgiReceive, AsgiScope, AsgiSend
+from steptwin.studio.viewers import HELLO_S, PATIENCE_S, REFUSED, SILENT, AsgiReceive, AsgiScope, AsgiSend, until_first
 from steptwin.subject.dispatch import failure, fields_of, read_message
 from steptwin.subject.fields import read_fields
 
@@ -68,7 +68,7 @@ class Editors:
         else:
             self._count += 1
             try:
-                await self._converse(receive, send, scope["state"]["writer"].abort, token)
+                await self._converse(receive, send, token)
             finally:
                 self._count -= 1
 
@@ -83,13 +83,13 @@ class Editors:
             raise Refusal(f"there are {MOST_EDITORS} editors already, the most possible")
         return token
 
-    async def _converse(self, receive: AsgiReceive, send: AsgiSend, abort: Callable[[], None], token: str | None) -> None:
-        loop = asyncio.get_running_loop()
+    async def _converse(self, receive: AsgiReceive, send: AsgiSend, token: str | None) -> None:
+        loop, is_full = asyncio.get_running_loop(), asyncio.Event()
         outgoing: asyncio.Queue[str] = asyncio.Queue(MOST_WAITING)
 
         def put(text: str) -> None:
             if outgoing.full():
-                abort()
+                is_full.set()
             else:
                 outgoing.put_nowait(text)
 
@@ -100,26 +100,27 @@ class Editors:
 
         files = self._files()
         there = await self._elsewhere(lambda: _begin(files, say))
-        writing = asyncio.create_task(_write(outgoing, send, abort))
         await outgoing.put(json.dumps({"ok": None}))
-        limit = RateLimit(RATE, BURST)
         try:
-            while (message := await receive())["type"] == "websocket.receive":
-                text = message.get("text")
-                if text is None:
-                    raise Misuse("a message is a text of JSON; this one is binary")
-                self._gate.enter(token)  # it may be asked for since a device was connected
-                if not limit.allows(self._clock()):
-                    raise Refusal(f"too many messages: permitted are {RATE:g} a second")
-                if await self._elsewhere(lambda text=text: _receive(there, text)) > MOST_DOCUMENTS:
-                    raise Refusal(f"too many texts: permitted are {MOST_DOCUMENTS}")
+            await until_first(self._read(receive, there, token), _write(outgoing, send), is_full.wait())
         except SteptwinError as error:
             await _end(send, SILENT, error)
+        except (TimeoutError, OSError):
+            pass  # it does not read, or is gone
         finally:
-            writing.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await writing
             await self._elsewhere(there.close)
+
+    async def _read(self, receive: AsgiReceive, there: Conversation, token: str | None) -> None:
+        limit = RateLimit(RATE, BURST)
+        while (message := await receive())["type"] == "websocket.receive":
+            text = message.get("text")
+            if text is None:
+                raise Misuse("a message is a text of JSON; this one is binary")
+            self._gate.enter(token)  # it may be asked for since a device was connected
+            if not limit.allows(self._clock()):
+                raise Refusal(f"too many messages: permitted are {RATE:g} a second")
+            if await self._elsewhere(lambda text=text: _receive(there, text)) > MOST_DOCUMENTS:
+                raise Refusal(f"too many texts: permitted are {MOST_DOCUMENTS}")
 
     async def _elsewhere(self, call: Callable[[], T]) -> T:
         """What a call gives that is made in the other thread."""
@@ -155,14 +156,11 @@ def _receive(there: Conversation, text: str) -> int:
     return there.documents
 
 
-async def _write(outgoing: asyncio.Queue[str], send: AsgiSend, abort: Callable[[], None]) -> None:
-    try:
-        while True:
-            text = await outgoing.get()
-            async with asyncio.timeout(PATIENCE_S):
-                await send({"type": "websocket.send", "text": text})
-    except (TimeoutError, OSError):
-        abort()
+async def _write(outgoing: asyncio.Queue[str], send: AsgiSend) -> None:
+    while True:
+        text = await outgoing.get()
+        async with asyncio.timeout(PATIENCE_S):
+            await send({"type": "websocket.send", "text": text})
 
 
 async def _end(send: AsgiSend, code: int, error: Exception) -> None:

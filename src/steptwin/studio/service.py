@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import asyncio
 import socket
 import time
-from collections.abc import Callable, Iterable
-from typing import Any
+from collections.abc import Callable
 
 from fastapi import FastAPI
-from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
-from websockets.protocol import State
-from websockets.server import ServerProtocol
 
 from steptwin import __version__
 from steptwin.access.origin import Origins
@@ -26,37 +21,6 @@ from steptwin.studio.viewers import Viewers
 from steptwin.subject.dispatch import LONGEST_REQUEST
 
 
-class _Protocol(WebSocketsSansIOProtocol):
-    """A connection whose application may write without waiting, and ends it where its other end does not read."""
-
-    def connection_made(self, transport: Any) -> None:
-        self.app_state = {**self.app_state, "writer": _SocketWriter(self.conn, transport)}
-        super().connection_made(transport)
-
-
-class _SocketWriter:
-    """What one viewer or editor is sent."""
-
-    def __init__(self, protocol: ServerProtocol, transport: asyncio.Transport) -> None:
-        self._protocol = protocol
-        self._transport = transport
-
-    @property
-    def unread(self) -> int:
-        return self._transport.get_write_buffer_size()
-
-    def write(self, texts: Iterable[str]) -> None:
-        protocol = self._protocol
-        if protocol.state is not State.OPEN or self._transport.is_closing():
-            return
-        for text in texts:
-            protocol.send_text(text.encode())
-        self._transport.write(b"".join(protocol.data_to_send()))
-
-    def abort(self) -> None:
-        self._transport.abort()
-
-
 class StudioService:
     """Serves ``hub`` at ``listening`` until it is closed. A `Link` of a server."""
 
@@ -67,7 +31,9 @@ class StudioService:
         self._editors = Editors(around.gate, around.programs.files, clock)
         sockets = {viewers.PATH: self._viewers.serve, editors.PATH: self._editors.serve}
         guarded = Guard(make_app(hub, clock), sockets, origins, clock, around.on_internal)
-        self._http = HttpService(guarded, listening, tls, ws=_Protocol, ws_max_size=LONGEST_REQUEST, ws_per_message_deflate=False)
+        self._http = HttpService(
+            guarded, listening, tls, ws="websockets-sansio", ws_max_size=LONGEST_REQUEST, ws_per_message_deflate=False
+        )
 
     def start(self) -> None:
         """Raises `LineFailure` for a certificate that cannot be used."""

@@ -1,7 +1,6 @@
 """Viewers over WebSockets: each request is answered, and messages of a session are sent as fast as its viewer reads.
 
 Everything runs in the event loop of the world, so commands are done between the requests of its other clients, without locks.
-Nothing that is sent waits or has a task of its own: all messages of a viewer that are there at a tick are one write.
 """
 
 from __future__ import annotations
@@ -9,11 +8,12 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-from collections.abc import Awaitable, Callable, Iterable, MutableMapping
-from typing import Any, Protocol, TypeAlias
+from collections import deque
+from collections.abc import Awaitable, Callable, Coroutine, Iterable, MutableMapping
+from typing import Any, TypeAlias
 
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, Nanos
+from steptwin.machine import Nanos
 from steptwin.studio.hub import Hub
 from steptwin.studio.session import ViewerSession
 from steptwin.subject.dispatch import Message, failure
@@ -26,29 +26,26 @@ PATH = "/ws"
 TICK_S = 1 / 30
 PATIENCE_S = 10.0
 """Time-out for a viewer that does not read."""
-MOST_UNREAD = 65_536
-"""A viewer with more unread bytes than this is sent nothing more, and its requests wait."""
+MOST_UNSENT = 65_536
+"""A viewer for which more characters than this wait is sent nothing more, and its requests wait."""
 HELLO_S = 10.0
 """Time-out for the hello of a connection."""
 REFUSED, SILENT = 4401, 4400
 """Close codes: wrong token, no hello."""
 
 
-class MessageWriter(Protocol):
-    """The sending half of a connection; ``scope["state"]["writer"]``."""
-
-    @property
-    def unread(self) -> int:
-        """Number of bytes that the operating system has not accepted yet."""
-        ...
-
-    def write(self, texts: Iterable[str]) -> None:
-        """Send messages, at once. Nothing on a connection that ends."""
-        ...
-
-    def abort(self) -> None:
-        """End the connection; unread bytes are dropped."""
-        ...
+async def until_first(*coroutines: Coroutine[Any, Any, Any]) -> None:
+    """Run them until one of them ends, then cancel the others. Raises its error."""
+    tasks = [asyncio.create_task(one) for one in coroutines]
+    try:
+        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        ended = [task for task in tasks if task.done()]
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.wait(tasks)
+    for task in ended:
+        task.result()
 
 
 class Viewers:
@@ -65,7 +62,7 @@ class Viewers:
         await receive()  # that it wants to connect
         await send({"type": "websocket.accept"})
         session = ViewerSession(self._hub, _peer(scope))
-        connection = ViewerConnection(session, scope["state"]["writer"], self._clock, self._hub.around.on_internal)
+        connection = ViewerConnection(session, self._clock, self._hub.around.on_internal)
         self._connections.add(connection)
         if self._ticking is None:
             self._ticking = asyncio.create_task(self._tick())
@@ -98,29 +95,30 @@ class Viewers:
 class ViewerConnection:
     """A connection. Answers are sent in order."""
 
-    def __init__(
-        self,
-        session: ViewerSession,
-        writer: MessageWriter,
-        clock: Callable[[], Nanos],
-        on_internal: Callable[[Exception], object],
-    ) -> None:
+    def __init__(self, session: ViewerSession, clock: Callable[[], Nanos], on_internal: Callable[[Exception], object]) -> None:
         self._session = session
-        self._writer = writer
         self._clock = clock
         self._on_internal = on_internal
+        self._unsent: deque[str] = deque()
+        self._size = 0
+        """Characters in ``_unsent``."""
+        self._is_wanted = asyncio.Event()
+        """Something is to be sent."""
         self._has_room = asyncio.Event()
         self._has_room.set()
-        self._unread = 0
-        """What there was when the viewer read something last, while there is too much."""
-        self._read_at: Nanos = 0
+        self._ended = asyncio.Event()
 
     async def serve(self, receive: AsgiReceive, send: AsgiSend) -> None:
-        silent = asyncio.get_running_loop().call_later(HELLO_S, self._writer.abort)
+        with contextlib.suppress(TimeoutError, OSError):  # it does not read, or is gone
+            await until_first(self._read(receive, send), self._send(send), self._ended.wait())
+
+    async def _read(self, receive: AsgiReceive, send: AsgiSend) -> None:
+        silent = asyncio.get_running_loop().call_later(HELLO_S, self._ended.set)
         try:
             while (message := await receive())["type"] == "websocket.receive":
                 self._answer(message.get("text"))
                 if self._session.is_refused:
+                    await self._send_all(send)
                     await send({"type": "websocket.close", "code": REFUSED})
                     return
                 if self._session.has_entered:
@@ -133,36 +131,48 @@ class ViewerConnection:
     def _answer(self, text: str | None) -> None:
         """Send an answer when it is available; other requests are served meanwhile."""
         if text is None:
-            self._write(failure(Misuse("a message is a text of JSON; this one is binary")))
+            self._answered(failure(Misuse("a message is a text of JSON; this one is binary")))
         else:
             answer = self._session.receive(text, self._clock())
-            answer.then(lambda: self._write(answer.result()))
+            answer.then(lambda: self._answered(answer.result()))
 
-    def _write(self, answer: Message) -> None:
-        self._writer.write((json.dumps(answer, separators=(",", ":")),))
+    def _answered(self, answer: Message) -> None:
+        self._put((json.dumps(answer, separators=(",", ":")),))
+
+    def _put(self, texts: Iterable[str]) -> None:
+        for text in texts:
+            self._unsent.append(text)
+            self._size += len(text)
+        self._is_wanted.set()
+
+    async def _send(self, send: AsgiSend) -> None:
+        while True:
+            await self._is_wanted.wait()
+            self._is_wanted.clear()
+            await self._send_all(send)
+
+    async def _send_all(self, send: AsgiSend) -> None:
+        """Raises `TimeoutError` for a viewer that does not read."""
+        while self._unsent:
+            text = self._unsent.popleft()
+            async with asyncio.timeout(PATIENCE_S):
+                await send({"type": "websocket.send", "text": text})
+            self._size -= len(text)
+        self._has_room.set()
 
     def look(self, now: Nanos) -> None:
-        """Send the available messages, if the viewer reads them; end the connection of one that has not for long."""
-        unread = self._writer.unread
-        if unread > MOST_UNREAD:
-            if self._has_room.is_set() or unread < self._unread:
-                self._has_room.clear()
-                self._unread, self._read_at = unread, now
-            elif now - self._read_at > PATIENCE_S * SECOND:
-                self._writer.abort()
+        """Send the available messages, if the viewer reads them."""
+        if self._size > MOST_UNSENT:
+            self._has_room.clear()
             return
-        self._has_room.set()
         if self._session.is_refused:  # since there is a device, a token is needed
-            self._writer.abort()
+            self._ended.set()
             return
         try:
-            texts = self._session.take(now)
+            self._put(self._session.take(now))
         except Exception as error:  # noqa: BLE001  it is reported here only
             self._on_internal(error)
-            self._writer.abort()
-            return
-        if texts:
-            self._writer.write(texts)
+            self._ended.set()
 
 
 def _peer(scope: AsgiScope) -> str:
