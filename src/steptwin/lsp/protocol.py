@@ -20,10 +20,7 @@ class Protocol(LanguageServerProtocol):
     """
 
     _is_initialized = False
-
-    @property
-    def is_shut_down(self) -> bool:
-        return self._shutdown
+    is_shut_down = False
 
     def structure_message(self, data: dict[str, Any]) -> Any:
         try:
@@ -48,9 +45,10 @@ class Protocol(LanguageServerProtocol):
                 super().handle_message(message)
         elif not self._is_initialized:
             self.refuse(number, JsonRpcServerNotInitialized("the first request is initialize"))
-        elif self._shutdown:
+        elif self.is_shut_down:
             self.refuse(number, JsonRpcInvalidRequest("the server has been shut down"))
         else:
+            self.is_shut_down = method == lsp.SHUTDOWN
             super().handle_message(message)
 
     def refuse(self, number: int | str | None, error: JsonRpcException) -> None:

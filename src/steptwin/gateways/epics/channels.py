@@ -80,7 +80,7 @@ class _RecordChannel(ChannelData):
         """Publish the value of the record where it, its alarm or its limits are others."""
         value, alarm = _shown(self.row, self.record.value(self.row.name)), self.record.alarm
         limits = _limits(self.record, self.row)
-        has_other_limits = any(self._data[name] != limit for name, limit in limits.items())
+        has_other_limits = any(getattr(self, name) != limit for name, limit in limits.items())
         if is_same(self.value, value) and alarm == self.shown_alarm and not has_other_limits:
             return
         if alarm != self.shown_alarm:
