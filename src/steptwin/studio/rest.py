@@ -24,6 +24,7 @@ from steptwin.studio.hub import Hub
 from steptwin.studio.requests import ALL, OF_CONNECTION, permit_of
 from steptwin.studio.schema import answer_schemas
 from steptwin.studio.session import STOPS, ViewerSession
+from steptwin.subject.commands import COMMANDS
 from steptwin.subject.dispatch import LONGEST_REQUEST, Message, failure
 from steptwin.subject.schema import definitions, request_schema
 
@@ -54,10 +55,10 @@ class Rest:
         self._sessions: dict[tuple[Role, str | None], ViewerSession] = {}
 
     def add_to(self, app: FastAPI) -> None:
-        answers = {"describe": {"$ref": "#/$defs/(description)"}, **answer_schemas()}
+        words = {name: row.result for name, row in COMMANDS.items()}
+        answers = {**words, "describe": {"$ref": "#/$defs/(description)"}, **answer_schemas()}
         for name, row in ALL.items():
             if name not in OF_CONNECTION:
-                answer = answers.get(name)
                 permit = permit_of(name)
                 needs = f" Role {permit.role.title}{', and control' if permit.control else ''}."
                 app.add_api_route(
@@ -69,7 +70,7 @@ class Rest:
                     summary=row.meaning,
                     description=row.meaning + needs,
                     openapi_extra=_extra(body=_body(name)),
-                    responses=RESPONSES if answer is None else {**RESPONSES, DONE: _done(answer)},
+                    responses={**RESPONSES, DONE: _done(answers[name])},
                 )
         reading = (
             _Reading("/api/describe", self._describe, "get_describe", "What there is."),

@@ -18,6 +18,17 @@ class CommandRow:
     meaning: str
     answer: str
     fields: tuple[Field, ...] = ()
+    is_list: bool = False
+    """Whether the answer is a list of what ``answer`` names; without, it is one, or `NOTHING`."""
+
+    @property
+    def result(self) -> dict[str, object]:
+        """A schema of the answer; the words are its description."""
+        if self.answer == NOTHING:
+            return {"type": "null"}
+        if self.is_list:
+            return {"type": "array", "items": {"type": "object"}, "description": self.answer}
+        return {"type": "object", "description": self.answer}
 
 
 MACHINE = Field("machine", TEXT, "The name of a machine.")

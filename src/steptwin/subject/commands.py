@@ -254,6 +254,7 @@ _ROWS = (
         "The present values of points.",
         "a list of point, value, unit, quality ('good', or 'unknown' with value null)",
         (Field("points", NAMES, "Points, such as table.M1.position, table.IN3, x.position, time."),),
+        is_list=True,
     ),
     CommandRow(
         "pins",
@@ -269,16 +270,28 @@ _ROWS = (
         "the state, alike for all kinds",
         (MACHINE, Field("parts", NAMES, "Only these parts: status, program, pins, details, names of axes.", None)),
     ),
-    CommandRow("encoders", Encoders, "The encoders of a machine.", "a list of axis, counts, turned_by", (MACHINE,)),
-    CommandRow("faults", ListFaults, "The faults that are set.", "a list of name, fault, seen (occasions), happened (how often)"),
+    CommandRow("encoders", Encoders, "The encoders of a machine.", "a list of axis, counts, turned_by", (MACHINE,), is_list=True),
+    CommandRow(
+        "faults",
+        ListFaults,
+        "The faults that are set.",
+        "a list of name, fault, seen (occasions), happened (how often)",
+        is_list=True,
+    ),
     CommandRow(
         "fault_kinds",
         ListFaultKinds,
         "The kinds of faults.",
         "a list of name, layer, occasion, meaning, lines, parameters: name, meaning, permitted, default, words, required",
+        is_list=True,
     ),
     CommandRow("time", Time, "The present moment, and how time goes.", "world, time_ns, time_s, paused, speed, stopped"),
-    CommandRow("end_points", EndPoints, "Where programs can connect.", "a list of kind, protocol and the address"),
+    CommandRow(
+        "end_points",
+        EndPoints,
+        "Where programs can connect.",
+        "name, pid, file, controllers, end_points: a list of kind, protocol and the address",
+    ),
     CommandRow(
         "follow",
         Follow,
@@ -445,7 +458,7 @@ _ROWS = (
         "name, time_ns",
         (Field("name", TEXT, "Its name; a number without.", None),),
     ),
-    CommandRow("snapshots", ListSnapshots, "The states that are kept.", "a list of name, time_ns"),
+    CommandRow("snapshots", ListSnapshots, "The states that are kept.", "a list of name, time_ns", is_list=True),
     CommandRow(
         "restore",
         RestoreSnapshot,

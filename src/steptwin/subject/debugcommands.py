@@ -254,6 +254,7 @@ ROWS = (
         "The statement that comes next, or is waited in, then those to which it returns; empty where no program runs.",
         "a list of name (the label before it), program, source, line, column, end_line, end_column",
         (MACHINE,),
+        is_list=True,
     ),
     CommandRow(
         "values",
@@ -261,6 +262,7 @@ ROWS = (
         "A group of values where the debugger stands.",
         f"a list of {_VALUE}",
         (MACHINE, Field("scope", choice(*SCOPES), "Which group.")),
+        is_list=True,
     ),
     CommandRow(
         "evaluate",
