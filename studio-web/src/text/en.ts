@@ -95,7 +95,8 @@ export const en = {
   keyHelp: "These keys",
   guide: "First minute",
   guideLook: "What there is, and where programs connect: the panel Overview. The tree on the left has all axes.",
-  guideMove: "To move an axis: the panel Axes, Enable, then hold a jog button. It stops when you let go.",
+  guideMove:
+    "To move an axis: the panel Axes, Enable where there is one, then hold a jog button. It stops when you let go.",
   guideStop: "Stop all is always at the top right; Space does the same, and Escape where nothing is open.",
   guideKeys: "? shows all keys. Point at a value or a field: its meaning, range and section of the manual.",
   guideShow: "Show",

@@ -98,7 +98,8 @@ export const pl: Record<keyof typeof en, string> = {
   keyHelp: "Te klawisze",
   guide: "Pierwsza minuta",
   guideLook: "Co tu jest i gdzie łączą się programy: panel Przegląd. Drzewo po lewej ma wszystkie osie.",
-  guideMove: "Ruch osi: panel Osie, załącz napęd, potem przytrzymaj przycisk ruchu. Puszczony zatrzymuje oś.",
+  guideMove:
+    "Ruch osi: panel Osie, załącz napęd, jeśli jest taki przycisk, potem przytrzymaj przycisk ruchu. Puszczony zatrzymuje oś.",
   guideStop:
     "„Zatrzymaj wszystko” jest zawsze w prawym górnym rogu; tak samo działa spacja, a gdy nic nie jest otwarte, Escape.",
   guideKeys: "? pokazuje wszystkie klawisze. Wskaż wartość lub pole: znaczenie, zakres i rozdział instrukcji.",

@@ -4,7 +4,7 @@ export const t = texts(
   {
     title: "Overview",
     first: "First steps",
-    firstMove: "Move an axis: panel Axes, Enable, then hold a jog button.",
+    firstMove: "Move an axis: panel Axes, Enable where there is one, then hold a jog button.",
     firstConnect: "Connect your own program to one of the addresses below.",
     firstWhy: "Something does not move? Status and alarms are here, what happened is at the bottom.",
     gotIt: "Got it",
@@ -57,7 +57,7 @@ export const t = texts(
   {
     title: "Przegląd",
     first: "Pierwsze kroki",
-    firstMove: "Rusz oś: panel Osie, załącz napęd, potem przytrzymaj przycisk ruchu.",
+    firstMove: "Rusz oś: panel Osie, załącz napęd, jeśli jest taki przycisk, potem przytrzymaj przycisk ruchu.",
     firstConnect: "Połącz własny program z jednym z adresów poniżej.",
     firstWhy: "Coś się nie rusza? Stan i alarmy są tutaj, a co się wydarzyło – na dole.",
     gotIt: "Rozumiem",
