@@ -1,4 +1,4 @@
-"""Small worlds with values by chance, and all that can be seen of them.
+"""Small worlds with values by chance, and rules that hold for each of them.
 
 A world is made of a `Scene`, a description with gaps (`Chance.filled`). What begins with ``?``, a line or a whole table, is left
 out by chance. ``! kind = ...`` is a fault, of the description or of a step. ``* condition`` is an event.
@@ -7,41 +7,35 @@ out by chance. ``! kind = ...`` is a fault, of the description or of a step. ``*
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
+from contextlib import suppress
 from itertools import islice
 
 from axis_scenes import AXIS_SCENES
 from belt_scenes import BELT_SCENES
 from chance import Chance
-from heard import Listener, faults_as_text
 from machine_scenes import MACHINE_SCENES
 from plant_scenes import PLANT_SCENES
 from scenes import Scene
 
-from steptwin.diagnostics import render, to_json
+from steptwin.diagnostics import Severity
 from steptwin.errors import Misuse, Refusal
-from steptwin.files.export import axis_views
 from steptwin.files.session import session_of
 from steptwin.files.world import World
 from steptwin.machine import SECOND, Nanos
-from steptwin.motion.divisions import StepTrain
-from steptwin.motion.profile import Profile
-from steptwin.simulation.describe.overrides import read_overrides
 from steptwin.simulation.describe.pieces import given_files
 from steptwin.simulation.describe.steptable import read_steps
-from steptwin.simulation.kinds.programs import Place, StatementFollower
+from steptwin.simulation.faults import read as read_fault
 from steptwin.simulation.logic.signal import SignalOf
-from steptwin.simulation.scheduler.trace import TraceRecord, encode
-from steptwin.simulation.toml.reader import TomlText
+from steptwin.simulation.toml.reader import TomlText, WorldError
 from steptwin.simulation.world.actions import ACTIONS
 from steptwin.simulation.world.check import diagnose
 from steptwin.simulation.world.history import History, Past
 from steptwin.simulation.world.inputs import Bytes, Download, Leave, See, SetVariable
 from steptwin.simulation.world.plant import Plant
-from steptwin.simulation.world.unfinished import unchanged_inputs, waiting
+from steptwin.simulation.world.unfinished import waiting
 from steptwin.simulation.world.views import MechanicsView
-from steptwin.simulation.world.worldprograms import WorldPrograms, program_texts
-from steptwin.subject.describe import describe
+from steptwin.simulation.world.worldprograms import WorldPrograms
 from steptwin.wire.crc import with_crc
 
 STEPS = 16
@@ -96,77 +90,54 @@ def fault(chance: Chance, line: str, name: str) -> tuple[str, str]:
     return "[[fault]]\n" + given.replace(", ", "\n"), ""
 
 
-def seen(name: str, seed: int) -> dict[str, list[str]]:
-    """What a world is made of, what it shows at some moments, and what has happened in it.
-
-    It is brought back to one of the moments, or another world goes on from there, and its session is replayed: if anything is
-    different then, that is said, too.
-    """
+def check_it_goes_on_alike(name: str, seed: int) -> None:
+    """What a world shows and does is the same when it goes on from a snapshot, goes back to its past, and is replayed."""
     chance, scene = Chance(name, seed), SCENES[name]
     text, from_outside = described(chance, scene)
     files = {file: chance.filled(content).encode() for file, content in scene.files.items()}
     world = World.from_toml(text, files)
-    statements: list[TraceRecord] = []
-    follower = StatementFollower(world.programs, statements.append)
-    listener, history = Listener(world), History(world)
+    assert [str(read_fault(str(one))) for one in world.spec.faults] == [str(one) for one in world.spec.faults]
+    history = History(world)
     moments = sorted(chance.below(round(END_S * SECOND)) for _ in range(MOMENTS))
     steps = list(zip(moments, from_outside, strict=True))
     cut = chance.below(MOMENTS)
-    values = go_on(world, steps[:cut], moments[cut], files)
-    values += do_from_outside(world, steps[cut][1], files)
+    go_on(world, steps[:cut], moments[cut], files)
+    do_from_outside(world, steps[cut][1], files)
     history.take()
     snapshot = world.snapshot()
-    values += go_on(world, steps[cut + 1 :], round(END_S * SECOND), files)
-    happened = [repr((*one[:4], shown_value(one), one.facts)) for one in (*world.trace, *statements)]
-    follower.close()
-    listener.close()
-    happened += listener.found + watched(text, files)
-    end, digest_there = shown(world), world.trace.digest()
-    values += past_of(history, chance.below(round(END_S * SECOND)))
-    replayed = session_of(world).replay()
+    go_on(world, steps[cut + 1 :], round(END_S * SECOND), files)
+    end, digest = shown(world), world.trace.digest()
+    check_past(history, chance.below(round(END_S * SECOND)))
+    assert session_of(world).replay().trace.digest() == digest
     other = world if chance.below(2) else world.branch(snapshot)
     other.restore(snapshot)
     go_on(other, steps[cut + 1 :], round(END_S * SECOND), files)
-    if shown(other) != end:
-        values.append("it goes on differently from a snapshot")
-    if not replayed.trace.digest() == other.trace.digest() == digest_there:
-        values.append("something else happens when it is replayed, or from a snapshot")
-    return {"parts": parts(world), "values": values, "trace": happened}
+    assert shown(other) == end
+    assert other.trace.digest() == digest
 
 
-def past_of(history: History, moment: int) -> list[str]:
-    """What has changed between its states, and what another world shows that goes back to a moment and then to the end."""
+def check_past(history: History, moment: int) -> None:
+    """Another world that goes back to a moment and then to the end shows the same there."""
     history.take()
-    found = [repr(sorted(history.state_at(history.world.now).changed)), repr(sorted(history.state_at(moment).changed))]
     past = Past(history)
-    for _ in past.go(moment):
-        pass
-    found += shown(past.world)
-    for _ in past.go(history.world.now):
-        pass
+    for until in (moment, history.world.now):
+        for _ in past.go(until):
+            pass
     history.close()
-    if seen_of_machines(past.world) != seen_of_machines(history.world):
-        found.append("it was different in the past")
-    return found
+    assert seen_of_machines(past.world) == seen_of_machines(history.world)
 
 
-def go_on(world: World, steps: list[tuple[int, str]], end: int, files: Mapping[str, bytes]) -> list[str]:
-    """Do steps at their moments, and run on to the end; what the world shows then."""
-    found: list[str] = []
+def go_on(world: World, steps: list[tuple[int, str]], end: int, files: Mapping[str, bytes]) -> None:
+    """Do steps at their moments, and run on to the end; who looks on does not matter."""
     for moment, step in steps:
         world.run(until=moment / SECOND)
-        found += [f"due {world.due()}", *shown(world)]
-        found += do_from_outside(world, step, files)
+        shown(world)
+        do_from_outside(world, step, files)
     world.run(until=end / SECOND)
-    for name, line in world.lines.items():
-        there = line.places.get("python")
-        if there is not None:
-            found.append(repr((name, there.kind, world.line[name].received())))
-    return found + shown(world)
 
 
-def do_from_outside(world: World, text: str, files: Mapping[str, bytes]) -> list[str]:
-    """Do now, as somebody outside of the world, a step of a description, or what no description has; why it cannot be done."""
+def do_from_outside(world: World, text: str, files: Mapping[str, bytes]) -> None:
+    """Do now, as somebody outside of the world, a step of a description, or what no description has, as far as it can be done."""
     if not text.startswith("@ "):
         toml = TomlText("steps", f"steps = [{text}]")
         for step in read_steps(toml, ("steps",), toml.data["steps"]):
@@ -174,8 +145,8 @@ def do_from_outside(world: World, text: str, files: Mapping[str, bytes]) -> list
                 world.apply_input(step)
             else:
                 world.at(world.time, step)
-        return []
-    try:
+        return
+    with suppress(Misuse, Refusal):
         match text[2:].split():
             case ["see", machine, *numbers]:
                 world.apply_input(See(machine, *map(float, numbers)))
@@ -190,26 +161,6 @@ def do_from_outside(world: World, text: str, files: Mapping[str, bytes]) -> list
                 world.apply_input(Leave(line, "python"))
             case [line, data]:
                 world.line[line].send(with_crc(bytes.fromhex(data)))
-    except (Misuse, Refusal) as error:
-        return [str(error)]
-    return []
-
-
-def watched(text: str, files: Mapping[str, bytes]) -> list[str]:
-    """What programs with a text do in such a world, if nothing comes from outside."""
-    if not any(file.endswith(".prg") for file in files):
-        return []
-    world = World.from_toml(text, files)
-    kernels = world.parts.kernel_of
-    watches = [world.kind(name).watch_program(machine, kernels[name], name) for name, machine in world.machines.items()]
-    world.run(until=END_S)
-    acts = [act for watch in watches if watch is not None for act in watch.happened]
-    return [repr((act.time, act.text, act.place)) for act in acts]
-
-
-def shown_value(record: TraceRecord) -> object:
-    """Of a motion all that it has, as in the digest of a trace."""
-    return encode(record).hex() if isinstance(record.value, Profile | StepTrain) else record.value
 
 
 def shown(world: Plant) -> list[str]:
@@ -242,68 +193,28 @@ def told_of(name: str, signal: SignalOf, now: Nanos) -> str:
     return f"{name} {signal.value(now):.9g} {signal.unit} {signal.bounds} {turns}"
 
 
-def parts(world: World) -> list[str]:
-    """As viewers and exports get them."""
-    there = describe(world)
-    found: list[object] = [*there.axes, there.buttons, *there.elements, *there.connections, *there.lines]
-    spec = world.spec
-    found += [spec.lines, spec.gateways, spec.history, spec.drawing, dict(axis_views(world)), unchanged_inputs(world, 0)]
-    return [*(repr(one) for one in found), *faults_as_text(world), *programs_of(world)]
-
-
-def programs_of(world: World) -> Iterator[str]:
-    """What is in the program memories of its controllers, as editors and debuggers get it."""
-    yield repr(WorldPrograms(world).files())
-    for machine, programs in world.programs.items():
-        for place, source in programs.texts.items():
-            numbers = range(len(programs.statements(place)))
-            yield repr((machine, source.name, programs.statements(place), programs.labels(place), dict(programs.after(place))))
-            for number in numbers:
-                at = Place(place, number)
-                yield repr((programs.use(at), programs.comes_back(at), sorted(programs.reached(place, [number]))))
-        for text in program_texts(world, machine):
-            yield repr((text.place, to_json(text.source, text.check()), text.memory(text.source.text)))
-
-
 VALUES = ("0", "-1", "1e300", "''", "'x'", "'c.IN1'", "'c.OUT1'", "'c.M1'", "[]", "[[0, 1]]", "true", "'10 ms'", "{}")
 
 
-def wrong(name: str, seed: int) -> list[str]:
-    """Descriptions with one or two mistakes by chance, or with a value in the place of another; and what is told of each."""
+def check_mistakes_are_found(name: str, seed: int) -> None:
+    """A description with one or two mistakes by chance has an error at a place of its text, or can be built."""
     chance, scene = Chance(name, seed), SCENES[name]
     text, _ = described(chance, scene)
     files = {file: chance.filled(content).encode() for file, content in scene.files.items()}
-    found = []
     for _ in range(WRONG):
         lines = text.split("\n")
-        found += replaced(chance, text, files)
         for _ in range(1 + chance.below(2)):
             damage(chance, lines)
-        found += told("\n".join(lines), files)
-    return found
-
-
-def told(text: str, files: Mapping[str, bytes]) -> list[str]:
-    """What is wrong with a description. What is said of a text that is not TOML is Python's."""
-    diagnosis = diagnose("w.toml", text, given_files(files))
-    if any(one.code == "D001" for one in diagnosis.findings):
-        return []
-    shown = [f"{one.code} {one.span} {one.message} ({one.hint}) {one.fix}" for one in diagnosis.findings]
-    return [text, *shown, *(render(source, of) for source, of in diagnosis.files)]
-
-
-def replaced(chance: Chance, text: str, files: Mapping[str, bytes]) -> list[str]:
-    """What comes of an override of a key of a table by the value of another one."""
-    keys = re.findall(r"^([a-z_]+) = (.*)$", text, re.MULTILINE)
-    names = re.findall(r"^name = .(\w+).$", text, re.MULTILINE)
-    tables = re.findall(r"^\[+(.*?)\]+$", text, re.MULTILINE)
-    owner = (names if chance.below(4) else tables)[chance.below(min(len(names), len(tables)))]
-    key, value = keys[chance.below(len(keys))][0], keys[chance.below(len(keys))][1]
-    given = read_overrides([f"{owner}.{key}={value}"])
-    try:
-        return [repr(given), *parts(World.from_toml(text, files, overrides=given))]
-    except Misuse as error:
-        return [repr(given), str(error)]
+        mistaken = "\n".join(lines)
+        findings = diagnose("w.toml", mistaken, given_files(files)).findings
+        assert all(0 <= one.span.start <= one.span.end <= len(mistaken) for one in findings), mistaken
+        try:
+            World.from_toml(mistaken, files)
+        except WorldError:
+            can_be_built = False
+        else:
+            can_be_built = True
+        assert can_be_built is not any(one.severity is Severity.ERROR for one in findings), mistaken
 
 
 def damage(chance: Chance, lines: list[str]) -> None:
