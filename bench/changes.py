@@ -28,7 +28,7 @@ from collections.abc import Callable, Generator
 from pathlib import Path
 
 from steptwin import World
-from steptwin.commands.up_world import Running, UpOptions, up_with
+from steptwin.live.running import Running, UpOptions, up_with
 from steptwin.simulation.script.steps import Set
 
 HERE = Path(__file__).parent

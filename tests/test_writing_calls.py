@@ -17,9 +17,9 @@ PERMITTED = {
     "files/ownership.py: os.ftruncate": "a lock file has no content that could be lost",
     "live/pty.py: replace": "a symbolic link to a pseudo terminal",
     "live/pty.py: os.open": "a pseudo terminal",
-    "commands/owntokens.py: os.open": "a file of tokens is made where there is none (O_EXCL)",
-    "commands/owntokens.py: open": "the same",
-    "commands/auditfile.py: replace": "the log that is full gets another name",
+    "live/studio/owntokens.py: os.open": "a file of tokens is made where there is none (O_EXCL)",
+    "live/studio/owntokens.py: open": "the same",
+    "files/auditfile.py: replace": "the log that is full gets another name",
 }
 WRITERS = {"write_bytes", "write_text"}
 """Methods of paths. What appends or makes a new file (modes ``a`` and ``x``) overwrites nothing."""

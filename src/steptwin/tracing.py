@@ -1,6 +1,6 @@
 """Traces of requests: from a gateway over a line to a device, and how long each part takes. Nothing is traced without a tracer.
 
-A span belongs to the one around it in the same task. `steptwin.commands.telemetry` sends them to an OpenTelemetry collector.
+A span belongs to the one around it in the same task. `steptwin.live.telemetry` sends them to an OpenTelemetry collector.
 """
 
 from __future__ import annotations

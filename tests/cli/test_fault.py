@@ -12,9 +12,9 @@ import pytest
 from typer.testing import CliRunner
 
 from steptwin.cli import app
-from steptwin.commands.serve import ServeOptions
-from steptwin.commands.serve_m1486 import ServeM1486, serve_m1486
-from steptwin.commands.serve_mic488 import ServeMic488, serve_mic488
+from steptwin.cli.serve_m1486 import ServeM1486, serve_m1486
+from steptwin.cli.serve_mic488 import ServeMic488, serve_mic488
+from steptwin.cli.serving import ServeOptions
 from steptwin.errors import Misuse
 from steptwin.simulation.faults import KINDS
 

@@ -33,7 +33,7 @@ def test_links_are_those_of_the_options_or_the_usual_ones(
     monkeypatch: pytest.MonkeyPatch, device: str, option: list[str], expected: dict[str, str]
 ) -> None:
     served: list[Any] = []
-    monkeypatch.setattr(f"steptwin.commands.serve_{device}.serve_{device}", lambda twin, controllers: served.append(twin))
+    monkeypatch.setattr(f"steptwin.cli.serve_{device}.serve_{device}", lambda twin, controllers: served.append(twin))
     assert CliRunner().invoke(app, ["serve", device, *option]).exit_code == 0
     links = served[0].links.items()
     assert {key: Path(value).name if key == "pty" else value for key, value in links if value is not None} == expected
@@ -50,7 +50,7 @@ def test_files_of_an_encrypted_line_are_given_together() -> None:
 @pytest.mark.parametrize("device", ["mic488", "m1486"])
 def test_time_and_control_are_as_with_up(monkeypatch: pytest.MonkeyPatch, device: str) -> None:
     started: list[Any] = []
-    monkeypatch.setattr("steptwin.commands.serve.up_with", lambda world, options: started.append(options))
+    monkeypatch.setattr("steptwin.cli.serving.up_with", lambda world, options: started.append(options))
     words = ["serve", device, "--tcp", ANYWHERE, "--speed", "0.1", "--control", ANYWHERE]
     assert CliRunner().invoke(app, words).exit_code == 0
     assert (started[0].speed, started[0].control) == ("0.1", ANYWHERE)

@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from steptwin.commands.serve import ServeOptions
-from steptwin.commands.serve_m1486 import ServeM1486, serve_m1486
+from steptwin.cli.serve_m1486 import ServeM1486, serve_m1486
+from steptwin.cli.serving import ServeOptions
 from steptwin.errors import Misuse
 
 Serve = Callable[..., Any]

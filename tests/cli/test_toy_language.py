@@ -9,9 +9,9 @@ import pytest
 from shell import Shell
 from toy.language import TARGETS, registered_language
 
-from steptwin.commands.languages import register
-from steptwin.commands.languages.contract import FileLanguage
 from steptwin.errors import Misuse
+from steptwin.languages import register
+from steptwin.languages.contract import FileLanguage
 
 
 @pytest.fixture

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 from shell import Shell
 
-from steptwin.commands.travels import parse_travel
 from steptwin.drivers.typed import tied
 from steptwin.errors import Misuse, SteptwinError
+from steptwin.languages.travels import parse_travel
 from steptwin.live.pace import read_speed
 from steptwin.mic488.registers import register_map
 from steptwin.mic488.values import value_of

@@ -93,7 +93,7 @@ def test_ctrl_c_ends_a_run_and_keeps_what_it_did(tmp_path: Path, monkeypatch: py
     def bar(*_: object) -> Generator[Callable[[int], None]]:
         yield lambda now: signal.raise_signal(signal.SIGINT) if now == SECOND else None
 
-    monkeypatch.setattr("steptwin.commands.run_world.bar", bar)
+    monkeypatch.setattr("steptwin.languages.run_world.bar", bar)
     session = tmp_path / "s.json"
     told = invoke("run", str(FEEDER), "--for", "20s", "--session", str(session), code=130)
     assert "1 s of bar feeder in" in told

@@ -24,11 +24,11 @@ from typer.core import TyperOption
 
 from steptwin.cli import app, main
 from steptwin.cli.writtenfiles import keep_apart
-from steptwin.commands.studio_drawing import WorldArrangement
 from steptwin.errors import SteptwinError
 from steptwin.files.memory import StateDirectory
 from steptwin.files.session import save, session_of
 from steptwin.files.world import World
+from steptwin.live.studio.drawing import WorldArrangement
 from steptwin.simulation.describe.arrangement import DrawnPlace
 
 OLD = b"[mic488]\n# the old one\n" * 100
@@ -237,7 +237,7 @@ def test_every_option_that_names_a_file_to_write_keeps_it_apart() -> None:
 def test_a_log_of_commands_to_the_standard_output_is_not_renamed(tmp_path: Path) -> None:
     """It was, when it was full, and over a pipe the first command failed."""
     python = "from pathlib import Path; from steptwin.access.audit import Audit; "
-    python += "from steptwin.commands.auditfile import AuditFile\n"
+    python += "from steptwin.files.auditfile import AuditFile\n"
     python += "with AuditFile(Path('/dev/stdout'), 1) as file: file.add(type('E', (), {'plain': lambda self: {}})())"
     done = subprocess.run([sys.executable, "-c", python], capture_output=True, check=True, cwd=tmp_path)
     assert done.stdout == b"{}\n"

@@ -8,15 +8,15 @@ from pathlib import Path
 
 import pytest
 
-from steptwin.commands.run_m1486 import M1486Run
-from steptwin.commands.run_m1486 import run as run_m1486
-from steptwin.commands.run_wbc import WbcRun
-from steptwin.commands.run_wbc import run as run_wbc
-from steptwin.commands.run_world import WorldRun
-from steptwin.commands.run_world import run as run_world
-from steptwin.commands.up_world import UpOptions, up
 from steptwin.errors import Misuse
 from steptwin.files.coverage import CoverageReports
+from steptwin.languages.run_m1486 import M1486Run
+from steptwin.languages.run_m1486 import run as run_m1486
+from steptwin.languages.run_wbc import WbcRun
+from steptwin.languages.run_wbc import run as run_wbc
+from steptwin.languages.run_world import WorldRun
+from steptwin.languages.run_world import run as run_world
+from steptwin.live.running import UpOptions, up
 from steptwin.machine import SECOND
 
 PROGRAM = "IF IN1 = 1\nOUT1 = ON\nENDIF\nEND\n"

@@ -13,8 +13,8 @@ from gateway_rig import running
 from pymodbus.client import ModbusTcpClient
 from tests.conftest import run_command, until
 
-from steptwin.commands.telling import Telling
 from steptwin.errors import Misuse
+from steptwin.live.telling import Telling
 
 WORLD = """
 [[line]]

@@ -14,7 +14,6 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from world_rig import TWO_LINES
 
-from steptwin.commands.up_world import LiveWorld, PlacePort, UpOptions, up
 from steptwin.errors import Misuse, Refusal
 from steptwin.files.session import load, session_of
 from steptwin.files.world import World
@@ -23,6 +22,7 @@ from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
 from steptwin.live.links import Feed
 from steptwin.live.pace import Pace
+from steptwin.live.running import LiveWorld, PlacePort, UpOptions, up
 from steptwin.live.world_control import WorldControl
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.subject.commands import read_command

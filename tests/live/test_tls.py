@@ -17,13 +17,13 @@ from tests.conftest import until
 from tls_files import Authority
 
 from steptwin.access.roles import Role
-from steptwin.commands.certificate import make_certificate
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.exchange import Job
 from steptwin.drivers.mic488.driver import AsyncMic488
 from steptwin.drivers.mic488.lines import ThreadModbusLine
 from steptwin.drivers.modbus import ModbusQuery
 from steptwin.errors import LineFailure, Misuse, Refusal
+from steptwin.files.certificate import make_certificate
 from steptwin.live.clients import Clients
 from steptwin.live.rfc2217 import TwinLine
 from steptwin.live.transports import TRANSPORTS, LinkArguments

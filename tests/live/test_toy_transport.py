@@ -12,10 +12,10 @@ import pytest
 from toy import kind as toy_kind
 from toy import transport
 
-from steptwin.commands.up_world import UpOptions, up
 from steptwin.errors import Misuse
 from steptwin.files.session import load
 from steptwin.files.world import World
+from steptwin.live.running import UpOptions, up
 from steptwin.live.transports import forget, register
 from steptwin.simulation.kinds.registry import line_kinds
 from steptwin.simulation.toml.reader import WorldError

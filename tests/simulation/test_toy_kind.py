@@ -13,7 +13,6 @@ from toy.kind import TOY, registered
 from typer.testing import CliRunner
 
 from steptwin.cli import app
-from steptwin.commands.up_world import UpOptions, up
 from steptwin.datasheet import plain
 from steptwin.errors import LineFailure, Misuse, Refusal
 from steptwin.files.export import axis_views, read_trace, write_trace
@@ -23,6 +22,7 @@ from steptwin.live import twins
 from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
 from steptwin.live.output import Output
+from steptwin.live.running import UpOptions, up
 from steptwin.live.view import LiveView
 from steptwin.live.world import LiveWorld, PlacePort, announced
 from steptwin.live.world_frames import follow_frames

@@ -17,8 +17,8 @@ import pytest
 from tests.conftest import STEPTWIN, until
 from websockets.sync.client import ClientConnection, connect
 
-from steptwin.commands.demo import FOLDER, describe_demo
 from steptwin.errors import Refusal
+from steptwin.live.studio.demo import FOLDER, describe_demo
 from steptwin.studio.page import find_page
 
 if TYPE_CHECKING:

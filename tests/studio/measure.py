@@ -19,7 +19,7 @@ from typing import Any
 from pymodbus.client import ModbusTcpClient
 from websockets.asyncio.client import connect
 
-from steptwin.commands.demo import FOLDER, describe_demo
+from steptwin.live.studio.demo import FOLDER, describe_demo
 
 SECONDS = 10.0
 Counts = Any

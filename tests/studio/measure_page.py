@@ -20,7 +20,7 @@ from typing import Any
 
 from playwright.sync_api import Page, sync_playwright
 
-from steptwin.commands.demo import FOLDER, describe_demo
+from steptwin.live.studio.demo import FOLDER, describe_demo
 
 CONTROLLERS = 100
 ON_A_LINE = 25

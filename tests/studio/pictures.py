@@ -15,7 +15,7 @@ from PIL import Image
 from playwright.sync_api import Browser, Locator, Page, sync_playwright
 from tests.studio.measure_page import show, studio
 
-from steptwin.commands.demo import describe_demo
+from steptwin.live.studio.demo import describe_demo
 from steptwin.studio.page import find_page
 
 ROOT = Path(__file__).parents[2]

@@ -20,11 +20,11 @@ from websockets.exceptions import ConnectionClosed
 
 from steptwin.access.roles import Role
 from steptwin.access.tokens import Token
-from steptwin.commands.openpage import OpenedPage
-from steptwin.commands.owntokens import own_tokens
-from steptwin.commands.studio import DEFAULT, AccessInfo
-from steptwin.commands.studio_drawing import WorldArrangement
 from steptwin.errors import Misuse
+from steptwin.live.studio.drawing import WorldArrangement
+from steptwin.live.studio.openpage import OpenedPage
+from steptwin.live.studio.owntokens import own_tokens
+from steptwin.live.studio.start import DEFAULT, AccessInfo
 from steptwin.simulation.describe.arrangement import DrawnPlace
 from steptwin.simulation.describe.description import read_world
 from steptwin.studio.rest import NO_TOKEN

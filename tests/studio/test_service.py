@@ -292,9 +292,9 @@ def test_options_that_do_not_go_together_are_named(options: tuple[str, ...], mes
 
 
 def test_the_next_free_port_is_taken_and_named(start_studio: Start, monkeypatch: pytest.MonkeyPatch) -> None:
-    from steptwin.commands import studio as command
     from steptwin.errors import LineFailure
     from steptwin.httpservice import listen
+    from steptwin.live.studio import start as command
     from steptwin.simulation.toml.addresses import Address
 
     assert Address("127.0.0.1", 8488) == command.DEFAULT

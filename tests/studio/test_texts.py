@@ -9,9 +9,9 @@ from functools import cache
 import pytest
 from tests.support.sentences import ROOT, Sentences, has_words, refused, table
 
-from steptwin.commands.demo import FOLDER, describe_demo
 from steptwin.datasheet import Datasheet
 from steptwin.files.world import World
+from steptwin.live.studio.demo import FOLDER, describe_demo
 from steptwin.m1486.datasheet import datasheet_of
 from steptwin.m1486.microsteps import UNIT
 from steptwin.m1486.variants import VARIANTS

@@ -12,7 +12,6 @@ from typing import Any
 from chip_rig import ChipWire, chip_task_line
 from mic488_rig import MM, controller, loaded
 
-from steptwin.commands.bridge import _Devices, connections_of
 from steptwin.devices.composite import CompositeSubject
 from steptwin.devices.device import ConnectedDevice, DeviceSurroundings
 from steptwin.drivers.m1486 import AsyncM1486
@@ -23,6 +22,7 @@ from steptwin.drivers.mic488.subject import Mic488Part
 from steptwin.drivers.place import LineAddress
 from steptwin.drivers.subject import AsyncDeviceSubject, DevicePart
 from steptwin.drivers.tasks import TaskLine
+from steptwin.live.bridge import _Devices, connections_of
 from steptwin.live.cell import Cell
 from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.device import Mic488Device

@@ -20,10 +20,10 @@ from functools import partial
 from pathlib import Path
 
 from steptwin.cli import main
-from steptwin.commands.studio_drawing import WorldArrangement
 from steptwin.files.export import write_trace
 from steptwin.files.session import save, session_of
 from steptwin.files.world import World
+from steptwin.live.studio.drawing import WorldArrangement
 from steptwin.simulation.describe.arrangement import DrawnPlace
 
 PROGRAM = "if in1=1\ndelay 5\nendif\n" * 800 + "end\n"

@@ -5,11 +5,11 @@ from __future__ import annotations
 import asyncio
 from typing import Any
 
-from steptwin.commands.gateways import LiveWorldSubject
 from steptwin.devices.composite import CompositeSubject
 from steptwin.devices.worldpart import WorldPart
 from steptwin.files.world import World
 from steptwin.live.cell import Cell
+from steptwin.live.gateways import LiveWorldSubject
 from steptwin.live.pace import Pace
 from steptwin.live.world import LiveWorld
 from steptwin.live.world_control import WorldControl

@@ -23,6 +23,6 @@ def command(
     """Serve real devices to programs of a plant, by the gateways of a file, until Ctrl-C.
 
     It owns the lines of the devices: commands are sent in order, stops first, and nothing is repeated."""
-    from steptwin.commands.bridge import bridge as serve_devices
+    from steptwin.live.bridge import bridge as serve_devices
 
     serve_devices(file, listen_any=listen_any, ready_file=ready_file, audit=audit, telling=log.telling())

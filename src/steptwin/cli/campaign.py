@@ -59,8 +59,8 @@ def run(
 
     Exit code 1 when a property failed in a run.
     """
-    from steptwin.commands.campaign import CampaignOptions
-    from steptwin.commands.campaign import run as run_campaign
+    from steptwin.cli.campaign_runs import CampaignOptions
+    from steptwin.cli.campaign_runs import run as run_campaign
 
     options = CampaignOptions(
         file=file,
@@ -95,7 +95,7 @@ def faults(
 
     Writes faults.html, faults.csv and a session of each run. Exit code 1 when one was unsafe.
     """
-    from steptwin.commands.campaign_faults import faults as run_faults
+    from steptwin.cli.campaign_faults import faults as run_faults
 
     if not run_faults(file, out, typer.echo, jobs=jobs, phases=phases, as_json=json):
         raise typer.Exit(1)
@@ -108,7 +108,7 @@ def compare(
     json: Json = False,
 ) -> None:
     """Compare two campaigns, such as before and after a change of the program. Exit code 1 when it became worse."""
-    from steptwin.commands.campaign import compare as compare_folders
+    from steptwin.cli.campaign_runs import compare as compare_folders
 
     if not compare_folders(before, after, typer.echo, as_json=json):
         raise typer.Exit(1)
@@ -120,7 +120,7 @@ def show(
     json: Json = False,
 ) -> None:
     """Show the summary of a campaign. Exit code 1 when a property failed in a run."""
-    from steptwin.commands.campaign import show as show_summary
+    from steptwin.cli.campaign_runs import show as show_summary
 
     if not show_summary(folder, typer.echo, as_json=json):
         raise typer.Exit(1)

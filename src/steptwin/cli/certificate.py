@@ -23,7 +23,7 @@ def command(
     name: Annotated[str, typer.Option(help="Who has it, as others see it.")] = "steptwin",
 ) -> None:
     """Make a certificate, signed by itself, and its key: for [gateway.opcua], tls_tcp of a [[line]], steptwin studio."""
-    from steptwin.commands.certificate import make_certificate
+    from steptwin.files.certificate import make_certificate
 
     for file in make_certificate(folder, host or [], days, role=role, name=name):
         typer.echo(file)

@@ -35,10 +35,10 @@ def command(
 ) -> None:
     """Check a file and report everything wrong or doubtful in it: WBC programs (.prg), position tables (.csv), configurations
     (.cfg), worlds (.toml); all others are M1486 programs."""
-    from steptwin.commands.languages import ability
-    from steptwin.commands.languages.contract import count
     from steptwin.diagnostics import Severity, render, to_json
     from steptwin.files.textfiles import read_text
+    from steptwin.languages import ability
+    from steptwin.languages.contract import count
 
     language, checker = ability(file, "check", lambda one: one.check)
     given = given_of(wbc, chip)

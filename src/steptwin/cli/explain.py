@@ -31,6 +31,6 @@ def command(
 
     Also loops that it never leaves, interrupts that can be lost, and lines that are never reached.
     """
-    from steptwin.commands.explain import show
+    from steptwin.cli.explain_pages import show
 
     show(file, given_of(wbc, chip), option_of, output, typer.echo, as_json=json)

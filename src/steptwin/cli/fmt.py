@@ -19,8 +19,8 @@ def command(
     json: Json = False,
 ) -> None:
     """Write WBC programs in one style: blanks, indentation, keywords in capitals. Lines with errors stay as they are."""
-    from steptwin.commands.languages import ability
     from steptwin.files.textfiles import read_text, write_bytes
+    from steptwin.languages import ability
 
     changed: list[str] = []
     for path in files:

@@ -44,7 +44,7 @@ def command(
 
     Without points: runs, and the points that there are. Dates are local time unless they have an offset.
     """
-    from steptwin.commands.history import HistoryOptions, show
+    from steptwin.cli.history_pages import HistoryOptions, show
 
     options = HistoryOptions(
         points=tuple(points or ()),

@@ -1,5 +1,5 @@
 """Options of commands that take files of several languages: a group for each that has options of its own
-(`steptwin.commands.languages.contract.FileLanguage.options`)."""
+(`steptwin.languages.contract.FileLanguage.options`)."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ def command(
     """Show what of a program does not fit another type of M1486 or another firmware of the MIC488, and why, with changes.
 
     Exit code 1 if errors are left."""
-    from steptwin.commands.migrate import migrate as migrate_file
+    from steptwin.cli.migrate_pages import migrate as migrate_file
 
     fits, data = migrate_file(file, to, old, output, (lambda _: None) if json else typer.echo)
     if json:

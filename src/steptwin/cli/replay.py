@@ -20,7 +20,7 @@ def command(
     json: Json = False,
 ) -> None:
     """Run a recorded session again and compare what happens."""
-    from steptwin.commands.run_world import replay as run_again
+    from steptwin.languages.run_world import replay as run_again
 
     if not run_again(file, trace, typer.echo, lambda text: typer.echo(text, err=True), as_json=json):
         raise typer.Exit(1)

@@ -1,6 +1,6 @@
 """``steptwin run``: run a program or a world in virtual time. Exit code 1 if something in it failed.
 
-From Python: `steptwin.commands.run_m1486.run` and its neighbours.
+From Python: `steptwin.languages.run_m1486.run` and its neighbours.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from steptwin.machine import Nanos
 
 WORLDS = (".toml", ".json")
-"""Suffixes of worlds and sessions; all other files are programs (`steptwin.commands.languages`)."""
+"""Suffixes of worlds and sessions; all other files are programs (`steptwin.languages`)."""
 
 File = Annotated[Path, typer.Argument(help="File to run: a program (.prg, .wbc, .m1486), a world (.toml) or a session (.json).")]
 Duration = Annotated[
@@ -164,8 +164,8 @@ def _program_runner(
     file: Path,
 ) -> Callable[[_CommonOptions, str | None, ProgramOptions, Mapping[str, Any]], bool]:
     """What runs a program. Raises `Misuse` for what is none."""
-    from steptwin.commands.languages import LANGUAGES, by_suffix
-    from steptwin.commands.program_run import ProgramRun
+    from steptwin.languages import LANGUAGES, by_suffix
+    from steptwin.languages.program_run import ProgramRun
 
     language = by_suffix(file)
     run_language = None if language is None else language.run
@@ -191,8 +191,8 @@ def _run_world(
     world: WorldRunOptions,
     shown: ShownOptions,
 ) -> bool:
-    from steptwin.commands.run_world import WorldRun
-    from steptwin.commands.run_world import run as run_world
+    from steptwin.languages.run_world import WorldRun
+    from steptwin.languages.run_world import run as run_world
 
     wanted = WorldRun(
         world=file,

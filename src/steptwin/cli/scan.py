@@ -36,8 +36,8 @@ def command(
 
     Exit code 1 when no device responds.
     """
-    from steptwin.commands.scanning import FoundAt, found_at, kinds_named, numbers_of
     from steptwin.live.ports import serial_ports, twin_ports
+    from steptwin.live.scanning import FoundAt, found_at, kinds_named, numbers_of
 
     kinds = kinds_named(kind, "--kind")
     numbers = numbers_of(units, "--units", 1, 247)

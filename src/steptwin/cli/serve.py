@@ -17,7 +17,7 @@ from steptwin.cli.writtenfiles import written
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
-    from steptwin.commands.serve import ServeOptions
+    from steptwin.cli.serving import ServeOptions
 
 command = typer.Typer(
     cls=CommandGroup, add_completion=False, rich_markup_mode=None, help="Serve a twin until Ctrl-C.", no_args_is_help=True
@@ -143,7 +143,7 @@ class TwinOptions(OptionGroup):
 
     def on(self, line: LineOptions, kind: str, ports: Mapping[str, int], log: LogOptions) -> ServeOptions:
         """The twin on a line; one that has no link gets those of ``ports`` and, where the system has them, a pseudo terminal."""
-        from steptwin.commands.serve import ServeOptions
+        from steptwin.cli.serving import ServeOptions
 
         name = kind if self.name is None else self.name
         return ServeOptions(
@@ -214,7 +214,7 @@ def mic488(
     system has them), on 127.0.0.1:5020 (Modbus TCP) and on
     127.0.0.1:5021 (RTU over TCP).
     """
-    from steptwin.commands.serve_mic488 import ServeMic488, serve_mic488
+    from steptwin.cli.serve_mic488 import ServeMic488, serve_mic488
     from steptwin.files.timedinputs import parse_duration
 
     controllers = ServeMic488(
@@ -254,7 +254,7 @@ def m1486(
 
     Without any of --pty, --serial, --tcp and --rfc2217 it listens on a pty and on 127.0.0.1:5022 (raw TCP).
     """
-    from steptwin.commands.serve_m1486 import ServeM1486, serve_m1486
+    from steptwin.cli.serve_m1486 import ServeM1486, serve_m1486
 
     chips = ServeM1486(variant=variant, chain=chain, interface=interface, wires=tuple(wire or ()), program=program)
     serve_m1486(twin.on(line, "m1486", {"tcp": M1486_TCP_PORT}, log), chips)

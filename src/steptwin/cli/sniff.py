@@ -1,6 +1,6 @@
 """``steptwin sniff``: the traffic between a master and a device, decoded, until Ctrl-C.
 
-From Python: `steptwin.commands.sniff.sniff`.
+From Python: `steptwin.live.sniff.sniff`.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ def command(
     """
     import asyncio
 
-    from steptwin.commands.sniff import sniff as run
     from steptwin.drivers.place import parse_line_address
+    from steptwin.live.sniff import sniff as run
     from steptwin.simulation.toml.addresses import parse_address
 
     decoding = _decoding(language, {"firmware": firmware, "variant": variant})
@@ -77,7 +77,7 @@ def _decoding(protocol: str, variants: Mapping[str, str | None]) -> Decoding:
 
 
 def _print(frame: FrameLine) -> None:
-    from steptwin.commands.sniff import ARROWS
+    from steptwin.live.sniff import ARROWS
     from steptwin.machine import SECOND
 
     arrow = ARROWS[frame.direction] if frame.raw else "?"

@@ -21,7 +21,7 @@ def command(twin: Twin = None, json: Json = False) -> None:
     if json:
         print_data(found)
         return
-    from steptwin.commands.state_text import lines
+    from steptwin.cli.state_text import lines
     from steptwin.controllerstate import read_state
 
     typer.echo("\n".join(lines(read_state(found), there.sheet(name))))

@@ -84,8 +84,8 @@ def command(
     machine asks for one only where a device is connected.
     """
     try:
-        from steptwin.commands.studio import studio as run_studio
-        from steptwin.commands.studiooptions import StudioOptions
+        from steptwin.live.studio.options import StudioOptions
+        from steptwin.live.studio.start import studio as run_studio
     except ModuleNotFoundError as error:
         if error.name is None or error.name.partition(".")[0] not in ("fastapi", "uvicorn", "websockets", "starlette"):
             raise

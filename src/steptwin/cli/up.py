@@ -57,8 +57,8 @@ def command(
         return
     if world is None:
         raise Misuse("a world is missing: give its description (.toml) or a session (.json)")
-    from steptwin.commands.auditfile import audit_into
-    from steptwin.commands.up_world import up as run_up
+    from steptwin.files.auditfile import audit_into
+    from steptwin.live.running import up as run_up
 
     wanted = replace(up_options(world, ready_file, live, options, log), past=past, coverage=tuple(coverage or ()))
     wanted = replace(wanted, names=tuple(shown.of or ()), kinds=tuple(shown.show or ()))

@@ -36,6 +36,6 @@ def command(
 
     A running twin answers if its past is kept: in the studio, or with 'steptwin up --past'.
     """
-    from steptwin.commands.why import answer
+    from steptwin.cli.why_pages import answer
 
     answer(where, question, at, typer.echo, as_json=json)

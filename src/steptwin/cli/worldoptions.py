@@ -12,8 +12,8 @@ from steptwin.cli.optiongroups import OptionGroup
 from steptwin.cli.writtenfiles import written
 
 if TYPE_CHECKING:
-    from steptwin.commands.telling import Telling
-    from steptwin.commands.up_world import UpOptions
+    from steptwin.live.running import UpOptions
+    from steptwin.live.telling import Telling
     from steptwin.machine import Nanos
     from steptwin.simulation.describe.overrides import Overrides
 
@@ -147,7 +147,7 @@ class LogOptions(OptionGroup):
     ] = None
 
     def telling(self) -> Telling:
-        from steptwin.commands.telling import Telling
+        from steptwin.live.telling import Telling
 
         return Telling(self.log_format, self.traces)
 
@@ -156,7 +156,7 @@ def up_options(
     world: Path | None, ready_file: Path | None, live: LiveOptions, options: WorldRunOptions, log: LogOptions
 ) -> UpOptions:
     """Raises `Misuse`."""
-    from steptwin.commands.up_world import UpOptions
+    from steptwin.live.running import UpOptions
 
     return UpOptions(
         world=world,

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from steptwin.commands.languages import LANGUAGES, ability
-from steptwin.commands.languages.contract import GivenOptions, Print
 from steptwin.errors import Misuse
 from steptwin.files.world import World
+from steptwin.languages import LANGUAGES, ability
+from steptwin.languages.contract import GivenOptions, Print
 from steptwin.nearmiss import NearMiss
 
 OPTIONS: Mapping[str, type] = {"positions": Path, "config": Path, "variant": str}

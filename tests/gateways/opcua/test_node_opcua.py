@@ -14,7 +14,7 @@ from pymodbus.client import ModbusTcpClient
 from tests.conftest import until
 from tokens import tokens_file
 
-from steptwin.commands.certificate import make_certificate
+from steptwin.files.certificate import make_certificate
 
 WORLD = """
     [[line]]

@@ -13,7 +13,7 @@ from cryptography.x509 import load_der_x509_certificate, load_pem_x509_certifica
 from gateway_rig import GatewayWorld
 
 from steptwin import World
-from steptwin.commands.certificate import make_certificate
+from steptwin.files.certificate import make_certificate
 from steptwin.gateways.opcua import gateway as opcua
 from steptwin.gateways.opcua import security
 from steptwin.simulation.describe.gateways import OpcUaSpec

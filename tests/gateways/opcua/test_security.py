@@ -15,8 +15,8 @@ from cryptography.hazmat.primitives.serialization import (
 )
 from tokens import tokens_file
 
-from steptwin.commands.certificate import make_certificate
 from steptwin.errors import Misuse
+from steptwin.files.certificate import make_certificate
 from steptwin.gateways.opcua.security import Security
 from steptwin.simulation.describe.description import read_world
 from steptwin.simulation.describe.gateways import OpcUaSpec

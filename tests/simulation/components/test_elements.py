@@ -14,11 +14,11 @@ from typer.testing import CliRunner
 from whole_world import everything
 
 from steptwin.cli import app
-from steptwin.commands.up_world import UpOptions, up
 from steptwin.errors import Misuse
 from steptwin.files.export import axis_views, read_trace, write_trace
 from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
+from steptwin.live.running import UpOptions, up
 from steptwin.machine import MILLISECOND
 from steptwin.simulation.components.button import BUTTON
 from steptwin.simulation.components.elementspec import ElementSpec

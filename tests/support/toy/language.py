@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Generator
 from contextlib import contextmanager
 
-from steptwin.commands.languages import LANGUAGES, register
-from steptwin.commands.languages.contract import CheckReport, FileLanguage, GivenOptions, Print, count
-from steptwin.commands.program_run import ProgramRun
 from steptwin.diagnostics import Diagnostic, Severity, SourceText, Span
 from steptwin.files.textfiles import read_text
+from steptwin.languages import LANGUAGES, register
+from steptwin.languages.contract import CheckReport, FileLanguage, GivenOptions, Print, count
+from steptwin.languages.program_run import ProgramRun
 
 
 def _check(source: SourceText, options: GivenOptions) -> CheckReport:

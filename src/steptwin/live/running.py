@@ -1,0 +1,341 @@
+"""`steptwin up MACHINE.toml`: run a world in real time, with lines to which other programs connect."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections.abc import Awaitable, Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import count
+from math import inf
+from pathlib import Path
+from typing import TypeAlias
+
+from steptwin.access.audit import Audit
+from steptwin.errors import Misuse
+from steptwin.files import session as sessions
+from steptwin.files.auditfile import wall_clock
+from steptwin.files.beginning import begin_world, check_session_target, is_session, set_faults
+from steptwin.files.coverage import CoverageReports
+from steptwin.files.export import axis_views, check_target, growing_file, read_trace, write_trace
+from steptwin.files.export.tracefile import Kept, Ring, TraceFile, read_kept
+from steptwin.files.world import World
+from steptwin.gateways.contract import OpenGateway
+from steptwin.live.cell import Cell
+from steptwin.live.clock import Clock
+from steptwin.live.display import Display, Lines, Notices, banner, remarks_on
+from steptwin.live.gateways import LiveWorldSubject, open_gateways, recording
+from steptwin.live.lookback import Lookback
+from steptwin.live.output import Output
+from steptwin.live.pace import Pace, read_speed
+from steptwin.live.rfc2217 import TwinLine
+from steptwin.live.server import Server, clear_ready_file
+from steptwin.live.serving import check_name, shows_live_view
+from steptwin.live.telling import Telling
+from steptwin.live.tracedport import TracedPort
+from steptwin.live.transports import TRANSPORTS, VISION
+from steptwin.live.world import LiveWorld, PlacePort, VisionPort, announced
+from steptwin.live.world_control import WorldControl
+from steptwin.machine import Nanos, SendingPort
+from steptwin.simulation.describe.overrides import Overrides
+from steptwin.simulation.kinds.kind import LineSpec, LinkKind
+from steptwin.simulation.kinds.lines import SCRIPTS
+from steptwin.simulation.kinds.registry import line_kinds
+from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.simulation.toml.addresses import check_addresses, parse_address
+from steptwin.simulation.world.inputs import Leave
+from steptwin.simulation.world.records import is_shown, named_in, read_selection
+from steptwin.tracing import is_traced
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UpOptions:
+    """The command's options as given; see ``steptwin up --help``."""
+
+    world: Path | None
+    """A description, or a session to continue; None for a world made from options."""
+    moment: Nanos | None = None
+    """The moment of the session to continue from; None: its end."""
+    seed: int | None = None
+    overrides: Overrides = field(default_factory=dict)
+    """Values that replace those of the description."""
+    state: Path | None = None
+    """Directory of the non-volatile memory; None: that of the description."""
+    speed: str = "1"
+    name: str | None = None
+    session: Path | None = None
+    """Where the session is written at the end."""
+    keeps_inputs: bool = False
+    """Whether a session is recorded that is only written on request."""
+    trace: str | None = None
+    """A file or directory, ``ring N`` or ``off``; None: the setting of the description."""
+    past: bool = False
+    """Whether the past is kept, for questions about it."""
+    coverage: Sequence[str] = ()
+    """Files for coverage of programs; ``-`` for a table."""
+    faults: Sequence[str] = ()
+    ready_file: Path | None = None
+    control: str | None = None
+    """HOST:PORT on this computer for the control endpoint, besides the local socket."""
+    strict: bool = False
+    """Whether a wait that timed out counts as a failure."""
+    listen_any: bool = False
+    log_frames: bool = False
+    names: Sequence[str] = ()
+    """What is shown: of these controllers, elements and lines only (`steptwin.simulation.world.records.Selection`)."""
+    kinds: Sequence[str] = ()
+    audit: Audit | None = None
+    """Where commands of gateways are recorded."""
+    allow_outside: bool = False
+    """Files of the description may lie anywhere."""
+    telling: Telling = field(default_factory=Telling)
+    is_closed: bool = False
+    """Whether nothing is open for other programs: neither lines nor the control endpoint."""
+
+    @property
+    def records_session(self) -> bool:
+        return self.keeps_inputs or self.session is not None
+
+
+@dataclass(frozen=True, slots=True)
+class Running:
+    """A world that is about to run, for what is served beside its lines."""
+
+    server: Server
+    live: LiveWorld
+    pace: Pace
+    control: WorldControl
+    gateways: list[OpenGateway] = field(default_factory=list)
+    """Those that are open, the history among them; empty until the world runs."""
+
+
+Addition: TypeAlias = Callable[[Running], Awaitable[None]]
+"""Opens further links of the world, which the server closes. With it no records are printed."""
+
+
+def up(options: UpOptions, addition: Addition | None = None) -> bool:
+    """Run a world until SIGINT, SIGTERM or SIGHUP, or until a script stops it. Returns whether all expectations held.
+
+    Raises `Misuse` or another `SteptwinError` with a text for the user.
+    """
+    if options.world is None:
+        raise Misuse("a world is missing: give its description (.toml) or a session (.json)")
+    check_name(options.name or options.world.stem)
+    read_speed(options.speed, least=0)
+    with begin_world(
+        options.world,
+        lambda text: sys.stderr.write(f"{text}\n"),
+        moment=options.moment,
+        seed=options.seed,
+        overrides=options.overrides,
+        keep_trace=options.trace not in (None, "off") or not is_session(options.world),
+        keep_inputs=options.records_session,
+        allow_outside=options.allow_outside,
+        state=options.state,
+    ) as world:
+        return up_with(world, options, addition)
+
+
+def up_with(world: World, options: UpOptions, addition: Addition | None = None) -> bool:
+    """As `up`, with an existing world."""
+    name = options.name or (world.spec.name if options.world is None else options.world.stem)
+    speed = read_speed(options.speed, least=0)
+    if not options.is_closed:
+        send_away(world)
+    past = [] if world.now else [record for record in world.trace if is_shown(record)]
+    kept = read_kept(options.trace or world.spec.trace or "off")
+    if kept is None:
+        world.trace.let_go()
+        if not options.records_session:
+            world.stop_recording()
+    set_faults(world, options.faults)
+    reports = CoverageReports(options.coverage)
+    reports.observe(world, Path() if options.world is None else options.world.parent)
+    outside = [line for line in world.spec.lines if line.is_open]
+    if speed == inf and outside:
+        raise Misuse(f"--speed max: line {outside[0].name!r} has external clients, which need real time; use 'steptwin run'")
+    addresses = [address for line in world.spec.lines for key, address in line.links.items() if TRANSPORTS[key].is_address]
+    addresses += [gateway.listen for gateway in world.spec.gateways]
+    check_addresses((*addresses, *(address for _, address in world.spec.vision_addresses())), listen_any=options.listen_any)
+    if isinstance(kept, Path):
+        check_target(kept)
+    if options.session is not None:
+        check_session_target(options.session)
+    if options.ready_file is not None:
+        clear_ready_file(options.ready_file)
+    asyncio.run(_serve(replace(options, name=name), world, past, kept, reports, addition))
+    return not world.failures and not (options.strict and world.overdue)
+
+
+def send_away(world: World) -> None:
+    """Disconnect the clients of a continued session: they are not connected now."""
+    for line in world.lines.values():
+        for place in [place for place in line.places if place != SCRIPTS]:
+            world.apply_input(Leave(line.name, place))
+
+
+async def _serve(
+    options: UpOptions,
+    world: World,
+    past: Sequence[TraceRecord],
+    kept: Kept,
+    reports: CoverageReports,
+    addition: Addition | None,
+) -> None:
+    with ExitStack() as stack:
+        output = options.telling.output()
+        stack.callback(output.close)
+        stack.enter_context(options.telling.tracing(world.spec.name, output.notice))
+        live = LiveWorld(world)
+        cell = Cell(live, Clock(begin=world.now))
+        quiet = addition is not None
+        display = Notices(live, output, frames=options.log_frames) if quiet else _display(live, cell, output, options)
+        live.show = display.notice
+        server = Server(cell, display.notice)
+        live.share_reads(cell)
+        pace = Pace(live, cell, display.notice, has_clients=any(line.is_open for line in world.spec.lines))
+        live.on_stop = server.end if addition is None else None
+        begun, recorder = False, None
+        try:
+            await _open(server, live, pace, options, addition)
+            recorder = _recorder(live, kept)
+            begun = True
+            head = banner(world, server.end_points, remarks_on(world, listen_any=options.listen_any))
+            display.begin(head, server.announcement(), past)
+            pace.begin(read_speed(options.speed, least=0))
+            await display.show(server)
+            cell.enter()
+        finally:
+            pace.close()
+            await server.close()
+            if begun:
+                _keep(options, live, output, recorder, kept, reports)
+
+
+def _display(live: LiveWorld, cell: Cell, output: Output, options: UpOptions) -> Display:
+    selection = read_selection(options.names, options.kinds, named_in(live.world.parts))
+    if not shows_live_view(output, log_frames=options.log_frames):
+        return Lines(live, output, frames=options.log_frames, selection=selection)
+    from steptwin.live.view import LiveView
+
+    return LiveView(live, cell, output, selection)
+
+
+def _recorder(live: LiveWorld, kept: Kept) -> TraceFile | None:
+    """The recorder that writes the trace to a file; None for a ring, which the world keeps."""
+    world, recorder = live.world, None
+    if isinstance(kept, int):
+        live.ring = Ring(world.trace, kept)
+    elif kept is not None:
+        live.trace_file = kept
+        recorder = TraceFile(world.trace, growing_file(kept), axis_views(world), world.spec.name, live.show)
+    if kept is not None:
+        world.trace.let_go()
+    return recorder
+
+
+def _keep(
+    options: UpOptions, live: LiveWorld, output: Output, recorder: TraceFile | None, kept: Kept, reports: CoverageReports
+) -> None:
+    """Write session, trace and coverage at the end: the session first, because a trace can be made from it. Raises `Misuse`."""
+    world = live.world
+    world.advance(world.now)
+    world.settle_all()
+    failures: list[str] = []
+    session = options.session
+    writing: list[Callable[[], list[Path]]] = [] if session is None else [partial(_write_session, session, live)]
+    if recorder is not None and isinstance(kept, Path):
+        writing.append(partial(_write_trace, recorder, kept, world.now))
+    writing.append(partial(reports.write, output.line))
+    for write in writing:
+        try:
+            for path in write():
+                output.line(f"wrote {path}")
+        except Misuse as error:
+            failures.append(str(error))
+    ended = "" if world.stopped is None else f", ended by: {world.stopped}"
+    inputs = f", {len(live.session().inputs)} inputs" if options.session is not None else ""
+    digest = f", digest {world.trace.digest()}" if world.trace.is_recorded else ""
+    output.line(f"ran for {world.time:.3f} s{inputs}{ended}{digest}")
+    if failures:
+        raise Misuse("\n".join(failures))
+
+
+def _write_session(where: Path, live: LiveWorld) -> list[Path]:
+    sessions.save(live.session(), where)
+    return [where]
+
+
+def _write_trace(recorder: TraceFile, where: Path, ended: Nanos) -> list[Path]:
+    """Close the trace, and convert it where another format is wanted."""
+    recorder.close(ended)
+    if recorder.path == where:
+        return [where]
+    saved = read_trace(recorder.path)
+    written = write_trace(saved.trace, where, views=saved.views, title=saved.title, ended=saved.until)
+    if recorder.path not in written:
+        recorder.path.unlink()
+    return written
+
+
+# ---------------------------------------------------------------------- links
+
+
+async def _open(server: Server, live: LiveWorld, pace: Pace, options: UpOptions, addition: Addition | None) -> None:
+    name = options.name or live.world.spec.name
+    control = WorldControl(server.cell, live, pace, server.announcement)
+    server.introduce(name, partial(announced, live.world), options.world)
+    if options.audit is None and live.world.spec.history is not None:
+        options = replace(options, audit=Audit(wall_clock))
+    server.audit = recording(options.audit, lambda: live.world.now)
+    if not options.is_closed:
+        await _open_for_others(server, live, control, options)
+    if options.past:
+        server.join(Lookback(live, server.cell, pace))
+    running = Running(server, live, pace, control)
+    if addition is not None:
+        await addition(running)
+    if not options.is_closed:
+        folder = Path() if options.world is None else options.world.parent
+        spec, subject = live.world.spec, LiveWorldSubject(control, live)
+        subject.audit = server.audit
+        opened = await open_gateways(
+            server, spec.gateways, spec.history, folder, subject, options.audit, listen_any=options.listen_any
+        )
+        running.gateways.extend(opened)
+    if options.ready_file is not None:
+        server.write_ready_file(options.ready_file)
+
+
+async def _open_for_others(server: Server, live: LiveWorld, control: WorldControl, options: UpOptions) -> None:
+    address = None if options.control is None else parse_address(options.control, listen_any=False)
+    await server.open_control(control, address)
+    for line in live.world.spec.lines:
+        await _open_line(server, live, line, options)
+    for controller, where in live.world.spec.vision_addresses():
+        make_port = partial(VisionPort, live, controller)
+        await server.open(VISION, where, f"vision records, {controller}", make_port, listen_any=options.listen_any)
+
+
+async def _open_line(server: Server, live: LiveWorld, line: LineSpec, options: UpOptions) -> None:
+    number, there = count(1), live.world.lines[line.name]
+    wire = TwinLine(lambda: there.baud, there.is_timed)
+
+    def maker(link: LinkKind, *, several: bool) -> Callable[[], SendingPort]:
+        def make() -> SendingPort:
+            port = PlacePort(live, line.name, f"{link.place}-{next(number)}" if several else link.place, link.place_kind)
+            return TracedPort(port, line.name) if is_traced() else port
+
+        return make
+
+    on = "" if len(live.world.spec.lines) == 1 else f", {line.name}"
+    links = line_kinds()[line.kind].opened_by
+    folder = Path() if options.world is None else options.world.parent
+    how = {"listen_any": options.listen_any, "tls": line.tls, "folder": folder}
+    for key, where in line.links.items():
+        link, transport = links[key], TRANSPORTS[key]
+        make_port = maker(link, several=transport.has_several)
+        protocol = f"{link.protocol}{on}"
+        await server.open(transport, where, protocol, make_port, line=line.name, wire=wire, **how)

@@ -1,0 +1,101 @@
+"""Branches of the world that a studio shows: studios of their own, in processes of their own."""
+
+from __future__ import annotations
+
+import asyncio
+import pickle
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import count
+from pathlib import Path
+from typing import NamedTuple
+
+from steptwin.errors import Misuse, Refusal
+from steptwin.eventloop import later
+from steptwin.live.cell import Cell
+from steptwin.live.lookback import Lookback
+from steptwin.live.studio.options import StudioOptions
+from steptwin.live.studio.processes import ChildProcesses, Process
+from steptwin.live.world import LiveWorld
+from steptwin.machine import MILLISECOND, Nanos
+from steptwin.simulation.scheduler.trace import Mark
+from steptwin.simulation.world.plantsnapshot import PlantSnapshot
+
+MOST_BRANCHES = 4
+MODULE = "steptwin.live.studio.branch"
+
+
+@dataclass(frozen=True, slots=True)
+class BranchStart:
+    """What the process of a branch is given on its standard input, pickled. ``source`` is the name of the description."""
+
+    own: StudioOptions
+    ready_file: Path
+    name: str
+    source: str
+    snapshot: PlantSnapshot
+
+
+class _OpenBranch(NamedTuple):
+    process: Process
+    begin: Nanos
+    url: str
+
+    def plain(self, number: int) -> Mapping[str, object]:
+        return {"branch": number, "from_ns": str(self.begin), "url": self.url}
+
+
+class WorldBranches:
+    """See `steptwin.studio.branchrequests.Branches`. A `Link` of the server. ``own``: how their pages are served; None: they
+    cannot be reached, so there are none."""
+
+    def __init__(self, live: LiveWorld, cell: Cell, lookback: Lookback, own: StudioOptions | None) -> None:
+        self._live = live
+        self._cell = cell
+        self._lookback = lookback
+        self._own = own
+        self._processes = ChildProcesses()
+        self._open: dict[int, _OpenBranch] = {}
+        self._starting = 0
+        self._numbers = count(1)
+
+    def plain(self) -> Sequence[Mapping[str, object]]:
+        return [branch.plain(number) for number, branch in self._running().items()]
+
+    def _running(self) -> dict[int, _OpenBranch]:
+        """Without those that have ended by themselves."""
+        self._open = {number: branch for number, branch in self._open.items() if branch.process.poll() is None}
+        return self._open
+
+    async def start(self, moment: Nanos | None) -> Mapping[str, object]:
+        if self._own is None:
+            raise Refusal("a branch is reached from the computer of the studio only: there is none while others can reach it")
+        if len(self._running()) + self._starting >= MOST_BRANCHES:
+            raise Refusal(f"{MOST_BRANCHES} branches are open already, which is the most: end one")
+        self._starting += 1
+        try:
+            self._cell.enter()
+            snapshot = await self._lookback.state_at(self._live.now if moment is None else moment)
+            number = next(self._numbers)
+            branch = await later(asyncio.to_thread(self._begin, self._own, number, snapshot))
+        finally:
+            self._starting -= 1
+        self._open[number] = branch
+        return branch.plain(number)
+
+    def _begin(self, own: StudioOptions, number: int, snapshot: PlantSnapshot) -> _OpenBranch:
+        """Blocks until its page is there. Its trace and its inputs begin anew: nothing of the past is recorded there."""
+        spec, ready = self._live.world.spec, self._processes.folder / f"{number}.ready.json"
+        name = f"{spec.name}, branch {number} from {snapshot.now // MILLISECOND / 1000:.3f} s"
+        begun = BranchStart(own, ready, name, spec.text.source.name, replace(snapshot, inputs=(), trace=Mark(())))
+        process = self._processes.start(MODULE, given=pickle.dumps(begun))
+        return _OpenBranch(process, snapshot.now, self._processes.url(process, ready, f"branch {number}"))
+
+    async def end(self, branch: int) -> None:
+        found = self._running().pop(branch, None)
+        if found is None:
+            raise Misuse(f"no branch {branch}: open are {', '.join(map(str, self._open)) or 'none'}")
+        await later(asyncio.to_thread(self._processes.end, found.process))
+
+    async def close(self) -> None:
+        await asyncio.to_thread(self._processes.close)

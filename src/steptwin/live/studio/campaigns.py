@@ -1,0 +1,200 @@
+"""Campaigns beside the description that a studio shows. They run in processes of their own."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import tomllib
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from steptwin.campaign.campaign import RESULTS, SUFFIX
+from steptwin.campaign.report.comparison import REPORT
+from steptwin.errors import Misuse, Refusal, SteptwinError
+from steptwin.eventloop import later
+from steptwin.files.ownfolder import place_in
+from steptwin.files.textfiles import read_text
+from steptwin.inputfiles import MOST_DESCRIPTION_BYTES, read_recorded
+from steptwin.live.studio.processes import ChildProcesses, Process, last_words
+
+TABLE = "campaign"
+MOST_FILES = 500
+"""Descriptions that are looked at."""
+MOST_CAUSES = 100
+PASSED, FAILED = 0, 1
+"""Exit codes of a campaign that has ended."""
+SERVED = (".html", ".json", ".xml", ".csv", ".py")
+
+
+@dataclass(frozen=True, slots=True)
+class _CampaignFile:
+    """A file with a table ``[campaign]``, or one that cannot be read as such."""
+
+    file: Path
+    table: Mapping[str, Any]
+    error: str | None = None
+
+    @property
+    def results(self) -> Path:
+        return self.file.with_suffix(SUFFIX)
+
+
+class FolderCampaigns:
+    """See `steptwin.studio.campaignrequests.Campaigns`. A `Link` of the server. ``world``: the description."""
+
+    def __init__(self, world: Path) -> None:
+        self._world = world.absolute()
+        self._processes = ChildProcesses()
+        self._running: tuple[str, Process] | None = None
+        self._errors: dict[str, str] = {}
+        """Why the last run of a campaign did not end as one."""
+
+    @property
+    def _folder(self) -> Path:
+        return self._world.parent
+
+    # ------------------------------------------------------------------ requests
+
+    async def plain(self) -> Sequence[Mapping[str, object]]:
+        running = self._present()
+        found = await later(asyncio.to_thread(lambda: [(name, *_contents(one)) for name, one in self._known().items()]))
+        return [
+            {
+                "campaign": name,
+                "results": str(PurePosixPath(name).with_suffix(SUFFIX)),
+                **plain,
+                "error": error or self._errors.get(name),
+                "is_running": name == running,
+            }
+            for name, plain, error in found
+        ]
+
+    async def run(self, campaign: str) -> None:
+        known = await later(asyncio.to_thread(self._campaign, campaign))
+        place_in(self._folder, str(known.results))
+        if (running := self._present()) is not None:
+            raise Refusal(f"{running} runs: one campaign at a time")
+        self._errors.pop(campaign, None)
+        self._running = campaign, self._processes.start("steptwin", "campaign", "run", str(known.file))
+
+    async def end(self, campaign: str) -> None:
+        if self._present() == campaign and self._running is not None:
+            process = self._running[1]
+            self._running = None
+            await later(asyncio.to_thread(self._processes.end, process))
+
+    async def file(self, name: str) -> str:
+        return await later(asyncio.to_thread(self._file, name))
+
+    async def close(self) -> None:
+        await asyncio.to_thread(self._processes.close)
+
+    def _present(self) -> str | None:
+        """The campaign that runs."""
+        if self._running is None:
+            return None
+        name, process = self._running
+        if process.poll() is None:
+            return name
+        self._running = None
+        words = self._processes.end(process)
+        if process.returncode not in (PASSED, FAILED):
+            self._errors[name] = last_words(words)
+        return None
+
+    # ------------------------------------------------------------------ files, which are read in threads
+
+    def _known(self) -> dict[str, _CampaignFile]:
+        """By their paths from the folder of the description."""
+        files = sorted([*self._folder.glob("*.toml"), *self._folder.glob("*/*.toml")])[:MOST_FILES]
+        found = ((file.relative_to(self._folder).as_posix(), self._read(file)) for file in files if file != self._world)
+        return {name: known for name, known in found if known is not None}
+
+    def _read(self, file: Path) -> _CampaignFile | None:
+        """None for what is no campaign, or one of another world."""
+        try:
+            text = read_text(file, MOST_DESCRIPTION_BYTES).source.text
+        except SteptwinError:
+            return None
+        try:
+            table = tomllib.loads(text).get(TABLE)
+        except (ValueError, RecursionError) as error:
+            return _CampaignFile(file, {}, str(error)) if f"[{TABLE}]" in text else None
+        if not isinstance(table, dict):
+            return None
+        world = table.get("world")
+        is_of_this = isinstance(world, str) and (file.parent / world).resolve() == self._world.resolve()
+        return _CampaignFile(file, table) if is_of_this else None
+
+    def _campaign(self, name: str) -> _CampaignFile:
+        known = self._known()
+        if name not in known:
+            raise Misuse(f"no campaign {name!r}: there are {', '.join(known) or 'none'}")
+        return known[name]
+
+    def _file(self, name: str) -> str:
+        path = (self._folder / name).resolve()
+        folders = [known.results.resolve() for known in self._known().values()]
+        if not any(map(path.is_relative_to, folders)) or path.suffix not in SERVED or not path.is_file():
+            raise Misuse(f"{name!r} is no file of the results of a campaign here")
+        return str(path)
+
+
+def _contents(known: _CampaignFile) -> tuple[dict[str, object], str | None]:
+    """As `steptwin.studio.campaignrequests` has it, and what is wrong with it."""
+    total = known.table.get("runs")
+    database = known.results / RESULTS
+    plain: dict[str, object] = {
+        "name": str(known.table.get("name", known.file.stem)),
+        "done": 0,
+        "failed": 0,
+        "total": total if isinstance(total, int) else None,
+        "changed": None,
+        "result": None,
+    }
+    if known.error is not None or not known.results.is_dir():
+        return plain, known.error
+    plain["result"] = _result(known.results / REPORT)
+    try:
+        if database.is_file():
+            from steptwin.campaign.store import counted
+
+            plain["done"], plain["failed"] = counted(database)
+            plain["changed"] = _changed(database)
+    except (SteptwinError, ImportError) as error:
+        return plain, str(error)
+    return plain, None
+
+
+def _changed(database: Path) -> str:
+    written = [database, database.with_name(f"{database.name}-wal")]
+    at = max(file.stat().st_mtime for file in written if file.exists())
+    return datetime.fromtimestamp(at, UTC).isoformat(timespec="seconds")
+
+
+def _result(report: Path) -> dict[str, object] | None:
+    """Of a campaign that has ended; None where it has not."""
+    with suppress(SteptwinError, LookupError, TypeError, ValueError, AttributeError):
+        plain = json.loads(read_recorded(report))
+        return {
+            "runs": plain["runs"],
+            "failed": plain["failed"],
+            "pass_rate": plain["pass_rate"],
+            "interval": plain["interval"],
+            "properties": [
+                {"name": name, "failed": one["failed"], "robustness": one["robustness"]}
+                for name, one in plain["properties"].items()
+            ],
+            "causes": [_cause(one) for one in plain["causes"][:MOST_CAUSES]],
+        }
+    return None
+
+
+def _cause(one: Mapping[str, Any]) -> dict[str, object]:
+    files = one["files"]
+    head = {"what": one["what"], "where": one["where"], "runs": one["count"]}
+    return {**head, "session": files.get("session"), "timeline": files.get("timeline")}

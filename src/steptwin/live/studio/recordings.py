@@ -1,0 +1,188 @@
+"""Sessions of the world that a studio shows: saved beside it, exported, and opened as studios of their own.
+
+Exports and views are processes of their own, so that the world goes on undisturbed.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import subprocess
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+
+from steptwin.errors import Misuse, Refusal
+from steptwin.eventloop import later
+from steptwin.files import session as sessions
+from steptwin.files.beginning import SESSION_SUFFIX, is_session
+from steptwin.files.export import FORMATS
+from steptwin.files.ownfolder import place_in
+from steptwin.files.savedsessions import SavedSession, path_of, read_saved, saved_sessions
+from steptwin.live.cell import Cell
+from steptwin.live.studio.processes import ChildProcesses, Process, last_words
+from steptwin.live.world import MOST_INPUT_BYTES, MOST_INPUTS, LiveWorld
+from steptwin.simulation.world import history
+
+EXPORT_S = 300.0
+"""Longest duration of an export."""
+MOST_VIEWS = 4
+
+
+class WorldRecordings:
+    """See `steptwin.studio.recordingrequests.Recordings`. A `Link` of the server.
+
+    ``folder``: where sessions are saved; ``stem``: how their names begin; ``access``: options of views about tokens. Views are
+    served at a loopback address; None: they cannot be reached, so there are none.
+    """
+
+    def __init__(
+        self, live: LiveWorld, cell: Cell, folder: Path, stem: str, file: Path | None, access: Sequence[str] | None
+    ) -> None:
+        self._live = live
+        self._cell = cell
+        self._folder = folder
+        self._stem = stem
+        self._file = file
+        self._access = access
+        self._processes = _Processes()
+
+    # ------------------------------------------------------------------ requests
+
+    async def plain(self) -> Mapping[str, object]:
+        saved = await later(asyncio.to_thread(saved_sessions, self._folder))
+        return {
+            "session": self._session(),
+            "past": self._past(),
+            "trace": self._trace(),
+            "folder": str(self._folder),
+            "saved": [_plain(one) for one in saved],
+            "formats": [name for name, form in FORMATS.items() if not form.missing],
+        }
+
+    async def save(self, name: str | None) -> Mapping[str, object]:
+        path = place_in(self._folder, path_of(self._folder, name or f"{self._stem}-{datetime.now(UTC):%Y%m%d-%H%M%S}").name)
+        self._cell.enter()
+        return _plain(await later(asyncio.to_thread(_save, self._live.session(), path)))
+
+    def place(self, file: str) -> str:
+        path = place_in(self._folder, file)
+        if path.exists():
+            if not is_session(path):
+                raise Refusal(f"{path} is there already: give another name")
+            read_saved(path)  # whatever else is there is not overwritten
+        return str(path)
+
+    async def view(self, name: str) -> str:
+        path = self._saved(name)
+        if self._access is None:
+            raise Refusal(f"a view is reached from the computer of the studio only: start it with steptwin studio {path} --view")
+        return await later(asyncio.to_thread(self._processes.view, path, self._access))
+
+    async def file(self, name: str) -> str:
+        stem, _, form = name.rpartition(".")
+        path = self._saved(stem)
+        if f".{form}" == SESSION_SUFFIX:
+            return str(path)
+        if form not in FORMATS:
+            raise Misuse(f"{name}: formats are {SESSION_SUFFIX[1:]}, {', '.join(FORMATS)}")
+        return str(await later(asyncio.to_thread(self._processes.export, path, form)))
+
+    def _saved(self, name: str) -> Path:
+        """Raises `Misuse` where there is no such session."""
+        path = path_of(self._folder, name)
+        if not path.is_file():
+            raise Misuse(f"no session is called {name!r} in {self._folder}")
+        read_saved(path)  # whatever else is there is nobody's business
+        return path
+
+    # ------------------------------------------------------------------ what is recorded
+
+    def _session(self) -> Mapping[str, object] | None:
+        recorded = self._live.recorded
+        if recorded is None:
+            return None
+        return {
+            "until_ns": str(recorded.until),
+            "inputs": recorded.inputs,
+            "most_inputs": MOST_INPUTS,
+            "bytes": recorded.size,
+            "most_bytes": MOST_INPUT_BYTES,
+            "is_full": recorded.is_full,
+            "file": None if self._file is None else str(self._file),
+        }
+
+    def _past(self) -> Mapping[str, object] | None:
+        past = self._live.history
+        if past is None:
+            return None
+        limits = {"inputs": past.kept_inputs, "most_inputs": history.MOST_INPUTS}
+        return {"from_ns": str(past.begin), "states": len(past), **limits}
+
+    def _trace(self) -> Mapping[str, object]:
+        ring, file = self._live.ring, self._live.trace_file
+        kind = "ring" if ring is not None else "none" if file is None else "file"
+        begin = None if ring is None else ring.begin
+        return {
+            "kind": kind,
+            "file": None if file is None else str(file),
+            "records": None if ring is None else len(ring),
+            "most_records": None if ring is None else ring.size,
+            "from_ns": None if begin is None else str(begin),
+        }
+
+    async def close(self) -> None:
+        await asyncio.to_thread(self._processes.close)
+
+
+class _Processes(ChildProcesses):
+    """Exports and views. All methods block."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._views: dict[Path, tuple[Process, str]] = {}
+
+    def export(self, path: Path, form: str) -> Path:
+        """One at a time; what has been made is kept. Raises `Refusal`."""
+        target = self.folder / f"{path.stem}.{form}"
+        with self.turn:
+            if target.exists() and target.stat().st_mtime > path.stat().st_mtime:
+                return target
+            target.unlink(missing_ok=True)
+            process = self.start("steptwin", "replay", str(path), "--trace", str(target))
+            try:
+                _, errors = process.communicate(timeout=EXPORT_S)
+            except subprocess.TimeoutExpired:
+                raise Refusal(f"{path.name} as {form} takes more than {EXPORT_S:g} s: use steptwin replay and export") from None
+            finally:
+                self.end(process)
+        if not target.exists():
+            raise Refusal(f"{path.name} as {form}: {last_words(errors)}")
+        return target
+
+    def view(self, path: Path, access: Sequence[str]) -> str:
+        """The address of a view, which may be running already; the oldest of too many ends. Raises `LineFailure`."""
+        with self.turn:
+            process, url = self._views.get(path, (None, ""))
+            if process is not None and process.poll() is None:
+                return url
+            while len(self._views) >= MOST_VIEWS:
+                self.end(self._views.pop(next(iter(self._views)))[0])
+            ready = self.folder / f"{path.stem}.ready.json"
+            ready.unlink(missing_ok=True)
+            options = ("--view", "--no-browser", "--http", "127.0.0.1:0", "--ready-file", str(ready), *access)
+            process = self.start("steptwin", "studio", str(path), *options)
+            url = self.url(process, ready, f"the view of {path.name}")
+            self._views[path] = process, url
+            return url
+
+
+def _save(session: sessions.Session, path: Path) -> SavedSession:
+    """Raises `Refusal` where there is such a file, `Misuse` where it cannot be written."""
+    if path.exists():
+        raise Refusal(f"{path} is there already: give another name")
+    sessions.save(session, path)
+    return read_saved(path)
+
+
+def _plain(saved: SavedSession) -> Mapping[str, object]:
+    return {"name": saved.name, "bytes": saved.size, "saved": saved.saved, "until_ns": str(saved.until)}

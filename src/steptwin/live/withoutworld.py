@@ -1,0 +1,52 @@
+"""`steptwin studio --device ...` and `steptwin bridge`: a server for devices, without a world and its virtual time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from steptwin.live.cell import Cell
+from steptwin.live.clock import Clock
+from steptwin.live.server import Server, clear_ready_file
+from steptwin.live.telling import Telling
+from steptwin.machine import Nanos
+
+
+class _Nothing:
+    """A world without contents, for a cell. See `steptwin.live.cell.Advanceable`."""
+
+    stale = False
+
+    def __init__(self) -> None:
+        self.now: Nanos = 0
+
+    def advance(self, now: Nanos) -> None:
+        self.now = now
+
+    def deadline(self) -> Nanos | None:
+        return None
+
+
+async def serve_without_world(
+    ready_file: Path | None, addition: Callable[[Server], Coroutine[Any, Any, None]], telling: Telling
+) -> None:
+    """Serve what ``addition`` opens until SIGINT, SIGTERM or SIGHUP."""
+    with ExitStack() as stack:
+        output = telling.output()
+        stack.callback(output.close)
+        stack.enter_context(telling.tracing("devices", output.notice))
+        if ready_file is not None:
+            clear_ready_file(ready_file)
+        server = Server(Cell(_Nothing(), Clock()), output.notice)
+        try:
+            if not await server.unless_ended(addition(server)):
+                return
+            if ready_file is not None:
+                server.write_ready_file(ready_file)
+            places = [f"  {end_point.protocol}  {end_point.place}" for end_point in server.end_points]
+            output.begin([*places, "Ctrl-C ends"], server.announcement())
+            await server.until_ended()
+        finally:
+            await server.close()
