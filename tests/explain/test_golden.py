@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from steptwin.cli.explain_pages import explanations
+from steptwin.cli.explain import explanations
 from steptwin.explain.picture import picture
 from steptwin.explain.plain import plain
 from steptwin.explain.text import text

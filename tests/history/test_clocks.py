@@ -12,7 +12,7 @@ import pytest
 from history_rig import BEGAN_US, RecordedWorld
 from sqlalchemy import Engine
 
-from steptwin.cli.history_pages import _local
+from steptwin.cli.history import _local
 from steptwin.errors import Misuse
 from steptwin.history import writer as writing
 from steptwin.history.reading import HistoryDatabase

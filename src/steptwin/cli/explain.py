@@ -5,8 +5,10 @@ From Python: `steptwin.explain.mic488.explain`, `steptwin.explain.m1486.explain`
 
 from __future__ import annotations
 
+import json
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,6 +16,13 @@ from steptwin.cli.device import Json
 from steptwin.cli.languageoptions import M1486FileOptions, WbcFileOptions, given_of
 from steptwin.cli.optiongroups import grouped, option_of
 from steptwin.cli.writtenfiles import written
+from steptwin.errors import Misuse
+
+if TYPE_CHECKING:
+    from steptwin.explain.model import Explanation
+    from steptwin.languages.contract import GivenOptions
+
+JSON_VERSION = 1
 
 
 @grouped
@@ -31,6 +40,51 @@ def command(
 
     Also loops that it never leaves, interrupts that can be lost, and lines that are never reached.
     """
-    from steptwin.cli.explain_pages import show
+    _show(file, given_of(wbc, chip), option_of, output, typer.echo, as_json=json)
 
-    show(file, given_of(wbc, chip), option_of, output, typer.echo, as_json=json)
+
+def explanations(path: Path, given: GivenOptions, option: Callable[[str], str] = str) -> list[Explanation]:
+    """One for each controller that the program is for. Raises `Misuse` for what is no program, or has errors, and for an option
+    that is not for its language, with the name that users know it by."""
+    from steptwin.files.textfiles import read_text
+    from steptwin.languages import ability
+
+    language, explain = ability(path, "explain", lambda one: one.explain)
+    language.refuse_others(given, option)
+    return explain(read_text(path).source, given)
+
+
+def _show(
+    path: Path,
+    given: GivenOptions,
+    option: Callable[[str], str],
+    output: Path | None,
+    out: Callable[[str], object],
+    *,
+    as_json: bool = False,
+) -> None:
+    """Print the explanation, or write the picture of the control flow to ``output``. Raises `Misuse`."""
+    from steptwin.explain.picture import picture
+    from steptwin.explain.plain import plain
+    from steptwin.explain.text import text
+    from steptwin.files.textfiles import write_bytes
+    from steptwin.files.writing import is_written_directly
+
+    if output is not None and output.suffix.lower() != ".svg" and not is_written_directly(output):
+        raise Misuse(f"cannot write {output}: permitted is FILE.svg")
+    found = explanations(path, given, option)
+    if output is not None:
+        write_bytes(output, picture(found).encode())
+    if as_json:
+        data = {"version": JSON_VERSION, "file": str(path), "programs": [plain(one) for one in found]}
+        out(json.dumps(data, ensure_ascii=False, indent=2))
+    elif output is None:
+        out("\n".join(text(one) for one in found).rstrip("\n"))
+    else:
+        out(f"{output}: {_blocks(found)}")
+
+
+def _blocks(found: Sequence[Explanation]) -> str:
+    from steptwin.languages.contract import count
+
+    return count(sum(len(one.blocks) for one in found), "block")

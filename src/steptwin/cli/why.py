@@ -5,12 +5,18 @@ From Python: `steptwin.files.why.why_of_session`, or `steptwin.files.world.World
 
 from __future__ import annotations
 
-from typing import Annotated
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 
 from steptwin.cli import completion
 from steptwin.cli.device import Json
+
+LONGEST_S = 60.0
+"""Time-out of an answer of a twin, s."""
 
 
 def command(
@@ -36,6 +42,30 @@ def command(
 
     A running twin answers if its past is kept: in the studio, or with 'steptwin up --past'.
     """
-    from steptwin.cli.why_pages import answer
+    _answer(where, question, at, typer.echo, as_json=json)
 
-    answer(where, question, at, typer.echo, as_json=json)
+
+def _answer(where: str, question: str, at: str | None, out: Callable[[str], object], *, as_json: bool = False) -> None:
+    """Print the answer. Raises `Misuse` for a file that is no session, and for what is no question there; `Refusal` for a twin
+    whose past is not kept."""
+    found = _of_session(Path(where), question, at) if Path(where).suffix == ".json" else _of_twin(where, question, at)
+    out(json.dumps(found, ensure_ascii=False, indent=2) if as_json else found["text"])
+
+
+def _of_session(path: Path, question: str, at: str | None) -> Mapping[str, Any]:
+    from steptwin.durations import duration
+    from steptwin.files import session as sessions
+    from steptwin.files.why import why_of_session
+
+    return why_of_session(sessions.load(path)).ask(question, None if at is None else duration(at)).plain()
+
+
+def _of_twin(text: str, question: str, at: str | None) -> Mapping[str, Any]:
+    from steptwin.durations import duration
+    from steptwin.live.remote import ask
+    from steptwin.live.twins import find_controller
+    from steptwin.subject.debugcommands import AskWhy
+
+    twin, controller = find_controller(text)
+    moment = None if at is None else duration(at)
+    return ask(twin, AskWhy(question or controller or "", moment), timeout_s=LONGEST_S)
