@@ -228,6 +228,17 @@ def test_what_is_english_on_the_polish_page_says_so(start_studio: Callable[..., 
     assert {panel: texts for panel, texts in found.items() if texts} == {}
 
 
+def test_a_phone_has_its_width_for_the_panels(studio: Studio) -> None:
+    """The buttons of the panels keep their names."""
+    page = studio.page(viewport={"width": 390, "height": 844})
+    rail = page.get_by_role("navigation").first
+    box = rail.bounding_box()
+    assert box is not None
+    assert box["width"] <= 44
+    rail.get_by_role("button", name="Registers", exact=True).click()
+    expect(page.get_by_role("region", name="Registers", exact=True).last).to_be_visible()
+
+
 def test_actions_of_a_table_that_is_wider_than_its_pane_stay_in_sight(studio: Studio) -> None:
     page = studio.page()
     show(page, "Overview")
