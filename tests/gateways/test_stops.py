@@ -609,9 +609,11 @@ MOMENTS_S = {"MIC488": (0.0, 0.003, 0.008, None), "slow": (0.0, 0.3, None), "M14
 
 FEWER = {
     "rest": ("MIC488 on a slow line", "M1486B", "M1486E1", "M1486B behind a bridge", "M1486E1 behind a bridge"),
-    "opcua": ("MIC488 on a slow line", "M1486E1", "M1486B behind a bridge"),
+    "opcua": ("MIC488 on a slow line", "M1486E1"),
+    "websocket": tuple(kind for kind in RIGS if kind != "M1486E1 behind a bridge"),
+    "sparkplug": tuple(kind for kind in RIGS if kind != "M1486E1 behind a bridge"),
 }
-"""Ways whose servers take their time to begin are tried with these: behind all of them is the same subject."""
+"""Ways that are tried with these only, because a server or an EEPROM takes its time: behind all of them is the same subject."""
 
 
 def moments_of(kind: str, what: str) -> tuple[float | None, ...]:

@@ -6,7 +6,7 @@ import contextlib
 import io
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import replace
 from http.client import HTTPConnection
 from pathlib import Path
@@ -81,8 +81,8 @@ def post(process: Process, name: str, token: str | None, /, **fields: object) ->
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Folder]:
     found = Folder(tmp_path_factory.mktemp("private"))
-    yield found
     try:
+        yield found
         found.process.end()
     finally:
         found.process.close()
@@ -213,50 +213,44 @@ OF_DEVICES: dict[str, Callable[[Visitor], bool]] = {
     "POST work": lambda visitor: visitor.post("work"),
 }
 NOBODY, WRONG, RIGHT = "no token", "a wrong token", "the token"
-LET_IN = {
-    "demo": {NOBODY, RIGHT},
-    "own file": {RIGHT},
-    "demo with a device": {RIGHT},
-    "others reach it": {RIGHT},
-}
-"""Who may look at a world, by studio. What reaches a device needs the token everywhere."""
 
 
-@pytest.fixture(scope="module")
-def studios(folder: Folder, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str], Process]]:
-    """Gives one of each, by its name in `LET_IN`."""
-    found = {"own file": folder.process}
+def check_who_is_let_in(studio: Process, to_the_world: set[str]) -> None:
+    for who, token in ((NOBODY, None), (WRONG, "wrong-0123456789abcdef"), (RIGHT, studio.token)):
+        visitor = Visitor(studio, token)
+        expected = {
+            **dict.fromkeys(PUBLIC, True),
+            **dict.fromkeys(OF_THE_WORLD, who in to_the_world),
+            **dict.fromkeys(OF_DEVICES, who == RIGHT),
+        }
+        assert {way: enter(visitor) for way, enter in {**PUBLIC, **OF_THE_WORLD, **OF_DEVICES}.items()} == expected, who
 
-    def find(name: str) -> Process:
-        if name not in found:
-            options = ("--http", "0.0.0.0:0", "--remote") if name == "others reach it" else ("--itself", "--with-token")
-            process = found[name] = Process(tmp_path_factory.mktemp("studio"), StudioWorld(), *options).wait_until_ready()
-            if name == "demo with a device":
-                device = f"127.0.0.1:{folder.process.end_points['tcp']['port']}"
-                assert '"ok": {"machine": "real"}' in post(process, "connect", process.token, address=device, name="real")[1]
-        return found[name]
 
-    yield find
-    del found["own file"]
+@contextlib.contextmanager
+def started(folder: Path, *options: str) -> Generator[Process]:
+    process = Process(folder, StudioWorld(), *options)
     try:
-        for process in found.values():
-            process.end()
+        yield process.wait_until_ready()
+        process.end()
     finally:
-        for process in found.values():
-            process.close()
+        process.close()
 
 
-@pytest.mark.parametrize("who", [NOBODY, WRONG, RIGHT])
-@pytest.mark.parametrize("name", LET_IN)
-def test_who_is_let_in(studios: Callable[[str], Process], name: str, who: str) -> None:
-    studio = studios(name)
-    visitor = Visitor(studio, {NOBODY: None, WRONG: "wrong-0123456789abcdef", RIGHT: studio.token}[who])
-    expected = {
-        **dict.fromkeys(PUBLIC, True),
-        **dict.fromkeys(OF_THE_WORLD, who in LET_IN[name]),
-        **dict.fromkeys(OF_DEVICES, who == RIGHT),
-    }
-    assert {way: enter(visitor) for way, enter in {**PUBLIC, **OF_THE_WORLD, **OF_DEVICES}.items()} == expected
+def test_who_is_let_in_to_a_file_of_the_user(folder: Folder) -> None:
+    check_who_is_let_in(folder.process, {RIGHT})
+
+
+def test_who_is_let_in_to_a_demo_before_and_after_a_device_is_connected(folder: Folder, tmp_path: Path) -> None:
+    with started(tmp_path, "--itself", "--with-token") as studio:
+        check_who_is_let_in(studio, {NOBODY, RIGHT})
+        device = f"127.0.0.1:{folder.process.end_points['tcp']['port']}"
+        assert '"ok": {"machine": "real"}' in post(studio, "connect", studio.token, address=device, name="real")[1]
+        check_who_is_let_in(studio, {RIGHT})
+
+
+def test_who_is_let_in_where_others_reach_it(tmp_path: Path) -> None:
+    with started(tmp_path, "--http", "0.0.0.0:0", "--remote") as studio:
+        check_who_is_let_in(studio, {RIGHT})
 
 
 def test_all_requests_are_behind_the_same_door(folder: Folder) -> None:
