@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from steptwin.messages import Message
+
+DID_YOU_MEAN = Message("nearmiss.did-you-mean", " (did you mean {name!r}?)")
+
 _BUDGET = 40
 """Most words looked up for one text: a text of unknown words only must not take quadratic time."""
 LIKE = 0.6
@@ -28,7 +32,7 @@ class NearMiss:
     def hint(self, word: str, candidates: Iterable[str]) -> str:
         """`` (did you mean 'pause'?)``, to follow the word, or nothing."""
         found = self.of(word, candidates)
-        return "" if found is None else f" (did you mean {found!r}?)"
+        return "" if found is None else DID_YOU_MEAN(name=found)
 
 
 def alike(word: str, candidates: Iterable[str], most: int = 3) -> list[str]:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from steptwin.access.roles import Permit, Role
 from steptwin.errors import Refusal
+from steptwin.messages import Message
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +30,9 @@ class ControlChange(NamedTuple):
     after: Viewer | None
 
 
+CONTROL_IS_HELD = Message("access.control-is-held", "{holder} holds control: take it over first")
+
+
 class Control:
     """The control of a subject; ``holder`` is None if it is free."""
 
@@ -39,7 +43,7 @@ class Control:
         """Give control to ``viewer``. Raises `Refusal` if another viewer holds it, unless ``over``."""
         before = self.holder
         if before is not None and before.number != viewer.number and not over:
-            raise Refusal(f"{before} holds control: take it over first")
+            raise Refusal(CONTROL_IS_HELD(holder=before))
         self.holder = viewer
         return ControlChange(before, viewer)
 
@@ -51,16 +55,20 @@ class Control:
         return ControlChange(before, self.holder)
 
 
+NEEDS_A_HIGHER_ROLE = Message("access.needs-a-higher-role", "{request} is for the role {role}; {viewer} has the role {own_role}")
+NEEDS_CONTROL = Message("access.needs-control", "{request} needs control, which {holder} holds: take it over first")
+
+
 def check(name: str, permit: Permit, viewer: Viewer, control: Control) -> bool:
     """Whether ``viewer`` must first take control, which is free, to execute the command ``name``.
 
     Raises `Refusal` if the role is insufficient, or another viewer holds control.
     """
     if viewer.role < permit.role:
-        raise Refusal(f"{name} is for the role {permit.role.title}; {viewer.name} has the role {viewer.role.title}")
+        raise Refusal(NEEDS_A_HIGHER_ROLE(request=name, role=permit.role.title, viewer=viewer.name, own_role=viewer.role.title))
     holder = control.holder
     if not permit.control or (holder is not None and holder.number == viewer.number):
         return False
     if holder is not None:
-        raise Refusal(f"{name} needs control, which {holder} holds: take it over first")
+        raise Refusal(NEEDS_CONTROL(request=name, holder=holder))
     return True

@@ -11,10 +11,15 @@ from collections.abc import Iterable
 from ipaddress import ip_address
 
 from steptwin.errors import Refusal
+from steptwin.messages import Message
 
 LOCAL_NAMES = ("localhost", "127.0.0.1", "[::1]")
 MOST_SHOWN = 80
 """Characters of a header in a message."""
+
+
+UNKNOWN_HOST = Message("access.unknown-host", "Host {host} is no name of this studio; it is reached as {names}")
+OTHER_ORIGIN = Message("access.other-origin", "Origin {origin} is another site; only pages of this studio may ask it")
 
 
 class Origins:
@@ -34,9 +39,9 @@ class Origins:
         """Raises `Refusal` for headers that do not belong to this server. Who sends no Origin is no browser, or asks nothing that
         changes anything."""
         if host is None or not (host.lower() in self._hosts or (self._by_address and self._is_address(host))):
-            raise Refusal(f"Host {_short(host)} is no name of this studio; it is reached as {', '.join(sorted(self._hosts))}")
+            raise Refusal(UNKNOWN_HOST(host=_short(host), names=sorted(self._hosts)))
         if origin is not None and origin.lower() != f"{self._scheme}://{host.lower()}":
-            raise Refusal(f"Origin {_short(origin)} is another site; only pages of this studio may ask it")
+            raise Refusal(OTHER_ORIGIN(origin=_short(origin)))
 
     def _is_address(self, host: str) -> bool:
         name, _, port = host.rpartition(":") if host[-1:].isdigit() and ":" in host.rpartition("]")[2] else (host, "", "")

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from steptwin.access.roles import ROLES, Role
 from steptwin.errors import Misuse, Refusal
+from steptwin.messages import Message
 
 SHORTEST_TOKEN, LONGEST_TOKEN = 16, 200
 """Characters."""
@@ -24,6 +25,12 @@ class Token:
 
 def _always() -> bool:
     return True
+
+
+WRONG_TOKEN = Message("access.wrong-token", "wrong token")
+NO_TOKEN = Message(
+    "access.no-token", "no token: it is in the address that the studio prints on a terminal, and in its file of tokens"
+)
 
 
 class AccessGate:
@@ -56,10 +63,17 @@ class AccessGate:
         if found is not None:
             return found.role, found.name
         if given and self._tokens:
-            raise Refusal("wrong token")
+            raise Refusal(WRONG_TOKEN())
         if self._open_to is None or self.asks:
-            raise Refusal("no token: it is in the address that the studio prints on a terminal, and in its file of tokens")
+            raise Refusal(NO_TOKEN())
         return self._open_to, None
+
+
+TOKEN_LINE_HAS_OTHER_WORDS = Message("access.token-line-has-other-words", "{place}: {count} words: expected ROLE NAME TOKEN")
+UNKNOWN_ROLE = Message("access.unknown-role", "{place}: no role {role!r}; roles are {names}")
+TOKEN_LENGTH = Message("access.token-length", "{place}: a token of {count} characters: permitted are {least} to {most}")
+TOKEN_TWICE = Message("access.token-twice", "{place}: this token is there already")
+NO_TOKENS = Message("access.no-tokens", "{place}: no tokens: expected lines ROLE NAME TOKEN")
 
 
 def read_tokens(text: str, place: str) -> tuple[Token, ...]:
@@ -71,15 +85,15 @@ def read_tokens(text: str, place: str) -> tuple[Token, ...]:
             continue
         where = f"{place}, line {number}"
         if len(words) != 3:
-            raise Misuse(f"{where}: {len(words)} words: expected ROLE NAME TOKEN")
+            raise Misuse(TOKEN_LINE_HAS_OTHER_WORDS(place=where, count=len(words)))
         role, name, token = words
         if role not in ROLES:
-            raise Misuse(f"{where}: no role {role!r}; roles are {', '.join(ROLES)}")
+            raise Misuse(UNKNOWN_ROLE(place=where, role=role, names=list(ROLES)))
         if not SHORTEST_TOKEN <= len(token) <= LONGEST_TOKEN:
-            raise Misuse(f"{where}: a token of {len(token)} characters: permitted are {SHORTEST_TOKEN} to {LONGEST_TOKEN}")
+            raise Misuse(TOKEN_LENGTH(place=where, count=len(token), least=SHORTEST_TOKEN, most=LONGEST_TOKEN))
         if any(token == other.text for other in found):
-            raise Misuse(f"{where}: this token is there already")
+            raise Misuse(TOKEN_TWICE(place=where))
         found.append(Token(ROLES[role], name, token))
     if not found:
-        raise Misuse(f"{place}: no tokens: expected lines ROLE NAME TOKEN")
+        raise Misuse(NO_TOKENS(place=place))
     return tuple(found)

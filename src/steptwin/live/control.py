@@ -24,7 +24,7 @@ from steptwin.live.directory import private_directory, runtime_directory
 from steptwin.simulation.toml.addresses import Address
 from steptwin.subject.commands import Command, Follow, Time, Unfollow
 from steptwin.subject.contract import Result
-from steptwin.subject.dispatch import FORM, LONGEST_REQUEST, Message, failure, read_message, respond
+from steptwin.subject.dispatch import FORM, LONGEST_REQUEST, JsonObject, failure, read_message, respond
 from steptwin.subject.events import Event
 from steptwin.subject.following import Filter, Following, filter_of
 from steptwin.system import reason
@@ -243,7 +243,7 @@ class _Conversation(asyncio.Protocol):
                 self._transport.pause_reading()
             answer.then(lambda: self._answered(answer.result(), is_late=is_late))
 
-    def _answered(self, message: Message, *, is_late: bool) -> None:
+    def _answered(self, message: JsonObject, *, is_late: bool) -> None:
         self._is_asked = False
         if self._transport.is_closing():
             return
@@ -292,10 +292,10 @@ class _Conversation(asyncio.Protocol):
 
     # ------------------------------------------------------------------ what is sent
 
-    def _write(self, message: Message) -> None:
+    def _write(self, message: JsonObject) -> None:
         self._transport.write(json.dumps(message).encode() + b"\n")
 
-    def _end(self, message: Message) -> None:
+    def _end(self, message: JsonObject) -> None:
         """Send the last answer; further input is not read."""
         self._received = b""
         self._write(message)
@@ -315,14 +315,14 @@ class _Conversation(asyncio.Protocol):
                 return
             missed, events = following.take(EVENTS_AT_ONCE)
             for event in events:
-                lost: Message = {"missed": missed} if missed else {}
+                lost: JsonObject = {"missed": missed} if missed else {}
                 self._write({"id": identity, "event": event.plain(), **lost})
                 missed = 0
             if len(following):
                 self._events_came()
 
 
-def _too_long() -> Message:
+def _too_long() -> JsonObject:
     return failure(Misuse(f"a request has at most {LONGEST_REQUEST} bytes"))
 
 

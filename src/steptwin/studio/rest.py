@@ -25,7 +25,7 @@ from steptwin.studio.requests import ALL, OF_CONNECTION, permit_of
 from steptwin.studio.schema import answer_schemas
 from steptwin.studio.session import STOPS, ViewerSession
 from steptwin.subject.commands import COMMANDS
-from steptwin.subject.dispatch import LONGEST_REQUEST, Message, failure
+from steptwin.subject.dispatch import LONGEST_REQUEST, JsonObject, failure
 from steptwin.subject.schema import definitions, request_schema
 
 _RestEndpoint: TypeAlias = Callable[[Request], Awaitable[Response]]
@@ -147,7 +147,7 @@ class Rest:
     async def _answer(self, request: Request, name: str, fields: Mapping[str, object]) -> Response:
         return _response(*await self._ask(request, name, fields))
 
-    async def _ask(self, request: Request, name: str, fields: Mapping[str, object]) -> tuple[Message, int]:
+    async def _ask(self, request: Request, name: str, fields: Mapping[str, object]) -> tuple[JsonObject, int]:
         """The answer, and its status."""
         try:
             session = self._session(request, name)
@@ -256,7 +256,7 @@ async def _fields(request: Request) -> dict[str, object]:
     return found
 
 
-def _response(answer: Message, status: int) -> Response:
+def _response(answer: JsonObject, status: int) -> Response:
     headers = {"cache-control": "no-store"} | ({"www-authenticate": "Bearer"} if status == NO_TOKEN else {})
     return Response(json.dumps(answer), status, headers, media_type="application/json")
 

@@ -24,7 +24,7 @@ def schema() -> dict[str, object]:
         "anyOf": [{"$ref": "#/$defs/(answer)"}, *({"$ref": f"#/$defs/{name.replace(' ', '%20')}"} for name in messages)],
         "$defs": {
             "(request)": {"oneOf": [{"$ref": f"#/$defs/{name}"} for name in requests]},
-            **{name: defs[name] for name in ("(answer)", "(event)", "(description)", "(state)")},
+            **{name: defs[name] for name in ("(sentence)", "(answer)", "(event)", "(description)", "(state)")},
             **requests,
             **answers,
             **messages,

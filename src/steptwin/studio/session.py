@@ -36,7 +36,7 @@ from steptwin.studio.watches import Watched
 from steptwin.subject import commands as command
 from steptwin.subject.commands import Command, read_command
 from steptwin.subject.contract import Result
-from steptwin.subject.dispatch import LONGEST_REQUEST, Message, answer, code_of, failure, fields_of, id_of, read_message
+from steptwin.subject.dispatch import LONGEST_REQUEST, JsonObject, answer, code_of, failure, fields_of, id_of, read_message
 from steptwin.subject.following import Filter, filter_of
 from steptwin.tables import complete
 
@@ -182,7 +182,7 @@ class ViewerSession:
 
     # ------------------------------------------------------------------ requests
 
-    def receive(self, text: str, now: Nanos) -> Later[Message]:
+    def receive(self, text: str, now: Nanos) -> Later[JsonObject]:
         """The answer to a request. ``now``: a moment of the wall clock."""
         self._now = now
         if self.is_rest:
@@ -190,8 +190,8 @@ class ViewerSession:
         data = text.encode("utf-8", "replace")
         return start(self._answer(data))
 
-    async def _answer(self, data: bytes) -> Message:
-        found: Message = {}
+    async def _answer(self, data: bytes) -> JsonObject:
+        found: JsonObject = {}
         try:
             if len(data) > LONGEST_REQUEST:
                 raise Misuse(f"a request has at most {LONGEST_REQUEST} bytes")
@@ -204,7 +204,7 @@ class ViewerSession:
                 self._hub.around.on_internal(error)
             return {**found, **failure(error)}
 
-    def _read(self, message: Message) -> Wanted:
+    def _read(self, message: JsonObject) -> Wanted:
         """Raises `Misuse`, and `Refusal` for too many."""
         name = str(message["do"])
         if not (self._stops if name in STOPS else self._limit).allows(self._now):

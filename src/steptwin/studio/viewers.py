@@ -16,7 +16,7 @@ from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.studio.hub import Hub
 from steptwin.studio.session import ViewerSession
-from steptwin.subject.dispatch import Message, failure
+from steptwin.subject.dispatch import JsonObject, failure
 
 AsgiScope: TypeAlias = MutableMapping[str, Any]
 AsgiReceive: TypeAlias = Callable[[], Awaitable[MutableMapping[str, Any]]]
@@ -136,7 +136,7 @@ class ViewerConnection:
             answer = self._session.receive(text, self._clock())
             answer.then(lambda: self._answered(answer.result()))
 
-    def _answered(self, answer: Message) -> None:
+    def _answered(self, answer: JsonObject) -> None:
         self._put((json.dumps(answer, separators=(",", ":")),))
 
     def _put(self, texts: Iterable[str]) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Awaitable, Callable, Mapping
 from typing import Any, TypeAlias
 
 from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
+from steptwin.messages import Message, read_message_text, text_of, with_messages
 from steptwin.plaintypes import shown
 from steptwin.subject.commands import COMMANDS, VERSION, Command, read_command, row_of
 from steptwin.subject.contract import Result
@@ -18,7 +19,7 @@ FORM = 'a request is a line of JSON: {"do": NAME, "id": ANY, FIELD: VALUE, ...}'
 
 Action: TypeAlias = Callable[[Any], object]
 """Executes a command; returns its answer as plain data."""
-Message: TypeAlias = dict[str, object]
+JsonObject: TypeAlias = dict[str, object]
 
 
 class Dispatcher:
@@ -61,7 +62,7 @@ class Dispatcher:
 # ---------------------------------------------------------------------- messages
 
 
-def read_message(line: bytes, key: str = "do") -> Message:
+def read_message(line: bytes, key: str = "do") -> JsonObject:
     """Read a JSON object with a text under ``key``. Raises `Misuse`."""
     try:
         message = json.loads(line)
@@ -94,16 +95,17 @@ def fields_of(message: Mapping[str, object]) -> dict[str, object]:
     return {name: value for name, value in message.items() if name not in ("do", "id", "version")}
 
 
-def answer(result: Result) -> Message:
+def answer(result: Result) -> JsonObject:
     return {"ok": result.value, "number": result.number, "time_ns": str(result.time)}
 
 
-def failure(error: Exception) -> Message:
+INTERNAL = Message("subject.internal-error", "internal error, please report it: {what}")
+
+
+def failure(error: Exception) -> JsonObject:
     """An error as a value. ``code``: misuse, refusal, failure (the line or the peer), internal."""
-    code = code_of(error)
-    if isinstance(error, SteptwinError):
-        return {"error": {"code": code, "message": str(error)}}
-    return {"error": {"code": code, "message": f"internal error, please report it: {type(error).__name__}: {error}"}}
+    text = text_of(error) if isinstance(error, SteptwinError) else INTERNAL(what=f"{type(error).__name__}: {error}")
+    return {"error": with_messages({"code": code_of(error), "message": text})}
 
 
 def code_of(error: Exception) -> str:
@@ -115,12 +117,12 @@ def code_of(error: Exception) -> str:
 def raised(error: Mapping[str, Any]) -> SteptwinError:
     """The exception for an error as a value."""
     kinds: Mapping[str, type[SteptwinError]] = {"misuse": Misuse, "refusal": Refusal, "failure": LineFailure}
-    return kinds.get(error["code"], SteptwinError)(error["message"])
+    return kinds.get(error["code"], SteptwinError)(read_message_text(error, "message"))
 
 
 async def respond(
     do: Callable[[Command, object], Awaitable[Result]], line: bytes, on_internal: Callable[[Exception], object]
-) -> Message:
+) -> JsonObject:
     """The answer to any message. ``do`` takes its command and its id; ``on_internal`` is called with unexpected exceptions."""
     found: dict[str, object] = {}
     try:

@@ -14,7 +14,7 @@ from steptwin.subject.contract import Description
 from steptwin.subject.controls import ControlDescription
 from steptwin.subject.fields import LONGEST_ID, Field
 from steptwin.subject.payloads import KINDS
-from steptwin.subject.shapes import members, shape
+from steptwin.subject.shapes import members, shape, with_sentences
 from steptwin.tables import complete
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -129,7 +129,19 @@ def schema() -> dict[str, object]:
 
 def definitions() -> dict[str, dict[str, object]]:
     """Of what is sent, by the names under which schemas of messages refer to it."""
-    return {"(answer)": _answer(), "(event)": _event(), "(description)": _description(), "(state)": _state()}
+    return {
+        "(sentence)": _sentence(),
+        "(answer)": _answer(),
+        "(event)": _event(),
+        "(description)": _description(),
+        "(state)": _state(),
+    }
+
+
+def _sentence() -> dict[str, object]:
+    """As `with_messages` writes it."""
+    found = members({"id": _TEXT, "values": {"type": "object"}})
+    return {**found, "description": "A message without its text. A value with a text is a message itself."}
 
 
 def _request(row: CommandRow) -> dict[str, object]:
@@ -158,14 +170,8 @@ def _or_null(schema: dict[str, object], *, is_required: bool) -> dict[str, objec
 
 
 def _answer() -> dict[str, object]:
-    error = {
-        "type": "object",
-        "properties": {
-            "code": {"enum": ["misuse", "refusal", "failure", "internal"]},
-            "message": {"type": "string"},
-        },
-        "required": ["code", "message"],
-    }
+    code = {"enum": ["misuse", "refusal", "failure", "internal"]}
+    error = with_sentences({"code": code, "message": _TEXT}, "message")
     return {
         "type": "object",
         "description": "Every request has exactly one.",

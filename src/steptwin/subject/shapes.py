@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 import types
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
@@ -48,3 +48,11 @@ def members(properties: Mapping[str, object], *optional: str) -> dict[str, objec
         "required": [name for name in properties if name not in optional],
         "additionalProperties": False,
     }
+
+
+def with_sentences(properties: Mapping[str, object], *texts: str, lists: Iterable[str] = ()) -> dict[str, object]:
+    """An object as `steptwin.messages.with_messages` writes it: the members ``texts`` and ``lists`` may be texts of messages."""
+    sentence = {"$ref": "#/$defs/(sentence)"}
+    several = {"type": "array", "items": {"anyOf": [sentence, {"type": "null"}]}}
+    found: dict[str, object] = {**dict.fromkeys(texts, sentence), **dict.fromkeys(lists, several)}
+    return members({**properties, "messages": members(found, *found)}, "messages")

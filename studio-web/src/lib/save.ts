@@ -1,3 +1,5 @@
+import { errorOf } from "./protocol/connection";
+import type { Answer } from "./protocol/types";
 import { tokenHeaders } from "./state/greeting";
 
 /** Gives a file to the browser's downloads. */
@@ -13,6 +15,6 @@ export function save(blob: Blob, name: string): void {
 export async function fetchFile(path: string): Promise<Blob> {
   const response = await fetch(path, { headers: tokenHeaders() });
   if (response.ok) return response.blob();
-  const answer = (await response.json().catch(() => null)) as { error?: { message?: string } } | null;
-  throw answer?.error?.message ?? `${response.status} ${response.statusText}`;
+  const answer = (await response.json().catch(() => null)) as Answer | null;
+  throw answer?.error ? errorOf(answer.error) : `${response.status} ${response.statusText}`;
 }

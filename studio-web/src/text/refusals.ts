@@ -11,26 +11,8 @@ export const REFUSALS: Readonly<Record<string, string>> = {
   "the connection was lost before the answer came; whether it was done is not known":
     "połączenie zerwało się przed odpowiedzią; nie wiadomo, czy to wykonano",
   // Who may do what.
-  "{name} is for the role {role}; {viewer} has the role {other}":
-    "{name} jest dla roli {role}; {viewer} ma rolę {other}",
-  "{name} needs control, which {holder} holds: take it over first":
-    "{name} wymaga sterowania, które ma {holder}: najpierw przejmij sterowanie",
-  "{holder} holds control: take it over first": "sterowanie ma {holder}: można je przejąć",
-  "Host {host} is no name of this studio; it is reached as {names}":
-    "{host} nie jest nazwą tego studia; osiąga się je jako {names}",
-  "Origin {origin} is another site; only pages of this studio may ask it":
-    "{origin} to inna strona; pytać mogą tylko strony tego studia",
-  "no token: it is in the address that the studio prints on a terminal, and in its file of tokens":
-    "brak tokenu: jest w adresie, który studio wypisuje w terminalu, i w jego pliku tokenów",
-  "wrong token": "zły token",
   "{name} needs the token of this studio, which is in its file of tokens":
     "{name} wymaga tokenu tego studia, który jest w jego pliku tokenów",
-  "{place}: no tokens: expected lines ROLE NAME TOKEN": "{place}: brak tokenów: oczekiwano linii ROLA NAZWA TOKEN",
-  "{place}: {#count} words: expected ROLE NAME TOKEN": "{place}: słów {#count}: oczekiwano ROLA NAZWA TOKEN",
-  "{place}: no role {role}; roles are {names}": "{place}: nie ma roli {role}; role to {names}",
-  "{place}: a token of {#count} characters: permitted are {#least} to {#most}":
-    "{place}: token o {#count} znakach: dozwolone {#least} do {#most}",
-  "{place}: this token is there already": "{place}: taki token już jest",
   "too many requests: permitted are {#rate} a second": "za dużo żądań: dozwolone {#rate} na sekundę",
   "too many messages: permitted are {#rate} a second": "za dużo wiadomości: dozwolone {#rate} na sekundę",
   "too many texts: permitted are {#most}": "za dużo tekstów: dozwolone {#most}",

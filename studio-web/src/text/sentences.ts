@@ -1,8 +1,10 @@
+import type { Sentence } from "../lib/protocol/types";
 import { DATASHEETS } from "./datasheets";
 import { DESCRIPTIONS } from "./descriptions";
 import { FINDINGS } from "./findings";
 import { HAPPENED } from "./happened";
 import { MEANINGS } from "./meanings";
+import { inPolish } from "./messages";
 import { REFUSALS } from "./refusals";
 import { language } from "./texts.svelte";
 import { POLISH } from "./words";
@@ -105,8 +107,8 @@ function inParts(sentence: string, between: string, depth: number): string | nul
 }
 
 /** In the language of the page as far as it is known; else in English, marked as English. */
-export function sentence(english: string): { text: string; lang: "pl" | "en" | undefined } {
-  const polish = language() === "pl" ? polishOf(english) : null;
+export function sentence(english: string, message?: Sentence): { text: string; lang: "pl" | "en" | undefined } {
+  const polish = language() !== "pl" ? null : message === undefined ? polishOf(english) : inPolish(message);
   if (polish !== null) return { text: polish, lang: undefined };
   return { text: english, lang: "en" };
 }

@@ -19,7 +19,7 @@ from steptwin.gateways.leases import JogLeases
 from steptwin.simulation.describe.gateways import MqttSpec
 from steptwin.subject.commands import Command, Jog, StopAxes, row_of
 from steptwin.subject.contract import Result
-from steptwin.subject.dispatch import Message, failure, read_message, respond
+from steptwin.subject.dispatch import JsonObject, failure, read_message, respond
 
 COMMANDS = (
     *("read", "pins", "state", "encoders", "faults", "time", "stop", "set", "press", "release", "write", "turn", "enable"),
@@ -74,10 +74,10 @@ class JsonCommands:
         self._door = door
         self._clock = clock
         self._leases = JogLeases(subject)
-        self._kept: OrderedDict[object, tuple[float, Message | None]] = OrderedDict()
+        self._kept: OrderedDict[object, tuple[float, JsonObject | None]] = OrderedDict()
         """Requests with an id, when they came and their answers; None while they are being done."""
 
-    async def answer(self, request: JsonRequest) -> Message | None:
+    async def answer(self, request: JsonRequest) -> JsonObject | None:
         """None for a request that is being done already: its answer comes."""
         found: dict[str, Any] = {}
         try:

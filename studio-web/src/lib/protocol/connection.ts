@@ -1,5 +1,6 @@
 import type { OpenLink, Link } from "./link";
-import type { Answer, HelloMessage, Pushed, Requests } from "./types";
+import type { Said } from "../../text";
+import type { Answer, HelloMessage, Pushed, Requests, Sentence } from "./types";
 
 export type Hello = HelloMessage["hello"];
 export type RequestName = keyof Requests;
@@ -11,9 +12,23 @@ export class RequestError extends Error {
   constructor(
     readonly code: ErrorCode,
     message: string,
+    readonly sentence?: Sentence,
   ) {
     super(message);
   }
+
+  get said(): Said {
+    return { text: this.message, message: this.sentence };
+  }
+}
+
+/** What to show of a rejection. */
+export function saidOf(error: unknown): Said {
+  return error instanceof RequestError ? error.said : { text: error instanceof Error ? error.message : String(error) };
+}
+
+export function errorOf({ code, message, messages }: NonNullable<Answer["error"]>): RequestError {
+  return new RequestError(code, message, messages?.message);
 }
 
 export interface ConnectionEvents {
@@ -21,7 +36,7 @@ export interface ConnectionEvents {
   hello(hello: Hello, isNewConnection: boolean): void;
   /** What was pushed since the last call, without hello and without gaps. */
   pushed(messages: readonly Pushed[]): void;
-  state(state: ConnectionState, why: string): void;
+  state(state: ConnectionState, why: Said): void;
 }
 
 /** `silent`: the connection is there, and nothing comes over it. `refused`: hello was answered with an error, for want of the right
@@ -124,7 +139,7 @@ export class Connection {
     this.resyncs = false;
     this.watch();
     this.request("hello", this.greeting()).catch((error: RequestError) => {
-      if (error.code !== "closed") this.enter("refused", error.message);
+      if (error.code !== "closed") this.enter("refused", error.said);
     });
   }
 
@@ -190,7 +205,7 @@ export class Connection {
     if (waiting === undefined) return;
     this.waiting.delete(answer.id as number);
     this.timers.clear(waiting.timer);
-    if (answer.error) waiting.failed(new RequestError(answer.error.code, answer.error.message));
+    if (answer.error) waiting.failed(errorOf(answer.error));
     else waiting.done(answer.ok);
   }
 
@@ -203,7 +218,7 @@ export class Connection {
     }, SILENT_MS);
   }
 
-  private enter(state: ConnectionState, why = ""): void {
+  private enter(state: ConnectionState, why: Said = { text: "" }): void {
     if (state === this.stateNow) return;
     this.stateNow = state;
     this.events.state(state, why);

@@ -1,12 +1,13 @@
 import {
   Connection,
-  RequestError,
+  saidOf,
   browserTimers,
   type ConnectionState,
   type Fields,
   type Hello,
   type RequestName,
 } from "../protocol/connection";
+import type { Said } from "../../text";
 import { openInWorker } from "../protocol/link";
 import { stopAllOverHttp } from "../stop";
 import type { Pushed, Requests, SubjectEvent } from "../protocol/types";
@@ -62,8 +63,7 @@ interface Following {
 export type Holder = Hello["control"];
 export type Listener = (events: readonly SubjectEvent[]) => void;
 
-export interface Notice {
-  text: string;
+export interface Notice extends Said {
   kind: "error" | "done";
   /** Of a text that is not in the language of the page. */
   lang?: "en";
@@ -75,7 +75,7 @@ const NOTICE_MS = 8000;
 export class Studio {
   link = $state<ConnectionState>("connecting");
   /** Why the studio did not accept this page. */
-  refusal = $state("");
+  refusal = $state.raw<Said>({ text: "" });
   hello = $state.raw<Hello | null>(null);
   model = $state.raw<Model>(EMPTY);
   control = $state.raw<Holder>(null);
@@ -114,7 +114,7 @@ export class Studio {
     const events = {
       hello: (hello: Hello, isNewConnection: boolean) => this.greeted(hello, isNewConnection),
       pushed: (messages: readonly Pushed[]) => messages.forEach((message) => this.pushed(message)),
-      state: (state: ConnectionState, why: string) => {
+      state: (state: ConnectionState, why: Said) => {
         this.link = state;
         this.refusal = why;
       },
@@ -188,7 +188,7 @@ export class Studio {
   }
 
   report(error: unknown): void {
-    this.show({ text: error instanceof RequestError ? error.message : String(error), kind: "error", lang: "en" });
+    this.show({ ...saidOf(error), kind: "error", lang: "en" });
   }
 
   show(notice: Notice): void {

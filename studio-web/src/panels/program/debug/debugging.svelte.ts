@@ -1,3 +1,5 @@
+import { saidOf } from "../../../lib/protocol/connection";
+import type { Said } from "../../../text";
 import type { SubjectEvent } from "../../../lib/protocol/types";
 import type { Studio } from "../../../lib/state/studio.svelte";
 
@@ -33,7 +35,7 @@ export interface Watched {
   expression: string;
   /** With its unit; null where it cannot be calculated. */
   value: string | null;
-  problem: string;
+  problem: Said | null;
 }
 
 export type Stopped = Pick<
@@ -155,12 +157,8 @@ export class Debugging {
 
   private evaluated(machine: string, expression: string): Promise<Watched> {
     return this.studio.ask("evaluate", { machine, expression }).then(
-      (found) => ({ expression, value: (found as { value: string }).value, problem: "" }),
-      (error: unknown) => ({
-        expression,
-        value: null,
-        problem: String(error instanceof Error ? error.message : error),
-      }),
+      (found) => ({ expression, value: (found as { value: string }).value, problem: null }),
+      (error: unknown) => ({ expression, value: null, problem: saidOf(error) }),
     );
   }
 
@@ -168,7 +166,7 @@ export class Debugging {
 
   watch(expression: string): void {
     if (expression && !this.watches.some((one) => one.expression === expression))
-      this.watches = [...this.watches, { expression, value: null, problem: "" }];
+      this.watches = [...this.watches, { expression, value: null, problem: null }];
     void this.refresh();
   }
 

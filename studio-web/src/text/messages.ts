@@ -1,0 +1,66 @@
+import type { Sentence } from "../lib/protocol/types";
+import polish from "./polish.json";
+
+/** A text of the service, and which message it is, where it is one with an id. */
+export interface Said {
+  text: string;
+  message?: Sentence;
+}
+
+/** Messages of the service in Polish, by id, with the places of the English one (src/steptwin/messages.py; tests/test_messages.py). */
+const POLISH: Readonly<Record<string, string>> = polish;
+
+/** A value of a message: what somebody gave or a program measured, which stays as it is; an object is a message. */
+type Value = string | number | readonly Value[] | { text: string; id?: string; values?: Values };
+type Values = Readonly<Record<string, Value>>;
+
+/** `{name}`, `{name!r}` in quotes, `{name:FORMAT}`; doubled brackets stand for one. */
+const PLACE = /\{\{|\}\}|\{(\w+)(!r)?(?::([^}]*))?\}/g;
+
+/** The message in Polish; null where there is none. */
+export function inPolish({ id, values }: Sentence): string | null {
+  return (
+    POLISH[id]?.replace(PLACE, (place, name?: string, quoted?: string, format?: string) => {
+      if (name === undefined) return place.charAt(0);
+      return shown((values as Values)[name] ?? "", quoted !== undefined, format);
+    }) ?? null
+  );
+}
+
+function shown(value: Value, isQuoted: boolean, format?: string): string {
+  if (typeof value === "number") return format === undefined ? String(value) : formatted(value, format);
+  if (typeof value === "string") return isQuoted ? quoted(value) : value;
+  if ("text" in value) {
+    const text = (value.id !== undefined && inPolish({ id: value.id, values: value.values ?? {} })) || value.text;
+    return isQuoted ? quoted(text) : text;
+  }
+  return value.map((one) => shown(one, isQuoted, format)).join(", ");
+}
+
+/** As Python quotes a text. */
+function quoted(text: string): string {
+  const quote = text.includes("'") && !text.includes('"') ? '"' : "'";
+  return quote + text.replaceAll("\\", "\\\\").replaceAll(quote, `\\${quote}`).replaceAll("\n", "\\n") + quote;
+}
+
+/** A number as Python formats it: `g`, `f`, `d` and `X`, with digits behind the point, width with zeros, and sign. */
+function formatted(value: number, format: string): string {
+  const [, sign, width = "", digits = "6", kind] = /^(\+?)(0\d+)?(?:\.(\d+))?([gfdX])$/.exec(format) ?? [];
+  const size = Math.abs(value);
+  const text =
+    kind === "g"
+      ? general(size, Number(digits))
+      : kind === "f"
+        ? size.toFixed(Number(digits))
+        : size.toString(kind === "X" ? 16 : 10).toUpperCase();
+  return (value < 0 ? "-" : (sign ?? "")) + text.padStart(Number(width), "0");
+}
+
+/** With so many digits, without zeros at the end; very large and very small numbers with an exponent. */
+function general(size: number, digits: number): string {
+  const [mantissa = "", power = "0"] = size.toExponential(digits - 1).split("e");
+  const exponent = Number(power);
+  const short = (text: string) => (text.includes(".") ? text.replace(/\.?0+$/, "") : text);
+  if (exponent >= -4 && exponent < digits) return short(size.toFixed(digits - 1 - exponent));
+  return `${short(mantissa)}e${exponent < 0 ? "-" : "+"}${String(Math.abs(exponent)).padStart(2, "0")}`;
+}
