@@ -22,6 +22,9 @@ from steptwin.subject.dispatch import failure, raised
 ROOT = Path(__file__).parents[1]
 SOURCES = ROOT / "src"
 POLISH = ROOT / "studio-web/src/text/polish.json"
+ROOMS = ("access", "calc", "debug", "devices", "studio", "subject", "why")
+"""Of the others, sentences still are in the tables by English (tests/studio/test_texts.py)."""
+ERRORS = ("LineFailure", "Misuse", "Refusal")
 DEFINITION = re.compile(r'^[A-Z_]+ = Message\(\s*"([^"]*)"', re.MULTILINE)
 FORMAT = re.compile(r"\+?(0\d+)?(\.\d+)?[gfdX]")
 """Formats of numbers that the page knows."""
@@ -62,6 +65,18 @@ def calls() -> Iterator[tuple[str, ast.Call, Message]]:
         for node in ast.walk(ast.parse(text)) if known else ():
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in known:
                 yield f"{path}:{node.lineno}", node, known[node.func.id]
+
+
+def test_errors_of_rooms_that_reach_the_page_are_messages() -> None:
+    """Not a text of its own in any ``raise``."""
+    paths = [path for room in ROOMS for path in (SOURCES / "steptwin" / room).rglob("*.py")]
+    nodes = [
+        (path, node) for path in paths for node in ast.walk(ast.parse(path.read_text("utf-8"))) if isinstance(node, ast.Raise)
+    ]
+    calls = [(path, node.exc) for path, node in nodes if isinstance(node.exc, ast.Call) and ast.unparse(node.exc.func) in ERRORS]
+    found = [(path, call.lineno) for path, call in calls if isinstance(call.args[0], ast.Constant | ast.JoinedStr)]
+    assert len(calls) > 100
+    assert found == []
 
 
 def test_each_use_of_a_message_gives_its_values() -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from control_rig import Desk, answer_to, answers_to, misuse, ok, served, turns
+from control_rig import Desk, answer_to, answers_to, misuse, ok, read_answer, served, turns
 
 from steptwin.live import control
 from steptwin.live.control import ControlEndpoint
@@ -18,7 +18,7 @@ from steptwin.simulation.toml.addresses import Address
 from steptwin.subject.dispatch import FORM
 
 TOKEN_FIRST = 'the first line of a connection is {"token": TOKEN}, with the token of this twin'
-FORM_ERROR = {"error": {"code": "misuse", "message": FORM}}
+FORM_ERROR = {"error": {"code": "misuse", "message": FORM()}}
 
 
 @pytest.fixture(autouse=True)
@@ -101,7 +101,7 @@ def test_half_a_request_is_dropped_after_a_time(monkeypatch: pytest.MonkeyPatch)
         writer.write(b'{"do": "note", "text": "a"}\n{"do": ')
         lines = (await reader.read()).splitlines()
         writer.close()
-        return [json.loads(line) for line in lines]
+        return [read_answer(line) for line in lines]
 
     first, second = served(play)
     assert first == ok("a")
@@ -116,7 +116,7 @@ def test_who_has_asked_may_be_silent_for_as_long_as_he_likes(monkeypatch: pytest
         found = []
         for _ in range(2):
             writer.write(b'{"do": "note", "text": "a"}\n')
-            found.append(json.loads(await reader.readline()))
+            found.append(read_answer(await reader.readline()))
             await asyncio.sleep(0.05)
         writer.close()
         return found
@@ -141,11 +141,11 @@ async def until(holds: Callable[[], bool]) -> None:
 async def following(endpoint: ControlEndpoint, **fields: object) -> tuple[asyncio.StreamReader, asyncio.StreamWriter, Any]:
     reader, writer = await asyncio.open_unix_connection(str(endpoint.path))
     writer.write(json.dumps({"do": "follow", "id": "e", **fields}).encode() + b"\n")
-    return reader, writer, json.loads(await reader.readline())
+    return reader, writer, read_answer(await reader.readline())
 
 
 async def next_of(reader: asyncio.StreamReader) -> Any:
-    return json.loads(await asyncio.wait_for(reader.readline(), 60))
+    return read_answer(await asyncio.wait_for(reader.readline(), 60))
 
 
 def test_events_come_after_the_answer_with_its_id_until_they_are_not_wanted_any_more() -> None:
@@ -235,7 +235,7 @@ def test_more_clients_than_there_may_be_are_told_so(monkeypatch: pytest.MonkeyPa
 
     async def play(endpoint: ControlEndpoint) -> Any:
         clients = [await asyncio.open_unix_connection(str(endpoint.path)) for _ in range(3)]
-        found = json.loads(await clients[2][0].readline())
+        found = read_answer(await clients[2][0].readline())
         for _, writer in clients:
             writer.close()
         return found
@@ -256,7 +256,7 @@ def by_tcp(*lines: bytes) -> list[Any]:
         for line in lines:
             writer.write(line.replace(b"TOKEN", said["token"].encode()) + b"\n")
         writer.write_eof()
-        found = [json.loads(line) for line in (await reader.read()).splitlines()]
+        found = [read_answer(line) for line in (await reader.read()).splitlines()]
         writer.close()
         return found
 
@@ -322,7 +322,7 @@ def test_an_answer_that_comes_later_keeps_its_place() -> None:
         other = await answer_to(endpoint, b'{"do": "note", "text": "other"}\n')
         assert other == ok("other")
         desk.later.put(None)
-        assert [json.loads(line) for line in (await reader.read()).splitlines()] == [ok("later", 2), ok("next", 3)]
+        assert [read_answer(line) for line in (await reader.read()).splitlines()] == [ok("later", 2), ok("next", 3)]
         writer.close()
 
     served(play)

@@ -433,7 +433,7 @@ def test_who_asks_over_rest_needs_no_hello_and_has_no_stream() -> None:
     assert rest(session, studio, "enable", machine="table", axis=1)["ok"] is None
     assert studio.hub.control.holder is None  # it acted while nobody held control, and holds none
     error = rest(session, studio, "watch", points=["time"])["error"]
-    assert error == {"code": "refusal", "message": "watch is about a connection: ask it over the WebSocket"}
+    assert (error["code"], error["message"]) == ("refusal", "watch is about a connection: ask it over the WebSocket")
     assert session.take(studio.now) == []
 
 

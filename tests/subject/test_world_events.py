@@ -133,3 +133,12 @@ def test_the_plans_of_a_run_give_every_position_the_controller_shows() -> None:
             shown = (plan.count(world.now) + origin) / scales[machine, str(axis)]
             assert shown == pytest.approx(world.read(f"{machine}.M{axis}.position"), abs=1e-9)
     assert len({event.number for event in plans.values()}) > 1
+
+
+def test_words_of_a_note_are_a_value_of_its_message() -> None:
+    words = "the chip shop waits 5 ms"
+    subject = of(small(f"[[script]]\nname = 's'\nsteps = [{{ note = '{words}' }}]\n"))
+    following = subject.follow(filter_of(["note"]), 99)
+    subject.do(command.Advance(duration=SECOND))
+    (note,) = following.take().events
+    assert note.plain()["messages"] == {"text": {"id": "subject.note", "values": {"note": words}}}

@@ -29,6 +29,7 @@ from steptwin.calc.solving import is_same, solve
 from steptwin.calc.units import Dimension
 from steptwin.datasheet import Limits
 from steptwin.errors import Misuse
+from steptwin.messages import Message, text_of
 from steptwin.motion import Profile
 from steptwin.nearmiss import NearMiss
 
@@ -49,6 +50,28 @@ TIMES = (
 """At most one of them may be given, instead of one quantity."""
 TIME_NAMES = tuple(time.name for time in TIMES)
 PARTS_OF = {"rises": RISE, "stays": CONSTANT, "falls": FALL}
+
+
+UNKNOWN_QUANTITY = Message("calc.unknown-quantity", "no quantity {name!r}{hint}: quantities are {names}")
+TWO_TIMES = Message("calc.two-times", "{times}: one time determines what is left out, two cannot both be wanted")
+TIME_IS_NEEDED = Message("calc.time-is-needed", "to calculate {find} a time is needed: one of {names}")
+TIME_AND_RESULT = Message(
+    "calc.time-and-result", "{time} is given, so {find} follows: name what is to be calculated, or leave out the time"
+)
+CHOICE_IS_NOT_CALCULATED = Message(
+    "calc.choice-is-not-calculated", "{find} cannot be calculated, it is a choice: calculated are {names}"
+)
+MISSING_TO_CALCULATE = Message("calc.missing-to-calculate", "{missing}: missing to calculate {find}")
+TIME_DETERMINES_ONE = Message("calc.time-determines-one", "{missing}: a time determines one of them, give the others")
+ALL_IS_GIVEN = Message("calc.all-is-given", "all is given, and a time: name what is to be calculated instead, one of {names}")
+MISSING = Message("calc.missing", "{missing}: missing; give them, or leave one of them out and give a time ({times})")
+OUT_OF_RANGE = Message("calc.out-of-range", "{quantity} = {value}: permitted {permitted}")
+TIME_IS_FIXED = Message("calc.time-is-fixed", "{time} = {wanted} cannot be: it is {actual}, whatever {unknown} is")
+POSSIBLE_TIMES = Message("calc.possible-times", "{least} to {most}")
+TIME_IS_IMPOSSIBLE = Message("calc.time-is-impossible", "{time} = {wanted} cannot be: with {unknown} {range} it is {possible}")
+TAKEN_AS = Message("calc.taken-as", "{name} {wanted:.10g} {unit} is taken as {value:.10g} {unit}")
+OTHER_TIME = Message("calc.other-time", "with values that the controller takes, {name} is {value} instead of {wanted}")
+LESS_THAN_A_STEP = Message("calc.less-than-a-step", "distance = {distance:g} {unit}: is less than the controller's step")
 
 
 class Calculator:
@@ -82,16 +105,16 @@ class Calculator:
         for name in (*given, *(() if find is None else (find,))):
             if name not in self.quantities:
                 hint = NearMiss().hint(name, self.quantities)
-                raise Misuse(f"no quantity {name!r}{hint}: quantities are {', '.join(self.quantities)}")
+                raise Misuse(UNKNOWN_QUANTITY(name=name, hint=hint, names=list(self.quantities)))
 
     def _wanted_time(self, given: Mapping[str, float], find: str | None) -> str | None:
         times = [name for name in given if name in TIME_NAMES]
         if len(times) > 1:
-            raise Misuse(f"{' and '.join(times)}: one time determines what is left out, two cannot both be wanted")
+            raise Misuse(TWO_TIMES(times=" and ".join(times)))
         if not times and find is not None and find not in TIME_NAMES:
-            raise Misuse(f"to calculate {find} a time is needed: one of {', '.join(TIME_NAMES)}")
+            raise Misuse(TIME_IS_NEEDED(find=find, names=list(TIME_NAMES)))
         if times and find in TIME_NAMES:
-            raise Misuse(f"{times[0]} is given, so {find} follows: name what is to be calculated, or leave out the time")
+            raise Misuse(TIME_AND_RESULT(time=times[0], find=find))
         return times[0] if times else None
 
     def _unknown(self, known: Mapping[str, float], find: str | None) -> str:
@@ -101,15 +124,15 @@ class Calculator:
         can = [one.name for one in self.model.quantities if not one.choices]
         if find is not None:
             if find not in can:
-                raise Misuse(f"{find} cannot be calculated, it is a choice: calculated are {', '.join(can)}")
+                raise Misuse(CHOICE_IS_NOT_CALCULATED(find=find, names=list(can)))
             if missing:
-                raise Misuse(f"{', '.join(missing)}: missing to calculate {find}")
+                raise Misuse(MISSING_TO_CALCULATE(missing=list(missing), find=find))
             return find
         if len(missing) == 1:
             return missing[0]
         if missing:
-            raise Misuse(f"{', '.join(missing)}: a time determines one of them, give the others")
-        raise Misuse(f"all is given, and a time: name what is to be calculated instead, one of {', '.join(can)}")
+            raise Misuse(TIME_DETERMINES_ONE(missing=list(missing)))
+        raise Misuse(ALL_IS_GIVEN(names=list(can)))
 
     def _complete(self, known: Mapping[str, float]) -> dict[str, float]:
         """With defaults. Raises `Misuse` for what is missing."""
@@ -122,9 +145,7 @@ class Calculator:
                 values[one.name] = values[one.same_as]
         missing = [one.name for one in self.model.quantities if one.name not in values and one.same_as is None]
         if missing:
-            raise Misuse(
-                f"{', '.join(missing)}: missing; give them, or leave one of them out and give a time ({', '.join(TIME_NAMES)})"
-            )
+            raise Misuse(MISSING(missing=list(missing), times=list(TIME_NAMES)))
         return {one.name: values[one.name] for one in self.model.quantities}
 
     def _check_together(self, known: Mapping[str, float]) -> None:
@@ -137,7 +158,8 @@ class Calculator:
         is_low = size <= low if limits.is_low_excluded else size < low
         is_wrong = value not in quantity.choices if quantity.choices else is_low or not (high is None or size <= high)
         if is_wrong or isnan(value):
-            raise Misuse(f"{quantity.name} = {value:.10g} {quantity.unit}".rstrip() + f": permitted {range_text(quantity)}")
+            given = f"{value:.10g} {quantity.unit}".rstrip()
+            raise Misuse(OUT_OF_RANGE(quantity=quantity.name, value=given, permitted=range_text(quantity)))
 
     # ------------------------------------------------------------------ what follows
 
@@ -156,9 +178,18 @@ class Calculator:
             ends = sorted((timed(wanted, low), timed(wanted, high)))
             which = self.quantities[wanted].meaning.lower()
             if is_same(*ends):
-                raise Misuse(f"{which} = {_seconds(seconds)} cannot be: it is {_seconds(ends[0])}, whatever {unknown} is")
-            possible = f"{_seconds(ends[0])} to {_seconds(ends[1])}"
-            raise Misuse(f"{which} = {_seconds(seconds)} cannot be: with {unknown} {range_text(quantity)} it is {possible}")
+                raise Misuse(
+                    TIME_IS_FIXED(time=text_of(which), wanted=_seconds(seconds), actual=_seconds(ends[0]), unknown=unknown)
+                )
+            raise Misuse(
+                TIME_IS_IMPOSSIBLE(
+                    time=text_of(which),
+                    wanted=_seconds(seconds),
+                    unknown=unknown,
+                    range=range_text(quantity),
+                    possible=POSSIBLE_TIMES(least=_seconds(ends[0]), most=_seconds(ends[1])),
+                )
+            )
         return found
 
     def _timed(self, unknown: str, known: Mapping[str, float], wanted: str, value: float) -> float:
@@ -172,17 +203,13 @@ class Calculator:
         for name, value in values.items():
             unit = self.quantities[name].unit
             if name != unknown and not is_same(value, exact_values[name]):
-                notes.append(f"{name} {exact_values[name]:.10g} {unit} is taken as {value:.10g} {unit}")
+                notes.append(TAKEN_AS(name=name, wanted=exact_values[name], value=value, unit=unit))
         if values[DISTANCE] == 0.0:
-            raise Misuse(
-                f"distance = {exact_values[DISTANCE]:g} {self.quantities[DISTANCE].unit}: is less than the controller's step"
-            )
+            raise Misuse(LESS_THAN_A_STEP(distance=exact_values[DISTANCE], unit=self.quantities[DISTANCE].unit))
         profile = self.model.plan(values)
         times = _times(profile)
         if seconds is not None and wanted is not None and abs(times[wanted] - seconds) > SHOWN * seconds:
-            notes.append(
-                f"with values that the controller takes, {wanted} is {_seconds(times[wanted])} instead of {_seconds(seconds)}"
-            )
+            notes.append(OTHER_TIME(name=wanted, value=_seconds(times[wanted]), wanted=_seconds(seconds)))
         speed_pulses = self.quantities[VELOCITY].pulses
         peak = max(_peaks(profile), default=0.0) / speed_pulses
         return Calculation(
@@ -262,11 +289,18 @@ def _seconds(seconds: float) -> str:
     return f"{seconds:.6g} s"
 
 
+ABOVE = Message("calc.above", "above {low:.10g}{unit}")
+FROM = Message("calc.from", "from {low:.10g}{unit}")
+ABOVE_UP_TO = Message("calc.above-up-to", "above {low:.10g} up to {high:.10g}{unit}")
+FROM_UP_TO = Message("calc.from-up-to", "from {low:.10g} up to {high:.10g}{unit}")
+
+
 def range_text(quantity: MoveQuantity) -> str:
     """What is permitted, with the unit."""
     if quantity.choices:
         return ", ".join(map(str, quantity.choices))
     low, high = quantity.limits.low or 0.0, quantity.limits.high
-    first = f"above {low:.10g}" if quantity.limits.is_low_excluded else f"from {low:.10g}"
-    last = "" if high is None else f" up to {high:.10g}"
-    return f"{first}{last} {quantity.unit}".rstrip()
+    unit = f" {quantity.unit}".rstrip()
+    if high is None:
+        return (ABOVE if quantity.limits.is_low_excluded else FROM)(low=low, unit=unit)
+    return (ABOVE_UP_TO if quantity.limits.is_low_excluded else FROM_UP_TO)(low=low, high=high, unit=unit)

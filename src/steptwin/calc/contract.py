@@ -8,6 +8,7 @@ from typing import NamedTuple, Protocol
 
 from steptwin.calc.units import Dimension
 from steptwin.datasheet import Limits
+from steptwin.messages import MessageText, with_messages
 from steptwin.motion import Profile
 
 DISTANCE, VELOCITY, ACCELERATION, DECELERATION = "distance", "velocity", "acceleration", "deceleration"
@@ -74,7 +75,7 @@ class Model(Protocol):
         """Raises `Misuse` for values that do not go together."""
         ...
 
-    def notes(self, values: Mapping[str, float], profile: Profile) -> list[str]:
+    def notes(self, values: Mapping[str, float], profile: Profile) -> list[MessageText]:
         """What is worth knowing of them."""
         ...
 
@@ -133,7 +134,7 @@ class Calculation:
 
 def plain(result: Calculation) -> dict[str, object]:
     """As JSON has values; ``curve`` has points of the profile (`curve`)."""
-    return {
+    found = {
         "title": result.title,
         "found": result.found,
         "exact": result.exact,
@@ -143,11 +144,12 @@ def plain(result: Calculation) -> dict[str, object]:
         "peak": result.peak,
         "reaches": result.reaches,
         "parts": [part._asdict() for part in result.parts],
-        "formulas": [formula._asdict() for formula in result.formulas],
+        "formulas": [with_messages(formula._asdict()) for formula in result.formulas],
         "notes": list(result.notes),
         "settings": [setting._asdict() for setting in result.settings],
         "curve": [list(point) for point in curve(result)],
     }
+    return with_messages(found)
 
 
 class CurvePoint(NamedTuple):

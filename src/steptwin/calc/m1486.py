@@ -34,11 +34,35 @@ from steptwin.m1486.microsteps import (
     microstep_size,
 )
 from steptwin.m1486.variants import DEFAULT, Variant
+from steptwin.messages import Message, MessageText
 from steptwin.motion import Profile
 from steptwin.motion.ramps import plan_distance
 
 STEEPEST = 65
 """M-4: of A in relation to S; beyond it the manual's table, which is missing, decides."""
+
+
+VELOCITY_IS_LIMITED = Message(
+    "calc.velocity-is-limited", "Q{qualification:g} permits {highest} step/s: V{velocity:g} runs as V{highest} (M-34)"
+)
+NO_RAMP = Message("calc.no-ramp", "V is not above S: constant velocity, no ramp (M-8)")
+PROFILE_OUT_OF_RANGE = Message(
+    "calc.profile-out-of-range", "P{profile:g}: the manual permits {low} to {high} step/s, or more than V"
+)
+STEEP = Message("calc.steep", "A is more than {most} × S: check the table of the manual whether S{start:g} permits it (M-4)")
+MICROSTEPS_OF_Q = Message("calc.microsteps-of-q", "above {limit:g} step/s the microsteps are those of Q")
+FAST_CLOCK = Message(
+    "calc.fast-clock", "at 24 MHz speeds are {speeds} ×, accelerations {accelerations} × the numbers of the commands"
+)
+LINEAR_RAMP = Message("calc.linear-ramp", "linear ramp")
+PARABOLIC_RAMP = Message("calc.parabolic-ramp", "parabolic ramp")
+CONSTANT_VELOCITY = Message("calc.constant-velocity", "constant velocity")
+SHORT_MOVE = Message("calc.short-move", "short move")
+RAMPS_MEET = Message("calc.ramps-meet", "the ramps meet where the braking distance is what remains")
+MICROSTEPS_AND_QUALIFICATION = Message(
+    "calc.microsteps-and-qualification",
+    "M{microstep} and Q{qualification} do not go together: with M{microstep} permitted is {permitted}",
+)
 
 
 class M1486Model:
@@ -90,35 +114,35 @@ class M1486Model:
         microstep, qualification = int(values[MICROSTEP]), int(values[QUALIFICATION])
         if qualification not in PAIRS[microstep]:
             permitted = ", ".join(f"Q{one}" for one in PAIRS[microstep])
-            raise Misuse(f"M{microstep} and Q{qualification} do not go together: with M{microstep} permitted is {permitted}")
+            raise Misuse(MICROSTEPS_AND_QUALIFICATION(microstep=microstep, qualification=qualification, permitted=permitted))
 
-    def notes(self, values: Mapping[str, float], profile: Profile) -> list[str]:
+    def notes(self, values: Mapping[str, float], profile: Profile) -> list[MessageText]:
         start, top, knee, qualification = (values[name] for name in (START, VELOCITY, KNEE, QUALIFICATION))
         highest = HIGHEST_SPEED[int(qualification)]
         found = []
         if top > highest:
-            found.append(f"Q{qualification:g} permits {highest} step/s: V{top:g} runs as V{highest} (M-34)")
+            found.append(VELOCITY_IS_LIMITED(qualification=qualification, highest=highest, velocity=top))
         if top <= start:
-            found.append("V is not above S: constant velocity, no ramp (M-8)")
+            found.append(NO_RAMP())
         if PROFILE_RANGE.stop <= knee <= top:
-            found.append(f"P{knee:g}: the manual permits {PROFILE_RANGE[0]} to {PROFILE_RANGE[-1]} step/s, or more than V")
+            found.append(PROFILE_OUT_OF_RANGE(profile=knee, low=PROFILE_RANGE[0], high=PROFILE_RANGE[-1]))
         if values[ACCELERATION] > STEEPEST * start:
-            found.append(f"A is more than {STEEPEST} × S: check the table of the manual whether S{start:g} permits it (M-4)")
+            found.append(STEEP(most=STEEPEST, start=start))
         if top > (limit := low_range_limit(int(values[MICROSTEP]))):
-            found.append(f"above {limit:g} step/s the microsteps are those of Q")
+            found.append(MICROSTEPS_OF_Q(limit=limit))
         if self._clock > 1:
-            found.append(f"at 24 MHz speeds are {self._clock} ×, accelerations {self._clock**2} × the numbers of the commands")
+            found.append(FAST_CLOCK(speeds=self._clock, accelerations=self._clock**2))
         return found
 
     def formulas(self, values: Mapping[str, float], profile: Profile) -> list[Formula]:
         found = []
         shapes = {(segment.c2 != 0.0, segment.c3 != 0.0) for segment in profile.segments}
         if (True, False) in shapes:
-            found.append(Formula("linear ramp", "v = S + A·t, t = (min(P, V) − S)/A", "VII.2"))
+            found.append(Formula(LINEAR_RAMP(), "v = S + A·t, t = (min(P, V) − S)/A", "VII.2"))
         if (True, True) in shapes:
-            found.append(Formula("parabolic ramp", "v = P + A·t − A²·t²/(4·(V − P)), t = 2·(V − P)/A", "M-6"))
+            found.append(Formula(PARABOLIC_RAMP(), "v = P + A·t − A²·t²/(4·(V − P)), t = 2·(V − P)/A", "M-6"))
         if (False, False) in shapes:
-            found.append(Formula("constant velocity", "t = (s − s of the ramps)/v", "VII.2"))
+            found.append(Formula(CONSTANT_VELOCITY(), "t = (s − s of the ramps)/v", "VII.2"))
         else:
-            found.append(Formula("short move", "the ramps meet where the braking distance is what remains", "M-7"))
+            found.append(Formula(SHORT_MOVE(), RAMPS_MEET(), "M-7"))
         return found

@@ -8,6 +8,7 @@ from steptwin.calc.contract import ACCELERATION, DECELERATION, DISTANCE, VELOCIT
 from steptwin.calc.units import Dimension
 from steptwin.datasheet import Limits
 from steptwin.errors import Misuse
+from steptwin.messages import Message, MessageText
 from steptwin.mic488.axis import MAX_SPEED_P
 from steptwin.mic488.encoding import REAL_MAX
 from steptwin.motion import MotionState, Profile, plan_position
@@ -15,6 +16,13 @@ from steptwin.motion import MotionState, Profile, plan_position
 FARTHEST_P = 2**32 - 1
 """From one end of the coordinates to the other (MIC-7)."""
 AXES = (1, 2, 3, 4)
+
+
+PULSES = Message("calc.pulses", "{count} pulses, at most {most:.6g} a second")
+TOO_SHORT = Message("calc.too-short", "too short to reach the velocity: a triangle")
+TRAPEZOID = Message("calc.trapezoid", "trapezoid")
+TRIANGLE = Message("calc.triangle", "triangle")
+NO_SUCH_AXIS = Message("calc.no-such-axis", "axis {axis}: a MIC488 has {first} to {last}")
 
 
 class Mic488Model:
@@ -25,7 +33,7 @@ class Mic488Model:
     def __init__(self, unit: str = "imp", gear: float = 1.0, axis: int = 1) -> None:
         """``gear``: pulses in a ``unit``. Raises `Misuse` for an axis that is not there."""
         if axis not in AXES:
-            raise Misuse(f"axis {axis}: a MIC488 has {AXES[0]} to {AXES[-1]}")
+            raise Misuse(NO_SUCH_AXIS(axis=axis, first=AXES[0], last=AXES[-1]))
         self._gear = gear
         reals = Limits(0.0, REAL_MAX, is_low_excluded=True)
         fastest = Limits(0.0, MAX_SPEED_P / gear, is_low_excluded=True)
@@ -60,18 +68,18 @@ class Mic488Model:
     def check(self, values: Mapping[str, float]) -> None:
         """All values go together."""
 
-    def notes(self, values: Mapping[str, float], profile: Profile) -> list[str]:
+    def notes(self, values: Mapping[str, float], profile: Profile) -> list[MessageText]:
         pulses = round(values[DISTANCE] * self._gear)
-        found = [f"{abs(pulses)} pulses, at most {min(values[VELOCITY] * self._gear, MAX_SPEED_P):.6g} a second"]
+        found = [PULSES(count=abs(pulses), most=min(values[VELOCITY] * self._gear, MAX_SPEED_P))]
         if not _has_constant(profile):
-            found.append("too short to reach the velocity: a triangle")
+            found.append(TOO_SHORT())
         return found
 
     def formulas(self, values: Mapping[str, float], profile: Profile) -> list[Formula]:
         if _has_constant(profile):
-            return [Formula("trapezoid", "t = v/(2·a) + v/(2·d) + s/v, while v²/(2·a) + v²/(2·d) < s", "4.3, MIC-29")]
+            return [Formula(TRAPEZOID(), "t = v/(2·a) + v/(2·d) + s/v, while v²/(2·a) + v²/(2·d) < s", "4.3, MIC-29")]
         peak = "v = √(2·s·a·d/(a + d)), t = v/a + v/d"
-        return [Formula("triangle", peak, "4.3, MIC-29")]
+        return [Formula(TRIANGLE(), peak, "4.3, MIC-29")]
 
 
 def _has_constant(profile: Profile) -> bool:

@@ -13,6 +13,7 @@ from math import isfinite
 from types import MappingProxyType
 
 from steptwin.errors import Misuse
+from steptwin.messages import Message
 from steptwin.nearmiss import NearMiss
 from steptwin.numerals import read_number
 
@@ -36,9 +37,14 @@ LARGEST_RATIO = 1e6
 _TEXT = re.compile(r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:e[+-]?\d{1,3})?) *(\S*)\Z", re.ASCII | re.IGNORECASE)
 
 
+RATIO_OUT_OF_RANGE = Message(
+    "calc.ratio-out-of-range", "{name} = {value:g}{unit}: permitted are numbers above 0, up to {most:g}{unit}"
+)
+
+
 def _positive(name: str, value: float, unit: str) -> None:
     if not (isfinite(value) and 0.0 < value <= LARGEST_RATIO):
-        raise Misuse(f"{name} = {value:g}{unit}: permitted are numbers above 0, up to {LARGEST_RATIO:g}{unit}")
+        raise Misuse(RATIO_OUT_OF_RANGE(name=name, value=value, unit=unit, most=LARGEST_RATIO))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,6 +73,12 @@ class DriveMechanics:
         return UnitScale(MappingProxyType(pulses))
 
 
+GEAR_OUT_OF_RANGE = Message("calc.gear-out-of-range", "gear = {gear:g} pulses/{unit}: permitted are numbers above 0")
+A_LEAD = Message("calc.a-lead", "the lead [mm/rev]")
+STEPS = Message("calc.steps", "the motor's steps in a revolution and its microsteps")
+UNIT_NEEDS_MECHANICS = Message("calc.unit-needs-mechanics", "{unit} is not known in pulses: give {need}; known are {names}")
+
+
 @dataclass(frozen=True, slots=True)
 class UnitScale:
     """Pulses in each unit of distance that is known."""
@@ -78,7 +90,7 @@ class UnitScale:
         """From GEAR, the pulses in one unit; the units that follow from it are known, too. Raises `Misuse`."""
         unit = unit_of(unit)
         if not (isfinite(gear) and gear > 0.0):
-            raise Misuse(f"gear = {gear:g} pulses/{unit}: permitted are numbers above 0")
+            raise Misuse(GEAR_OUT_OF_RANGE(gear=gear, unit=unit))
         pulses = {PULSE: 1.0, unit: gear}
         for family in (_IN_REV, _IN_MM):
             if unit in family:
@@ -89,25 +101,35 @@ class UnitScale:
         """Pulses in one ``unit``: its GEAR. Raises `Misuse` for a unit that is not known, or needs mechanics."""
         known = unit_of(unit)
         if known not in self.pulses:
-            need = "the lead [mm/rev]" if known in _IN_MM else "the motor's steps in a revolution and its microsteps"
-            raise Misuse(f"{unit} is not known in pulses: give {need}; known are {', '.join(self.pulses)}")
+            raise Misuse(UNIT_NEEDS_MECHANICS(unit=unit, need=A_LEAD() if known in _IN_MM else STEPS(), names=list(self.pulses)))
         return self.pulses[known]
+
+
+UNKNOWN_UNIT = Message("calc.unknown-unit", "no unit {text!r}{hint}: units are {names}")
 
 
 def unit_of(text: str) -> str:
     """The unit of distance of a name. Raises `Misuse` with those that there are."""
     name = _ALIASES.get(text.strip().lower(), text.strip().lower())
     if name not in UNITS:
-        raise Misuse(f"no unit {text!r}{NearMiss().hint(text, (*UNITS, *_ALIASES))}: units are {', '.join(UNITS)}")
+        raise Misuse(UNKNOWN_UNIT(text=text, hint=NearMiss().hint(text, (*UNITS, *_ALIASES)), names=list(UNITS)))
     return name
+
+
+NO_LENGTH = Message("calc.no-length", "{text!r} is no length: units are {names}")
 
 
 def read_lead(text: str) -> float:
     """The travel in one revolution, mm; a number without a unit is in mm. Raises `Misuse`."""
     value, unit = read_quantity(text, Dimension.DISTANCE)
     if unit is not None and unit not in _IN_MM:
-        raise Misuse(f"{text!r} is no length: units are {', '.join(_IN_MM)}")
+        raise Misuse(NO_LENGTH(text=text, names=list(_IN_MM)))
     return value if unit is None else value * _IN_MM[unit]
+
+
+NO_QUANTITY = Message("calc.no-quantity", "{text!r} is not a number with a unit: expected such as {examples}")
+NO_TIME = Message("calc.no-time", "{text!r} is not a time: units are {names}")
+OTHER_DIMENSION = Message("calc.other-dimension", "{text!r} has the unit of something else: expected such as {examples}")
 
 
 def read_quantity(text: str, dimension: Dimension) -> tuple[float, str | None]:
@@ -115,19 +137,19 @@ def read_quantity(text: str, dimension: Dimension) -> tuple[float, str | None]:
     seconds. Raises `Misuse` for what is none of this dimension."""
     match = _TEXT.match(text.strip())
     if match is None:
-        raise Misuse(f"{text!r} is not a number with a unit: expected such as {_EXAMPLES[dimension]}")
+        raise Misuse(NO_QUANTITY(text=text, examples=_EXAMPLES[dimension]))
     value, suffix = read_number(match[1]), match[2].lower().replace("s2", "s²").replace("s^2", "s²")
     if not suffix:
         return value, None
     if dimension is Dimension.TIME:
         if suffix not in _OF_TIME:
-            raise Misuse(f"{text!r} is not a time: units are {', '.join(_OF_TIME)}")
+            raise Misuse(NO_TIME(text=text, names=list(_OF_TIME)))
         return value * _OF_TIME[suffix], None
     if dimension is Dimension.SPEED and suffix == "rpm":
         return value / 60.0, REV
     name, slash, per = suffix.partition("/")
     if slash + per != dimension.value:
-        raise Misuse(f"{text!r} has the unit of something else: expected such as {_EXAMPLES[dimension]}")
+        raise Misuse(OTHER_DIMENSION(text=text, examples=_EXAMPLES[dimension]))
     return value, unit_of(name)
 
 

@@ -12,6 +12,7 @@ from steptwin.debug.calculation import HitCount, LogText, ResolvedExpression
 from steptwin.debug.values import DataPoint, LabelPoint, LinePoint, SetPoint
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.messages import NONE, Message
 from steptwin.nearmiss import NearMiss
 from steptwin.simulation.kinds.programs import Place, Programs
 from steptwin.simulation.world.plant import Plant
@@ -128,21 +129,32 @@ def with_left_side(name: str, condition: str) -> str:
     return f"{name} {condition}" if condition.lstrip()[:1] in "<>=!" else condition
 
 
+HAS_NO_PROGRAM = Message("debug.has-no-program", "{machine!r} has no program: {names} has one")
+NO_CONTROLLER = Message("debug.no-controller", "no controller")
+
+
 def _programs_of(programs: Mapping[str, Programs], machine: str) -> Programs:
     if machine not in programs:
-        raise Misuse(f"{machine!r} has no program: {', '.join(programs) or 'no controller'} has one")
+        raise Misuse(HAS_NO_PROGRAM(machine=machine, names=list(programs) or NO_CONTROLLER()))
     return programs[machine]
+
+
+UNKNOWN_TEXT = Message("debug.unknown-text", "{machine} has no text {text!r}: texts are {names}")
+NO_STATEMENT_IN_LINE = Message("debug.no-statement-in-line", "no statement is in line {line} of {name} or after it")
 
 
 def places_of_line(programs: Mapping[str, Programs], asked: LinePoint) -> tuple[Place, int]:
     """The first statement in a line or after it, and its line. Raises `Misuse`."""
     own = _programs_of(programs, asked.machine)
     if asked.text not in own.texts:
-        raise Misuse(f"{asked.machine} has no text {asked.text!r}: texts are {', '.join(own.texts)}")
+        raise Misuse(UNKNOWN_TEXT(machine=asked.machine, text=asked.text, names=list(own.texts)))
     for number, statement in enumerate(own.statements(asked.text)):
         if statement.line >= asked.line and statement.start < statement.end:
             return Place(asked.text, number), statement.line
-    raise Misuse(f"no statement is in line {asked.line} of {own.texts[asked.text].name} or after it")
+    raise Misuse(NO_STATEMENT_IN_LINE(line=asked.line, name=own.texts[asked.text].name))
+
+
+UNKNOWN_LABEL = Message("debug.unknown-label", "no label is called {label!r}{hint}; there are {names}")
 
 
 def places_of_label(programs: Mapping[str, Programs], label: str) -> dict[str, list[Place]]:
@@ -154,7 +166,7 @@ def places_of_label(programs: Mapping[str, Programs], label: str) -> dict[str, l
             found.setdefault(machine, []).append(Place(text, number))
     if not found:
         known = list(dict.fromkeys(name for _, _, name, _ in _labels(programs)))
-        raise Misuse(f"no label is called {label!r}{NearMiss().hint(wanted, known)}; there are {', '.join(known) or 'none'}")
+        raise Misuse(UNKNOWN_LABEL(label=label, hint=NearMiss().hint(wanted, known), names=list(known) or NONE()))
     return found
 
 

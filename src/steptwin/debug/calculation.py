@@ -14,6 +14,7 @@ from sys import float_info
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.messages import NONE, Message
 from steptwin.nearmiss import NearMiss
 from steptwin.simulation.components.signals import Idle
 from steptwin.simulation.logic.expression import ReadAt, parse_expression, value_of
@@ -80,6 +81,9 @@ class ResolvedExpression:
         return float(self._value(now))
 
 
+WRITE_ONLY = Message("debug.write-only", "{name} can only be written")
+
+
 def _signal(world: Plant, machine: str, name: str) -> SignalOf | Idle | None:
     """The signal that a name means; None for a name of the program. Raises `Misuse`."""
     owner, dot, _ = name.partition(".")
@@ -88,8 +92,11 @@ def _signal(world: Plant, machine: str, name: str) -> SignalOf | Idle | None:
     is_full = owner in world.machines or owner in world.parts.element_names
     found = world.signal(name) if is_full else _own_signal(world, machine, name)
     if not found.is_readable:
-        raise Misuse(f"{name} can only be written")
+        raise Misuse(WRITE_ONLY(name=name))
     return found
+
+
+UNKNOWN_VARIABLE = Message("debug.unknown-variable", "{name!r} means nothing to {machine}{hint}: its variables are {names}")
 
 
 def _own_signal(world: Plant, machine: str, name: str) -> SignalOf | Idle:
@@ -98,7 +105,7 @@ def _own_signal(world: Plant, machine: str, name: str) -> SignalOf | Idle:
     except Misuse:
         variables = list(world.programs_of(machine).variables(world.now))
         hint = NearMiss().hint(name, [*variables, *world.machine(machine).pins(), *_paths(world, machine)])
-        raise Misuse(f"{name!r} means nothing to {machine}{hint}: its variables are {', '.join(variables) or 'none'}") from None
+        raise Misuse(UNKNOWN_VARIABLE(name=name, machine=machine, hint=hint, names=list(variables) or NONE())) from None
 
 
 def _paths(world: Plant, machine: str) -> list[str]:
@@ -116,11 +123,20 @@ def _read_by_program(world: Plant, machine: str, name: str) -> ReadAt:
     return read
 
 
+CALCULATION_FAILS = Message(
+    "debug.calculation-fails", "a division by zero, or a result that is too large: permitted are numbers up to {most:.3g}"
+)
+
+
 def _checked(value: float) -> float:
     """Raises `Misuse` for what nothing can be calculated with, and nothing set to."""
     if not isfinite(value):
-        raise Misuse(f"a division by zero, or a result that is too large: permitted are numbers up to {float_info.max:.3g}")
+        raise Misuse(CALCULATION_FAILS(most=float_info.max))
     return value
+
+
+BRACE_WITHOUT_PARTNER = Message("debug.brace-without-partner", "log {text!r}: a brace has no partner")
+NO_NAME_IN_LOG = Message("debug.no-name-in-log", "log {text!r}: only names of the program can be in it")
 
 
 class LogText:
@@ -131,18 +147,23 @@ class LogText:
         self._parts: list[str | ResolvedExpression] = []
         for plain, inner, stray in re.findall(r"([^{}]+)|\{([^{}]*)\}|([{}])", text):
             if stray:
-                raise Misuse(f"log {text!r}: a brace has no partner")
+                raise Misuse(BRACE_WITHOUT_PARTNER(text=text))
             self._parts.append(plain or self._local(text, calculation(inner)))
 
     @staticmethod
     def _local(text: str, calculation: ResolvedExpression) -> ResolvedExpression:
         if not calculation.is_local:
-            raise Misuse(f"log {text!r}: only names of the program can be in it")
+            raise Misuse(NO_NAME_IN_LOG(text=text))
         return calculation
 
     def shown(self, now: Nanos) -> str:
         """As a statement at ``now`` finds it."""
         return "".join(part if isinstance(part, str) else number_text(part.value_at_statement(now)) for part in self._parts)
+
+
+WRONG_HIT_COUNT = Message(
+    "debug.wrong-hit-count", "hit count {text!r}: expected a number from 1 on, after nothing, or one of = < <= > >= %"
+)
 
 
 class HitCount:
@@ -152,7 +173,7 @@ class HitCount:
         """Raises `Misuse`."""
         match = re.fullmatch(r"\s*(%|[=<>]=?)?\s*([1-9]\d{0,8})\s*", text)
         if match is None:
-            raise Misuse(f"hit count {text!r}: expected a number from 1 on, after nothing, or one of = < <= > >= %")
+            raise Misuse(WRONG_HIT_COUNT(text=text))
         self._sign, self._number = match[1] or "=", int(match[2])
 
     def counts(self, hit: int) -> bool:

@@ -20,6 +20,7 @@ from steptwin.debug.values import Events, Location, Scope, SetPoint, ShownValue,
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
+from steptwin.messages import Message
 from steptwin.simulation.kinds.programs import Place, Programs
 from steptwin.simulation.world.history import History, outside_past
 from steptwin.simulation.world.inputs import ExternalInput
@@ -42,6 +43,16 @@ DebugTravel: TypeAlias = Generator[None, None, Stopped]
 """A run in parts: after each of them something else can be done, or the run be ended by `close`."""
 
 
+NO_KNOWN_PROGRAM = Message("debug.no-known-program", "{name}: no controller has a program whose text is known")
+NO_STATEMENT_TIME = Message(
+    "debug.no-statement-time", "{name}: statement_time = 0: a debugger stops between statements: give them '1 us' at least"
+)
+NOT_IN_THE_PAST = Message(
+    "debug.not-in-the-past",
+    "{name} cannot be set {ago:.9g} s before the present: branch, so that what came later has not happened",
+)
+
+
 class Debugger:
     """Debugs the programs of ``world``. Raises `Misuse` for a world without a program whose text is known, and for one with
     programs whose statements take no time.
@@ -62,10 +73,10 @@ class Debugger:
     ) -> None:
         debugged = {name: programs for name, programs in world.programs.items() if programs.texts}
         if not debugged:
-            raise Misuse(f"{world.spec.name}: no controller has a program whose text is known")
+            raise Misuse(NO_KNOWN_PROGRAM(name=world.spec.name))
         for name, programs in debugged.items():
             if programs.statement_time == 0:
-                raise Misuse(f"{name}: statement_time = 0: a debugger stops between statements: give them '1 us' at least")
+                raise Misuse(NO_STATEMENT_TIME(name=name))
         self._world = world
         self._statement = min(programs.statement_time for programs in debugged.values())
         self._apply_input = apply_input or world.apply_input
@@ -173,7 +184,7 @@ class Debugger:
         """Give a variable, an input or a register the value of an expression. Raises `Misuse`, in the past in any case."""
         if self._is_past:
             ago = (self.present - self.now) / SECOND
-            raise Misuse(f"{name} cannot be set {ago:.9g} s before the present: branch, so that what came later has not happened")
+            raise Misuse(NOT_IN_THE_PAST(name=name, ago=ago))
         value = scopes.evaluate(self._world, machine, text).number or 0.0
         self._apply_input(scopes.setting(self._world, machine, name, value))
         self._scout.changed(self.now)

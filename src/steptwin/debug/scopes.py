@@ -10,6 +10,7 @@ from steptwin.datasheet import Access
 from steptwin.debug.calculation import ResolvedExpression, number_text
 from steptwin.debug.values import Scope, ShownValue
 from steptwin.errors import Misuse
+from steptwin.messages import Message
 from steptwin.motioncontroller import MotionController
 from steptwin.points import LivePoint
 from steptwin.simulation.kinds.kind import AnyKind
@@ -21,11 +22,14 @@ from steptwin.subject.debugcommands import SCOPES
 VARIABLES, AXES, PINS, CONTROLLER, REGISTERS, PARTS = SCOPES
 
 
+UNKNOWN_GROUP = Message("debug.unknown-group", "no group of values is called {name!r}: there are {names}")
+
+
 def scope(world: Plant, machine: str, name: str) -> Scope:
     """One of `SCOPES` of a controller, at the present moment of its world. Raises `Misuse`."""
     world.touch(machine)
     if name not in SCOPES:
-        raise Misuse(f"no group of values is called {name!r}: there are {', '.join(SCOPES)}")
+        raise Misuse(UNKNOWN_GROUP(name=name, names=list(SCOPES)))
     return Scope(name, [value._replace(expression=_expression(world, machine, value)) for value in _VALUES[name](world, machine)])
 
 
@@ -120,6 +124,12 @@ def evaluate(world: Plant, machine: str, text: str) -> ShownValue:
     return ShownValue(name, number_text(number), number, is_settable=False)
 
 
+READ_ONLY = Message("debug.read-only", "{name} cannot be set: it can only be read")
+CANNOT_BE_SET = Message(
+    "debug.cannot-be-set", "{name!r} cannot be set: what can be are variables ({known}), inputs and registers that can be written"
+)
+
+
 def setting(world: Plant, machine: str, name: str, value: float) -> ExternalInput:
     """What gives a variable, an input or a register another value. Raises `Misuse` for what cannot be set."""
     own = world.programs_of(machine)
@@ -134,8 +144,8 @@ def setting(world: Plant, machine: str, name: str, value: float) -> ExternalInpu
         return Set(((target, kind.input_pin(path, value), value),))
     if kind.registers is not None and (point := kind.point(device, path)) is not None:
         if point.point.access is Access.READ:
-            raise Misuse(f"{name} cannot be set: it can only be read")
+            raise Misuse(READ_ONLY(name=name))
         world.requests(target, world.registers(target), ((path, value),))  # raises `Misuse`
         return Write(((target, path, value),))
     known = ", ".join(variables.values()) or "none"
-    raise Misuse(f"{name!r} cannot be set: what can be are variables ({known}), inputs and registers that can be written")
+    raise Misuse(CANNOT_BE_SET(name=name, known=known))

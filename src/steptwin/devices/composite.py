@@ -11,6 +11,7 @@ from steptwin.devices.worldpart import WorldPart
 from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
 from steptwin.later import start
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.nearmiss import NearMiss
 from steptwin.simulation.script import steps
 from steptwin.subject import commands as command
@@ -43,6 +44,22 @@ class SubjectPart(Protocol):
         ...
 
     async def begin_jog(self, wanted: command.Jog) -> Held: ...
+
+
+UNKNOWN_MACHINE = Message("devices.unknown-machine", "no machine is called {machine!r}{hint}; {known}")
+THERE_ARE = Message("devices.there-are", "there are {names}")
+NONE_IS_CONNECTED = Message("devices.none-is-connected", "no device is connected")
+NAME_THE_MACHINE = Message("devices.name-the-machine", "{command}: name the machine")
+NOT_POSSIBLE = Message("devices.not-possible", "{command} is not possible here; possible are {names}")
+NOT_STOPPED = Message("devices.not-stopped", "not stopped: {problems}{also}")
+ALSO_STOPPED = Message("devices.also-stopped", "; stopped: {names}")
+ONE_CONTROLLER_AT_A_TIME = Message(
+    "devices.one-controller-at-a-time", "{command}: one controller at a time where there are devices"
+)
+NO_DEVICE_FOR = Message("devices.no-device-for", "{command}: no device is connected")
+NEEDS_AN_ADDRESS = Message(
+    "devices.needs-an-address", "text: several devices are on {line}: it begins with the address of one of them, {known}, and CR"
+)
 
 
 class CompositeSubject:
@@ -106,8 +123,8 @@ class CompositeSubject:
         part = self._of_machine.get(machine) or self._world
         if part is None:
             names = self._of_machine
-            known = f"there are {', '.join(names)}" if names else "no device is connected"
-            raise Misuse(f"no machine is called {machine!r}{NearMiss().hint(machine, names)}; {known}")
+            known = THERE_ARE(names=list(names)) if names else NONE_IS_CONNECTED()
+            raise Misuse(UNKNOWN_MACHINE(machine=machine, hint=NearMiss().hint(machine, names), known=known))
         return part
 
     def _part_of(self, wanted: Command) -> SubjectPart:
@@ -126,16 +143,15 @@ class CompositeSubject:
             elif field.name == "values" and value is not None:
                 found += [self._part_called(machine) for machine, _, _ in value]
         if len(set(map(id, found))) > 1:
-            raise Misuse(f"{row_of(wanted).name}: one controller at a time where there are devices")
+            raise Misuse(ONE_CONTROLLER_AT_A_TIME(command=row_of(wanted).name))
         if found:
             return found[0]
         if self._world is None and not self._parts:
-            raise Refusal(f"{row_of(wanted).name}: no device is connected")
+            raise Refusal(NO_DEVICE_FOR(command=row_of(wanted).name))
         if self._world is None and len(self._parts) > 1:
             can = self.description.commands
             name = row_of(wanted).name
-            why = ": name the machine" if name in can else f" is not possible here; possible are {', '.join(can)}"
-            raise Refusal(f"{name}{why}")
+            raise Refusal(NAME_THE_MACHINE(command=name) if name in can else NOT_POSSIBLE(command=name, names=list(can)))
         return self._parts[0]
 
     def _addressed(self, wanted: steps.Send) -> SubjectPart:
@@ -144,9 +160,7 @@ class CompositeSubject:
         there = self._of_unit.get((wanted.line, address))
         if there is None:
             known = ", ".join(f"X{unit:X}" for line, unit in self._of_unit if line == wanted.line and unit is not None)
-            raise Misuse(
-                f"text: several devices are on {wanted.line}: it begins with the address of one of them, {known}, and CR"
-            )
+            raise Misuse(NEEDS_AN_ADDRESS(line=wanted.line, known=known))
         return there
 
     # ------------------------------------------------------------------ as `Served`
@@ -214,8 +228,8 @@ class CompositeSubject:
                 done["machines"] += names
                 done["scripts"] += stopped["scripts"] if part is self._world else []
         if failed:
-            also = f"; stopped: {', '.join(done['machines'])}" if done["machines"] else ""
-            raise LineFailure(f"not stopped: {'; '.join(failed)}{also}")
+            also = ALSO_STOPPED(names=done["machines"]) if done["machines"] else ""
+            raise LineFailure(NOT_STOPPED(problems="; ".join(failed), also=also))
         return done
 
     def result_of(self, value: object) -> Result:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from steptwin.devices.composite import CompositeSubject
+from steptwin.devices.composite import THERE_ARE, CompositeSubject
 from steptwin.devices.device import ConnectedDevice, DeviceSurroundings
 from steptwin.diagnostics import SourceText
 from steptwin.drivers.exchange import ExchangeCounts, NoAnswer
@@ -19,6 +19,7 @@ from steptwin.drivers.subject import AsyncDeviceSubject, DevicePart
 from steptwin.errors import LineFailure, Misuse
 from steptwin.eventloop import later
 from steptwin.machine import Nanos
+from steptwin.messages import Message, text_of
 from steptwin.nearmiss import NearMiss
 
 MOST_DEVICES = 32
@@ -46,6 +47,13 @@ class _SharedLine:
 class _Connected:
     device: ConnectedDevice
     key: tuple[str, str, int]
+
+
+UNKNOWN_DEVICE = Message("devices.unknown-device", "no device is called {machine!r}{hint}; {known}")
+THERE_IS_NONE = Message("devices.there-is-none", "there is none")
+TOO_MANY_DEVICES = Message("devices.too-many-devices", "{most} devices are connected already, which is the most")
+WRONG_NAME = Message("devices.wrong-name", "name = {name!r}: permitted are {form}")
+NAME_IN_USE = Message("devices.name-in-use", "name = {name!r}: a machine is called that already")
 
 
 class DeviceConnections:
@@ -91,8 +99,8 @@ class DeviceConnections:
     def _connected(self, machine: str) -> _Connected:
         """Raises `Misuse`."""
         if machine not in self._devices:
-            known = f"there are {', '.join(self._devices)}" if self._devices else "there is none"
-            raise Misuse(f"no device is called {machine!r}{NearMiss().hint(machine, self._devices)}; {known}")
+            known = THERE_ARE(names=list(self._devices)) if self._devices else THERE_IS_NONE()
+            raise Misuse(UNKNOWN_DEVICE(machine=machine, hint=NearMiss().hint(machine, self._devices), known=known))
         return self._devices[machine]
 
     async def open(self, text: str, name: str | None = None) -> str:
@@ -100,7 +108,7 @@ class DeviceConnections:
         address = await asyncio.to_thread(self._computer.find, text)
         async with self._turn:
             if len(self._devices) >= MOST_DEVICES:
-                raise Misuse(f"{MOST_DEVICES} devices are connected already, which is the most")
+                raise Misuse(TOO_MANY_DEVICES(most=MOST_DEVICES))
             name = self._free_name(address, name)
             key = address.kind, address.place, address.baud
             line = self._lines.get(key) or _SharedLine(_line_of(address))
@@ -122,9 +130,9 @@ class DeviceConnections:
         taken = [machine.name for machine in self._subject.description.machines]
         if name is not None:
             if not NAME.fullmatch(name):
-                raise Misuse(f"name = {name!r}: permitted are {NAME_FORM}")
+                raise Misuse(WRONG_NAME(name=name, form=NAME_FORM))
             if name in taken:
-                raise Misuse(f"name = {name!r}: a machine is called that already")
+                raise Misuse(NAME_IN_USE(name=name))
             return name
         how, there = DRIVERS[address.kind].selection, address.number
         usual = address.kind if there is None or there == how.usual else f"{address.kind}-{how.show(there)}"
@@ -151,19 +159,25 @@ class DeviceConnections:
             await self._close(machine)
 
 
+FOR_COMMANDS_ONLY = Message("devices.for-commands-only", "{kind} cannot be connected: its driver is for commands only")
+
+
 def _line_of(address: DeviceAddress) -> DriverLine[Any, Any]:
     kind = DRIVERS[address.kind]
     if kind.line is None:
-        raise Misuse(f"{kind.title} cannot be connected: its driver is for commands only")
+        raise Misuse(FOR_COMMANDS_ONLY(kind=kind.title))
     return kind.line(address.place, address.baud)
+
+
+NO_ANSWER = Message("devices.no-answer", "{problem}{others}")
 
 
 async def _device_at(address: DeviceAddress, line: DriverLine[Any, Any]) -> DevicePart:
     """Open the driver, which moves nothing. Raises `Misuse`, `Refusal`, `LineFailure`."""
     kind = DRIVERS[address.kind]
     if kind.part is None:
-        raise Misuse(f"{kind.title} cannot be connected: its driver is for commands only")
+        raise Misuse(FOR_COMMANDS_ONLY(kind=kind.title))
     try:
         return await kind.part(address, line)
     except NoAnswer as error:
-        raise LineFailure(f"{error}{others_there(kind)}") from error
+        raise LineFailure(NO_ANSWER(problem=text_of(error), others=text_of(others_there(kind)))) from error

@@ -19,6 +19,7 @@ from steptwin.drivers.subject import AsyncDeviceSubject, DevicePart, RawEffect
 from steptwin.errors import LineFailure, Refusal, SteptwinError
 from steptwin.eventloop import later
 from steptwin.machine import SECOND, Nanos
+from steptwin.messages import Message, text_of
 from steptwin.simulation.script import steps
 from steptwin.simulation.script.control import Halt, ended
 from steptwin.subject import commands as command
@@ -56,6 +57,18 @@ class DeviceSurroundings:
     keep: Callable[[str, str], str]
     """Keeps the settings of a machine, a text of JSON; where they are. Raises `SteptwinError`."""
     on_internal: Callable[[Exception], object]
+
+
+CONNECTION_IS_LOST = Message("devices.connection-is-lost", "{command} was not sent: the connection is lost ({lost})")
+TOO_MANY_WAITING = Message("devices.too-many-waiting", "{command} was not sent: {most} commands wait already")
+STOP_IS_BEING_EXECUTED = Message(
+    "devices.stop-is-being-executed", "{command} was not sent: a stop is being executed; repeat it after that"
+)
+STOPPED_MEANWHILE = Message("devices.stopped-meanwhile", "{command} was not sent: a stop was requested meanwhile")
+WAITED_TOO_LONG = Message("devices.waited-too-long", "{command} was not sent: it has waited more than {most_s} s; repeat it")
+AXIS_IS_JOGGED = Message("devices.axis-is-jogged", "{name}: a twin can be made at rest: an axis is jogged")
+JOGGED_ALREADY = Message("devices.jogged-already", "{name} axis {axis} is jogged already")
+JOG_STOPPED_MEANWHILE = Message("devices.jog-stopped-meanwhile", "jog was not begun: a stop was requested meanwhile")
 
 
 class ConnectedDevice:
@@ -180,7 +193,7 @@ class ConnectedDevice:
             if self._is_stop(wanted):
                 return await self._stop(wanted)
             if self.lost is not None:
-                raise LineFailure(f"{row_of(wanted).name} was not sent: the connection is lost ({self.lost})")
+                raise LineFailure(CONNECTION_IS_LOST(command=row_of(wanted).name, lost=text_of(self.lost)))
             if type(wanted) in LOOKS or self._effect_of(wanted) is RawEffect.LOOK:
                 return await self._subject.do(wanted)
             return await self._in_turn(wanted)
@@ -221,7 +234,7 @@ class ConnectedDevice:
         self._refuse_while_stopping(wanted)
         stops, asked = self._stops, self._around.clock()
         if self._waiting >= MOST_WAITING:
-            raise Refusal(f"{row_of(wanted).name} was not sent: {MOST_WAITING} commands wait already")
+            raise Refusal(TOO_MANY_WAITING(command=row_of(wanted).name, most=MOST_WAITING))
         self._waiting += 1
         try:
             await self._turn.acquire()
@@ -257,14 +270,14 @@ class ConnectedDevice:
 
     def _refuse_while_stopping(self, wanted: Command) -> None:
         if self._stopping:
-            raise Refusal(f"{row_of(wanted).name} was not sent: a stop is being executed; repeat it after that")
+            raise Refusal(STOP_IS_BEING_EXECUTED(command=row_of(wanted).name))
 
     def _refuse_late(self, wanted: Command, stops: int, asked: Nanos) -> None:
         """Refuse what a stop has overtaken, and what was asked for too long ago."""
         if self._stops != stops:
-            raise Refusal(f"{row_of(wanted).name} was not sent: a stop was requested meanwhile")
+            raise Refusal(STOPPED_MEANWHILE(command=row_of(wanted).name))
         if self._around.clock() - asked > PATIENCE_NS:
-            raise Refusal(f"{row_of(wanted).name} was not sent: it has waited more than {PATIENCE_NS // SECOND} s; repeat it")
+            raise Refusal(WAITED_TOO_LONG(command=row_of(wanted).name, most_s=PATIENCE_NS // SECOND))
 
     def _look_away(self) -> None:
         """The last values of a device that does not answer while it moves are out of date."""
@@ -293,7 +306,7 @@ class ConnectedDevice:
         """Put a twin beside it, in place of one that is there. Raises `Refusal`, `LineFailure`."""
         async with self._turn:
             if self._jogs:
-                raise Refusal(f"{self.name}: a twin can be made at rest: an axis is jogged")
+                raise Refusal(AXIS_IS_JOGGED(name=self.name))
             twin = await self._device.twin(self.name)
             now = self._around.clock()
             self._shadow = Shadow(self.name, self._subject.description.machines[0].datasheet, twin, now)
@@ -327,7 +340,7 @@ class ConnectedDevice:
 
     async def _begin_jog(self, wanted: command.Jog) -> LeasedJog:
         if self.lost is not None:
-            raise LineFailure(f"jog was not sent: the connection is lost ({self.lost})")
+            raise LineFailure(CONNECTION_IS_LOST(command="jog", lost=text_of(self.lost)))
         self._refuse_while_stopping(wanted)
         jog = self._device.held_jog(wanted)
         stops = self._stops
@@ -336,11 +349,11 @@ class ConnectedDevice:
             async with asyncio.timeout(JOG_WAIT_S):
                 await turn.acquire()
         except TimeoutError:
-            raise Refusal(f"{self.name} axis {wanted.axis} is jogged already") from None
+            raise Refusal(JOGGED_ALREADY(name=self.name, axis=wanted.axis)) from None
         held = LeasedJog(jog, self._around.clock, self._report)
         try:
             if self._stops != stops:
-                raise Refusal("jog was not begun: a stop was requested meanwhile")
+                raise Refusal(JOG_STOPPED_MEANWHILE())
             self._jogs[wanted.axis] = held
             if self._shadow is not None:
                 self._shadow.jogs(wanted.axis, on=True)

@@ -9,9 +9,14 @@ from collections.abc import Callable
 from steptwin.drivers.subject import DeviceJog
 from steptwin.errors import Refusal
 from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.messages import Message, text_of
+from steptwin.subject.jogs import JOG_HAS_ENDED
 
 LEASE_NS: Nanos = 250 * MILLISECOND
 """The jog continues for this time after it was extended; then the axis brakes."""
+
+
+JOG_NOT_BEGUN = Message("devices.jog-not-begun", "the jog was not begun: {why}")
 
 
 class LeasedJog:
@@ -34,7 +39,7 @@ class LeasedJog:
         await self._jog.__aenter__()
         if self._jog.end is not None:
             await self._jog.__aexit__(None, None, None)
-            raise Refusal(f"the jog was not begun: {self._jog.end}")
+            raise Refusal(JOG_NOT_BEGUN(why=text_of(str(self._jog.end))))
         self._until = self._clock() + self.lasts_ns
         self._running = asyncio.get_running_loop().create_task(self._run())
 
@@ -79,7 +84,7 @@ class LeasedJog:
         if now > self._until:  # whoever renews it was away, or this process: what waited meanwhile extends nothing
             self._end("lapsed")
         if self.over is not None:
-            raise Refusal(f"the jog has ended: {self.over}")
+            raise Refusal(JOG_HAS_ENDED(why=text_of(self.over)))
         self._until = now + self.lasts_ns
 
     def release(self) -> None:

@@ -166,7 +166,7 @@ class _Conversation(asyncio.Protocol):
         if self._is_full or self._transport.is_closing():
             self.abort()
         else:
-            self._end(failure(Misuse(f"no complete request within {TIMEOUT_S:g} s: {FORM}")))
+            self._end(failure(Misuse(f"no complete request within {TIMEOUT_S:g} s: {FORM()}")))
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._calm()
@@ -187,7 +187,7 @@ class _Conversation(asyncio.Protocol):
         self._has_ended = True
         self._unfollow_all()
         if self._received and not self._is_full:
-            self._end(failure(Misuse(f"the request has no end of line: {FORM}")))
+            self._end(failure(Misuse(f"the request has no end of line: {FORM()}")))
         return self._is_full or self._is_asked
 
     def pause_writing(self) -> None:

@@ -6,7 +6,14 @@ from collections.abc import Mapping
 
 from steptwin.calc import TIMES, Calculator, DriveMechanics, MoveQuantity, calculator_of, plain
 from steptwin.errors import Refusal
+from steptwin.messages import Message
 from steptwin.studio.machines import Sheets
+
+NO_CALCULATOR = Message(
+    "studio.no-calculator",
+    "there is no motion calculator for axis {axis} of {machine}: its kind has none, or the pulses in a unit are not known "
+    "(config=FILE behind the address of a device)",
+)
 
 
 class Calculations:
@@ -29,8 +36,7 @@ class Calculations:
     def _calculator(self, machine: str, axis: int) -> Calculator:
         found = calculator_of(self._sheets.of(machine), axis)
         if found is None:
-            why = "its kind has none, or the pulses in a unit are not known (config=FILE behind the address of a device)"
-            raise Refusal(f"there is no motion calculator for axis {axis} of {machine}: {why}")
+            raise Refusal(NO_CALCULATOR(axis=axis, machine=machine))
         return found
 
 

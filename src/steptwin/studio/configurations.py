@@ -8,10 +8,15 @@ from steptwin.configuration import ConfigurationFormat, ConfigurationKey, Form, 
 from steptwin.datasheet import Datasheet, plain
 from steptwin.diagnostics import SourceText, to_json
 from steptwin.errors import Refusal
+from steptwin.messages import Message
 from steptwin.simulation.kinds.registry import KINDS
 from steptwin.simulation.world.worldprograms import FINDING
 from steptwin.studio.machines import Sheets
 from steptwin.subject.contract import Reading
+
+NO_CONFIGURATION_FILE = Message(
+    "studio.no-configuration-file", "{machine} is of the kind {kind}, which has no configuration file: it is set up by commands"
+)
 
 
 class Configurations:
@@ -53,7 +58,7 @@ class Configurations:
         sheet = self._sheets.of(machine)
         kind = KINDS.get(sheet.kind)
         if kind is None or kind.configuration_format is None:
-            raise Refusal(f"{machine} is of the kind {sheet.kind}, which has no configuration file: it is set up by commands")
+            raise Refusal(NO_CONFIGURATION_FILE(machine=machine, kind=sheet.kind))
         return kind.configuration_format, sheet
 
 

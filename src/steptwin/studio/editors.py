@@ -18,8 +18,19 @@ from steptwin.access.rate import RateLimit
 from steptwin.access.tokens import AccessGate
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.studio.requests import REQUESTS
-from steptwin.studio.viewers import HELLO_S, PATIENCE_S, REFUSED, SILENT, AsgiReceive, AsgiScope, AsgiSend, until_first
+from steptwin.studio.viewers import (
+    BINARY_MESSAGE,
+    HELLO_S,
+    PATIENCE_S,
+    REFUSED,
+    SILENT,
+    AsgiReceive,
+    AsgiScope,
+    AsgiSend,
+    until_first,
+)
 from steptwin.subject.dispatch import failure, fields_of, read_message
 from steptwin.subject.fields import read_fields
 
@@ -43,6 +54,12 @@ class Conversation(Protocol):
     def close(self) -> None: ...
 
 
+HELLO_COMES_FIRST = Message("studio.hello-comes-first", "the first message is hello")
+TOO_MANY_EDITORS = Message("studio.too-many-editors", "there are {most} editors already, the most possible")
+TOO_MANY_MESSAGES = Message("studio.too-many-messages", "too many messages: permitted are {rate:g} a second")
+TOO_MANY_TEXTS = Message("studio.too-many-texts", "too many texts: permitted are {most}")
+
+
 class Editors:
     """All connections. ``files`` gives the present texts of the subject by address, ``clock`` the wall clock in nanoseconds."""
 
@@ -62,7 +79,7 @@ class Editors:
             async with asyncio.timeout(HELLO_S):
                 token = self._enter((await receive()).get("text"))
         except TimeoutError:
-            await _end(send, SILENT, Misuse("the first message is hello"))
+            await _end(send, SILENT, Misuse(HELLO_COMES_FIRST()))
         except SteptwinError as error:
             await _end(send, REFUSED, error)
         else:
@@ -76,11 +93,11 @@ class Editors:
         """The token that was given. Raises `Misuse` and `Refusal`."""
         message = read_message((text or "").encode("utf-8", "replace"))
         if message["do"] != "hello":
-            raise Misuse("the first message is hello")
+            raise Misuse(HELLO_COMES_FIRST())
         token: str | None = read_fields("hello", REQUESTS["hello"].fields, fields_of(message))["token"]
         self._gate.enter(token)
         if self._count >= MOST_EDITORS:
-            raise Refusal(f"there are {MOST_EDITORS} editors already, the most possible")
+            raise Refusal(TOO_MANY_EDITORS(most=MOST_EDITORS))
         return token
 
     async def _converse(self, receive: AsgiReceive, send: AsgiSend, token: str | None) -> None:
@@ -115,12 +132,12 @@ class Editors:
         while (message := await receive())["type"] == "websocket.receive":
             text = message.get("text")
             if text is None:
-                raise Misuse("a message is a text of JSON; this one is binary")
+                raise Misuse(BINARY_MESSAGE())
             self._gate.enter(token)  # it may be asked for since a device was connected
             if not limit.allows(self._clock()):
-                raise Refusal(f"too many messages: permitted are {RATE:g} a second")
+                raise Refusal(TOO_MANY_MESSAGES(rate=RATE))
             if await self._elsewhere(lambda text=text: _receive(there, text)) > MOST_DOCUMENTS:
-                raise Refusal(f"too many texts: permitted are {MOST_DOCUMENTS}")
+                raise Refusal(TOO_MANY_TEXTS(most=MOST_DOCUMENTS))
 
     async def _elsewhere(self, call: Callable[[], T]) -> T:
         """What a call gives that is made in the other thread."""

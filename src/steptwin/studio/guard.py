@@ -10,6 +10,8 @@ from steptwin.access.origin import Origins
 from steptwin.access.rate import RateLimits
 from steptwin.errors import Refusal
 from steptwin.machine import Nanos
+from steptwin.messages import Message
+from steptwin.studio.session import TOO_MANY_REQUESTS
 from steptwin.studio.viewers import AsgiReceive, AsgiScope, AsgiSend
 from steptwin.subject.dispatch import failure
 
@@ -28,6 +30,9 @@ HEADERS = (
 )
 ServeSocket: TypeAlias = Callable[[AsgiScope, AsgiReceive, AsgiSend], Awaitable[None]]
 """Serves one WebSocket from its beginning to its end."""
+
+
+WEBSOCKETS_ARE_ELSEWHERE = Message("studio.websockets-are-elsewhere", "WebSockets are at {places}")
 
 
 class Guard:
@@ -56,7 +61,7 @@ class Guard:
         try:
             self._origins.check(headers.get(b"host"), headers.get(b"origin"))
             if not self._limits.allows(client[0] if client else None, self._clock()):
-                await refuse(send, receive, 429, Refusal(f"too many requests: permitted are {RATE:g} a second"))
+                await refuse(send, receive, 429, Refusal(TOO_MANY_REQUESTS(rate=RATE)))
                 return
         except Refusal as error:
             await refuse(send, receive, 403, error)
@@ -64,7 +69,7 @@ class Guard:
         if not is_socket:
             await self._pass(scope, receive, send)
         elif scope["path"] not in self._sockets:
-            await _refuse_socket(send, receive, 404, Refusal(f"WebSockets are at {' and '.join(self._sockets)}"))
+            await _refuse_socket(send, receive, 404, Refusal(WEBSOCKETS_ARE_ELSEWHERE(places=" and ".join(self._sockets))))
         else:
             try:
                 await self._sockets[scope["path"]](scope, receive, _sending(send))

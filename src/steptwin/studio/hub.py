@@ -15,6 +15,7 @@ from steptwin.access.roles import Role
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.messages import Message
 from steptwin.studio.branchrequests import Branches
 from steptwin.studio.calculations import Calculations
 from steptwin.studio.campaignrequests import Campaigns
@@ -95,6 +96,22 @@ class SharedParts:
         return [(name, self._texts[name]) for name, number in self._changed.items() if number > change]
 
 
+NO_WORLD_TO_RECORD = Message("studio.no-world-to-record", "nothing is recorded here: there is no world")
+NO_WORLD_TO_BRANCH = Message("studio.no-world-to-branch", "branches are worlds: there is none here")
+NO_WORLD_TO_DRAW = Message("studio.no-world-to-draw", "what is drawn is a world: there is none here")
+NO_WORLD_WITH_GATEWAYS = Message("studio.no-world-with-gateways", "gateways and a history are beside a world: there is none here")
+NO_FILE_FOR_CAMPAIGNS = Message("studio.no-file-for-campaigns", "campaigns are beside the file of a world: there is none here")
+NO_WORLD_WITH_LINES = Message("studio.no-world-with-lines", "traffic is counted on lines of a world: there is no world")
+TOO_MANY_VIEWERS = Message("studio.too-many-viewers", "there are {most} viewers already, the most possible")
+TOO_FAST_FOR_A_JOG = Message(
+    "studio.too-fast-for-a-jog", "time goes too fast for a jog ({speed:g} times): it is possible up to {most:g} times"
+)
+TOO_MANY_JOGS = Message("studio.too-many-jogs", "{most} axes are jogged already, which is the most")
+VIEWER_HAS_GONE = Message("studio.viewer-has-gone", "the viewer has gone")
+LEASE_HAS_ENDED = Message("studio.lease-has-ended", "lease {number} has ended, or is another viewer's")
+NO_POINTS = Message("studio.no-points", "points: at least one is needed")
+
+
 class Hub:
     """Of one subject."""
 
@@ -139,41 +156,41 @@ class Hub:
     def recordings(self) -> Recordings:
         """Raises `Refusal` where there is no world."""
         if self.around.recordings is None:
-            raise Refusal("nothing is recorded here: there is no world")
+            raise Refusal(NO_WORLD_TO_RECORD())
         return self.around.recordings
 
     @property
     def branches(self) -> Branches:
         """Raises `Refusal` where there is no world."""
         if self.around.branches is None:
-            raise Refusal("branches are worlds: there is none here")
+            raise Refusal(NO_WORLD_TO_BRANCH())
         return self.around.branches
 
     @property
     def arrangement(self) -> Arrangement:
         """Raises `Refusal` where there is no world."""
         if self.around.arrangement is None:
-            raise Refusal("what is drawn is a world: there is none here")
+            raise Refusal(NO_WORLD_TO_DRAW())
         return self.around.arrangement
 
     @property
     def plant(self) -> PlantRecords:
         """Raises `Refusal` where there is no world."""
         if self.around.plant is None:
-            raise Refusal("gateways and a history are beside a world: there is none here")
+            raise Refusal(NO_WORLD_WITH_GATEWAYS())
         return self.around.plant
 
     @property
     def campaigns(self) -> Campaigns:
         """Raises `Refusal` where there is no file of a world."""
         if self.around.campaigns is None:
-            raise Refusal("campaigns are beside the file of a world: there is none here")
+            raise Refusal(NO_FILE_FOR_CAMPAIGNS())
         return self.around.campaigns
 
     def traffic(self) -> dict[str, object]:
         """Raises `Refusal` where there is no world."""
         if self.around.traffic is None:
-            raise Refusal("traffic is counted on lines of a world: there is no world")
+            raise Refusal(NO_WORLD_WITH_LINES())
         return {"time_ns": str(self.around.moment().time), "lines": self.around.traffic()}
 
     # ------------------------------------------------------------------ viewers
@@ -184,7 +201,7 @@ class Hub:
     def join(self, viewer: Viewer) -> None:
         """Raises `Refusal` where there are too many."""
         if len(self.viewers) >= MOST_VIEWERS:
-            raise Refusal(f"there are {MOST_VIEWERS} viewers already, the most possible")
+            raise Refusal(TOO_MANY_VIEWERS(most=MOST_VIEWERS))
         self.viewers[viewer.number] = viewer
         self.shared.put("viewers", len(self.viewers))
 
@@ -244,16 +261,16 @@ class Hub:
         """Raises `Misuse` and `Refusal`."""
         speed = self.around.moment().speed
         if speed > FASTEST_JOG:
-            raise Refusal(f"time goes too fast for a jog ({speed:g} times): it is possible up to {FASTEST_JOG:g} times")
+            raise Refusal(TOO_FAST_FOR_A_JOG(speed=speed, most=FASTEST_JOG))
         own = [one for one in self._leases.values() if (one.jog.machine, one.jog.axis) == (wanted.machine, wanted.axis)]
         for lease in own:
             self._end(lease, lease.held.release)
         if len(self._leases) >= MOST_LEASES:
-            raise Refusal(f"{MOST_LEASES} axes are jogged already, which is the most")
+            raise Refusal(TOO_MANY_JOGS(most=MOST_LEASES))
         held = await self._jogs.begin(wanted)
         if viewer.number not in self.viewers and viewer.number not in self._asked:
             held.drop()
-            raise Refusal("the viewer has gone")
+            raise Refusal(VIEWER_HAS_GONE())
         lease = Lease(next(self._lease_numbers), viewer, wanted, held)
         self._leases[lease.number] = lease
         self._say_leases()
@@ -278,7 +295,7 @@ class Hub:
     def _lease(self, viewer: Viewer, number: int) -> Lease:
         lease = self._leases.get(number)
         if lease is None or lease.viewer.number != viewer.number:
-            raise Refusal(f"lease {number} has ended, or is another viewer's")
+            raise Refusal(LEASE_HAS_ENDED(number=number))
         return lease
 
     def _lasting(self, lease: Lease) -> dict[str, object]:
@@ -331,7 +348,7 @@ class Hub:
 
     def read(self, points: Sequence[str]) -> tuple[Reading, ...]:
         if not points:
-            raise Misuse("points: at least one is needed")
+            raise Misuse(NO_POINTS())
         return self.subject.read(*points)
 
     async def _present(self, points: Sequence[str]) -> Sequence[Reading]:

@@ -10,6 +10,7 @@ from steptwin.devices.worldpart import PlannedSubject, present_of
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.later import Later
 from steptwin.machine import SECOND, Nanos
+from steptwin.messages import Message
 from steptwin.studio.programs import ProgramTexts
 from steptwin.studio.watches import Watched
 from steptwin.subject.commands import Command, Encoders, ListFaults, ReadPins, ReadPoints, ReadState
@@ -65,6 +66,14 @@ class KeptPast(Protocol):
         ...
 
 
+NO_PAST_TO_LOOK_AT = Message("studio.no-past-to-look-at", "look: no past is kept here")
+VIEWER_IS_AT_PRESENT = Message("studio.viewer-is-at-present", "this viewer looks at the present")
+NO_PAST_EVENTS = Message("studio.no-past-events", "past_events: no past is kept here")
+PAST_TOO_LONG = Message(
+    "studio.past-too-long", "past_events from {from_s:g} s to {to_s:g} s: permitted is up to {most_s} s in one answer"
+)
+
+
 class Looking:
     """The shown moment of one viewer: the present until `go`."""
 
@@ -85,7 +94,7 @@ class Looking:
     async def go(self, moment: Nanos, watches: Mapping[int, Watched]) -> dict[str, object]:
         """Show a moment. Raises `Misuse`, and `Refusal` if no past is kept."""
         if self._lookback is None:
-            raise Refusal("look: no past is kept here")
+            raise Refusal(NO_PAST_TO_LOOK_AT())
         look = self._look or self._lookback.open()
         try:
             self._going = look.go(moment)
@@ -115,7 +124,7 @@ class Looking:
             except SteptwinError:
                 continue  # another moment is wanted by now
         if self._look is None:
-            raise Refusal("this viewer looks at the present")
+            raise Refusal(VIEWER_IS_AT_PRESENT())
         return self._look
 
     async def do(self, wanted: Command) -> Result:
@@ -135,11 +144,10 @@ class Looking:
         """What happened between two moments, whichever is shown. Raises `Misuse`, and `Refusal` if no past is kept."""
         lookback = self._lookback
         if lookback is None:
-            raise Refusal("past_events: no past is kept here")
+            raise Refusal(NO_PAST_EVENTS())
         begin = max(begin, lookback.begin)
         if not begin <= end <= begin + LONGEST_PAST:
-            span = f"permitted is up to {LONGEST_PAST // SECOND} s in one answer"
-            raise Misuse(f"past_events from {begin / SECOND:g} s to {end / SECOND:g} s: {span}")
+            raise Misuse(PAST_TOO_LONG(from_s=begin / SECOND, to_s=end / SECOND, most_s=LONGEST_PAST // SECOND))
         present, batch = await lookback.events(begin, end, filter_of(kinds), MOST_PAST_EVENTS, _present)
         if batch.missed:  # what held at the begin says nothing of the first event that is left
             begin, present = batch.events[0].time, {"state": {}, "faults": [], "plans": []}

@@ -6,8 +6,11 @@ from collections.abc import Callable
 
 from steptwin.datasheet import Datasheet
 from steptwin.errors import Misuse
+from steptwin.messages import Message
 from steptwin.nearmiss import NearMiss
 from steptwin.subject.contract import Description
+
+UNKNOWN_CONTROLLER = Message("studio.unknown-controller", "there is no controller {machine!r}{hint}: there are {names}")
 
 
 class Sheets:
@@ -19,5 +22,5 @@ class Sheets:
         sheets = {part.name: part.datasheet for part in self._describe().machines}
         if machine not in sheets:
             hint = NearMiss().hint(machine, sheets)
-            raise Misuse(f"there is no controller {machine!r}{hint}: there are {', '.join(sheets)}")
+            raise Misuse(UNKNOWN_CONTROLLER(machine=machine, hint=hint, names=list(sheets)))
         return sheets[machine]

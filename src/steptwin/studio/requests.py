@@ -15,6 +15,7 @@ from steptwin.access.roles import ACT, LOOK, ROLES, SERVICE, TAKE, Permit
 from steptwin.diagnostics import Severity
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.nearmiss import NearMiss
 from steptwin.plaintypes import shown
 from steptwin.simulation.kinds.registry import KINDS as CONTROLLERS
@@ -449,10 +450,13 @@ OF_CAMPAIGNS = frozenset(row.name for row in CAMPAIGNS)
 OF_CONNECTION = frozenset({"follow", "unfollow", *(row.name for row in _ROWS if row.is_of_connection)})
 
 
+UNKNOWN_REQUEST = Message("studio.unknown-request", "no request {name}{hint}; requests are {names}")
+
+
 def check_name(name: str) -> None:
     """Raises `Misuse` for what is no request."""
     if name not in ALL:
-        raise Misuse(f"no request {shown(name)}{NearMiss().hint(name, ALL)}; requests are {', '.join(ALL)}")
+        raise Misuse(UNKNOWN_REQUEST(name=shown(name), hint=NearMiss().hint(name, ALL), names=list(ALL)))
 
 
 def read_request(row: RequestRow, given: Mapping[str, object]) -> StudioRequest:

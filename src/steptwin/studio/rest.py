@@ -20,6 +20,7 @@ from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.eventloop import result_of
 from steptwin.later import start
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.studio.hub import Hub
 from steptwin.studio.requests import ALL, OF_CONNECTION, permit_of
 from steptwin.studio.schema import answer_schemas
@@ -235,6 +236,10 @@ def _bearer(request: Request) -> str | None:
     return given.strip() if scheme.lower() == "bearer" else None
 
 
+WRONG_BODY = Message("studio.wrong-body", 'a body is an object of JSON with the fields: {{"machine": "table", "axis": 1, ...}}')
+FIELD_OF_THE_ADDRESS = Message("studio.field-of-the-address", "no field {name!r}: the address says which request it is")
+
+
 async def _fields(request: Request) -> dict[str, object]:
     """The fields in a body. Raises `Misuse`."""
     data = b""
@@ -249,10 +254,10 @@ async def _fields(request: Request) -> dict[str, object]:
     except (ValueError, RecursionError):
         found = None
     if not isinstance(found, dict):
-        raise Misuse('a body is an object of JSON with the fields: {"machine": "table", "axis": 1, ...}')
+        raise Misuse(WRONG_BODY())
     taken = [name for name in OWN if name in found]
     if taken:
-        raise Misuse(f"no field {taken[0]!r}: the address says which request it is")
+        raise Misuse(FIELD_OF_THE_ADDRESS(name=taken[0]))
     return found
 
 

@@ -17,6 +17,7 @@ from steptwin.access.roles import LOOK, Permit, Role
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.later import Later, start
 from steptwin.machine import SECOND, Nanos
+from steptwin.messages import NONE, Message
 from steptwin.studio import branchrequests as branch
 from steptwin.studio import campaignrequests as campaign
 from steptwin.studio import devicerequests as device
@@ -63,6 +64,24 @@ class Wanted(NamedTuple):
     name: str
     fields: Mapping[str, object]
     act: Callable[[Identity], Awaitable[Result]]
+
+
+TOO_MANY_REQUESTS = Message("studio.too-many-requests", "too many requests: permitted are {rate:g} a second")
+REQUEST_TOO_LONG = Message("studio.request-too-long", "a request has at most {most} bytes")
+HELLO_IS_FIRST_REQUEST = Message("studio.hello-is-first-request", "{request}: the first request is hello")
+NEEDS_A_TOKEN = Message("studio.needs-a-token", "{request} needs the token of this studio, which is in its file of tokens")
+ABOUT_A_CONNECTION = Message("studio.about-a-connection", "{request} is about a connection: ask it over the WebSocket")
+PAST_CANNOT_BE_CHANGED = Message(
+    "studio.past-cannot-be-changed", "{request}: the past is looked at, which cannot be changed: look at the present first"
+)
+SECOND_HELLO = Message("studio.second-hello", "hello: this connection has said hello already; resync asks for the state again")
+TOO_MANY_WATCHES = Message("studio.too-many-watches", "watch: there are {most} already, which is the most")
+TOO_MANY_WATCHED_POINTS = Message("studio.too-many-watched-points", "watch: more than {most} points in all")
+UNKNOWN_WATCH = Message("studio.unknown-watch", "unwatch: no watch {number}; there are {names}")
+FOLLOW_WITHOUT_ID = Message("studio.follow-without-id", "follow: give an id, by which it is ended")
+FOLLOW_ID_IN_USE = Message("studio.follow-id-in-use", "follow: the id {id!r} is in use")
+TOO_MANY_FOLLOWS = Message("studio.too-many-follows", "follow: there are {most} already, which is the most")
+UNKNOWN_FOLLOW = Message("studio.unknown-follow", "no subscription has the id {id!r}")
 
 
 class ViewerSession:
@@ -194,7 +213,7 @@ class ViewerSession:
         found: JsonObject = {}
         try:
             if len(data) > LONGEST_REQUEST:
-                raise Misuse(f"a request has at most {LONGEST_REQUEST} bytes")
+                raise Misuse(REQUEST_TOO_LONG(most=LONGEST_REQUEST))
             message = read_message(data)
             identity = id_of(message)
             found = {} if identity is None else {"id": identity}
@@ -208,7 +227,7 @@ class ViewerSession:
         """Raises `Misuse`, and `Refusal` for too many."""
         name = str(message["do"])
         if not (self._stops if name in STOPS else self._limit).allows(self._now):
-            raise Refusal(f"too many requests: permitted are {RATE:g} a second")
+            raise Refusal(TOO_MANY_REQUESTS(rate=RATE))
         check_name(name)
         fields = fields_of(message)
         row = REQUESTS.get(name)
@@ -244,13 +263,13 @@ class ViewerSession:
     async def _do(self, wanted: Wanted, identity: Identity) -> Result:
         name = wanted.name
         if not self.has_entered and name not in STOPS and name != "hello":
-            raise Refusal(f"{name}: the first request is hello")
+            raise Refusal(HELLO_IS_FIRST_REQUEST(request=name))
         if self.is_refused and name not in STOPS:
             self._hub.around.gate.enter(None)
         if name in self.with_token:
-            raise Refusal(f"{name} needs the token of this studio, which is in its file of tokens")
+            raise Refusal(NEEDS_A_TOKEN(request=name))
         if self.is_rest and name in OF_CONNECTION:
-            raise Refusal(f"{name} is about a connection: ask it over the WebSocket")
+            raise Refusal(ABOUT_A_CONNECTION(request=name))
         permit = permit_of(name)
         try:
             result = await self._permitted(wanted, permit, identity)
@@ -263,7 +282,7 @@ class ViewerSession:
     async def _permitted(self, wanted: Wanted, permit: Permit, identity: Identity) -> Result:
         hub = self._hub
         if self._looking.is_back and permit.control and wanted.name not in IN_THE_PAST:
-            raise Refusal(f"{wanted.name}: the past is looked at, which cannot be changed: look at the present first")
+            raise Refusal(PAST_CANNOT_BE_CHANGED(request=wanted.name))
         takes = check(wanted.name, permit, self.viewer, hub.control) and not self.is_rest
         if takes:
             hub.control.take(self.viewer, over=False)  # so that no other viewer acts while a device is asked
@@ -288,7 +307,7 @@ class ViewerSession:
 
     def _hello(self, wanted: ask.Hello) -> object:
         if self.has_entered:
-            raise Misuse("hello: this connection has said hello already; resync asks for the state again")
+            raise Misuse(SECOND_HELLO())
         try:
             role, of_token = self._hub.around.gate.enter(wanted.token)
         except Refusal:
@@ -351,9 +370,9 @@ class ViewerSession:
 
     def _watch(self, wanted: ask.WatchPoints) -> object:
         if len(self._watches) >= MOST_WATCHES:
-            raise Misuse(f"watch: there are {MOST_WATCHES} already, which is the most")
+            raise Misuse(TOO_MANY_WATCHES(most=MOST_WATCHES))
         if sum(len(one.values.points) for one in self._watches.values()) + len(wanted.points) > MOST_WATCHED:
-            raise Misuse(f"watch: more than {MOST_WATCHED} points in all")
+            raise Misuse(TOO_MANY_WATCHED_POINTS(most=MOST_WATCHED))
         readings = self._hub.read(wanted.points)
         number = next(self._watch_numbers)
         self._watches[number] = self._hub.watches.add(number, readings, wanted.rate)
@@ -364,16 +383,16 @@ class ViewerSession:
     def _unwatch(self, wanted: ask.Unwatch) -> None:
         watched = self._watches.pop(wanted.watch, None)
         if watched is None:
-            raise Misuse(f"unwatch: no watch {wanted.watch}; there are {', '.join(map(str, self._watches)) or 'none'}")
+            raise Misuse(UNKNOWN_WATCH(number=wanted.watch, names=list(self._watches) or NONE()))
         self._hub.watches.remove(watched)
 
     async def _follow(self, wanted: command.Follow, identity: Identity) -> Result:
         if identity is None:
-            raise Misuse("follow: give an id, by which it is ended")
+            raise Misuse(FOLLOW_WITHOUT_ID())
         if identity in self._follows:
-            raise Misuse(f"follow: the id {identity!r} is in use")
+            raise Misuse(FOLLOW_ID_IN_USE(id=identity))
         if len(self._follows) >= MOST_FOLLOWS:
-            raise Misuse(f"follow: there are {MOST_FOLLOWS} already, which is the most")
+            raise Misuse(TOO_MANY_FOLLOWS(most=MOST_FOLLOWS))
         what = filter_of(wanted.kinds, wanted.machines, wanted.axes)
         plans = [plan.plain() for plan in self._hub.subject.plans(what)]
         self._follows[identity] = what, wanted.bound
@@ -382,7 +401,7 @@ class ViewerSession:
 
     async def _unfollow(self, wanted: command.Unfollow) -> Result:
         if self._follows.pop(wanted.id, None) is None:
-            raise Misuse(f"no subscription has the id {wanted.id!r}")
+            raise Misuse(UNKNOWN_FOLLOW(id=wanted.id))
         self._move()
         return self._hub.subject.result_of(None)
 

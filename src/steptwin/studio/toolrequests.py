@@ -10,6 +10,7 @@ from steptwin.access.roles import LOOK
 from steptwin.calc import Formula, MovePart, RequiredSetting
 from steptwin.diagnostics import Severity
 from steptwin.errors import Misuse
+from steptwin.messages import Message
 from steptwin.studio.requestrow import RequestRow
 from steptwin.subject.fields import (
     HEX,
@@ -25,7 +26,7 @@ from steptwin.subject.fields import (
     whole,
     wrong,
 )
-from steptwin.subject.shapes import members
+from steptwin.subject.shapes import members, with_sentences
 from steptwin.wire.pcapng import CapturedFrame
 
 LONGEST_FILE = 48_000
@@ -120,7 +121,7 @@ _QUANTITY = members(
     }
 )
 _QUANTITIES = members({"title": _TEXT, "quantities": _list(_QUANTITY), "times": _list(_QUANTITY)})
-_MOVE = members(
+_MOVE = with_sentences(
     {
         "title": _TEXT,
         "found": _or_null(_TEXT),
@@ -131,7 +132,7 @@ _MOVE = members(
         "peak": _NUMBER,
         "reaches": {**_FLAG, "description": "Whether the peak is the velocity."},
         "parts": _list(members({name: _TEXT if name == "name" else _NUMBER for name in MovePart._fields})),
-        "formulas": _list(members(dict.fromkeys(Formula._fields, _TEXT))),
+        "formulas": _list(with_sentences(dict.fromkeys(Formula._fields, _TEXT), "name", "text")),
         "notes": _list(_TEXT),
         "settings": _list(members({name: _NUMBER if name == "value" else _TEXT for name in RequiredSetting._fields})),
         "curve": {
@@ -139,7 +140,8 @@ _MOVE = members(
             "items": {"type": "array", "items": _NUMBER, "minItems": 3, "maxItems": 3},
             "description": "Time [s], position, velocity.",
         },
-    }
+    },
+    lists=("notes",),
 )
 _FINDING = members(
     {
@@ -190,7 +192,8 @@ def _file(value: Any) -> str:
     return value
 
 
-_FILE = ValueType(f"a text of at most {LONGEST_FILE} characters", {"type": "string", "maxLength": LONGEST_FILE}, _file)
+A_FILE = Message("studio.a-file", "a text of at most {most} characters")
+_FILE = ValueType(A_FILE(most=LONGEST_FILE), {"type": "string", "maxLength": LONGEST_FILE}, _file)
 
 
 def _numbers(value: Any) -> Mapping[str, float]:
@@ -198,17 +201,23 @@ def _numbers(value: Any) -> Mapping[str, float]:
     return {name: form.read(one) for name, one in _table(value).items()}
 
 
+EXPECTED_A_TEXT = Message("studio.expected-a-text", "{name}: {value!r}: expected a text")
+
+
 def _texts(value: Any) -> Mapping[str, str]:
     found = _table(value)
     for name, one in found.items():
         if not isinstance(one, str):
-            raise Misuse(f"{name}: {one!r}: expected a text")
+            raise Misuse(EXPECTED_A_TEXT(name=name, value=one))
     return found
+
+
+OBJECT_OF_MEMBERS = Message("studio.object-of-members", "an object with at most {most} members")
 
 
 def _table(value: Any) -> Mapping[str, Any]:
     if not isinstance(value, dict) or len(value) > MOST_ITEMS:
-        raise wrong(value, f"an object with at most {MOST_ITEMS} members")
+        raise wrong(value, OBJECT_OF_MEMBERS(most=MOST_ITEMS))
     return value
 
 

@@ -14,6 +14,7 @@ from typing import Any, TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.studio.hub import Hub
 from steptwin.studio.session import ViewerSession
 from steptwin.subject.dispatch import JsonObject, failure
@@ -32,6 +33,7 @@ HELLO_S = 10.0
 """Time-out for the hello of a connection."""
 REFUSED, SILENT = 4401, 4400
 """Close codes: wrong token, no hello."""
+BINARY_MESSAGE = Message("studio.binary-message", "a message is a text of JSON; this one is binary")
 
 
 async def until_first(*coroutines: Coroutine[Any, Any, Any]) -> None:
@@ -131,7 +133,7 @@ class ViewerConnection:
     def _answer(self, text: str | None) -> None:
         """Send an answer when it is available; other requests are served meanwhile."""
         if text is None:
-            self._answered(failure(Misuse("a message is a text of JSON; this one is binary")))
+            self._answered(failure(Misuse(BINARY_MESSAGE())))
         else:
             answer = self._session.receive(text, self._clock())
             answer.then(lambda: self._answered(answer.result()))

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 from steptwin.errors import Refusal, SteptwinError
 from steptwin.eventloop import later, result_of
 from steptwin.later import Later
+from steptwin.messages import Message
 
 
 class Cancelled(Exception):
@@ -78,6 +79,9 @@ class Worker(Protocol):
         ...
 
 
+WORK_IS_RUNNING = Message("studio.work-is-running", "{kind} is running: wait, or cancel it")
+
+
 class DeviceWork:
     """See `steptwin.studio.surroundings.LongWork`."""
 
@@ -106,7 +110,7 @@ class DeviceWork:
 
     def _begin(self, kind: str, do: Callable[[Work], None]) -> None:
         if self._work is not None and self._work.is_running:
-            raise Refusal(f"{self._work.kind} is running: wait, or cancel it")
+            raise Refusal(WORK_IS_RUNNING(kind=self._work.kind))
         work = self._work = Work(kind)
         self._running = later(asyncio.to_thread(self._run, work, do))
 

@@ -12,6 +12,7 @@ from typing import TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
+from steptwin.messages import Message
 from steptwin.nearmiss import NearMiss
 from steptwin.plaintypes import shown
 from steptwin.simulation.script import steps as do
@@ -138,6 +139,9 @@ class Resume:
     speed: float | None = None
 
 
+STEP_HAS_TWO_ENDS = Message("subject.step-has-two-ends", "step: for_ns and to_ns exclude each other")
+
+
 @dataclass(frozen=True, slots=True)
 class Advance:
     """Time goes on for a duration or to a moment, at most until a condition is true, and stands then."""
@@ -148,7 +152,7 @@ class Advance:
 
     def __post_init__(self) -> None:
         if self.duration is not None and self.to is not None:
-            raise Misuse("step: for_ns and to_ns exclude each other")
+            raise Misuse(STEP_HAS_TWO_ENDS())
 
 
 @dataclass(frozen=True, slots=True)
@@ -483,12 +487,15 @@ COMMANDS: Mapping[str, CommandRow] = {row.name: row for row in _ROWS}
 _BY_KIND: Mapping[object, CommandRow] = {row.kind: row for row in _ROWS}
 
 
+UNKNOWN_COMMAND = Message("subject.unknown-command", "no command {name}{hint}; commands are {names}")
+
+
 def read_command(name: object, given: Mapping[str, object]) -> Command:
     """The command called ``name`` with fields as in JSON. Raises `Misuse`."""
     row = COMMANDS.get(name) if isinstance(name, str) else None
     if row is None:
         hint = NearMiss().hint(name, COMMANDS) if isinstance(name, str) else ""
-        raise Misuse(f"no command {shown(name)}{hint}; commands are {', '.join(COMMANDS)}")
+        raise Misuse(UNKNOWN_COMMAND(name=shown(name), hint=hint, names=list(COMMANDS)))
     return row.kind(**read_fields(row.name, row.fields, given))
 
 

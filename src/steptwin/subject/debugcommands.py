@@ -12,6 +12,7 @@ from typing import TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.messages import NONE, Message
 from steptwin.subject.commandrow import MACHINE, NOTHING, CommandRow
 from steptwin.subject.fields import TEXT, TIME, Field, choice, choices, whole
 
@@ -34,6 +35,11 @@ class Debug:
     """What can be debugged, and where the debugger stands."""
 
 
+BREAKPOINT_GIVE_ONE = Message("subject.breakpoint-give-one", "breakpoint: give one of line, label and value; given are {given}")
+BREAKPOINT_NEEDS = Message("subject.breakpoint-needs", "breakpoint: {one} needs {other}")
+BREAKPOINT_TAKES_NO = Message("subject.breakpoint-takes-no", "breakpoint: {one} takes no {other}")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetBreakpoint:
     """Time stops at a line, at a label, or when a value changes: one of ``line``, ``label`` and ``value``."""
@@ -51,14 +57,14 @@ class SetBreakpoint:
         fields = {name: value for name, value in asdict(self).items() if value is not None}
         given = [name for name in _FIELDS_WITH if name in fields]
         if len(given) != 1:
-            raise Misuse(f"breakpoint: give one of line, label and value; given are {' and '.join(given) or 'none'}")
+            raise Misuse(BREAKPOINT_GIVE_ONE(given=" and ".join(given) or NONE()))
         needed, permitted = _FIELDS_WITH[given[0]]
         for name in needed:
             if name not in fields:
-                raise Misuse(f"breakpoint: {given[0]} needs {name}")
+                raise Misuse(BREAKPOINT_NEEDS(one=given[0], other=name))
         for name in fields:
             if name not in (*given, *needed, *permitted):
-                raise Misuse(f"breakpoint: {given[0]} takes no {name}")
+                raise Misuse(BREAKPOINT_TAKES_NO(one=given[0], other=name))
 
 
 @dataclass(frozen=True, slots=True)

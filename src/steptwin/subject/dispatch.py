@@ -15,11 +15,14 @@ from steptwin.subject.fields import ID
 
 LONGEST_REQUEST = 1 << 20
 """Limit of a message, bytes: sufficient for the longest permitted program in any JSON encoding."""
-FORM = 'a request is a line of JSON: {"do": NAME, "id": ANY, FIELD: VALUE, ...}'
+FORM = Message("subject.form-of-a-request", 'a request is a line of JSON: {{"do": NAME, "id": ANY, FIELD: VALUE, ...}}')
 
 Action: TypeAlias = Callable[[Any], object]
 """Executes a command; returns its answer as plain data."""
 JsonObject: TypeAlias = dict[str, object]
+
+
+COMMAND_NOT_SUPPORTED = Message("subject.command-not-supported", "{command} is not supported here; supported are {names}")
 
 
 class Dispatcher:
@@ -55,7 +58,7 @@ class Dispatcher:
     def _action(self, command: Command) -> Action:
         action = self._actions.get(type(command))
         if action is None:
-            raise Refusal(f"{row_of(command).name} is not supported here; supported are {', '.join(self.names)}")
+            raise Refusal(COMMAND_NOT_SUPPORTED(command=row_of(command).name, names=list(self.names)))
         return action
 
 
@@ -67,10 +70,13 @@ def read_message(line: bytes, key: str = "do") -> JsonObject:
     try:
         message = json.loads(line)
     except (ValueError, RecursionError):
-        raise Misuse(FORM) from None
+        raise Misuse(FORM()) from None
     if not isinstance(message, dict) or not isinstance(message.get(key), str):
-        raise Misuse(FORM)
+        raise Misuse(FORM())
     return message
+
+
+WRONG_ID = Message("subject.wrong-id", "id: {problem}")
 
 
 def id_of(message: Mapping[str, object]) -> object:
@@ -79,7 +85,7 @@ def id_of(message: Mapping[str, object]) -> object:
     try:
         return None if found is None else ID.read(found)
     except Misuse as error:
-        raise Misuse(f"id: {error}") from None
+        raise Misuse(WRONG_ID(problem=text_of(error))) from None
 
 
 def command_of(message: Mapping[str, object]) -> Command:
@@ -87,11 +93,14 @@ def command_of(message: Mapping[str, object]) -> Command:
     return read_command(message["do"], fields_of(message))
 
 
+OTHER_VERSION = Message("subject.other-version", "version = {version}: this subject has version {own}")
+
+
 def fields_of(message: Mapping[str, object]) -> dict[str, object]:
     """The fields in a request. Raises `Misuse` for another version."""
     version = message.get("version", VERSION)
     if version != VERSION or isinstance(version, bool):
-        raise Misuse(f"version = {shown(version)}: this subject has version {VERSION}")
+        raise Misuse(OTHER_VERSION(version=shown(version), own=VERSION))
     return {name: value for name, value in message.items() if name not in ("do", "id", "version")}
 
 

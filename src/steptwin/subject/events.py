@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from steptwin.machine import SECOND, Nanos
+from steptwin.messages import read_message_text, with_messages
 from steptwin.motion.plain import read_plan
 from steptwin.simulation.scheduler.trace import KINDS as RECORDS
 from steptwin.simulation.scheduler.trace import TraceRecord
@@ -81,7 +82,7 @@ class Event:
     def plain(self) -> dict[str, object]:
         """As JSON. ``text`` describes it; it adds nothing to the rest."""
         head = {"number": self.number, "time_ns": str(self.time), "machine": self.machine, "kind": self.kind}
-        return {**head, **self.payload.plain(), "cause": self.cause, "text": self.text}
+        return with_messages({**head, **self.payload.plain(), "cause": self.cause, "text": self.text})
 
 
 def line_of(time: Nanos, machine: str, text: str) -> str:
@@ -188,7 +189,7 @@ _READ: Mapping[str, Callable[[Mapping[str, Any]], Payload]] = complete(
         "frame": lambda data: FramePayload(data["client"], data["direction"], bytes.fromhex(data["data"]), data["words"]),
         "write": lambda data: WritePayload(data["client"], data["source"], data["words"], data["outcome"]),
         "statement": lambda data: StatementPayload(data["program"], data["line"]),
-        "status": lambda data: StatusPayload(data["code"], data["text"], tuple(data["facts"].items())),
+        "status": lambda data: StatusPayload(data["code"], read_message_text(data, "text"), tuple(data["facts"].items())),
         "note": lambda data: NotePayload(data["note"]),
         "report": lambda data: ReportPayload(data["code"], data["what"]),
         "button": lambda data: ButtonPayload(data["button"], data["pressed"]),

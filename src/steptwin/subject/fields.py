@@ -12,6 +12,7 @@ from typing import Any
 
 from steptwin.durations import LONGEST_NS
 from steptwin.errors import Misuse
+from steptwin.messages import NONE, Message, text_of
 from steptwin.nearmiss import NearMiss
 from steptwin.plaintypes import shown
 from steptwin.simulation.faults import Fault
@@ -65,6 +66,11 @@ class Field:
         return {**self.form.schema, "description": text}
 
 
+UNKNOWN_FIELD = Message("subject.unknown-field", "{place}: no field {name}{hint}; fields are {names}")
+FIELD_IS_MISSING = Message("subject.field-is-missing", "{place}: {name} is missing, expected {what}: {meaning}")
+WRONG_FIELD = Message("subject.wrong-field", "{place}: {name}: {problem}")
+
+
 def read_fields(place: str, fields: Iterable[Field], given: Mapping[str, object]) -> dict[str, Any]:
     """The values of ``fields`` by attribute. Raises `Misuse` for unknown, missing and wrong ones, with ``place``."""
     fields = list(fields)
@@ -72,35 +78,42 @@ def read_fields(place: str, fields: Iterable[Field], given: Mapping[str, object]
     for name in given:
         if name not in known:
             hint = NearMiss().hint(name, known)
-            raise Misuse(f"{place}: no field {shown(name)}{hint}; fields are {', '.join(known) or 'none'}")
+            raise Misuse(UNKNOWN_FIELD(place=place, name=shown(name), hint=hint, names=list(known) or NONE()))
     values: dict[str, Any] = {}
     for field in fields:
         value = given.get(field.name)
         if value is None and field.is_required:
-            raise Misuse(f"{place}: {field.name} is missing, expected {field.form.what}: {field.meaning}")
+            raise Misuse(FIELD_IS_MISSING(place=place, name=field.name, what=field.form.what, meaning=field.meaning))
         if value is None and (field.name not in given or field.default is None):
             values[field.key] = field.default
             continue
         try:
             values[field.key] = field.form.read(value)
         except Misuse as error:
-            raise Misuse(f"{place}: {field.name}: {error}") from None
+            raise Misuse(WRONG_FIELD(place=place, name=field.name, problem=text_of(error))) from None
     return values
 
 
+WRONG_VALUE = Message("subject.wrong-value", "{value}: expected {expected}")
+
+
 def wrong(value: object, form: str) -> Misuse:
-    return Misuse(f"{shown(value)}: expected {form}")
+    return Misuse(WRONG_VALUE(value=shown(value), expected=form))
 
 
 # ---------------------------------------------------------------------- forms
 
 
+TEXT_TOO_LONG = Message("subject.text-too-long", "a text of {count} characters: permitted are at most {most}")
+TEXT_HAS_NUL_OR_SURROGATES = Message("subject.text-has-nul-or-surrogates", "{value}: a text takes neither NUL nor surrogates")
+
+
 def check_text(value: str) -> str:
     """Raises `Misuse` for a text that is too long, or has characters which no file name and no line takes."""
     if len(value) > LONGEST_TEXT:
-        raise Misuse(f"a text of {len(value)} characters: permitted are at most {LONGEST_TEXT}")
+        raise Misuse(TEXT_TOO_LONG(count=len(value), most=LONGEST_TEXT))
     if any(c == "\0" or "\ud800" <= c <= "\udfff" for c in value):
-        raise Misuse(f"{shown(value)}: a text takes neither NUL nor surrogates")
+        raise Misuse(TEXT_HAS_NUL_OR_SURROGATES(value=shown(value)))
     return value
 
 
@@ -110,24 +123,28 @@ def _text(value: Any) -> str:
     return check_text(value)
 
 
-TEXT = ValueType("a text", {"type": "string", "minLength": 1, "maxLength": LONGEST_TEXT}, _text)
+A_TEXT = Message("subject.a-text", "a text")
+TEXT = ValueType(A_TEXT(), {"type": "string", "minLength": 1, "maxLength": LONGEST_TEXT}, _text)
 
 
 LONGEST_PROGRAM = 170_000
 """Characters of a program; the longest that are meant have 4000 lines."""
 
 
+TEXT_HAS_SURROGATES = Message("subject.text-has-surrogates", "a text takes no surrogates")
+
+
 def _program(value: Any) -> str:
     if not isinstance(value, str):
         raise wrong(value, PROGRAM.what)
     if len(value) > LONGEST_PROGRAM:
-        raise Misuse(f"a text of {len(value)} characters: permitted are at most {LONGEST_PROGRAM}")
+        raise Misuse(TEXT_TOO_LONG(count=len(value), most=LONGEST_PROGRAM))
     if any("\ud800" <= c <= "\udfff" for c in value):
-        raise Misuse("a text takes no surrogates")
+        raise Misuse(TEXT_HAS_SURROGATES())
     return value
 
 
-PROGRAM = ValueType("a text", {"type": "string", "maxLength": LONGEST_PROGRAM}, _program)
+PROGRAM = ValueType(A_TEXT(), {"type": "string", "maxLength": LONGEST_PROGRAM}, _program)
 
 
 def _flag(value: Any) -> bool:
@@ -136,12 +153,17 @@ def _flag(value: Any) -> bool:
     return value
 
 
-FLAG = ValueType("true or false", {"type": "boolean"}, _flag)
+TRUE_OR_FALSE = Message("subject.true-or-false", "true or false")
+FLAG = ValueType(TRUE_OR_FALSE(), {"type": "boolean"}, _flag)
+
+
+A_NUMBER = Message("subject.a-number", "a number from {least:g} to {most:g}")
+A_WHOLE_NUMBER = Message("subject.a-whole-number", "a whole number from {least} to {most}")
 
 
 def number(least: float = -1e300, most: float = 1e300) -> ValueType:
     """A finite number from ``least`` to ``most``."""
-    what = f"a number from {least:g} to {most:g}"
+    what = A_NUMBER(least=least, most=most)
 
     def read(value: Any) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value <= most:
@@ -152,7 +174,7 @@ def number(least: float = -1e300, most: float = 1e300) -> ValueType:
 
 
 def whole(least: int, most: int) -> ValueType:
-    what = f"a whole number from {least} to {most}"
+    what = A_WHOLE_NUMBER(least=least, most=most)
 
     def read(value: Any) -> int:
         if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
@@ -174,8 +196,9 @@ def read_time(value: Any) -> int:
     return value
 
 
+NANOSECONDS = Message("subject.nanoseconds", "whole nanoseconds from 0 to {most}, as decimal text or a number")
 TIME = ValueType(
-    f"whole nanoseconds from 0 to {LONGEST_NS}, as decimal text or a number",
+    NANOSECONDS(most=LONGEST_NS),
     {"anyOf": [{"type": "string", "pattern": "^[0-9]{1,20}$"}, {"type": "integer", "minimum": 0, "maximum": LONGEST_NS}]},
     read_time,
     str,
@@ -209,7 +232,8 @@ def _names(value: Any) -> tuple[str, ...]:
     return tuple(map(_text, value))
 
 
-NAMES = ValueType("a list of texts", {"type": "array", "items": TEXT.schema, "maxItems": MOST_ITEMS}, _names, list)
+TEXTS = Message("subject.texts", "a list of texts")
+NAMES = ValueType(TEXTS(), {"type": "array", "items": TEXT.schema, "maxItems": MOST_ITEMS}, _names, list)
 
 
 def choice(*words: str) -> ValueType:
@@ -223,6 +247,10 @@ def choice(*words: str) -> ValueType:
     return ValueType(what, {"enum": list(words)}, read)
 
 
+A_LIST_OF = Message("subject.a-list-of", "a list of {what}s: {names}")
+UNKNOWN_NAME = Message("subject.unknown-name", "no {what} {name}{hint}; there are {names}")
+
+
 def choices(words: Iterable[str], what: str) -> ValueType:
     """A list of some of ``words``."""
     known = tuple(words)
@@ -230,10 +258,10 @@ def choices(words: Iterable[str], what: str) -> ValueType:
     def read(value: Any) -> tuple[str, ...]:
         for name in _names(value):
             if name not in known:
-                raise Misuse(f"no {what} {shown(name)}{NearMiss().hint(name, known)}; there are {', '.join(known)}")
+                raise Misuse(UNKNOWN_NAME(what=what, name=shown(name), hint=NearMiss().hint(name, known), names=list(known)))
         return tuple(value)
 
-    return ValueType(f"a list of {what}s: {', '.join(known)}", {"type": "array", "items": {"enum": list(known)}}, read, list)
+    return ValueType(A_LIST_OF(what=what, names=list(known)), {"type": "array", "items": {"enum": list(known)}}, read, list)
 
 
 LONGEST_ID = 200
@@ -247,8 +275,9 @@ def _id(value: Any) -> object:
     raise wrong(value, ID.what)
 
 
+AN_ID = Message("subject.an-id", "a text of at most {most} characters, or a whole number below 2^63")
 ID = ValueType(
-    f"a text of at most {LONGEST_ID} characters, or a whole number below 2^63",
+    AN_ID(most=LONGEST_ID),
     {"type": ["string", "integer"], "minLength": 1, "maxLength": LONGEST_ID},
     _id,
 )
@@ -265,9 +294,11 @@ def _hex(value: Any) -> bytes:
     return data
 
 
-HEX = ValueType(
-    "bytes as hexadecimal digits", {"type": "string", "pattern": "^([0-9A-Fa-f]{2} ?)+$"}, _hex, lambda data: data.hex()
-)
+HEXADECIMAL = Message("subject.hexadecimal", "bytes as hexadecimal digits")
+HEX = ValueType(HEXADECIMAL(), {"type": "string", "pattern": "^([0-9A-Fa-f]{2} ?)+$"}, _hex, lambda data: data.hex())
+
+
+NO_8_BIT_CHARACTER = Message("subject.no-8-bit-character", "{text!r} is not an 8-bit character")
 
 
 def _characters(value: Any) -> bytes:
@@ -276,11 +307,12 @@ def _characters(value: Any) -> bytes:
     try:
         return value.encode("latin-1")
     except UnicodeEncodeError as error:
-        raise Misuse(f"{value[error.start]!r} is not an 8-bit character") from None
+        raise Misuse(NO_8_BIT_CHARACTER(text=value[error.start])) from None
 
 
+ONE_BYTE_EACH = Message("subject.one-byte-each", "characters, one byte each")
 CHARACTERS = ValueType(
-    "characters, one byte each",
+    ONE_BYTE_EACH(),
     {"type": "string", "minLength": 1, "maxLength": LONGEST_DATA},
     _characters,
     lambda data: data.decode("latin-1"),
@@ -291,7 +323,8 @@ def _fault(value: Any) -> Fault:
     return read_fault(_text(value))
 
 
-FAULT = ValueType("a fault such as 'crc unit=1 nth=3'", TEXT.schema, _fault, str)
+A_FAULT = Message("subject.a-fault", "a fault such as 'crc unit=1 nth=3'")
+FAULT = ValueType(A_FAULT(), TEXT.schema, _fault, str)
 
 
 def _speed(value: Any) -> float:
@@ -302,8 +335,9 @@ def _speed(value: Any) -> float:
     return float(value)
 
 
+A_SPEED = Message("subject.a-speed", "a number from {slowest:g} to {fastest:g}, or 'max'")
 SPEED = ValueType(
-    f"a number from {SLOWEST:g} to {FASTEST:g}, or 'max'",
+    A_SPEED(slowest=SLOWEST, fastest=FASTEST),
     {"anyOf": [{"type": "number", "minimum": SLOWEST, "maximum": FASTEST}, {"const": "max"}]},
     _speed,
     lambda speed: "max" if speed == inf else speed,

@@ -7,6 +7,7 @@ from typing import Any, Protocol, TypeAlias
 
 from steptwin.errors import Refusal
 from steptwin.machine import Nanos
+from steptwin.messages import Message, text_of
 from steptwin.simulation.script.heldjog import Given, HeldJog
 from steptwin.subject.commands import Jog
 from steptwin.subject.world import WorldSubject
@@ -86,6 +87,9 @@ class WorldJogs:
         self._held = [held for held in self._held if held.jog.deadline() is not None]
 
 
+JOG_HAS_ENDED = Message("subject.jog-has-ended", "the jog has ended: {why}")
+
+
 class _Held:
     def __init__(self, subject: WorldSubject, jog: HeldJog, at_present: AtPresent) -> None:
         self._subject = subject
@@ -103,7 +107,7 @@ class _Held:
     def extend(self) -> None:
         self._at_present(lambda: self.give(self.jog.extend(self._subject.world.now)))
         if self.jog.over is not None:
-            raise Refusal(f"the jog has ended: {self.jog.over}")
+            raise Refusal(JOG_HAS_ENDED(why=text_of(self.jog.over)))
 
     def release(self) -> None:
         self._at_present(lambda: self.give(self.jog.release(self._subject.world.now)))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar, TypeAlias, get_args
 
 from steptwin.machine import Fact, Nanos
+from steptwin.messages import Message, text_of
 from steptwin.motion.divisions import Plan as MotionPlan
 from steptwin.motion.divisions import profile_of
 from steptwin.motion.plain import plain_plan
@@ -207,6 +208,9 @@ class StatusPayload:
         return {"code": self.code, "axis": self.axis, "facts": dict(self.facts)}
 
 
+NOTE = Message("subject.note", "note: {note}")
+
+
 @dataclass(frozen=True, slots=True)
 class NotePayload:
     """A text of a script or an operator."""
@@ -217,10 +221,16 @@ class NotePayload:
 
     @property
     def text(self) -> str:
-        return f"note: {self.note}"
+        return NOTE(note=self.note)
 
     def plain(self) -> dict[str, object]:
         return {"note": self.note}
+
+
+EXPECTATION = Message("subject.expectation", "expectation: {what}")
+OVERDUE = Message("subject.overdue", "overdue: {what}")
+REPORTS = {"expectation": EXPECTATION, "overdue": OVERDUE}
+"""By the code of the report."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,10 +244,14 @@ class ReportPayload:
 
     @property
     def text(self) -> str:
-        return f"{self.code}: {self.what}"
+        return REPORTS[self.code](what=text_of(self.what))
 
     def plain(self) -> dict[str, object]:
         return {"code": self.code, "what": self.what}
+
+
+PRESSED = Message("subject.button-pressed", "{button}: pressed")
+RELEASED = Message("subject.button-released", "{button}: released")
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,10 +265,16 @@ class ButtonPayload:
 
     @property
     def text(self) -> str:
-        return f"{self.button}: {'pressed' if self.pressed else 'released'}"
+        return (PRESSED if self.pressed else RELEASED)(button=self.button)
 
     def plain(self) -> dict[str, object]:
         return {"button": self.button, "pressed": self.pressed}
+
+
+INPUT = Message("subject.input", "{what}: {value}")
+TURNED = Message("subject.turned", "{shaft} turned: {counts}")
+POWER_CYCLE = Message("subject.power-cycle", "power-cycle:")
+POWER_CYCLE_OF = Message("subject.power-cycle-of", "power-cycle: {what}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -268,11 +288,18 @@ class InputPayload:
 
     @property
     def text(self) -> str:
-        value = self.value.hex(" ") if isinstance(self.value, bytes) else self.value
-        return f"{self.what}: {value}".rstrip()
+        value = self.value.hex(" ") if isinstance(self.value, bytes) else str(self.value)
+        if self.what == "power-cycle":
+            return POWER_CYCLE_OF(what=value) if value else POWER_CYCLE()
+        if self.what.endswith(" turned"):
+            return TURNED(shaft=self.what.removesuffix(" turned"), counts=value)
+        return INPUT(what=self.what, value=value) if value else f"{self.what}:"
 
     def plain(self) -> dict[str, object]:
         return {"what": self.what, "value": {"hex": self.value.hex()} if isinstance(self.value, bytes) else self.value}
+
+
+FAULT = Message("subject.fault", "{fault}: {effect}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,10 +313,16 @@ class FaultPayload:
 
     @property
     def text(self) -> str:
-        return f"{self.fault}: {self.words}"
+        return FAULT(fault=self.fault, effect=text_of(self.words))
 
     def plain(self) -> dict[str, object]:
         return {"fault": self.fault, "words": self.words}
+
+
+PAUSED = Message("subject.paused", "paused")
+RUNNING = Message("subject.running", "running")
+RUNNING_FAST = Message("subject.running-fast", "running as fast as possible")
+RUNNING_AT = Message("subject.running-at", "running, {speed:g} virtual seconds per second")
 
 
 @dataclass(frozen=True, slots=True)
@@ -304,13 +337,17 @@ class PacePayload:
     @property
     def text(self) -> str:
         if self.paused:
-            return "paused"
+            return PAUSED()
         if self.speed is None:
-            return "running as fast as possible"
-        return "running" if self.speed == 1.0 else f"running, {self.speed:g} virtual seconds per second"
+            return RUNNING_FAST()
+        return RUNNING() if self.speed == 1.0 else RUNNING_AT(speed=self.speed)
 
     def plain(self) -> dict[str, object]:
         return {"paused": self.paused, "speed": "max" if self.speed is None else self.speed}
+
+
+BACK_IN_TIME = Message("subject.back-in-time", "time went back to here")
+BACK_AT_SNAPSHOT = Message("subject.back-at-snapshot", "back at snapshot {name}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -325,7 +362,7 @@ class RestoredPayload:
 
     @property
     def text(self) -> str:
-        return "time went back to here" if self.snapshot is None else f"back at snapshot {self.snapshot}"
+        return BACK_IN_TIME() if self.snapshot is None else BACK_AT_SNAPSHOT(name=self.snapshot)
 
     def plain(self) -> dict[str, object]:
         return {"snapshot": self.snapshot}

@@ -188,7 +188,8 @@ def _event_of(kind: str, given: Mapping[str, object]) -> dict[str, object]:
     head = {"number": _NUMBER_OF_EVENT, "time_ns": _MOMENT, "machine": {"type": "string"}, "kind": {"const": kind}}
     cause = {"type": ["integer", "null"], "minimum": 1, "description": "The command or the event that led to it."}
     text = {"type": "string", "description": "As text; it adds nothing to the rest."}
-    return members({**head, **given, "cause": cause, "text": text})
+    words = [name for name in ("words", "what", "text") if given.get(name, text) in (_TEXT, text)]
+    return with_sentences({**head, **given, "cause": cause, "text": text}, *words)
 
 
 def _message() -> dict[str, object]:

@@ -5,11 +5,16 @@ from __future__ import annotations
 from itertools import count
 
 from steptwin.errors import Misuse
+from steptwin.messages import NONE, Message
 from steptwin.nearmiss import NearMiss
 from steptwin.simulation.world.plantsnapshot import PlantSnapshot
 from steptwin.subject.commands import DropSnapshot, RestoreSnapshot, TakeSnapshot
 
 MOST_SNAPSHOTS = 32
+
+
+TOO_MANY_SNAPSHOTS = Message("subject.too-many-snapshots", "{most} snapshots are kept, as many as may be: drop one: {names}")
+UNKNOWN_SNAPSHOT = Message("subject.unknown-snapshot", "no snapshot is called {name!r}{hint}; there are {names}")
 
 
 class Snapshots:
@@ -24,7 +29,7 @@ class Snapshots:
         if name is None:
             name = next(text for number in count(1) if (text := str(number)) not in self._kept)
         if name not in self._kept and len(self._kept) >= MOST_SNAPSHOTS:
-            raise Misuse(f"{MOST_SNAPSHOTS} snapshots are kept, as many as may be: drop one: {', '.join(self._kept)}")
+            raise Misuse(TOO_MANY_SNAPSHOTS(most=MOST_SNAPSHOTS, names=list(self._kept)))
         self._kept.pop(name, None)
         self._kept[name] = snapshot
         return _plain(name, snapshot)
@@ -37,7 +42,7 @@ class Snapshots:
         found = self._kept.get(wanted.name)
         if found is None:
             hint = NearMiss().hint(wanted.name, self._kept)
-            raise Misuse(f"no snapshot is called {wanted.name!r}{hint}; there are {', '.join(self._kept) or 'none'}")
+            raise Misuse(UNKNOWN_SNAPSHOT(name=wanted.name, hint=hint, names=list(self._kept) or NONE()))
         return found
 
     def drop(self, wanted: DropSnapshot) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
+from steptwin.messages import Message
 from steptwin.simulation.world.plant import Plant
 from steptwin.subject.commands import Advance
 from steptwin.subject.following import Filter, Following, filter_of
@@ -15,6 +16,9 @@ LONGEST_RUN_NS: Nanos = 3600 * SECOND
 """A condition that never comes true is given up after an hour, where no other limit is given."""
 MOST_SHOWN = 1000
 """Events in the answer to a step."""
+
+
+TIME_HAS_PASSED = Message("subject.time-has-passed", "to_ns = {end}: this world is at {now} ns already")
 
 
 def advance(world: Plant, follow: Callable[[Filter, int], Following], wanted: Advance) -> Mapping[str, object]:
@@ -27,7 +31,7 @@ def advance(world: Plant, follow: Callable[[Filter, int], Following], wanted: Ad
         came = False
         if end is not None:
             if end < world.now:
-                raise Misuse(f"to_ns = {end}: this world is at {world.now} ns already")
+                raise Misuse(TIME_HAS_PASSED(end=end, now=world.now))
             reason = world.run_to(end, wanted.until)
             came = reason is not None and reason == wanted.until
     finally:

@@ -9,6 +9,7 @@ from typing import Any, get_args
 
 from steptwin.errors import Refusal
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.simulation.components.registry import failing
 from steptwin.simulation.faults.kinds import rows
 from steptwin.simulation.kinds.lines import LineWords, LineWrite
@@ -43,6 +44,10 @@ STEPS = (
 
 LOOKS = frozenset({command.ReadPoints, command.ReadState, command.Encoders, command.Describe})
 """Commands that change nothing, and bring to the present what they look at."""
+
+
+CANNOT_DO = Message("subject.cannot-do", "{name!r} is {kind}, which cannot do {command}; it can do {known}")
+CANNOT_BE_JOGGED = Message("subject.cannot-be-jogged", "{name!r} is {kind}, which cannot be jogged")
 
 
 class WorldSubject:
@@ -163,7 +168,7 @@ class WorldSubject:
         kind = world.kind(name)
         if type(wanted) not in kind.control:
             known = ", ".join(command.name_of(one) for one in kind.control)
-            raise Refusal(f"{name!r} is {kind.title}, which cannot do {command.name_of(type(wanted))}; it can do {known}")
+            raise Refusal(CANNOT_DO(name=name, kind=kind.title, command=command.name_of(type(wanted)), known=known))
         step = ordered(world, wanted)
         self._apply_input(step)
         if isinstance(step, Halt):
@@ -198,7 +203,7 @@ class WorldSubject:
         world, name = self.world, wanted.machine
         kind, machine = world.kind(name), world.machine(name)
         if kind.held_jog is None:
-            raise Refusal(f"{name!r} is {kind.title}, which cannot be jogged")
+            raise Refusal(CANNOT_BE_JOGGED(name=name, kind=kind.title))
         world.touch(name)
         on = world.parts.line_of.get(name)
         held = kind.held_jog(machine, None if on is None else on[0].name, wanted)

@@ -10,6 +10,7 @@ from typing import NamedTuple, TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
+from steptwin.messages import Message
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.plant import Plant
 from steptwin.simulation.world.plantsnapshot import RecordedInput
@@ -28,6 +29,9 @@ CourseWatch: TypeAlias = Callable[[Plant, str, CourseTurns], do.Steps]
 class _Course(NamedTuple):
     end: Nanos
     turns: CourseTurns
+
+
+NOTHING_IS_KNOWN = Message("why.nothing-is-known", "{name}: nothing is known of it at {end:g} s")
 
 
 class Courses:
@@ -66,7 +70,7 @@ class Courses:
             yield
         for name, turns in found.items():
             if not turns:
-                raise Misuse(f"{name}: nothing is known of it at {end / SECOND:g} s")
+                raise Misuse(NOTHING_IS_KNOWN(name=name, end=end / SECOND))
             for interval in lacking:
                 self._known[name, interval.state.snapshot.now] = _Course(interval.end, list(_within(turns, interval)))
             self._remembered += len(turns) + len(lacking)

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
+from steptwin.messages import Message
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.faults.active import HeldLevel
 from steptwin.simulation.kinds.programs import Place, Programs
@@ -82,6 +83,11 @@ class Hold(NamedTuple):
 
     time: Nanos
     held: HeldLevel | None
+
+
+TOO_MUCH_TO_SEARCH = Message(
+    "why.too-much-to-search", "more than {most} records and statements since {begin:g} s: too many to look at"
+)
 
 
 class CauseLog:
@@ -156,7 +162,7 @@ class CauseLog:
 
     def _check_size(self) -> None:
         if self.noted > self._most:
-            raise Misuse(f"more than {self._most} records and statements since {self.begin / SECOND:g} s: too many to look at")
+            raise Misuse(TOO_MUCH_TO_SEARCH(most=self._most, begin=self.begin / SECOND))
 
     def _take(self, record: TraceRecord) -> None:
         self._count()

@@ -10,6 +10,7 @@ from typing import TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
+from steptwin.messages import Message
 from steptwin.points import LivePoint
 from steptwin.simulation.kinds.programs import Resource, ResourceKind
 from steptwin.simulation.logic.condition import Signal, SignalCondition
@@ -80,6 +81,18 @@ def _last_flip(condition: SignalCondition, times: Iterable[Nanos], at: Nanos) ->
     return next((time for time in sorted(times, reverse=True) if condition.holds(time - 1) is not value), None)
 
 
+FORM_OF_A_QUESTION = Message(
+    "why.form-of-a-question", "a question is a signal, a condition, or a controller: table.OUT3, 'table.OUT3 == 0', table"
+)
+AMBIGUOUS_NAME = Message("why.ambiguous-name", "{name} is of {machines}: ask with the controller, such as {example}")
+VARIABLE_OF_A_PROGRAM = Message(
+    "why.variable-of-a-program", "{name} is a variable of the program of {machine}: a question is about a signal or register"
+)
+NOTHING_EXECUTED_YET = Message(
+    "why.nothing-executed-yet", "{machine} has executed no statement until {at:g} s: ask about one of its signals"
+)
+
+
 class Why:
     """Answers questions about the past of a world.
 
@@ -125,7 +138,7 @@ class Why:
         """The controller that is meant without a question."""
         machines = [name for name, programs in self.log.world.programs.items() if programs.texts]
         if len(machines) != 1:
-            raise Misuse("a question is a signal, a condition, or a controller: table.OUT3, 'table.OUT3 == 0', table")
+            raise Misuse(FORM_OF_A_QUESTION())
         return machines[0]
 
     # ------------------------------------------------------------------ signals and conditions
@@ -200,7 +213,7 @@ class Why:
                 full = [f"{machine}.{name}" for machine in having] or list(self._registers(name))
                 if len(full) > 1:
                     owners = [one.partition(".")[0] for one in full]
-                    raise Misuse(f"{name} is of {' and '.join(owners)}: ask with the controller, such as {full[0]}")
+                    raise Misuse(AMBIGUOUS_NAME(name=name, machines=" and ".join(owners), example=full[0]))
                 if not full:
                     self._refuse_variable(name)
                     world.signal(name)
@@ -211,7 +224,7 @@ class Why:
         """Raises `Misuse` for a variable of a program, whose values are not noted."""
         for machine, programs in self.log.world.programs.items():
             if name.removeprefix(f"{machine}.") in programs.variables(self.log.world.now):
-                raise Misuse(f"{name} is a variable of the program of {machine}: a question is about a signal or register")
+                raise Misuse(VARIABLE_OF_A_PROGRAM(name=name, machine=machine))
 
     def _registers(self, name: str) -> Iterator[str]:
         """What a name of a program language means, of each controller with a program: ``table.USER_REGISTER[10]:real`` for
@@ -366,7 +379,7 @@ class Why:
         log, causes = self.log, self._causes
         index = log.last_executed(machine, at)
         if index < 0:
-            raise Misuse(f"{machine} has executed no statement until {at / SECOND:g} s: ask about one of its signals")
+            raise Misuse(NOTHING_EXECUTED_YET(machine=machine, at=at / SECOND))
         executed = log.executed[machine]
         here = executed[index]
         use = causes.use(machine, index)

@@ -108,29 +108,6 @@ export const DESCRIPTIONS: Readonly<Record<string, string>> = {
   "sets the variable {name} = {#value}": "nadaje zmiennej {name} = {#value}",
   "puts a text into {place}": "wkłada tekst do {place}",
   "sends {hex} from {place}": "wysyła {hex} z {place}",
-  // Notes of the calculator.
-  "{name} {#value} {unit} is taken as {#taken} {unit2}": "{name} {#value} {unit} przyjęto jako {#taken} {unit2}",
-  "with values that the controller takes, {name} is {value} instead of {wanted}":
-    "przy wartościach, które przyjmuje sterownik, {name} wynosi {value} zamiast {wanted}",
-  "{#pulses} pulses, at most {#most} a second": "impulsów {#pulses}, najwyżej {#most} na sekundę",
-  "too short to reach the velocity: a triangle": "za krótki, żeby osiągnąć prędkość: trójkąt",
-  "Q{#qualification} permits {#highest} step/s: V{#velocity} runs as V{#taken} (M-34)":
-    "Q{#qualification} pozwala na {#highest} krok/s: V{#velocity} działa jak V{#taken} (M-34)",
-  "V is not above S: constant velocity, no ramp (M-8)": "V nie jest większe niż S: stała prędkość, bez rampy (M-8)",
-  "P{#profile}: the manual permits {#low} to {#high} step/s, or more than V":
-    "P{#profile}: podręcznik dopuszcza {#low} do {#high} krok/s albo więcej niż V",
-  "A is more than {#times} × S: check the table of the manual whether S{#start} permits it (M-4)":
-    "A to więcej niż {#times} × S: sprawdź w tabeli podręcznika, czy S{#start} na to pozwala (M-4)",
-  "above {#limit} step/s the microsteps are those of Q": "powyżej {#limit} krok/s mikrokroki są takie jak w Q",
-  "at 24 MHz speeds are {#times} ×, accelerations {#square} × the numbers of the commands":
-    "przy 24 MHz prędkości to {#times} ×, a przyspieszenia {#square} × liczby z poleceń",
-  trapezoid: "trapez",
-  triangle: "trójkąt",
-  "linear ramp": "rampa liniowa",
-  "parabolic ramp": "rampa paraboliczna",
-  "constant velocity": "stała prędkość",
-  "short move": "krótki ruch",
-  "the ramps meet where the braking distance is what remains": "rampy schodzą się tam, gdzie zostaje droga hamowania",
   // Permitted values.
   text: "tekst",
   "numbers {#low} to {#high}": "liczby {#low} do {#high}",

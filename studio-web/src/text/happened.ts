@@ -4,20 +4,6 @@
  */
 export const HAPPENED: Readonly<Record<string, string>> = {
   // Of any machine.
-  "note: {text}": "uwaga: {text}",
-  "expectation: {what}": "oczekiwanie: {what}",
-  "overdue: {what}": "po terminie: {what}",
-  "{button}: pressed": "{button}: wciśnięty",
-  "{button}: released": "{button}: zwolniony",
-  "{shaft} turned: {counts}": "{shaft} obrócono: {counts}",
-  "power-cycle: {text}": "zasilanie wyłączono i włączono {text}",
-  "power-cycle:": "zasilanie wyłączono i włączono",
-  "time stands": "czas stoi",
-  "time goes on": "czas płynie dalej",
-  "time goes on as fast as possible": "czas płynie najszybciej, jak może",
-  "time goes on, {speed} virtual seconds a second": "czas płynie dalej, {speed} sekund wirtualnych na sekundę",
-  "time went back to here": "czas cofnięto do tej chwili",
-  "back at snapshot {name}": "znów stan {name}",
   "power-on": "włączenie zasilania",
   // Of a MIC488.
   "M{axis} is at its home position": "M{axis} jest w pozycji bazowej",

@@ -6,6 +6,7 @@ vi.mock("./polish.json", () => ({
     numbers: "{a:g} {a:.3g} {b:+d} {b:04X} {c:.3f} {c} {{x}}",
     names: "{name!r} z {names!r}: {problem}",
     inner: "wewnątrz {text}",
+    note: "uwaga: {note}",
   },
 }));
 
@@ -25,6 +26,11 @@ test("messages in a message are translated, texts of users and from elsewhere ar
   );
   const elsewhere = { text: "no such file" };
   expect(inPolish({ id: "names", values: { name: "x", names: [], problem: elsewhere } })).toBe("'x' z : no such file");
+});
+
+test("words of a user are not translated, whatever they are like", () => {
+  const note = "the chip shop waits 5 ms";
+  expect(inPolish({ id: "note", values: { note } })).toBe(`uwaga: ${note}`);
 });
 
 test("a message without a translation has none", () => {

@@ -1,4 +1,5 @@
 import type { Sentence } from "../lib/protocol/types";
+import { polishOf } from "./sentences";
 import polish from "./polish.json";
 
 /** A text of the service, and which message it is, where it is one with an id. */
@@ -31,8 +32,9 @@ function shown(value: Value, isQuoted: boolean, format?: string): string {
   if (typeof value === "number") return format === undefined ? String(value) : formatted(value, format);
   if (typeof value === "string") return isQuoted ? quoted(value) : value;
   if ("text" in value) {
-    const text = (value.id !== undefined && inPolish({ id: value.id, values: value.values ?? {} })) || value.text;
-    return isQuoted ? quoted(text) : text;
+    const found =
+      value.id === undefined ? polishOf(value.text) : inPolish({ id: value.id, values: value.values ?? {} });
+    return isQuoted ? quoted(found ?? value.text) : (found ?? value.text);
   }
   return value.map((one) => shown(one, isQuoted, format)).join(", ");
 }

@@ -8,7 +8,6 @@ test.each([
   ["moves +1600 to 17600 in 0.082481 s", "jedzie +1600 do 17600 w 0.082481 s"],
   ["infeed.3 is on infeed", "infeed.3 jest na infeed"],
   ["jam1: M1 is blocked for 2 s", "jam1: M1 zablokowany na 2 s"],
-  ["note: is on", "uwaga: is on"],
   [
     "M1: 2e+06 imp/s is more than the outputs give, 1e+06 imp/s",
     "M1: 2e+06 imp/s to więcej, niż dają wyjścia: 1e+06 imp/s",
@@ -18,12 +17,6 @@ test.each([
   ["HOME needs a drive; OUT1 is not one", "HOME wymaga napędu; OUT1 nim nie jest"],
   // A name is no sentence, and stays.
   ["there is no label position", "nie ma etykiety position"],
-  // A text behind another one may be missing.
-  [
-    "there is no controller tabel (did you mean 'table'?): there are table, drum",
-    "nie ma sterownika tabel (czy miało być 'table'?): są table, drum",
-  ],
-  ["there is no controller x: there are table", "nie ma sterownika x: są table"],
   // Numbers are numbers.
   ["0 to 1 000 000 000", "0 do 1 000 000 000"],
   ["on some paths F 4 is not a multiple of 8", "na niektórych drogach F 4 nie jest wielokrotnością 8"],
