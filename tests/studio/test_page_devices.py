@@ -115,6 +115,26 @@ def test_a_twin_is_put_beside_a_device(studio: Studio, serve: Callable[..., Any]
     expect(beside).to_have_count(0)
 
 
+@pytest.mark.parametrize(
+    ("language", "chip", "bare"),
+    [
+        ("en-US", "position is unknown while it moves", "connect it with config=FILE"),
+        ("pl-PL", "w ruchu jego pozycja jest nieznana", "podłącz go z config=PLIK"),
+    ],
+)
+def test_a_twin_is_offered_only_where_there_can_be_one(
+    studio: Studio, serve: Callable[..., Any], serve_m1486: Callable[..., Any], language: str, chip: str, bare: str
+) -> None:
+    for name, address in (("chip", f"tcp://127.0.0.1:{serve_m1486().tcp_port},kind=m1486"), ("bare", f"{serve().pty}")):
+        answer = httpx.post(f"{studio.process.url}/api/do/connect", json={"address": address, "name": name})
+        assert answer.status_code == 200, answer.text
+    page = studio.page(language, panel="Devices" if language == "en-US" else "Urządzenia")
+    expect(page.get_by_text("chip: ").filter(has_text=chip)).to_be_visible()
+    expect(page.get_by_text("bare: ").filter(has_text=bare)).to_be_visible()
+    expect(page.get_by_role("button", name=re.compile("twin beside|bliźniaka obok"))).to_have_count(0)
+    page.screenshot(path=PICTURES / f"devices-no-twin-{language}.png")
+
+
 @pytest.mark.parametrize("language", ["en-US", "pl-PL"])
 def test_the_panel_on_a_tablet_in_the_dark(studio: Studio, language: str) -> None:
     name = "Devices" if language == "en-US" else "Urządzenia"

@@ -138,6 +138,11 @@ class DevicePart(Protocol):
         """The configuration file that the user has named; None without one. It may block. Raises `Misuse`."""
         ...
 
+    @property
+    def no_twin(self) -> str:
+        """Why there can be no twin of it; empty if there can be one while it is at rest."""
+        ...
+
     async def twin(self, name: str) -> DeviceTwin:
         """A twin called ``name``. Raises `Refusal` where there can be none, or not now."""
         ...
@@ -205,7 +210,8 @@ class AsyncDeviceSubject:
     def _described(self) -> Description:
         place = self._line.place
         sheet = self._device.datasheet
-        machine = MachinePart(self.name, sheet, place, self._device.address, controls_of(sheet, self._actions), is_real=True)
+        controls, no_twin = controls_of(sheet, self._actions), self._device.no_twin
+        machine = MachinePart(self.name, sheet, place, self._device.address, controls, is_real=True, no_twin=no_twin)
         names = tuple(row.name for row in COMMANDS.values() if row.kind in self._actions)
         return Description(self.name, (machine,), lines=(LinePart(place, self._device.line_kind, None),), commands=names)
 

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, Protocol
 
 from steptwin.datasheet import Datasheet, plain, read_argument, read_datasheet
 from steptwin.machine import Nanos
+from steptwin.messages import read_message_text, with_messages
 from steptwin.subject.commands import VERSION, Command
 from steptwin.subject.controls import ControlDescription
 from steptwin.subject.following import Filter, Following
@@ -53,6 +54,8 @@ class MachinePart:
     is_moved: bool = False
     """Whether encoders of it may turn without an event of it: by an axis of another controller, or by a load that its drive
     does not hold."""
+    no_twin: str = ""
+    """Why a studio can put no twin beside this device; empty if it can while the device is at rest."""
 
     @property
     def controls(self) -> tuple[str, ...]:
@@ -189,16 +192,19 @@ class Description:
         sheets = {id(part.datasheet): part.datasheet for part in self.machines}
         numbers = {key: number for number, key in enumerate(sheets)}
         machines = [
-            {
-                "name": part.name,
-                "datasheet": numbers[id(part.datasheet)],
-                "line": part.line,
-                "unit": part.unit,
-                "controls": part.controls,
-                "takes": plain(part.takes),
-                "real": part.is_real,
-                "moved": part.is_moved,
-            }
+            with_messages(
+                {
+                    "name": part.name,
+                    "datasheet": numbers[id(part.datasheet)],
+                    "line": part.line,
+                    "unit": part.unit,
+                    "controls": part.controls,
+                    "takes": plain(part.takes),
+                    "real": part.is_real,
+                    "moved": part.is_moved,
+                    "no_twin": part.no_twin,
+                }
+            )
             for part in self.machines
         ]
         return {
@@ -224,6 +230,7 @@ def read_description(data: Mapping[str, Any]) -> Description:
             tuple(map(_read_control, one["takes"])),
             is_real=one["real"],
             is_moved=one["moved"],
+            no_twin=read_message_text(one, "no_twin"),
         )
         for one in data["machines"]
     )

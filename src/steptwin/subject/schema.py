@@ -203,7 +203,7 @@ def _message() -> dict[str, object]:
 
 def _description() -> dict[str, object]:
     """As `Description.plain` writes it."""
-    machine = members(
+    machine = with_sentences(
         {
             "name": _TEXT,
             "datasheet": {"type": "integer", "minimum": 0, "description": "Index of its data sheet."},
@@ -221,7 +221,12 @@ def _description() -> dict[str, object]:
             },
             "real": {"type": "boolean", "description": "A device: it gives samples instead of plans, and may move something."},
             "moved": {"type": "boolean", "description": "Encoders of it may turn without an event of it."},
-        }
+            "no_twin": {
+                "type": "string",
+                "description": "Why a studio can put no twin beside this device; empty if it can while the device is at rest.",
+            },
+        },
+        "no_twin",
     )
     own: Mapping[str, object] = {
         "machines": {"type": "array", "items": machine},

@@ -152,10 +152,6 @@ export const REFUSALS: Readonly<Record<string, string>> = {
   // What there is beside a world.
   // Devices.
   "{name}: a twin can be made at rest: {what} runs": "{name}: bliźniaka robi się w spoczynku: działa {what}",
-  "{name}: a twin needs the configuration of the controller: connect it with config=FILE":
-    "{name}: bliźniak wymaga konfiguracji sterownika: podłącz go z config=PLIK",
-  "{name}: no twin beside an M1486, whose position is unknown while it moves (M-28)":
-    "{name}: obok M1486 nie ma bliźniaka, bo w ruchu jego pozycja jest nieznana (M-28)",
   "period_s = {#value}: permitted are {#low} to {#high} s": "period_s = {#value}: dozwolone {#low} do {#high} s",
   "{name} is not possible for this device ({place}); possible are {names}":
     "{name} nie jest możliwe dla tego urządzenia ({place}); możliwe są {names}",

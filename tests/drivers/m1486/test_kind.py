@@ -238,7 +238,7 @@ def test_a_chip_as_a_subject(monkeypatch: pytest.MonkeyPatch) -> None:
 
     address, unit, refused = run_virtual(wire, main())
     assert (address, unit) == (7, "min. microsteps")
-    assert refused == "memory: no twin beside an M1486, whose position is unknown while it moves (M-28)"
+    assert refused == "no twin beside an M1486, whose position is unknown while it moves (M-28)"
 
 
 def test_a_server_of_modbus_tcp_has_no_chips(monkeypatch: pytest.MonkeyPatch) -> None:

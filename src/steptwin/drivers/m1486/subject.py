@@ -24,6 +24,7 @@ from steptwin.errors import Misuse, Refusal
 from steptwin.m1486.datasheet import axis, datasheet_of
 from steptwin.m1486.microsteps import FULL_STEP
 from steptwin.m1486.registers import UPLOADS
+from steptwin.messages import Message
 from steptwin.simulation.script import steps
 from steptwin.subject import commands as command
 from steptwin.subject.devicetwin import DeviceTwin
@@ -36,12 +37,14 @@ COUNTER = (1, 2, 3)
 FORMAT = "steptwin M1486 settings 1"
 BUSY = StatusPayload("busy", "moves, waits or runs its program")
 AT_REST = StatusPayload("at-rest", "is at rest")
+NO_TWIN = Message("drivers.no-twin-of-m1486", "no twin beside an M1486, whose position is unknown while it moves (M-28)")
 
 
 class M1486Part:
     """Positions are in the driver's unit, from its origin; the points of the data sheet are in minimum microsteps."""
 
     line_kind = "m1486"
+    no_twin = NO_TWIN()
 
     def __init__(self, chip: AsyncM1486) -> None:
         self._chip = chip
@@ -255,7 +258,7 @@ class M1486Part:
         """It has none."""
 
     async def twin(self, name: str) -> DeviceTwin:
-        raise Refusal(f"{self.line.place}: no twin beside an M1486, whose position is unknown while it moves (M-28)")
+        raise Refusal(self.no_twin)
 
     async def settings_text(self) -> str:
         """What can be read of the chip: S, A, V and other settings cannot, so only those are known that this driver has made."""

@@ -21,6 +21,7 @@ from steptwin.drivers.modbus import ModbusQuery
 from steptwin.drivers.subject import DeviceAction, RawEffect, ValueAndUnit
 from steptwin.errors import LineFailure, Misuse, Refusal
 from steptwin.inputfiles import read_bytes
+from steptwin.messages import Message
 from steptwin.mic488.datasheet import datasheet_of
 from steptwin.mic488.inifile import IniFile
 from steptwin.mic488.points import item_of
@@ -40,6 +41,9 @@ LINE, CONFIG = "line", "device.cfg"
 """Of the world of a twin."""
 MOST_NAMED = 9
 """Most points listed in a message."""
+NO_CONFIGURATION = Message(
+    "drivers.no-configuration", "a twin needs the configuration of the controller: connect it with config=FILE"
+)
 
 
 class Mic488Part:
@@ -265,10 +269,14 @@ class Mic488Part:
             return None
         return IniFile.parse(read_bytes(Path(self._config_file)), Path(self._config_file).name).source
 
+    @property
+    def no_twin(self) -> str:
+        return NO_CONFIGURATION() if self._config_file is None else ""
+
     async def twin(self, name: str) -> DeviceTwin:
         """With its registers, positions and drives. Programs cannot be read; pulses per unit are in no register (MIC-27)."""
         if self._config_file is None:
-            raise Refusal(f"{self.line.place}: a twin needs the configuration of the controller: connect it with config=FILE")
+            raise Refusal(NO_CONFIGURATION())
         status = await self._mic.status()
         moving = [f"M{axis}" for axis, code in zip(ALL_AXES, status.axes, strict=True) if code in MOVING]
         if moving or status.program:

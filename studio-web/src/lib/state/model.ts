@@ -1,4 +1,4 @@
-import type { Description } from "../protocol/types";
+import type { Description, Sentence } from "../protocol/types";
 
 /** What there is, from the description alone: no panel asks which kind a controller is. */
 
@@ -49,6 +49,8 @@ export interface MachineModel {
   name: string;
   /** A device: its positions are samples, and it may move something. */
   isReal: boolean;
+  /** Why no twin can be put beside a device; null where one can. */
+  noTwin: { text: string; message: Sentence | undefined } | null;
   sheet: Datasheet;
   line: string | null;
   unit: number | null;
@@ -128,6 +130,7 @@ export function modelOf(description: Description): Model {
     return {
       name: part.name,
       isReal: part.real,
+      noTwin: part.no_twin ? { text: part.no_twin, message: part.messages?.no_twin } : null,
       sheet,
       line: part.line,
       unit: part.unit,
