@@ -154,6 +154,46 @@ def test_raw_requests_wait_in_order_reads_do_not_and_a_stop_overtakes_them() -> 
     asyncio.run(story())
 
 
+class Twin:
+    """What a shadow is for its device."""
+
+    points = registers = ()
+
+    def __init__(self) -> None:
+        self.seen: list[tuple[object, int, int]] = []
+
+    def did(self, wanted: object, begun: int, ended: int) -> None:
+        self.seen.append((wanted, begun, ended))
+
+    def compare(self, *_: object) -> bool:
+        return False
+
+
+def test_a_twin_beside_it_has_a_raw_motion_whatever_becomes_of_the_look_at_its_drive() -> None:
+    async def story() -> None:
+        rig = Rig()
+        rig.device.is_read.set()
+        is_looking = asyncio.Event()
+
+        async def ignored(_: steps.Request) -> tuple[int, ...]:
+            rig.now += SECOND
+            is_looking.set()
+            await asyncio.Event().wait()
+            return ()
+
+        rig.device.ignored = ignored
+        twin = Twin()
+        rig.shown._shadow = cast("Any", twin)
+        task = asyncio.create_task(rig.shown._do(request(6)))
+        await is_looking.wait()
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+        assert twin.seen == [(request(6), 0, 0)]
+        await rig.shown.close()
+
+    asyncio.run(story())
+
+
 PAUSE = command.ControlProgram("table", "pause")
 STOP_PROGRAM = command.ControlProgram("table", "stop")
 

@@ -256,10 +256,10 @@ class ConnectedDevice:
         """Also by the twin beside it."""
         begun = self._around.clock()
         result = await self._subject.do(wanted)
+        if self._shadow is not None:  # before anything else is awaited: that would be lag, and may be cancelled
+            self._shadow.did(wanted, begun, self._around.clock())
         if isinstance(wanted, steps.Request):
             await self._report_ignored(wanted)
-        if self._shadow is not None:
-            self._shadow.did(wanted, begun, self._around.clock())
         return result
 
     async def _report_ignored(self, request: steps.Request) -> None:
