@@ -12,13 +12,17 @@ from steptwin.errors import Misuse, Refusal
 from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.mic488.registermap import DataType
+from steptwin.mic488.registers import register_map
+from steptwin.mic488.values import encoded, named
 from steptwin.simulation.faults import read as read_fault
-from steptwin.simulation.script.steps import SetFault
+from steptwin.simulation.script.steps import Request, SetFault
 from steptwin.simulation.world.inputs import Bytes
 from steptwin.subject import commands as command
 from steptwin.subject.following import filter_of
 from steptwin.subject.jogs import WorldJogs
 from steptwin.subject.world import WorldSubject
+from steptwin.wire.pdu import encode_request
 
 HOIST = """
     [world]
@@ -188,6 +192,17 @@ def test_scripts_end_and_held_buttons_are_released(tmp_path: Path) -> None:
     # A session replays the stop.
     save(session_of(world), tmp_path / "s.json")
     assert load(tmp_path / "s.json").replay().trace.digest() == world.trace.digest()
+
+
+def test_a_raw_stop_is_an_input_of_each_controller_that_has_its_address() -> None:
+    cells = "".join(f'[[mic488]]\nname = "{name}"\nline = "bus"\nunit = {unit}\n' for name, unit in (("a", 1), ("b", 2)))
+    apart = '[[mic488]]\nname = "c"\n'
+    subject = WorldSubject(World.from_toml(f'{cells}{apart}[[line]]\nname = "bus"\nkind = "modbus"\ntiming = "off"\n'))
+    following = subject.follow(filter_of(["input"]), 99)
+    stop = encode_request(encoded(named(register_map("1.70"), "M1_STOP"), 1.0, DataType.REAL))
+    for unit, stopped in ((1, ["a"]), (0, ["a", "b"]), (3, [])):
+        subject.do(Request("bus", unit, stop, SECOND))
+        assert [event.machine for event in following.take().events if event.payload.text.startswith("stop")] == stopped
 
 
 def test_a_snapshot_before_a_stop_is_whole() -> None:

@@ -34,6 +34,7 @@ from steptwin.subject.payloads import FramePayload, InputPayload, PacePayload, P
 from steptwin.subject.snapshots import Snapshots
 from steptwin.subject.time import advance
 from steptwin.wire.frameline import FrameLine
+from steptwin.wire.rtu import BROADCAST
 
 STEPS = (
     steps.Set, steps.Press, steps.Release, steps.Send, steps.PowerCycle, steps.Turn, steps.Couple, steps.ClearFault,
@@ -218,8 +219,9 @@ class WorldSubject:
             self._apply_input(step)
         finally:
             master.wanted -= {number}
-        name = self._machine_of.get((step.line, step.unit))
-        if name is not None:
+        machines = self._machine_of
+        units = [unit for line, unit in machines if line == step.line] if step.unit == BROADCAST else [step.unit]
+        for name in (machines[step.line, unit] for unit in units if (step.line, unit) in machines):
             self._publish_stops(name, step.pdu)
         found = master.answers.pop(number, None)
         return {"pdu": found[1:-2].hex() if found else None}
