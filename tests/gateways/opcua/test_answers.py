@@ -100,6 +100,27 @@ async def check_a_dead_band_keeps_quiet(client: Client, world: GatewayWorld) -> 
     assert seen.values == [0.0, 1.5, 3.0, 4.5]
 
 
+async def check_an_item_that_is_enabled_again_reports_its_value(client: Client, world: GatewayWorld) -> None:
+    volts, seen = node(client, VOLTS), Seen()
+    await write(volts, 0.0)
+    subscription: Any = await client.create_subscription(100, cast("Any", seen))
+    handle = await subscription.subscribe_data_change(volts)
+
+    async def switch(mode: ua.MonitoringMode) -> None:
+        await asyncio.sleep(1.0)
+        wanted = ua.SetMonitoringModeParameters(subscription.subscription_id, mode, [handle])
+        assert await client.uaclient.set_monitoring_mode(wanted) == [ua.StatusCode()]
+
+    for values in ((6.0, 0.0), (), (6.0,)):
+        await switch(ua.MonitoringMode.Disabled)
+        for value in values:
+            await write(volts, value)
+        await switch(ua.MonitoringMode.Reporting)
+    await switch(ua.MonitoringMode.Reporting)
+    await asyncio.sleep(1.0)
+    assert seen.values == [0.0, 0.0, 0.0, 6.0]
+
+
 FILTERS: dict[str, tuple[str, Any, Any, str]] = {
     "percent": (VOLTS, changes(1.0, 2), ua.AttributeIds.Value, "BadMonitoredItemFilterUnsupported"),
     "unknown kind": (VOLTS, changes(1.0, 7), ua.AttributeIds.Value, "BadDeadbandFilterInvalid"),
@@ -269,6 +290,7 @@ async def check_what_the_gateway_refuses_is_in_the_audit_log(client: Client, wor
 CHECKS = (
     check_what_the_gateway_refuses_is_in_the_audit_log,
     check_a_dead_band_keeps_quiet,
+    check_an_item_that_is_enabled_again_reports_its_value,
     check_filters_that_are_not_supported_are_refused,
     check_parts_of_an_array,
     check_a_value_with_a_status_is_not_written,

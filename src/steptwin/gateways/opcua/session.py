@@ -26,7 +26,7 @@ from steptwin.access.roles import Role
 from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
 from steptwin.gateways.clients import GatewayClient, NotPermitted, address_text
 from steptwin.gateways.contract import ClientState
-from steptwin.gateways.opcua.filters import ChangeFilter, change_filter, differs
+from steptwin.gateways.opcua.filters import ChangeFilter, Reading, change_filter, differs
 from steptwin.gateways.opcua.indexranges import check_range, part_of
 from steptwin.gateways.opcua.limits import AT_ONCE, MOST_READ
 from steptwin.gateways.opcua.nodetypes import standard, status
@@ -206,6 +206,8 @@ class MonitoredItem:
     handle: int
     """The client's."""
     filter: ChangeFilter
+    size: int = 0
+    """Of the queue of the library."""
     notified: ua.DataValue | None = None
     """The value that the client knows."""
 
@@ -248,6 +250,19 @@ class NotificationQueue:
             item.notified = value
             notification = ua.MonitoredItemNotification(item.handle, value)
             await self.subscription.enqueue_datachange_event(identity, notification, size)
+
+    async def switch(self, identity: int, read: Reading, *, on: bool) -> None:
+        """An item that is enabled again reports its value, also the one that it had before (OPC 10000-4, 5.13.1.3): the library
+        compares with that."""
+        item = self.item(identity)
+        if item is None or item.what.AttributeId == ua.AttributeIds.EventNotifier:
+            return
+        if not on:
+            item.notified = None
+        elif item.notified is None:
+            value = read(item.what.NodeId, item.what.AttributeId)
+            notification = ua.MonitoredItemNotification(self.numbers[identity], value)
+            await self.enqueue_datachange_event(identity, notification, item.size)
 
 
 class GatewaySession(InternalSession):
@@ -377,6 +392,7 @@ class GatewaySession(InternalSession):
         (result,) = await super().create_monitored_items(replace(params, ItemsToCreate=[asked]))
         if result.StatusCode.is_good():
             queue.numbers[result.MonitoredItemId] = number
+            queue.items[number].size = result.RevisedQueueSize
         else:
             del queue.items[number]
         return result
@@ -404,7 +420,17 @@ class GatewaySession(InternalSession):
             item.filter, item.handle = what, asked.ClientHandle
             one = replace(one, RequestedParameters=replace(asked, Filter=what.trigger_only()))
         (result,) = await super().modify_monitored_items(replace(params, ItemsToModify=[one]))
+        item.size = result.RevisedQueueSize
         return result
+
+    async def set_monitoring_mode(self, params: ua.SetMonitoringModeParameters) -> list[ua.StatusCode]:
+        codes = await super().set_monitoring_mode(params)
+        queue = self._server.queue(params.SubscriptionId)
+        if queue is not None:
+            is_on = params.MonitoringMode != ua.MonitoringMode.Disabled
+            for identity in params.MonitoredItemIds:
+                await queue.switch(identity, self._server.read_attribute_value, on=is_on)
+        return codes
 
     async def delete_monitored_items(self, params: ua.DeleteMonitoredItemsParameters) -> list[ua.StatusCode]:
         codes = await super().delete_monitored_items(params)
