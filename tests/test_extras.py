@@ -21,6 +21,15 @@ def test_the_libraries_of_an_extra_are_those_of_the_package() -> None:
     assert {extra: names(libraries_of(extra)) for extra in extras} == {extra: names(all_of) for extra, all_of in extras.items()}
 
 
+def test_the_library_whose_internal_classes_are_used_has_the_bounds_of_the_version_that_is_tried() -> None:
+    root = Path(__file__).parents[1]
+    tried = re.search(r"^asyncua==(\d+)\.(\d+)", (root / "requirements/dev.txt").read_text(), re.MULTILINE)
+    assert tried is not None
+    major, minor = map(int, tried.groups())
+    extras = tomllib.loads((root / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    assert f"asyncua>={major}.{minor},<{major}.{minor + 1}" in extras["opcua"]
+
+
 def test_what_is_missing_is_named_with_the_command_that_installs_it() -> None:
     assert str(missing("the studio", ["fastapi", "uvicorn"])) == (
         "the studio needs fastapi and uvicorn, which are not installed: "
