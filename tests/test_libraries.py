@@ -38,16 +38,23 @@ def is_private(name: str) -> bool:
 
 
 def own_names(tree: ast.AST) -> set[str]:
-    """Names that are defined in a module or class: functions, classes, variables, attributes of ``self``, ``__slots__``."""
+    """Names that are defined in a module or class: functions, classes, variables, attributes of ``self``."""
     found: set[str] = set()
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
             found.add(node.name)
-        elif isinstance(node, ast.Attribute | ast.Name) and not isinstance(node.ctx, ast.Load):
-            found.add(node.attr if isinstance(node, ast.Attribute) else node.id)
-        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-            found.add(node.value)
+        elif isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load):
+            found.add(node.id)
+        elif isinstance(node, ast.Attribute) and not isinstance(node.ctx, ast.Load) and is_oneself(node.value):
+            found.add(node.attr)
     return found
+
+
+def is_oneself(node: ast.expr) -> bool:
+    """``self``, ``cls`` or ``super()``."""
+    if isinstance(node, ast.Call):
+        return isinstance(node.func, ast.Name) and node.func.id == "super"
+    return isinstance(node, ast.Name) and node.id in ("self", "cls")
 
 
 class Classes:
@@ -81,33 +88,55 @@ class Classes:
 
 
 def foreign_names(tree: ast.AST, own: set[str], classes: Classes) -> Iterator[str]:
+    """Private names of other things than ``self`` that are not among ``own``, those of ``self`` that its class has not from this
+    package, and what is kept by its library for itself. A module that imports a library has no private name of another thing."""
+    libraries = set(imported_from_libraries(tree))
     for node in ast.walk(tree):
-        if isinstance(node, ast.Attribute) and is_private(node.attr) and node.attr not in own:
-            yield f"{node.lineno}: {ast.unparse(node)}"
+        if isinstance(node, ast.Attribute) and is_private(node.attr) and not is_oneself(node.value):
+            if libraries or node.attr not in own:
+                yield f"{node.lineno}: {ast.unparse(node)}"
         elif isinstance(node, ast.ClassDef):
             theirs = classes.names(node.name)
             for inner in ast.walk(node):
-                if not isinstance(inner, ast.Attribute) or not isinstance(inner.value, ast.Name):
+                if not isinstance(inner, ast.Attribute) or inner.attr in theirs:
                     continue
-                if (
-                    inner.value.id in ("self", "cls")
-                    and is_private(inner.attr)
-                    and inner.attr in own
-                    and inner.attr not in theirs
-                ):
+                if is_private(inner.attr) and is_oneself(inner.value):
                     yield f"{inner.lineno}: {ast.unparse(inner)}"
-        elif isinstance(node, ast.Import | ast.ImportFrom):
+    for line, name in libraries:
+        if name.startswith(INTERNAL) or any(map(is_private, name.split("."))):
+            yield f"{line}: {name}"
+
+
+def imported_from_libraries(tree: ast.AST) -> Iterator[tuple[int, str]]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import | ast.ImportFrom):
             module = (node.module or "") if isinstance(node, ast.ImportFrom) else ""
             for name in (f"{module}.{one.name}".lstrip(".") for one in node.names):
-                is_library = name.partition(".")[0] not in {"steptwin", *sys.stdlib_module_names}
-                if is_library and (name.startswith(INTERNAL) or any(map(is_private, name.split(".")))):
-                    yield f"{node.lineno}: {name}"
+                if name.partition(".")[0] not in {"steptwin", *sys.stdlib_module_names}:
+                    yield node.lineno, name
 
 
 def test_private_parts_of_libraries_are_used_where_there_is_a_reason() -> None:
-    modules = {str(path.relative_to(SOURCE)): ast.parse(path.read_text()) for path in sorted(SOURCE.rglob("*.py"))}
-    own = {name for tree in modules.values() for name in own_names(tree)}
+    modules = {path.relative_to(SOURCE): ast.parse(path.read_text()) for path in sorted(SOURCE.rglob("*.py"))}
+    own: dict[str, set[str]] = {}
+    """By room, whose classes may know of each other."""
+    for path, tree in modules.items():
+        own.setdefault(path.parts[0], set()).update(own_names(tree))
     classes = Classes(modules.values())
-    found = {name: list(foreign_names(tree, own, classes)) for name, tree in modules.items()}
+    found = {path.as_posix(): list(foreign_names(tree, own[path.parts[0]], classes)) for path, tree in modules.items()}
     assert {name: uses for name, uses in found.items() if uses and name not in REASONS} == {}
     assert [name for name in REASONS if not found[name]] == []
+
+
+def test_a_name_that_is_also_one_of_ours_hides_nothing() -> None:
+    ours = "class Ours:\n    def __init__(self): self._queue = self._client = None\n"
+    use = "def use(client, ours):\n    client._client._queue.clear()\n    client._loop.stop()\n    client._sock = ours._queue\n"
+    derived = "class Theirs(Client):\n    def use(self): self._queue.clear()\n"
+    library = ast.parse(f"from aiomqtt import Client\n{ours}{use}{derived}")
+    plain = ast.parse(ours + use)
+    names = {"_queue", "_client"}
+    assert own_names(plain) & {"_queue", "_client", "_loop", "_sock"} == names
+    assert {text.partition(": ")[2] for text in foreign_names(library, names, Classes([library]))} == {
+        *("client._client._queue", "client._client", "client._loop", "client._sock", "ours._queue", "self._queue"),
+    }
+    assert {text.partition(": ")[2] for text in foreign_names(plain, names, Classes([plain]))} == {"client._loop", "client._sock"}
