@@ -11,7 +11,7 @@ from virtual_loop import run_virtually
 
 from steptwin.devices.device import MOST_WAITING, ConnectedDevice, DeviceSurroundings
 from steptwin.drivers.subject import RawEffect
-from steptwin.errors import Refusal
+from steptwin.errors import LineFailure, Refusal, SteptwinError
 from steptwin.machine import SECOND
 from steptwin.simulation.script import steps
 from steptwin.subject import commands as command
@@ -35,8 +35,8 @@ class Device:
     def ended_by(self, request: steps.Request | steps.Write) -> frozenset[int]:
         return frozenset({1})
 
-    async def ignored(self, request: steps.Request) -> tuple[int, ...]:
-        return ()
+    async def ignoring(self, request: steps.Request) -> frozenset[int]:
+        return frozenset()
 
     async def settings_text(self) -> str:
         self.is_asked.set()
@@ -50,6 +50,7 @@ class Subject:
 
     def __init__(self) -> None:
         self.done: list[object] = []
+        self.published: list[str] = []
 
     async def do(self, wanted: object) -> str:
         self.done.append(wanted)
@@ -61,8 +62,8 @@ class Subject:
     async def read(self, *points: str) -> tuple[object, ...]:
         return ()
 
-    def publish(self, payload: object) -> None:
-        """Nobody follows."""
+    def publish(self, payload: Any) -> None:
+        self.published.append(payload.text)
 
     def forget(self) -> None:
         """Nothing is known."""
@@ -175,13 +176,14 @@ def test_a_twin_beside_it_has_a_raw_motion_whatever_becomes_of_the_look_at_its_d
         rig.device.is_read.set()
         is_looking = asyncio.Event()
 
-        async def ignored(_: steps.Request) -> tuple[int, ...]:
-            rig.now += SECOND
-            is_looking.set()
-            await asyncio.Event().wait()
-            return ()
+        async def ignoring(_: steps.Request) -> frozenset[int]:
+            if rig.subject.done:
+                rig.now += SECOND
+                is_looking.set()
+                await asyncio.Event().wait()
+            return frozenset({1})
 
-        rig.device.ignored = ignored
+        rig.device.ignoring = ignoring
         twin = Twin()
         rig.shown._shadow = cast("Any", twin)
         task = asyncio.create_task(rig.shown._do(request(6)))
@@ -189,6 +191,52 @@ def test_a_twin_beside_it_has_a_raw_motion_whatever_becomes_of_the_look_at_its_d
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
         assert twin.seen == [(request(6), 0, 0)]
+        await rig.shown.close()
+
+    asyncio.run(story())
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "ignored"),
+    [({1, 2}, {1, 2}, {1, 2}), (set(), {1}, set()), ({1}, set(), set()), ({1}, None, set())],
+    ids=["off", "switched off by another one", "switched on by another one", "line lost"],
+)
+def test_a_raw_motion_is_ignored_where_the_drive_is_off_before_and_after_it(before: Any, after: Any, ignored: set[int]) -> None:
+    async def story() -> None:
+        rig = Rig()
+        rig.device.is_read.set()
+
+        async def ignoring(_: steps.Request) -> frozenset[int]:
+            found = after if rig.subject.done else before
+            if found is None:
+                raise LineFailure("silence")
+            return frozenset(found)
+
+        rig.device.ignoring = ignoring
+        assert await rig.shown._do(request(6)) == "done"
+        said = [text for text in rig.subject.published if "ignored" in text]
+        assert said == [f"motion ignored: M{axis} is not enabled" for axis in sorted(ignored)]
+        await rig.shown.close()
+
+    asyncio.run(story())
+
+
+@pytest.mark.parametrize(("is_silent", "why"), [(False, "a stop was requested meanwhile"), (True, "silence")])
+def test_a_raw_motion_is_not_sent_late_behind_the_look_at_its_drive(is_silent: bool, why: str) -> None:
+    async def story() -> None:
+        rig = Rig()
+        rig.device.is_read.set()
+
+        async def ignoring(_: steps.Request) -> frozenset[int]:
+            if is_silent:
+                raise LineFailure("silence")
+            await rig.shown._do(request(5))
+            return frozenset()
+
+        rig.device.ignoring = ignoring
+        with pytest.raises(SteptwinError, match=why):
+            await rig.shown._do(request(6))
+        assert request(6) not in rig.subject.done
         await rig.shown.close()
 
     asyncio.run(story())

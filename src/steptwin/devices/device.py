@@ -245,6 +245,12 @@ class ConnectedDevice:
             if type(wanted) in WRITES and not self._is_kept:
                 await self._keep_settings()
                 self._refuse_late(wanted, stops, asked)  # that took its time, and a write may begin a motion
+            if isinstance(wanted, steps.Request):
+                ignoring = await self._ignoring(wanted)
+                self._refuse_late(wanted, stops, asked)
+                result = await self._execute(wanted)
+                await self._report_ignored(wanted, ignoring)
+                return result
             result = await self._execute(wanted)
             if type(wanted) is command.Move:
                 self._look_away()
@@ -258,15 +264,25 @@ class ConnectedDevice:
         result = await self._subject.do(wanted)
         if self._shadow is not None:  # before anything else is awaited: that would be lag, and may be cancelled
             self._shadow.did(wanted, begun, self._around.clock())
-        if isinstance(wanted, steps.Request):
-            await self._report_ignored(wanted)
         return result
 
-    async def _report_ignored(self, request: steps.Request) -> None:
-        """As a twin does it. The request has been answered, whatever becomes of the look at its drives."""
-        with contextlib.suppress(SteptwinError):
-            for axis in await self._device.ignored(request):
-                self._subject.publish(StatusPayload(NOT_ENABLED, f"motion ignored: M{axis} is not enabled", (("axis", axis),)))
+    async def _ignoring(self, request: steps.Request) -> frozenset[int]:
+        """The axes that ignore a raw motion now, none where that is not known. Raises `LineFailure`."""
+        try:
+            return await self._device.ignoring(request)
+        except Refusal:
+            return frozenset()
+
+    async def _report_ignored(self, request: steps.Request, before: frozenset[int]) -> None:
+        """As a twin does it. ``before``: the axes that would have ignored it just before. Those that still do have ignored it: a
+        program of the device, or another master, may have switched the drives of the others. It has been answered, whatever
+        becomes of the look at its drives."""
+        after: frozenset[int] = frozenset()
+        if before:
+            with contextlib.suppress(LineFailure):
+                after = await self._ignoring(request)
+        for axis in sorted(before & after):
+            self._subject.publish(StatusPayload(NOT_ENABLED, f"motion ignored: M{axis} is not enabled", (("axis", axis),)))
 
     def _refuse_while_stopping(self, wanted: Command) -> None:
         if self._stopping:

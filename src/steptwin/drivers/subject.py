@@ -105,9 +105,9 @@ class DevicePart(Protocol):
         """What it ends if it is a stop: the numbers of axes, and 0 for the program. Raises `Misuse` for an unknown register."""
         ...
 
-    async def ignored(self, request: steps.Request) -> tuple[int, ...]:
-        """The axes to which a raw request that has been answered gave motions which they ignored, because their drives are off
-        now. Raises `LineFailure`, `Refusal`."""
+    async def ignoring(self, request: steps.Request) -> frozenset[int]:
+        """The axes that ignore the motions of a raw request now, because their drives are off. None for a request that cannot be
+        decoded. Raises `LineFailure`, `Refusal`."""
         ...
 
     def actions(self) -> Mapping[type, DeviceAction]:

@@ -160,9 +160,9 @@ class M1486Part:
         """It takes none."""
         return frozenset()
 
-    async def ignored(self, request: steps.Request) -> tuple[int, ...]:
+    async def ignoring(self, request: steps.Request) -> frozenset[int]:
         """It takes none."""
-        return ()
+        return frozenset()
 
     def actions(self) -> Mapping[type, DeviceAction]:
         return {

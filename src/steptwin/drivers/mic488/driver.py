@@ -338,15 +338,14 @@ class AsyncMic488:
         async with unit.stopping_if_late(*ALL_AXES, program=starts_program(unit.registers, request)):
             return pdu.answer(request, await unit.ask(request, permission=unit.permission(*ALL_AXES)))
 
-    async def ignored(self, request: pdu.ModbusRequest) -> tuple[int, ...]:
-        """The axes to which a request that has been answered gave motions which they ignored, because their drives are off now
-        (MIC-8)."""
+    async def ignoring(self, request: pdu.ModbusRequest) -> frozenset[int]:
+        """The axes that ignore the motions of a request, because their drives are off now (MIC-8)."""
         unit = self._unit
         axes = given_motions(unit.registers, request)
         control = await unit.control() if axes else None
         if control is None or control.triggered:
-            return ()
-        return tuple(axis for axis in axes if control.axes[axis - 1] == AxisStatus.OFF)
+            return frozenset()
+        return frozenset(axis for axis in axes if control.axes[axis - 1] == AxisStatus.OFF)
 
     # ------------------------------------------------------------------ snapshots
 

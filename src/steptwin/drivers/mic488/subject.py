@@ -218,8 +218,11 @@ class Mic488Part:
         except pdu.ModbusException:
             return frozenset()
 
-    async def ignored(self, request: steps.Request) -> tuple[int, ...]:
-        return await self._mic.ignored(pdu.decode_request(request.pdu))
+    async def ignoring(self, request: steps.Request) -> frozenset[int]:
+        try:
+            return await self._mic.ignoring(pdu.decode_request(request.pdu))
+        except pdu.ModbusException:
+            return frozenset()
 
     async def _request(self, wanted: steps.Request) -> object:
         if wanted.unit != self.address:
