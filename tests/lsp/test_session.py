@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import itertools
+import sys
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager
+from types import FrameType
+from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.lsp.conftest import BROKEN, CONFIG, PROGRAM, TABLE
+from tests.lsp.conftest import BROKEN, CONFIG, PROGRAM, TABLE, WORLD
 
 from steptwin.diagnostics import Span
 from steptwin.errors import Misuse
 from steptwin.lsp import navigation
+from steptwin.lsp.analysis import Analysis
 from steptwin.lsp.documents import TextChange
 from steptwin.lsp.positions import Encoding, LineIndex
 from steptwin.lsp.session import EditorSession
@@ -158,6 +164,81 @@ def test_texts_of_other_programs_are_left_alone() -> None:
     ):
         made.open(uri, "plaintext", 1, text)
         assert made.analysis(uri) is None
+
+
+class Interruption(BaseException):
+    """As of a request that is cancelled."""
+
+
+@contextmanager
+def interrupted(line: int) -> Generator[None]:
+    """Raise at a line, counted as they are executed, of what the session does and of what reads a text in parts."""
+    left = line
+
+    def at_line(frame: FrameType, event: str, _: object) -> Any:
+        nonlocal left
+        if event == "line":
+            left -= 1
+            if left == 0:
+                raise Interruption
+        return at_line
+
+    def at_call(frame: FrameType, event: str, _: object) -> Any:
+        return at_line if frame.f_code.co_filename.endswith(("session.py", "incremental.py", "memory.py", "built.py")) else None
+
+    before = sys.gettrace()
+    sys.settrace(at_call)
+    try:
+        yield
+    finally:
+        sys.settrace(before)
+
+
+CYLINDER = '[[cylinder]]\nname = "ram"\nstroke = 50.0\nextend_time = "1 s"\nextend = "table.OUT1"\n'
+
+
+@pytest.mark.parametrize(
+    ("uri", "text", "change", "ask"),
+    [
+        (PRG, "#a 1\nx = a\ny = q\n", TextChange("\n", (1, 0), (1, 0)), lambda one: one.diagnostics()),
+        (
+            "file:///m/cell.toml",
+            WORLD + "\n[[script]]\nsteps = [\n{ until = 'ram.",
+            TextChange(CYLINDER, (0, 0), (0, 0)),
+            lambda one: one.items(len(one.text)).items,
+        ),
+    ],
+    ids=["program", "world"],
+)
+def test_what_is_interrupted_anywhere_is_made_when_it_is_asked_for_again(
+    uri: str, text: str, change: TextChange, ask: Callable[[Analysis], Sequence[object]]
+) -> None:
+    def opened() -> EditorSession:
+        made = session("")
+        made.open(uri, "", 1, text)
+        return made
+
+    def asked(made: EditorSession) -> Sequence[object]:
+        analysis = made.analysis(uri)
+        assert analysis is not None
+        return ask(analysis)
+
+    changed = opened()
+    changed.change(uri, 2, [change])
+    wanted = asked(changed)
+    assert wanted
+    for line in itertools.count(1):
+        made = opened()
+        asked(made)
+        made.change(uri, 2, [change])
+        try:
+            with interrupted(line):
+                asked(made)
+        except Interruption:
+            assert asked(made) == wanted, f"interrupted at line {line}"
+        else:
+            break
+    assert line > 50
 
 
 def test_a_text_of_any_size_is_not_looked_at() -> None:

@@ -12,7 +12,6 @@ import pytest
 
 from steptwin.baseprotocol import message_bytes
 from steptwin.lsp.editorserver import EditorServer
-from steptwin.lsp.session import EditorSession as Session
 from steptwin.lsp.stdio import serve
 
 INITIALIZE = {"id": 1, "method": "initialize", "params": {"processId": None, "rootUri": None, "capabilities": {}}}
@@ -67,19 +66,23 @@ def test_a_request_that_is_cancelled_while_it_waits_is_not_begun(monkeypatch: py
 def test_a_request_that_is_cancelled_while_it_is_answered_is_interrupted(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """What it has half made goes, and the next one has its answer."""
+    """What is known of the texts stays, also the files of a machine whose description cannot be read during typing."""
+    texts = {"a.prg": "WAITPOS\n", "b.toml": '[[mic488]]\nname = "x"\nline = "y"\nprogram = "a.prg"\n'}
+    opened = [
+        {"textDocument": {"uri": f"file:///{name}", "languageId": "", "version": 1, "text": text}} for name, text in texts.items()
+    ]
+    typed = {"textDocument": {"uri": "file:///b.toml", "version": 2}, "contentChanges": [{"text": "x = [\n" + texts["b.toml"]}]}
     hover = {"textDocument": {"uri": "file:///a.prg"}, "position": {"line": 0, "character": 1}}
-    opened = {"textDocument": {"uri": "file:///a.prg", "languageId": "mic488-wbc", "version": 1, "text": "WAITPOS\n"}}
-    requests = [{"id": number, "method": "textDocument/hover", "params": hover} for number in (5, 6)]
-    has_begun, begun = threading.Event(), []
-    hovered = Session.analysis
+    requests = [{"id": number, "method": "textDocument/hover", "params": hover} for number in (4, 5, 6)]
+    has_begun, found = threading.Event(), []
+    answered = EditorServer.analysed
 
-    def analysis(session: Session, uri: str) -> Any:
-        begun.append(dict(session._kept))
-        while len(begun) == 1:
-            session._kept[uri] = {}
+    def analysed(server: EditorServer, uri: str) -> Any:
+        made = answered(server, uri)
+        found.append((made and made[0], server.session.related(uri)))
+        while len(found) == 2:
             has_begun.set()
-        return hovered(session, uri)
+        return made
 
     class Source(BytesIO):
         def read(self, size: int | None = -1, /) -> bytes:
@@ -88,14 +91,22 @@ def test_a_request_that_is_cancelled_while_it_is_answered_is_interrupted(
                 assert has_begun.wait(10)
             return body
 
-    monkeypatch.setattr(Session, "analysis", analysis)
-    cancel = {"method": "$/cancelRequest", "params": {"id": 5}}
-    given = asked(INITIALIZE, {"method": "textDocument/didOpen", "params": opened}, requests[0], cancel, requests[1])
+    monkeypatch.setattr(EditorServer, "analysed", analysed)
+    given = asked(
+        INITIALIZE,
+        *({"method": "textDocument/didOpen", "params": one} for one in opened),
+        requests[0],
+        {"method": "textDocument/didChange", "params": typed},
+        requests[1],
+        {"method": "$/cancelRequest", "params": {"id": 5}},
+        requests[2],
+    )
     _, answers = served(Source(given + asked(SHUTDOWN, EXIT)))
     by_number = {one["id"]: one for one in answers if "id" in one}
     assert by_number[5]["error"]["code"] == -32800
     assert "WAITPOS" in by_number[6]["result"]["contents"]["value"]
-    assert begun[1] == {}
+    assert found[2][0] is found[1][0]
+    assert found[2][1] == found[1][1] == ["file:///b.toml"]
     assert caplog.messages == []
 
 

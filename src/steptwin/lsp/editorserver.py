@@ -13,7 +13,6 @@ from time import perf_counter
 
 from lsprotocol import types as lsp
 from pygls.capabilities import ServerCapabilitiesBuilder, get_capability
-from pygls.exceptions import JsonRpcRequestCancelled
 from pygls.lsp.server import LanguageServer
 from pygls.protocol import default_converter
 
@@ -55,13 +54,10 @@ class EditorServer(LanguageServer):
 
     @contextmanager
     def answering(self) -> Generator[None]:
-        """Permit an interruption; what is half made then goes."""
+        """Permit an interruption."""
         self.is_answering = True
         try:
             yield
-        except JsonRpcRequestCancelled:
-            self.session.forget()
-            raise
         finally:
             self.is_answering = False
 

@@ -3,6 +3,8 @@
 Texts go by normal addresses (`steptwin.lsp.files.normal`), whatever spelling the client uses. A change makes a new analysis of
 that text only; the others of its machine are made anew when they are next asked for and something they look at has changed.
 What a language needs of the session is `steptwin.lsp.language.OtherTexts`.
+
+A question may be interrupted at any place by an exception. So what is made of a text is stored when it is complete.
 """
 
 from __future__ import annotations
@@ -78,12 +80,6 @@ class EditorSession:
         self._worlds = None
         self._beside.clear()
 
-    def forget(self) -> None:
-        """Make everything anew that follows from the texts."""
-        for kept in (self._analysed, self._outside, self._derived, self._kept):
-            kept.clear()
-        self.refresh()
-
     @property
     def open_uris(self) -> list[str]:
         """The normal addresses of the open texts."""
@@ -135,7 +131,11 @@ class EditorSession:
 
     def _analyse(self, uri: str, language: EditorLanguage, lines: LineIndex) -> Analysis:
         most = language.most_characters
-        return TooLong(uri, lines, most) if len(lines.text) > most else language.analyse(self, uri, lines)
+        try:
+            return TooLong(uri, lines, most) if len(lines.text) > most else language.analyse(self, uri, lines)
+        except BaseException:
+            self._kept.pop(uri, None)  # it may have the new text in part
+            raise
 
     # -- what languages need
 

@@ -40,9 +40,9 @@ class ElementSignals:
         """``edited``: the table that is being typed in. ``read`` gives the content of a file by the name it has in the text."""
         text = "\n".join(lines.line(number) for table in _others(tables, edited) for number in range(table.first, table.last + 1))
         if text != self._text:
-            self._text = text
             with suppress(Misuse):
                 self._known = _built(name, text, read)
+            self._text = text
         return self._known
 
 
