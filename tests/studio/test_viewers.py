@@ -54,9 +54,18 @@ class Viewer:
         await self.look()
 
 
-def with_viewer(story: Callable[[Viewer], Awaitable[None]]) -> None:
+class Remote(Viewer):
+    """What follows a long message waits until it has been read, as in uvicorn."""
+
+    async def _send(self, message: Any) -> None:
+        await super()._send(message)
+        if len(message["text"]) > MOST_UNSENT:
+            self.reads.clear()
+
+
+def with_viewer(story: Callable[[Viewer], Awaitable[None]], kind: type[Viewer] = Viewer) -> None:
     async def told() -> None:
-        viewer = Viewer(Studio())
+        viewer = kind(Studio())
         viewer.requests.put_nowait(ASKED)  # the connection notices that it has entered
         await viewer.look()
         await asyncio.sleep(1)
@@ -122,6 +131,20 @@ def test_one_that_reads_slowly_has_time() -> None:
         assert not viewer.serving.done()
 
     with_viewer(story)
+
+
+def test_one_that_reads_a_long_message_has_more_time() -> None:
+    async def story(viewer: Viewer) -> None:
+        for _ in range(10 * MOST_UNSENT // 4096):
+            viewer.tab.ok("note", text="x" * 4096)
+        await viewer.look()
+        await viewer.look()
+        assert not viewer.reads.is_set()
+        await asyncio.sleep(10 * PATIENCE_S)
+        assert not viewer.serving.done()
+        await viewer.serving
+
+    with_viewer(story, Remote)
 
 
 def test_requests_of_one_that_does_not_read_its_answers_wait() -> None:

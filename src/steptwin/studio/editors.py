@@ -29,6 +29,7 @@ from steptwin.studio.viewers import (
     AsgiReceive,
     AsgiScope,
     AsgiSend,
+    patience_s,
     until_first,
 )
 from steptwin.subject.dispatch import failure, fields_of, read_message
@@ -174,10 +175,12 @@ def _receive(there: Conversation, text: str) -> int:
 
 
 async def _write(outgoing: asyncio.Queue[str], send: AsgiSend) -> None:
+    before = 0
     while True:
         text = await outgoing.get()
-        async with asyncio.timeout(PATIENCE_S):
+        async with asyncio.timeout(patience_s(before)):
             await send({"type": "websocket.send", "text": text})
+        before = len(text)
 
 
 async def _end(send: AsgiSend, code: int, error: Exception) -> None:

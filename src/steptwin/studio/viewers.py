@@ -26,7 +26,7 @@ AsgiSend: TypeAlias = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 PATH = "/ws"
 TICK_S = 1 / 30
 PATIENCE_S = 10.0
-"""Time-out for a viewer that does not read."""
+"""Time-out for a viewer to read `MOST_UNSENT` characters."""
 MOST_UNSENT = 65_536
 """A viewer for which more characters than this wait is sent nothing more, and its requests wait."""
 HELLO_S = 10.0
@@ -34,6 +34,15 @@ HELLO_S = 10.0
 REFUSED, SILENT = 4401, 4400
 """Close codes: wrong token, no hello."""
 BINARY_MESSAGE = Message("studio.binary-message", "a message is a text of JSON; this one is binary")
+
+
+def patience_s(before: int) -> float:
+    """Time-out for a message to be sent, which waits until that before it, of ``before`` characters, has been read.
+
+    ASGI does not say how much of a message has been read, so a long one has more time. Besides it, as many bytes may wait as
+    asyncio permits, which are `MOST_UNSENT`, too.
+    """
+    return PATIENCE_S * (1 + before / MOST_UNSENT)
 
 
 async def until_first(*coroutines: Coroutine[Any, Any, Any]) -> None:
@@ -104,6 +113,8 @@ class ViewerConnection:
         self._unsent: deque[str] = deque()
         self._size = 0
         """Characters in ``_unsent``."""
+        self._before = 0
+        """Characters of the message that was sent last."""
         self._is_wanted = asyncio.Event()
         """Something is to be sent."""
         self._has_room = asyncio.Event()
@@ -157,9 +168,10 @@ class ViewerConnection:
         """Raises `TimeoutError` for a viewer that does not read."""
         while self._unsent:
             text = self._unsent.popleft()
-            async with asyncio.timeout(PATIENCE_S):
+            async with asyncio.timeout(patience_s(self._before)):
                 await send({"type": "websocket.send", "text": text})
-            self._size -= len(text)
+            self._before = len(text)
+            self._size -= self._before
         self._has_room.set()
 
     def look(self, now: Nanos) -> None:
