@@ -25,7 +25,7 @@ export const isInField = (event: KeyboardEvent): boolean => {
 export const isHolding = (): boolean => document.querySelector("[data-held]") !== null;
 
 /** What a key means outside of controls: null for nothing. */
-export type Meaning = "stop" | "live" | "pause" | "back" | "on" | "find" | "help" | { panel: number };
+export type Meaning = "stop" | "live" | "pause" | "back" | "on" | "find" | "filter" | "help" | { panel: number };
 
 export function meaningOf(event: KeyboardEvent): Meaning | null {
   if (event.ctrlKey || event.altKey || event.metaKey) return null;
@@ -38,6 +38,7 @@ export function meaningOf(event: KeyboardEvent): Meaning | null {
     ",": "back",
     ";": "on",
     "/": "find",
+    f: "filter",
     "?": "help",
   };
   if (target instanceof Element && target.closest('[role="application"]')) return null;
