@@ -19,8 +19,6 @@ from steptwin.system import reason
 
 PORTS_TRIED = 20
 MOST_CONNECTIONS = 256
-UNREAD_MS = 10_000
-"""The system ends a connection whose other end has taken nothing for so long: what waits for it would keep it open."""
 END_S = 1
 """Time-out for connections to end."""
 
@@ -38,14 +36,10 @@ def listen(address: Address, *, is_fixed: bool) -> socket.socket:
     tried = 1 if is_fixed or address.port == 0 else PORTS_TRIED
     for port in range(address.port, address.port + tried):
         try:
-            listening = socket.create_server((address.host, port), family=_family(address.host), backlog=128)
+            return socket.create_server((address.host, port), family=_family(address.host), backlog=128)
         except OSError as error:
             if port == address.port + tried - 1:
                 raise LineFailure(f"cannot listen on {Address(address.host, port)}: {reason(error)}") from error
-        else:
-            if hasattr(socket, "TCP_USER_TIMEOUT"):  # Linux; its connections have it, too
-                listening.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, UNREAD_MS)
-            return listening
     raise AssertionError
 
 
