@@ -14,7 +14,8 @@ A line with several slaves carries requests and responses: at each place the fra
 request and the one it has as a response. When a burst has ended, a rest with a right CRC is a frame even where the length of its
 function is not known.
 
-Nothing bounds the search in noise: a cut could fall into a frame, and a byte of noise costs little more than one of a request.
+Nothing bounds the search in noise: a cut could fall into a frame, and a byte of noise costs at most about five times as much as
+one of a request (2 µs instead of 0.4 µs on an EPYC server).
 """
 
 from __future__ import annotations
