@@ -108,8 +108,10 @@ class CharacterTalk:
         self.on_bytes = on_bytes
         self.device: int | None = ALL
         """The chip of the last request."""
-        self._stored: Counter[int | None] = Counter()  # bits of commands for one chip
-        self._stored_by_all = 0  # bits of commands sent while several may listen
+        self._stored: Counter[int | None] = Counter()
+        """Bits of commands for one chip."""
+        self._stored_by_all = 0
+        """Bits of commands sent while several may listen."""
         self.free_ns: Nanos
         self._busy_until: Nanos
         self.selected: int | None
@@ -126,8 +128,19 @@ class CharacterTalk:
         """Bytes uploaded by a program in a chip, while one may run."""
         self.letters: int | None
         """Letters from any chip while several chips are watched (`steptwin.drivers.m1486.watching`)."""
+        self.surplus: int
+        """Number of late type letters that may still arrive."""
+        self.dirty: bool
+        """Whether characters of an abandoned command may precede the next one."""
+        self.nearly_full: bool
+        """Whether the last command took one of the last three places of the input buffer."""
+        self._is_stuck: bool
+        """Whether the buffer had no room for the invalid command, which is sent again."""
         self._request: ChipRequest | None
         self._lines: list[bytes]
+        """Characters still to be sent; the first is being sent."""
+        self._sent: bytes
+        self._echoed: bytes
         self._answer: int | None
         self.reset()
 
@@ -143,14 +156,11 @@ class CharacterTalk:
         self.uploads = None
         self.letters = None
         self.surplus = 0
-        """Number of late type letters that may still arrive."""
         self.dirty = False
-        """Whether characters of an abandoned command may precede the next one."""
         self.nearly_full = False
-        """Whether the last command took one of the last three places of the input buffer."""
-        self._is_stuck = False  # the buffer had no room for the invalid command, which is sent again
+        self._is_stuck = False
         self._request = None
-        self._lines = []  # characters still to be sent; the first is being sent
+        self._lines = []
         self._sent = b""
         self._echoed = b""
         self._answer = None
