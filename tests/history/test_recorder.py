@@ -231,6 +231,23 @@ def test_rows_that_are_lost_at_the_last_look_are_told_at_the_end() -> None:
     assert event.text == f"{sum(map(len, lost))} rows found no room and are missing before this moment"
 
 
+def test_lost_rows_are_told_once_when_a_run_ends_because_time_has_gone_back_and_again_if_its_end_is_lost() -> None:
+    made = RecordedWorld(CELL)
+    made.subject.inner.do(command.TakeSnapshot("one"))
+    lost = made.look()
+    made.recorder.lost(lost)
+    made.world.run(for_=0.1)
+    made.subject.inner.do(command.RestoreSnapshot("one"))
+    end, *others = made.look(has_room=False)
+    count = sum(map(len, lost))
+    told = "rows found no room and are missing before this moment"
+    assert [event.text for event in end.events if told in event.text] == [f"{count} {told}"]
+    made.recorder.lost([end])
+    (first,) = made.look()
+    events = [event.text for batch in (*others, first) for event in batch.events if told in event.text]
+    assert events == [f"{count + len(end) - 1} {told}"]
+
+
 def test_a_controller_that_does_not_answer_is_not_known() -> None:
     made = RecordedWorld(CELL)
     made.look()
