@@ -35,7 +35,6 @@ FINDING = re.compile(r"^.+?:\d+:\d+: (?:error|warning|note) [MW]\d+: (.*)$|^ +\d
 REFUSING = [
     "simulation/kinds/*/[cfhmp]*/*.py",
     *(f"mic488/{name}.py" for name in ("core", "encoding", "program", "program_banks", "values")),
-    *(f"live/{name}.py" for name in ("debugging", "lookback", "why", "world")),
     *(f"simulation/faults/{name}.py" for name in ("active", "element", "fault", "machine", "places")),
     "m1486/*_effects.py",
     "drivers/subject.py",

@@ -12,7 +12,7 @@ from steptwin.debug.calculation import HitCount, LogText, ResolvedExpression
 from steptwin.debug.values import DataPoint, LabelPoint, LinePoint, SetPoint
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
-from steptwin.messages import NONE, Message
+from steptwin.messages import NONE, Message, text_of
 from steptwin.nearmiss import NearMiss
 from steptwin.simulation.kinds.programs import Place, Programs
 from steptwin.simulation.world.plant import Plant
@@ -225,7 +225,7 @@ class Breakpoints:
                 places = {asked.machine: [place]}
             point = Breakpoint(number, asked, places, self._calculate)
         except Misuse as error:
-            return SetPoint(number, problem=str(error))
+            return SetPoint(number, problem=text_of(error))
         if before is not None:
             point.take_hits(before)
         self._all.append(point)

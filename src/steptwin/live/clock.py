@@ -8,6 +8,9 @@ from math import inf
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
+from steptwin.messages import Message
+
+SPEED_IS_OUT_OF_RANGE = Message("live.speed-is-out-of-range", "speed = {speed:g}: must be finite and greater than 0")
 
 
 class Clock:
@@ -48,7 +51,7 @@ class Clock:
     def run(self, speed: float) -> None:
         """Run at ``speed`` from the moment at which the clock was made or stopped. Raises `Misuse` for an invalid speed."""
         if not 0.0 < speed < inf:
-            raise Misuse(f"speed = {speed:g}: must be finite and greater than 0")
+            raise Misuse(SPEED_IS_OUT_OF_RANGE(speed=speed))
         self.speed = speed
         self._start_ns = self._wall_ns()
         self.is_stopped = False

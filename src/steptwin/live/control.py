@@ -21,6 +21,7 @@ from steptwin.files.ownership import InUse, Ownership
 from steptwin.files.writing import PRIVATE, new_content
 from steptwin.later import start
 from steptwin.live.directory import private_directory, runtime_directory
+from steptwin.messages import Message
 from steptwin.simulation.toml.addresses import Address
 from steptwin.subject.commands import Command, Follow, Time, Unfollow
 from steptwin.subject.contract import Result
@@ -51,6 +52,12 @@ class Controlled(Protocol):
     async def answer(self, wanted: Command) -> Result: ...
     def follow(self, what: Filter, bound: int) -> Following: ...
     def plans(self, what: Filter) -> list[Event]: ...
+
+
+TWIN_IS_RUNNING = Message(
+    "live.twin-is-running", "a twin named {name!r} is running already ({owner}): give this one another --name"
+)
+CONTROL_IS_NOT_OPENED = Message("live.control-is-not-opened", "cannot open the control endpoint {place}: {reason}")
 
 
 class ControlEndpoint:
@@ -84,10 +91,10 @@ class ControlEndpoint:
             if self._address is not None:
                 await self._open_tcp(self._address)
         except InUse as taken:
-            raise Misuse(f"a twin named {self.name!r} is running already ({taken.owner}): give this one another --name") from None
+            raise Misuse(TWIN_IS_RUNNING(name=self.name, owner=taken.owner)) from None
         except OSError as error:
             await self.close()
-            raise LineFailure(f"cannot open the control endpoint {self._address or self.path}: {reason(error)}") from error
+            raise LineFailure(CONTROL_IS_NOT_OPENED(place=self._address or self.path, reason=reason(error))) from error
         return self.path
 
     async def _open_tcp(self, address: Address) -> None:
@@ -121,6 +128,18 @@ class ControlEndpoint:
             self._owned = None
 
 
+TOO_MANY_CLIENTS = Message("live.too-many-clients", "there are {most} clients already, the most possible")
+REQUEST_TOOK_TOO_LONG = Message("live.request-took-too-long", "no complete request within {timeout_s:g} s: {form}")
+REQUEST_WITHOUT_END = Message("live.request-without-end", "the request has no end of line: {form}")
+TOKEN_COMES_FIRST = Message(
+    "live.token-comes-first", 'the first line of a connection is {{"token": TOKEN}}, with the token of this twin'
+)
+UNKNOWN_SUBSCRIPTION = Message("live.unknown-subscription", "no subscription has the id {name!r}")
+NO_ID_TO_FOLLOW = Message("live.no-id-to-follow", "follow: an id is required; its events carry it")
+FOLLOWED_ALREADY = Message("live.followed-already", "follow: the id {name!r} is in use")
+TOO_MANY_FOLLOWED = Message("live.too-many-followed", "follow: there are {most} already, the most for a client")
+
+
 class _Conversation(asyncio.Protocol):
     """One client: its requests in order, their answers, and the events of its subscriptions."""
 
@@ -147,7 +166,7 @@ class _Conversation(asyncio.Protocol):
         self._transport = cast(asyncio.Transport, transport)
         self._transport.set_write_buffer_limits(high=MOST_WAITING_BYTES)
         if len(self._clients) >= MOST_CLIENTS:
-            self._end(failure(LineFailure(f"there are {MOST_CLIENTS} clients already, the most possible")))
+            self._end(failure(LineFailure(TOO_MANY_CLIENTS(most=MOST_CLIENTS))))
             return
         self._clients.add(self)
         self._wait()
@@ -166,7 +185,7 @@ class _Conversation(asyncio.Protocol):
         if self._is_full or self._transport.is_closing():
             self.abort()
         else:
-            self._end(failure(Misuse(f"no complete request within {TIMEOUT_S:g} s: {FORM()}")))
+            self._end(failure(Misuse(REQUEST_TOOK_TOO_LONG(timeout_s=TIMEOUT_S, form=FORM()))))
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._calm()
@@ -187,7 +206,7 @@ class _Conversation(asyncio.Protocol):
         self._has_ended = True
         self._unfollow_all()
         if self._received and not self._is_full:
-            self._end(failure(Misuse(f"the request has no end of line: {FORM()}")))
+            self._end(failure(Misuse(REQUEST_WITHOUT_END(form=FORM()))))
         return self._is_full or self._is_asked
 
     def pause_writing(self) -> None:
@@ -261,7 +280,7 @@ class _Conversation(asyncio.Protocol):
         except Misuse:
             given = ""
         if not hmac.compare_digest(str(given).encode("utf-8", "replace"), self._token.encode()):
-            self._end(failure(Misuse('the first line of a connection is {"token": TOKEN}, with the token of this twin')))
+            self._end(failure(Misuse(TOKEN_COMES_FIRST())))
             return
         self._token = ""
         self._write({"ok": None})
@@ -272,18 +291,18 @@ class _Conversation(asyncio.Protocol):
         if isinstance(wanted, Unfollow):
             following = self._following.pop(wanted.id, None)
             if following is None:
-                raise Misuse(f"no subscription has the id {wanted.id!r}")
+                raise Misuse(UNKNOWN_SUBSCRIPTION(name=wanted.id))
             following.close()
             return self._subject.do(Time())._replace(value=None)
         return await self._subject.answer(wanted)
 
     def _follow(self, wanted: Follow, identity: object) -> object:
         if identity is None:
-            raise Misuse("follow: an id is required; its events carry it")
+            raise Misuse(NO_ID_TO_FOLLOW())
         if identity in self._following:
-            raise Misuse(f"follow: the id {identity!r} is in use")
+            raise Misuse(FOLLOWED_ALREADY(name=identity))
         if len(self._following) >= MOST_FOLLOWED:
-            raise Misuse(f"follow: there are {MOST_FOLLOWED} already, the most for a client")
+            raise Misuse(TOO_MANY_FOLLOWED(most=MOST_FOLLOWED))
         what = filter_of(wanted.kinds, wanted.machines, wanted.axes)
         plans = [plan.plain() for plan in self._subject.plans(what)]
         following = self._following[identity] = self._subject.follow(what, wanted.bound)
@@ -322,8 +341,11 @@ class _Conversation(asyncio.Protocol):
                 self._events_came()
 
 
+REQUEST_IS_TOO_LONG = Message("live.request-is-too-long", "a request has at most {most} bytes")
+
+
 def _too_long() -> JsonObject:
-    return failure(Misuse(f"a request has at most {LONGEST_REQUEST} bytes"))
+    return failure(Misuse(REQUEST_IS_TOO_LONG(most=LONGEST_REQUEST)))
 
 
 def _report(error: Exception) -> None:

@@ -24,6 +24,7 @@ from steptwin.live.lookback import PART_S, Lookback, take_back
 from steptwin.live.pace import Pace
 from steptwin.live.world import LiveWorld
 from steptwin.machine import Nanos
+from steptwin.messages import NONE, Message, text_of
 from steptwin.simulation.world.inputs import Download
 from steptwin.simulation.world.model import WORLD
 from steptwin.simulation.world.plantsnapshot import PlantSnapshot, RecordedInput
@@ -40,6 +41,15 @@ class _Requested(NamedTuple):
     point: AnyPoint
     times: int = 1
     """How often it was set and not removed: it stays until each of its clients has removed it."""
+
+
+STOPS_NEED_A_FOLLOWER = Message(
+    "live.stops-need-a-follower", "without a follower a stop is not reported: follow events of kind {kind!r} first"
+)
+TOO_MANY_BREAKPOINTS = Message("live.too-many-breakpoints", "{most} breakpoints are set, as many as may be")
+WRONG_BREAKPOINT = Message("live.wrong-breakpoint", "breakpoint: {problem}")
+UNKNOWN_BREAKPOINT = Message("live.unknown-breakpoint", "there is no breakpoint {number}; there are {names}")
+UNKNOWN_PROGRAM = Message("live.unknown-program", "{machine} has no program {program!r}; there are {names}")
 
 
 class Debugging:
@@ -75,7 +85,7 @@ class Debugging:
         """Raises `Refusal` without a follower of stops, and `Misuse` for a world that cannot be debugged."""
         if self._open is None:
             if not self._is_followed:
-                raise Refusal(f"without a follower a stop is not reported: follow events of kind {StoppedPayload.kind!r} first")
+                raise Refusal(STOPS_NEED_A_FOLLOWER(kind=StoppedPayload.kind))
             self._open = _OpenDebugger(self._live, self._cell, self._pace, self._renew, self._numbers)
             self._open.debugger.set_events([_EVENTS[name] for name in self._events])
             self._renew()
@@ -104,7 +114,7 @@ class Debugging:
     def _add(self, wanted: command.SetBreakpoint) -> object:
         self._opened()
         if len(self._breakpoints) >= command.MOST_BREAKPOINTS:
-            raise Misuse(f"{command.MOST_BREAKPOINTS} breakpoints are set, as many as may be")
+            raise Misuse(TOO_MANY_BREAKPOINTS(most=command.MOST_BREAKPOINTS))
         same = next((number for number, one in self._breakpoints.items() if one.wanted == wanted), None)
         if same is not None:
             found = self._breakpoints[same]
@@ -115,14 +125,13 @@ class Debugging:
         self._set_all()
         if problem := self._set[number].problem:
             self._remove(number)
-            raise Misuse(f"breakpoint: {problem}")
+            raise Misuse(WRONG_BREAKPOINT(problem=text_of(problem)))
         self._tell()
         return self._plain(number)
 
     def _clear(self, wanted: command.ClearBreakpoint) -> None:
         if wanted.number not in self._breakpoints:
-            known = ", ".join(map(str, self._breakpoints)) or "none"
-            raise Misuse(f"there is no breakpoint {wanted.number}; there are {known}")
+            raise Misuse(UNKNOWN_BREAKPOINT(number=wanted.number, names=list(self._breakpoints) or NONE()))
         found = self._breakpoints[wanted.number]
         if found.times > 1:
             self._breakpoints[wanted.number] = found._replace(times=found.times - 1)
@@ -189,9 +198,16 @@ class Debugging:
     def _source(self, wanted: command.ProgramSource) -> object:
         texts = self._opened().debugger.texts(wanted.machine)
         if wanted.program not in texts:
-            raise Misuse(f"{wanted.machine} has no program {wanted.program!r}; there are {', '.join(texts) or 'none'}")
+            raise Misuse(UNKNOWN_PROGRAM(machine=wanted.machine, program=wanted.program, names=list(texts) or NONE()))
         source = texts[wanted.program]
         return {"program": wanted.program, "source": source.name, "text": source.text}
+
+
+DEBUGGER_IS_AT_THE_PRESENT = Message(
+    "live.debugger-is-at-the-present", "the debugger stands at the present: there is nothing to go back to"
+)
+DEBUGGER_IS_ON_ITS_WAY = Message("live.debugger-is-on-its-way", "the debugger is on its way through the past: pause it first")
+WORLD_IS_RUNNING = Message("live.world-is-running", "the world is running: pause it first")
 
 
 class _OpenDebugger:
@@ -325,7 +341,7 @@ class _OpenDebugger:
     def branch(self) -> object:
         debugger = self._standing
         if not debugger.is_past:
-            raise Refusal("the debugger stands at the present: there is nothing to go back to")
+            raise Refusal(DEBUGGER_IS_AT_THE_PRESENT())
         debugger.branch()
         return self.place()
 
@@ -335,13 +351,13 @@ class _OpenDebugger:
     @property
     def looked_at(self) -> Debugger:
         if self._travel is not None:
-            raise Refusal("the debugger is on its way through the past: pause it first")
+            raise Refusal(DEBUGGER_IS_ON_ITS_WAY())
         return self.debugger
 
     @property
     def _standing(self) -> Debugger:
         if self._goes:
-            raise Refusal("the world is running: pause it first")
+            raise Refusal(WORLD_IS_RUNNING())
         return self.looked_at
 
     # ------------------------------------------------------------------ through the past

@@ -8,6 +8,7 @@ import tempfile
 from pathlib import Path
 
 from steptwin.errors import Misuse
+from steptwin.messages import Message
 from steptwin.system import is_own, user
 
 
@@ -33,6 +34,10 @@ def private_directory(path: Path) -> Path:
     return path
 
 
+NO_DIRECTORY = Message("live.no-directory", "{path} is not a directory")
+DIRECTORY_OF_ANOTHER = Message("live.directory-of-another", "{path} belongs to another user")
+
+
 def permissions(path: Path) -> int:
     """The permission bits of a directory; 0o700 where they mean nothing (Windows: access follows the directory above).
 
@@ -40,7 +45,7 @@ def permissions(path: Path) -> int:
     """
     found = path.lstat()
     if not stat.S_ISDIR(found.st_mode):
-        raise Misuse(f"{path} is not a directory")
+        raise Misuse(NO_DIRECTORY(path=path))
     if not is_own(found):
-        raise Misuse(f"{path} belongs to another user")
+        raise Misuse(DIRECTORY_OF_ANOTHER(path=path))
     return 0o700 if user() is None else stat.S_IMODE(found.st_mode)

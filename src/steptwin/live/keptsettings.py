@@ -9,6 +9,7 @@ from pathlib import Path
 from steptwin.errors import Misuse
 from steptwin.files.writing import new_text
 from steptwin.live.directory import private_directory
+from steptwin.messages import Message
 from steptwin.system import reason
 
 
@@ -16,6 +17,11 @@ def state_directory() -> Path:
     """``XDG_STATE_HOME`` or ``~/.local/state``, on Windows ``LOCALAPPDATA``; in it ``steptwin``. It need not exist."""
     base = os.environ.get("XDG_STATE_HOME") or os.environ.get("LOCALAPPDATA")
     return (Path(base) if base else Path.home() / ".local" / "state") / "steptwin"
+
+
+SETTINGS_ARE_NOT_KEPT = Message(
+    "live.settings-are-not-kept", "nothing was written: the settings of {machine} cannot be kept in {path}: {reason}"
+)
 
 
 def keep_settings(machine: str, text: str) -> str:
@@ -27,5 +33,5 @@ def keep_settings(machine: str, text: str) -> str:
         with new_text(path) as file:
             file.write(text)
     except OSError as error:
-        raise Misuse(f"nothing was written: the settings of {machine} cannot be kept in {path}: {reason(error)}") from error
+        raise Misuse(SETTINGS_ARE_NOT_KEPT(machine=machine, path=path, reason=reason(error))) from error
     return str(path)

@@ -15,6 +15,7 @@ from steptwin.live.cell import Cell
 from steptwin.live.pace import Pace
 from steptwin.live.world import LiveWorld
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.simulation.world.history import History, Past
 from steptwin.simulation.world.plantsnapshot import PlantSnapshot
 from steptwin.simulation.world.worldprograms import WorldPrograms
@@ -28,6 +29,7 @@ PART_S = 0.01
 MOST_LOOKS = 8
 """Worlds besides the one that goes on."""
 T = TypeVar("T")
+TOO_MANY_LOOK_BACK = Message("live.too-many-look-back", "{most} viewers look back already, which is the most")
 
 
 class Lookback:
@@ -84,7 +86,7 @@ class Lookback:
     def open(self) -> Look:
         """For another viewer of the past. Raises `Refusal` where there are too many."""
         if self._looks >= MOST_LOOKS:
-            raise Refusal(f"{MOST_LOOKS} viewers look back already, which is the most")
+            raise Refusal(TOO_MANY_LOOK_BACK(most=MOST_LOOKS))
         self._looks += 1
         return Look(Past(self._history), partial(take_back, self._live, self._pace), self._closed)
 
@@ -96,6 +98,10 @@ def take_back(live: LiveWorld, pace: Pace, snapshot: PlantSnapshot) -> None:
     """A world goes back to a state of its past; time stands there. Raises `Refusal`."""
     inputs = tuple(given for given in live.world.inputs if given.time <= snapshot.now)
     pace.go_back(replace(snapshot, inputs=inputs))
+
+
+ANOTHER_MOMENT_IS_WANTED = Message("live.another-moment-is-wanted", "another moment is looked for by now")
+VIEW_OF_THE_PAST_WAS_CLOSED = Message("live.view-of-the-past-was-closed", "the view of the past was closed")
 
 
 class Look:
@@ -146,7 +152,7 @@ class Look:
 
     def _begin(self, parts: Iterator[None]) -> Later[Any]:
         if self._going is not None:
-            self._going.fail(Refusal("another moment is looked for by now"))
+            self._going.fail(Refusal(ANOTHER_MOMENT_IS_WANTED()))
         self._going = later = Later[Any]()
         self._parts = parts
         self._part(later)
@@ -174,5 +180,5 @@ class Look:
     def close(self) -> None:
         """End looking back."""
         if self._going is not None:
-            self._going.fail(Refusal("the view of the past was closed"))
+            self._going.fail(Refusal(VIEW_OF_THE_PAST_WAS_CLOSED()))
         self._closed()

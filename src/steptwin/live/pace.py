@@ -19,6 +19,7 @@ from steptwin.files.export import axis_views, check_target, write_trace
 from steptwin.files.textfiles import check_folder
 from steptwin.live.cell import Cell
 from steptwin.machine import SECOND, Nanos
+from steptwin.messages import Message, text_of
 from steptwin.numerals import read_number
 from steptwin.simulation.logic.condition import SignalCondition
 from steptwin.simulation.world.model import WORLD
@@ -38,24 +39,38 @@ SLICE_NS: Nanos = 10 * SECOND
 """Virtual time per slice without a clock, ns, so that clients are served between slices."""
 PART_S = 0.1
 """Longest real time of a part of a step, s; each request executes one part."""
+PERMITTED_SPEEDS = Message("live.permitted-speeds", "permitted are {least:g} to {most:g}, and 'max'")
+PERMITTED_SPEEDS_AND_NONE = Message(
+    "live.permitted-speeds-and-none", "permitted are 0 (stands), {least:g} to {most:g}, and 'max'"
+)
+WRONG_SPEED = Message("live.wrong-speed", "--speed {problem}: {permitted}")
+SPEED_IS_NOT_PERMITTED = Message("live.speed-is-not-permitted", "--speed {text}: {permitted}")
 
 
 def read_speed(text: str, least: float = SLOWEST) -> float:
     """Parse a speed, virtual seconds per second; infinite for ``max``. Raises `Misuse`."""
     if text == "max":
         return inf
-    standing = "" if least else "0 (stands), "
-    permitted = f"permitted are {standing}{SLOWEST:g} to {FASTEST:g}, and 'max'"
+    permitted = PERMITTED_SPEEDS(least=SLOWEST, most=FASTEST) if least else PERMITTED_SPEEDS_AND_NONE(least=SLOWEST, most=FASTEST)
     try:
         speed = read_number(text)
     except Misuse as error:
-        raise Misuse(f"--speed {error}: {permitted}") from None
+        raise Misuse(WRONG_SPEED(problem=text_of(error), permitted=permitted)) from None
     if not SLOWEST <= speed <= FASTEST and speed != least:
-        raise Misuse(f"--speed {text}: {permitted}")
+        raise Misuse(SPEED_IS_NOT_PERMITTED(text=text, permitted=permitted))
     return speed
 
 
 _STANDS = events.PacePayload(paused=True, speed=None)
+SPEED_MAX_WITH_CLIENTS = Message(
+    "live.speed-max-with-clients", "--speed max: this world has lines with external clients, which need real time"
+)
+FILE_IS_NOT_ABSOLUTE = Message("live.file-is-not-absolute", "file = {file!r}: must be the absolute path of a file")
+NO_LAST_RECORDS = Message(
+    "live.no-last-records",
+    "{path}: this world does not keep its last records: start it with --trace 'ring 10000'; for a session, name the file "
+    "NAME.json",
+)
 
 
 class Pace:
@@ -111,7 +126,7 @@ class Pace:
     def resume(self, speed: float | None = None) -> None:
         """Continue, at ``speed`` if given; while time runs, only the speed changes. Raises `Misuse`."""
         if speed == inf and self._has_clients:
-            raise Misuse("--speed max: this world has lines with external clients, which need real time")
+            raise Misuse(SPEED_MAX_WITH_CLIENTS())
         changes = self.is_paused or speed not in (None, self.speed)
         if speed is not None:
             self.speed = speed
@@ -267,7 +282,7 @@ class Pace:
     def _save(self, wanted: command.Save) -> object:
         path = Path(wanted.file)
         if not path.is_absolute():
-            raise Misuse(f"file = {wanted.file!r}: must be the absolute path of a file")
+            raise Misuse(FILE_IS_NOT_ABSOLUTE(file=wanted.file))
         if not is_session(path):
             return self._save_ring(path)
         check_session_target(path)
@@ -281,10 +296,7 @@ class Pace:
         """The last records, in the format of the file's suffix."""
         ring, world = self._live.ring, self._live.world
         if ring is None:
-            raise Misuse(
-                f"{path}: this world does not keep its last records: start it with --trace 'ring 10000'; for a session, name "
-                "the file NAME.json"
-            )
+            raise Misuse(NO_LAST_RECORDS(path=path))
         check_target(path)
         self._cell.enter()
         trace = ring.trace()

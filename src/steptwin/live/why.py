@@ -10,6 +10,7 @@ from steptwin.errors import Refusal, SteptwinError
 from steptwin.later import Later
 from steptwin.live.lookback import PART_S
 from steptwin.live.world import LiveWorld
+from steptwin.messages import Message
 from steptwin.simulation.world.history import History
 from steptwin.subject.debugcommands import AskWhy as Wanted
 from steptwin.why.kept import PastQuestions
@@ -19,7 +20,8 @@ MOST_QUESTIONS = 16
 """Questions that wait."""
 KEPT_S = 60.0
 """After so long without a question what was noted is dropped, s."""
-NO_PAST = "no past is kept here: start the twin with 'steptwin up --past' or in the studio"
+NO_PAST = Message("live.no-past", "no past is kept here: start the twin with 'steptwin up --past' or in the studio")
+TOO_MANY_QUESTIONS = Message("live.too-many-questions", "{most} questions wait for their answers, which is the most")
 
 
 class LiveWhy:
@@ -35,9 +37,9 @@ class LiveWhy:
     def ask(self, wanted: Wanted) -> Later[object]:
         """The answer as plain data. Raises `Refusal` where no past is kept, and for too many questions at once."""
         if self._live.history is None:
-            raise Refusal(NO_PAST)
+            raise Refusal(NO_PAST())
         if len(self._waiting) >= MOST_QUESTIONS:
-            raise Refusal(f"{MOST_QUESTIONS} questions wait for their answers, which is the most")
+            raise Refusal(TOO_MANY_QUESTIONS(most=MOST_QUESTIONS))
         later = Later[object]()
         self._waiting.append((wanted, later))
         if len(self._waiting) == 1:
@@ -79,7 +81,7 @@ class LiveWhy:
         """Raises `Refusal` where no past is kept any more."""
         history = self._live.history
         if history is None:
-            raise Refusal(NO_PAST)
+            raise Refusal(NO_PAST())
         if self._past is None or self._past[0] is not history:
             self._past = history, PastQuestions(history)
         return self._past[1]

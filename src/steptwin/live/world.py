@@ -15,6 +15,7 @@ from steptwin.live.cell import Cell
 from steptwin.live.sharedreads import share_reads
 from steptwin.live.tracedport import traced
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.simulation.kinds.lines import LineEndPoint
 from steptwin.simulation.kinds.registry import line_kinds
 from steptwin.simulation.scheduler.kernel import Kernel
@@ -82,6 +83,21 @@ class RunControl(Protocol):
     def restored(self) -> None:
         """The world has gone back to the present moment; what was later has not happened."""
         ...
+
+
+MEMORY_CANNOT_GO_BACK = Message(
+    "live.memory-cannot-go-back",
+    "this world keeps its memory in {place}, which cannot go back: start it without a state directory",
+)
+TRACE_FILE_CANNOT_GO_BACK = Message(
+    "live.trace-file-cannot-go-back",
+    "the trace of this world is written to a file, which cannot go back: start it without that, or with a ring",
+)
+AXIS_IS_JOGGED = Message("live.axis-is-jogged", "an axis is being jogged: end the jog first")
+SCRIPT_ENDS_THE_RUN = Message("live.script-ends-the-run", "a script would end the run here: {reason}")
+NO_SESSION_IS_RECORDED = Message(
+    "live.no-session-is-recorded", "this world does not record a session: start it with --session FILE"
+)
 
 
 class LiveWorld:
@@ -162,15 +178,11 @@ class LiveWorld:
         """
         world = self.world
         if world.state is not None:
-            raise Refusal(
-                f"this world keeps its memory in {world.state}, which cannot go back: start it without a state directory"
-            )
+            raise Refusal(MEMORY_CANNOT_GO_BACK(place=world.state))
         if self.trace_file is not None:
-            raise Refusal(
-                "the trace of this world is written to a file, which cannot go back: start it without that, or with a ring"
-            )
+            raise Refusal(TRACE_FILE_CANNOT_GO_BACK())
         if self.companion is not None and self.companion.deadline() is not None:
-            raise Refusal("an axis is being jogged: end the jog first")
+            raise Refusal(AXIS_IS_JOGGED())
         self.subject.go_back(snapshot, name)
         self._recorded_bytes = sum(size_of(given.what) for given in world.inputs)
         self._dues = _Dues(world.kernels)
@@ -193,7 +205,7 @@ class LiveWorld:
         if self._full is not None:
             return self._full
         if not self.world.keeps_inputs:
-            raise Misuse("this world does not record a session: start it with --session FILE")
+            raise Misuse(NO_SESSION_IS_RECORDED())
         return sessions.session_of(self.world)
 
     @property
@@ -263,7 +275,7 @@ class LiveWorld:
 
     def _pass_stop(self, reason: str) -> None:
         """Report it without a record: a replay goes on as well."""
-        text = f"a script would end the run here: {reason}"
+        text = SCRIPT_ENDS_THE_RUN(reason=reason)
         self.show(text)
         self.subject.publish(self.now, WORLD, StatusPayload("script-stop", text))
         self.world.go_on()

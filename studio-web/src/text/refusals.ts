@@ -10,11 +10,9 @@ export const REFUSALS: Readonly<Record<string, string>> = {
   "{name}: no answer within {#seconds} s": "{name}: brak odpowiedzi przez {#seconds} s",
   "the connection was lost before the answer came; whether it was done is not known":
     "połączenie zerwało się przed odpowiedzią; nie wiadomo, czy to wykonano",
-  // Who may do what.
   // Requests and their fields.
   "breakpoint: give one of line, label and value; given are {names}":
     "punkt przerwania: podaj jedno z line, label i value; podano {names}",
-  "breakpoint: {problem}": "punkt przerwania: {problem}",
   "a text": "tekst",
   "true or false": "true lub false",
   "a number from {#low} to {#high}": "liczby od {#low} do {#high}",
@@ -140,16 +138,6 @@ export const REFUSALS: Readonly<Record<string, string>> = {
   "{text} is not a command": "{text} nie jest poleceniem",
   "the distance {#distance} is not a multiple of {#grid} (M{#microstep})":
     "odcinek {#distance} nie jest wielokrotnością {#grid} (M{#microstep})",
-  // Time, the past, branches.
-  "{#most} viewers look back already, which is the most": "przeszłość ogląda już {#most}, więcej nie można",
-  "this world keeps its memory in {place}, which cannot go back: start it without a state directory":
-    "ten świat trzyma pamięć w {place}, której nie da się cofnąć: uruchom go bez katalogu stanu",
-  "the trace of this world is written to a file, which cannot go back: start it without that, or with a ring":
-    "ślad tego świata idzie do pliku, którego nie da się cofnąć: uruchom go bez tego albo z pierścieniem",
-  "an axis is being jogged: end the jog first": "trwa jazda ręczna: najpierw ją zakończ",
-  "this world does not record a session: start it with --session FILE":
-    "ten świat nie nagrywa sesji: uruchom go z --session PLIK",
-  // What there is beside a world.
   // Devices.
   "{name}: a twin can be made at rest: {what} runs": "{name}: bliźniaka robi się w spoczynku: działa {what}",
   "period_s = {#value}: permitted are {#low} to {#high} s": "period_s = {#value}: dozwolone {#low} do {#high} s",
@@ -220,20 +208,7 @@ export const REFUSALS: Readonly<Record<string, string>> = {
   "{where} = {value}: permitted are {permitted}": "{where} = {value}: dozwolone {permitted}",
   "{where}: a number of more than 63 bits: permitted are {permitted}":
     "{where}: liczba o ponad 63 bitach: dozwolone {permitted}",
-  // The debugger and Why?.
+  // Others.
   "{name} has no program: {who} has one": "{name} nie ma programu: ma go {who}",
-  "{#most} breakpoints are set, as many as may be": "ustawionych jest {#most} punktów przerwania, więcej nie można",
-  "there is no breakpoint {#number}; there are {names}": "nie ma punktu przerwania {#number}; są {names}",
-  "{machine} has no program {name}; there are {names}": "{machine} nie ma programu {name}; są {names}",
-  "the debugger stands at the present: there is nothing to go back to":
-    "debugger stoi w teraźniejszości: nie ma do czego wracać",
-  "the debugger is on its way through the past: pause it first":
-    "debugger idzie przez przeszłość: najpierw go wstrzymaj",
-  "the world is running: pause it first": "świat działa: najpierw go wstrzymaj",
-  "without a follower a stop is not reported: follow events of kind {kind} first":
-    "bez śledzenia nikt nie dowie się o zatrzymaniu: najpierw śledź zdarzenia {kind}",
-  "{#most} questions wait for their answers, which is the most":
-    "na odpowiedź czeka już {#most} pytań, więcej nie można",
-  // The calculator.
   "{name} can only be written": "{name} jest tylko do zapisu",
 };

@@ -18,6 +18,7 @@ from steptwin.live.studio.options import StudioOptions
 from steptwin.live.studio.processes import ChildProcesses, Process
 from steptwin.live.world import LiveWorld
 from steptwin.machine import MILLISECOND, Nanos
+from steptwin.messages import NONE, Message
 from steptwin.simulation.scheduler.trace import Mark
 from steptwin.simulation.world.plantsnapshot import PlantSnapshot
 
@@ -45,6 +46,15 @@ class _OpenBranch(NamedTuple):
         return {"branch": number, "from_ns": str(self.begin), "url": self.url}
 
 
+BRANCH_FROM_ELSEWHERE = Message(
+    "live.branch-from-elsewhere",
+    "a branch is reached from the computer of the studio only: there is none while others can reach it",
+)
+TOO_MANY_BRANCHES = Message("live.too-many-branches", "{most} branches are open already, which is the most: end one")
+BRANCH = Message("live.branch", "branch {number}")
+UNKNOWN_BRANCH = Message("live.unknown-branch", "no branch {branch}: open are {names}")
+
+
 class WorldBranches:
     """See `steptwin.studio.branchrequests.Branches`. A `Link` of the server. ``own``: how their pages are served; None: they
     cannot be reached, so there are none."""
@@ -69,9 +79,9 @@ class WorldBranches:
 
     async def start(self, moment: Nanos | None) -> Mapping[str, object]:
         if self._own is None:
-            raise Refusal("a branch is reached from the computer of the studio only: there is none while others can reach it")
+            raise Refusal(BRANCH_FROM_ELSEWHERE())
         if len(self._running()) + self._starting >= MOST_BRANCHES:
-            raise Refusal(f"{MOST_BRANCHES} branches are open already, which is the most: end one")
+            raise Refusal(TOO_MANY_BRANCHES(most=MOST_BRANCHES))
         self._starting += 1
         try:
             self._cell.enter()
@@ -89,12 +99,12 @@ class WorldBranches:
         name = f"{spec.name}, branch {number} from {snapshot.now // MILLISECOND / 1000:.3f} s"
         begun = BranchStart(own, ready, name, spec.text.source.name, replace(snapshot, inputs=(), trace=Mark(())))
         process = self._processes.start(MODULE, given=pickle.dumps(begun))
-        return _OpenBranch(process, snapshot.now, self._processes.url(process, ready, f"branch {number}"))
+        return _OpenBranch(process, snapshot.now, self._processes.url(process, ready, BRANCH(number=number)))
 
     async def end(self, branch: int) -> None:
         found = self._running().pop(branch, None)
         if found is None:
-            raise Misuse(f"no branch {branch}: open are {', '.join(map(str, self._open)) or 'none'}")
+            raise Misuse(UNKNOWN_BRANCH(branch=branch, names=list(self._open) or NONE()))
         await later(asyncio.to_thread(self._processes.end, found.process))
 
     async def close(self) -> None:

@@ -20,6 +20,7 @@ from steptwin.files.ownfolder import place_in
 from steptwin.files.textfiles import read_text
 from steptwin.inputfiles import MOST_DESCRIPTION_BYTES, read_recorded
 from steptwin.live.studio.processes import ChildProcesses, Process, last_words
+from steptwin.messages import NONE, Message
 
 TABLE = "campaign"
 MOST_FILES = 500
@@ -41,6 +42,11 @@ class _CampaignFile:
     @property
     def results(self) -> Path:
         return self.file.with_suffix(SUFFIX)
+
+
+CAMPAIGN_IS_RUNNING = Message("live.campaign-is-running", "{name} runs: one campaign at a time")
+UNKNOWN_CAMPAIGN = Message("live.unknown-campaign", "no campaign {name!r}: there are {names}")
+NO_FILE_OF_RESULTS = Message("live.no-file-of-results", "{name!r} is no file of the results of a campaign here")
 
 
 class FolderCampaigns:
@@ -77,7 +83,7 @@ class FolderCampaigns:
         known = await later(asyncio.to_thread(self._campaign, campaign))
         place_in(self._folder, str(known.results))
         if (running := self._present()) is not None:
-            raise Refusal(f"{running} runs: one campaign at a time")
+            raise Refusal(CAMPAIGN_IS_RUNNING(name=running))
         self._errors.pop(campaign, None)
         self._running = campaign, self._processes.start("steptwin", "campaign", "run", str(known.file))
 
@@ -133,14 +139,14 @@ class FolderCampaigns:
     def _campaign(self, name: str) -> _CampaignFile:
         known = self._known()
         if name not in known:
-            raise Misuse(f"no campaign {name!r}: there are {', '.join(known) or 'none'}")
+            raise Misuse(UNKNOWN_CAMPAIGN(name=name, names=list(known) or NONE()))
         return known[name]
 
     def _file(self, name: str) -> str:
         path = (self._folder / name).resolve()
         folders = [known.results.resolve() for known in self._known().values()]
         if not any(map(path.is_relative_to, folders)) or path.suffix not in SERVED or not path.is_file():
-            raise Misuse(f"{name!r} is no file of the results of a campaign here")
+            raise Misuse(NO_FILE_OF_RESULTS(name=name))
         return str(path)
 
 

@@ -8,8 +8,11 @@ from pathlib import Path
 from steptwin.errors import Misuse
 from steptwin.files.ownfolder import place_in
 from steptwin.files.textfiles import read_text, write_bytes
+from steptwin.messages import Message
 from steptwin.simulation.describe.arrangement import OTHERS, DrawnPlace, arranged
 from steptwin.simulation.describe.spec import WorldSpec
+
+NO_PLACE_OF = Message("live.no-place-of", "places: no axis or element is called {name!r}; there are {names}")
 
 
 class WorldArrangement:
@@ -28,7 +31,7 @@ class WorldArrangement:
 
     def save(self, places: Sequence[DrawnPlace]) -> Mapping[str, object]:
         if strange := [place.of for place in places if place.of not in self._known]:
-            raise Misuse(f"places: no axis or element is called {strange[0]!r}; there are {', '.join(sorted(self._known))}")
+            raise Misuse(NO_PLACE_OF(name=strange[0], names=sorted(self._known)))
         name = f"{self._spec.name if self._file is None else self._file.stem}.toml"
         if self._file is None:
             text = arranged(self._spec.text.source.text, places)

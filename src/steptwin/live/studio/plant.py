@@ -11,6 +11,7 @@ from steptwin.errors import Misuse, Refusal
 from steptwin.eventloop import later
 from steptwin.gateways.contract import OpenGateway
 from steptwin.machine import SECOND
+from steptwin.messages import Message
 from steptwin.simulation.describe.historytable import HISTORY
 from steptwin.studio.plantrequests import MOST_POINTS, MOST_WRITES
 
@@ -24,6 +25,8 @@ MOST_VALUES = 4000
 """Of a point; where there are more, it is read in equal steps."""
 MOST_RUNS = 500
 """The last ones."""
+COUNT_OF_POINTS = Message("live.count-of-points", "points: {count} are given: permitted are 1 to {most}")
+NO_HISTORY = Message("live.no-history", "nothing is kept here: the description of the world has no table [{table}]")
 
 
 class WorldPlant:
@@ -46,7 +49,7 @@ class WorldPlant:
 
     async def values(self, points: Sequence[str], run: int, begin_s: float, end_s: float | None) -> Mapping[str, object]:
         if not 0 < len(points) <= MOST_POINTS:
-            raise Misuse(f"points: {len(points)} are given: permitted are 1 to {MOST_POINTS}")
+            raise Misuse(COUNT_OF_POINTS(count=len(points), most=MOST_POINTS))
         return await self._read(lambda past: _values(past, points, past.run(run), begin_s, end_s))
 
     async def compare(
@@ -70,7 +73,7 @@ class WorldPlant:
         """What ``work`` reads, in a thread. Raises `Refusal` where there is no history."""
         url = self._url
         if url is None:
-            raise Refusal(f"nothing is kept here: the description of the world has no table [{HISTORY}]")
+            raise Refusal(NO_HISTORY(table=HISTORY))
 
         def read() -> T:
             from steptwin.history.reading import HistoryDatabase
@@ -107,12 +110,15 @@ def _length_s(run: KeptRun) -> float:
     return (run.ended_ns - run.began_ns) / SECOND
 
 
+ENDS_BEFORE_ITS_BEGIN = Message("live.ends-before-its-begin", "to_s {until_s:g}: this is before from_s {begin_s:g}")
+
+
 def _values(
     past: HistoryDatabase, points: Sequence[str], run: KeptRun, begin_s: float, end_s: float | None
 ) -> Mapping[str, object]:
     until_s = _length_s(run) if end_s is None else end_s
     if until_s < begin_s:
-        raise Misuse(f"to_s {until_s:g}: this is before from_s {begin_s:g}")
+        raise Misuse(ENDS_BEFORE_ITS_BEGIN(until_s=until_s, begin_s=begin_s))
     series = [_series(past, point, run, begin_s, until_s) for point in points]
     return {"run": run.number, "from_s": begin_s, "to_s": until_s, "series": series}
 

@@ -12,11 +12,15 @@ from tempfile import TemporaryDirectory
 from typing import TypeAlias
 
 from steptwin.errors import LineFailure, Refusal
+from steptwin.messages import Message, text_of
 
 START_S = 300.0
 """Longest duration of the start of a studio."""
 POLL_S = 0.05
 Process: TypeAlias = subprocess.Popen[bytes]
+STUDIO_ENDS = Message("live.studio-ends", "the studio ends")
+ENDED_WITHOUT_A_WORD = Message("live.ended-without-a-word", "it ended without a word")
+HAS_NOT_STARTED = Message("live.has-not-started", "{what} has not started: {problem}")
 
 
 class ChildProcesses:
@@ -33,7 +37,7 @@ class ChildProcesses:
     def start(self, module: str, *arguments: str, given: bytes | None = None) -> Process:
         """``given``: what it reads; its input stays open then. Raises `Refusal` when the studio ends."""
         if self._is_closed:
-            raise Refusal("the studio ends")
+            raise Refusal(STUDIO_ENDS())
         process = subprocess.Popen(
             [sys.executable, "-m", module, *arguments],
             stdin=subprocess.DEVNULL if given is None else subprocess.PIPE,
@@ -55,7 +59,7 @@ class ChildProcesses:
         while not ready.exists() and process.poll() is None and time.monotonic() < until:
             time.sleep(POLL_S)
         if not ready.exists():
-            raise LineFailure(f"{what} has not started: {last_words(self.end(process))}")
+            raise LineFailure(HAS_NOT_STARTED(what=what, problem=text_of(last_words(self.end(process)))))
         points = json.loads(ready.read_text("utf-8"))["end_points"]
         return str(next(point["url"] for point in points if point["kind"] == "http"))
 
@@ -77,7 +81,7 @@ def last_words(errors: bytes) -> str:
     """The last error of a process; of a finding in a file its place, what is wrong and what is permitted."""
     lines = errors.decode("utf-8", "replace").strip().splitlines()
     if not lines:
-        return "it ended without a word"
+        return ENDED_WITHOUT_A_WORD()
     begin = max(number for number, line in enumerate(lines) if number == 0 or not line[:1].isspace())
     hints = [line.strip().removeprefix("= ") for line in lines[begin + 1 :] if line.lstrip().startswith("= ")]
     return f"{lines[begin]} ({hints[0]})" if hints else lines[begin]

@@ -21,11 +21,19 @@ from steptwin.files.savedsessions import SavedSession, path_of, read_saved, save
 from steptwin.live.cell import Cell
 from steptwin.live.studio.processes import ChildProcesses, Process, last_words
 from steptwin.live.world import MOST_INPUT_BYTES, MOST_INPUTS, LiveWorld
+from steptwin.messages import Message, text_of
 from steptwin.simulation.world import history
 
 EXPORT_S = 300.0
 """Longest duration of an export."""
 MOST_VIEWS = 4
+FILE_IS_THERE = Message("live.file-is-there", "{path} is there already: give another name")
+VIEW_FROM_ELSEWHERE = Message(
+    "live.view-from-elsewhere",
+    "a view is reached from the computer of the studio only: start it with steptwin studio {path} --view",
+)
+UNKNOWN_FORMAT = Message("live.unknown-format", "{name}: formats are {names}")
+UNKNOWN_SESSION = Message("live.unknown-session", "no session is called {name!r} in {folder}")
 
 
 class WorldRecordings:
@@ -68,14 +76,14 @@ class WorldRecordings:
         path = place_in(self._folder, file)
         if path.exists():
             if not is_session(path):
-                raise Refusal(f"{path} is there already: give another name")
+                raise Refusal(FILE_IS_THERE(path=path))
             read_saved(path)  # whatever else is there is not overwritten
         return str(path)
 
     async def view(self, name: str) -> str:
         path = self._saved(name)
         if self._access is None:
-            raise Refusal(f"a view is reached from the computer of the studio only: start it with steptwin studio {path} --view")
+            raise Refusal(VIEW_FROM_ELSEWHERE(path=path))
         return await later(asyncio.to_thread(self._processes.view, path, self._access))
 
     async def file(self, name: str) -> str:
@@ -84,14 +92,14 @@ class WorldRecordings:
         if f".{form}" == SESSION_SUFFIX:
             return str(path)
         if form not in FORMATS:
-            raise Misuse(f"{name}: formats are {SESSION_SUFFIX[1:]}, {', '.join(FORMATS)}")
+            raise Misuse(UNKNOWN_FORMAT(name=name, names=[SESSION_SUFFIX[1:], *FORMATS]))
         return str(await later(asyncio.to_thread(self._processes.export, path, form)))
 
     def _saved(self, name: str) -> Path:
         """Raises `Misuse` where there is no such session."""
         path = path_of(self._folder, name)
         if not path.is_file():
-            raise Misuse(f"no session is called {name!r} in {self._folder}")
+            raise Misuse(UNKNOWN_SESSION(name=name, folder=self._folder))
         read_saved(path)  # whatever else is there is nobody's business
         return path
 
@@ -134,6 +142,13 @@ class WorldRecordings:
         await asyncio.to_thread(self._processes.close)
 
 
+EXPORT_TAKES_TOO_LONG = Message(
+    "live.export-takes-too-long", "{name} as {form} takes more than {most_s:g} s: use steptwin replay and export"
+)
+VIEW_OF = Message("live.view-of", "the view of {name}")
+EXPORT_FAILED = Message("live.export-failed", "{name} as {form}: {problem}")
+
+
 class _Processes(ChildProcesses):
     """Exports and views. All methods block."""
 
@@ -152,11 +167,11 @@ class _Processes(ChildProcesses):
             try:
                 _, errors = process.communicate(timeout=EXPORT_S)
             except subprocess.TimeoutExpired:
-                raise Refusal(f"{path.name} as {form} takes more than {EXPORT_S:g} s: use steptwin replay and export") from None
+                raise Refusal(EXPORT_TAKES_TOO_LONG(name=path.name, form=form, most_s=EXPORT_S)) from None
             finally:
                 self.end(process)
         if not target.exists():
-            raise Refusal(f"{path.name} as {form}: {last_words(errors)}")
+            raise Refusal(EXPORT_FAILED(name=path.name, form=form, problem=text_of(last_words(errors))))
         return target
 
     def view(self, path: Path, access: Sequence[str]) -> str:
@@ -171,7 +186,7 @@ class _Processes(ChildProcesses):
             ready.unlink(missing_ok=True)
             options = ("--view", "--no-browser", "--http", "127.0.0.1:0", "--ready-file", str(ready), *access)
             process = self.start("steptwin", "studio", str(path), *options)
-            url = self.url(process, ready, f"the view of {path.name}")
+            url = self.url(process, ready, VIEW_OF(name=path.name))
             self._views[path] = process, url
             return url
 
@@ -179,7 +194,7 @@ class _Processes(ChildProcesses):
 def _save(session: sessions.Session, path: Path) -> SavedSession:
     """Raises `Refusal` where there is such a file, `Misuse` where it cannot be written."""
     if path.exists():
-        raise Refusal(f"{path} is there already: give another name")
+        raise Refusal(FILE_IS_THERE(path=path))
     sessions.save(session, path)
     return read_saved(path)
 

@@ -50,6 +50,7 @@ from steptwin.live.studio.work import LineWork
 from steptwin.live.twins import find_device
 from steptwin.live.withoutworld import serve_without_world
 from steptwin.live.world import LiveWorld
+from steptwin.messages import Message
 from steptwin.simulation.describe.blueprint import Blueprint
 from steptwin.simulation.describe.description import read_world
 from steptwin.simulation.describe.pieces import given_files
@@ -355,6 +356,9 @@ class _Links:
         await self.connections.close()
 
 
+TEXTS_OF_A_DEVICE = Message("live.texts-of-a-device", "{machine} is a device: the texts of its programs are not known here")
+
+
 class _NoPrograms:
     """Of devices, whose program texts are not known."""
 
@@ -369,7 +373,7 @@ class _NoPrograms:
         return ()
 
     def text(self, machine: str, place: str) -> Mapping[str, object]:
-        raise Misuse(f"{machine} is a device: the texts of its programs are not known here")
+        raise Misuse(TEXTS_OF_A_DEVICE(machine=machine))
 
 
 def _ports() -> Sequence[Mapping[str, object]]:
