@@ -12,6 +12,7 @@ itself the text of a message.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import isfinite
 from typing import Any, TypeAlias
 
 JsonValue: TypeAlias = "str | int | float | Sequence[JsonValue] | Mapping[str, JsonValue]"
@@ -82,6 +83,8 @@ def _json_value(value: Any) -> JsonValue:
         return value.plain()
     if isinstance(value, (list, tuple)):
         return [_json_value(one) for one in value]
+    if isinstance(value, float) and not isfinite(value):
+        return str(value)
     return value if isinstance(value, (str, int, float)) else str(value)
 
 

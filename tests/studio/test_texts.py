@@ -37,10 +37,8 @@ REFUSING = [
     *(f"mic488/{name}.py" for name in ("core", "encoding", "program", "program_banks", "values")),
     *(f"simulation/faults/{name}.py" for name in ("active", "element", "fault", "machine", "places")),
     "m1486/*_effects.py",
-    "drivers/subject.py",
-    "drivers/*/subject.py",
 ]
-"""Where what a viewer asks for can be refused. Not among them: files, descriptions, addresses of devices, what drivers say."""
+"""Where what a viewer asks for can be refused. Not among them: files and descriptions."""
 PLACE = re.compile(r"\{#?\w+\}")
 CONTINUED = re.compile(r'"\s+f?"')
 MOST_PARTS = 3

@@ -12,6 +12,7 @@ from typing import Any
 from steptwin.drivers.kind import AnyDriverKind, DeviceAddress
 from steptwin.drivers.kinds import DRIVERS
 from steptwin.errors import Misuse
+from steptwin.messages import Message
 
 
 def parse_device(text: str) -> DeviceAddress:
@@ -20,13 +21,16 @@ def parse_device(text: str) -> DeviceAddress:
     return device_at(text, place, options)
 
 
+OPTION_OF_ANOTHER_KIND = Message("drivers.option-of-another-kind", "device {text!r}: {options} does not go with kind={kind}")
+
+
 def device_at(text: str, place: str, options: Mapping[str, Any]) -> DeviceAddress:
     """The device at an address with these options; ``text`` is the whole input, for messages. Raises `Misuse`."""
     kind = _kind_of(text, options)
     how = kind.selection
     strange = {name for other in DRIVERS.values() for name in other.selection.options - how.options} & options.keys()
     if strange:
-        raise Misuse(f"device {text!r}: {', '.join(sorted(strange))} does not go with kind={kind.name}")
+        raise Misuse(OPTION_OF_ANOTHER_KIND(text=text, options=sorted(strange), kind=kind.name))
     return DeviceAddress(
         place,
         kind.name,
@@ -46,31 +50,42 @@ def text_of(address: DeviceAddress) -> str:
     return f"{address.place},{how.option}={how.show(address.number)}"
 
 
+UNKNOWN_KIND = Message("drivers.unknown-kind", "device {text!r}: kind {kind!r} is none of {names}")
+
+
 def _kind_of(text: str, options: Mapping[str, Any]) -> AnyDriverKind:
     """The kind that is named, or the first that has one of the options, or the first of all."""
     name = options.get("kind")
     if name is None:
         return next((kind for kind in DRIVERS.values() if kind.selection.options & options.keys()), next(iter(DRIVERS.values())))
     if name not in DRIVERS:
-        raise Misuse(f"device {text!r}: kind {name!r} is none of {', '.join(DRIVERS)}")
+        raise Misuse(UNKNOWN_KIND(text=text, kind=name, names=list(DRIVERS)))
     return DRIVERS[name]
+
+
+NO_ADDRESS_OF_A_DEVICE = Message(
+    "drivers.no-address-of-a-device",
+    "device {text!r} has no address: expected ADDRESS, or with options behind it: ADDRESS,{forms}",
+)
+WRONG_OPTION = Message("drivers.wrong-option", "device {text!r}: {option!r} is none of {forms}, each once")
+NO_NUMBER = Message("drivers.no-number", "device {text!r}: {value!r} is not a number for {name}")
 
 
 def split_device(text: str) -> tuple[str, dict[str, Any]]:
     """The part before the first comma, and the options behind it. Raises `Misuse`."""
     place, *options = (part.strip() for part in text.split(","))
     if not place:
-        raise Misuse(f"device {text!r} has no address: expected ADDRESS, or with options behind it: ADDRESS,{_forms()}")
+        raise Misuse(NO_ADDRESS_OF_A_DEVICE(text=text, forms=_forms()))
     types = _types()
     found: dict[str, Any] = {}
     for option in options:
         name, equals, value = option.partition("=")
         if not equals or name not in types or name in found:
-            raise Misuse(f"device {text!r}: {option!r} is none of {_forms()}, each once")
+            raise Misuse(WRONG_OPTION(text=text, option=option, forms=_forms()))
         try:
             found[name] = types[name](value)
         except ValueError:
-            raise Misuse(f"device {text!r}: {value!r} is not a number for {name}") from None
+            raise Misuse(NO_NUMBER(text=text, value=value, name=name)) from None
     return place, found
 
 

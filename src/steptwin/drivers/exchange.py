@@ -18,6 +18,7 @@ from typing import Generic, NamedTuple, Protocol, TypeVar
 from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Refusal, SteptwinError
 from steptwin.machine import SECOND, Nanos
+from steptwin.messages import Message, text_of
 
 
 class LineRequest(Protocol):
@@ -99,6 +100,28 @@ class Discipline(Protocol[Q_contra, A_co]):
         ...
 
 
+TRIED = Message("drivers.tried", ", tried {count} times")
+ONLY_RECEIVED = Message("drivers.only-received", "only {received} was received, which is not an answer")
+NOTHING_RECEIVED = Message("drivers.nothing-received", "nothing was received")
+EXECUTED_OR_NOT = Message("drivers.executed-or-not", "; it is unknown whether the device has executed it")
+NO_ANSWER = Message("drivers.no-answer", "{place}: no answer to '{request}' within {timeout_s:g} s{tries}; {what}{doubt}")
+STOPPED_BEFORE_SENT = Message("drivers.stopped-before-sent", "'{request}' was not sent: a stop was requested meanwhile")
+STOPPED_BEFORE_REPEATED = Message(
+    "drivers.stopped-before-repeated", "'{request}' was not sent again: a stop was requested meanwhile"
+)
+TOO_LATE = Message(
+    "drivers.too-late",
+    "'{request}' was not sent: it was requested more than {patience_s:g} s ago; the program was suspended, "
+    "or the line was busy. Repeat it",
+)
+SENT_LATE = Message(
+    "drivers.sent-late",
+    "'{request}' was sent more than {patience_s:g} s after it was requested, because the program was "
+    "suspended at that moment; a motion that it began was stopped",
+)
+LOST_MEANWHILE = Message("drivers.lost-meanwhile", "{problem}; it is unknown whether '{request}' was executed")
+
+
 class NoAnswer(LineFailure):
     """No valid answer in all permitted attempts.
 
@@ -109,10 +132,11 @@ class NoAnswer(LineFailure):
         self.attempts = attempts
         self.received = received
         self.uncertain = request.changes
-        tries = "" if attempts == 1 else f", tried {attempts} times"
-        what = f"only {received.hex(' ')} was received, which is not an answer" if received else "nothing was received"
-        doubt = "; it is unknown whether the device has executed it" if self.uncertain else ""
-        super().__init__(f"{place}: no answer to '{request}' within {timeout_ns / SECOND:g} s{tries}; {what}{doubt}")
+        tries = "" if attempts == 1 else TRIED(count=attempts)
+        what = ONLY_RECEIVED(received=received.hex(" ")) if received else NOTHING_RECEIVED()
+        doubt = EXECUTED_OR_NOT() if self.uncertain else ""
+        timeout_s = timeout_ns / SECOND
+        super().__init__(NO_ANSWER(place=place, request=request, timeout_s=timeout_s, tries=tries, what=what, doubt=doubt))
 
 
 class LineLost(LineFailure):
@@ -123,18 +147,14 @@ class Overtaken(Refusal):
     """A motion was not begun because a stop of its axis was requested meanwhile."""
 
     def __init__(self, request: object, attempts: int) -> None:
-        sent = " again" if attempts else ""
-        super().__init__(f"'{request}' was not sent{sent}: a stop was requested meanwhile")
+        super().__init__(STOPPED_BEFORE_REPEATED(request=request) if attempts else STOPPED_BEFORE_SENT(request=request))
 
 
 class TooLate(Refusal):
     """A request was not sent: too much time had passed since the call, for example because the program was suspended."""
 
     def __init__(self, request: object, patience_ns: Nanos) -> None:
-        super().__init__(
-            f"'{request}' was not sent: it was requested more than {patience_ns / SECOND:g} s ago; the program was suspended, "
-            "or the line was busy. Repeat it"
-        )
+        super().__init__(TOO_LATE(request=request, patience_s=patience_ns / SECOND))
 
 
 class SentLate(LineFailure):
@@ -143,10 +163,7 @@ class SentLate(LineFailure):
     uncertain = True
 
     def __init__(self, request: object, patience_ns: Nanos) -> None:
-        super().__init__(
-            f"'{request}' was sent more than {patience_ns / SECOND:g} s after it was requested, because the program was "
-            "suspended at that moment; a motion that it began was stopped"
-        )
+        super().__init__(SENT_LATE(request=request, patience_s=patience_ns / SECOND))
 
 
 class Job(Generic[Q, A]):
@@ -438,6 +455,6 @@ class Exchanger(Generic[Q, A]):
         self.discipline.reset()
         job, self._current, self._more = self._current, None, None
         if job is not None:
-            failure = LineLost(f"{error}; it is unknown whether '{job.request}' was executed") if job.request.changes else error
+            failure = LineLost(LOST_MEANWHILE(problem=text_of(error), request=job.request)) if job.request.changes else error
             failure.uncertain = job.request.changes
             self._missed(job, failure)

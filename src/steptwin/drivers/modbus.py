@@ -9,6 +9,7 @@ from typing import NamedTuple
 from steptwin.drivers.exchange import LineLost, SendNext
 from steptwin.errors import Misuse
 from steptwin.machine import MICROSECOND, MILLISECOND, SECOND, Nanos
+from steptwin.messages import Message
 from steptwin.wire import mbap, pdu, rtu
 from steptwin.wire.crc import crc16
 from steptwin.wire.line import SerialLine
@@ -321,7 +322,7 @@ class TcpMaster:
     def _feed(self, data: bytes) -> list[mbap.TcpFrame]:
         frames = self._framer.feed(data)
         if self._framer.broken is not None:
-            raise LineLost(f"{self._place}: what came is not Modbus TCP ({self._framer.broken})")
+            raise LineLost(NO_MODBUS(place=self._place, problem=self._framer.broken))
         return frames
 
     def abandon(self, now: Nanos) -> bytes:
@@ -342,8 +343,12 @@ def bits(answer: bytes, count: int) -> list[bool]:
     return pdu.unpack_bits(answer[2:], count)
 
 
+NO_MODBUS = Message("drivers.no-modbus", "{place}: what came is not Modbus TCP ({problem})")
+WRONG_UNIT = Message("drivers.wrong-unit", "unit {unit} is outside {least} to {most}")
+
+
 def check_unit(unit: int, *, tcp: bool) -> None:
     """Raises `Misuse` for a unit that sends no answers."""
     least, most = (0, 255) if tcp else (1, rtu.MAX_UNIT)
     if not least <= unit <= most:
-        raise Misuse(f"unit {unit} is outside {least} to {most}")
+        raise Misuse(WRONG_UNIT(unit=unit, least=least, most=most))

@@ -14,6 +14,7 @@ from urllib.parse import parse_qsl, urlsplit
 from steptwin.drivers.exchange import LineLost
 from steptwin.drivers.tcp import READ_BYTES, Channel, Endpoint, TcpEndpoint
 from steptwin.errors import Misuse
+from steptwin.messages import Message
 from steptwin.system import reason
 from steptwin.wire.line import SerialLine
 
@@ -22,9 +23,10 @@ if TYPE_CHECKING:
 
 MODBUS_PORT, SECURE_PORT = 502, 802
 BAUDS = (300, 1_000_000)
-FORMS = (
+FORMS = Message(
+    "drivers.forms-of-addresses",
     "expected a serial port such as /dev/ttyUSB0 or COM3, tcp://HOST:PORT, rtu-tcp://HOST:PORT, rfc2217://HOST:PORT or "
-    "tls://HOST:PORT?certificate=FILE&key=FILE&trusted=FILE"
+    "tls://HOST:PORT?certificate=FILE&key=FILE&trusted=FILE",
 )
 TLS_FILES = ("certificate", "key", "trusted")
 
@@ -39,19 +41,28 @@ class LineAddress:
     """The settings of a line on which bytes take time; else None."""
 
 
+WRONG_BAUD = Message("drivers.wrong-baud", "{baud} bit/s is outside {least} to {most}")
+NO_ADDRESS = Message("drivers.no-address", "{text!r} is not an address: {forms}")
+SERIAL_PORT_IS_NOT_OPENED = Message(
+    "drivers.serial-port-is-not-opened", "cannot open serial port {device} at {baud} bit/s: {why}"
+)
+SERIAL_PORT_WAS_LOST = Message("drivers.serial-port-was-lost", "serial port {place} was lost: {reason}")
+NO_PORT = Message("drivers.no-port", "{text!r} names no port: {forms}")
+
+
 def parse_line_address(text: str, baud: int) -> LineAddress:
     """Parse an address. ``baud`` is for serial ports. Raises `Misuse`."""
     if not BAUDS[0] <= baud <= BAUDS[1]:
-        raise Misuse(f"{baud} bit/s is outside {BAUDS[0]} to {BAUDS[1]}")
+        raise Misuse(WRONG_BAUD(baud=baud, least=BAUDS[0], most=BAUDS[1]))
     scheme, separator, _ = text.partition("://")
     if not separator:
         if not text or (":" in text and "/" not in text):
-            raise Misuse(f"{text!r} is not an address: {FORMS}")
+            raise Misuse(NO_ADDRESS(text=text, forms=FORMS()))
         return LineAddress(SerialEndpoint(text, baud), serial=SerialLine(baud))
     if scheme == "rfc2217":
         return LineAddress(SerialEndpoint(text, baud), serial=SerialLine(baud))
     if scheme not in ("tcp", "rtu-tcp", "tls"):
-        raise Misuse(f"{text!r} is not an address: {FORMS}")
+        raise Misuse(NO_ADDRESS(text=text, forms=FORMS()))
     try:
         parts = urlsplit(text)
         host, port = parts.hostname, parts.port
@@ -60,10 +71,10 @@ def parse_line_address(text: str, baud: int) -> LineAddress:
     except ValueError:
         host, port, files, rest = None, None, [], ""
     if not host or rest or sorted(name if value else "" for name, value in files) != sorted(TLS_FILES if scheme == "tls" else ()):
-        raise Misuse(f"{text!r} is not an address: {FORMS}")
+        raise Misuse(NO_ADDRESS(text=text, forms=FORMS()))
     if port is None:
         if scheme == "rtu-tcp":
-            raise Misuse(f"{text!r} names no port: {FORMS}")
+            raise Misuse(NO_PORT(text=text, forms=FORMS()))
         port = MODBUS_PORT if scheme == "tcp" else SECURE_PORT
     if scheme == "tls":
         from steptwin.drivers.tls import TlsEndpoint  # its library takes a while to import
@@ -121,7 +132,7 @@ class SerialEndpoint:
 
     def _failed(self, error: Exception) -> LineLost:
         why = "in use by another program" if getattr(error, "errno", None) == errno.EBUSY else reason(error)
-        return LineLost(f"cannot open serial port {self.device} at {self.baud} bit/s: {why}")
+        return LineLost(SERIAL_PORT_IS_NOT_OPENED(device=self.device, baud=self.baud, why=why))
 
 
 class SerialChannel:
@@ -144,7 +155,7 @@ class SerialChannel:
         return bytes(self._buffer[:count])
 
     def _gone(self, error: Exception) -> LineLost:
-        return LineLost(f"serial port {self._place} was lost: {reason(error)}")
+        return LineLost(SERIAL_PORT_WAS_LOST(place=self._place, reason=reason(error)))
 
     def close(self) -> None:
         with contextlib.suppress(Exception):

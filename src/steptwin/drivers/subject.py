@@ -24,6 +24,7 @@ from steptwin.drivers.line import DriverLine
 from steptwin.drivers.lineframes import FRAMES, LineFrames, SeenFrame
 from steptwin.errors import Misuse, Refusal
 from steptwin.machine import SECOND, Nanos
+from steptwin.messages import Message
 from steptwin.nearmiss import NearMiss
 from steptwin.simulation.script import steps
 from steptwin.subject import commands as command
@@ -167,6 +168,14 @@ class DeviceJog(Protocol):
     ) -> None: ...
 
 
+WRONG_PERIOD = Message("drivers.wrong-period", "period_s = {period_s:g}: permitted are {least:g} to {most:g} s")
+UNKNOWN_OWNER = Message("drivers.unknown-owner", "nothing is called {owner!r}{hint}; there are {name}, time")
+COMMAND_IS_NOT_POSSIBLE = Message(
+    "drivers.command-is-not-possible", "{command} is not possible for this device ({place}); possible are {names}"
+)
+UNKNOWN_NAME = Message("drivers.unknown-name", "no {what} is called {name!r}{hint}; there are {there}")
+
+
 class AsyncDeviceSubject:
     """The controller ``name`` as a subject. Other programs may drive it over the same line. `poll` makes the events; `run`
     polls repeatedly.
@@ -185,7 +194,7 @@ class AsyncDeviceSubject:
         numbering: Numbering | None = None,
     ) -> None:
         if not PERIODS_S[0] <= period_s <= PERIODS_S[1]:
-            raise Misuse(f"period_s = {period_s:g}: permitted are {PERIODS_S[0]:g} to {PERIODS_S[1]:g} s")
+            raise Misuse(WRONG_PERIOD(period_s=period_s, least=PERIODS_S[0], most=PERIODS_S[1]))
         self.name = name
         self.period_ns: Nanos = round(period_s * SECOND)
         self._device = device
@@ -232,15 +241,18 @@ class AsyncDeviceSubject:
     def _path(self, point: str) -> str:
         owner, _, path = point.partition(".")
         if owner != self.name:
-            raise Misuse(f"nothing is called {owner!r}{NearMiss().hint(owner, (self.name,))}; there are {self.name}, time")
+            raise Misuse(UNKNOWN_OWNER(owner=owner, hint=NearMiss().hint(owner, (self.name,)), name=self.name))
         return path
 
     async def do(self, wanted: Command) -> Result:
         """Raises `Misuse`, `Refusal`, `LineFailure`."""
         action = self._actions.get(type(wanted))
         if action is None:
-            can = ", ".join(self.description.commands)
-            raise Refusal(f"{row_of(wanted).name} is not possible for this device ({self._line.place}); possible are {can}")
+            raise Refusal(
+                COMMAND_IS_NOT_POSSIBLE(
+                    command=row_of(wanted).name, place=self._line.place, names=list(self.description.commands)
+                )
+            )
         self._check_names(wanted)
         number = self._numbering.command(self.now())
         try:
@@ -312,7 +324,7 @@ class AsyncDeviceSubject:
 
     def _check_name(self, what: str, name: str | None, there: str) -> None:
         if name is not None and name != there:
-            raise Misuse(f"no {what} is called {name!r}{NearMiss().hint(name, (there,))}; there are {there}")
+            raise Misuse(UNKNOWN_NAME(what=what, name=name, hint=NearMiss().hint(name, (there,)), there=there))
 
     async def _describe(self, _: command.Describe) -> object:
         return self.description.plain()

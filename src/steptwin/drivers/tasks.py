@@ -13,11 +13,13 @@ from steptwin.drivers.line import LOCK_SLICE_S
 from steptwin.drivers.tcp import Endpoint
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
+from steptwin.messages import Message
 from steptwin.system import reason
 from steptwin.tracing import is_traced, span
 
 CLOSE_S = 1.0
 """Time for the other end to close a connection, s."""
+LINE_IS_CLOSED = Message("drivers.line-is-closed", "the line {place} is closed")
 
 
 class TaskLine(Generic[Q, A]):
@@ -102,7 +104,7 @@ class TaskLine(Generic[Q, A]):
 
     async def _exchanged(self, job: Job[Q, A]) -> A:
         if self._closed:
-            raise Misuse(f"the line {self.place} is closed")
+            raise Misuse(LINE_IS_CLOSED(place=self.place))
         done: asyncio.Future[None] = self._running().create_future()
         job.on_done = lambda: None if done.done() else done.set_result(None)
         self._engine.submit(job)

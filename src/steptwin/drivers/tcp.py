@@ -11,10 +11,16 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from steptwin.drivers.exchange import LineLost
+from steptwin.messages import Message
 from steptwin.system import reason
 
 CONNECT_S = 3.0
 READ_BYTES = 4096
+CANNOT_CONNECT = Message("drivers.cannot-connect", "cannot connect to {place}: {why}")
+NO_ANSWER_WITHIN = Message("drivers.no-answer-within", "no answer within {connect_s:g} s")
+TAKES_NOTHING = Message("drivers.takes-nothing", "{place}: the other end takes nothing any more")
+CLOSED_BY_THE_OTHER = Message("drivers.closed-by-the-other", "{place}: the other end closed the connection")
+CONNECTION_FAILED = Message("drivers.connection-failed", "{place}: {reason}")
 
 
 class Channel(Protocol):
@@ -67,8 +73,8 @@ class TcpEndpoint:
         return transport
 
     def _failed(self, error: OSError) -> LineLost:
-        why = f"no answer within {CONNECT_S:g} s" if isinstance(error, TimeoutError) else reason(error)
-        return LineLost(f"cannot connect to {self}: {why}")
+        why = NO_ANSWER_WITHIN(connect_s=CONNECT_S) if isinstance(error, TimeoutError) else reason(error)
+        return LineLost(CANNOT_CONNECT(place=str(self), why=why))
 
 
 class SocketChannel:
@@ -87,9 +93,9 @@ class SocketChannel:
             if self._send(data) < len(data):
                 raise BlockingIOError(errno.EAGAIN, "")
         except BlockingIOError:
-            raise LineLost(f"{self._place}: the other end takes nothing any more") from None
+            raise LineLost(TAKES_NOTHING(place=self._place)) from None
         except OSError as error:
-            raise LineLost(f"{self._place}: {reason(error)}") from error
+            raise LineLost(CONNECTION_FAILED(place=self._place, reason=reason(error))) from error
 
     def read(self, timeout_s: float) -> bytes:
         try:
@@ -97,9 +103,9 @@ class SocketChannel:
         except BlockingIOError:
             return b""
         except OSError as error:
-            raise LineLost(f"{self._place}: {reason(error)}") from error
+            raise LineLost(CONNECTION_FAILED(place=self._place, reason=reason(error))) from error
         if not data:
-            raise LineLost(f"{self._place}: the other end closed the connection")
+            raise LineLost(CLOSED_BY_THE_OTHER(place=self._place))
         return data
 
     def close(self) -> None:

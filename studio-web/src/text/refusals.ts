@@ -27,10 +27,8 @@ export const REFUSALS: Readonly<Record<string, string>> = {
   // Machines, axes, motions.
   "no machine is called {name}{hint}; {known}": "żadna maszyna nie nazywa się {name}{hint}; {known}",
   "no device is called {name}{hint}; {known}": "żadne urządzenie nie nazywa się {name}{hint}; {known}",
-  "nothing is called {name}{hint}; there are {names}, time": "nic nie nazywa się {name}{hint}; są {names}, time",
   "{name}: no axis {axis}: an M1486 has one, 1": "{name}: nie ma osi {axis}: M1486 ma jedną, 1",
   "{name}: no axis {axis}: a MIC488 has 1 to {#most}": "{name}: nie ma osi {axis}: MIC488 ma 1 do {#most}",
-  "axis = {axis}: an M1486 has axis {#one} only": "axis = {axis}: M1486 ma tylko oś {#one}",
   "{name} is not enabled: switch its drive on first": "{name} nie jest załączony: najpierw załącz napęd",
   "{name} has a position error: stop it first": "{name} ma błąd pozycji: najpierw go zatrzymaj",
   "{name} runs its program: pause or stop it before an axis is jogged":
@@ -41,9 +39,6 @@ export const REFUSALS: Readonly<Record<string, string>> = {
     "prędkość {#value} {unit}/s: dozwolone od {#least} do {#most} {unit2}/s (VMAX), oprócz 0",
   "velocity = {#value} {unit}/s: {permitted}": "prędkość {#value} {unit}/s: {permitted}",
   "velocity {#value} {unit}/s, V{#number}: {why}": "prędkość {#value} {unit}/s, V{#number}: {why}",
-  "velocity = 0: the sign of the velocity is the direction; stop ends the motion":
-    "velocity = 0: kierunek to znak prędkości; ruch kończy stop",
-  "velocity = 0: the sign of the velocity is the direction": "velocity = 0: kierunek to znak prędkości",
   "{name}: {title} writes every command into its EEPROM, so it is not jogged":
     "{name}: {title} zapisuje każde polecenie w EEPROM, więc nie ma jazdy ręcznej",
   "the chip {what}": "układ {what}",
@@ -138,22 +133,7 @@ export const REFUSALS: Readonly<Record<string, string>> = {
   "{text} is not a command": "{text} nie jest poleceniem",
   "the distance {#distance} is not a multiple of {#grid} (M{#microstep})":
     "odcinek {#distance} nie jest wielokrotnością {#grid} (M{#microstep})",
-  // Devices.
-  "{name}: a twin can be made at rest: {what} runs": "{name}: bliźniaka robi się w spoczynku: działa {what}",
-  "period_s = {#value}: permitted are {#low} to {#high} s": "period_s = {#value}: dozwolone {#low} do {#high} s",
-  "{name} is not possible for this device ({place}); possible are {names}":
-    "{name} nie jest możliwe dla tego urządzenia ({place}); możliwe są {names}",
   "no {what} is called {name}{hint}; there are {names}": "nic ({what}) nie nazywa się {name}{hint}; są {names}",
-  "no point {name}{hint}; there are {names}": "nie ma punktu {name}{hint}; są {names}",
-  "{name} is not a point of an M1486: there are {names}": "{name} nie jest punktem M1486: są {names}",
-  "unit = {unit}: this subject is the device with address {address}":
-    "unit = {unit}: to urządzenie o adresie {address}",
-  "an M1486 has no command to {action} its program: only stop can be done":
-    "M1486 nie ma polecenia {action} dla programu: możliwy jest tylko stop",
-  "text: X{selected} selects another chip: this device is {own}":
-    "tekst: X{selected} wybiera inny układ: to urządzenie to {own}",
-  "text: whole commands are sent to a device, each with CR behind it":
-    "text: do urządzenia wysyła się całe polecenia, każde z CR na końcu",
   // Modbus.
   "function {function} refused with exception {code} ({name}): {detail}":
     "funkcja {function} odrzucona z wyjątkiem {code} ({name}): {detail}",

@@ -22,6 +22,7 @@ from steptwin.m1486.microsteps import FULL_STEP
 from steptwin.m1486.variants import Variant
 from steptwin.m1486.variants import variant as variant_named
 from steptwin.machine import SECOND
+from steptwin.messages import Message
 
 TIMEOUT_S = 0.5
 LARGEST = 16_000_000
@@ -50,6 +51,34 @@ def _flags(byte: int) -> dict[int, bool]:
     return {number: bool(byte >> bit & 1) for bit, number in enumerate((*USER_FLAGS, CARRY))}
 
 
+WRONG_TIME_OUT = Message("drivers.m1486.wrong-time-out", "a time-out of {timeout_s:g} s is outside 0 to 60 s")
+WRONG_ADDRESS = Message("drivers.m1486.wrong-address", "address {address}: permitted are 0 to 15")
+WRONG_STEPS_PER_UNIT = Message("drivers.m1486.wrong-steps-per-unit", "steps_per_unit = {steps_per_unit:g}: must be above 0")
+WRONG_ORIGIN = Message("drivers.m1486.wrong-origin", "origin_u = {origin_u}: permitted are 0 to {most} minimum microsteps")
+OTHER_TYPE_IS_KNOWN = Message("drivers.m1486.other-type-is-known", "{place}: {name} is known as an {title}, not an {named}")
+NO_POSITION = Message("drivers.m1486.no-position", "{position} {unit} is not a position")
+COUNTER_SHOWS_THE_TARGET = Message(
+    "drivers.m1486.counter-shows-the-target",
+    "{place}: the counter of {chip} shows its target, not where it was stopped: "
+    "seek a line at a known position and set that position (set_position)",
+)
+POSITION_IS_OUT_OF_RANGE = Message(
+    "drivers.m1486.position-is-out-of-range", "position {position:g} {unit} is outside {least:g} to {most:g} {unit}"
+)
+OFF_THE_GRID = Message(
+    "drivers.m1486.off-the-grid",
+    "{value:g} {unit} is {exact:g} minimum microsteps, which is not a whole full step ({full_step}), "
+    "and M of {name} is not known: configure(microstep=...) first",
+)
+UNKNOWN_LINE = Message("drivers.m1486.unknown-line", "no line {line}: lines are {least} to {most}")
+LINE_OF_AN_INTERFACE = Message("drivers.m1486.line-of-an-interface", "B{line} belongs to the {title} interface")
+UNKNOWN_FLAG = Message("drivers.m1486.unknown-flag", "no user flag {flag}: they are {least} to {most}")
+UNKNOWN_FUNCTION = Message("drivers.m1486.unknown-function", "no function {function}: they are {least} to {most}")
+FUNCTION_IS_OF_THE_DRIVER = Message(
+    "drivers.m1486.function-is-of-the-driver", "function {function} is used by this driver: it stays {level}"
+)
+
+
 class AsyncChip:
     """See `steptwin.drivers.m1486.driver.AsyncM1486`."""
 
@@ -67,13 +96,13 @@ class AsyncChip:
         log: Callable[[str], object] | None = None,
     ) -> None:
         if not 0.0 < timeout_s <= 60.0:
-            raise Misuse(f"a time-out of {timeout_s:g} s is outside 0 to 60 s")
+            raise Misuse(WRONG_TIME_OUT(timeout_s=timeout_s))
         if address is not None and address not in range(16):
-            raise Misuse(f"address {address}: permitted are 0 to 15")
+            raise Misuse(WRONG_ADDRESS(address=address))
         if not (isfinite(steps_per_unit) and steps_per_unit > 0.0):
-            raise Misuse(f"steps_per_unit = {steps_per_unit:g}: must be above 0")
+            raise Misuse(WRONG_STEPS_PER_UNIT(steps_per_unit=steps_per_unit))
         if not 0 <= origin_u <= LARGEST:
-            raise Misuse(f"origin_u = {origin_u}: permitted are 0 to {LARGEST} minimum microsteps")
+            raise Misuse(WRONG_ORIGIN(origin_u=origin_u, most=LARGEST))
         self._variant = None if variant is None else variant_named(variant)
         self._own = isinstance(where, str)
         self.line: DriverLine[ChipRequest, bytes] = self._own_line(where, baud, log) if isinstance(where, str) else where
@@ -132,7 +161,7 @@ class AsyncChip:
         if named is None or named is known:
             return
         if known is not None and known.type_letter != named.type_letter:
-            raise Misuse(f"{self.line.place}: {self._unit.name} is known as an {known.title}, not an {named.title}")
+            raise Misuse(OTHER_TYPE_IS_KNOWN(place=self.line.place, name=self._unit.name, title=known.title, named=named.title))
         notes.variant = named
 
     async def open_line(self) -> None:
@@ -168,21 +197,18 @@ class AsyncChip:
 
     def _check_position(self) -> None:
         if not self._unit.notes.is_position_valid:
-            raise PositionUnknown(
-                f"{self.line.place}: the counter of {self._unit.name} shows its target, not where it was stopped: "
-                "seek a line at a known position and set that position (set_position)"
-            )
+            raise PositionUnknown(COUNTER_SHOWS_THE_TARGET(place=self.line.place, chip=self._unit.name))
 
     def _shown(self, counter_u: int) -> float:
         return (counter_u - self.origin_u) / self.scale_u
 
     def _counter_of(self, position: float) -> int:
         if not isfinite(position):
-            raise Misuse(f"{position} {self.unit} is not a position")
+            raise Misuse(NO_POSITION(position=position, unit=self.unit))
         counter = self._on_grid(position, self.origin_u)
         if not 0 <= counter <= LARGEST:
             least, most = self._shown(0), self._shown(LARGEST)
-            raise Misuse(f"position {position:g} {self.unit} is outside {least:g} to {most:g} {self.unit}")
+            raise Misuse(POSITION_IS_OUT_OF_RANGE(position=position, unit=self.unit, least=least, most=most))
         return counter
 
     def _on_grid(self, value: float, offset_u: int) -> int:
@@ -191,10 +217,7 @@ class AsyncChip:
         exact = value * self.scale_u + offset_u
         rounded = round(exact / grid) * grid
         if self.settings.microstep is None and abs(exact - rounded) > 0.5:
-            raise Misuse(
-                f"{value:g} {self.unit} is {exact:g} minimum microsteps, which is not a whole full step ({FULL_STEP}), and M of "
-                f"{self._unit.name} is not known: configure(microstep=...) first"
-            )
+            raise Misuse(OFF_THE_GRID(value=value, unit=self.unit, exact=exact, full_step=FULL_STEP, name=self._unit.name))
         return rounded
 
     async def variable(self) -> int:
@@ -315,26 +338,26 @@ class AsyncChip:
     async def set_output(self, line: int, on: bool) -> None:
         """Set B1 to B21 high or low."""
         if line not in LINES:
-            raise Misuse(f"no line {line}: lines are {LINES[0]} to {LINES[-1]}")
+            raise Misuse(UNKNOWN_LINE(line=line, least=LINES[0], most=LINES[-1]))
         async with self._unit.turn():
             await self._unit.rest()
             interface = await self._unit.find_interface()
             if interface is not None and line in interface.occupied:
-                raise Misuse(f"B{line} belongs to the {interface.title} interface")
+                raise Misuse(LINE_OF_AN_INTERFACE(line=line, title=interface.title))
             await self._send_switch(line, on)
 
     async def set_flag(self, flag: int, on: bool) -> None:
         """Set user flag 80 to 86."""
         if flag not in USER_FLAGS:
-            raise Misuse(f"no user flag {flag}: they are {USER_FLAGS[0]} to {USER_FLAGS[-1]}")
+            raise Misuse(UNKNOWN_FLAG(flag=flag, least=USER_FLAGS[0], most=USER_FLAGS[-1]))
         await self._switch(flag, on)
 
     async def set_function(self, function: int, on: bool) -> None:
         """Switch function 40 to 63. 41 (echo) and 57 (report) are reserved for the driver."""
         if function not in FUNCTIONS:
-            raise Misuse(f"no function {function}: they are {FUNCTIONS[0]} to {FUNCTIONS[-1]}")
+            raise Misuse(UNKNOWN_FUNCTION(function=function, least=FUNCTIONS[0], most=FUNCTIONS[-1]))
         if function in (RETURN, REPORT):
-            raise Misuse(f"function {function} is used by this driver: it stays {'ON' if function == RETURN else 'OFF'}")
+            raise Misuse(FUNCTION_IS_OF_THE_DRIVER(function=function, level="ON" if function == RETURN else "OFF"))
         await self._switch(function, on)
         self._unit.notes.note_function(function, on=on)
 

@@ -21,6 +21,7 @@ from steptwin.m1486.functions import FUNCTIONS, RECOVER
 from steptwin.m1486.unit import MASK
 from steptwin.m1486.variants import Store, Variant
 from steptwin.machine import SECOND
+from steptwin.messages import Message
 
 MARK = "u15"
 """The last command of a block: uploads the driver interface, a byte that is not a type letter."""
@@ -28,6 +29,10 @@ START_BITS = sum(map(memory_bits, ":JU"))
 """What `AsyncM1486.start_program` stores: the label, the jump and the question whether it runs."""
 _TYPED = frozenset("abdfghmnpqsv:+-*/<>=tcw!?oz")
 """Commands that may be sent alone: they move nothing, do not jump and are not answered."""
+NO_DISTANCE = Message("drivers.m1486.no-distance", "{distance} {unit} is not a distance")
+DISTANCE_IS_OUT_OF_RANGE = Message(
+    "drivers.m1486.distance-is-out-of-range", "distance {distance:g} {unit} is outside ±{most:g} {unit}"
+)
 
 
 class AsyncM1486(AsyncChip):
@@ -59,10 +64,10 @@ class AsyncM1486(AsyncChip):
     async def move_by(self, distance: float) -> None:
         """Begin to move by a distance, rounded to a microstep. Errors as `move_to`."""
         if not isfinite(distance):
-            raise Misuse(f"{distance} {self.unit} is not a distance")
+            raise Misuse(NO_DISTANCE(distance=distance, unit=self.unit))
         distance_u = self._on_grid(distance, 0)
         if abs(distance_u) > LARGEST:
-            raise Misuse(f"distance {distance:g} {self.unit} is outside ±{LARGEST / self.scale_u:g} {self.unit}")
+            raise Misuse(DISTANCE_IS_OUT_OF_RANGE(distance=distance, unit=self.unit, most=LARGEST / self.scale_u))
         unit = self._unit
         permission = unit.permission()
         async with unit.turn(permission):

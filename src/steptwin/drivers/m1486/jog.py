@@ -25,6 +25,7 @@ from steptwin.m1486.microsteps import FULL_STEP
 from steptwin.m1486.unit import MASK
 from steptwin.m1486.variants import SLOWEST_JOG, Store
 from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.messages import Message
 
 LINK_S = 0.15
 """A move is as long as the velocity of the jog makes in this time; it lasts longer by its ramps."""
@@ -38,6 +39,16 @@ NOT_HELD = f"not held within {HOLD_NS / SECOND:g} s of the last answer: the prog
 """The end of a jog that was held too late."""
 PATIENCE_NS: Nanos = 2 * SECOND
 """A move that lasts longer is not one of a jog: LIMIT or Kill holds the chip."""
+VELOCITY_ZERO = Message("drivers.m1486.velocity-zero", "velocity = 0: the sign of the velocity is the direction")
+EEPROM_IS_NOT_JOGGED = Message(
+    "drivers.m1486.eeprom-is-not-jogged", "{title} writes every command into its EEPROM, so it is not jogged"
+)
+LINE_IS_TOO_SLOW_TO_JOG = Message(
+    "drivers.m1486.line-is-too-slow-to-jog",
+    "{place}: a jog needs a line of at least {least} bit/s: with {baud} bit/s the commands of "
+    "the next move take longer than the {hold_s:g} s within which it has to begin",
+)
+JOG_IS_NOT_BEGUN = Message("drivers.m1486.jog-is-not-begun", "a jog is held inside its with block")
 
 
 class AsyncM1486Jog:
@@ -51,15 +62,14 @@ class AsyncM1486Jog:
 
     def __init__(self, chip: AsyncChip, velocity: float) -> None:
         if not velocity:
-            raise Misuse("velocity = 0: the sign of the velocity is the direction")
+            raise Misuse(VELOCITY_ZERO())
         if chip.variant.store is Store.EEPROM:
-            raise Refusal(f"{chip.variant.title} writes every command into its EEPROM, so it is not jogged")
+            raise Refusal(EEPROM_IS_NOT_JOGGED(title=chip.variant.title))
         self._chip = chip
         self._unit = unit = chip._unit
         if unit.talk.baud < SLOWEST_JOG:
             raise Refusal(
-                f"{unit.place}: a jog needs a line of at least {SLOWEST_JOG} bit/s: with {unit.talk.baud} bit/s the commands of "
-                f"the next move take longer than the {HOLD_NS / SECOND:g} s within which it has to begin"
+                LINE_IS_TOO_SLOW_TO_JOG(place=unit.place, least=SLOWEST_JOG, baud=unit.talk.baud, hold_s=HOLD_NS / SECOND)
             )
         self._direction = 1 if velocity > 0.0 else -1
         self._velocity = round(abs(velocity) * chip.scale_u / (FULL_STEP * chip.variant.clock))
@@ -111,7 +121,7 @@ class AsyncM1486Jog:
         """See the class. Raises `LineFailure`; the motor then stops by itself."""
         permission = self._permission
         if permission is None:
-            raise Misuse("a jog is held inside its with block")
+            raise Misuse(JOG_IS_NOT_BEGUN())
         if self.end is not None:
             return False
         async with self._unit.turn():

@@ -38,6 +38,22 @@ FORMAT = "steptwin M1486 settings 1"
 BUSY = StatusPayload("busy", "moves, waits or runs its program")
 AT_REST = StatusPayload("at-rest", "is at rest")
 NO_TWIN = Message("drivers.no-twin-of-m1486", "no twin beside an M1486, whose position is unknown while it moves (M-28)")
+UNKNOWN_POINT = Message("drivers.m1486.unknown-point", "{point!r} is not a point of an M1486: there are {names}")
+ONE_AXIS_ONLY = Message("drivers.m1486.one-axis-only", "axis = {axis}: an M1486 has axis {only} only")
+VELOCITY_ZERO_TO_RUN = Message(
+    "drivers.m1486.velocity-zero-to-run", "velocity = 0: the sign of the velocity is the direction; stop ends the motion"
+)
+PROGRAM_CAN_ONLY_BE_STOPPED = Message(
+    "drivers.m1486.program-can-only-be-stopped", "an M1486 has no command to {action} its program: only stop can be done"
+)
+ONLY_CHIP = Message("drivers.m1486.only-chip", "the only chip of its line")
+OWN_CHIP = Message("drivers.m1486.own-chip", "chip {address:X}")
+OTHER_CHIP_IS_SELECTED = Message(
+    "drivers.m1486.other-chip-is-selected", "text: X{selected:X} selects another chip: this device is {own}"
+)
+NO_WHOLE_COMMANDS = Message(
+    "drivers.m1486.no-whole-commands", "text: whole commands are sent to a device, each with CR behind it"
+)
 
 
 class M1486Part:
@@ -102,7 +118,7 @@ class M1486Part:
     def unit_of(self, point: str) -> str:
         unit = self._units.get(point.upper())
         if unit is None:
-            raise Misuse(f"{point!r} is not a point of an M1486: there are {', '.join(self._paths)}")
+            raise Misuse(UNKNOWN_POINT(point=point, names=list(self._paths)))
         return unit
 
     async def _value(self, path: str) -> float | None:
@@ -176,7 +192,7 @@ class M1486Part:
 
     def _check_axis(self, axis: int | None) -> None:
         if axis not in (None, AXIS):
-            raise Misuse(f"axis = {axis}: an M1486 has axis {AXIS} only")
+            raise Misuse(ONE_AXIS_ONLY(axis=axis, only=AXIS))
 
     async def _move(self, wanted: command.Move) -> None:
         self._check_axis(wanted.axis)
@@ -188,7 +204,7 @@ class M1486Part:
     async def _jog(self, wanted: command.Jog) -> None:
         self._check_axis(wanted.axis)
         if wanted.velocity == 0.0:
-            raise Misuse("velocity = 0: the sign of the velocity is the direction; stop ends the motion")
+            raise Misuse(VELOCITY_ZERO_TO_RUN())
         full_steps = abs(wanted.velocity) * self._chip.scale_u / FULL_STEP
         await self._chip.run(1 if wanted.velocity > 0.0 else -1, full_steps)
 
@@ -198,7 +214,7 @@ class M1486Part:
 
     async def _program(self, wanted: command.ControlProgram) -> None:
         if wanted.action != "stop":
-            raise Refusal(f"an M1486 has no command to {wanted.action} its program: only stop can be done")
+            raise Refusal(PROGRAM_CAN_ONLY_BE_STOPPED(action=wanted.action))
         await self._chip.stop_program()
 
     async def _send(self, wanted: steps.Send) -> None:
@@ -206,12 +222,12 @@ class M1486Part:
         selects the chip: ``X`` with its address may come first. Raises `Misuse`, also for that of another chip."""
         selected = self.selected(wanted.data)
         if selected not in (None, self.address):
-            own = "the only chip of its line" if self.address is None else f"chip {self.address:X}"
-            raise Misuse(f"text: X{selected:X} selects another chip: this device is {own}")
+            own = ONLY_CHIP() if self.address is None else OWN_CHIP(address=self.address)
+            raise Misuse(OTHER_CHIP_IS_SELECTED(selected=selected, own=own))
         found = _SELECTION.match(wanted.data)
         *lines, rest = wanted.data[0 if found is None else found.end() :].decode("latin-1").split("\r")
         if rest or not lines:
-            raise Misuse("text: whole commands are sent to a device, each with CR behind it")
+            raise Misuse(NO_WHOLE_COMMANDS())
         await self._chip.commands(lines)
 
     # ------------------------------------------------------------------ polling

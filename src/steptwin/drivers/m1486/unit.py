@@ -25,6 +25,7 @@ from steptwin.m1486.ranges import out_of_range
 from steptwin.m1486.syntax import parse_line
 from steptwin.m1486.variants import VARIANTS, Variant
 from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.messages import Message, MessageText
 
 TRIES = 3
 STOP_TRIES = 5
@@ -56,6 +57,16 @@ RUNS_NS: Nanos = 60 * MILLISECOND
 """The time in which a chip at rest answers, with adapters that delay bytes, ns."""
 READINGS = 4
 """Number of attempts to read the same value twice."""
+
+IS_BUSY = Message("drivers.m1486.is-busy", "{place}: {chip} {why}")
+IS_HELD_BY_KILL = Message(
+    "drivers.m1486.is-held-by-kill",
+    "is held by Kill because its function 51 is OFF: recover it; a program of it then continues",
+)
+IS_NOT_DONE = Message("drivers.m1486.is-not-done", "is not done with {motion}: wait for its end or stop it")
+DOES_NOT_ANSWER_YET = Message(
+    "drivers.m1486.does-not-answer-yet", "does not answer yet: it moves or waits, its program runs, or LIMIT holds it"
+)
 
 
 class ChipUnit:
@@ -436,7 +447,7 @@ class ChipUnit:
         type."""
         letter = await self.query_type()
         if letter is None:
-            raise Busy(f"{self.place}: {self.name} {self.why_busy()}")
+            raise Busy(IS_BUSY(place=self.place, chip=self.name, why=self.why_busy()))
         notes = self.notes
         if notes.variant is None or letter == notes.variant.type_letter:
             return letter
@@ -447,12 +458,12 @@ class ChipUnit:
             )
         return letter
 
-    def why_busy(self) -> str:
+    def why_busy(self) -> MessageText:
         if self.notes.is_killed and self.notes.function(RECOVER) is False:
-            return "is held by Kill because its function 51 is OFF: recover it; a program of it then continues"
+            return IS_HELD_BY_KILL()
         if self.notes.motion is not None:
-            return f"is not done with {self.notes.motion.kind.value}: wait for its end or stop it"
-        return "does not answer yet: it moves or waits, its program runs, or LIMIT holds it"
+            return IS_NOT_DONE(motion=self.notes.motion.kind.value)
+        return DOES_NOT_ANSWER_YET()
 
     # ------------------------------------------------------------------ reading
 

@@ -10,6 +10,7 @@ from steptwin.drivers.mic488.motion import MotionCommand, MotionKind, MoveEnd
 from steptwin.drivers.mic488.unit import URGENT_TRIES, ControlRegisters, Unit, check_axis
 from steptwin.drivers.mic488.waiting import AxisWait, wait_for
 from steptwin.errors import LineFailure, Misuse
+from steptwin.messages import Message
 from steptwin.mic488.axis import MAX_SPEED_P
 from steptwin.mic488.encoding import DINT_MAX, DINT_MIN
 
@@ -19,6 +20,16 @@ _KEYS = {
     MotionKind.VELOCITY: "VEL_ABS",
     MotionKind.HOMING: "HOME",
 }
+HOMING_WITHOUT_VELOCITY = Message(
+    "drivers.mic488.homing-without-velocity", "homing of M{number} at 0 {unit}/s: the sign of the velocity chooses the switch"
+)
+JOG_WITHOUT_VELOCITY = Message("drivers.mic488.jog-without-velocity", "a jog of M{number} at 0 {unit}/s does not move")
+WRONG_DIRECTION = Message("drivers.mic488.wrong-direction", "direction {direction}: permitted are 1 and -1")
+NO_NUMBER = Message("drivers.mic488.no-number", "M{number}: {value_u} {unit} is not a {kind}")
+OUT_OF_RANGE = Message(
+    "drivers.mic488.out-of-range",
+    "M{number}: {kind} {value_u:g} {unit} is outside {low:.6g}…{high:.6g} {unit} ({least:.0f}…{most:.0f} pulses)",
+)
 
 
 class AsyncMic488Axis:
@@ -128,7 +139,7 @@ class AsyncMic488Axis:
         """Begin homing at this velocity: negative towards the switch KL, positive towards KR. Sent only once, as `move_by`."""
         self.check(MotionKind.HOMING, velocity_u)
         if velocity_u == 0.0:
-            raise Misuse(f"homing of M{self.number} at 0 {self.unit}/s: the sign of the velocity chooses the switch")
+            raise Misuse(HOMING_WITHOUT_VELOCITY(number=self.number, unit=self.unit))
         await self._begin(MotionKind.HOMING, velocity_u)
 
     async def _begin(self, kind: MotionKind, value_u: float) -> None:
@@ -187,7 +198,7 @@ class AsyncMic488Axis:
         """
         self.check(MotionKind.VELOCITY, velocity_u)
         if velocity_u == 0.0:
-            raise Misuse(f"a jog of M{self.number} at 0 {self.unit}/s does not move")
+            raise Misuse(JOG_WITHOUT_VELOCITY(number=self.number, unit=self.unit))
         return AsyncMic488Jog(self._unit, self.number, velocity_u, hold_s, self.register_command)
 
     async def jog_bit(self, direction: int, on: bool) -> None:
@@ -196,7 +207,7 @@ class AsyncMic488Axis:
         Nothing stops it when this program or the line fails; `jog` is the safe way.
         """
         if direction not in (1, -1):
-            raise Misuse(f"direction {direction}: permitted are 1 and -1")
+            raise Misuse(WRONG_DIRECTION(direction=direction))
         unit = self._unit
         item = unit.item("JOG_PLUS" if direction > 0 else "JOG_MINUS", self.number)
         if not on:
@@ -216,10 +227,20 @@ class AsyncMic488Axis:
         is_velocity = kind in (MotionKind.VELOCITY, MotionKind.HOMING)
         unit = f"{self.unit}/s" if is_velocity else self.unit
         if not isfinite(value_u):
-            raise Misuse(f"M{self.number}: {value_u} {unit} is not a {kind.value}")
+            raise Misuse(NO_NUMBER(number=self.number, value_u=value_u, unit=unit, kind=kind.value))
         if gear is None:
             return
         least, most = (-MAX_SPEED_P, MAX_SPEED_P) if is_velocity else (DINT_MIN, DINT_MAX)
         if not least <= value_u * gear <= most:
-            limits = f"{least / gear:.6g}…{most / gear:.6g} {unit}"
-            raise Misuse(f"M{self.number}: {kind.value} {value_u:g} {unit} is outside {limits} ({least:.0f}…{most:.0f} pulses)")
+            raise Misuse(
+                OUT_OF_RANGE(
+                    number=self.number,
+                    kind=kind.value,
+                    value_u=value_u,
+                    unit=unit,
+                    low=least / gear,
+                    high=most / gear,
+                    least=least,
+                    most=most,
+                )
+            )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from steptwin.errors import LineFailure, Refusal
+from steptwin.messages import Message, text_of
 from steptwin.wire.pdu import EXCEPTION_NAMES, ModbusException
 
 if TYPE_CHECKING:
@@ -12,10 +13,17 @@ if TYPE_CHECKING:
 
 
 _WHY = {
-    1: "the controller does not have this function",
-    2: "the controller does not have this register, or not for this function",
-    3: "the controller does not accept this value",
+    1: Message("drivers.mic488.no-function", "the controller does not have this function"),
+    2: Message("drivers.mic488.no-register", "the controller does not have this register, or not for this function"),
+    3: Message("drivers.mic488.value-is-not-accepted", "the controller does not accept this value"),
 }
+AT_PLACE = Message("drivers.mic488.at-place", "{place}: {what}")
+REFUSED = Message("drivers.mic488.refused", "'{request}' was refused: {why} (exception {code:02X}, {name})")
+REFUSED_WITHOUT_REASON = Message("drivers.mic488.refused-without-reason", "'{request}' was refused: exception {code:02X}, {name}")
+UNCONFIRMED = Message(
+    "drivers.mic488.unconfirmed",
+    "{who} could not be {what}: the controller cannot be reached and continues its last command ({problem})",
+)
 
 
 class Mic488Refusal(Refusal):
@@ -23,7 +31,7 @@ class Mic488Refusal(Refusal):
 
     def __init__(self, place: str, what: str) -> None:
         self.what = what
-        super().__init__(f"{place}: {what}")
+        super().__init__(AT_PLACE(place=place, what=text_of(what)))
 
 
 class ModbusRefusal(Mic488Refusal):
@@ -31,10 +39,11 @@ class ModbusRefusal(Mic488Refusal):
 
     def __init__(self, place: str, request: object, exception: ModbusException) -> None:
         self.code = exception.code
-        name = EXCEPTION_NAMES.get(exception.code, "unknown")
-        why = _WHY.get(exception.code)
-        reason = f"exception {exception.code:02X}, {name}"
-        super().__init__(place, f"'{request}' was refused: {f'{why} ({reason})' if why else reason}")
+        code, name = exception.code, text_of(EXCEPTION_NAMES.get(exception.code, "unknown"))
+        if code in _WHY:
+            super().__init__(place, REFUSED(request=request, why=_WHY[code](), code=code, name=name))
+        else:
+            super().__init__(place, REFUSED_WITHOUT_REASON(request=request, code=code, name=name))
 
 
 class NotReady(Mic488Refusal):
@@ -59,4 +68,4 @@ class Unconfirmed(LineFailure):
 
 def unconfirmed(who: str, what: str, failure: LineFailure) -> Unconfirmed:
     """The error for the axis or controller ``who``, which could not be ``what``, such as ``stopped``."""
-    return Unconfirmed(f"{who} could not be {what}: the controller cannot be reached and continues its last command ({failure})")
+    return Unconfirmed(UNCONFIRMED(who=who, what=what, problem=text_of(failure)))

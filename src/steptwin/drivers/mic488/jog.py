@@ -25,6 +25,7 @@ from steptwin.drivers.mic488.waiting import dynamics
 from steptwin.drivers.permission import HOLD_NS, Permission
 from steptwin.errors import LineFailure, Misuse, SteptwinError
 from steptwin.machine import SECOND, Nanos
+from steptwin.messages import Message, text_of
 from steptwin.mic488.status import AxisStatus
 
 HOLD_S = HOLD_NS / SECOND
@@ -34,6 +35,25 @@ SINGLE = 2.0**-23
 """Relative precision of VMAX, a REAL."""
 RENEWALS = 4
 """Number of renewals within the hold time."""
+FASTER_THAN_VMAX = Message(
+    "drivers.mic488.faster-than-vmax",
+    "a jog of M{axis} at {speed:g} {unit}/s is faster than its VMAX, {vmax:g} {unit}/s (which a program that "
+    "was killed while it jogged leaves at the velocity of its jog): set VMAX first",
+)
+TRIGGERED_BY_ANOTHER = Message(
+    "drivers.mic488.triggered-by-another",
+    "AXIS_CTR_MODE was set to TRIGGER by another program: M{axis} is no longer jogged",
+)
+MAY_HAVE_BEGUN = Message("drivers.mic488.may-have-begun", "may have begun to jog")
+CANNOT_BE_HELD = Message("drivers.mic488.cannot-be-held", "cannot be held any more")
+CANNOT_BE_STOPPED = Message("drivers.mic488.cannot-be-stopped", "cannot be stopped")
+CANNOT_BE_REACHED = Message(
+    "drivers.mic488.cannot-be-reached",
+    "M{axis} {what}: the controller cannot be reached ({problem}). "
+    "It stops by itself, at most {reach:g} {unit} after it was held last, {since_s:.2f} s ago",
+)
+WRONG_HOLD_TIME = Message("drivers.mic488.wrong-hold-time", "a hold time of {hold_s:g} s is outside {least:g} to {most:g} s")
+JOG_IS_NOT_BEGUN = Message("drivers.mic488.jog-is-not-begun", "a jog is held inside its with block")
 
 
 class AsyncMic488Jog:
@@ -55,7 +75,7 @@ class AsyncMic488Jog:
     ) -> None:
         least, most = HOLD_RANGE_S
         if not least <= hold_s <= most:
-            raise Misuse(f"a hold time of {hold_s:g} s is outside {least:g} to {most:g} s")
+            raise Misuse(WRONG_HOLD_TIME(hold_s=hold_s, least=least, most=most))
         self._unit = unit
         self._axis = axis
         self._velocity_u = velocity_u
@@ -88,8 +108,7 @@ class AsyncMic488Jog:
                 name = unit.unit_name(axis)
                 raise NotReady(
                     unit.place,
-                    f"a jog of M{axis} at {speed:g} {name}/s is faster than its VMAX, {vmax:g} {name}/s (which a program that "
-                    "was killed while it jogged leaves at the velocity of its jog): set VMAX first",
+                    FASTER_THAN_VMAX(axis=axis, speed=speed, vmax=vmax, unit=name),
                 )
             self._reach_u = speed * self._hold_s + speed * speed / (2.0 * dec)
             if vmax != speed:
@@ -107,7 +126,7 @@ class AsyncMic488Jog:
             with contextlib.suppress(SteptwinError):
                 await self._put_back()
             if isinstance(error, LineFailure) and not isinstance(error, SentLate):
-                raise self._unconfirmed("may have begun to jog", error) from error
+                raise self._unconfirmed(MAY_HAVE_BEGUN(), error) from error
             raise
         return self
 
@@ -115,7 +134,7 @@ class AsyncMic488Jog:
         """Let the axis run on; False when it has stopped. Raises `Unconfirmed` if the controller cannot be reached in time."""
         unit, permission = self._unit, self._permission
         if permission is None or self._held_ns is None:
-            raise Misuse("a jog is held inside its with block")
+            raise Misuse(JOG_IS_NOT_BEGUN())
         if self.end is not None:
             return False
         await unit.line.sleep((self._held_ns + self._renew_ns - unit.line.now()) / SECOND)
@@ -135,7 +154,7 @@ class AsyncMic488Jog:
             except LineFailure as failure:
                 if not permission.has_expired():
                     continue
-                raise self._unconfirmed("cannot be held any more", failure) from failure
+                raise self._unconfirmed(CANNOT_BE_HELD(), failure) from failure
             return self.end is None
         # The operator was away: the axis must not continue afterwards without `hold`.
         self._not_held()
@@ -144,9 +163,7 @@ class AsyncMic488Jog:
     async def _look(self) -> ControlRegisters:
         control = await self._unit.control(timeout_ns=self._exchange_ns())
         if control.triggered:
-            raise NotReady(
-                self._unit.place, f"AXIS_CTR_MODE was set to TRIGGER by another program: M{self._axis} is no longer jogged"
-            )
+            raise NotReady(self._unit.place, TRIGGERED_BY_ANOTHER(axis=self._axis))
         return control
 
     def _exchange_ns(self) -> Nanos:
@@ -200,7 +217,7 @@ class AsyncMic488Jog:
             except (TooLate, SentLate):
                 self._not_held()
             except LineFailure as failure:
-                raise self._unconfirmed("cannot be stopped", failure) from failure
+                raise self._unconfirmed(CANNOT_BE_STOPPED(), failure) from failure
             else:
                 self._stopped(Reason.RELEASED, "")
                 self._on_command(MotionKind.VELOCITY, 0.0, None)
@@ -221,6 +238,5 @@ class AsyncMic488Jog:
         since = (unit.line.now() - (self._held_ns or unit.line.now())) / SECOND
         self._stopped(Reason.COMMUNICATION, str(failure))
         return Unconfirmed(
-            f"M{self._axis} {what}: the controller cannot be reached ({failure}). "
-            f"It stops by itself, at most {self._reach_u:g} {name} after it was held last, {since:.2f} s ago"
+            CANNOT_BE_REACHED(axis=self._axis, what=what, problem=text_of(failure), reach=self._reach_u, unit=name, since_s=since)
         )

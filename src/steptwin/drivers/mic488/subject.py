@@ -21,7 +21,7 @@ from steptwin.drivers.modbus import ModbusQuery
 from steptwin.drivers.subject import DeviceAction, RawEffect, ValueAndUnit
 from steptwin.errors import LineFailure, Misuse, Refusal
 from steptwin.inputfiles import read_bytes
-from steptwin.messages import Message
+from steptwin.messages import Message, text_of
 from steptwin.mic488.datasheet import datasheet_of
 from steptwin.mic488.inifile import IniFile
 from steptwin.mic488.points import item_of
@@ -44,6 +44,13 @@ MOST_NAMED = 9
 NO_CONFIGURATION = Message(
     "drivers.no-configuration", "a twin needs the configuration of the controller: connect it with config=FILE"
 )
+UNKNOWN_POINT = Message(
+    "drivers.mic488.unknown-point", "no point {path!r}{hint}; there are {names} and more, {count} in all, and pins"
+)
+OTHER_UNIT = Message("drivers.mic488.other-unit", "unit = {unit}: this subject is the device with address {address}")
+WRONG_PDU = Message("drivers.mic488.wrong-pdu", "pdu = {pdu}: {problem}")
+ITS_PROGRAM = Message("drivers.mic488.its-program", "its program")
+TWIN_NEEDS_REST = Message("drivers.mic488.twin-needs-rest", "{place}: a twin can be made at rest: {names} runs")
 
 
 class Mic488Part:
@@ -107,8 +114,11 @@ class Mic488Part:
             return self._registers.at(Space(address.space), int(address.place)).name
         if point is None and path.upper() not in self._pins:
             known = [each.path for each in self.datasheet.points]
-            listed = f"{', '.join(known[:MOST_NAMED])} and more, {len(known)} in all, and pins"
-            raise Misuse(f"no point {path!r}{NearMiss().hint(path, (*known, *self._pins))}; there are {listed}")
+            raise Misuse(
+                UNKNOWN_POINT(
+                    path=path, hint=NearMiss().hint(path, (*known, *self._pins)), names=known[:MOST_NAMED], count=len(known)
+                )
+            )
         return None
 
     def unit_of(self, point: str) -> str:
@@ -226,11 +236,11 @@ class Mic488Part:
 
     async def _request(self, wanted: steps.Request) -> object:
         if wanted.unit != self.address:
-            raise Misuse(f"unit = {wanted.unit}: this subject is the device with address {self.address}")
+            raise Misuse(OTHER_UNIT(unit=wanted.unit, address=self.address))
         try:
             request = pdu.decode_request(wanted.pdu)
         except pdu.ModbusException as error:
-            raise Misuse(f"pdu = {wanted.pdu.hex()}: {error.detail or error}") from None
+            raise Misuse(WRONG_PDU(pdu=wanted.pdu.hex(), problem=text_of(error.detail or error))) from None
         try:
             answer = await self._mic.request(request)
             return {"pdu": pdu.encode_response(answer).hex()}
@@ -283,7 +293,7 @@ class Mic488Part:
         status = await self._mic.status()
         moving = [f"M{axis}" for axis, code in zip(ALL_AXES, status.axes, strict=True) if code in MOVING]
         if moving or status.program:
-            raise Refusal(f"{self.line.place}: a twin can be made at rest: {', '.join(moving) or 'its program'} runs")
+            raise Refusal(TWIN_NEEDS_REST(place=self.line.place, names=moving or ITS_PROGRAM()))
         snapshot = await self._mic.take_snapshot()
         shown = await self._mic.get_shown(*snapshot.values)
         # Values mean something only with the DATA_TYPE they were read with.

@@ -18,6 +18,7 @@ from steptwin.drivers.modbus import ModbusQuery, bits, words
 from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Misuse
 from steptwin.machine import SECOND, Nanos
+from steptwin.messages import Message, text_of
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.describe import AxisScale, Wording
 from steptwin.mic488.registermap import DataType, RegisterMap, Type
@@ -45,6 +46,20 @@ URGENT_TRIES = 5
 """Number of attempts for a stop."""
 PATIENCE_NS: Nanos = 5 * SECOND
 """A request that changes something is sent at most this long after the call, ns."""
+
+GEAR_IS_UNKNOWN = Message(
+    "drivers.mic488.gear-is-unknown",
+    "DATA_TYPE is DINT, so {name} takes pulses, and GEAR is not known: give the configuration, or set DATA_TYPE to REAL",
+)
+NO_DATA_TYPE = Message("drivers.mic488.no-data-type", "unit {unit} reads DATA_TYPE = {value}, which is not a value of a MIC488")
+WAITS_FOR_TRIGGERS = Message(
+    "drivers.mic488.waits-for-triggers",
+    "unit {unit} is in TRIGGER mode (AXIS_CTR_MODE = 1), in which a motion waits for its trigger: set AXIS_CTR_MODE to 0",
+)
+IS_SWITCHED_OFF = Message(
+    "drivers.mic488.is-switched-off", "M{axis} of unit {unit} is switched off: enable it first (M{axis}_EN = 1)"
+)
+TOO_LATE_AND_UNCONFIRMED = Message("drivers.mic488.too-late-and-unconfirmed", "a request was sent too late, and {problem}")
 
 
 class ControlRegisters(NamedTuple):
@@ -272,8 +287,7 @@ class Unit:
         if gear is None:
             raise NotReady(
                 self.place,
-                f"DATA_TYPE is DINT, so {item.name} takes pulses, and GEAR is not known: "
-                "give the configuration, or set DATA_TYPE to REAL",
+                GEAR_IS_UNKNOWN(name=item.name),
             )
         return round(value_u * gear)
 
@@ -304,7 +318,7 @@ class Unit:
         values = self._control_block.values(words(answer), DataType.REAL)
         found = [int(values[item]) for item in self._control_items]
         if found[0] not in (DataType.REAL, DataType.DINT):
-            raise NotReady(self.place, f"unit {self.number} reads DATA_TYPE = {found[0]}, which is not a value of a MIC488")
+            raise NotReady(self.place, NO_DATA_TYPE(unit=self.number, value=found[0]))
         status = found[3] if self._has_status else None
         control = ControlRegisters(at, DataType(found[0]), found[1], found[2] == 1, status, tuple(found[-AXES:]))
         self.wording.data_type = control.data_type
@@ -317,8 +331,7 @@ class Unit:
         if control.triggered:
             raise NotReady(
                 self.place,
-                f"unit {self.number} is in TRIGGER mode (AXIS_CTR_MODE = 1), in which a motion waits for its trigger: set "
-                "AXIS_CTR_MODE to 0",
+                WAITS_FOR_TRIGGERS(unit=self.number),
             )
         self.check_enabled(control, *axes)
         return control
@@ -327,7 +340,7 @@ class Unit:
         """Raises `NotReady` for an axis that would ignore a motion because its drive is off (MIC-8)."""
         for axis in axes:
             if control.axes[axis - 1] == AxisStatus.OFF:
-                raise NotReady(self.place, f"M{axis} of unit {self.number} is switched off: enable it first (M{axis}_EN = 1)")
+                raise NotReady(self.place, IS_SWITCHED_OFF(axis=axis, unit=self.number))
 
     def lock(self) -> AbstractAsyncContextManager[object]:
         """A lock for exchanges that no other motion command may interrupt."""
@@ -382,7 +395,7 @@ class Unit:
                 finally:
                     await self.stop(axes)
             except LineFailure as failure:
-                raise Unconfirmed(f"a request was sent too late, and {failure}") from late
+                raise Unconfirmed(TOO_LATE_AND_UNCONFIRMED(problem=text_of(failure))) from late
             raise
 
     async def end_program(self, state: ProgramState, what: str) -> None:
