@@ -32,6 +32,10 @@ DONE = (
     *(f"drivers/{name}.py" for name in ("address", "exchange", "place", "subject", "tcp", "*/failures", "*/jog", "*/subject")),
     *(f"drivers/{name}.py" for name in ("m1486/chip", "mic488/axis")),
     *(f"live/studio/{name}.py" for name in ("branches", "campaigns", "drawing", "plant", "processes", "recordings", "work")),
+    *(
+        f"simulation/kinds/{name}.py"
+        for name in ("kind", "lines", "master", "*/control", "*/heldjog", "*/memory", "m1486/programs")
+    ),
 )
 """Of the others that reach the page, sentences still are in the tables by English (tests/studio/test_texts.py)."""
 ERRORS = ("LineFailure", "Misuse", "Refusal")

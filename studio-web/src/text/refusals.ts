@@ -27,40 +27,9 @@ export const REFUSALS: Readonly<Record<string, string>> = {
   // Machines, axes, motions.
   "no machine is called {name}{hint}; {known}": "żadna maszyna nie nazywa się {name}{hint}; {known}",
   "no device is called {name}{hint}; {known}": "żadne urządzenie nie nazywa się {name}{hint}; {known}",
-  "{name}: no axis {axis}: an M1486 has one, 1": "{name}: nie ma osi {axis}: M1486 ma jedną, 1",
-  "{name}: no axis {axis}: a MIC488 has 1 to {#most}": "{name}: nie ma osi {axis}: MIC488 ma 1 do {#most}",
   "{name} is not enabled: switch its drive on first": "{name} nie jest załączony: najpierw załącz napęd",
-  "{name} has a position error: stop it first": "{name} ma błąd pozycji: najpierw go zatrzymaj",
-  "{name} runs its program: pause or stop it before an axis is jogged":
-    "{name} wykonuje program: przed jazdą ręczną wstrzymaj go albo zatrzymaj",
-  "{name} waits for triggers (AXIS_CTR_MODE), so an axis cannot be jogged":
-    "{name} czeka na wyzwolenie (AXIS_CTR_MODE), więc jazda ręczna nie jest możliwa",
-  "velocity = {#value} {unit}/s: permitted are {#least} to {#most} {unit2}/s (VMAX), but not 0":
-    "prędkość {#value} {unit}/s: dozwolone od {#least} do {#most} {unit2}/s (VMAX), oprócz 0",
-  "velocity = {#value} {unit}/s: {permitted}": "prędkość {#value} {unit}/s: {permitted}",
-  "velocity {#value} {unit}/s, V{#number}: {why}": "prędkość {#value} {unit}/s, V{#number}: {why}",
-  "{name}: {title} writes every command into its EEPROM, so it is not jogged":
-    "{name}: {title} zapisuje każde polecenie w EEPROM, więc nie ma jazdy ręcznej",
-  "the chip {what}": "układ {what}",
-  "move: {#value} {unit}: permitted are {limits}": "ruch: {#value} {unit}: dozwolone {limits}",
-  "{name} is on no line, so no commands can be sent to it":
-    "{name} nie jest na żadnej linii, więc nie da się mu nic wysłać",
-  "{name} is on no line, so nothing can be typed to it":
-    "{name} nie jest na żadnej linii, więc nie da się do niego pisać",
-  "{name} is not at rest ({what}): wait, or stop it": "{name} nie stoi ({what}): poczekaj albo go zatrzymaj",
-  "{name} is {what}, so it receives nothing": "{name}: {what}, więc nic nie odbiera",
-  "{name} has no commands": "{name} nie ma poleceń",
   "{what}: a whole number is needed": "{what}: potrzebna liczba całkowita",
-  "{what}: no multiple of {#grid}, the microstep of M{#microstep}":
-    "{what}: to nie wielokrotność {#grid}, mikrokroku przy M{#microstep}",
-  "position {#value} {unit}: no multiple of {#grid}, the microstep of M{#microstep}":
-    "pozycja {#value} {unit}: to nie wielokrotność {#grid}, mikrokroku przy M{#microstep}",
-  "distance {#value} {unit}: no multiple of {#grid}, the microstep of M{#microstep}":
-    "odcinek {#value} {unit}: to nie wielokrotność {#grid}, mikrokroku przy M{#microstep}",
-  "{name} was stopped in a move: its counter does not show where it is (M-16)":
-    "{name} zatrzymano w ruchu: licznik nie pokazuje, gdzie jest (M-16)",
-  "seek {pin}: permitted are B{#low} to B{#high}, such as '-B8'":
-    "szukanie {pin}: dozwolone B{#low} do B{#high}, np. '-B8'",
+  "the chip {what}": "układ {what}",
   // Registers and variables.
   "{text} is not a name of a value: {form}": "{text} nie jest nazwą wartości: {form}",
   "{text}: choose one of {name}[0] to {name2}[{#last}]": "{text}: wybierz {name}[0] do {name2}[{#last}]",
@@ -77,9 +46,6 @@ export const REFUSALS: Readonly<Record<string, string>> = {
   "{name} = {#value}: permitted are 0 (OFF) and 1 (ON)": "{name} = {#value}: dozwolone 0 (OFF) i 1 (ON)",
   "{name}: permitted {range}": "{name}: dozwolone {range}",
   "the program has no variable {name}: there are {names}": "program nie ma zmiennej {name}: są {names}",
-  "the chip has no variable {name}: there are {names}": "układ nie ma zmiennej {name}: są {names}",
-  "{name} = {#value}: permitted are whole numbers from 0 to {#high}":
-    "{name} = {#value}: dozwolone liczby całkowite od 0 do {#high}",
   "{name} = {#value}: permitted are {range}": "{name} = {#value}: dozwolone {range}",
   "{name} = {value}: a digital input is 0 or 1": "{name} = {value}: wejście cyfrowe ma 0 lub 1",
   "{name} = {#value} V: an analog input takes 0 to 10 V": "{name} = {#value} V: wejście analogowe ma 0 do 10 V",
@@ -102,8 +68,6 @@ export const REFUSALS: Readonly<Record<string, string>> = {
     "bank programu {#bank} jest w użyciu: najpierw zatrzymaj program",
   "position bank {#bank} is in use: stop the program first":
     "bank pozycji {#bank} jest w użyciu: najpierw zatrzymaj program",
-  "{place} is in use by the program that runs or is paused: stop it first":
-    "{place} jest w użyciu przez program, który działa lub jest wstrzymany: najpierw go zatrzymaj",
   "{keyword} {text}: the position table has rows 0…{#last}": "{keyword} {text}: tabela pozycji ma wiersze 0…{#last}",
   "PULSE(OUT{#output}, …): permitted are 0.001 s and more": "PULSE(OUT{#output}, …): dozwolone 0.001 s i więcej",
   "{name} cannot run: {why}": "{name} nie może działać: {why}",

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeAlias,
 
 from steptwin.errors import Misuse
 from steptwin.machine import MachineEvent, Nanos
+from steptwin.messages import Message
 from steptwin.motioncontroller import MotionController
 from steptwin.nearmiss import NearMiss
 from steptwin.simulation.kinds.links import LINK_KEYS, TlsFiles
@@ -408,6 +409,9 @@ class LinkKind:
     """For people: ``Modbus RTU``."""
 
 
+HAS_NONE_OF_THESE = Message("simulation.has-none-of-these", "{name!r} is {title}, which has no {what}")
+
+
 def lacks(name: str, kind: AnyKind, what: str) -> Misuse:
     """Refuses what only other controllers have."""
-    return Misuse(f"{name!r} is {kind.title}, which has no {what}")
+    return Misuse(HAS_NONE_OF_THESE(name=name, title=kind.title, what=what))

@@ -13,6 +13,7 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos, Port, sends_by_itself
+from steptwin.messages import Message
 from steptwin.simulation.faults import Faults, FaultyPort, FaultySendingPort
 from steptwin.simulation.faults import LineProtocol as FaultLine
 from steptwin.simulation.kinds.master import Master
@@ -117,6 +118,14 @@ class LineEndPoint(Stateful):
         return taken
 
 
+LINE_CARRIES_NO_MODBUS = Message(
+    "simulation.line-carries-no-modbus", "line {name!r} carries no Modbus: requests need a line of kind modbus"
+)
+OTHER_KIND_OF_CONNECTION = Message(
+    "simulation.other-kind-of-connection", "line {name!r} takes no connection of kind {kind!r}: permitted are {names}"
+)
+
+
 class Line(Stateful, ABC):
     """Base class of lines; a part of its kernel."""
 
@@ -154,7 +163,7 @@ class Line(Stateful, ABC):
     @property
     def master(self) -> Master:
         """Sends the Modbus requests of scripts. Raises `Misuse` for a line without Modbus."""
-        raise Misuse(f"line {self.name!r} carries no Modbus: requests need a line of kind modbus")
+        raise Misuse(LINE_CARRIES_NO_MODBUS(name=self.name))
 
     def recall(self, unit: int, now: Nanos) -> None:
         """Drop what scripts have asked of the controller with an address and is not executed yet."""
@@ -186,7 +195,7 @@ class Line(Stateful, ABC):
             return found
         kind = self.kinds[0] if kind is None else kind
         if kind not in self.kinds:
-            raise Misuse(f"line {self.name!r} takes no connection of kind {kind!r}: permitted are {', '.join(self.kinds)}")
+            raise Misuse(OTHER_KIND_OF_CONNECTION(name=self.name, kind=kind, names=list(self.kinds)))
         port = self._port(place, kind)
         framed = self._framed(port)
         if sends_by_itself(port):

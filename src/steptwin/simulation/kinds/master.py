@@ -8,6 +8,7 @@ from typing import ClassVar
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
+from steptwin.messages import Message
 from steptwin.state import Stateful
 
 ANSWER_NS: Nanos = SECOND
@@ -15,6 +16,9 @@ ANSWER_NS: Nanos = SECOND
 
 MOST_WAITING = 10_000
 """Limit of queued requests."""
+TOO_MANY_REQUESTS_ARE_QUEUED = Message(
+    "simulation.too-many-requests-are-queued", "{most} requests of scripts are queued for this line: it answers too slowly"
+)
 
 
 class Master(Stateful):
@@ -53,7 +57,7 @@ class Master(Stateful):
         Raises `Misuse` if `MOST_WAITING` requests are queued.
         """
         if len(self._queue) >= MOST_WAITING:
-            raise Misuse(f"{MOST_WAITING} requests of scripts are queued for this line: it answers too slowly")
+            raise Misuse(TOO_MANY_REQUESTS_ARE_QUEUED(most=MOST_WAITING))
         self.asked += 1
         self._queue.append((frame, within))
         self._go_on(now)

@@ -9,9 +9,12 @@ from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.pins import ALIASES, known_pin, refuse_taken
 from steptwin.m1486.variants import Store
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.simulation.faults.machine import AxisLoad, FaultyMachine
 from steptwin.simulation.faults.table import FaultKind, Need, Occasion
 from steptwin.simulation.kinds.kind import LineUnit
+
+DIGITAL_INPUT_IS_0_OR_1 = Message("simulation.m1486.digital-input-is-0-or-1", "{pin} = {level:g}: a digital input is 0 or 1")
 
 
 class M1486Body:
@@ -47,7 +50,7 @@ class M1486Body:
     def check_pin(self, pin: str, level: float) -> None:
         refuse_taken(known_pin(pin), self._chip.interface)
         if level not in (0.0, 1.0):
-            raise Misuse(f"{pin} = {level:g}: a digital input is 0 or 1")
+            raise Misuse(DIGITAL_INPUT_IS_0_OR_1(pin=pin, level=level))
 
 
 def _keep(chip: M1486Chip, store: Callable[[bytes], bytes | None] | None, owner: FaultyMachine, image: bytes) -> bytes:

@@ -14,8 +14,9 @@ from steptwin.m1486.ranges import out_of_range
 from steptwin.m1486.syntax import ChipCommand
 from steptwin.m1486.variants import SLOWEST_JOG, Store
 from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.messages import Message, text_of
 from steptwin.motion.ramps import longest_within
-from steptwin.simulation.kinds.m1486.control import typed
+from steptwin.simulation.kinds.m1486.control import IS_NOT_AT_REST, IS_ON_NO_LINE, ONE_AXIS_ONLY, typed
 from steptwin.simulation.script.control import Jog
 from steptwin.simulation.script.heldjog import REST_NS, STOP_NS, Given
 
@@ -27,6 +28,13 @@ LOOK_NS: Nanos = MILLISECOND
 """How often a chip that is not yet at rest is looked at."""
 PATIENCE_NS: Nanos = 2 * SECOND
 """A chip that is busy for so long does something else."""
+WRONG_VELOCITY = Message("simulation.m1486.wrong-velocity", "velocity {velocity:g} {unit}/s, V{number}: {why}")
+EEPROM_IS_NOT_JOGGED = Message(
+    "simulation.m1486.eeprom-is-not-jogged", "{name}: {title} writes every command into its EEPROM, so it is not jogged"
+)
+LINE_IS_TOO_SLOW_TO_JOG = Message(
+    "simulation.m1486.line-is-too-slow-to-jog", "{name}: a jog needs a line of at least {least} bit/s; this one has {baud} bit/s"
+)
 
 
 class M1486HeldJog:
@@ -36,15 +44,15 @@ class M1486HeldJog:
     def __init__(self, chip: M1486Chip, line: str | None, wanted: Jog) -> None:
         name = wanted.machine
         if wanted.axis != 1:
-            raise Misuse(f"{name}: no axis {wanted.axis}: an M1486 has one, 1")
+            raise Misuse(ONE_AXIS_ONLY(machine=name, axis=wanted.axis))
         if line is None:
-            raise Refusal(f"{name} is on no line, so no commands can be sent to it")
+            raise Refusal(IS_ON_NO_LINE(machine=name))
         if chip.variant.store is Store.EEPROM:
-            raise Refusal(f"{name}: {chip.variant.title} writes every command into its EEPROM, so it is not jogged")
+            raise Refusal(EEPROM_IS_NOT_JOGGED(name=name, title=chip.variant.title))
         if chip.is_timed and chip.uart.baud < SLOWEST_JOG:
-            raise Refusal(f"{name}: a jog needs a line of at least {SLOWEST_JOG} bit/s; this one has {chip.uart.baud} bit/s")
+            raise Refusal(LINE_IS_TOO_SLOW_TO_JOG(name=name, least=SLOWEST_JOG, baud=chip.uart.baud))
         if not chip.is_idle():
-            raise Refusal(f"{name} is not at rest ({program_words(chip, chip.now)}): wait, or stop it")
+            raise Refusal(IS_NOT_AT_REST(name=name, words=text_of(program_words(chip, chip.now))))
         self.lasts_ns: Nanos = min(STOP_NS, REST_NS - TYPED * chip.uart.character_ns) - LINK_NS
         self._chip = chip
         self._line = line
@@ -52,7 +60,7 @@ class M1486HeldJog:
         self._velocity = round(abs(wanted.velocity) / (FULL_STEP * chip.variant.clock))
         why = out_of_range(ChipCommand("V", self._velocity), chip.variant)
         if why is not None:
-            raise Misuse(f"velocity {wanted.velocity:g} {UNIT}/s, V{self._velocity}: {why}")
+            raise Misuse(WRONG_VELOCITY(velocity=wanted.velocity, unit=UNIT, number=self._velocity, why=text_of(why)))
         self._before = chip.drive.velocity
         self._distance_u = self._distance()
         self.over: str | None = None

@@ -16,6 +16,7 @@ from steptwin.m1486.present import program_words, state_of
 from steptwin.m1486.structure import streams
 from steptwin.m1486.syntax import ParsedProgram, parse
 from steptwin.m1486.variants import Store
+from steptwin.messages import Message, MessageText
 from steptwin.simulation.kinds.kind import TextContext, text_of
 from steptwin.simulation.kinds.m1486.build import sound
 from steptwin.simulation.kinds.m1486.table import M1486Spec
@@ -77,17 +78,22 @@ def _is_in(chip: M1486Chip, file: StoredFile | None) -> bool:
     return file is not None and begin is not None and chip.memory.holds(begin, file)
 
 
+NO_COMMANDS = Message("simulation.m1486.no-commands", "{name} has no commands")
+CANNOT_BE_TYPED_TO = Message("simulation.m1486.cannot-be-typed-to", "{machine} is on no line, so nothing can be typed to it")
+RECEIVES_NOTHING = Message("simulation.m1486.receives-nothing", "{machine} is {words}, so it receives nothing")
+
+
 def download(chip: M1486Chip, to: Destination, source: SourceText) -> Downloading:
     """See `steptwin.simulation.kinds.kind.ControllerKind.download`. A host types it: Kill, which stops with the ramp; Reset,
     which ends the program and empties the memory; the file in ``[ ]``, which runs as soon as it is there (chapter II, Memory)."""
     program = sound(source, chip.variant, chip.interface).program
     if not program.all_commands:
-        raise Misuse(f"{source.name} has no commands")
+        raise Misuse(NO_COMMANDS(name=source.name))
     image_of(program, chip.variant)
     if to.line is None:
-        raise Refusal(f"{to.machine} is on no line, so nothing can be typed to it")
+        raise Refusal(CANNOT_BE_TYPED_TO(machine=to.machine))
     if chip.is_shut_down:
-        raise Refusal(f"{to.machine} is {program_words(chip, chip.now)}, so it receives nothing")
+        raise Refusal(RECEIVES_NOTHING(machine=to.machine, words=MessageText(program_words(chip, chip.now))))
     return Downloading(typed=tuple(_typed(chip, to.machine, to.line, program)))
 
 

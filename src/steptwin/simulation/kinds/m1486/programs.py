@@ -19,6 +19,7 @@ from steptwin.m1486.successors import flow_of
 from steptwin.m1486.syntax import ChipCommand, parse
 from steptwin.m1486.unit import MASK
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.simulation.kinds.kind import TextContext
 from steptwin.simulation.kinds.m1486.memory import PLACE as TEXT
 from steptwin.simulation.kinds.m1486.memory import given_text
@@ -103,6 +104,12 @@ class _Text:
         """Of the label at or before a statement."""
         found = bisect_right(self._named, number, key=lambda row: row[0])
         return self._named[found - 1][1] if found else BEGIN
+
+
+UNKNOWN_VARIABLE = Message("simulation.m1486.unknown-variable", "the chip has no variable {name!r}: there are {names}")
+VARIABLE_IS_OUT_OF_RANGE = Message(
+    "simulation.m1486.variable-is-out-of-range", "{name} = {value:g}: permitted are whole numbers from 0 to {most}"
+)
 
 
 class ChipPrograms:
@@ -215,10 +222,10 @@ class ChipPrograms:
         chip = self._chip
         names = self.variables(now)
         if name not in names:
-            raise Misuse(f"the chip has no variable {name!r}: there are {', '.join(names)}")
+            raise Misuse(UNKNOWN_VARIABLE(name=name, names=list(names)))
         highest = MASK if name == "variable" else REGISTER_MAX
         if value != int(value) or not 0 <= value <= highest:
-            raise Misuse(f"{name} = {value:g}: permitted are whole numbers from 0 to {highest}")
+            raise Misuse(VARIABLE_IS_OUT_OF_RANGE(name=name, value=value, most=highest))
         if name == "variable":
             chip.unit.variable = int(value)
         else:

@@ -7,6 +7,7 @@ from typing import Any
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.mic488.axis import Axis
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.encoding import DINT_MAX, DINT_MIN
@@ -44,11 +45,17 @@ def _move(device: Mic488Device, line: str | None, command: Move) -> do.Write:
     return _write(command, "POS_REL", command.by or 0.0) if command.to is None else _write(command, "POS_ABS", command.to)
 
 
+POSITION_IS_OUT_OF_RANGE = Message(
+    "simulation.mic488.position-is-out-of-range", "move: {value:g} {unit}: permitted are {low:.12g}…{high:.12g} {unit}"
+)
+
+
 def _check_position(axis: Axis, value: float) -> None:
     """Raises `Misuse` for a position or distance that the controller ignores, because its pulses do not fit a DINT."""
     if not DINT_MIN <= value * axis.gear <= DINT_MAX:
-        limits = f"{DINT_MIN / axis.gear:.12g}…{DINT_MAX / axis.gear:.12g} {axis.config.unit_name}"
-        raise Misuse(f"move: {value:g} {axis.config.unit_name}: permitted are {limits}")
+        raise Misuse(
+            POSITION_IS_OUT_OF_RANGE(value=value, unit=axis.config.unit_name, low=DINT_MIN / axis.gear, high=DINT_MAX / axis.gear)
+        )
 
 
 def _home(device: Mic488Device, line: str | None, command: Home) -> do.Write:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from steptwin.errors import Misuse, Refusal
 from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.messages import Message
 from steptwin.mic488.axis import Axis
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.registers import AXES, AXIS_STATUS_TEXTS
@@ -26,6 +27,19 @@ OWN = frozenset({AxisStatus.POSITION, AxisStatus.REACHED, AxisStatus.CORRECTION}
 """Statuses of an axis during a jog; another status means that the axis was stopped or has another motion."""
 SAME = 1e-6
 """Velocities that differ by less, as a fraction, are the same: they go through a REAL."""
+UNKNOWN_AXIS = Message("simulation.mic488.unknown-axis", "{machine}: no axis {axis}: a MIC488 has 1 to {most}")
+IS_NOT_ENABLED = Message("simulation.mic488.is-not-enabled", "{name} is not enabled: switch its drive on first")
+HAS_A_POSITION_ERROR = Message("simulation.mic488.has-a-position-error", "{name} has a position error: stop it first")
+PROGRAM_IS_RUNNING = Message(
+    "simulation.mic488.program-is-running", "{machine} runs its program: pause or stop it before an axis is jogged"
+)
+WAITS_FOR_TRIGGERS = Message(
+    "simulation.mic488.waits-for-triggers", "{machine} waits for triggers (AXIS_CTR_MODE), so an axis cannot be jogged"
+)
+WRONG_VELOCITY = Message(
+    "simulation.mic488.wrong-velocity",
+    "velocity = {velocity:g} {unit}/s: permitted are {least:g} to {most:g} {unit}/s (VMAX), but not 0",
+)
 
 
 class Mic488HeldJog:
@@ -34,7 +48,7 @@ class Mic488HeldJog:
 
     def __init__(self, device: Mic488Device, line: str | None, wanted: Jog) -> None:
         if not 1 <= wanted.axis <= AXES:
-            raise Misuse(f"{wanted.machine}: no axis {wanted.axis}: a MIC488 has 1 to {AXES}")
+            raise Misuse(UNKNOWN_AXIS(machine=wanted.machine, axis=wanted.axis, most=AXES))
         self._device = device
         self._axis: Axis = device.axes[wanted.axis - 1]
         self._wanted = wanted
@@ -57,18 +71,17 @@ class Mic488HeldJog:
         wanted, axis = self._wanted, self._axis
         name = f"{wanted.machine} M{wanted.axis}"
         if not axis.can_move:
-            raise Refusal(f"{name} is not enabled: switch its drive on first")
+            raise Refusal(IS_NOT_ENABLED(name=name))
         if axis.status is AxisStatus.ERROR:
-            raise Refusal(f"{name} has a position error: stop it first")
+            raise Refusal(HAS_A_POSITION_ERROR(name=name))
         if self._device.program.state is ProgramState.RUNNING:
-            raise Refusal(f"{wanted.machine} runs its program: pause or stop it before an axis is jogged")
+            raise Refusal(PROGRAM_IS_RUNNING(machine=wanted.machine))
         if self._device.trigger_mode:
-            raise Refusal(f"{wanted.machine} waits for triggers (AXIS_CTR_MODE), so an axis cannot be jogged")
+            raise Refusal(WAITS_FOR_TRIGGERS(machine=wanted.machine))
         vmax = axis.vmax_p / axis.gear
         if not 0.0 < abs(wanted.velocity) <= vmax * (1.0 + SAME):
             unit = axis.config.unit_name
-            permitted = f"permitted are {-vmax:g} to {vmax:g} {unit}/s (VMAX), but not 0"
-            raise Misuse(f"velocity = {wanted.velocity:g} {unit}/s: {permitted}")
+            raise Misuse(WRONG_VELOCITY(velocity=wanted.velocity, unit=unit, least=-vmax, most=vmax))
 
     def _has_same_speed(self) -> bool:
         return abs(self._axis.vmax_p - self._speed_p) <= SAME * self._speed_p

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from steptwin.diagnostics import Diagnostic, Severity, SourceText, render
 from steptwin.errors import Refusal, SourceErrors
+from steptwin.messages import Message
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.present import place_of
 from steptwin.mic488.program_banks import load, setup_of
@@ -64,13 +65,18 @@ def _positions(spec: Mic488Spec, device: Mic488Device, context: TextContext) -> 
         )
 
 
+PROGRAM_IS_IN_USE = Message(
+    "simulation.mic488.program-is-in-use", "{place} is in use by the program that runs or is paused: stop it first"
+)
+
+
 def download(device: Mic488Device, to: Destination, source: SourceText) -> Downloading:
     """See `steptwin.simulation.kinds.kind.ControllerKind.download`. The bank is filled at once, without the line, for how the
     vendor's program does it is not documented. Its program must be stopped (manual 4.1)."""
     what, _, number = to.place.partition(" ")
     bank, control = int(number), device.program
     if control.runs_program(bank) if what == PROGRAM else control.runs_positions(bank):
-        raise Refusal(f"{to.place} is in use by the program that runs or is paused: stop it first")
+        raise Refusal(PROGRAM_IS_IN_USE(place=to.place))
     if what == PROGRAM:
         checked = _checked(device, bank, source.text)
         _refuse(source, checked.errors)
