@@ -46,7 +46,6 @@ export const REFUSALS: Readonly<Record<string, string>> = {
   "{name} = {#value}: permitted are 0 (OFF) and 1 (ON)": "{name} = {#value}: dozwolone 0 (OFF) i 1 (ON)",
   "{name}: permitted {range}": "{name}: dozwolone {range}",
   "the program has no variable {name}: there are {names}": "program nie ma zmiennej {name}: są {names}",
-  "{name} = {#value}: permitted are {range}": "{name} = {#value}: dozwolone {range}",
   "{name} = {value}: a digital input is 0 or 1": "{name} = {value}: wejście cyfrowe ma 0 lub 1",
   "{name} = {#value} V: an analog input takes 0 to 10 V": "{name} = {#value} V: wejście analogowe ma 0 do 10 V",
   "no input pin {name}: inputs are IN1 to IN{#inputs} and AIN1 to AIN{#analog}":
@@ -98,6 +97,7 @@ export const REFUSALS: Readonly<Record<string, string>> = {
   "the distance {#distance} is not a multiple of {#grid} (M{#microstep})":
     "odcinek {#distance} nie jest wielokrotnością {#grid} (M{#microstep})",
   "no {what} is called {name}{hint}; there are {names}": "nic ({what}) nie nazywa się {name}{hint}; są {names}",
+  "{name} = {#value}: permitted are {range}": "{name} = {#value}: dozwolone {range}",
   // Modbus.
   "function {function} refused with exception {code} ({name}): {detail}":
     "funkcja {function} odrzucona z wyjątkiem {code} ({name}): {detail}",
@@ -117,41 +117,6 @@ export const REFUSALS: Readonly<Record<string, string>> = {
   "byte count {#bytes} does not match {#count} registers":
     "liczba bajtów {#bytes} nie zgadza się z {#count} rejestrami",
   "the PDU has {#length} bytes instead of {wanted}": "PDU ma {#length} bajtów zamiast {wanted}",
-  // Faults.
-  "there is a fault {name} already": "usterka {name} już jest",
-  "no fault {name}: set are {names}": "nie ma usterki {name}: ustawione są {names}",
-  "fault {name}: choose a machine: there are {names}": "usterka {name}: wybierz maszynę: są {names}",
-  "fault {name}: machine = {value}: there are {names}": "usterka {name}: machine = {value}: są {names}",
-  "fault {name}: element = {value}: those that can fail are {names}":
-    "usterka {name}: element = {value}: zawieść mogą {names}",
-  "fault {name}: element = {value}, whose faults are {names}":
-    "usterka {name}: element = {value}, jego usterki to {names}",
-  "fault {name}: {key} = {value} is not a number": "usterka {name}: {key} = {value} nie jest liczbą",
-  "{place}: kind = {value}: permitted are {names}": "{place}: kind = {value}: dozwolone {names}",
-  "{place}: name = {value}: permitted is text that can be printed, without blanks":
-    "{place}: name = {value}: dozwolony jest tekst drukowalny, bez spacji",
-  "{place}: nth and every exclude each other": "{place}: nth i every wykluczają się",
-  "{place}: until_s = {#end} is before the fault begins at {#begin} s":
-    "{place}: until_s = {#end} to przed początkiem usterki w {#begin} s",
-  "a fault is {form}, such as {example}; kinds are {names}": "usterka to {form}, np. {example}; rodzaje to {names}",
-  "{place}: {name} is missing: {what}": "{place}: brakuje {name}: {what}",
-  "fault {name}: {word} is not NAME=VALUE": "usterka {name}: {word} to nie NAZWA=WARTOŚĆ",
-  "fault {name}: {key} is given twice": "usterka {name}: {key} podano dwa razy",
-  "{place}: there is no {key}: parameters are {names}": "{place}: nie ma {key}: parametry to {names}",
-  "fault bounce: pin = {pin} is an analog input, which has no switch":
-    "usterka bounce: pin = {pin} to wejście analogowe, które nie ma łącznika",
-  "fault {name}: axis = {axis}: permitted are 1 to {#most}": "usterka {name}: axis = {axis}: dozwolone 1 do {#most}",
-  "fault {name}: pin = {pin}: name the machine as machine=NAME, and the pin alone":
-    "usterka {name}: pin = {pin}: maszynę podaj jako machine=NAZWA, a pin osobno",
-  "fault {name}: pin = {pin}: {machine} has {names}": "usterka {name}: pin = {pin}: {machine} ma {names}",
-  "fault {name}: {machine} {problem}": "usterka {name}: {machine} {problem}",
-  "fault {name}: link = {value}: there are {names}": "usterka {name}: link = {value}: są {names}",
-  "fault {name} happens on {where}: {what}": "usterka {name} zdarza się na {where}: {what}",
-  "fault {name}: unit = {value}: served are {names}": "usterka {name}: unit = {value}: obsługiwane są {names}",
-  "fault {name}: line = {value}: there are {names}": "usterka {name}: line = {value}: są {names}",
-  "{where} = {value}: permitted are {permitted}": "{where} = {value}: dozwolone {permitted}",
-  "{where}: a number of more than 63 bits: permitted are {permitted}":
-    "{where}: liczba o ponad 63 bitach: dozwolone {permitted}",
   // Others.
   "{name} has no program: {who} has one": "{name} nie ma programu: ma go {who}",
   "{name} can only be written": "{name} jest tylko do zapisu",

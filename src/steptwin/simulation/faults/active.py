@@ -8,6 +8,7 @@ from weakref import WeakSet
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
+from steptwin.messages import NONE, Message
 from steptwin.simulation.faults.table import Fault, Layer
 from steptwin.simulation.scheduler.chance import Chance
 from steptwin.simulation.scheduler.trace import RecordSink, TraceRecord
@@ -156,6 +157,17 @@ class FailingPort(Protocol):
         ...
 
 
+FAULT_IS_SET_ALREADY = Message("simulation.fault-is-set-already", "there is a fault {name!r} already")
+UNKNOWN_FAULT = Message("simulation.unknown-fault", "no fault {name!r}: set are {names}")
+NO_MACHINE_OF_A_FAULT = Message("simulation.no-machine-of-a-fault", "fault {name}: choose a machine: there are {names}")
+UNKNOWN_MACHINE_OF_A_FAULT = Message(
+    "simulation.unknown-machine-of-a-fault", "fault {name}: machine = {machine}: there are {names}"
+)
+UNKNOWN_ELEMENT_OF_A_FAULT = Message(
+    "simulation.unknown-element-of-a-fault", "fault {name}: element = {element}: those that can fail are {names}"
+)
+
+
 class Faults(Stateful):
     """The faults of a world. The random stream of a fault depends only on ``seed`` and its name.
 
@@ -206,7 +218,7 @@ class Faults(Stateful):
     def add(self, fault: Fault, now: Nanos = 0) -> ActiveFault:
         """Set a fault at ``now``. Raises `Misuse` for a name in use, or an unknown machine, pin or axis."""
         if fault.name and self._named(fault.name) is not None:
-            raise Misuse(f"there is a fault {fault.name!r} already")
+            raise Misuse(FAULT_IS_SET_ALREADY(name=fault.name))
         active = ActiveFault(fault, fault.name or self._free_name(fault.kind.name), self.seed, now)
         failing = self.check(fault)
         self.active = (*self.active, active)
@@ -240,7 +252,7 @@ class Faults(Stateful):
         """The active fault called ``name``. Raises `Misuse` with the existing names."""
         active = self._named(name)
         if active is None:
-            raise Misuse(f"no fault {name!r}: set are {', '.join(a.name for a in self.active) or 'none'}")
+            raise Misuse(UNKNOWN_FAULT(name=name, names=[a.name for a in self.active] or NONE()))
         return active
 
     def clear(self, now: Nanos) -> None:
@@ -261,20 +273,20 @@ class Faults(Stateful):
         wanted = fault.get("machine")
         if wanted is None and len(self.machines) == 1:
             return next(iter(self.machines.values()))
-        there = ", ".join(self.machines) or "none"
+        there = list(self.machines) or NONE()
         if wanted is None:
-            raise Misuse(f"fault {fault.kind.name}: choose a machine: there are {there}")
+            raise Misuse(NO_MACHINE_OF_A_FAULT(name=fault.kind.name, names=there))
         machine = self.machines.get(str(wanted))
         if machine is None:
-            raise Misuse(f"fault {fault.kind.name}: machine = {wanted!r}: there are {there}")
+            raise Misuse(UNKNOWN_MACHINE_OF_A_FAULT(name=fault.kind.name, machine=repr(wanted), names=there))
         return machine
 
     def _element(self, fault: Fault) -> Failing:
         wanted = fault.get("element")
         found = self.elements.get(str(wanted))
         if found is None:
-            there = ", ".join(self.elements) or "none"
-            raise Misuse(f"fault {fault.kind.name}: element = {wanted!r}: those that can fail are {there}")
+            there = list(self.elements) or NONE()
+            raise Misuse(UNKNOWN_ELEMENT_OF_A_FAULT(name=fault.kind.name, element=repr(wanted), names=there))
         return found
 
     def of_element(self, name: str) -> tuple[ActiveFault, ...]:

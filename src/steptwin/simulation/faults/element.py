@@ -7,10 +7,15 @@ from typing import Any, ClassVar
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.messages import NONE, Message
 from steptwin.simulation.faults.active import ActiveFault, Faults, HeldLevel
 from steptwin.simulation.faults.table import Fault, FaultKind
 from steptwin.simulation.scheduler.kernel import Kernel
 from steptwin.state import Stateful
+
+FAULT_OF_ANOTHER_ELEMENT = Message(
+    "simulation.fault-of-another-element", "fault {name}: element = {element!r}, whose faults are {names}"
+)
 
 
 class FaultyElement(Stateful):
@@ -31,8 +36,8 @@ class FaultyElement(Stateful):
     def check(self, fault: Fault) -> None:
         """`Misuse` for a fault of another kind of element."""
         if fault.kind not in self._kinds:
-            there = ", ".join(kind.name for kind in self._kinds) or "none"
-            raise Misuse(f"fault {fault.kind.name}: element = {self.name!r}, whose faults are {there}")
+            there = [kind.name for kind in self._kinds] or NONE()
+            raise Misuse(FAULT_OF_ANOTHER_ELEMENT(name=fault.kind.name, element=self.name, names=there))
         if fault.kind.check is not None:
             fault.kind.check(self._part, fault)
 

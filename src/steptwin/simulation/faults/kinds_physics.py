@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.simulation.faults.active import ActiveFault
 from steptwin.simulation.faults.effects import ChangeEffect, MomentEffect, SaveEffect, WindowEffect
 from steptwin.simulation.faults.machine import FaultyMachine
@@ -67,10 +68,15 @@ def _bounce(active: ActiveFault, machine: FaultyMachine, pin: str, levels: tuple
     machine.bounce(changes)
 
 
+FAULT_OF_AN_ANALOG_INPUT = Message(
+    "simulation.fault-of-an-analog-input", "fault bounce: pin = {pin!r} is an analog input, which has no switch"
+)
+
+
 def _needs_switch(machine: FaultyMachine, fault: Fault) -> None:
     pin = machine.pin_of(fault)
     if pin.startswith("AIN"):
-        raise Misuse(f"fault bounce: pin = {pin!r} is an analog input, which has no switch")
+        raise Misuse(FAULT_OF_AN_ANALOG_INPUT(pin=pin))
 
 
 def _cut_power(active: ActiveFault, machine: FaultyMachine, old: bytes, kept: bytearray, now: Nanos) -> None:

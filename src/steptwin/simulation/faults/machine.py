@@ -7,6 +7,7 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos, PinEdge
+from steptwin.messages import Message, text_of
 from steptwin.motioncontroller import Drive, MotionController
 from steptwin.simulation.faults.active import ActiveFault, Faults, HeldLevel
 from steptwin.simulation.faults.answers import NEVER_SENT
@@ -66,6 +67,14 @@ class FaultySnapshot(NamedTuple):
 
     faults: Plain
     machine: Any
+
+
+MACHINE_LACKS_WHAT_FAILS = Message("simulation.machine-lacks-what-fails", "fault {name}: {machine!r} {problem}")
+UNKNOWN_AXIS_OF_A_FAULT = Message("simulation.unknown-axis-of-a-fault", "fault {name}: axis = {axis}: permitted are 1 to {most}")
+PIN_WITH_ITS_MACHINE = Message(
+    "simulation.pin-with-its-machine", "fault {name}: pin = {pin!r}: name the machine as machine=NAME, and the pin alone"
+)
+UNKNOWN_PIN_OF_A_FAULT = Message("simulation.unknown-pin-of-a-fault", "fault {name}: pin = {pin!r}: {machine!r} has {names}")
 
 
 class FaultyMachine(Stateful):
@@ -239,10 +248,10 @@ class FaultyMachine(Stateful):
         """`Misuse` unless the machine has the axis or input."""
         lacks = self.body.lacks(fault.kind)
         if lacks is not None:
-            raise Misuse(f"fault {fault.kind.name}: {self.name!r} {lacks}")
+            raise Misuse(MACHINE_LACKS_WHAT_FAILS(name=fault.kind.name, machine=self.name, problem=text_of(lacks)))
         axis = fault.whole("axis")
         if axis is not None and axis > len(self.body.shafts):
-            raise Misuse(f"fault {fault.kind.name}: axis = {axis}: permitted are 1 to {len(self.body.shafts)}")
+            raise Misuse(UNKNOWN_AXIS_OF_A_FAULT(name=fault.kind.name, axis=axis, most=len(self.body.shafts)))
         if fault.kind.check is not None:
             fault.kind.check(self, fault)
         if fault.kind.parameter("pin") is None:
@@ -250,9 +259,9 @@ class FaultyMachine(Stateful):
         pin = self.pin_of(fault)
         levels = self.inner.pins()
         if "." in pin:
-            raise Misuse(f"fault {fault.kind.name}: pin = {pin!r}: name the machine as machine=NAME, and the pin alone")
+            raise Misuse(PIN_WITH_ITS_MACHINE(name=fault.kind.name, pin=pin))
         if pin not in levels:
-            raise Misuse(f"fault {fault.kind.name}: pin = {pin!r}: {self.name!r} has {', '.join(levels)}")
+            raise Misuse(UNKNOWN_PIN_OF_A_FAULT(name=fault.kind.name, pin=pin, machine=self.name, names=list(levels)))
         level = fault.get("value")
         self.body.check_pin(pin, level if isinstance(level, float) else levels[pin])
 

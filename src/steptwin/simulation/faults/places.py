@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from steptwin.errors import Misuse
+from steptwin.messages import NONE, Message
 from steptwin.simulation.faults.kinds import KINDS
 from steptwin.simulation.faults.table import Fault, Layer, LineProtocol
 
@@ -42,6 +43,12 @@ class RequestRoute(NamedTuple):
         return f"{self.name} {self.line.value}, where {', '.join(kinds)} can happen"
 
 
+UNKNOWN_LINE_OF_A_FAULT = Message("simulation.unknown-line-of-a-fault", "fault {name}: line = {line}: there are {names}")
+UNKNOWN_LINK_OF_A_FAULT = Message("simulation.unknown-link-of-a-fault", "fault {name}: link = {link}: there are {names}")
+FAULT_HAPPENS_ELSEWHERE = Message("simulation.fault-happens-elsewhere", "fault {name} happens on {lines}: {offers}{hint}")
+UNKNOWN_UNIT_OF_A_FAULT = Message("simulation.unknown-unit-of-a-fault", "fault {name}: unit = {unit}: served are {names}")
+
+
 def check_place(fault: Fault, wires: Sequence[RequestRoute]) -> None:
     """Raises `Misuse` for a fault of bytes, frames or protocol that none of ``wires`` can show."""
     kind, link, unit = fault.kind, fault.get("link"), fault.get("unit")
@@ -49,20 +56,20 @@ def check_place(fault: Fault, wires: Sequence[RequestRoute]) -> None:
         return
     line = fault.get("line")
     if line is not None:
-        there = ", ".join(dict.fromkeys(wire.on for wire in wires if wire.on)) or "none"
+        there = list(dict.fromkeys(wire.on for wire in wires if wire.on)) or NONE()
         wires = [wire for wire in wires if wire.on == line]
         if not wires:
-            raise Misuse(f"fault {kind.name}: line = {line!r}: there are {there}")
+            raise Misuse(UNKNOWN_LINE_OF_A_FAULT(name=kind.name, line=repr(line), names=there))
     meant = [wire for wire in wires if (wire.is_usual if link is None else wire.is_called(str(link)))]
     if link is not None and not meant:
-        there = ", ".join(dict.fromkeys(wire.link for wire in wires if wire.link)) or "none"
-        raise Misuse(f"fault {kind.name}: link = {link!r}: there are {there}")
+        there = list(dict.fromkeys(wire.link for wire in wires if wire.link)) or NONE()
+        raise Misuse(UNKNOWN_LINK_OF_A_FAULT(name=kind.name, link=repr(link), names=there))
     able = [wire for wire in meant if wire.lets_happen(fault)]
     if not able:
         offers = "; ".join(dict.fromkeys(wire.offers for wire in meant)) or "there is no line"
         others = [wire for wire in wires if not wire.is_usual and wire.lets_happen(fault)] if link is None else []
         hint = f"; with link={others[0].link} it happens to the scripts' own requests, as {others[0].line}" if others else ""
-        raise Misuse(f"fault {kind.name} happens on {' and '.join(kind.lines)}: {offers}{hint}")
+        raise Misuse(FAULT_HAPPENS_ELSEWHERE(name=kind.name, lines=" and ".join(kind.lines), offers=offers, hint=hint))
     units = sorted({one for wire in able for one in wire.units})
     if unit is not None and unit not in units:
-        raise Misuse(f"fault {kind.name}: unit = {unit}: served are {', '.join(map(str, units)) or 'none'}")
+        raise Misuse(UNKNOWN_UNIT_OF_A_FAULT(name=kind.name, unit=unit, names=list(units) or NONE()))

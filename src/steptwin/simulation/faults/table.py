@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias, TypedDict, Unpack
 
 from steptwin.errors import Misuse
+from steptwin.messages import Message, text_of
 from steptwin.numerals import read_whole
 
 FaultValue: TypeAlias = int | float | str | tuple[int, int]
@@ -155,6 +156,9 @@ class FaultKind:
         return next((parameter for parameter in self.parameters if parameter.name == name), None)
 
 
+NO_NUMBER_OF_A_FAULT = Message("simulation.no-number-of-a-fault", "fault {name}: {key} = {value} is not a number")
+
+
 @dataclass(frozen=True, slots=True)
 class Fault:
     """``given`` are the parameters that were given; ``name`` distinguishes it from others of its kind; empty: none."""
@@ -176,7 +180,7 @@ class Fault:
         value = self.get(name)
         if isinstance(value, int | float):
             return value
-        raise Misuse(f"fault {self.kind.name}: {name} = {value!r} is not a number")
+        raise Misuse(NO_NUMBER_OF_A_FAULT(name=self.kind.name, key=name, value=repr(value)))
 
     def whole(self, name: str) -> int | None:
         value = self.get(name)
@@ -281,13 +285,17 @@ SERIAL = (LineProtocol.RTU, LineProtocol.CHARACTERS)
 MODBUS = (LineProtocol.RTU, LineProtocol.TCP)
 ALL_LINES = (LineProtocol.RTU, LineProtocol.TCP, LineProtocol.CHARACTERS)
 OFF = number("for_s", "How long the supply is off.", 1e-6, LONGEST_S, default=1.0)
+NUMBER_HAS_TOO_MANY_BITS = Message(
+    "simulation.number-has-too-many-bits", "{where}: a number of more than 63 bits: permitted are {permitted}"
+)
+VALUE_OF_A_FAULT = Message("simulation.value-of-a-fault", "{where} = {value}: permitted are {permitted}")
 
 
 def check(parameter: Parameter, value: object, where: str) -> FaultValue:
     """``value`` if the parameter takes it. `Misuse` names it, ``where`` and what is permitted."""
     form = parameter.form
     if isinstance(value, int) and abs(value) >= LARGEST_WHOLE:
-        raise Misuse(f"{where}: a number of more than 63 bits: permitted are {parameter.permitted}")
+        raise Misuse(NUMBER_HAS_TOO_MANY_BITS(where=where, permitted=text_of(parameter.permitted)))
     if form is ParameterForm.SPAN:
         return _span(parameter, value, where)
     if form is ParameterForm.NUMBER and isinstance(value, int) and not isinstance(value, bool):
@@ -298,7 +306,7 @@ def check(parameter: Parameter, value: object, where: str) -> FaultValue:
             return value
     elif isinstance(value, str) and value != "" and (not parameter.words or value in parameter.words):
         return value
-    raise Misuse(f"{where} = {value!r}: permitted are {parameter.permitted}")
+    raise Misuse(VALUE_OF_A_FAULT(where=where, value=repr(value), permitted=text_of(parameter.permitted)))
 
 
 def _is_within(parameter: Parameter, value: float) -> bool:
@@ -312,5 +320,5 @@ def _span(parameter: Parameter, value: object, where: str) -> tuple[int, int]:
     if first is None or last is None or len(ends) > 2:
         first, last = 1, 0
     if first > last or not _is_within(parameter, first) or not _is_within(parameter, last):
-        raise Misuse(f"{where} = {value!r}: permitted are {parameter.permitted}")
+        raise Misuse(VALUE_OF_A_FAULT(where=where, value=repr(value), permitted=text_of(parameter.permitted)))
     return first, last

@@ -14,7 +14,7 @@ from steptwin.simulation.faults.machine import AxisLoad, FaultyMachine
 from steptwin.simulation.faults.table import FaultKind, Need, Occasion
 from steptwin.simulation.kinds.kind import LineUnit
 
-DIGITAL_INPUT_IS_0_OR_1 = Message("simulation.m1486.digital-input-is-0-or-1", "{pin} = {level:g}: a digital input is 0 or 1")
+WRONG_LEVEL = Message("simulation.m1486.wrong-level", "{pin} = {level:g}: a digital input is 0 or 1")
 
 
 class M1486Body:
@@ -50,7 +50,7 @@ class M1486Body:
     def check_pin(self, pin: str, level: float) -> None:
         refuse_taken(known_pin(pin), self._chip.interface)
         if level not in (0.0, 1.0):
-            raise Misuse(DIGITAL_INPUT_IS_0_OR_1(pin=pin, level=level))
+            raise Misuse(WRONG_LEVEL(pin=pin, level=level))
 
 
 def _keep(chip: M1486Chip, store: Callable[[bytes], bytes | None] | None, owner: FaultyMachine, image: bytes) -> bytes:
