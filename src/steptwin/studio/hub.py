@@ -36,7 +36,6 @@ from steptwin.studio.requests import (
 )
 from steptwin.studio.streams import Streams
 from steptwin.studio.surroundings import Served, Surroundings
-from steptwin.studio.tools import tools
 from steptwin.studio.watches import Watches
 from steptwin.subject import commands as command
 from steptwin.subject.commands import COMMANDS
@@ -130,7 +129,7 @@ class Hub:
         self._describe()
         sheets = Sheets(lambda: subject.description)
         self.configurations = Configurations(sheets, self._configuration, self._present)
-        self.tools = tools(Calculations(sheets), self.configurations)
+        self.calculations = Calculations(sheets)
         self._jogs = jogs
         self._numbers = count(1)
         self._leases: dict[int, Lease] = {}

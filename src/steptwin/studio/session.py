@@ -7,9 +7,11 @@ past. The answer of a world is there at once, that of a device later: both are a
 from __future__ import annotations
 
 import json
+from base64 import b64encode
 from collections.abc import Awaitable, Callable, Mapping
+from inspect import isawaitable
 from itertools import count
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, ClassVar, NamedTuple, TypeAlias
 
 from steptwin.access.control import Viewer, check
 from steptwin.access.rate import RateLimit
@@ -27,6 +29,7 @@ from steptwin.studio import recordingrequests as recording
 from steptwin.studio import requests as ask
 from steptwin.studio import toolrequests as tool
 from steptwin.studio import workrequests as work
+from steptwin.studio.calculations import gear
 from steptwin.studio.hub import Hub
 from steptwin.studio.looking import OF_A_MOMENT, Looking
 from steptwin.studio.messages import VERSION
@@ -40,6 +43,7 @@ from steptwin.subject.contract import Result
 from steptwin.subject.dispatch import LONGEST_REQUEST, JsonObject, answer, code_of, failure, fields_of, id_of, read_message
 from steptwin.subject.following import Filter, filter_of
 from steptwin.tables import complete
+from steptwin.wire.pcapng import capture
 
 RATE, BURST = 200.0, 1000.0
 """Rate limit of a viewer: requests per second, and burst; stops have a separate limit of the same size."""
@@ -118,8 +122,6 @@ class ViewerSession:
         self._events_due: Nanos = 0
         self._now: Nanos = 0
         self._looking = Looking(hub.around.lookback)
-        self._asking = self._asking_actions()
-        self._own = self._own_actions()
         self._of_subject: Mapping[object, Callable[[Any, Identity], Awaitable[Result]]] = {
             command.Jog: lambda wanted, _: self._jog(wanted),
             command.StopAxes: lambda wanted, _: hub.stop(wanted),
@@ -129,63 +131,6 @@ class ViewerSession:
             command.Unfollow: lambda wanted, _: self._unfollow(wanted),
         }
         """Commands of a subject that mean something else, or more, in the studio."""
-
-    def _asking_actions(self) -> Mapping[object, Callable[[Any], Awaitable[object]]]:
-        """Of requests that ask the subject, which may answer later."""
-        hub = self._hub
-        return {
-            ask.ShowMoment: self._look_at,
-            ask.GoBack: self._go_back,
-            ask.ReadPastEvents: lambda wanted: self._looking.events(wanted.begin, wanted.end, wanted.kinds),
-            tool.ReadConfiguration: lambda wanted: hub.configurations.read(wanted.machine),
-            ask.ListPrograms: self._list_programs,
-            ask.ReadProgram: self._read_program,
-            ask.ReadMemory: self._read_memory,
-            ask.ListPorts: lambda _: hub.around.connections.ports(),
-            ask.Connect: self._connect,
-            ask.Disconnect: lambda wanted: hub.around.connections.disconnect(wanted.machine),
-            device.ReadSettings: self._read_settings,
-            device.SetShadow: lambda wanted: hub.around.connections.shadow(wanted.machine, on=wanted.on),
-            recording.ReadRecordings: lambda _: hub.recordings.plain(),
-            recording.SaveRecording: lambda wanted: hub.recordings.save(wanted.name),
-            recording.ViewRecording: self._view_recording,
-            branch.StartBranch: lambda wanted: hub.branches.start(wanted.moment),
-            branch.EndBranch: lambda wanted: hub.branches.end(wanted.branch),
-            plant.ReadHistory: lambda _: hub.plant.history(),
-            plant.ReadHistoryValues: lambda one: hub.plant.values(one.points, one.run, one.from_s, one.to_s),
-            plant.ReadHistoryWrites: lambda one: hub.plant.writes(one.run, one.from_s, one.to_s),
-            plant.CompareHistory: lambda one: hub.plant.compare(one.points, (one.run, one.other), one.from_s, one.to_s),
-            campaign.ListCampaigns: lambda _: hub.campaigns.plain(),
-            campaign.RunCampaign: lambda wanted: hub.campaigns.run(wanted.campaign),
-            campaign.EndCampaign: lambda wanted: hub.campaigns.end(wanted.campaign),
-        }
-
-    def _own_actions(self) -> Mapping[object, Callable[[Any], object]]:
-        """Of all other requests of the studio."""
-        hub = self._hub
-        actions: Mapping[object, Callable[[Any], object]] = {
-            ask.Hello: self._hello,
-            ask.Resync: self._resync,
-            ask.WatchPoints: self._watch,
-            ask.Unwatch: self._unwatch,
-            ask.TakeControl: lambda wanted: hub.take_control(self.viewer, over=wanted.over),
-            ask.ReleaseControl: lambda _: hub.release_control(self.viewer),
-            ask.Renew: lambda wanted: hub.renew(self.viewer, wanted.lease),
-            ask.LetGo: lambda wanted: hub.let_go(self.viewer, wanted.lease),
-            **hub.tools,
-            work.Scan: lambda wanted: hub.around.work.scan(wanted.places, wanted.kind, wanted.units, wanted.baud, wanted.timeout),
-            work.Verify: lambda wanted: hub.around.work.verify(wanted.address, write=wanted.write),
-            branch.ListBranches: lambda _: hub.branches.plain(),
-            plant.ReadGateways: lambda _: hub.plant.gateways(),
-            drawing.ReadDrawing: lambda _: hub.arrangement.plain(),
-            drawing.SaveDrawing: lambda wanted: hub.arrangement.save(wanted.places),
-            work.ReadWork: lambda _: hub.around.work.plain(),
-            device.ReadShadow: lambda wanted: hub.around.connections.shadow_of(wanted.machine, wanted.after),
-            work.CancelWork: lambda _: hub.around.work.cancel(),
-            ask.ReadTraffic: lambda wanted: hub.traffic(),
-            ask.ReadAudit: lambda wanted: [entry.plain() for entry in hub.around.audit.last(wanted.most)],
-        }
-        return complete("request", [row.kind for row in REQUESTS.values() if row.kind not in self._asking], "action", actions)
 
     @property
     def is_refused(self) -> bool:
@@ -238,9 +183,8 @@ class ViewerSession:
         return Wanted(name, fields, lambda identity: self._command(wanted, identity))
 
     async def _asked(self, request: ask.StudioRequest) -> Result:
-        asking = self._asking.get(type(request))
-        value = self._own[type(request)](request) if asking is None else await asking(request)
-        return self._hub.subject.result_of(value)
+        value = self._ACTIONS[type(request)](self, request)
+        return self._hub.subject.result_of(await value if isawaitable(value) else value)
 
     async def _command(self, wanted: Command, identity: Identity) -> Result:
         if self._looking.is_back and type(wanted) in OF_A_MOMENT:
@@ -504,3 +448,62 @@ class ViewerSession:
         }
         text = json.dumps(whole, separators=(",", ":"))
         return f'{{"seq":0,"hello":{text[:-1]},"description":{hub.description}}}}}'
+
+    _ACTIONS: ClassVar[Mapping[object, Callable[[Any, Any], object]]] = complete(
+        "request",
+        [row.kind for row in REQUESTS.values()],
+        "action",
+        {
+            ask.Hello: _hello,
+            ask.Resync: _resync,
+            ask.WatchPoints: _watch,
+            ask.Unwatch: _unwatch,
+            ask.TakeControl: lambda self, wanted: self._hub.take_control(self.viewer, over=wanted.over),
+            ask.ReleaseControl: lambda self, _: self._hub.release_control(self.viewer),
+            ask.Renew: lambda self, wanted: self._hub.renew(self.viewer, wanted.lease),
+            ask.LetGo: lambda self, wanted: self._hub.let_go(self.viewer, wanted.lease),
+            ask.ShowMoment: _look_at,
+            ask.GoBack: _go_back,
+            ask.ReadPastEvents: lambda self, one: self._looking.events(one.begin, one.end, one.kinds),
+            ask.ListPrograms: _list_programs,
+            ask.ReadProgram: _read_program,
+            ask.ReadMemory: _read_memory,
+            ask.ListPorts: lambda self, _: self._hub.around.connections.ports(),
+            ask.Connect: _connect,
+            ask.Disconnect: lambda self, wanted: self._hub.around.connections.disconnect(wanted.machine),
+            ask.ReadTraffic: lambda self, _: self._hub.traffic(),
+            ask.ReadAudit: lambda self, wanted: [entry.plain() for entry in self._hub.around.audit.last(wanted.most)],
+            tool.ReadConfiguration: lambda self, wanted: self._hub.configurations.read(wanted.machine),
+            tool.EditConfiguration: lambda self, one: self._hub.configurations.edit(one.machine, one.text, one.changes),
+            tool.ReadQuantities: lambda self, wanted: self._hub.calculations.quantities(wanted.machine, wanted.axis),
+            tool.Calculate: lambda self, one: self._hub.calculations.calculate(one.machine, one.axis, one.given, one.find),
+            tool.ConvertGear: lambda _, one: gear(one.motor_steps, one.microsteps, one.ratio, one.lead),
+            tool.MakeCapture: lambda _, one: {"data": b64encode(b"".join(capture(one.frames))).decode("ascii")},
+            device.ReadSettings: _read_settings,
+            device.ReadShadow: lambda self, wanted: self._hub.around.connections.shadow_of(wanted.machine, wanted.after),
+            device.SetShadow: lambda self, wanted: self._hub.around.connections.shadow(wanted.machine, on=wanted.on),
+            recording.ReadRecordings: lambda self, _: self._hub.recordings.plain(),
+            recording.SaveRecording: lambda self, wanted: self._hub.recordings.save(wanted.name),
+            recording.ViewRecording: _view_recording,
+            branch.ListBranches: lambda self, _: self._hub.branches.plain(),
+            branch.StartBranch: lambda self, wanted: self._hub.branches.start(wanted.moment),
+            branch.EndBranch: lambda self, wanted: self._hub.branches.end(wanted.branch),
+            plant.ReadGateways: lambda self, _: self._hub.plant.gateways(),
+            plant.ReadHistory: lambda self, _: self._hub.plant.history(),
+            plant.ReadHistoryValues: lambda self, one: self._hub.plant.values(one.points, one.run, one.from_s, one.to_s),
+            plant.ReadHistoryWrites: lambda self, one: self._hub.plant.writes(one.run, one.from_s, one.to_s),
+            plant.CompareHistory: lambda self, one: self._hub.plant.compare(
+                one.points, (one.run, one.other), one.from_s, one.to_s
+            ),
+            campaign.ListCampaigns: lambda self, _: self._hub.campaigns.plain(),
+            campaign.RunCampaign: lambda self, wanted: self._hub.campaigns.run(wanted.campaign),
+            campaign.EndCampaign: lambda self, wanted: self._hub.campaigns.end(wanted.campaign),
+            drawing.ReadDrawing: lambda self, _: self._hub.arrangement.plain(),
+            drawing.SaveDrawing: lambda self, wanted: self._hub.arrangement.save(wanted.places),
+            work.Scan: lambda self, one: self._hub.around.work.scan(one.places, one.kind, one.units, one.baud, one.timeout),
+            work.Verify: lambda self, wanted: self._hub.around.work.verify(wanted.address, write=wanted.write),
+            work.ReadWork: lambda self, _: self._hub.around.work.plain(),
+            work.CancelWork: lambda self, _: self._hub.around.work.cancel(),
+        },
+    )
+    """Actions of the requests of the studio, by class. The answer of one that asks a subject may come later."""
