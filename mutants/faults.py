@@ -49,7 +49,7 @@ class Fault:
     """What is once in the function, up to white space; ``new`` takes its place."""
     new: str
     noticed: Mapping[str, Sequence[str]]
-    """By kind, tests that noticed it first, each ``tests/world/test_belt.py::test_it``."""
+    """By kind, tests that noticed it first, each ``tests/simulation/mechanics/test_belt.py::test_it``."""
 
     def put_into(self, root: Path) -> tuple[Path, str]:
         """The module with the function and its source with the fault. Raises `Lost`."""

@@ -5,7 +5,7 @@ export interface Branch {
   time: string;
 }
 
-/** The name of a branch says what it is (commands/studio_branches.py); null for any other world. */
+/** The name of a branch says what it is (live/studio/branches.py); null for any other world. */
 export function branchOf(name: string): Branch | null {
   const [, of, number, time] = /^(.+), branch (\d+) from ([\d.]+) s$/.exec(name) ?? [];
   return of === undefined || number === undefined || time === undefined ? null : { name: of, number, time };
