@@ -103,7 +103,7 @@ class Interpreter(Stateful):
         """Something outside the cells has changed since the mark."""
         self._moment: Nanos = -1
         self._spent = 0
-        """Statements executed at that moment, also before a restart by the program itself."""
+        """Statements executed at that moment, also before a restart by the program itself; counted if they take no time."""
         self.stack: deque[tuple[int, Nanos]]
         """Steps to which RETURN goes, each with its earliest moment (a DELAY that was interrupted, WBC-19)."""
         self.not_before: Nanos
@@ -255,10 +255,9 @@ class Interpreter(Stateful):
         if now < self.not_before:  # the interrupt for which a DELAY was looked at again has been dropped meanwhile
             self.due = self.not_before
             return
-        if now != self._moment:
-            self._moment = now
-            self._spent = 0
         if self.statement_time == 0:
+            if now != self._moment:
+                self._moment, self._spent = now, 0
             self._execute_untimed(code)
             return
         while True:
