@@ -22,8 +22,8 @@ READ_FLAGS = (
     os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
 )  # fmt: skip
 """Open for reading: no waiting for the other end of a pipe, not inherited by processes, no translation of line ends."""
-OWN_SIGNAL = signal.SIGBREAK if sys.platform == "win32" else signal.SIGUSR1
-"""A signal that means what a program says."""
+OWN_SIGNAL: signal.Signals = getattr(signal, "SIGUSR1", None) or signal.Signals(21)
+"""A signal that means what a program says; where there is no SIGUSR1, the SIGBREAK of Windows, which is 21."""
 
 WRITE_FLAGS = os.O_WRONLY | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
 """Open for writing: not inherited by processes, no translation of line ends."""
