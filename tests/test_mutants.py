@@ -190,11 +190,11 @@ def test_a_recorded_fault_is_found_where_its_function_is_now(tree: Tree) -> None
     one = fault("total", "( a + b )", "(a - b)")
     assert one.put_into(tree.path)[0] == SUMS
     assert "return (a - b)" in one.put_into(tree.path)[1]
-    (tree.path / "src/steptwin/world/sums.py").write_text((tree.path / SUMS).read_text())
+    (tree.path / "src/steptwin/simulation/sums.py").write_text((tree.path / SUMS).read_text())
     assert one.put_into(tree.path)[0] == SUMS, "where it was first"
     (tree.path / SUMS).write_text("")
-    assert one.put_into(tree.path)[0] == Path("src/steptwin/world/sums.py")
-    (tree.path / "src/steptwin/world/other.py").write_text((tree.path / "src/steptwin/world/sums.py").read_text())
+    assert one.put_into(tree.path)[0] == Path("src/steptwin/simulation/sums.py")
+    (tree.path / "src/steptwin/simulation/other.py").write_text((tree.path / "src/steptwin/simulation/sums.py").read_text())
     for lost in (one, fault("total", "a", "b"), fault("sum", "a + b", "a - b"), fault("use", "3", "(")):
         with pytest.raises(Lost):
             lost.put_into(tree.path)
@@ -202,10 +202,10 @@ def test_a_recorded_fault_is_found_where_its_function_is_now(tree: Tree) -> None
 
 def test_a_test_is_found_where_it_is_now(tree: Tree) -> None:
     assert find_test(tree.path, IN_WIRE) == IN_WIRE
-    (tree.path / "tests/wire/test_sums.py").rename(tree.path / "tests/world/test_sums.py")
-    assert find_test(tree.path, IN_WIRE) == "tests/world/test_sums.py::test_total"
-    (tree.path / "tests/world/test_sums.py").rename(tree.path / "tests/world/test_added.py")
-    assert find_test(tree.path, IN_WIRE) == "tests/world/test_added.py::test_total"
-    (tree.path / "tests/world/test_added.py").unlink()
+    (tree.path / "tests/wire/test_sums.py").rename(tree.path / "tests/simulation/test_sums.py")
+    assert find_test(tree.path, IN_WIRE) == "tests/simulation/test_sums.py::test_total"
+    (tree.path / "tests/simulation/test_sums.py").rename(tree.path / "tests/simulation/test_added.py")
+    assert find_test(tree.path, IN_WIRE) == "tests/simulation/test_added.py::test_total"
+    (tree.path / "tests/simulation/test_added.py").unlink()
     with pytest.raises(Lost):
         find_test(tree.path, IN_WIRE)

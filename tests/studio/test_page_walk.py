@@ -15,7 +15,12 @@ from tests.studio.conftest import Process
 
 OF_TWINS = re.compile(r"\b(twins?|virtual\w*|world\w*|simulat\w*|descriptions?)\b", re.IGNORECASE)
 ABOUT_TWINS = {
-    "Devices": ("Twin beside it", "Does it behave as the twin does?", "no twin"),
+    "Devices": (
+        "Twin beside it",
+        "Does it behave as the twin does?",
+        "no twin",
+        "a twin needs the configuration of the controller",
+    ),
 }
 """What a panel of devices says of twins."""
 VENDORS = Path(__file__).parents[2] / "docs/vendor-programs.md"
