@@ -6,8 +6,7 @@ several chips share an `M1486Line` or `AsyncM1486Line`. Errors as of `steptwin.d
 
 from __future__ import annotations
 
-from steptwin.drivers.m1486.chip import ChipStatus
-from steptwin.drivers.m1486.driver import AsyncM1486
+from steptwin.drivers.m1486.driver import AsyncM1486, ChipStatus
 from steptwin.drivers.m1486.failures import (
     Busy,
     DoubtfulMove,

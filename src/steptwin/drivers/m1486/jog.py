@@ -11,19 +11,20 @@ from __future__ import annotations
 
 from contextlib import suppress
 from types import TracebackType
-from typing import Self
+from typing import Protocol, Self
 
 from steptwin.drivers.exchange import Overtaken, SentLate, TooLate
-from steptwin.drivers.m1486.chip import AsyncChip
 from steptwin.drivers.m1486.download import begin
 from steptwin.drivers.m1486.motion import ChipMotion
+from steptwin.drivers.m1486.settings import ChipSettings
+from steptwin.drivers.m1486.unit import ChipUnit
 from steptwin.drivers.m1486.waiting import wait_for
 from steptwin.drivers.permission import HOLD_NS, Permission
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.m1486.lines import STEP_DIRECTION
 from steptwin.m1486.microsteps import FULL_STEP
 from steptwin.m1486.unit import MASK
-from steptwin.m1486.variants import SLOWEST_JOG, Store
+from steptwin.m1486.variants import SLOWEST_JOG, Store, Variant
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.messages import Message
 
@@ -51,6 +52,24 @@ LINE_IS_TOO_SLOW_TO_JOG = Message(
 JOG_IS_NOT_BEGUN = Message("drivers.m1486.jog-is-not-begun", "a jog is held inside its with block")
 
 
+class JoggedChip(Protocol):
+    """The part of `steptwin.drivers.m1486.driver.AsyncM1486` that a jog needs."""
+
+    unit: str
+    scale_u: float
+    _unit: ChipUnit
+
+    @property
+    def variant(self) -> Variant: ...
+
+    @property
+    def settings(self) -> ChipSettings: ...
+
+    async def configure(self, *, velocity: int | None = None) -> None: ...
+
+    def _shown(self, counter_u: int) -> float: ...
+
+
 class AsyncM1486Jog:
     """A jog at ``velocity`` (units/s): ``async with jog: while pressed(): await jog.hold()``.
 
@@ -60,7 +79,7 @@ class AsyncM1486Jog:
     EEPROM, and for a line slower than 1200 bit/s.
     """
 
-    def __init__(self, chip: AsyncChip, velocity: float) -> None:
+    def __init__(self, chip: JoggedChip, velocity: float) -> None:
         if not velocity:
             raise Misuse(VELOCITY_ZERO())
         if chip.variant.store is Store.EEPROM:

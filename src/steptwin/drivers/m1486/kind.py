@@ -24,10 +24,9 @@ from steptwin.drivers.kind import (
 )
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.m1486 import named
-from steptwin.drivers.m1486.chip import TIMEOUT_S
 from steptwin.drivers.m1486.conversation import ChipConversation
 from steptwin.drivers.m1486.decoder import M1486Decoder
-from steptwin.drivers.m1486.driver import AsyncM1486
+from steptwin.drivers.m1486.driver import TIMEOUT_S, AsyncM1486
 from steptwin.drivers.m1486.identify import CHIP_BAUDS, SearchLine, end_line, scan_chips, select_all
 from steptwin.drivers.m1486.jog import LINK_S, RELEASED
 from steptwin.drivers.m1486.lines import BAUD, AsyncM1486Line

@@ -13,8 +13,7 @@ from dataclasses import asdict, replace
 from steptwin.controllerstate import ControllerState, DetailValue, ProgramActivity, StateAxis, StateProgram, StateStatus
 from steptwin.datasheet import Datasheet
 from steptwin.drivers.line import DriverLine
-from steptwin.drivers.m1486.chip import ChipStatus
-from steptwin.drivers.m1486.driver import AsyncM1486
+from steptwin.drivers.m1486.driver import AsyncM1486, ChipStatus
 from steptwin.drivers.m1486.failures import Busy
 from steptwin.drivers.m1486.jog import AsyncM1486Jog
 from steptwin.drivers.m1486.notes import FUNCTION_BYTES

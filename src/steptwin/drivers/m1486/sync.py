@@ -11,9 +11,8 @@ from typing import Self
 
 from steptwin.drivers.blocking import Blocking, blocking, finish
 from steptwin.drivers.line import DriverLine
-from steptwin.drivers.m1486.chip import TIMEOUT_S, ChipStatus
 from steptwin.drivers.m1486.download import DownloadProgress
-from steptwin.drivers.m1486.driver import AsyncM1486
+from steptwin.drivers.m1486.driver import TIMEOUT_S, AsyncM1486, ChipStatus
 from steptwin.drivers.m1486.driver import download_to as async_download_to
 from steptwin.drivers.m1486.jog import AsyncM1486Jog
 from steptwin.drivers.m1486.lines import BAUD, ThreadM1486Line

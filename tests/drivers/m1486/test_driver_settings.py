@@ -320,7 +320,7 @@ def test_a_driver_opens_the_line_at_its_address_as_it_is_told(monkeypatch: pytes
         opened.append((address, baud, log))
         return chip_line(ChipWire("B"))
 
-    monkeypatch.setattr("steptwin.drivers.m1486.chip.AsyncM1486Line", line)
+    monkeypatch.setattr("steptwin.drivers.m1486.driver.AsyncM1486Line", line)
     AsyncM1486("tcp://127.0.0.1:5022", 3, baud=19_200, log=print)
     assert opened == [("tcp://127.0.0.1:5022", 19_200, print)]
 
