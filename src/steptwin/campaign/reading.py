@@ -31,7 +31,7 @@ from steptwin.machine import SECOND, Nanos
 from steptwin.simulation.describe.tables import SEED, tables
 from steptwin.simulation.logic.expression import parse_condition
 from steptwin.simulation.toml.reader import Key, TomlText, optional, read_table
-from steptwin.simulation.toml.sense import TableRows, check_sense
+from steptwin.simulation.toml.table import TableRows, check_sense
 from steptwin.simulation.toml.tomlplaces import Path as TomlPath
 from steptwin.simulation.toml.values import flag, name_value, number, positive_time, text_value, whole, word
 

@@ -21,15 +21,14 @@ from steptwin.files.world import World
 from steptwin.live.running import UpOptions, up
 from steptwin.machine import MILLISECOND
 from steptwin.simulation.components.button import BUTTON
-from steptwin.simulation.components.elementspec import ElementSpec
+from steptwin.simulation.components.contact import ContactSpec
 from steptwin.simulation.components.registry import ELEMENTS, register
 from steptwin.simulation.components.source import SOURCE
 from steptwin.simulation.components.wire import WIRE
 from steptwin.simulation.faults import KINDS, read
 from steptwin.simulation.script.steps import SetFault
-from steptwin.simulation.toml.reader import WorldError, optional
-from steptwin.simulation.toml.sense import TableRows
-from steptwin.simulation.toml.values import flag
+from steptwin.simulation.toml.reader import WorldError
+from steptwin.simulation.toml.table import table
 from steptwin.tables import IncompleteTable
 
 TEXT = """
@@ -196,17 +195,19 @@ def test_what_elements_record_begins_with_its_first_level() -> None:
     assert sorted(first) == EDGES.split()
 
 
-@dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
-class Bare(ElementSpec):
-    """An element without a value."""
+@table("[[button]]")
+class Unread(ContactSpec):
+    """A button with a field that is no key."""
+
+    name: str = ""
+    colour: str = "green"
 
 
 @pytest.mark.parametrize(
     ("element", "changed", "text"),
     [
-        (BUTTON, {"spec": Bare}, "element button: Bare lacks bounce, bounces, contact, join, name, target"),
+        (BUTTON, {"spec": Unread}, "element button: no key becomes colour, name of Unread"),
         (BUTTON, {"signals": None}, "element button has a name and lacks its signals"),
-        (BUTTON, {"rows": dataclasses.replace(BUTTON.rows, keys=BUTTON.rows.keys[1:])}, "no key becomes name of ButtonSpec"),
         (WIRE, {"signals": lambda part: {}}, "element wire has signals and lacks a name"),
         (WIRE, {"terminals": ELEMENTS["gate"].terminals}, "element wire has terminals and lacks a name"),
         (WIRE, {"faults": LAMP.faults}, "element wire: fault burnt-out is of the layer element, and its element has a name"),
@@ -220,16 +221,9 @@ def test_an_incomplete_element_is_refused(element: Any, changed: dict[str, objec
 
 def test_a_piece_that_is_left_out_is_an_error_at_import() -> None:
     whole: dict[str, Any] = {one.name: getattr(SOURCE, one.name) for one in dataclasses.fields(SOURCE) if one.init}
-    for name in ("spec", "rows", "read", "refers", "build"):
+    for name in ("spec", "refers", "build"):
         with pytest.raises(TypeError, match=name):
             type(SOURCE)(**{key: value for key, value in whole.items() if key != name})
-
-
-def test_rows_speak_of_keys_that_there_are() -> None:
-    with pytest.raises(IncompleteTable, match=r"\[\[x\]\] has no key b"):
-        TableRows(written="[[x]]", keys=(optional(flag, "a", "?"),), need={"a": "b"})
-    with pytest.raises(Misuse, match=r"\[\[x\]\]: two keys have one name"):
-        TableRows(written="[[x]]", keys=(optional(flag, "a", "?"), optional(flag, "a", "!")))
 
 
 def test_a_name_is_registered_once() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import ClassVar
 
 from steptwin.machine import Nanos
@@ -17,17 +16,17 @@ from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.scheduler.kernel import Kernel
 from steptwin.simulation.scheduler.wires import PinName
-from steptwin.simulation.toml.reader import Key, Row, Table, TomlText, optional
-from steptwin.simulation.toml.sense import TableRows
+from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT, Terminal, flag, name_value, pin_name, time_value
 from steptwin.state import Stateful
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@table("[[lamp]]")
 class LampSpec(NamedSpec):
-    source: Terminal
-    inverted: bool
-    warms: Nanos
+    name: str = key(name_value, "how conditions and faults name it")
+    source: Terminal = key(pin_name, "the output: MACHINE.PIN", name="from")
+    inverted: bool = key(flag, "whether it is lit while the output is off", default=False)
+    warms: Nanos = key(time_value, "how long it needs to light up", default=0)
 
 
 class Lamp(Stateful):
@@ -68,10 +67,6 @@ class Lamp(Stateful):
         return self._due
 
 
-def _read(text: TomlText, row: Row, table: Table) -> LampSpec:
-    return LampSpec(**row)
-
-
 def _refers(spec: LampSpec, described: ElementSpecs) -> Iterator[Reference]:
     yield Reference(spec.source[0], spec.source[0], (*spec.path, "from"))
 
@@ -93,18 +88,7 @@ def _burn(active: ActiveFault, lamp: Lamp, begins: bool, now: Nanos) -> str:
 
 
 LAMP: Element[LampSpec, Lamp] = Element(
-    name="lamp",
     spec=LampSpec,
-    rows=TableRows(
-        written="[[lamp]]",
-        keys=(
-            Key("name", name_value, "how conditions and faults name it"),
-            Key("from", pin_name, "the output: MACHINE.PIN", attribute="source"),
-            optional(flag, "inverted", "whether it is lit while the output is off", False),
-            optional(time_value, "warms", "how long it needs to light up", 0),
-        ),
-    ),
-    read=_read,
     refers=_refers,
     build=_build,
     signals=_signals,

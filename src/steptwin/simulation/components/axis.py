@@ -12,10 +12,10 @@ from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
-from steptwin.simulation.components.encoder import ENCODER, EncoderSpec, read_encoder
-from steptwin.simulation.components.motor import MOTOR, MotorSpec, motor_of, read_motor
+from steptwin.simulation.components.encoder import EncoderSpec
+from steptwin.simulation.components.motor import MotorSpec, motor_of
 from steptwin.simulation.components.site import Site
-from steptwin.simulation.components.switch import SWITCH, SwitchSpec, lane_of, put_switch, read_switches, zone_of
+from steptwin.simulation.components.switch import SwitchSpec, lane_of, put_switch, zone_of
 from steptwin.simulation.kinds.kind import EncoderInputs
 from steptwin.simulation.logic.contacts import Switch, Zone
 from steptwin.simulation.logic.signal import SignalOf
@@ -24,8 +24,8 @@ from steptwin.simulation.mechanics.mechanics import EncoderBuild, Mechanism, Rot
 from steptwin.simulation.mechanics.scale import GivenScale, Scale, exact_fraction, scale_of
 from steptwin.simulation.scheduler.kernel import Kernel, Source
 from steptwin.simulation.toml.names import Unknown, WrongTerminal
-from steptwin.simulation.toml.reader import Key, Row, Table, TomlText, optional
-from steptwin.simulation.toml.sense import TableRows
+from steptwin.simulation.toml.reader import TomlText
+from steptwin.simulation.toml.table import key, table, table_in, tables_in
 from steptwin.simulation.toml.values import (
     Terminal,
     axis_number,
@@ -43,21 +43,35 @@ MECHANICS = ("position", "lost", "stalled")
 """What there is of the mechanics of an axis."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@table("[[axis]]")
 class AxisSpec(NamedSpec):
-    drive: Terminal
-    kind: str
-    unit: str | None
-    pulses_per_unit: float | None
-    pitch: float | None
-    pulses_per_rev: int | None
-    inverted: bool
-    travel: tuple[float, float] | None
-    start: float
-    backlash: float
-    switches: tuple[SwitchSpec, ...]
-    encoder: EncoderSpec | None
-    motor: MotorSpec | None
+    name: str = key(name_value, "how scripts and conditions name it")
+    drive: Terminal = key(pin_name, "what drives it: an axis of a controller, such as table.M1")
+    kind: str = key(word("linear", "rotary"), "what moves", default="linear")
+    unit: str | None = key(
+        text_value, "of its positions: mm, cm, m, degree, rev or anything; default mm, degree or its drive's", default=None
+    )
+    pulses_per_unit: float | None = key(
+        number(0.0, above=True),
+        "pulses (M1486: minimum microsteps) per unit; else by pitch, by revolution, by gear",
+        default=None,
+    )
+    pitch: float | None = key(
+        number(0.0, above=True),
+        "units per motor revolution, instead of pulses_per_unit",
+        default=None,
+        excludes=("pulses_per_unit",),
+    )
+    pulses_per_rev: int | None = key(
+        whole(1, 10**7), "pulses per motor revolution; default mot_resol; M1486: 64 × full_steps", default=None
+    )
+    inverted: bool = key(flag, "whether positive pulses go down", default=False)
+    travel: tuple[float, float] | None = key(pair, "hard stops, in its unit", default=None)
+    start: float = key(number(), "where it stands when the world begins, in its unit", default=0.0)
+    backlash: float = key(number(0.0), "play between motor and load, in its unit", default=0.0)
+    switches: tuple[SwitchSpec, ...] = tables_in("switch", SwitchSpec)
+    encoder: EncoderSpec | None = table_in("encoder", EncoderSpec)
+    motor: MotorSpec | None = table_in("motor", MotorSpec)
 
     @property
     def scale(self) -> GivenScale:
@@ -70,6 +84,17 @@ class AxisSpec(NamedSpec):
             pulses_per_rev=self.pulses_per_rev,
             full_steps=None if self.motor is None else self.motor.full_steps,
         )
+
+    def check(self, text: TomlText) -> None:
+        if self.encoder is not None and self.encoder.follows == self.name:
+            text.wrong(
+                (*self.encoder.path, "follows"),
+                "D007",
+                f"follows = {self.name!r} is its own axis: an encoder is on it anyway",
+            )
+        start, travel = (*self.path, "start"), self.travel
+        if travel is not None and not travel[0] <= self.start <= travel[1] and not text.is_wrong(start):
+            text.wrong(start, "D007", f"start = {self.start:g} is outside travel = {list(travel)}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,24 +113,6 @@ class BuiltAxis:
     def units(self, pulses: int) -> float:
         scale = self.scale.pulses_per_unit
         return pulses * scale.denominator / scale.numerator
-
-
-def _read(text: TomlText, row: Row, table: Table) -> AxisSpec:
-    path = row["path"]
-    spec = AxisSpec(
-        **row,
-        switches=tuple(read_switches(text, path, table)),
-        encoder=read_encoder(text, path, table),
-        motor=read_motor(text, path, table),
-    )
-    if spec.encoder is not None and spec.encoder.follows == spec.name:
-        text.wrong(
-            (*spec.encoder.path, "follows"), "D007", f"follows = {spec.name!r} is its own axis: an encoder is on it anyway"
-        )
-    start, travel = (*path, "start"), spec.travel
-    if travel is not None and not travel[0] <= spec.start <= travel[1] and not text.is_wrong(start):
-        text.wrong(start, "D007", f"start = {spec.start:g} is outside travel = {list(travel)}")
-    return spec
 
 
 def _refers(spec: AxisSpec, described: ElementSpecs) -> Iterator[Reference]:
@@ -257,34 +264,7 @@ def _signals(fitted: BuiltAxis) -> Mapping[str, SignalOf]:
 
 
 AXIS: Element[AxisSpec, BuiltAxis] = Element(
-    name="axis",
     spec=AxisSpec,
-    rows=TableRows(
-        written="[[axis]]",
-        keys=(
-            Key("name", name_value, "how scripts and conditions name it"),
-            Key("drive", pin_name, "what drives it: an axis of a controller, such as table.M1"),
-            optional(word("linear", "rotary"), "kind", "what moves", "linear"),
-            optional(
-                text_value, "unit", "of its positions: mm, cm, m, degree, rev or anything; default mm, degree or its drive's"
-            ),
-            optional(
-                number(0.0, above=True),
-                "pulses_per_unit",
-                "pulses (M1486: minimum microsteps) per unit; else by pitch, by revolution, by gear",
-            ),
-            optional(number(0.0, above=True), "pitch", "units per motor revolution, instead of pulses_per_unit"),
-            optional(whole(1, 10**7), "pulses_per_rev", "pulses per motor revolution; default mot_resol; M1486: 64 × full_steps"),
-            optional(flag, "inverted", "whether positive pulses go down", False),
-            optional(pair, "travel", "hard stops, in its unit"),
-            optional(number(), "start", "where it stands when the world begins, in its unit", 0.0),
-            optional(number(0.0), "backlash", "play between motor and load, in its unit", 0.0),
-        ),
-        exclude=(("pulses_per_unit", "pitch"),),
-    ),
-    inner={"switch": SWITCH, "encoder": ENCODER, "motor": MOTOR},
-    inner_attributes={"switch": "switches"},
-    read=_read,
     refers=_refers,
     build=_build,
     connect=_connect,

@@ -2,63 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import ClassVar, Protocol, TypeVar
 
 from steptwin.machine import Nanos
-from steptwin.simulation.components.contact import CONTACT_KEYS
+from steptwin.simulation.components.contact import ContactSpec
 from steptwin.simulation.logic.contacts import Circuit, Contact
 from steptwin.simulation.mechanics.belt import BeltDrive, Load, next_change
 from steptwin.simulation.scheduler.chance import Chance
-from steptwin.simulation.toml.reader import Key, Table, TomlText, optional, read_table
-from steptwin.simulation.toml.sense import TableRows, check_sense
-from steptwin.simulation.toml.tomlplaces import Path
+from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import INPUT_PIN, Terminal, number, word
 
 WORKPIECE, MARK = "workpiece", "mark"
 T = TypeVar("T")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SensorSpec:
+@table("[[conveyor.sensor]]")
+class SensorSpec(ContactSpec):
     """A light barrier, proximity switch or mark sensor over the belt."""
 
-    at: float
-    sees: str
-    target: Terminal
-    contact: str
-    join: str | None
-    bounce: Nanos
-    bounces: int
-    path: Path = ()
-
-
-SENSOR = TableRows(
-    written="[[conveyor.sensor]]",
-    keys=(
-        Key("at", number(0.0), "mm from the beginning of the belt"),
-        Key("to", INPUT_PIN, "the input, on while a workpiece covers it: MACHINE.PIN", attribute="target"),
-        optional(word(WORKPIECE, MARK), "sees", "workpiece, or the marks on workpieces", WORKPIECE),
-        *CONTACT_KEYS,
-    ),
-    need={"bounces": "bounce"},
-)
-
-
-def read_inner(
-    text: TomlText, path: Path, table: Table, key: str, rows: TableRows, make: Callable[..., T], needed: tuple[str, ...]
-) -> tuple[T, ...]:
-    """The tables ``key`` in a table, those that have what they need."""
-    given = table.get(key, [])
-    found: list[T] = []
-    for n, one in enumerate(given if isinstance(given, list) else [given]):
-        of_one = (*path, key, n)
-        values = read_table(text, of_one, one, rows.keys)
-        if all(attribute in values for attribute in needed):
-            check_sense(text, of_one, rows, one)
-            found.append(make(**values, path=of_one))
-    return tuple(found)
+    at: float = key(number(0.0), "mm from the beginning of the belt", order=-1)
+    target: Terminal = key(INPUT_PIN, "the input, on while a workpiece covers it: MACHINE.PIN", name="to")
+    sees: str = key(word(WORKPIECE, MARK), "workpiece, or the marks on workpieces", default=WORKPIECE)
 
 
 class Carrying(Protocol):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from typing import ClassVar
 
 from steptwin.errors import Misuse
@@ -18,22 +17,22 @@ from steptwin.simulation.faults.table import number
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.mechanics.mechanics import Mechanism
 from steptwin.simulation.scheduler.kernel import Board
-from steptwin.simulation.toml.reader import Key, optional
+from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, NameOf, Terminal, time_value
 from steptwin.simulation.toml.values import number as number_value
 
 RELEASE, RELEASED = "RELEASE", "RELEASED"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@table("[[brake]]")
 class BrakeSpec(BoardSpec):
     """``torque`` in N·m at the motor."""
 
-    axis: str
-    torque: float
-    release: Terminal | None
-    release_time: Nanos
-    apply_time: Nanos
+    axis: str = key(NameOf("axis"), "the axis whose motor it holds")
+    torque: float = key(number_value(0.0, above=True), "N·m at the motor, of a brake that is not worn")
+    release: Terminal | None = key(OUTPUT_PIN, "output joined to RELEASE; without it a wire may be", default=None)
+    release_time: Nanos = key(time_value, "from RELEASE on until it lets go", default=30 * MILLISECOND)
+    apply_time: Nanos = key(time_value, "from RELEASE off until it acts", default=20 * MILLISECOND)
 
     @property
     def terminals(self) -> Terminals:
@@ -118,15 +117,7 @@ def _make(spec: BrakeSpec, site: Site) -> Brake:
 
 
 BRAKE = with_terminals(
-    "brake",
     BrakeSpec,
-    (
-        Key("axis", NameOf("axis"), "the axis whose motor it holds"),
-        Key("torque", number_value(0.0, above=True), "N·m at the motor, of a brake that is not worn"),
-        optional(OUTPUT_PIN, "release", "output joined to RELEASE; without it a wire may be"),
-        optional(time_value, "release_time", "from RELEASE on until it lets go", 30 * MILLISECOND),
-        optional(time_value, "apply_time", "from RELEASE off until it acts", 20 * MILLISECOND),
-    ),
     make=_make,
     faults=(
         *STUCK,

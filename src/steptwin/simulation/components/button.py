@@ -3,32 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
-from steptwin.machine import Nanos
-from steptwin.simulation.components.contact import CONTACT_KEYS
+from steptwin.simulation.components.contact import ContactSpec
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.simulation.components.site import Site
 from steptwin.simulation.logic.contacts import Button
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.scheduler.kernel import Kernel
-from steptwin.simulation.toml.reader import Key, Row, Table, TomlText
-from steptwin.simulation.toml.sense import TableRows
-from steptwin.simulation.toml.values import INPUT_PIN, Terminal, name_value
+from steptwin.simulation.toml.table import key, table
+from steptwin.simulation.toml.values import name_value
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ButtonSpec(NamedSpec):
-    target: Terminal
-    contact: str
-    join: str | None
-    bounce: Nanos
-    bounces: int
-
-
-def _read(text: TomlText, row: Row, table: Table) -> ButtonSpec:
-    return ButtonSpec(**row)
+@table("[[button]]")
+class ButtonSpec(ContactSpec, NamedSpec):
+    name: str = key(name_value, "how scripts name it")
 
 
 def _refers(spec: ButtonSpec, described: ElementSpecs) -> Iterator[Reference]:
@@ -57,18 +46,7 @@ def _signals(built: tuple[Button, Kernel]) -> Mapping[str, SignalOf]:
 
 
 BUTTON: Element[ButtonSpec, tuple[Button, Kernel]] = Element(
-    name="button",
     spec=ButtonSpec,
-    rows=TableRows(
-        written="[[button]]",
-        keys=(
-            Key("name", name_value, "how scripts name it"),
-            Key("to", INPUT_PIN, "the input: MACHINE.PIN", attribute="target"),
-            *CONTACT_KEYS,
-        ),
-        need={"bounces": "bounce"},
-    ),
-    read=_read,
     refers=_refers,
     build=_build,
     signals=_signals,

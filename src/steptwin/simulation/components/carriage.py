@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import partial
 from math import floor
 from typing import ClassVar
@@ -15,7 +14,7 @@ from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.simulation.components.site import Site
-from steptwin.simulation.components.switch import SWITCH, SwitchSpec, lane_of, put_switch, read_switches, zone_of
+from steptwin.simulation.components.switch import SwitchSpec, lane_of, put_switch, zone_of
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.faults.table import number as parameter
@@ -23,20 +22,20 @@ from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.drawing import rail
 from steptwin.simulation.mechanics.lanes import SPRING_SHARE, MovedLane
 from steptwin.simulation.mechanics.loadmotion import load_stretches
-from steptwin.simulation.toml.reader import Key, Row, Table, TomlText, optional
-from steptwin.simulation.toml.sense import TableRows
+from steptwin.simulation.toml.table import key, table, tables_in
 from steptwin.simulation.toml.values import NameOf, name_value, number
 from steptwin.state import Plain, Stateful
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@table("[[carriage]]")
 class CarriageSpec(NamedSpec):
     """``frequency`` in Hz; ``damping`` is the damping ratio."""
 
-    axis: str
-    frequency: float
-    damping: float
-    switches: tuple[SwitchSpec, ...]
+    name: str = key(name_value, "how conditions and faults name it")
+    axis: str = key(NameOf("axis"), "the axis that moves it")
+    frequency: float = key(number(0.1, 10_000.0), "Hz at which it swings while the axis stands")
+    damping: float = key(number(0.001, 0.99), "damping ratio: 1 would not swing", default=0.05)
+    switches: tuple[SwitchSpec, ...] = tables_in("switch", SwitchSpec)
 
 
 class Carriage(Stateful):
@@ -141,10 +140,6 @@ def _slacken(active: ActiveFault, carriage: Carriage, begins: bool, now: Nanos) 
     return f"the belt of {carriage.spec.name} has {share:g} of its frequency"
 
 
-def _read(text: TomlText, row: Row, table: Table) -> CarriageSpec:
-    return CarriageSpec(**row, switches=tuple(read_switches(text, row["path"], table)))
-
-
 def _refers(spec: CarriageSpec, described: ElementSpecs) -> Iterator[Reference]:
     drives = {axis.name: axis.drive[0] for axis in described.of(AXIS)}
     machine = drives.get(spec.axis, spec.axis)
@@ -183,20 +178,7 @@ def _signals(carriage: Carriage) -> Mapping[str, SignalOf]:
 
 
 CARRIAGE: Element[CarriageSpec, Carriage] = Element(
-    name="carriage",
     spec=CarriageSpec,
-    rows=TableRows(
-        written="[[carriage]]",
-        keys=(
-            Key("name", name_value, "how conditions and faults name it"),
-            Key("axis", NameOf("axis"), "the axis that moves it"),
-            Key("frequency", number(0.1, 10_000.0), "Hz at which it swings while the axis stands"),
-            optional(number(0.001, 0.99), "damping", "damping ratio: 1 would not swing", 0.05),
-        ),
-    ),
-    inner={"switch": SWITCH},
-    inner_attributes={"switch": "switches"},
-    read=_read,
     refers=_refers,
     build=_build,
     signals=_signals,

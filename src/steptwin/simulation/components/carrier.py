@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import ClassVar
 
 from steptwin.machine import Nanos
@@ -15,35 +14,25 @@ from steptwin.simulation.components.site import Site
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.belt import Workpiece, next_change
 from steptwin.simulation.scheduler.kernel import Board
-from steptwin.simulation.toml.reader import optional
+from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, NameOf, Terminal, number
 
 PICK, PLACE, HELD = "PICK", "PLACE", "HELD"
 
-CARRIER_KEYS = (
-    optional(OUTPUT_PIN, "pick", "output joined to PICK: it is where it picks up"),
-    optional(OUTPUT_PIN, "place", "output joined to PLACE: it is where it puts down"),
-    optional(
-        NameOf("conveyor"),
-        "from",
-        "conveyor that it picks from; without one a workpiece is there whenever PICK is on",
-        None,
-        "source",
-    ),
-    optional(number(0.0), "pick_at", "with from: mm from the beginning of the belt", 0.0),
-    optional(NameOf("conveyor"), "onto", "conveyor that it puts on"),
-    optional(number(0.0), "place_at", "with onto: mm from the beginning of the belt, of the front of the workpiece", 0.0),
-)
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
+@table()
 class CarrierSpec(BoardSpec):
-    pick: Terminal | None
-    place: Terminal | None
-    source: str | None
-    pick_at: float
-    onto: str | None
-    place_at: float
+    pick: Terminal | None = key(OUTPUT_PIN, "output joined to PICK: it is where it picks up", default=None)
+    place: Terminal | None = key(OUTPUT_PIN, "output joined to PLACE: it is where it puts down", default=None)
+    source: str | None = key(
+        NameOf("conveyor"),
+        "conveyor that it picks from; without one a workpiece is there whenever PICK is on",
+        default=None,
+        name="from",
+    )
+    pick_at: float = key(number(0.0), "with from: mm from the beginning of the belt", default=0.0)
+    onto: str | None = key(NameOf("conveyor"), "conveyor that it puts on", default=None)
+    place_at: float = key(number(0.0), "with onto: mm from the beginning of the belt, of the front of the workpiece", default=0.0)
 
     @property
     @abstractmethod
@@ -55,9 +44,9 @@ class CarrierSpec(BoardSpec):
         own = self.own_joint
         if own is not None:
             yield own
-        for key, terminal, source in (("pick", PICK, self.pick), ("place", PLACE, self.place)):
+        for name, terminal, source in (("pick", PICK, self.pick), ("place", PLACE, self.place)):
             if source is not None:
-                yield Joint(key, terminal, source)
+                yield Joint(name, terminal, source)
 
     def others(self, described: ElementSpecs) -> Iterable[tuple[str, str]]:
         if self.source is not None:

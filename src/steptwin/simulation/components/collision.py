@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
 from steptwin.simulation.components.axis import AXIS
 from steptwin.simulation.components.carriage import CARRIAGE
@@ -19,15 +18,16 @@ from steptwin.simulation.components.touch import HIT, JAM, REPORT, RESET, Touch
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.mechanics import Mechanism
-from steptwin.simulation.toml.reader import Key, TomlText, optional
+from steptwin.simulation.toml.reader import TomlText
+from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, text_value, word
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@table("[[collision]]")
 class CollisionSpec(BoardSpec):
-    when: str
-    effect: str
-    reset: Terminal | None
+    when: str = key(text_value, "the condition under which parts touch, such as 'x.position > 300 and z.position < 50'")
+    effect: str = key(word(REPORT, JAM), "report, or jam: the axes in the condition, or of what is in it, stand", default=REPORT)
+    reset: Terminal | None = key(OUTPUT_PIN, "output joined to RESET, which frees jammed axes", default=None)
 
     @property
     def terminals(self) -> Terminals:
@@ -74,13 +74,7 @@ def _axes_of(spec: CollisionSpec, site: Site) -> Iterator[tuple[str, Mechanism]]
 
 
 COLLISION = with_terminals(
-    "collision",
     CollisionSpec,
-    (
-        Key("when", text_value, "the condition under which parts touch, such as 'x.position > 300 and z.position < 50'"),
-        optional(word(REPORT, JAM), "effect", "report, or jam: the axes in the condition, or of what is in it, stand", REPORT),
-        optional(OUTPUT_PIN, "reset", "output joined to RESET, which frees jammed axes"),
-    ),
     make=_make,
     signals=lambda collision: {"count": SignalOf((collision.board.source,), lambda now: float(collision.count))},
     faults=STUCK,

@@ -15,10 +15,10 @@ from typing import ClassVar
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.simulation.components.axis import find_axis, turns_of_axis
-from steptwin.simulation.components.beltsensor import SENSOR, Sensor, SensorSpec, read_inner
-from steptwin.simulation.components.conveyortable import FEED, RUN, STOP, ConveyorSpec, StopSpec, mark_places, stop_terminal
+from steptwin.simulation.components.beltsensor import Sensor, SensorSpec
+from steptwin.simulation.components.conveyortable import FEED, RUN, ConveyorSpec, stop_terminal
 from steptwin.simulation.components.elementspec import Reference
-from steptwin.simulation.components.logic import STUCK_INPUT, BoardPart, Inner, with_terminals
+from steptwin.simulation.components.logic import STUCK_INPUT, BoardPart, with_terminals
 from steptwin.simulation.components.site import Site
 from steptwin.simulation.faults import ActiveFault, Fault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
@@ -28,8 +28,6 @@ from steptwin.simulation.mechanics.drawing import BELT, Drawing, SensorZone
 from steptwin.simulation.mechanics.scale import exact_fraction
 from steptwin.simulation.scheduler.kernel import Board
 from steptwin.simulation.toml.names import Unknown
-from steptwin.simulation.toml.reader import Key, optional
-from steptwin.simulation.toml.values import OUTPUT_PIN, NameOf, number, positive_time
 
 FEEDER_STANDS = "feeder_stands"
 """Edges ``CONVEYOR.feeder_stands`` that a fault records."""
@@ -400,22 +398,7 @@ def _signals(conveyor: Conveyor) -> Mapping[str, SignalOf]:
 
 
 CONVEYOR = with_terminals(
-    "conveyor",
     ConveyorSpec,
-    (
-        Key("length", number(0.0, above=True), "mm"),
-        optional(number(0.0, above=True), "speed", "mm/s while RUN is on"),
-        optional(OUTPUT_PIN, "run", "with speed: output joined to RUN; without it a wire may be"),
-        optional(NameOf("axis"), "axis", "the axis that moves the belt, instead of speed"),
-        optional(number(0.0, above=True), "mm_per_unit", "with axis: mm of the belt per unit of the axis", 1.0),
-        optional(OUTPUT_PIN, "feed", "output joined to FEED, which puts a workpiece on when it is switched on"),
-        optional(positive_time, "feed_every", "a workpiece comes after each such time"),
-        optional(number(0.0, above=True), "workpiece", "length of a workpiece, mm", 50.0),
-        optional(number(0.0), "mass", "kg of a workpiece", 0.0),
-        optional(mark_places, "marks", "mm from the front of a workpiece to each of its marks, such as [10, 35]", ()),
-        optional(number(0.0, above=True), "mark_width", "length of a mark, mm", 2.0),
-        optional(NameOf("conveyor"), "next", "the conveyor on which workpieces go on"),
-    ),
     make=_make,
     signals=_signals,
     drawing=_drawing,
@@ -438,22 +421,6 @@ CONVEYOR = with_terminals(
             effect=ElementEffect(_stop_feeder),
         ),
     ),
-    inner=(
-        Inner(
-            key="sensor",
-            attribute="sensors",
-            rows=SENSOR,
-            read=partial(read_inner, key="sensor", rows=SENSOR, make=SensorSpec, needed=("at", "target")),
-            refers=_refers_of_sensors,
-            build=_put_sensors,
-        ),
-        Inner(
-            key="stop",
-            attribute="stops",
-            rows=STOP,
-            read=partial(read_inner, key="stop", rows=STOP, make=StopSpec, needed=("at",)),
-            refers=lambda spec: (),
-            build=lambda spec, conveyor, site: None,
-        ),
-    ),
+    refers=_refers_of_sensors,
+    fit=_put_sensors,
 )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Any
 
 from steptwin.errors import Misuse
@@ -12,48 +11,50 @@ from steptwin.simulation.components.beltsensor import SensorSpec
 from steptwin.simulation.components.elementspec import ElementSpecs
 from steptwin.simulation.components.logic import BoardSpec, Joint
 from steptwin.simulation.kinds.kind import Terminals
-from steptwin.simulation.toml.reader import Key, TomlText, optional
-from steptwin.simulation.toml.sense import TableRows
-from steptwin.simulation.toml.tomlplaces import Path
-from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, number, permitting
+from steptwin.simulation.toml.reader import TomlText
+from steptwin.simulation.toml.table import TableSpec, key, table, tables_in
+from steptwin.simulation.toml.values import OUTPUT_PIN, NameOf, Terminal, number, permitting, positive_time
 
 RUN, FEED = "RUN", "FEED"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StopSpec:
+@table("[[conveyor.stop]]")
+class StopSpec(TableSpec):
     """A stop that holds workpieces back."""
 
-    at: float
-    hold: Terminal | None
-    path: Path = ()
+    at: float = key(number(0.0), "mm from the beginning of the belt, where fronts of workpieces stand")
+    hold: Terminal | None = key(
+        OUTPUT_PIN, "output joined to STOP1 (of the second STOP2 ...), which holds workpieces while it is on", default=None
+    )
 
 
-STOP = TableRows(
-    written="[[conveyor.stop]]",
-    keys=(
-        Key("at", number(0.0), "mm from the beginning of the belt, where fronts of workpieces stand"),
-        optional(OUTPUT_PIN, "hold", "output joined to STOP1 (of the second STOP2 ...), which holds workpieces while it is on"),
-    ),
-)
+@permitting("list of numbers from 0")
+def _mark_places(value: Any) -> tuple[float, ...]:
+    if not isinstance(value, list):
+        raise Misuse(f"{value!r}: expected a list of numbers, mm from the front")
+    return tuple(number(0.0)(one) for one in value)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@table("[[conveyor]]")
 class ConveyorSpec(BoardSpec):
-    length: float
-    speed: float | None
-    run: Terminal | None
-    axis: str | None
-    mm_per_unit: float
-    feed: Terminal | None
-    feed_every: Nanos | None
-    workpiece: float
-    mass: float
-    marks: tuple[float, ...]
-    mark_width: float
-    next: str | None
-    sensors: tuple[SensorSpec, ...]
-    stops: tuple[StopSpec, ...]
+    length: float = key(number(0.0, above=True), "mm")
+    speed: float | None = key(number(0.0, above=True), "mm/s while RUN is on", default=None)
+    run: Terminal | None = key(OUTPUT_PIN, "with speed: output joined to RUN; without it a wire may be", default=None)
+    axis: str | None = key(NameOf("axis"), "the axis that moves the belt, instead of speed", default=None)
+    mm_per_unit: float = key(number(0.0, above=True), "with axis: mm of the belt per unit of the axis", default=1.0)
+    feed: Terminal | None = key(
+        OUTPUT_PIN, "output joined to FEED, which puts a workpiece on when it is switched on", default=None
+    )
+    feed_every: Nanos | None = key(positive_time, "a workpiece comes after each such time", default=None)
+    workpiece: float = key(number(0.0, above=True), "length of a workpiece, mm", default=50.0)
+    mass: float = key(number(0.0), "kg of a workpiece", default=0.0)
+    marks: tuple[float, ...] = key(
+        _mark_places, "mm from the front of a workpiece to each of its marks, such as [10, 35]", default=()
+    )
+    mark_width: float = key(number(0.0, above=True), "length of a mark, mm", default=2.0)
+    next: str | None = key(NameOf("conveyor"), "the conveyor on which workpieces go on", default=None)
+    sensors: tuple[SensorSpec, ...] = tables_in("sensor", SensorSpec)
+    stops: tuple[StopSpec, ...] = tables_in("stop", StopSpec)
 
     @property
     def terminals(self) -> Terminals:
@@ -88,13 +89,6 @@ class ConveyorSpec(BoardSpec):
             if mark + self.mark_width > self.workpiece:
                 message = f"a mark from {mark:g} to {mark + self.mark_width:g} mm is beyond workpiece = {self.workpiece:g}"
                 text.wrong((*self.path, "marks"), "D007", message)
-
-
-@permitting("list of numbers from 0")
-def mark_places(value: Any) -> tuple[float, ...]:
-    if not isinstance(value, list):
-        raise Misuse(f"{value!r}: expected a list of numbers, mm from the front")
-    return tuple(number(0.0)(one) for one in value)
 
 
 def stop_terminal(n: int) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import ClassVar
 
 from steptwin.machine import Nanos
@@ -11,19 +10,19 @@ from steptwin.simulation.components.logic import STUCK, BoardPart, BoardSpec, Jo
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.scheduler.kernel import Board
-from steptwin.simulation.toml.reader import Key, optional
+from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, whole
 
 UP, DOWN, RESET, OUT = "UP", "DOWN", "RESET", "OUT"
 MOST = 2**31 - 1
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@table("[[counter]]")
 class CounterSpec(BoardSpec):
-    preset: int
-    up: Terminal | None
-    down: Terminal | None
-    reset: Terminal | None
+    preset: int = key(whole(1, MOST), "the count from which OUT is on")
+    up: Terminal | None = key(OUTPUT_PIN, "output joined to UP, whose edges from 0 to 1 count up", default=None)
+    down: Terminal | None = key(OUTPUT_PIN, "output joined to DOWN, whose edges from 0 to 1 count down", default=None)
+    reset: Terminal | None = key(OUTPUT_PIN, "output joined to RESET; the count is 0 while it is on", default=None)
 
     @property
     def terminals(self) -> Terminals:
@@ -31,9 +30,9 @@ class CounterSpec(BoardSpec):
 
     @property
     def joints(self) -> Iterable[Joint]:
-        for key, terminal, source in (("up", UP, self.up), ("down", DOWN, self.down), ("reset", RESET, self.reset)):
+        for name, terminal, source in (("up", UP, self.up), ("down", DOWN, self.down), ("reset", RESET, self.reset)):
             if source is not None:
-                yield Joint(key, terminal, source)
+                yield Joint(name, terminal, source)
 
 
 class Counter(BoardPart):
@@ -60,14 +59,7 @@ def _signals(counter: Counter) -> Mapping[str, SignalOf]:
 
 
 COUNTER = with_terminals(
-    "counter",
     CounterSpec,
-    (
-        Key("preset", whole(1, MOST), "the count from which OUT is on"),
-        optional(OUTPUT_PIN, "up", "output joined to UP, whose edges from 0 to 1 count up"),
-        optional(OUTPUT_PIN, "down", "output joined to DOWN, whose edges from 0 to 1 count down"),
-        optional(OUTPUT_PIN, "reset", "output joined to RESET; the count is 0 while it is on"),
-    ),
     faults=STUCK,
     make=lambda spec, site: Counter(site.board(spec.name), spec.preset),
     signals=_signals,

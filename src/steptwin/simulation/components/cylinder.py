@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
 from math import floor
@@ -11,9 +10,9 @@ from typing import ClassVar
 
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.simulation.components.elementspec import Reference
-from steptwin.simulation.components.logic import STUCK, BoardPart, BoardSpec, Inner, Joint, with_terminals
+from steptwin.simulation.components.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
 from steptwin.simulation.components.site import Site
-from steptwin.simulation.components.switch import SWITCH, SwitchSpec, lane_of, put_switch, read_switches, zone_of
+from steptwin.simulation.components.switch import SwitchSpec, lane_of, put_switch, zone_of
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.kinds.kind import Terminals
@@ -22,24 +21,25 @@ from steptwin.simulation.mechanics.drawing import ROD, Drawing
 from steptwin.simulation.mechanics.scale import exact_fraction
 from steptwin.simulation.mechanics.travel import Travel
 from steptwin.simulation.scheduler.kernel import Board
-from steptwin.simulation.toml.reader import TomlText, optional
+from steptwin.simulation.toml.reader import TomlText
+from steptwin.simulation.toml.table import key, table, tables_in
 from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, number, positive_time, time_value, word
 
 EXTEND, RETRACT, EXTENDED, RETRACTED = "EXTEND", "RETRACT", "EXTENDED", "RETRACTED"
 SINGLE, DOUBLE = "single", "double"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@table("[[cylinder]]")
 class CylinderSpec(BoardSpec):
-    valve: str
-    extend: Terminal | None
-    retract: Terminal | None
-    stroke: float
-    extend_time: Nanos
-    retract_time: Nanos
-    switching: Nanos
-    start: str
-    switches: tuple[SwitchSpec, ...]
+    valve: str = key(word(SINGLE, DOUBLE), "single: one coil and a spring; double: two coils", default=SINGLE)
+    extend: Terminal | None = key(OUTPUT_PIN, "output joined to the coil EXTEND; without it a wire may be", default=None)
+    retract: Terminal | None = key(OUTPUT_PIN, "valve double: output joined to the coil RETRACT", default=None)
+    stroke: float = key(number(0.0, above=True), "mm", default=100.0)
+    extend_time: Nanos = key(positive_time, "from end to end", default=300 * MILLISECOND)
+    retract_time: Nanos = key(positive_time, "from end to end", default=300 * MILLISECOND)
+    switching: Nanos = key(time_value, "from a coil to the spool of the valve", default=0)
+    start: str = key(word("retracted", "extended"), "where it stands when the world begins", default="retracted")
+    switches: tuple[SwitchSpec, ...] = tables_in("switch", SwitchSpec)
 
     @property
     def terminals(self) -> Terminals:
@@ -180,18 +180,7 @@ def _signals(cylinder: Cylinder) -> Mapping[str, SignalOf]:
 
 
 CYLINDER = with_terminals(
-    "cylinder",
     CylinderSpec,
-    (
-        optional(word(SINGLE, DOUBLE), "valve", "single: one coil and a spring; double: two coils", SINGLE),
-        optional(OUTPUT_PIN, "extend", "output joined to the coil EXTEND; without it a wire may be"),
-        optional(OUTPUT_PIN, "retract", "valve double: output joined to the coil RETRACT"),
-        optional(number(0.0, above=True), "stroke", "mm", 100.0),
-        optional(positive_time, "extend_time", "from end to end", 300 * MILLISECOND),
-        optional(positive_time, "retract_time", "from end to end", 300 * MILLISECOND),
-        optional(time_value, "switching", "from a coil to the spool of the valve", 0),
-        optional(word("retracted", "extended"), "start", "where it stands when the world begins", "retracted"),
-    ),
     make=lambda spec, site: Cylinder(site.board(spec.name), spec),
     signals=_signals,
     drawing=lambda cylinder: cylinder.drawing,
@@ -206,14 +195,6 @@ CYLINDER = with_terminals(
         ),
         FaultKind("jam", Layer.ELEMENT, Occasion.ALWAYS, "A cylinder stands where it is.", effect=ElementEffect(_jam)),
     ),
-    inner=(
-        Inner(
-            key="switch",
-            attribute="switches",
-            rows=SWITCH,
-            read=lambda text, path, table: tuple(read_switches(text, path, table)),
-            refers=_refers_of_switches,
-            build=_put_switches,
-        ),
-    ),
+    refers=_refers_of_switches,
+    fit=_put_switches,
 )

@@ -11,15 +11,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, TypeAlias, cast
 
-from steptwin.simulation.components.elementspec import B, ElementSpec, ElementSpecs, ElementTable, NamedSpec, Reference, S
+from steptwin.simulation.components.elementspec import B, ElementSpecs, ElementTable, NamedSpec, Reference, S
 from steptwin.simulation.components.site import Site
 from steptwin.simulation.faults.table import FaultKind, Layer
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.drawing import Drawing
 from steptwin.simulation.mechanics.lanes import MovedLane
-from steptwin.simulation.toml.reader import Row, Table, TomlText
-from steptwin.simulation.toml.sense import TableRows
+from steptwin.simulation.toml.table import TableRows, TableSpec
 from steptwin.tables import IncompleteTable
 
 
@@ -27,15 +26,6 @@ from steptwin.tables import IncompleteTable
 class Element(ElementTable[S, B]):
     """A kind of element. ``S`` is its table as a value, ``B`` the built object. Raises `IncompleteTable` for missing entries."""
 
-    spec: type[S]
-    rows: TableRows
-    """The keys of its table, with meanings, units and ranges."""
-    inner: Mapping[str, TableRows] = field(default_factory=dict)
-    """Nested tables by key; ``spec`` has an attribute for each."""
-    inner_attributes: Mapping[str, str] = field(default_factory=dict)
-    """Attributes of nested tables whose names differ from their keys."""
-    read: Callable[[TomlText, Row, Table], S]
-    """Makes ``S``. Reports inconsistent combinations of keys, and errors in nested tables."""
     refers: Callable[[S, ElementSpecs], Iterable[Reference]]
     """All machines, lines and elements with terminals that it names. Names that do not exist are reported at the path."""
     build: Callable[[S, Site], B]
@@ -58,22 +48,29 @@ class Element(ElementTable[S, B]):
     """Whether its table has a ``name``."""
 
     @property
+    def rows(self) -> TableRows:
+        """The keys of its table, with meanings, units and ranges."""
+        return self.spec.rows
+
+    @property
+    def inner(self) -> Mapping[str, TableRows]:
+        """The tables in its table, by key."""
+        return {one.key: one.rows for one in self.rows.inner}
+
+    @property
     def needs_name(self) -> bool:
         """Whether none of its tables is without a name."""
         return any(key.name == "name" and key.is_required for key in self.rows.keys)
 
-    def named(self, specs: Sequence[ElementSpec]) -> Sequence[NamedSpec]:
+    def named(self, specs: Sequence[TableSpec]) -> Sequence[NamedSpec]:
         """Those of ``specs`` that have a name; none of a kind without names."""
         return [spec for spec in cast("Sequence[NamedSpec]", specs) if spec.name] if self.is_named else ()
 
     def __post_init__(self) -> None:
+        ElementTable.__post_init__(self)
         object.__setattr__(self, "is_named", any(key.name == "name" for key in self.rows.keys))
         where = f"element {self.name}"
-        attributes = {*self.rows.attributes, *(self.inner_attributes.get(key, key) for key in self.inner), "path"}
-        having = {one.name for one in fields(self.spec)}
-        if lacking := sorted(attributes - having):
-            raise IncompleteTable(f"{where}: {self.spec.__name__} lacks {', '.join(lacking)}")
-        if left_over := sorted(having - attributes):
+        if left_over := sorted({one.name for one in fields(self.spec)} - {*self.rows.attributes, "path"}):
             raise IncompleteTable(f"{where}: no key becomes {', '.join(left_over)} of {self.spec.__name__}")
         if self.is_named and self.signals is None:
             raise IncompleteTable(f"{where} has a name and lacks its signals")

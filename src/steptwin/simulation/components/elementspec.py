@@ -2,27 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Generic, NamedTuple, TypeVar, cast
 
+from steptwin.simulation.toml.table import TableSpec, table
 from steptwin.simulation.toml.tomlplaces import Path
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ElementSpec:
-    """An element as its table describes it. ``path``: the place of the table in the text."""
-
-    path: Path = ()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NamedSpec(ElementSpec):
+@table()
+class NamedSpec(TableSpec):
     """The specification of an element with a name, which may be empty where its key is optional."""
 
     name: str
 
 
-S = TypeVar("S", bound=ElementSpec)
+S = TypeVar("S", bound=TableSpec)
 B = TypeVar("B")
 
 
@@ -30,11 +24,15 @@ B = TypeVar("B")
 class ElementTable(Generic[S, B]):
     """The table of a kind of element. ``S`` is a table as a value, ``B`` the object that is built of it."""
 
-    name: str
-    """How it is written: ``[[NAME]]``."""
+    spec: type[S]
+    name: str = field(init=False)
+    """Its header: ``[[NAME]]``."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", self.spec.rows.written.strip("[]"))
 
 
-class ElementSpecs(dict[str, tuple[ElementSpec, ...]]):
+class ElementSpecs(dict[str, tuple[TableSpec, ...]]):
     """The elements of a description by the names of their tables."""
 
     def of(self, element: ElementTable[S, Any]) -> tuple[S, ...]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
 from math import floor
@@ -16,7 +15,7 @@ from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.simulation.components.shaft import SHAFT, TURN, GearedShaft
 from steptwin.simulation.components.site import Site
-from steptwin.simulation.components.switch import SWITCH, SwitchSpec, lane_of, put_switch, read_switches, zone_of
+from steptwin.simulation.components.switch import SwitchSpec, lane_of, put_switch, zone_of
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.faults.table import number
@@ -26,8 +25,8 @@ from steptwin.simulation.mechanics.drawing import ROD, Drawing
 from steptwin.simulation.mechanics.lanes import LIFT_SHARE, STUCK, MovedLane
 from steptwin.simulation.mechanics.scale import exact_fraction
 from steptwin.simulation.toml.names import Unknown
-from steptwin.simulation.toml.reader import Key, Row, Table, TomlText, optional
-from steptwin.simulation.toml.sense import TableRows
+from steptwin.simulation.toml.reader import TomlText
+from steptwin.simulation.toml.table import key, table, tables_in
 from steptwin.simulation.toml.values import NameOf, name_value, points, text_value
 from steptwin.state import Stateful
 
@@ -35,16 +34,27 @@ PLACES = 10**6
 """Places of a unit of the follower: nanometres of a millimetre."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@table("[[follower]]")
 class FollowerSpec(NamedSpec):
-    shaft: str
-    points: tuple[tuple[float, float], ...]
-    unit: str
-    switches: tuple[SwitchSpec, ...]
+    name: str = key(name_value, "how conditions and faults name it")
+    shaft: str = key(NameOf("shaft"), "the shaft that its cam disc is on")
+    points: tuple[tuple[float, float], ...] = key(
+        points, "[[degrees, lift], ...], linear between, also from the last to the first"
+    )
+    unit: str = key(text_value, "of its lift: mm, cm, m, degree or anything", default="mm")
+    switches: tuple[SwitchSpec, ...] = tables_in("switch", SwitchSpec)
 
     @property
     def highest(self) -> float:
         return max(lift for _, lift in self.points)
+
+    def check(self, text: TomlText) -> None:
+        angles = [angle for angle, _ in self.points]
+        where = (*self.path, "points")
+        if len(angles) < 2 or not (angles[0] >= 0.0 and angles[-1] < TURN):
+            text.wrong(where, "D007", f"{len(angles)} angles: a cam has at least two, from 0 to below {TURN} degrees")
+        if min(lift for _, lift in self.points) < 0.0 or self.highest == 0.0:
+            text.wrong(where, "D007", "lifts are counted from 0, and one of them is above 0")
 
 
 class Follower(Stateful):
@@ -161,17 +171,6 @@ def _wear(active: ActiveFault, follower: Follower, begins: bool, now: Nanos) -> 
 # ---------------------------------------------------------------------- the element
 
 
-def _read(text: TomlText, row: Row, table: Table) -> FollowerSpec:
-    spec = FollowerSpec(**row, switches=tuple(read_switches(text, row["path"], table)))
-    angles = [angle for angle, _ in spec.points]
-    where = (*spec.path, "points")
-    if len(angles) < 2 or not (angles[0] >= 0.0 and angles[-1] < TURN):
-        text.wrong(where, "D007", f"{len(angles)} angles: a cam has at least two, from 0 to below {TURN} degrees")
-    if min(lift for _, lift in spec.points) < 0.0 or spec.highest == 0.0:
-        text.wrong(where, "D007", "lifts are counted from 0, and one of them is above 0")
-    return spec
-
-
 def _machine(spec: FollowerSpec, described: ElementSpecs) -> str:
     """What drives the axis of its shaft; otherwise the name that does not exist."""
     axes = {shaft.name: shaft.axis for shaft in described.of(SHAFT)}
@@ -227,20 +226,7 @@ def _signals(follower: Follower) -> Mapping[str, SignalOf]:
 
 
 FOLLOWER: Element[FollowerSpec, Follower] = Element(
-    name="follower",
     spec=FollowerSpec,
-    rows=TableRows(
-        written="[[follower]]",
-        keys=(
-            Key("name", name_value, "how conditions and faults name it"),
-            Key("shaft", NameOf("shaft"), "the shaft that its cam disc is on"),
-            Key("points", points, "[[degrees, lift], ...], linear between, also from the last to the first"),
-            optional(text_value, "unit", "of its lift: mm, cm, m, degree or anything", "mm"),
-        ),
-    ),
-    inner={"switch": SWITCH},
-    inner_attributes={"switch": "switches"},
-    read=_read,
     refers=_refers,
     build=_build,
     signals=_signals,

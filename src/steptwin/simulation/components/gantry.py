@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import ClassVar
 
 from steptwin.errors import Misuse
@@ -24,7 +24,8 @@ from steptwin.simulation.mechanics.drawing import Drawing, rail
 from steptwin.simulation.mechanics.lanes import MovedLane
 from steptwin.simulation.mechanics.scale import Loading, burden_of
 from steptwin.simulation.scheduler.kernel import Board
-from steptwin.simulation.toml.reader import Key, TomlText, optional
+from steptwin.simulation.toml.reader import TomlText
+from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, NameOf, Terminal, word
 from steptwin.simulation.toml.values import number as number_value
 
@@ -34,17 +35,17 @@ SHARES = {SKEW: (1.0, -1.0), "position": (0.5, 0.5)}
 """Of the ends, in how far the one on its axis is ahead, and in where the middle is."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@table("[[gantry]]")
 class GantrySpec(BoardSpec):
     """``limit`` in the unit of its axes, ``mass`` in kg, ``friction_force`` in N."""
 
-    axis: str
-    other: str
-    limit: float
-    mass: float
-    friction_force: float
-    effect: str
-    reset: Terminal | None
+    axis: str = key(NameOf("axis"), "the axis that moves one end")
+    other: str = key(NameOf("axis"), "the axis that moves the other end")
+    limit: float = key(number_value(0.0, above=True), "skew in the unit of the axes, beyond which SKEWED is on")
+    mass: float = key(number_value(0.0), "kg of the beam and what is on it; each motor moves half", default=0.0)
+    friction_force: float = key(number_value(0.0), "N against its motion; each motor moves half", default=0.0)
+    effect: str = key(word(REPORT, JAM), "of too much skew: report, or jam (both axes stand)", default=JAM)
+    reset: Terminal | None = key(OUTPUT_PIN, "output joined to RESET, which frees jammed axes", default=None)
 
     @property
     def terminals(self) -> Terminals:
@@ -166,17 +167,7 @@ def _signals(gantry: Gantry) -> Mapping[str, SignalOf]:
 
 
 _GANTRY = with_terminals(
-    "gantry",
     GantrySpec,
-    (
-        Key("axis", NameOf("axis"), "the axis that moves one end"),
-        Key("other", NameOf("axis"), "the axis that moves the other end"),
-        Key("limit", number_value(0.0, above=True), "skew in the unit of the axes, beyond which SKEWED is on"),
-        optional(number_value(0.0), "mass", "kg of the beam and what is on it; each motor moves half", 0.0),
-        optional(number_value(0.0), "friction_force", "N against its motion; each motor moves half", 0.0),
-        optional(word(REPORT, JAM), "effect", "of too much skew: report, or jam (both axes stand)", JAM),
-        optional(OUTPUT_PIN, "reset", "output joined to RESET, which frees jammed axes"),
-    ),
     make=_make,
     signals=_signals,
     drawing=lambda gantry: gantry.drawing,

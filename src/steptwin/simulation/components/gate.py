@@ -10,7 +10,8 @@ from steptwin.machine import Nanos
 from steptwin.simulation.components.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.scheduler.kernel import Board
-from steptwin.simulation.toml.reader import Key, TomlText
+from steptwin.simulation.toml.reader import TomlText
+from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT, PinOf, Terminal, whole, word
 
 MOST_INPUTS = 32
@@ -35,10 +36,13 @@ class GateInputs(PinOf):
         return whole(1, self.most)(value) if isinstance(value, int) else PinOf.__call__(self, value)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@table("[[gate]]")
 class GateSpec(BoardSpec):
-    kind: str
-    inputs: int | tuple[Terminal, ...]
+    kind: str = key(word(*FUNCTIONS), ", ".join(FUNCTIONS))
+    inputs: int | tuple[Terminal, ...] = key(
+        GateInputs(OUTPUT, MOST_INPUTS),
+        "outputs joined to IN1, IN2 ...: MACHINE.PIN or ELEMENT.TERMINAL; or how many inputs, for wires and contacts",
+    )
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -76,16 +80,7 @@ class Gate(BoardPart):
 
 
 _GATE = with_terminals(
-    "gate",
     GateSpec,
-    (
-        Key("kind", word(*FUNCTIONS), ", ".join(FUNCTIONS)),
-        Key(
-            "inputs",
-            GateInputs(OUTPUT, MOST_INPUTS),
-            "outputs joined to IN1, IN2 ...: MACHINE.PIN or ELEMENT.TERMINAL; or how many inputs, for wires and contacts",
-        ),
-    ),
     faults=STUCK,
     make=lambda spec, site: Gate(site.board(spec.name), spec.kind, spec.names),
 )

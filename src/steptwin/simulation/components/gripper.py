@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from math import floor
 from typing import ClassVar
 
 from steptwin.machine import MILLISECOND, Nanos
-from steptwin.simulation.components.carrier import CARRIER_KEYS, HELD, PICK, PLACE, Carrier, CarrierSpec, carrier_signals
+from steptwin.simulation.components.carrier import HELD, PICK, PLACE, Carrier, CarrierSpec, carrier_signals
 from steptwin.simulation.components.logic import STUCK, Joint, with_terminals
 from steptwin.simulation.components.site import Site
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
@@ -19,19 +18,25 @@ from steptwin.simulation.mechanics.drawing import ROD, Drawing
 from steptwin.simulation.mechanics.scale import exact_fraction
 from steptwin.simulation.mechanics.travel import Travel
 from steptwin.simulation.scheduler.kernel import Board
-from steptwin.simulation.toml.reader import TomlText, optional
+from steptwin.simulation.toml.reader import TomlText
+from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, number, positive_time
 
 CLOSE, OPENED, CLOSED = "CLOSE", "OPENED", "CLOSED"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@table("[[gripper]]")
 class GripperSpec(CarrierSpec):
-    close: Terminal | None
-    stroke: float
-    width: float
-    close_time: Nanos
-    open_time: Nanos
+    close: Terminal | None = key(
+        OUTPUT_PIN,
+        "output joined to CLOSE, which closes the jaws while it is on; without it a wire may be",
+        default=None,
+        order=-1,
+    )
+    stroke: float = key(number(0.0, above=True), "mm between the open jaws", default=20.0)
+    width: float = key(number(0.0), "mm of a workpiece between the jaws", default=10.0)
+    close_time: Nanos = key(positive_time, "from open to closed, without a workpiece", default=100 * MILLISECOND)
+    open_time: Nanos = key(positive_time, "from closed to open", default=100 * MILLISECOND)
 
     @property
     def terminals(self) -> Terminals:
@@ -116,16 +121,7 @@ def _signals(gripper: Gripper) -> Mapping[str, SignalOf]:
 
 
 GRIPPER = with_terminals(
-    "gripper",
     GripperSpec,
-    (
-        optional(OUTPUT_PIN, "close", "output joined to CLOSE, which closes the jaws while it is on; without it a wire may be"),
-        *CARRIER_KEYS,
-        optional(number(0.0, above=True), "stroke", "mm between the open jaws", 20.0),
-        optional(number(0.0), "width", "mm of a workpiece between the jaws", 10.0),
-        optional(positive_time, "close_time", "from open to closed, without a workpiece", 100 * MILLISECOND),
-        optional(positive_time, "open_time", "from closed to open", 100 * MILLISECOND),
-    ),
     make=lambda spec, site: Gripper(site.board(spec.name), spec, site),
     signals=_signals,
     drawing=lambda gripper: Drawing(ROD, gripper.stroke, ("position",)),

@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import ClassVar
 
 from steptwin.machine import Nanos
 from steptwin.simulation.components.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.scheduler.kernel import Board
-from steptwin.simulation.toml.reader import optional
+from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, word
 
 SET, RESET, OUT = "SET", "RESET", "OUT"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@table("[[latch]]")
 class LatchSpec(BoardSpec):
-    set: Terminal | None
-    reset: Terminal | None
-    priority: str
+    set: Terminal | None = key(OUTPUT_PIN, "output joined to SET; without it wires and contacts may be", default=None)
+    reset: Terminal | None = key(OUTPUT_PIN, "output joined to RESET; without it wires and contacts may be", default=None)
+    priority: str = key(word("set", "reset"), "what wins while both are on", default="reset")
 
     @property
     def terminals(self) -> Terminals:
@@ -55,13 +54,7 @@ class Latch(BoardPart):
 
 
 LATCH = with_terminals(
-    "latch",
     LatchSpec,
-    (
-        optional(OUTPUT_PIN, "set", "output joined to SET; without it wires and contacts may be"),
-        optional(OUTPUT_PIN, "reset", "output joined to RESET; without it wires and contacts may be"),
-        optional(word("set", "reset"), "priority", "what wins while both are on", "reset"),
-    ),
     faults=STUCK,
     make=lambda spec, site: Latch(site.board(spec.name), spec.priority),
 )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from typing import ClassVar
 
 from steptwin.errors import Misuse
@@ -31,7 +30,8 @@ from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.motor import Burden
 from steptwin.simulation.mechanics.scale import Loading, burden_of
 from steptwin.simulation.scheduler.kernel import Board
-from steptwin.simulation.toml.reader import Key, TomlText, optional
+from steptwin.simulation.toml.reader import TomlText
+from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import NameOf, points, text_value
 from steptwin.simulation.toml.values import number as number_value
 from steptwin.state import Plain
@@ -40,21 +40,26 @@ ACTS = "ACTS"
 MOST_SHARE = 1000.0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+_not_negative = number_value(0.0)
+
+
+@table("[[load]]")
 class LoadSpec(BoardSpec):
     """``mass`` in kg, ``force`` and ``friction_force`` in N on a linear axis, the others in kg·m² and N·m at the motor."""
 
-    axis: str
-    when: str | None
-    mass: float
-    force: float
-    friction_force: float
-    inertia: float
-    load: float
-    friction: float
-    of: str | None
-    points: tuple[tuple[float, float], ...] | None
-    resolution: float
+    axis: str = key(NameOf("axis"), "the axis whose motor moves it")
+    when: str | None = key(text_value, "the condition under which it is there, such as 'cup.held'; default always", default=None)
+    mass: float = key(_not_negative, "kg moved by a linear axis", default=0.0)
+    force: float = key(number_value(), "N on a linear axis; positive pulls towards lower positions", default=0.0)
+    friction_force: float = key(_not_negative, "N against motion of a linear axis", default=0.0)
+    inertia: float = key(_not_negative, "kg·m² at the motor", default=0.0)
+    load: float = key(number_value(), "N·m at the motor; positive pulls towards lower positions", default=0.0)
+    friction: float = key(_not_negative, "N·m against motion, at the motor", default=0.0)
+    of: str | None = key(text_value, "the signal that points are over, such as x.position or time", default=None)
+    points: tuple[tuple[float, float], ...] | None = key(
+        points, "[[value, share], ...] of all its values there is, linear between; default 1", default=None
+    )
+    resolution: float = key(number_value(0.0001, 1.0), "steps in which the share changes", default=0.01)
 
     @property
     def terminals(self) -> Terminals:
@@ -71,8 +76,8 @@ class LoadSpec(BoardSpec):
     def others(self, described: ElementSpecs) -> Iterator[tuple[str, str]]:
         yield "axis", self.axis
         named = () if self.of is None else (owner_of(self.of),)
-        for key, owners in (("when", () if self.when is None else owners_of(self.when)), ("of", named)):
-            yield from ((key, owner) for owner in owners if owner != TIME)
+        for name, owners in (("when", () if self.when is None else owners_of(self.when)), ("of", named)):
+            yield from ((name, owner) for owner in owners if owner != TIME)
 
     def check(self, text: TomlText) -> None:
         if self.when is not None:
@@ -164,24 +169,8 @@ def _make(spec: LoadSpec, site: Site) -> FurtherLoad:
     return FurtherLoad(board, axis, whole, None if spec.when is None else condition_of(spec.when, board, site), curve)
 
 
-_not_negative = number_value(0.0)
-
 LOAD = with_terminals(
-    "load",
     LoadSpec,
-    (
-        Key("axis", NameOf("axis"), "the axis whose motor moves it"),
-        optional(text_value, "when", "the condition under which it is there, such as 'cup.held'; default always"),
-        optional(_not_negative, "mass", "kg moved by a linear axis", 0.0),
-        optional(number_value(), "force", "N on a linear axis; positive pulls towards lower positions", 0.0),
-        optional(_not_negative, "friction_force", "N against motion of a linear axis", 0.0),
-        optional(_not_negative, "inertia", "kg·m² at the motor", 0.0),
-        optional(number_value(), "load", "N·m at the motor; positive pulls towards lower positions", 0.0),
-        optional(_not_negative, "friction", "N·m against motion, at the motor", 0.0),
-        optional(text_value, "of", "the signal that points are over, such as x.position or time"),
-        optional(points, "points", "[[value, share], ...] of all its values there is, linear between; default 1"),
-        optional(number_value(0.0001, 1.0), "resolution", "steps in which the share changes", 0.01),
-    ),
     make=_make,
     signals=lambda load: {"share": SignalOf((load.board.source,), load.share, bounds=(0.0, load.most))},
     faults=(

@@ -5,9 +5,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
@@ -22,8 +21,7 @@ from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.drawing import Drawing
 from steptwin.simulation.scheduler.kernel import Board
 from steptwin.simulation.scheduler.wires import PinName, Wire
-from steptwin.simulation.toml.reader import Key, Row, Table, TomlText
-from steptwin.simulation.toml.sense import TableRows
+from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.tomlplaces import Path
 from steptwin.simulation.toml.values import Terminal, name_value
 from steptwin.state import Stateful
@@ -37,9 +35,11 @@ class Joint(NamedTuple):
     source: Terminal
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@table()
 class BoardSpec(NamedSpec, ABC):
     """The table of an element with terminals."""
+
+    name: str = key(name_value, "how others name it", order=-2)
 
     @property
     @abstractmethod
@@ -54,9 +54,6 @@ class BoardSpec(NamedSpec, ABC):
     def others(self, described: ElementSpecs) -> Iterable[tuple[str, str]]:
         """Keys that name other elements, and the names of these or of what they are in one kernel with."""
         return ()
-
-    def check(self, text: TomlText) -> None:
-        """Report keys that do not fit together."""
 
 
 class BoardPart(Stateful, ABC):
@@ -88,19 +85,6 @@ class BoardPart(Stateful, ABC):
 
 S = TypeVar("S", bound=BoardSpec)
 P = TypeVar("P", bound=BoardPart)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Inner(Generic[S, P]):
-    """A kind of table in the table of an element: ``[[ELEMENT.KEY]]``."""
-
-    key: str
-    attribute: str
-    """Of the element's value, a tuple."""
-    rows: TableRows
-    read: Callable[[TomlText, Path, Table], tuple[Any, ...]]
-    refers: Callable[[S], Iterable[Reference]]
-    build: Callable[[S, P, Site], None]
 
 
 def _wires(spec: BoardSpec) -> Iterator[tuple[Wire, Path]]:
@@ -168,50 +152,37 @@ STUCK = (STUCK_OUTPUT, STUCK_INPUT)
 
 
 def with_terminals(
-    name: str,
     spec: type[S],
-    keys: Sequence[Key],
     *,
     make: Callable[[S, Site], P],
     signals: Callable[[P], Mapping[str, SignalOf]] = lambda part: {},
     faults: Sequence[FaultKind] = (),
-    inner: Sequence[Inner[S, P]] = (),
+    refers: Callable[[S], Iterable[Reference]] = lambda spec: (),
+    fit: Callable[[S, P, Site], None] = lambda spec, part, site: None,
     connect: Callable[[S, P, Site], None] | None = None,
     drawing: Callable[[P], Drawing] | None = None,
 ) -> Element[S, P]:
     """An element with a name and terminals. Each terminal is a signal, each output a lane.
 
-    ``signals`` are those besides. ``connect`` and ``drawing`` are as in `Element`.
+    ``signals`` and ``refers`` are those besides. ``fit`` adds the parts of tables in its table. ``connect`` and ``drawing`` are
+    as in `Element`.
     """
 
-    def read(text: TomlText, row: Row, table: Table) -> S:
-        more: dict[str, Any] = {one.attribute: one.read(text, row["path"], table) for one in inner}
-        found = spec(**row, **more)
-        found.check(text)
-        return found
-
-    def refers(found: S, described: ElementSpecs) -> Iterator[Reference]:
+    def all_references(found: S, described: ElementSpecs) -> Iterator[Reference]:
         yield from _references(found, described)
-        for one in inner:
-            yield from one.refers(found)
+        yield from refers(found)
 
     def build(found: S, site: Site) -> P:
         part = make(found, site)
         part.board.kernel.add_part(part, part.watches, found.name)
         for wire, path in site.memo.once((*found.path, "wires"), lambda: tuple(_wires(found))):
             site.join(wire, path)
-        for one in inner:
-            one.build(found, part, site)
+        fit(found, part, site)
         return part
 
     return Element(
-        name=name,
         spec=spec,
-        rows=TableRows(written=f"[[{name}]]", keys=(Key("name", name_value, "how others name it"), *keys)),
-        inner={one.key: one.rows for one in inner},
-        inner_attributes={one.key: one.attribute for one in inner},
-        read=read,
-        refers=refers,
+        refers=all_references,
         build=build,
         connect=connect,
         terminals=lambda found: found.terminals,
@@ -226,8 +197,8 @@ def _references(found: BoardSpec, described: ElementSpecs) -> Iterator[Reference
     yield Reference(found.name, found.name, found.path)
     for joint in found.joints:
         yield Reference(found.name, joint.source[0], (*found.path, joint.key))
-    for key, other in found.others(described):
-        yield Reference(found.name, other, (*found.path, key))
+    for name, other in found.others(described):
+        yield Reference(found.name, other, (*found.path, name))
 
 
 def _terminal_signals(board: Board) -> Mapping[str, SignalOf]:

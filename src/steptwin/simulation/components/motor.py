@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from steptwin.errors import Misuse
@@ -10,9 +9,8 @@ from steptwin.machine import MILLISECOND, Nanos
 from steptwin.simulation.mechanics.motor import StepperMotor
 from steptwin.simulation.mechanics.resonance import Resonance
 from steptwin.simulation.mechanics.scale import Loading, Scale, burden_of
-from steptwin.simulation.toml.reader import Key, Table, TomlText, optional, read_table
-from steptwin.simulation.toml.sense import TableRows, check_sense
-from steptwin.simulation.toml.tomlplaces import Path
+from steptwin.simulation.toml.reader import TomlText
+from steptwin.simulation.toml.table import TableSpec, key, table
 from steptwin.simulation.toml.values import flag, number, pair, permitting, points, time_value, whole, word
 
 _not_negative = number(0.0)
@@ -27,83 +25,55 @@ def _band(value: Any) -> tuple[float, float]:
     return low, high
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MotorSpec:
+@table("[axis.motor]")
+class MotorSpec(TableSpec):
     """Torques in N·m at the motor, speeds in rev/min; for linear axes mass in kg and forces in N as well."""
 
-    torque: tuple[tuple[float, float], ...]
-    inertia: float
-    mass: float
-    friction: float
-    friction_force: float
-    load: float
-    force: float
-    start_speed: float | None
-    full_steps: int | None
-    when_off: str
-    detent: float
-    hold_current: float
-    hold_delay: Nanos
-    overruns: bool
-    resonance: tuple[float, float] | None
-    resonance_growth: float
-    resonance_fading: float
-    vibration: float
-    path: Path = ()
+    torque: tuple[tuple[float, float], ...] = key(
+        points, "pull-out torque: [[rev/min, N·m], ...] from 0 on; none above the last speed"
+    )
+    inertia: float = key(_not_negative, "kg·m² of rotor and load, at the motor", default=0.0)
+    mass: float = key(_not_negative, "kg moved by a linear axis", default=0.0, kinds=("linear",))
+    friction: float = key(_not_negative, "N·m against motion", default=0.0)
+    friction_force: float = key(_not_negative, "N against motion of a linear axis", default=0.0, kinds=("linear",))
+    load: float = key(number(), "constant N·m; positive pulls towards lower positions", default=0.0)
+    force: float = key(
+        number(), "constant N on a linear axis; positive pulls towards lower positions", default=0.0, kinds=("linear",)
+    )
+    start_speed: float | None = key(
+        _not_negative, "rev/min it starts with at once and is caught at; default any, caught at rest", default=None
+    )
+    when_off: str = key(
+        word("holds", "free"), "without current: holds (self-locking), or free: its load moves it", default="holds"
+    )
+    full_steps: int | None = key(whole(4, 10_000), "full steps per revolution; default 200", default=None)
+    detent: float = key(_not_negative, "N·m without current, with when_off = 'free': holds the rotor at full steps", default=0.0)
+    hold_current: float = key(number(0.0, 1.0), "share of the current at rest; below 1 with when_off = 'free'", default=1.0)
+    hold_delay: Nanos = key(
+        time_value, "from the last pulse until the current is reduced", default=100 * MILLISECOND, needs="hold_current"
+    )
+    overruns: bool = key(flag, "whether it runs on after a stop without ramp, as far as its energy goes", default=False)
+    resonance: tuple[float, float] | None = key(
+        _band, "[low, high] rev/min: the rotor vibrates there, ever more, until it loses the field", default=None
+    )
+    resonance_growth: float = key(_rate, "1/s with which the vibration grows there", default=20.0, needs="resonance")
+    resonance_fading: float = key(_rate, "1/s with which it fades elsewhere", default=20.0, needs="resonance")
+    vibration: float = key(
+        number(1e-6, 1.0), "full steps: the vibration that there always is, with resonance", default=0.05, needs="resonance"
+    )
 
-
-MOTOR = TableRows(
-    written="[axis.motor]",
-    keys=(
-        Key("torque", points, "pull-out torque: [[rev/min, N·m], ...] from 0 on; none above the last speed"),
-        optional(_not_negative, "inertia", "kg·m² of rotor and load, at the motor", 0.0),
-        optional(_not_negative, "mass", "kg moved by a linear axis", 0.0),
-        optional(_not_negative, "friction", "N·m against motion", 0.0),
-        optional(_not_negative, "friction_force", "N against motion of a linear axis", 0.0),
-        optional(number(), "load", "constant N·m; positive pulls towards lower positions", 0.0),
-        optional(number(), "force", "constant N on a linear axis; positive pulls towards lower positions", 0.0),
-        optional(_not_negative, "start_speed", "rev/min it starts with at once and is caught at; default any, caught at rest"),
-        optional(word("holds", "free"), "when_off", "without current: holds (self-locking), or free: its load moves it", "holds"),
-        optional(whole(4, 10_000), "full_steps", "full steps per revolution; default 200"),
-        optional(_not_negative, "detent", "N·m without current, with when_off = 'free': holds the rotor at full steps", 0.0),
-        optional(number(0.0, 1.0), "hold_current", "share of the current at rest; below 1 with when_off = 'free'", 1.0),
-        optional(time_value, "hold_delay", "from the last pulse until the current is reduced", 100 * MILLISECOND),
-        optional(flag, "overruns", "whether it runs on after a stop without ramp, as far as its energy goes", False),
-        optional(_band, "resonance", "[low, high] rev/min: the rotor vibrates there, ever more, until it loses the field"),
-        optional(_rate, "resonance_growth", "1/s with which the vibration grows there", 20.0),
-        optional(_rate, "resonance_fading", "1/s with which it fades elsewhere", 20.0),
-        optional(number(1e-6, 1.0), "vibration", "full steps: the vibration that there always is, with resonance", 0.05),
-    ),
-    need={
-        "hold_delay": "hold_current",
-        "resonance_growth": "resonance",
-        "resonance_fading": "resonance",
-        "vibration": "resonance",
-    },
-    only={"mass": ("linear",), "friction_force": ("linear",), "force": ("linear",)},
-)
-
-
-def read_motor(text: TomlText, axis: Path, table: Table) -> MotorSpec | None:
-    """The motor in the table of an axis; None where there is none, or it is wrong."""
-    if "motor" not in table:
-        return None
-    path = (*axis, "motor")
-    values = read_table(text, path, table["motor"], MOTOR.keys)
-    if "torque" not in values:
-        return None
-    motor = MotorSpec(**values, path=path)
-    check_sense(text, path, MOTOR, table["motor"], table.get("kind", "linear"))
-    if motor.torque[0][0] != 0.0 or any(torque < 0.0 for _, torque in motor.torque):
-        text.wrong((*path, "torque"), "D003", "a torque curve begins at 0 rev/min and is never negative")
-    if motor.when_off == "free" and not motor.inertia and not motor.mass:
-        text.wrong((*path, "when_off"), "D007", "what moves freely needs an inertia or a mass")
-    if motor.overruns and not motor.inertia and not motor.mass:
-        text.wrong((*path, "overruns"), "D007", "what runs on needs an inertia or a mass")
-    for key in ("detent", "hold_current"):
-        if key in table["motor"] and motor.when_off != "free":
-            text.wrong((*path, key), "D007", f"{key} acts on a rotor that may move: it needs when_off = 'free'")
-    return motor
+    def check(self, text: TomlText) -> None:
+        if self.torque[0][0] != 0.0 or any(torque < 0.0 for _, torque in self.torque):
+            text.wrong((*self.path, "torque"), "D003", "a torque curve begins at 0 rev/min and is never negative")
+        moves = self.inertia or self.mass
+        if self.when_off == "free" and not moves:
+            text.wrong((*self.path, "when_off"), "D007", "what moves freely needs an inertia or a mass")
+        if self.overruns and not moves:
+            text.wrong((*self.path, "overruns"), "D007", "what runs on needs an inertia or a mass")
+        for name in ("detent", "hold_current"):
+            if self.when_off != "free" and text.is_given((*self.path, name)):
+                message = f"{name} acts on a rotor that may move: it needs when_off = 'free'"
+                text.wrong((*self.path, name), "D007", message)
 
 
 def motor_of(motor: MotorSpec, scale: Scale) -> StepperMotor:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import ClassVar
 
 from steptwin.machine import Nanos
@@ -12,17 +11,19 @@ from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.scheduler.kernel import Board
-from steptwin.simulation.toml.reader import optional
+from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, time_value
 
 COIL, NO, NC = "COIL", "NO", "NC"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@table("[[relay]]")
 class RelaySpec(BoardSpec):
-    coil: Terminal | None
-    pull_in: Nanos
-    drop_out: Nanos
+    coil: Terminal | None = key(
+        OUTPUT_PIN, "output joined to COIL; without it wires and contacts may be, such as emergency stops", default=None
+    )
+    pull_in: Nanos = key(time_value, "from energising the coil to the contact", default=0)
+    drop_out: Nanos = key(time_value, "from switching the coil off to the contact", default=0)
 
     @property
     def terminals(self) -> Terminals:
@@ -90,13 +91,7 @@ def _interrupt(active: ActiveFault, relay: Relay, begins: bool, now: Nanos) -> s
 
 
 RELAY = with_terminals(
-    "relay",
     RelaySpec,
-    (
-        optional(OUTPUT_PIN, "coil", "output joined to COIL; without it wires and contacts may be, such as emergency stops"),
-        optional(time_value, "pull_in", "from energising the coil to the contact", 0),
-        optional(time_value, "drop_out", "from switching the coil off to the contact", 0),
-    ),
     make=lambda spec, site: Relay(site.board(spec.name), spec.pull_in, spec.drop_out),
     faults=(
         *STUCK,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
 from math import floor
@@ -12,7 +11,7 @@ from typing import Any, ClassVar
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis, turns_of_axis
-from steptwin.simulation.components.contact import CONTACT_KEYS
+from steptwin.simulation.components.contact import ContactSpec
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.simulation.components.site import Site
@@ -24,52 +23,46 @@ from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.drawing import DIAL, Drawing, SensorZone
 from steptwin.simulation.mechanics.lanes import SLIPS, MovedLane
 from steptwin.simulation.mechanics.scale import exact_fraction
-from steptwin.simulation.toml.reader import Key, Row, Table, TomlText, optional, read_table
-from steptwin.simulation.toml.sense import TableRows, check_sense
-from steptwin.simulation.toml.tomlplaces import Path
-from steptwin.simulation.toml.values import INPUT_PIN, NameOf, Terminal, name_value, number, permitting
+from steptwin.simulation.toml.reader import TomlText
+from steptwin.simulation.toml.table import key, table, tables_in
+from steptwin.simulation.toml.values import NameOf, name_value, number, permitting
 from steptwin.state import Stateful
 
 TURN = 360
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CamSpec:
+@permitting("number other than 0")
+def _ratio(value: Any) -> float:
+    found = number()(value)
+    if found == 0.0:
+        raise Misuse(f"{value!r}: permitted are numbers other than 0")
+    return found
+
+
+@table("[[shaft.cam]]")
+class CamSpec(ContactSpec):
     """On from ``begin`` to ``end`` degrees of the shaft; through 0 where the end is not above the beginning."""
 
-    begin: float
-    end: float
-    target: Terminal
-    contact: str
-    join: str | None
-    bounce: Nanos
-    bounces: int
-    path: Path = ()
+    begin: float = key(number(0.0, 360.0), "degrees, from which it is on", name="from", order=-1)
+    end: float = key(number(0.0, 360.0), "degrees, to which it is on; below from: through 0", name="until", order=-1)
 
     @property
     def zone(self) -> SensorZone:
         """Where it is on, as it is drawn."""
         return SensorZone(self.target, self.begin, self.end if self.end > self.begin else self.end + TURN)
 
-
-CAM = TableRows(
-    written="[[shaft.cam]]",
-    keys=(
-        Key("from", number(0.0, 360.0), "degrees, from which it is on", attribute="begin"),
-        Key("until", number(0.0, 360.0), "degrees, to which it is on; below from: through 0", attribute="end"),
-        Key("to", INPUT_PIN, "the input: MACHINE.PIN", attribute="target"),
-        *CONTACT_KEYS,
-    ),
-    need={"bounces": "bounce"},
-)
+    def check(self, text: TomlText) -> None:
+        if self.begin == self.end:
+            text.wrong((*self.path, "until"), "D007", f"from and until are {self.end:g} degrees: the cam has no width")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@table("[[shaft]]")
 class ShaftSpec(NamedSpec):
-    axis: str
-    ratio: float
-    offset: float
-    cams: tuple[CamSpec, ...]
+    name: str = key(name_value, "how conditions and faults name it")
+    axis: str = key(NameOf("axis"), "the axis that turns it")
+    ratio: float = key(_ratio, "turns of the shaft per unit of the axis; negative: backwards")
+    offset: float = key(number(), "degrees of the shaft while the axis is at 0", default=0.0)
+    cams: tuple[CamSpec, ...] = tables_in("cam", CamSpec)
 
 
 class GearedShaft(Stateful):
@@ -154,22 +147,6 @@ class GearedShaft(Stateful):
         return Zone(floor(low + half), floor(high + half), 0, abs(self.pulses_per_turn))
 
 
-def _read(text: TomlText, row: Row, table: Table) -> ShaftSpec:
-    return ShaftSpec(**row, cams=tuple(_read_cams(text, row["path"], table)))
-
-
-def _read_cams(text: TomlText, path: Path, table: Table) -> Iterator[CamSpec]:
-    given = table.get("cam", [])
-    for n, cam in enumerate(given if isinstance(given, list) else [given]):
-        of_cam = (*path, "cam", n)
-        values = read_table(text, of_cam, cam, CAM.keys)
-        if all(name in values for name in ("begin", "end", "target")):
-            check_sense(text, of_cam, CAM, cam)
-            if values["begin"] == values["end"]:
-                text.wrong((*of_cam, "until"), "D007", f"from and until are {values['end']:g} degrees: the cam has no width")
-            yield CamSpec(**values, path=of_cam)
-
-
 def _refers(spec: ShaftSpec, described: ElementSpecs) -> Iterator[Reference]:
     drives = {axis.name: axis.drive[0] for axis in described.of(AXIS)}
     machine = drives.get(spec.axis, spec.axis)
@@ -204,29 +181,8 @@ def _slip(active: ActiveFault, shaft: GearedShaft, begins: bool, now: Nanos) -> 
     return f"the coupling of {name} slips" if begins else f"the coupling of {name} grips, {shaft.behind:g} degrees behind"
 
 
-@permitting("number other than 0")
-def _ratio(value: Any) -> float:
-    found = number()(value)
-    if found == 0.0:
-        raise Misuse(f"{value!r}: permitted are numbers other than 0")
-    return found
-
-
 SHAFT: Element[ShaftSpec, GearedShaft] = Element(
-    name="shaft",
     spec=ShaftSpec,
-    rows=TableRows(
-        written="[[shaft]]",
-        keys=(
-            Key("name", name_value, "how conditions and faults name it"),
-            Key("axis", NameOf("axis"), "the axis that turns it"),
-            Key("ratio", _ratio, "turns of the shaft per unit of the axis; negative: backwards"),
-            optional(number(), "offset", "degrees of the shaft while the axis is at 0", 0.0),
-        ),
-    ),
-    inner={"cam": CAM},
-    inner_attributes={"cam": "cams"},
-    read=_read,
     refers=_refers,
     build=_build,
     signals=_signals,

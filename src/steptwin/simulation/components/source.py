@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, SECOND, Nanos
@@ -21,8 +20,7 @@ from steptwin.simulation.logic.sources import (
     TableWaveform,
     Waveform,
 )
-from steptwin.simulation.toml.reader import Key, Row, Table, TomlText, optional
-from steptwin.simulation.toml.sense import TableRows
+from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import (
     ANALOG_INPUT,
     PinOf,
@@ -34,22 +32,6 @@ from steptwin.simulation.toml.values import (
     time_value,
     word,
 )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SourceSpec(NamedSpec):
-    target: Terminal
-    kind: str
-    value: float
-    amplitude: float
-    frequency: float
-    phase: float
-    points: tuple[tuple[float, float], ...]
-    begin: float
-    end: float
-    ramp_time: Nanos
-    repeat: Nanos | None
-    period: Nanos
 
 
 def _repeat_s(spec: SourceSpec) -> float | None:
@@ -77,8 +59,23 @@ WAVEFORMS: Mapping[str, Callable[[SourceSpec], Waveform]] = {
 """By ``kind``. They raise `Misuse` for values that are missing."""
 
 
-def _read(text: TomlText, row: Row, table: Table) -> SourceSpec:
-    return SourceSpec(**row)
+@table("[[source]]")
+class SourceSpec(NamedSpec):
+    name: str = key(name_value, "how conditions and faults name it; without it they cannot", default="")
+    target: Terminal = key(PinOf(ANALOG_INPUT), "the analog input: MACHINE.AIN1 or AIN2", name="to")
+    kind: str = key(word(*WAVEFORMS), "constant, ramp, sine or table", default="constant")
+    value: float = key(number(), "volts; of a sine its mean", default=0.0, kinds=("constant", "sine"))
+    amplitude: float = key(number(), "sine: volts", default=0.0, kinds=("sine",))
+    frequency: float = key(number(0.0), "sine: Hz", default=1.0, kinds=("sine",))
+    phase: float = key(number(), "sine: degrees", default=0.0, kinds=("sine",))
+    points: tuple[tuple[float, float], ...] = key(points, "table: [[seconds, volts], ...]", default=(), kinds=("table",))
+    begin: float = key(number(), "ramp: volts at first", default=0.0, kinds=("ramp",))
+    end: float = key(number(), "ramp: volts in the end", default=0.0, kinds=("ramp",))
+    ramp_time: Nanos = key(time_value, "ramp: how long it takes", default=0, name="over", kinds=("ramp",))
+    repeat: Nanos | None = key(positive_time, "ramp, table: begins anew after this time", default=None, kinds=("ramp", "table"))
+    period: Nanos = key(
+        positive_time, "how often the voltage is renewed", default=10 * MILLISECOND, kinds=("ramp", "sine", "table")
+    )
 
 
 def _refers(spec: SourceSpec, described: ElementSpecs) -> Iterator[Reference]:
@@ -94,39 +91,7 @@ def _build(spec: SourceSpec, site: Site) -> AnalogSource:
 
 
 SOURCE: Element[SourceSpec, AnalogSource] = Element(
-    name="source",
     spec=SourceSpec,
-    rows=TableRows(
-        written="[[source]]",
-        keys=(
-            optional(name_value, "name", "how conditions and faults name it; without it they cannot", ""),
-            Key("to", PinOf(ANALOG_INPUT), "the analog input: MACHINE.AIN1 or AIN2", attribute="target"),
-            optional(word(*WAVEFORMS), "kind", "constant, ramp, sine or table", "constant"),
-            optional(number(), "value", "volts; of a sine its mean", 0.0),
-            optional(number(), "amplitude", "sine: volts", 0.0),
-            optional(number(0.0), "frequency", "sine: Hz", 1.0),
-            optional(number(), "phase", "sine: degrees", 0.0),
-            optional(points, "points", "table: [[seconds, volts], ...]", ()),
-            optional(number(), "begin", "ramp: volts at first", 0.0),
-            optional(number(), "end", "ramp: volts in the end", 0.0),
-            optional(time_value, "over", "ramp: how long it takes", 0, "ramp_time"),
-            optional(positive_time, "repeat", "ramp, table: begins anew after this time"),
-            optional(positive_time, "period", "how often the voltage is renewed", 10 * MILLISECOND),
-        ),
-        only={
-            "value": ("constant", "sine"),
-            "amplitude": ("sine",),
-            "frequency": ("sine",),
-            "phase": ("sine",),
-            "points": ("table",),
-            "begin": ("ramp",),
-            "end": ("ramp",),
-            "over": ("ramp",),
-            "repeat": ("ramp", "table"),
-            "period": ("ramp", "sine", "table"),
-        },
-    ),
-    read=_read,
     refers=_refers,
     build=_build,
     signals=lambda built: {"volts": SignalOf((built.source,), built.volts, unit="V", bounds=(LOWEST_V, HIGHEST_V))},

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from math import ceil
 from typing import Any, ClassVar, NamedTuple
 
@@ -20,7 +19,8 @@ from steptwin.simulation.faults.table import number as parameter
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.scheduler.kernel import Board
-from steptwin.simulation.toml.reader import Key, TomlText, optional
+from steptwin.simulation.toml.reader import TomlText
+from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, flag, name_value, number, permitting, time_value
 
 ON, GOOD = "ON", "GOOD"
@@ -29,19 +29,34 @@ USUAL_SHARE = 0.75
 MOST_FED = 1000
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@permitting("name, or list of names")
+def _names(value: Any) -> tuple[str, ...]:
+    names = value if isinstance(value, list) else [value]
+    if not 1 <= len(names) <= MOST_FED:
+        raise Misuse(f"{len(names)} controllers: permitted are 1 to {MOST_FED}")
+    found = tuple(name_value(name) for name in names)
+    if len(set(found)) < len(found):
+        raise Misuse(f"{value!r}: a controller is named twice")
+    return found
+
+
+@table("[[supply]]")
 class SupplySpec(BoardSpec):
     """Voltages in V."""
 
-    feeds: tuple[str, ...]
-    on: Terminal | None
-    switched: bool
-    volts: float
-    enough: float | None
-    delay: Nanos
-    rise: Nanos
-    hold_up: Nanos
-    fall: Nanos
+    feeds: tuple[str, ...] = key(_names, "the controllers that it feeds: a name, or a list of them")
+    on: Terminal | None = key(OUTPUT_PIN, "output joined to ON, such as the output good of another supply", default=None)
+    switched: bool = key(
+        flag, "whether wires or contacts switch ON; without it and on: it is on from the beginning", default=False
+    )
+    volts: float = key(number(0.0, above=True), "V of its output", default=24.0)
+    enough: float | None = key(
+        number(0.0, above=True), "V from which on its controllers are on; default three quarters of volts", default=None
+    )
+    delay: Nanos = key(time_value, "from ON until the voltage rises", default=0)
+    rise: Nanos = key(time_value, "from 0 to all of the voltage", default=50 * MILLISECOND)
+    hold_up: Nanos = key(time_value, "after ON until the voltage falls", default=20 * MILLISECOND)
+    fall: Nanos = key(time_value, "from all of the voltage to 0", default=100 * MILLISECOND)
 
     @property
     def is_switched(self) -> bool:
@@ -213,31 +228,8 @@ def _signals(supply: Supply) -> Mapping[str, SignalOf]:
     return {"volts": of}
 
 
-@permitting("name, or list of names")
-def _names(value: Any) -> tuple[str, ...]:
-    names = value if isinstance(value, list) else [value]
-    if not 1 <= len(names) <= MOST_FED:
-        raise Misuse(f"{len(names)} controllers: permitted are 1 to {MOST_FED}")
-    found = tuple(name_value(name) for name in names)
-    if len(set(found)) < len(found):
-        raise Misuse(f"{value!r}: a controller is named twice")
-    return found
-
-
 SUPPLY = with_terminals(
-    "supply",
     SupplySpec,
-    (
-        Key("feeds", _names, "the controllers that it feeds: a name, or a list of them"),
-        optional(OUTPUT_PIN, "on", "output joined to ON, such as the output good of another supply"),
-        optional(flag, "switched", "whether wires or contacts switch ON; without it and on: it is on from the beginning", False),
-        optional(number(0.0, above=True), "volts", "V of its output", 24.0),
-        optional(number(0.0, above=True), "enough", "V from which on its controllers are on; default three quarters of volts"),
-        optional(time_value, "delay", "from ON until the voltage rises", 0),
-        optional(time_value, "rise", "from 0 to all of the voltage", 50 * MILLISECOND),
-        optional(time_value, "hold_up", "after ON until the voltage falls", 20 * MILLISECOND),
-        optional(time_value, "fall", "from all of the voltage to 0", 100 * MILLISECOND),
-    ),
     make=_make,
     signals=_signals,
     faults=(

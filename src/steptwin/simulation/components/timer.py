@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import ClassVar
 
 from steptwin.machine import Nanos
 from steptwin.simulation.components.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.scheduler.kernel import Board
-from steptwin.simulation.toml.reader import Key, optional
+from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, positive_time, word
 
 IN, OUT = "IN", "OUT"
 ON_DELAY, OFF_DELAY, PULSE = "on-delay", "off-delay", "pulse"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@table("[[timer]]")
 class TimerSpec(BoardSpec):
-    kind: str
-    input: Terminal | None
-    time: Nanos
+    kind: str = key(word(ON_DELAY, OFF_DELAY, PULSE), "on-delay (TON), off-delay (TOF) or pulse (TP)")
+    time: Nanos = key(positive_time, "such as '200 ms'")
+    input: Terminal | None = key(OUTPUT_PIN, "output joined to IN; without it wires and contacts may be", default=None)
 
     @property
     def terminals(self) -> Terminals:
@@ -82,13 +82,7 @@ class Timer(BoardPart):
 
 
 _TIMER = with_terminals(
-    "timer",
     TimerSpec,
-    (
-        Key("kind", word(ON_DELAY, OFF_DELAY, PULSE), "on-delay (TON), off-delay (TOF) or pulse (TP)"),
-        Key("time", positive_time, "such as '200 ms'"),
-        optional(OUTPUT_PIN, "input", "output joined to IN; without it wires and contacts may be"),
-    ),
     faults=STUCK,
     make=lambda spec, site: Timer(site.board(spec.name), spec.kind, spec.time),
 )

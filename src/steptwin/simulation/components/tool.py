@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, ClassVar
 
@@ -14,7 +13,7 @@ from steptwin.simulation.components.coordinate import PLACES, Coordinate, Pulled
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.simulation.components.site import Site
-from steptwin.simulation.components.switch import SWITCH, SwitchSpec, put_switch, read_switches, zone_of
+from steptwin.simulation.components.switch import SwitchSpec, put_switch, zone_of
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.faults.table import Parameter, ParameterForm
@@ -22,8 +21,8 @@ from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.drawing import PLANE, Drawing, rail
 from steptwin.simulation.mechanics.lanes import SLIPS, MovedLane
 from steptwin.simulation.mechanics.scale import exact_fraction
-from steptwin.simulation.toml.reader import Key, Row, Table, TomlText, optional
-from steptwin.simulation.toml.sense import TableRows
+from steptwin.simulation.toml.reader import TomlText
+from steptwin.simulation.toml.table import key, table, tables_in
 from steptwin.simulation.toml.values import NameOf, name_value, number, pair, permitting
 from steptwin.state import Plain, Stateful
 
@@ -31,24 +30,46 @@ COORDINATES = ("x", "y")
 BELTS = ("axis", "other")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@permitting("[share of axis, share of other], not both 0")
+def _shares(value: Any) -> tuple[float, float]:
+    if not isinstance(value, list) or len(value) != 2:
+        raise Misuse(f"{value!r}: expected [share of axis, share of other]")
+    one, other = (number()(share) for share in value)
+    if one == other == 0.0:
+        raise Misuse(f"{value!r}: one of the shares is not 0")
+    return one, other
+
+
+@table("[[tool]]")
 class ToolSpec(NamedSpec):
     """``x`` and ``y``: the shares of ``axis`` and ``other`` in each coordinate."""
 
-    axis: str
-    other: str
-    x: tuple[float, float]
-    y: tuple[float, float]
-    x_travel: tuple[float, float] | None
-    y_travel: tuple[float, float] | None
-    x_switches: tuple[SwitchSpec, ...]
-    y_switches: tuple[SwitchSpec, ...]
+    name: str = key(name_value, "how conditions and faults name it")
+    axis: str = key(NameOf("axis"), "an axis that moves it")
+    other: str = key(NameOf("axis"), "the other axis that moves it, in the same unit")
+    x: tuple[float, float] = key(
+        _shares, "units of its x per unit of axis, and of other; default that of CoreXY", default=(0.5, 0.5)
+    )
+    y: tuple[float, float] = key(
+        _shares, "units of its y per unit of axis, and of other; default that of CoreXY", default=(0.5, -0.5)
+    )
+    x_travel: tuple[float, float] | None = key(pair, "where its x may be, in the unit of the axes: it is drawn so", default=None)
+    y_travel: tuple[float, float] | None = key(pair, "where its y may be, in the unit of the axes: it is drawn so", default=None)
+    x_switches: tuple[SwitchSpec, ...] = tables_in("x_switch", SwitchSpec, "[[tool.x_switch]]")
+    y_switches: tuple[SwitchSpec, ...] = tables_in("y_switch", SwitchSpec, "[[tool.y_switch]]")
 
     @property
     def switches(self) -> Iterator[tuple[str, int, SwitchSpec]]:
         """The coordinate of each, its number there, from 1, and itself."""
         for name, those in zip(COORDINATES, (self.x_switches, self.y_switches), strict=True):
             yield from ((name, n, one) for n, one in enumerate(those, start=1))
+
+    def check(self, text: TomlText) -> None:
+        if self.axis == self.other:
+            text.wrong((*self.path, "other"), "D007", f"other = {self.other!r} is its axis already: a tool has two")
+        if self.x[0] * self.y[1] == self.x[1] * self.y[0]:
+            message = f"y = {list(self.y)} is a multiple of x = {list(self.x)}: it moves along one line"
+            text.wrong((*self.path, "y"), "D007", message)
 
 
 class Tool(Stateful):
@@ -133,27 +154,6 @@ class Tool(Stateful):
 # ---------------------------------------------------------------------- the element
 
 
-@permitting("[share of axis, share of other], not both 0")
-def _shares(value: Any) -> tuple[float, float]:
-    if not isinstance(value, list) or len(value) != 2:
-        raise Misuse(f"{value!r}: expected [share of axis, share of other]")
-    one, other = (number()(share) for share in value)
-    if one == other == 0.0:
-        raise Misuse(f"{value!r}: one of the shares is not 0")
-    return one, other
-
-
-def _read(text: TomlText, row: Row, table: Table) -> ToolSpec:
-    path = row["path"]
-    x, y = (tuple(read_switches(text, path, table, f"{name}_switch")) for name in COORDINATES)
-    spec = ToolSpec(**row, x_switches=x, y_switches=y)
-    if spec.axis == spec.other:
-        text.wrong((*path, "other"), "D007", f"other = {spec.other!r} is its axis already: a tool has two")
-    if spec.x[0] * spec.y[1] == spec.x[1] * spec.y[0]:
-        text.wrong((*path, "y"), "D007", f"y = {list(spec.y)} is a multiple of x = {list(spec.x)}: it moves along one line")
-    return spec
-
-
 def _refers(spec: ToolSpec, described: ElementSpecs) -> Iterator[Reference]:
     drives = {axis.name: axis.drive[0] for axis in described.of(AXIS)}
     machine, other = (drives.get(name, name) for name in (spec.axis, spec.other))
@@ -199,23 +199,7 @@ def _slip(active: ActiveFault, tool: Tool, begins: bool, now: Nanos) -> str:
 
 
 TOOL: Element[ToolSpec, Tool] = Element(
-    name="tool",
     spec=ToolSpec,
-    rows=TableRows(
-        written="[[tool]]",
-        keys=(
-            Key("name", name_value, "how conditions and faults name it"),
-            Key("axis", NameOf("axis"), "an axis that moves it"),
-            Key("other", NameOf("axis"), "the other axis that moves it, in the same unit"),
-            optional(_shares, "x", "units of its x per unit of axis, and of other; default that of CoreXY", (0.5, 0.5)),
-            optional(_shares, "y", "units of its y per unit of axis, and of other; default that of CoreXY", (0.5, -0.5)),
-            optional(pair, "x_travel", "where its x may be, in the unit of the axes: it is drawn so"),
-            optional(pair, "y_travel", "where its y may be, in the unit of the axes: it is drawn so"),
-        ),
-    ),
-    inner={f"{name}_switch": replace(SWITCH, written=f"[[tool.{name}_switch]]") for name in COORDINATES},
-    inner_attributes={f"{name}_switch": f"{name}_switches" for name in COORDINATES},
-    read=_read,
     refers=_refers,
     build=_build,
     signals=_signals,

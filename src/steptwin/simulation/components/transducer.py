@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import ClassVar
 
 from steptwin.errors import Misuse
@@ -20,19 +19,28 @@ from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.logic.sources import HIGHEST_V, LOWEST_V
 from steptwin.simulation.scheduler.kernel import Kernel, Source
 from steptwin.simulation.scheduler.wires import PinName
-from steptwin.simulation.toml.reader import Key, Row, Table, TomlText, optional
-from steptwin.simulation.toml.sense import TableRows
+from steptwin.simulation.toml.reader import TomlText
+from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import ANALOG_INPUT, PinOf, Terminal, name_value, points, text_value
 from steptwin.simulation.toml.values import number as number_value
 from steptwin.state import Stateful
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@table("[[transducer]]")
 class TransducerSpec(NamedSpec):
-    of: str
-    target: Terminal
-    points: tuple[tuple[float, float], ...]
-    resolution: float
+    name: str = key(name_value, "how conditions and faults name it")
+    of: str = key(text_value, "the signal that it measures, such as x.position, clamp.position, cup.pressure")
+    target: Terminal = key(PinOf(ANALOG_INPUT), "the analog input: MACHINE.AIN1 or AIN2", name="to")
+    points: tuple[tuple[float, float], ...] = key(points, "[[value, volts], ...] in the unit of the signal, linear between")
+    resolution: float = key(number_value(0.0001, 10.0), "V: steps in which the voltage changes", default=0.01)
+
+    def check(self, text: TomlText) -> None:
+        check_owners(text, (*self.path, "of"), self.name, (owner_of(self.of),))
+        volts = [volts for _, volts in self.points]
+        if not all(LOWEST_V <= one <= HIGHEST_V for one in volts):
+            there = f"{min(volts):g} to {max(volts):g} V"
+            message = f"{there}: an analog input takes {LOWEST_V:g} to {HIGHEST_V:g} V"
+            text.wrong((*self.path, "points"), "D007", message)
 
 
 class Transducer(Stateful):
@@ -72,17 +80,6 @@ class Transducer(Stateful):
         return self._level.due
 
 
-def _read(text: TomlText, row: Row, table: Table) -> TransducerSpec:
-    spec = TransducerSpec(**row)
-    check_owners(text, (*spec.path, "of"), spec.name, (owner_of(spec.of),))
-    volts = [volts for _, volts in spec.points]
-    if not all(LOWEST_V <= one <= HIGHEST_V for one in volts):
-        there = f"{min(volts):g} to {max(volts):g} V"
-        message = f"{there}: an analog input takes {LOWEST_V:g} to {HIGHEST_V:g} V"
-        text.wrong((*spec.path, "points"), "D007", message)
-    return spec
-
-
 def _refers(spec: TransducerSpec, described: ElementSpecs) -> Iterator[Reference]:
     yield Reference(spec.target[0], spec.target[0], (*spec.path, "to"))
     yield Reference(spec.target[0], owner_of(spec.of), (*spec.path, "of"))
@@ -101,19 +98,7 @@ def _build(spec: TransducerSpec, site: Site) -> Transducer:
 
 
 TRANSDUCER: Element[TransducerSpec, Transducer] = Element(
-    name="transducer",
     spec=TransducerSpec,
-    rows=TableRows(
-        written="[[transducer]]",
-        keys=(
-            Key("name", name_value, "how conditions and faults name it"),
-            Key("of", text_value, "the signal that it measures, such as x.position, clamp.position, cup.pressure"),
-            Key("to", PinOf(ANALOG_INPUT), "the analog input: MACHINE.AIN1 or AIN2", attribute="target"),
-            Key("points", points, "[[value, volts], ...] in the unit of the signal, linear between"),
-            optional(number_value(0.0001, 10.0), "resolution", "V: steps in which the voltage changes", 0.01),
-        ),
-    ),
-    read=_read,
     refers=_refers,
     build=_build,
     signals=lambda built: {"volts": SignalOf((built.source,), built.volts, unit="V", bounds=(LOWEST_V, HIGHEST_V))},

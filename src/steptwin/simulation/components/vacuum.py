@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from math import ceil
 from typing import ClassVar
 
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.motion.exponential import decay, logarithm
-from steptwin.simulation.components.carrier import CARRIER_KEYS, HELD, PICK, PLACE, Carrier, CarrierSpec, carrier_signals
+from steptwin.simulation.components.carrier import HELD, PICK, PLACE, Carrier, CarrierSpec, carrier_signals
 from steptwin.simulation.components.logic import STUCK, Joint, with_terminals
 from steptwin.simulation.components.site import Site
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
@@ -17,19 +16,20 @@ from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.scheduler.kernel import Board
-from steptwin.simulation.toml.reader import TomlText, optional
+from steptwin.simulation.toml.reader import TomlText
+from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, number, positive_time
 
 EJECTOR = "EJECTOR"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@table("[[vacuum]]")
 class VacuumSpec(CarrierSpec):
-    ejector: Terminal | None
-    vacuum: float
-    threshold: float
-    build_up: Nanos
-    release: Nanos
+    ejector: Terminal | None = key(OUTPUT_PIN, "output joined to EJECTOR; without it a wire may be", default=None, order=-1)
+    vacuum: float = key(number(0.0, 101.0, above=True), "kPa below the pressure of the air, with a closed cup", default=70.0)
+    threshold: float = key(number(0.0, 101.0, above=True), "kPa, from which HELD is on", default=50.0)
+    build_up: Nanos = key(positive_time, "from 0 to the threshold", default=100 * MILLISECOND)
+    release: Nanos = key(positive_time, "from vacuum to the threshold", default=40 * MILLISECOND)
 
     @property
     def terminals(self) -> Terminals:
@@ -140,16 +140,7 @@ def _signals(vacuum: Vacuum) -> Mapping[str, SignalOf]:
 
 
 VACUUM = with_terminals(
-    "vacuum",
     VacuumSpec,
-    (
-        optional(OUTPUT_PIN, "ejector", "output joined to EJECTOR; without it a wire may be"),
-        *CARRIER_KEYS,
-        optional(number(0.0, 101.0, above=True), "vacuum", "kPa below the pressure of the air, with a closed cup", 70.0),
-        optional(number(0.0, 101.0, above=True), "threshold", "kPa, from which HELD is on", 50.0),
-        optional(positive_time, "build_up", "from 0 to the threshold", 100 * MILLISECOND),
-        optional(positive_time, "release", "from vacuum to the threshold", 40 * MILLISECOND),
-    ),
     make=lambda spec, site: Vacuum(site.board(spec.name), spec, site),
     signals=_signals,
     faults=(

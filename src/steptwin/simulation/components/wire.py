@@ -3,28 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from steptwin.machine import Nanos
 from steptwin.simulation.components.element import Element
-from steptwin.simulation.components.elementspec import ElementSpec, ElementSpecs, Reference
+from steptwin.simulation.components.elementspec import ElementSpecs, Reference
 from steptwin.simulation.components.site import Site
 from steptwin.simulation.scheduler.wires import PinName, Wire
-from steptwin.simulation.toml.reader import Key, Row, Table, TomlText, optional
-from steptwin.simulation.toml.sense import TableRows
+from steptwin.simulation.toml.table import TableSpec, key, table
 from steptwin.simulation.toml.values import INPUT_PIN, OUTPUT_PIN, Terminal, flag, time_value
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WireSpec(ElementSpec):
-    source: Terminal
-    target: Terminal
-    inverted: bool
-    delay: Nanos
-
-
-def _read(text: TomlText, row: Row, table: Table) -> WireSpec:
-    return WireSpec(**row)
+@table("[[wire]]")
+class WireSpec(TableSpec):
+    source: Terminal = key(OUTPUT_PIN, "the output: MACHINE.PIN", name="from")
+    target: Terminal = key(INPUT_PIN, "the input: MACHINE.PIN", name="to")
+    inverted: bool = key(flag, "whether the level is turned round", default=False)
+    delay: Nanos = key(time_value, "how much later it arrives", default=0)
 
 
 def _refers(spec: WireSpec, described: ElementSpecs) -> Iterator[Reference]:
@@ -39,18 +33,7 @@ def _build(spec: WireSpec, site: Site) -> Wire:
 
 
 WIRE: Element[WireSpec, Wire] = Element(
-    name="wire",
     spec=WireSpec,
-    rows=TableRows(
-        written="[[wire]]",
-        keys=(
-            Key("from", OUTPUT_PIN, "the output: MACHINE.PIN", attribute="source"),
-            Key("to", INPUT_PIN, "the input: MACHINE.PIN", attribute="target"),
-            optional(flag, "inverted", "whether the level is turned round", False),
-            optional(time_value, "delay", "how much later it arrives", 0),
-        ),
-    ),
-    read=_read,
     refers=_refers,
     build=_build,
 )

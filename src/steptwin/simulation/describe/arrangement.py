@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from steptwin.errors import Misuse, Refusal
 from steptwin.simulation.toml.names import Unknown
 from steptwin.simulation.toml.reader import Key, TomlText
-from steptwin.simulation.toml.sense import TableRows
+from steptwin.simulation.toml.table import TableRows
 from steptwin.simulation.toml.values import permitting, text_value, whole
 
 DRAWING = "drawing"

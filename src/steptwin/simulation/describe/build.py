@@ -9,7 +9,7 @@ from typing import Any
 from steptwin.errors import Misuse
 from steptwin.machine import MachineEvent, Nanos
 from steptwin.simulation.components.element import AnyElement
-from steptwin.simulation.components.elementspec import ElementSpec, NamedSpec
+from steptwin.simulation.components.elementspec import NamedSpec
 from steptwin.simulation.components.parts import WorldParts
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.components.site import Site
@@ -21,6 +21,7 @@ from steptwin.simulation.kinds.kind import ControllerSpec, LineSpec, Member, Ter
 from steptwin.simulation.kinds.registry import line_kinds
 from steptwin.simulation.scheduler.kernel import Board, Kernel
 from steptwin.simulation.scheduler.trace import RecordSink, TraceRecord
+from steptwin.simulation.toml.table import TableSpec
 
 Keep = Callable[[str, bytes, Nanos], None]
 """Stores the non-volatile memory of a controller (name, contents, moment); returns when it is on disk. Raises `OSError`."""
@@ -128,7 +129,7 @@ class _Builder:
 
     def _make_elements(self) -> None:
         """In the order of `ELEMENTS`, but behind those whose signals they are over (`_waits`)."""
-        later: list[tuple[AnyElement, ElementSpec]] = []
+        later: list[tuple[AnyElement, TableSpec]] = []
         for element in ELEMENTS.values():
             specs = self.spec.elements[element.name]
             waiting = [spec for spec in specs if self._waits(element, spec)]
@@ -145,20 +146,20 @@ class _Builder:
                 if order := self.blueprint.memo.once(("order", number), kernel.order):
                     kernel.arrange(order)
 
-    def _waits(self, element: AnyElement, spec: ElementSpec) -> bool:
+    def _waits(self, element: AnyElement, spec: TableSpec) -> bool:
         """Whether it is over a signal of an element that is not built yet."""
         references = element.refers(spec, self.spec.elements)
         over = (reference.other for reference in references if reference.path[-1:] in (("of",), ("when",)))
         return any(self.parts.unbuilt(owner) is not None for owner in over)
 
-    def _build_elements(self, element: AnyElement, specs: Iterable[ElementSpec]) -> None:
+    def _build_elements(self, element: AnyElement, specs: Iterable[TableSpec]) -> None:
         built = [(spec, self._element(element, spec)) for spec in specs]
         if element.connect is not None:
             for spec, part in built:
                 if part is not None:
                     self.spec.text.unless_wrong(spec.path, partial(element.connect, spec, part, self.site))
 
-    def _element(self, element: AnyElement, spec: ElementSpec) -> Any:
+    def _element(self, element: AnyElement, spec: TableSpec) -> Any:
         """The built element; None if it has errors."""
         found = self.spec.text.unless_wrong(spec.path, partial(element.build, spec, self.site))
         if found is None:

@@ -8,7 +8,7 @@ from typing import Any
 
 from steptwin.errors import Misuse
 from steptwin.simulation.components.element import AnyElement
-from steptwin.simulation.components.elementspec import ElementSpec, ElementSpecs, NamedSpec
+from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.describe.arrangement import DRAWING, check_places, read_places
 from steptwin.simulation.describe.gateways import GATEWAY, read_gateways
@@ -24,7 +24,7 @@ from steptwin.simulation.kinds.links import LINK_KEYS, TLS_KEYS, TlsFiles
 from steptwin.simulation.kinds.registry import KINDS
 from steptwin.simulation.toml.names import RESERVED
 from steptwin.simulation.toml.reader import TomlText, read_table
-from steptwin.simulation.toml.sense import check_sense
+from steptwin.simulation.toml.table import TableSpec, check_sense, make_spec, read_row
 
 CAMPAIGN = "campaign"
 """The table that only a campaign has (`steptwin.campaign`)."""
@@ -115,8 +115,8 @@ def _tables(toml: TomlText, kind: str, also: tuple[str, ...] = ()) -> list[tuple
     names: set[str] = set()
     for number_, table in enumerate(given):
         path = (kind, number_)
-        values = read_table(toml, path, table, rows.keys, also)
-        if any(key.is_required and (key.attribute or key.name) not in values for key in rows.keys):
+        values = read_row(toml, path, rows, table, also)
+        if values is None:
             continue
         check_sense(toml, path, rows, table)
         if values.get("name") and values["name"] in names:
@@ -130,9 +130,9 @@ def _rows(toml: TomlText, kind: str) -> list[dict[str, Any]]:
     return [row for row, _ in _tables(toml, kind)]
 
 
-def _elements(toml: TomlText, element: AnyElement) -> Iterator[ElementSpec]:
-    for row, table in _tables(toml, element.name, tuple(element.inner)):
-        yield element.read(toml, row, table)
+def _elements(toml: TomlText, element: AnyElement) -> Iterator[TableSpec]:
+    for row, table in _tables(toml, element.name):
+        yield make_spec(toml, element.spec, row, table)
 
 
 def _line(row: dict[str, Any]) -> LineSpec:

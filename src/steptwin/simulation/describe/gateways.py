@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.simulation.toml.reader import Key, TomlText, optional, read_table
-from steptwin.simulation.toml.sense import TableRows, check_sense
+from steptwin.simulation.toml.table import TableRows, check_sense
 from steptwin.simulation.toml.values import (
     address_value,
     flag,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.simulation.toml.reader import Key, TomlText, optional, read_table
-from steptwin.simulation.toml.sense import TableRows
+from steptwin.simulation.toml.table import TableRows
 from steptwin.simulation.toml.tomlplaces import Path
 from steptwin.simulation.toml.values import number, positive_time, text_value, texts, whole
 

@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 from steptwin.errors import Misuse
 from steptwin.simulation.kinds.registry import KINDS
 from steptwin.simulation.toml.reader import Key, TomlText, WorldError, read_table
-from steptwin.simulation.toml.sense import TableRows
+from steptwin.simulation.toml.table import TableRows
 from steptwin.simulation.toml.tomlplaces import Path
 from steptwin.simulation.toml.values import NameOf, PinOf, name_value, text_value
 

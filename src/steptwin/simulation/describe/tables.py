@@ -24,7 +24,7 @@ from steptwin.simulation.kinds.kind import AnyKind
 from steptwin.simulation.kinds.links import LINK_KEYS, TLS_KEYS, TLS_NEED
 from steptwin.simulation.kinds.registry import KINDS, line_kinds
 from steptwin.simulation.toml.reader import Key, optional
-from steptwin.simulation.toml.sense import TableRows
+from steptwin.simulation.toml.table import TableRows
 from steptwin.simulation.toml.values import (
     flag,
     name_value,

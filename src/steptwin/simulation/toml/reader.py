@@ -188,9 +188,7 @@ class TomlText:
 
     def _key_with(self, path: Path, name: str) -> Path:
         """The key of the table at ``path``, or of a table in it, whose text has a name, if exactly one has it; else ``path``."""
-        table: Any = self.data
-        for step in path:
-            table = table[step]
+        table = self._given(path)
         if not isinstance(table, dict):
             return path
         keys = [key for key, value in table.items() if any(name.lower() in text.lower() for text in _texts(value))]
@@ -206,6 +204,20 @@ class TomlText:
         table = tables[number] if isinstance(tables, list) and isinstance(number, int) else None
         found = table.get("name") if isinstance(table, dict) else None
         return found if isinstance(found, str) else None
+
+    def is_given(self, path: Path) -> bool:
+        """Whether the text has a value at ``path``."""
+        return self._given(path) is not _MISSING
+
+    def _given(self, path: Path) -> Any:
+        """The value at ``path``; `_MISSING` where there is none. A table may stand for a list of one."""
+        found: Any = self.data
+        for step in path:
+            if isinstance(found, dict) and step != 0:
+                found = found.get(step, _MISSING)
+            elif isinstance(found, list):
+                found = found[step] if isinstance(step, int) and step < len(found) else _MISSING
+        return found
 
     def is_wrong(self, path: Path) -> bool:
         """Whether something is wrong with the value at ``path`` or in it."""
@@ -348,6 +360,12 @@ class Key:
     default: Any = _MISSING
     attribute: str = ""
     """The attribute it becomes, where that is not its name."""
+    needs: str = ""
+    """The key without which it means nothing."""
+    excludes: tuple[str, ...] = ()
+    """Keys that give the same value in another way."""
+    kinds: tuple[str, ...] = ()
+    """The values of the key ``kind`` with which it has a meaning; empty: all."""
     is_required: bool = field(init=False)
 
     def __post_init__(self) -> None:
