@@ -13,7 +13,7 @@ import typer
 
 from steptwin.cli import completion
 from steptwin.columns import aligned
-from steptwin.errors import LineFailure, Misuse, Refusal
+from steptwin.errors import LineFailure, Refusal
 
 if TYPE_CHECKING:
     from steptwin.drivers.kind import AnyDriverKind, DeviceAddress, ReadValues
@@ -60,11 +60,6 @@ def kind_of(address: DeviceAddress) -> AnyDriverKind:
     from steptwin.drivers.kinds import DRIVERS
 
     return DRIVERS[address.kind]
-
-
-def no_command(kind: AnyDriverKind, command: str) -> Misuse:
-    """Refuse a command that only other devices have."""
-    return Misuse(f"{kind.title} has no {command}")
 
 
 @contextlib.contextmanager

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from steptwin.cli.device import Device, Json, LogFrames, find, kind_of, no_command
+from steptwin.cli.device import Device, Json, LogFrames, find, kind_of
 from steptwin.cli.motions import Timeout, Wait, carry_out
 
 
@@ -31,7 +31,4 @@ def command(
     An M1486 seeks the line at start/stop speed, and its position is 0 there.
     """
     address = find(device)
-    kind = kind_of(address)
-    if kind.home is None:
-        raise no_command(kind, "home")
-    carry_out(address, kind.home(velocities), wait=wait, timeout=timeout, json=json, log_frames=log_frames)
+    carry_out(address, kind_of(address).home(velocities), wait=wait, timeout=timeout, json=json, log_frames=log_frames)

@@ -19,7 +19,6 @@ from steptwin.cli.device import (
     complain,
     find,
     kind_of,
-    no_command,
     opened,
     print_json,
 )
@@ -43,12 +42,13 @@ def command(
     An M1486 makes one short move after the other, of 0.15 s at the velocity given (full steps/s), whatever --hold is. E types,
     which write every command into their EEPROM, are not jogged, nor is anything on a line below 1200 bit/s.
     """
+    from steptwin.drivers.kind import DriverKind
     from steptwin.drivers.typed import tied
 
     address = find(device)
     kind = kind_of(address)
-    if kind.jog is None:
-        raise no_command(kind, "jog")
+    if not kind.offers(DriverKind.jog):
+        raise kind.lacks("jog")
     given = tied([velocity], kind.axes)
     if seconds is None and not sys.stdin.isatty():
         raise Misuse("no terminal, so no key can end the jog: give --seconds")

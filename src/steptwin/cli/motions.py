@@ -13,7 +13,6 @@ from steptwin.cli.device import (
     complain,
     find,
     kind_of,
-    no_command,
     opened,
     print_json,
     print_started,
@@ -30,10 +29,12 @@ Timeout = Annotated[float | None, typer.Option(help="Seconds to wait at most. De
 
 def switch_drives(command: str, axes: Sequence[str] | None, device: str | None, *, log_frames: bool) -> None:
     """Switch drives on, by the command ``enable``, or off, by ``disable``."""
+    from steptwin.drivers.kind import DriverKind
+
     address = find(device)
     kind = kind_of(address)
-    if kind.enable is None:
-        raise no_command(kind, command)
+    if not kind.offers(DriverKind.enable):
+        raise kind.lacks(command)
     wanted = axes_of(axes, kind)
     with opened(address, log_frames=log_frames) as driver:
         kind.enable(driver, wanted, command == "enable")

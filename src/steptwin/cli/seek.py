@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from steptwin.cli.device import Device, Json, LogFrames, find, kind_of, no_command
+from steptwin.cli.device import Device, Json, LogFrames, find, kind_of
 from steptwin.cli.motions import Timeout, Wait, carry_out
 
 
@@ -26,7 +26,4 @@ def command(
     That is low for B1 to B3, B8 to B11 and B16 to B19, else high. The number of the line is in the internal variable afterwards.
     """
     address = find(device)
-    kind = kind_of(address)
-    if kind.seek is None:
-        raise no_command(kind, "seek")
-    carry_out(address, kind.seek([line]), wait=wait, timeout=timeout, json=json, log_frames=log_frames)
+    carry_out(address, kind_of(address).seek([line]), wait=wait, timeout=timeout, json=json, log_frames=log_frames)

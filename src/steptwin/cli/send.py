@@ -14,7 +14,6 @@ from typing import Annotated
 import typer
 
 from steptwin.cli.device import Device, Json, LogFrames, SuspensionDetector, find, kind_of, log_of, print_json
-from steptwin.errors import Refusal
 
 
 def command(
@@ -27,16 +26,18 @@ def command(
 
     A program that selects chips with X is sent to all of them; --device then names their line: ADDRESS,kind=m1486, or the twin.
     """
+    from steptwin.drivers.kind import DriverKind
     from steptwin.drivers.kinds import DRIVERS
     from steptwin.files.textfiles import read_text
 
     text = read_text(file).source.text
     # A program that no device of its kind takes needs no device.
-    refused = [kind for kind in DRIVERS.values() if file.suffix.lower() in kind.programs and kind.send is None]
+    of_file = (kind for kind in DRIVERS.values() if file.suffix.lower() in kind.programs)
+    refused = [kind for kind in of_file if not kind.offers(DriverKind.send)]
     address = None if refused else find(device, whole_line=True)
     kind = refused[0] if address is None else kind_of(address)
-    if address is None or kind.send is None:
-        raise Refusal(f"{file} was not sent: {kind.cannot_send or f'{kind.title} takes no programs'}")
+    if address is None or not kind.offers(DriverKind.send):
+        raise kind.not_sent(file)
     held_up = SuspensionDetector()
     with _progress(file.name) as progress:
         sent = kind.send(address, file, text, progress, held_up.check, log_of(log_frames))

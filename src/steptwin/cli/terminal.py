@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from steptwin.cli.device import Device, LogFrames, complain, find, kind_of, log_of, no_command, other_kinds_named
+from steptwin.cli.device import Device, LogFrames, complain, find, kind_of, log_of, other_kinds_named
 from steptwin.cli.typedlines import typed_lines
 from steptwin.errors import Misuse, SteptwinError
 
@@ -27,8 +27,6 @@ def command(device: Device = None, log_frames: LogFrames = False) -> None:
     """
     address = find(device, whole_line=True)
     kind = kind_of(address)
-    if kind.terminal is None:
-        raise no_command(kind, "terminal")
     interactive = sys.stdin.isatty()
 
     def show(text: str) -> None:

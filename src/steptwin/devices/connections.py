@@ -111,7 +111,7 @@ class DeviceConnections:
                 raise Misuse(TOO_MANY_DEVICES(most=MOST_DEVICES))
             name = self._free_name(address, name)
             key = address.kind, address.place, address.baud
-            line = self._lines.get(key) or _SharedLine(_line_of(address))
+            line = self._lines.get(key) or _SharedLine(DRIVERS[address.kind].line(address.place, address.baud))
             try:
                 driver = await _device_at(address, line.line)
             except BaseException:
@@ -159,24 +159,12 @@ class DeviceConnections:
             await self._close(machine)
 
 
-FOR_COMMANDS_ONLY = Message("devices.for-commands-only", "{kind} cannot be connected: its driver is for commands only")
-
-
-def _line_of(address: DeviceAddress) -> DriverLine[Any, Any]:
-    kind = DRIVERS[address.kind]
-    if kind.line is None:
-        raise Misuse(FOR_COMMANDS_ONLY(kind=kind.title))
-    return kind.line(address.place, address.baud)
-
-
 NO_ANSWER = Message("devices.no-answer", "{problem}{others}")
 
 
 async def _device_at(address: DeviceAddress, line: DriverLine[Any, Any]) -> DevicePart:
     """Open the driver, which moves nothing. Raises `Misuse`, `Refusal`, `LineFailure`."""
     kind = DRIVERS[address.kind]
-    if kind.part is None:
-        raise Misuse(FOR_COMMANDS_ONLY(kind=kind.title))
     try:
         return await kind.part(address, line)
     except NoAnswer as error:

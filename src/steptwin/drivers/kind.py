@@ -1,12 +1,13 @@
-"""What programs need of the drivers of a device: one value for each kind of device, `steptwin.drivers.kinds.DRIVERS`.
+"""The interface between programs and the drivers of a device: one `DriverKind` for each kind of device,
+`steptwin.drivers.kinds.DRIVERS`.
 
-The commands of the shell, the search for devices and the studio use nothing else. A field that only some devices have is None in
-the others, and a command that needs it is refused with a message.
+The commands of the shell, the search for devices and the studio use nothing else.
 """
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Collection, Iterable, Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,8 +16,9 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeAlias, TypeVar
 
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.subject import DevicePart
-from steptwin.errors import Misuse
+from steptwin.errors import Misuse, Refusal
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection
 
@@ -35,14 +37,21 @@ class AddressSelection:
     variant: str
     forms: str
     """The options that only this kind has, for messages: ``unit=N, firmware=1.70``."""
-    show: Callable[[int], str] = str
-    read: Callable[[str], int] = int
+    base: int = 10
+    """Base of the numeral of an address: 10 or 16."""
     usual: int | None = None
     """The address on the line if none is given; None: the driver selects nothing, as there is one controller only."""
     may_be_open: bool = False
     """Whether a driver may hold the line without selecting one of its controllers."""
     has_config: bool = False
     """Whether ``config`` names the configuration file of the device."""
+
+    def show(self, number: int) -> str:
+        return f"{number:X}" if self.base == 16 else str(number)
+
+    def read(self, text: str) -> int:
+        """Raises `ValueError`."""
+        return int(text, self.base)
 
     @property
     def options(self) -> frozenset[str]:
@@ -203,17 +212,21 @@ class Decoder(Protocol):
     def expire(self, now: Nanos) -> None: ...
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Decoding:
-    """How the traffic between other programs and devices of a kind is put into words."""
+class Decoding(ABC):
+    """Decoding of the traffic between other programs and devices of a kind, in words."""
 
-    protocol: str
-    """``--language`` of ``steptwin sniff``."""
-    make: Callable[[Callable[[FrameLine], None], str | None, bool], Decoder]
-    """A decoder that gives its lines to the function. The text is the variant (None: the usual one), the flag says whether the
-    frames are those of Modbus TCP. Raises `Misuse`."""
     framed_tcp: bool = True
     """Whether ``tcp://`` carries the frames of Modbus TCP, not the bytes of the line."""
+
+    @property
+    @abstractmethod
+    def protocol(self) -> str:
+        """``--language`` of ``steptwin sniff``."""
+
+    @abstractmethod
+    def make(self, sink: Callable[[FrameLine], None], variant: str | None, tcp: bool) -> Decoder:
+        """A decoder that gives its lines to ``sink``, for a variant (None: the usual one). ``tcp``: the frames are those of
+        Modbus TCP. Raises `Misuse`."""
 
 
 class FoundDevice(NamedTuple):
@@ -223,95 +236,102 @@ class FoundDevice(NamedTuple):
     what: str
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DeviceSearch:
-    """How devices of a kind are searched on a line. Nothing moves, and no setting is changed."""
+class DeviceSearch(ABC):
+    """Search for devices of a kind on a line. Nothing moves, and no setting is changed."""
 
-    bauds: Sequence[int]
-    """The rates to try, bit/s."""
-    numbers: int | None
-    """How many addresses are tried; None: those that a user names."""
-    title: str
-    """For a progress bar: ``unit``."""
-    form: str
-    """The format of an address there."""
-    find: Callable[[str, int, Sequence[int], float, Callable[[int], object]], Sequence[FoundDevice]]
-    """The devices at an address and a rate: those of the numbers, waiting so many seconds for each. The function is called with
-    each number before. Raises `LineFailure`."""
-    disturbs: bool
-    """Whether what is sent may disturb devices of other kinds, so that those are searched first."""
-    leave: Callable[[str, int], None] = lambda place, baud: None
-    """Put devices of this kind back into their usual state where none was found."""
+    @property
+    @abstractmethod
+    def bauds(self) -> Sequence[int]:
+        """The rates to try, bit/s."""
+
+    @property
+    @abstractmethod
+    def numbers(self) -> int | None:
+        """How many addresses are tried; None: those that a user names."""
+
+    @property
+    @abstractmethod
+    def title(self) -> str:
+        """For a progress bar: ``unit``."""
+
+    @property
+    @abstractmethod
+    def form(self) -> str:
+        """The format of an address there."""
+
+    @property
+    @abstractmethod
+    def disturbs(self) -> bool:
+        """Whether what is sent may disturb devices of other kinds, so that those are searched first."""
+
+    @abstractmethod
+    def find(
+        self, place: str, baud: int, numbers: Sequence[int], timeout_s: float, progress: Callable[[int], object]
+    ) -> Sequence[FoundDevice]:
+        """The devices at an address and a rate: those of the numbers, waiting for each until its time-out. ``progress`` is called
+        with each number before. Raises `LineFailure`."""
+
+    def leave(self, place: str, baud: int) -> None:
+        """Put devices of this kind back into their usual state where none was found."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DriverKind(Generic[D]):
-    """A kind of device, and what its drivers offer."""
+FOR_COMMANDS_ONLY = Message("drivers.for-commands-only", "{kind} cannot be connected: its driver is for commands only")
 
-    name: str
-    """``,kind=NAME`` behind an address; also the name of its twins."""
-    title: str
-    """With its article, for messages: ``a MIC488``."""
-    axes: int
-    """Number of axes."""
-    selection: AddressSelection
-    baud: int
-    timeout_s: float
 
-    # As a subject, in an event loop.
-    line: Callable[[str, int], DriverLine[Any, Any]] | None = None
-    """A line at an address, which is not opened; None if the device cannot be a subject."""
-    part: Callable[[DeviceAddress, DriverLine[Any, Any]], Awaitable[DevicePart]] | None = None
-    """The device on a line, which is opened; nothing moves. Raises `SteptwinError`."""
+class DriverKind(ABC, Generic[D]):
+    """A kind of device, and what its drivers offer. Each kind is one object of one class, in its folder.
 
-    # On lines of unknown devices.
+    A missing member that every kind has is a `TypeError` at import. Methods that only some kinds have raise `Misuse` in the
+    others.
+    """
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """``,kind=NAME`` behind an address; also the name of its twins."""
+
+    @property
+    @abstractmethod
+    def title(self) -> str:
+        """With its article, for messages: ``a MIC488``."""
+
+    @property
+    @abstractmethod
+    def axes(self) -> int:
+        """Number of axes."""
+
+    @property
+    @abstractmethod
+    def selection(self) -> AddressSelection: ...
+
+    @property
+    @abstractmethod
+    def baud(self) -> int: ...
+
+    @property
+    @abstractmethod
+    def timeout_s(self) -> float: ...
+
+    @property
+    @abstractmethod
+    def usual(self) -> Sequence[str]:
+        """The names of values that are watched if none is given."""
+
     search: DeviceSearch | None = None
-    clear: Callable[[str, int], None] | None = None
-    """End bytes of other protocols on the line, so that devices of this kind read their next command correctly; None where they
-    do no harm."""
-
     decoding: Decoding | None = None
     """None: the traffic cannot be put into words."""
-
-    # For a thread.
-    opened: Callable[[DeviceAddress, bool, Log | None], AbstractContextManager[D]]
-    """An open driver. The flag: it only observes, and leaves settings as they are that commands need."""
-    info: Callable[[D, DeviceAddress], DeviceOverview]
-    names: Callable[[], Sequence[str]]
-    """The names of values, for completion."""
-    usual: Sequence[str]
-    """The names of values that are watched if none is given."""
-    reading: Callable[[Sequence[str]], Callable[[D], ReadValues]]
-    """A function that reads values by name. Raises `Misuse`, as the function does, for what is no name."""
-    followed: Callable[[Sequence[str], str | None], Sequence[str] | None]
-    """The points of a running twin of a variant that have these names (none: the usual ones); None if a driver has to read
-    them."""
-    writing: Callable[[Sequence[str]], Callable[[D], ReadValues]]
-    """A function that writes NAME=VALUE one after the other, all of them checked before the first is sent, and gives the values
-    that can be read again. Raises as ``reading``."""
-    stop: Callable[[DeviceAddress, Log | None, Collection[int], bool], str | None]
-    """Stop axes at once (none: all), and with the flag the program. Opens the line itself. Gives a warning, if there is one."""
-    enable: Callable[[D, Collection[int], bool], object] | None = None
-    """Switch drives of axes (none: all) on or off."""
-    move: Callable[[WantedMoves], DeviceMotion[D]]
-    home: Callable[[Sequence[str]], DeviceMotion[D]] | None = None
-    """``AXIS=VALUE`` as typed. Raises `Misuse`."""
-    seek: Callable[[Sequence[str]], DeviceMotion[D]] | None = None
-    """The same, for a motion until a line has its end level."""
-    jog: Callable[[D, int, float, float], DeviceHeldJog] | None = None
-    """A jog of an axis at a velocity, which lasts for so many seconds after each `DeviceHeldJog.hold`."""
-    wait: Callable[[D, Collection[int], float | None], Sequence[EndedMotion]]
-    """Wait for the end of the motions of axes, so many seconds at most; None: as computed from the motion."""
-    halt: Callable[[D, Collection[int]], object]
-    """Stop axes."""
-    terminal: Callable[[DeviceAddress, Callable[[str], object], Log | None], DeviceTerminal] | None = None
-    """A conversation; the function shows what comes without being asked."""
     programs: Collection[str] = ()
     """Suffixes of its programs."""
-    send: Callable[[DeviceAddress, Path, str, Progress, Callable[[], object], Log | None], SentProgram] | None = None
-    """Download the text of a file; the second function is called immediately before something may move."""
     cannot_send: str = ""
     """Why programs cannot be downloaded, and what else can be done."""
+
+    def offers(self, method: Callable[..., object]) -> bool:
+        """Whether this kind has a method that only some have, such as `DriverKind.jog`."""
+        return getattr(type(self), method.__name__) is not method
+
+    def lacks(self, what: str) -> Misuse:
+        """Refusal of what only other devices have."""
+        return Misuse(f"{self.title} has no {what}")
 
     def check_axis(self, number: int) -> int:
         """Raises `Misuse` for an axis that is not there."""
@@ -319,6 +339,95 @@ class DriverKind(Generic[D]):
             last = "" if self.axes == 1 else f" to {self.axes}"
             raise Misuse(f"axis {number} is not one of {self.title}: permitted are 1{last}")
         return number
+
+    # ------------------------------------------------------------------ as a subject, in an event loop
+
+    def line(self, place: str, baud: int) -> DriverLine[Any, Any]:
+        """A line at an address, which is not opened."""
+        raise Misuse(FOR_COMMANDS_ONLY(kind=self.title))
+
+    async def part(self, address: DeviceAddress, line: DriverLine[Any, Any]) -> DevicePart:
+        """The device on a line, which is opened; nothing moves. Raises `SteptwinError`."""
+        raise Misuse(FOR_COMMANDS_ONLY(kind=self.title))
+
+    # ------------------------------------------------------------------ on lines of unknown devices
+
+    def clear(self, place: str, baud: int) -> None:
+        """End bytes of other protocols on the line, so that devices of this kind read their next command correctly. Kinds to
+        which they do no harm do not have it."""
+
+    # ------------------------------------------------------------------ for a thread
+
+    @abstractmethod
+    def opened(self, address: DeviceAddress, observe: bool, log: Log | None) -> AbstractContextManager[D]:
+        """An open driver. ``observe``: it leaves settings as they are that commands need."""
+
+    @abstractmethod
+    def info(self, driver: D, address: DeviceAddress) -> DeviceOverview: ...
+
+    @abstractmethod
+    def names(self) -> Sequence[str]:
+        """The names of values, for completion."""
+
+    @abstractmethod
+    def reading(self, names: Sequence[str]) -> Callable[[D], ReadValues]:
+        """A function that reads values by name. Raises `Misuse`, as the function does, for what is no name."""
+
+    @abstractmethod
+    def followed(self, names: Sequence[str], variant: str | None) -> Sequence[str] | None:
+        """The points of a running twin of a variant that have these names (none: the usual ones); None if a driver has to read
+        them."""
+
+    @abstractmethod
+    def writing(self, changes: Sequence[str]) -> Callable[[D], ReadValues]:
+        """A function that writes NAME=VALUE one after the other, all of them checked before the first is sent, and gives the
+        values that can be read again. Raises as `reading`."""
+
+    @abstractmethod
+    def stop(self, address: DeviceAddress, log: Log | None, axes: Collection[int], program: bool) -> str | None:
+        """Stop axes at once (none: all), and with ``program`` the program. Opens the line itself. Gives a warning, if there is
+        one."""
+
+    def enable(self, driver: D, axes: Collection[int], on: bool) -> None:
+        """Switch drives of axes (none: all) on or off."""
+        raise self.lacks("enable" if on else "disable")
+
+    @abstractmethod
+    def move(self, moves: WantedMoves) -> DeviceMotion[D]: ...
+
+    def home(self, texts: Sequence[str]) -> DeviceMotion[D]:
+        """``AXIS=VALUE`` as typed. Raises `Misuse`."""
+        raise self.lacks("home")
+
+    def seek(self, texts: Sequence[str]) -> DeviceMotion[D]:
+        """The same, for a motion until a line has its end level."""
+        raise self.lacks("seek")
+
+    def jog(self, driver: D, axis: int, velocity: float, hold_s: float) -> DeviceHeldJog:
+        """A jog of an axis, which lasts for ``hold_s`` after each `DeviceHeldJog.hold`."""
+        raise self.lacks("jog")
+
+    @abstractmethod
+    def wait(self, driver: D, axes: Collection[int], timeout_s: float | None) -> Sequence[EndedMotion]:
+        """Wait for the end of the motions of axes, for a time at most; None: as computed from the motion."""
+
+    @abstractmethod
+    def halt(self, driver: D, axes: Collection[int]) -> None:
+        """Stop axes."""
+
+    def terminal(self, address: DeviceAddress, show: Callable[[str], object], log: Log | None) -> DeviceTerminal:
+        """A conversation; ``show`` gets what comes without being asked."""
+        raise self.lacks("terminal")
+
+    def send(
+        self, address: DeviceAddress, file: Path, text: str, progress: Progress, check: Callable[[], object], log: Log | None
+    ) -> SentProgram:
+        """Download the text of a file; ``check`` is called immediately before something may move. Raises `SteptwinError`."""
+        raise self.not_sent(file)
+
+    def not_sent(self, file: Path) -> Refusal:
+        """Refusal of a program that cannot be downloaded."""
+        return Refusal(f"{file} was not sent: {self.cannot_send or f'{self.title} takes no programs'}")
 
 
 AnyDriverKind: TypeAlias = DriverKind[Any]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from steptwin.drivers.kind import AnyDriverKind
+from steptwin.drivers.kind import AnyDriverKind, DriverKind
 from steptwin.drivers.m1486.kind import M1486_DRIVER
 from steptwin.drivers.mic488.kind import MIC488_DRIVER
 from steptwin.errors import Misuse
@@ -22,7 +22,7 @@ def register(kind: AnyDriverKind) -> None:
 
 def others_there(kind: AnyDriverKind) -> str:
     """What else an address may lead to where a device of this kind does not answer, as the end of a message."""
-    others = [other for other in DRIVERS.values() if other is not kind and other.clear is not None]
+    others = [other for other in DRIVERS.values() if other is not kind and other.offers(DriverKind.clear)]
     return "".join(f". If it is {other.title}, put ',kind={other.name}' behind the address" for other in others)
 
 
@@ -33,5 +33,5 @@ register(M1486_DRIVER)
 def clear_line(kind: AnyDriverKind, place: str, baud: int) -> None:
     """End the bytes of a kind of device on a line, so that devices of other kinds read their next command correctly."""
     for other in DRIVERS.values():
-        if other is not kind and other.clear is not None:
+        if other is not kind:
             other.clear(place, baud)

@@ -24,7 +24,6 @@ class Talk:
         self.wire = wire
         self.shown: list[str] = []
         self.log: list[str] = []
-        assert M1486_DRIVER.terminal is not None
         self.conversation = M1486_DRIVER.terminal(address, self.shown.append, self.log.append)
 
     def __call__(self, line: str) -> list[str]:

@@ -10,7 +10,7 @@ from chip_rig import KNOWN, ChipWire, chip_driver, typed
 from line_rig import at_every_address, run_virtual
 
 from steptwin.drivers.exchange import LineLost
-from steptwin.drivers.kind import DeviceAddress, DeviceMotion, EndedMotion, FoundDevice, WantedMoves
+from steptwin.drivers.kind import DeviceAddress, DeviceMotion, DriverKind, EndedMotion, FoundDevice, WantedMoves
 from steptwin.drivers.m1486 import kind
 from steptwin.drivers.m1486.failures import WrongType
 from steptwin.drivers.m1486.jog import LINK_S
@@ -62,7 +62,6 @@ def test_a_stop_of_a_move_spoils_the_position() -> None:
 @pytest.mark.parametrize(("text", "line", "direction"), [("1=-B8", 8, -1), ("M1 = +b8", 8, 1), ("m1=-b9", 9, -1)])
 def test_a_seek_and_homing(text: str, line: int, direction: int) -> None:
     for motion, what in ((M1486_DRIVER.seek, "seek"), (M1486_DRIVER.home, "home")):
-        assert motion is not None
         wire = ChipWire(addresses=(7,))
         chip = ready(wire)
         wire.chip.set_pin(f"B{line}", 1, wire.now)
@@ -91,7 +90,6 @@ def test_a_seek_and_homing(text: str, line: int, direction: int) -> None:
 )
 def test_what_is_no_seek(texts: list[str], message: str) -> None:
     for motion in (M1486_DRIVER.seek, M1486_DRIVER.home):
-        assert motion is not None
         with pytest.raises(Misuse, match=message):
             motion(texts)
 
@@ -99,7 +97,6 @@ def test_what_is_no_seek(texts: list[str], message: str) -> None:
 def test_a_held_jog() -> None:
     wire = ChipWire(addresses=(7,))
     chip = ready(wire)
-    assert M1486_DRIVER.jog is not None
     jog = M1486_DRIVER.jog(chip, 1, 400.0, 0.3)
     assert (jog.unit, jog.ahead_s) == ("step", 2.0 * LINK_S)
     with jog:
@@ -115,7 +112,6 @@ def test_a_held_jog() -> None:
 def test_a_jog_that_others_end_is_not_ok() -> None:
     wire = ChipWire(addresses=(7,))
     chip = ready(wire)
-    assert M1486_DRIVER.jog is not None
     jog = M1486_DRIVER.jog(chip, 1, 400.0, 0.3)
     with jog:
         assert jog.hold()
@@ -132,7 +128,6 @@ def test_a_jog_that_limit_holds_is_not_ok_and_no_error() -> None:
     wire = ChipWire(addresses=(7,))
     chip = chip_driver(wire, 7)
     chip.command("c51")
-    assert M1486_DRIVER.jog is not None
     jog = M1486_DRIVER.jog(chip, 1, 400.0, 0.3)
     with jog:
         assert jog.hold()
@@ -206,7 +201,6 @@ def test_bytes_of_other_protocols_are_ended_by_a_line_end(monkeypatch: pytest.Mo
     wire.sleep(1.0)
     at_every_address(monkeypatch, wire)
     del wire.sent[:]
-    assert M1486_DRIVER.clear is not None
     M1486_DRIVER.clear("tcp://memory:1", 38400)
     once = typed(wire)
     assert once.endswith(" ")
@@ -219,8 +213,6 @@ def test_a_chip_as_a_subject(monkeypatch: pytest.MonkeyPatch) -> None:
     """What the studio connects; a twin beside a chip is impossible, for its position is unknown while it moves."""
     wire = ChipWire("C", addresses=(7,))
     at_every_address(monkeypatch, wire)
-    assert M1486_DRIVER.line is not None
-    assert M1486_DRIVER.part is not None
     connect, part_of = M1486_DRIVER.line, M1486_DRIVER.part
 
     async def main() -> tuple[int | None, str, str]:
@@ -282,4 +274,4 @@ def test_what_it_takes() -> None:
         with pytest.raises(Misuse, match=rf"axis {axis} is not one of an M1486: permitted are 1$"):
             M1486_DRIVER.check_axis(axis)
     assert list(M1486_DRIVER.programs) == [".m1486"]
-    assert M1486_DRIVER.enable is None
+    assert not M1486_DRIVER.offers(DriverKind.enable)

@@ -21,7 +21,6 @@ NAMES = ("POSITION", "COUNTER", "VARIABLE", "FLAGS", "FUNCTIONS", "TYPE", "INTER
 
 
 def send(address: DeviceAddress, text: str, progress: Progress, check: Callable[[], object]) -> SentProgram:
-    assert M1486_DRIVER.send is not None
     return M1486_DRIVER.send(address, Path("p.m1486"), text, progress, check, None)
 
 

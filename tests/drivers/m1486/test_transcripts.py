@@ -71,7 +71,6 @@ def bench(patch: pytest.MonkeyPatch, options: str) -> Bench:
     address = kinds.DeviceAddress("memory", "m1486", numbers[0] if numbers else None, BAUD, 1.0)
 
     def talking(variant: str | None = None, number: int | None = address.number) -> Any:
-        assert M1486_DRIVER.terminal is not None
         where = kinds.DeviceAddress("memory", "m1486", number, BAUD, 1.0, variant)
         return M1486_DRIVER.terminal(where, shown.append, log.append if "logged" in words else None)
 

@@ -10,7 +10,7 @@ from host_rig import Wire, driver, run_virtual
 from line_rig import at_every_address
 from mic488_rig import loaded
 
-from steptwin.drivers.kind import DeviceAddress, EndedMotion, FoundDevice, WantedMoves
+from steptwin.drivers.kind import DeviceAddress, DriverKind, EndedMotion, FoundDevice, WantedMoves
 from steptwin.drivers.mic488.kind import MIC488_DRIVER, RUNS_ON, of_mic488, unit_of
 from steptwin.drivers.mic488.sync import Mic488
 from steptwin.errors import LineFailure, Misuse, Refusal
@@ -43,7 +43,6 @@ def begin(mic: Mic488, moves: WantedMoves) -> list[EndedMotion]:
 
 def enabled(wire: Wire, *axes: int) -> Mic488:
     mic = driver(wire)
-    assert MIC488_DRIVER.enable is not None
     MIC488_DRIVER.enable(mic, axes or (1,), True)
     return mic
 
@@ -89,7 +88,6 @@ def test_a_refusal_before_the_motion_begins_nothing() -> None:
 def test_homing_of_axes_one_after_the_other() -> None:
     wire = Wire()
     mic = enabled(wire, 1, 3)
-    assert MIC488_DRIVER.home is not None
     motion = MIC488_DRIVER.home(["1=-5", "M3=-4"])
     assert tuple(motion.axes) == (1, 3)
     begun: set[int] = set()
@@ -115,7 +113,6 @@ def test_an_end_that_does_not_come_in_time_is_overdue() -> None:
 def test_a_held_jog() -> None:
     wire = Wire()
     mic = enabled(wire, 2)
-    assert MIC488_DRIVER.jog is not None
     jog = MIC488_DRIVER.jog(mic, 2, 10.0, 0.4)
     assert (jog.unit, jog.ahead_s) == ("mm", 0.0)
     with jog:
@@ -133,7 +130,6 @@ def test_a_held_jog() -> None:
 def test_a_jog_that_was_not_let_go_says_why_it_ended() -> None:
     wire = Wire()
     mic = enabled(wire)
-    assert MIC488_DRIVER.jog is not None
     jog = MIC488_DRIVER.jog(mic, 1, -20.0, 0.4)
     with jog:
         while jog.hold():
@@ -147,7 +143,6 @@ def test_a_jog_that_another_master_has_taken_over_says_so() -> None:
     """The axis runs on without end, so that nothing is waited for."""
     wire = Wire()
     mic = enabled(wire)
-    assert MIC488_DRIVER.jog is not None
     jog = MIC488_DRIVER.jog(mic, 1, 5.0, 0.4)
     with jog:
         driver(wire).set("M1_VEL_ABS", 5.0)
@@ -161,7 +156,6 @@ def test_drives_are_switched_on_and_off() -> None:
     wire = Wire()
     mic = enabled(wire, 1, 3)
     assert mic.status().axes == (1, 0, 1, 0)
-    assert MIC488_DRIVER.enable is not None
     MIC488_DRIVER.enable(mic, (1,), False)
     assert mic.status().axes == (0, 0, 1, 0)
 
@@ -209,8 +203,8 @@ def test_controllers_on_a_line_are_found(monkeypatch: pytest.MonkeyPatch) -> Non
     wire = Wire(units=(2, 5))
     begin = wire.now
     at_every_address(monkeypatch, wire)
-    assert MIC488_DRIVER.search is not None
     asked: list[int] = []
+    assert MIC488_DRIVER.search is not None
     found = MIC488_DRIVER.search.find("memory", 38400, [1, 2, 5], 0.2, asked.append)
     assert found == [FoundDevice(2, "1.70", "MIC488, firmware 1.70"), FoundDevice(5, "1.70", "MIC488, firmware 1.70")]
     assert asked == [1, 2, 5]
@@ -230,8 +224,6 @@ def test_a_controller_as_a_subject(monkeypatch: pytest.MonkeyPatch, tmp_path: Pa
     config = tmp_path / "table.cfg"
     config.write_text(config_text(wire.config, FIRMWARES["1.70"]))
     address = DeviceAddress("memory", "mic488", 2, 38400, 0.25, "1.70", str(config))
-    assert MIC488_DRIVER.line is not None
-    assert MIC488_DRIVER.part is not None
     connect, part_of = MIC488_DRIVER.line, MIC488_DRIVER.part
 
     async def twin_of(address: DeviceAddress) -> DeviceTwin:
@@ -293,7 +285,7 @@ def test_axes_that_it_has() -> None:
 
 def test_what_it_takes() -> None:
     assert set(MIC488_DRIVER.programs) == {".prg", ".wbc"}
-    assert MIC488_DRIVER.send is None
+    assert not MIC488_DRIVER.offers(DriverKind.send)
     assert "not documented" in MIC488_DRIVER.cannot_send
     assert MIC488_DRIVER.selection.options == {"unit", "firmware", "config"}
     assert (MIC488_DRIVER.axes, MIC488_DRIVER.baud) == (4, 38400)

@@ -237,7 +237,6 @@ def test_typed_lines(monkeypatch: pytest.MonkeyPatch) -> None:
     wire = Wire()
     at_every_address(monkeypatch, wire)
     log: list[str] = []
-    assert MIC488_DRIVER.terminal is not None
     terminal = MIC488_DRIVER.terminal(ADDRESS, log.append, log.append)
     assert wire.opened == 1
     terminal.greet()
@@ -269,7 +268,6 @@ def test_typing_leaves_the_data_type(monkeypatch: pytest.MonkeyPatch) -> None:
     wire = Wire()
     driver(wire).set("DATA_TYPE", 1)
     at_every_address(monkeypatch, wire)
-    assert MIC488_DRIVER.terminal is not None
     terminal = MIC488_DRIVER.terminal(ADDRESS, str, None)
     assert list(terminal.answer("DATA_TYPE", waits=True)) == ["DATA_TYPE = 1"]
 

@@ -8,18 +8,16 @@ from itertools import groupby
 from math import isfinite
 from typing import Any, NamedTuple
 
-from steptwin.drivers.kind import DeviceAddress, DeviceOverview, ReadValue, ReadValues
+from steptwin.drivers.kind import ReadValue, ReadValues
 from steptwin.drivers.m1486.settings import COMMANDS, checked_number
 from steptwin.drivers.m1486.sync import M1486
-from steptwin.drivers.typed import changes_of, number_of, shown
+from steptwin.drivers.typed import changes_of, number_of
 from steptwin.errors import Misuse
 from steptwin.m1486.functions import FUNCTIONS, USER_FLAGS
 from steptwin.m1486.lines import LINES
 from steptwin.m1486.microsteps import UNIT
-from steptwin.m1486.variants import Store
 
 NAMES = ("POSITION", "COUNTER", "VARIABLE", "FLAGS", "FUNCTIONS", "TYPE", "INTERFACE", "SERIES")
-USUAL = ("POSITION", "VARIABLE", "FLAGS")
 USUAL_POINTS = ("counter", "velocity", "variable")
 """Of a twin. Its point ``position`` is not what `POSITION` is: it counts from power-on."""
 ONLY_OF_DRIVER = frozenset({"POSITION", "FLAGS", "FUNCTIONS", "TYPE", "INTERFACE", "SERIES"})
@@ -29,16 +27,7 @@ _SWITCHES = {"ON": True, "TRUE": True, "1": True, "OFF": False, "FALSE": False, 
 SETTABLE = "POSITION, VARIABLE, B1…B21, FLAG80…FLAG86, F40…F63, S, A, V, P, M, Q, N"
 
 
-def reading(names: Sequence[str]) -> Callable[[M1486], ReadValues]:
-    """See `steptwin.drivers.kind.DriverKind`."""
-    wanted = [name.upper() for name in names]
-    for name in wanted:
-        if name not in NAMES:
-            raise Misuse(f"{name!r} is not a value of an M1486: permitted are {', '.join(NAMES)}")
-    return lambda chip: _read(chip, wanted)
-
-
-def _read(chip: M1486, wanted: Sequence[str]) -> ReadValues:
+def read(chip: M1486, wanted: Sequence[str]) -> ReadValues:
     """Only what is wanted: what is read takes command memory."""
     if "POSITION" in wanted or "COUNTER" in wanted:
         chip.counter()
@@ -61,66 +50,29 @@ def _interface(chip: M1486) -> str | None:
     return None if found is None else found.title
 
 
-def followed(names: Sequence[str], variant: str | None) -> Sequence[str] | None:
-    """The points of a twin with these names; None if the driver knows some of them better."""
-    wanted = names or USUAL_POINTS
-    return wanted if not names or ONLY_OF_DRIVER.isdisjoint(name.upper() for name in wanted) else None
-
-
 def _on(states: Mapping[int, bool]) -> str:
     return " ".join(str(number) for number, on in states.items() if on) or "none"
 
 
-def overview(chip: M1486, address: DeviceAddress) -> DeviceOverview:
-    """A type that has its program in the same memory as what is typed is only asked for its position."""
-    names = NAMES if chip.variant.store is Store.EEPROM else ("POSITION", "COUNTER", "TYPE")
-    found: dict[str, Any] = dict.fromkeys(NAMES) | {name: one.value for name, one in _read(chip, names).items()}
-    position = "unknown" if found["POSITION"] is None else f"{shown(found['POSITION'])} {chip.unit}"
-    which = "" if chip.address is None else f", chip {chip.address:X}"
-    head = [f"{found['TYPE']}{which} at {chip.place}", f"position {position} ({found['COUNTER']} {UNIT})"]
-    if names is NAMES:
-        head[0] += f", {found['INTERFACE']}, series {found['SERIES']}"
-        head += [
-            f"internal variable {found['VARIABLE']}; flags ON: {found['FLAGS']}",
-            f"functions ON: {found['FUNCTIONS']}",
-        ]
-    else:
-        head.append(
-            f"not read, because questions overwrite a program in the {chip.variant.memory_bits} bits of the command memory: "
-            f"{', '.join(name.lower() for name in NAMES if name not in names)}; 'steptwin get NAME' reads them"
-        )
-    return DeviceOverview(
-        {"device": chip.place, "chip": chip.address} | {name.lower(): value for name, value in found.items()}, tuple(head)
-    )
-
-
-class _CheckedChange(NamedTuple):
+class CheckedChange(NamedTuple):
     """A change of a chip, and its check, which sends nothing."""
 
     check: Callable[[M1486], object]
     make: Callable[[M1486], object]
 
 
-def writing(changes: Sequence[str]) -> Callable[[M1486], ReadValues]:
-    """See `steptwin.drivers.kind.DriverKind`. Nothing is read again. Settings one behind the other are made together, so that M
-    and Q may change to others that go together."""
-    wanted: list[_CheckedChange] = []
+def checked_changes(changes: Sequence[str]) -> Sequence[CheckedChange]:
+    """``NAME=VALUE`` as typed. Settings one behind the other are made together, so that M and Q may change to others that go
+    together. Raises `Misuse`."""
+    wanted: list[CheckedChange] = []
     given = changes_of(changes, "VARIABLE=7 or B6=off")
     for is_setting, group in groupby(given, lambda change: change[0].upper() in _SETTINGS):
         several = list(group)
         wanted += [_settings(several)] if is_setting else [_change(*change) for change in several]
-
-    def write(chip: M1486) -> ReadValues:
-        for change in wanted:
-            change.check(chip)
-        for change in wanted:
-            change.make(chip)
-        return {}
-
-    return write
+    return wanted
 
 
-def _settings(given: Sequence[tuple[str, str, str]]) -> _CheckedChange:
+def _settings(given: Sequence[tuple[str, str, str]]) -> CheckedChange:
     numbers = {name.upper(): _whole(name.upper(), value, text) for name, value, text in given}
     settings: dict[str, Any] = {_SETTINGS[letter]: number for letter, number in numbers.items()}
 
@@ -129,17 +81,17 @@ def _settings(given: Sequence[tuple[str, str, str]]) -> _CheckedChange:
             checked_number(letter.lower(), number, chip.variant, letter)
         chip.settings.with_(**settings).check()
 
-    return _CheckedChange(check, lambda chip: chip.configure(**settings))
+    return CheckedChange(check, lambda chip: chip.configure(**settings))
 
 
-def _change(name: str, value: str, text: str) -> _CheckedChange:
+def _change(name: str, value: str, text: str) -> CheckedChange:
     name = name.upper()
     if name == "POSITION":
         position = number_of(value, text)
-        return _CheckedChange(lambda chip: None, lambda chip: chip.set_position(position))
+        return CheckedChange(lambda chip: None, lambda chip: chip.set_position(position))
     if name == "VARIABLE":
         number = _whole(name, value, text)
-        return _CheckedChange(
+        return CheckedChange(
             lambda chip: checked_number(":", number, chip.variant, "the internal variable"),
             lambda chip: chip.set_variable(number),
         )
@@ -151,7 +103,7 @@ def _change(name: str, value: str, text: str) -> _CheckedChange:
                 raise Misuse(f"{text!r}: expected on or off")
             if number not in permitted:
                 raise Misuse(f"{text!r}: permitted are {prefix}{permitted[0]} to {prefix}{permitted[-1]}")
-            return _CheckedChange(lambda chip: None, partial(switch, number=number, on=on))
+            return CheckedChange(lambda chip: None, partial(switch, number=number, on=on))
     raise Misuse(f"{text!r}: {name} cannot be set: permitted are {SETTABLE}")
 
 

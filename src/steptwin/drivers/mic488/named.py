@@ -14,23 +14,14 @@ from steptwin.drivers.typed import changes_of
 from steptwin.errors import Misuse
 from steptwin.mic488 import values
 from steptwin.mic488.registermap import DataType, Register, RegisterMap, WriteEffect
-from steptwin.mic488.registers import DEFAULT_FIRMWARE, register_map
+from steptwin.mic488.registers import register_map
 
 USUAL = ("M?_POS_ACT", "M?_VEL_ACT", "M?_STATUS")
 _RUN = re.compile(r"(?P<head>\w+\[)(?P<first>\d+)-(?P<last>\d+)(?P<tail>\].*)")
 
 
-def names() -> Sequence[str]:
-    return [register.name for register in register_map()]
-
-
 def map_of(mic: Mic488) -> RegisterMap:
     return register_map(mic.firmware)
-
-
-def reading(wanted: Sequence[str]) -> Callable[[Mic488], ReadValues]:
-    """See `steptwin.drivers.kind.DriverKind`."""
-    return lambda mic: read(mic, wanted)
 
 
 def read(mic: Mic488, wanted: Sequence[str]) -> ReadValues:
@@ -45,13 +36,6 @@ def _named(mic: Mic488, wanted: Sequence[str]) -> Mapping[str, ReadValue]:
     shown = mic.get_shown(*wanted) if wanted else {}
     registers = map_of(mic)
     return {name: ReadValue(value, unit, _meaning(registers, name, value)) for name, (value, unit) in shown.items()}
-
-
-def followed(wanted: Sequence[str], firmware: str | None) -> Sequence[str] | None:
-    """The registers of a twin with these names; None if addresses are among them."""
-    found = expanded(register_map(firmware or DEFAULT_FIRMWARE), wanted or USUAL)
-    by_name = [one for one in found if isinstance(one, str)]
-    return by_name if len(by_name) == len(found) else None
 
 
 def expanded(registers: RegisterMap, wanted: Sequence[str]) -> list[str | ValueAddress]:
@@ -80,7 +64,7 @@ def expanded(registers: RegisterMap, wanted: Sequence[str]) -> list[str | ValueA
 
 
 def writing(changes: Sequence[str]) -> Callable[[Mic488], ReadValues]:
-    """See `steptwin.drivers.kind.DriverKind`. Gives the registers that hold what is written."""
+    """As `steptwin.drivers.kind.DriverKind.writing`. Gives the registers that hold what is written."""
     given = changes_of(changes, "M1_ACC=50")
 
     def write(mic: Mic488) -> ReadValues:
