@@ -28,7 +28,8 @@ from collections.abc import Callable, Generator
 from pathlib import Path
 
 from steptwin import World
-from steptwin.live.running import Running, UpOptions, up_with
+from steptwin.live.options import LiveOptions, UpOptions
+from steptwin.live.running import Running, up_with
 from steptwin.simulation.script.steps import Set
 
 HERE = Path(__file__).parent
@@ -66,7 +67,7 @@ def serve(controllers: int, rate: int, seconds: int, file: Path) -> None:
         tasks.append(asyncio.create_task(driven))
 
     tasks: list[asyncio.Task[None]] = []
-    options = UpOptions(world=file, trace="off", ready_file=file.with_name("ready.json"))
+    options = UpOptions(world=file, live=LiveOptions(trace="off"), ready_file=file.with_name("ready.json"))
     up_with(World.from_toml(file.read_text()), options, change)
 
 

@@ -23,7 +23,6 @@ TOOLS = {
     "cli/diff.py": "recordings of sessions with a MIC488",
     "cli/record.py": "positions of a MIC488 into its position table",
     "cli/registers.py": "register map of the MIC488",
-    "cli/serve.py": "options of each twin",
     "languages/chips.py": "options of chips on a line",
     "live/studio/demo.py": "the world of serve mic488 --demo",
     "languages/__init__.py": "table of the languages",

@@ -60,7 +60,7 @@ def test_the_help_of_all_commands_imports_none_of_them() -> None:
     code = "import sys; from typer.testing import CliRunner; from steptwin.cli import app; CliRunner().invoke(app, '--help'); "
     run = subprocess.run([sys.executable, "-c", code + "print(*sys.modules)"], capture_output=True, text=True, check=True)
     room = {name for name in run.stdout.split() if name.startswith("steptwin.cli.")}
-    assert room == {"steptwin.cli.commandgroup", "steptwin.cli.optiongroups"}
+    assert room == {f"steptwin.cli.{name}" for name in ("commandgroup", "completion", "optiongroups", "writtenfiles")}
 
 
 def test_exports_bring_their_libraries_when_they_write() -> None:

@@ -12,9 +12,9 @@ import pytest
 from typer.testing import CliRunner
 
 from steptwin.cli import app
-from steptwin.cli.serve_m1486 import ServeM1486, serve_m1486
-from steptwin.cli.serve_mic488 import ServeMic488, serve_mic488
-from steptwin.cli.serving import ServeOptions
+from steptwin.cli.serve_m1486 import ChipLineOptions, ChipOptions, serve_m1486
+from steptwin.cli.serve_mic488 import Mic488Options, ModbusOptions, serve_mic488
+from steptwin.cli.serving import Served, TwinOptions
 from steptwin.errors import Misuse
 from steptwin.simulation.faults import KINDS
 
@@ -83,7 +83,9 @@ def test_a_twin_that_cannot_have_the_fault_does_not_start(
 ) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     with pytest.raises(Misuse) as refused:
-        serve_mic488(ServeOptions(name="mic488", links={"tcp": "127.0.0.1:0"}, faults=(fault,)), ServeMic488())
+        serve_mic488(
+            Served(kind="mic488", line=ModbusOptions(tcp="127.0.0.1:0"), twin=TwinOptions(fault=(fault,))), Mic488Options()
+        )
     assert str(refused.value).startswith(text)
     assert [file for _, _, files in os.walk(tmp_path) for file in files] == []
 
@@ -91,4 +93,6 @@ def test_a_twin_that_cannot_have_the_fault_does_not_start(
 def test_frames_of_chips_cannot_go_wrong(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     with pytest.raises(Misuse, match="fault late happens on Modbus RTU and Modbus TCP: line 'bus' carries M1486"):
-        serve_m1486(ServeOptions(name="m1486", links={"tcp": "127.0.0.1:0"}, faults=("late",)), ServeM1486())
+        serve_m1486(
+            Served(kind="m1486", line=ChipLineOptions(tcp="127.0.0.1:0"), twin=TwinOptions(fault=("late",))), ChipOptions()
+        )

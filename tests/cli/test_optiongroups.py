@@ -11,24 +11,25 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from steptwin.cli.optiongroups import GroupedCommand, OptionGroup, grouped
+from steptwin.cli.optiongroups import GroupedCommand, grouped
 from steptwin.errors import Misuse
+from steptwin.options import Option, OptionGroup
 
 
 @dataclass(frozen=True, kw_only=True)
 class Cutting(OptionGroup):
     heading = "Options of cutting"
 
-    blade_width: Annotated[float, typer.Option(help="In mm.")] = 1.5
-    from_: Annotated[str | None, typer.Option("--from", help="Where to begin.")] = None
-    part: Annotated[list[str] | None, typer.Option(help="Only this one; repeatable.")] = None
+    blade_width: Annotated[float, Option("In mm.")] = 1.5
+    from_: Annotated[str | None, Option("Where to begin.", flags=("--from",))] = None
+    part: Annotated[tuple[str, ...], Option("Only this one; repeatable.")] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
 class Printing(OptionGroup):
     heading = "Options of printing"
 
-    paper: Annotated[Path | None, typer.Option(help="What to print on.")] = None
+    paper: Annotated[Path | None, Option("What to print on.")] = None
 
 
 app = typer.Typer(rich_markup_mode=None)
@@ -40,7 +41,7 @@ given: list[tuple[str, bool, Cutting, Printing]] = []
 def work(
     name: Annotated[str, typer.Argument(help="Of the work.")],
     cutting: Cutting,
-    fast: Annotated[bool, typer.Option("--fast", help="Without pauses.")] = False,
+    fast: Annotated[bool, Option("Without pauses.")] = False,
     *,
     printing: Printing,
 ) -> None:
@@ -57,7 +58,7 @@ def ran(*arguments: str) -> str:
 
 def test_a_command_gets_its_groups_as_values() -> None:
     ran("saw", "--blade-width", "2", "--from", "left", "--part", "a", "--part", "b", "--paper", "p.txt", "--fast")
-    cutting = Cutting(blade_width=2.0, from_="left", part=["a", "b"])
+    cutting = Cutting(blade_width=2.0, from_="left", part=("a", "b"))
     assert given == [("saw", True, cutting, Printing(paper=Path("p.txt")))]
 
 
@@ -80,7 +81,7 @@ def test_the_help_has_a_section_for_each_group() -> None:
     [
         (Cutting(blade_width=2.0), "--blade-width"),
         (Cutting(from_=""), "--from"),
-        (Cutting(part=["a"]), "--part"),
+        (Cutting(part=("a",)), "--part"),
     ],
 )
 def test_an_option_that_was_given_is_refused_by_its_name(cutting: Cutting, option: str) -> None:

@@ -50,7 +50,7 @@ def test_files_of_an_encrypted_line_are_given_together() -> None:
 @pytest.mark.parametrize("device", ["mic488", "m1486"])
 def test_time_and_control_are_as_with_up(monkeypatch: pytest.MonkeyPatch, device: str) -> None:
     started: list[Any] = []
-    monkeypatch.setattr("steptwin.cli.serving.up_with", lambda world, options: started.append(options))
+    monkeypatch.setattr("steptwin.live.running.up_with", lambda world, options: started.append(options))
     words = ["serve", device, "--tcp", ANYWHERE, "--speed", "0.1", "--control", ANYWHERE]
     assert CliRunner().invoke(app, words).exit_code == 0
-    assert (started[0].speed, started[0].control) == ("0.1", ANYWHERE)
+    assert (started[0].live.speed, started[0].live.control) == ("0.1", ANYWHERE)

@@ -12,9 +12,10 @@ from typing import Any
 
 import pytest
 
-from steptwin.cli.serve_m1486 import ServeM1486, serve_m1486
-from steptwin.cli.serving import ServeOptions
+from steptwin.cli.serve_m1486 import ChipLineOptions, ChipOptions, serve_m1486
+from steptwin.cli.serving import Served
 from steptwin.errors import Misuse
+from steptwin.live.options import LiveOptions
 
 Serve = Callable[..., Any]
 
@@ -134,7 +135,7 @@ def test_a_program_to_switch_on_with(serve_m1486: Serve, tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize(
-    ("twin", "chips", "text"),
+    ("line", "chips", "text"),
     [
         ({}, {"variant": "D"}, "no M1486 variant is called 'D'; there are A, B, C, E1, E2"),
         ({"baud": 9600}, {"variant": "B"}, "9600 bit/s: M1486B has 300, 1200, 2400, 4800"),
@@ -142,21 +143,24 @@ def test_a_program_to_switch_on_with(serve_m1486: Serve, tmp_path: Path) -> None
         ({}, {"variant": "E1", "chain": "0"}, "address 0: M1486E1 takes 1 to F"),
         ({}, {"interface": "dac"}, "no driver interface is called 'dac'; there are sd, dual, two"),
         ({"line_timing": "fast"}, {}, "--line-timing fast: permitted are 'real' and 'off'"),
-        ({}, {"wires": ("B1=B3",)}, "--wire B1=B3: expected FROM=TO"),
-        ({"name": "a b"}, {}, "--name 'a b': permitted are"),
-        ({"links": {"tcp": "0.0.0.0:0"}}, {}, "0.0.0.0 is not a loopback address"),
+        ({}, {"wire": ("B1=B3",)}, "--wire B1=B3: expected FROM=TO"),
+        ({"tcp": "0.0.0.0:0"}, {}, "0.0.0.0 is not a loopback address"),
         ({}, {"program": Path("nowhere.m1486")}, "cannot read nowhere.m1486: no such file or directory"),
     ],
 )
-def test_wrong_options_are_said(twin: dict[str, Any], chips: dict[str, Any], text: str) -> None:
-    twin.setdefault("name", "m1486")
+def test_wrong_options_are_said(line: dict[str, Any], chips: dict[str, Any], text: str) -> None:
     with pytest.raises(Misuse) as refusal:
-        serve_m1486(ServeOptions(**twin), ServeM1486(**chips))
+        serve_m1486(Served(kind="m1486", line=ChipLineOptions(**line)), ChipOptions(**chips))
     assert str(refusal.value).startswith(text)
+
+
+def test_a_wrong_name_is_refused() -> None:
+    with pytest.raises(Misuse, match="--name 'a b': permitted are"):
+        serve_m1486(Served(kind="m1486", line=ChipLineOptions(), live=LiveOptions(name="a b")), ChipOptions())
 
 
 def test_a_program_with_errors_is_shown(tmp_path: Path) -> None:
     path = tmp_path / "p.m1486"
     path.write_text("f640\nj3\n")
     with pytest.raises(Misuse, match=r"p\.m1486:2:"):
-        serve_m1486(ServeOptions(name="m1486"), ServeM1486(program=path))
+        serve_m1486(Served(kind="m1486", line=ChipLineOptions()), ChipOptions(program=path))

@@ -16,7 +16,8 @@ from steptwin.languages.run_wbc import WbcRun
 from steptwin.languages.run_wbc import run as run_wbc
 from steptwin.languages.run_world import WorldRun
 from steptwin.languages.run_world import run as run_world
-from steptwin.live.running import UpOptions, up
+from steptwin.live.options import LiveOptions, UpOptions
+from steptwin.live.running import up
 from steptwin.machine import SECOND
 
 PROGRAM = "IF IN1 = 1\nOUT1 = ON\nENDIF\nEND\n"
@@ -55,7 +56,7 @@ def test_a_world_names_its_files_from_the_present_directory(machine: Path) -> No
 def test_a_world_in_real_time(machine: Path, capfd: pytest.CaptureFixture[str]) -> None:
     stop = '[[script]]\nname = "end"\nat = "0.5 s"\nsteps = [{ stop = "done" }]\n'
     machine.write_text(WORLD + stop)
-    assert up(UpOptions(world=machine, speed="max", is_closed=True, coverage=("-", "c.json")))
+    assert up(UpOptions(world=machine, live=LiveOptions(speed="max"), is_closed=True, coverage=("-", "c.json")))
     shown = capfd.readouterr().out
     assert json.loads(Path("c.json").read_text())["summary"]["missed"] == 1
     assert re.search(r"site/parts/p\.prg +3 +1 +2 +1 +60\.0 %", shown)

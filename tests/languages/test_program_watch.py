@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 from steptwin.files.world import World
+from steptwin.files.worldoptions import ShownOptions
 from steptwin.languages.run_world import WorldRun, run
 from steptwin.mic488.present import state_of
 
@@ -51,7 +52,11 @@ def test_a_run_shows_what_a_program_does_with_its_statements(tmp_path: Path) -> 
 def test_what_is_shown_can_be_chosen(tmp_path: Path) -> None:
     def shown(names: tuple[str, ...] = (), kinds: tuple[str, ...] = ()) -> list[str]:
         said: list[str] = []
-        assert run(WorldRun(world=machine(tmp_path), limit=5_000_000_000, names=names, kinds=kinds), said.append, said.append)
+        assert run(
+            WorldRun(world=machine(tmp_path), limit=5_000_000_000, shown=ShownOptions(of=names, show=kinds)),
+            said.append,
+            said.append,
+        )
         return [line.split()[2] for line in said if re.match(r" +[0-9.]+ s ", line)]
 
     assert set(shown()) == {"table"}

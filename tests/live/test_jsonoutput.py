@@ -14,7 +14,7 @@ from pymodbus.client import ModbusTcpClient
 from tests.conftest import run_command, until
 
 from steptwin.errors import Misuse
-from steptwin.live.telling import Telling
+from steptwin.live.options import LogOptions
 
 WORLD = """
 [[line]]
@@ -70,6 +70,6 @@ def test_a_bridge_too(tmp_path: Path) -> None:
 
 def test_other_formats_are_refused() -> None:
     with pytest.raises(Misuse, match="--log-format xml: permitted are text and json"):
-        Telling("xml").output()
+        LogOptions(log_format="xml").output()
     found = run_command(("serve", "mic488", "--log-format", "xml"), dict(os.environ))
     assert (found.returncode, "permitted are text and json" in found.stderr) == (2, True)

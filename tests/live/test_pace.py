@@ -17,12 +17,14 @@ from world_rig import TWO_LINES
 from steptwin.errors import Misuse, Refusal
 from steptwin.files.session import load, session_of
 from steptwin.files.world import World
+from steptwin.files.worldoptions import WorldRunOptions
 from steptwin.live import pace as pacing
 from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
 from steptwin.live.links import Feed
+from steptwin.live.options import LiveOptions, UpOptions
 from steptwin.live.pace import Pace
-from steptwin.live.running import LiveWorld, PlacePort, UpOptions, up
+from steptwin.live.running import LiveWorld, PlacePort, up
 from steptwin.live.world_control import WorldControl
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.subject.commands import read_command
@@ -374,13 +376,14 @@ def test_a_session_goes_on_live_without_those_who_were_there(run: Run, tmp_path:
         rig.close()
 
     run(scene())
-    options = UpOptions(world=tmp_path / "s.json", speed="max", session=tmp_path / "end.json")
+    fast, end = LiveOptions(speed="max"), tmp_path / "end.json"
+    options = UpOptions(world=tmp_path / "s.json", run=WorldRunOptions(session=end), live=fast)
     assert up(options)
     assert "5.000 s, 2 inputs, ended by: enough" in capfd.readouterr().out
     session = load(tmp_path / "end.json")
     assert [type(given.what).__name__ for given in session.inputs] == ["Bytes", "Leave"]
     assert session.replay().trace.digest() == session.digest
-    assert up(UpOptions(world=tmp_path / "s.json", moment=SECOND, speed="max", session=tmp_path / "end.json"))
+    assert up(UpOptions(world=tmp_path / "s.json", run=WorldRunOptions(from_="1s", session=end), live=fast))
     assert load(tmp_path / "end.json").inputs == ()
 
 
@@ -388,9 +391,9 @@ def test_what_a_script_stopped_goes_on_from_its_session(tmp_path: Path, capfd: p
     world, first, second = tmp_path / "w.toml", tmp_path / "1.json", tmp_path / "2.json"
     steps = '[{ wait = "1 s" }, { stop = "here" }, { note = "on" }, { wait = "1 s" }, { stop = "there" }]'
     world.write_text(f'[[mic488]]\nname = "a"\n[[script]]\nname = "s"\nsteps = {steps}\n')
-    assert up(UpOptions(world=world, seed=5, speed="1000", session=first))
+    assert up(UpOptions(world=world, run=WorldRunOptions(seed=5, session=first), live=LiveOptions(speed="1000")))
     assert "1.000 s, 0 inputs, ended by: here" in capfd.readouterr().out
-    assert up(UpOptions(world=first, speed="1000", session=second))
+    assert up(UpOptions(world=first, run=WorldRunOptions(session=second), live=LiveOptions(speed="1000")))
     told = capfd.readouterr().out
     assert "note: on" in told
     assert "2.000 s, 0 inputs, ended by: there" in told

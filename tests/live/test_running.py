@@ -15,11 +15,13 @@ from steptwin.errors import LineFailure, Misuse
 from steptwin.files.export.tracefile import TraceFile
 from steptwin.files.session import load, session_of
 from steptwin.files.world import World
+from steptwin.files.worldoptions import WorldRunOptions
 from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
 from steptwin.live.links import Feed
+from steptwin.live.options import LiveOptions, UpOptions
 from steptwin.live.pace import Pace
-from steptwin.live.running import LiveWorld, PlacePort, UpOptions, up
+from steptwin.live.running import LiveWorld, PlacePort, up
 from steptwin.live.world_control import WorldControl
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.simulation.script import steps as do
@@ -149,27 +151,32 @@ def test_a_script_that_stops_a_live_world_stops_it_for_all() -> None:
 def arguments(tmp_path: Path, text: str) -> UpOptions:
     world = tmp_path / "stopping.toml"
     world.write_text(text)
-    return UpOptions(world=world, speed="1000", session=tmp_path / "s.json", trace=str(tmp_path / "t.jsonl"))
+    return UpOptions(
+        world=world,
+        run=WorldRunOptions(session=tmp_path / "s.json"),
+        live=LiveOptions(speed="1000", trace=str(tmp_path / "t.jsonl")),
+    )
 
 
 def test_a_script_ends_the_command(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     options = arguments(tmp_path, STOPPING)
     assert up(options)
     told = capfd.readouterr().out.splitlines()
-    assert told[-3:-1] == [f"wrote {options.session}", f"wrote {options.trace}"]
+    assert told[-3:-1] == [f"wrote {options.run.session}", f"wrote {options.live.trace}"]
     assert told[-1].startswith("ran for 1.000 s, 0 inputs, ended by: enough, digest ")
     assert load(tmp_path / "s.json").until == SECOND
 
 
 def test_a_world_can_begin_with_faults(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    options = replace(arguments(tmp_path, STOPPING), faults=("lost-steps machine=a axis=1 pulses=64 at_s=0.5",))
+    options = arguments(tmp_path, STOPPING)
+    options = replace(options, run=replace(options.run, fault=("lost-steps machine=a axis=1 pulses=64 at_s=0.5",)))
     assert up(options)
     assert "lost-steps: M1 loses 64 pulses" in capfd.readouterr().out
     session = load(tmp_path / "s.json")
     assert len(session.inputs) == 1
     assert session.replay().trace.digest() == session.digest
     with pytest.raises(Misuse, match="axis = 9"):
-        up(replace(options, faults=("stall machine=a axis=9",)))
+        up(replace(options, run=WorldRunOptions(fault=("stall machine=a axis=9",))))
 
 
 def test_a_trace_that_cannot_be_written_leaves_the_session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -188,7 +195,7 @@ def test_what_did_not_begin_overwrites_nothing(tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         line = f'[[line]]\nname = "chips"\nkind = "m1486"\ntcp = "127.0.0.1:{taken.getsockname()[1]}"\n'
         options = arguments(tmp_path, STOPPING + line + '[[m1486]]\nname = "b"\nline = "chips"\n')
-        for path in (options.session, options.trace):
+        for path in (options.run.session, options.live.trace):
             assert path is not None
             Path(path).write_text("yesterday")
         with pytest.raises(LineFailure, match="in use"):
@@ -206,7 +213,7 @@ def test_what_did_not_begin_overwrites_nothing(tmp_path: Path) -> None:
 )
 def test_speeds_that_cannot_be_are_misuse(speed: str, message: str) -> None:
     with pytest.raises(Misuse, match=message):
-        up(UpOptions(world=EXAMPLES / "feeder.toml", speed=speed))
+        up(UpOptions(world=EXAMPLES / "feeder.toml", live=LiveOptions(speed=speed)))
 
 
 def test_a_world_wakes_up_by_itself() -> None:

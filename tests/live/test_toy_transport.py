@@ -15,7 +15,9 @@ from toy import transport
 from steptwin.errors import Misuse
 from steptwin.files.session import load
 from steptwin.files.world import World
-from steptwin.live.running import UpOptions, up
+from steptwin.files.worldoptions import WorldRunOptions
+from steptwin.live.options import UpOptions
+from steptwin.live.running import up
 from steptwin.live.transports import forget, register
 from steptwin.simulation.kinds.registry import line_kinds
 from steptwin.simulation.toml.reader import WorldError
@@ -86,7 +88,7 @@ def test_up_serves_lines_of_every_kind_over_it(tmp_path: Path, monkeypatch: pyte
 
     with ThreadPoolExecutor() as pool:
         answers = pool.submit(clients)
-        assert up(UpOptions(world=place, session=session))
+        assert up(UpOptions(world=place, run=WorldRunOptions(session=session)))
     toy, damaged, done = answers.result()
     right = with_crc(bytes.fromhex("01 01 01 00"))
     assert (toy, done) == (b"P\0", OUTPUT_ON)

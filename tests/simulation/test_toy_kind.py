@@ -21,8 +21,9 @@ from steptwin.files.world import World
 from steptwin.live import twins
 from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
+from steptwin.live.options import LiveOptions, UpOptions
 from steptwin.live.output import Output
-from steptwin.live.running import UpOptions, up
+from steptwin.live.running import up
 from steptwin.live.view import LiveView
 from steptwin.live.world import LiveWorld, PlacePort, announced
 from steptwin.live.world_frames import follow_frames
@@ -234,7 +235,7 @@ def test_up_serves_it(tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeyp
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     place = tmp_path / "toys.toml"
     place.write_text(TEXT.replace("{ expect", '{ stop = "done" },\n  { expect'), "utf-8")
-    assert up(UpOptions(world=place, speed="1000", log_frames=True))
+    assert up(UpOptions(world=place, live=LiveOptions(speed="1000", log_frames=True)))
     shown = capfd.readouterr().out
     assert "toys" in shown
     assert "127.0.0.1:" in shown

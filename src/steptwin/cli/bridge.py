@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from steptwin.cli.optiongroups import grouped
-from steptwin.cli.worldoptions import AuditInto, ListenAny, LogOptions, ReadyFile
+from steptwin.live.options import AuditInto, ListenAny, LogOptions, ReadyFile
 
 
 @grouped
@@ -25,4 +25,4 @@ def command(
     It owns the lines of the devices: commands are sent in order, stops first, and nothing is repeated."""
     from steptwin.live.bridge import bridge as serve_devices
 
-    serve_devices(file, listen_any=listen_any, ready_file=ready_file, audit=audit, telling=log.telling())
+    serve_devices(file, listen_any=listen_any, ready_file=ready_file, audit=audit, log=log)

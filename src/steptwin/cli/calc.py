@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from steptwin.cli import completion
 from steptwin.cli.device import Json, table
-from steptwin.cli.optiongroups import OptionGroup, grouped, option_of
+from steptwin.cli.optiongroups import grouped
 from steptwin.cli.writtenfiles import written
 from steptwin.errors import Misuse
+from steptwin.options import Option, OptionGroup, option_of
 
 if TYPE_CHECKING:
     from steptwin.calc import Calculation, Calculator, UnitScale
@@ -28,8 +28,8 @@ class CalculatedKind(enum.StrEnum):
     M1486 = "m1486"
 
 
-def _value(meaning: str) -> typer.models.OptionInfo:
-    return typer.Option(help=meaning, metavar="VALUE")
+def _value(meaning: str) -> Option:
+    return Option(meaning, metavar="VALUE")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,19 +46,17 @@ class QuantityOptions(OptionGroup):
     acceleration_time: Annotated[str | None, _value("Time of acceleration.")] = None
     constant_time: Annotated[str | None, _value("Time at constant velocity.")] = None
     deceleration_time: Annotated[str | None, _value("Time of deceleration.")] = None
-    microstep: Annotated[int | None, typer.Option("--microstep", "-M", help="M of an M1486. Default: 4.")] = None
-    qualification: Annotated[int | None, typer.Option("--qualification", "-Q", help="Q of an M1486. Default: 1.")] = None
+    microstep: Annotated[int | None, Option("M of an M1486. Default: 4.", flags=("--microstep", "-M"))] = None
+    qualification: Annotated[int | None, Option("Q of an M1486. Default: 1.", flags=("--qualification", "-Q"))] = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class MechanicsOptions(OptionGroup):
     heading = "Mechanics"
 
-    motor_steps: Annotated[float | None, typer.Option(help="Full steps in a revolution of the motor. Default: 200.")] = None
-    microsteps: Annotated[float | None, typer.Option(help="Pulses in a full step of a MIC488, as its drive is set.")] = None
-    ratio: Annotated[float | None, typer.Option(help="Revolutions of the motor for one revolution of its load. Default: 1.")] = (
-        None
-    )
+    motor_steps: Annotated[float | None, Option("Full steps in a revolution of the motor. Default: 200.")] = None
+    microsteps: Annotated[float | None, Option("Pulses in a full step of a MIC488, as its drive is set.")] = None
+    ratio: Annotated[float | None, Option("Revolutions of the motor for one revolution of its load. Default: 1.")] = None
     lead: Annotated[
         str | None,
         _value("Travel in one revolution: lead of a screw, teeth × pitch of a pulley, such as 5mm [mm]."),
@@ -83,22 +81,20 @@ class Mic488MoveOptions(OptionGroup):
 
     unit: Annotated[
         str | None,
-        typer.Option(
+        Option(
             metavar="UNIT",
             help="imp, rev, degree, mm, cm or m. Default: mm with --lead, rev with --microsteps, else imp.",
         ),
     ] = None
-    gear: Annotated[float | None, typer.Option(help="GEAR, pulses in a unit, instead of the mechanics.")] = None
-    axis: Annotated[int | None, typer.Option(help="Axis, for the names of registers. Default: 1.")] = None
+    gear: Annotated[float | None, Option("GEAR, pulses in a unit, instead of the mechanics.")] = None
+    axis: Annotated[int | None, Option("Axis, for the names of registers. Default: 1.")] = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class M1486MoveOptions(OptionGroup):
     heading = "Options of the M1486"
 
-    variant: Annotated[str | None, typer.Option(metavar="TYPE", help="Type. Default: A.", autocompletion=completion.variants)] = (
-        None
-    )
+    variant: Annotated[str | None, Option(metavar="TYPE", help="Type. Default: A.", completion="variants")] = None
 
 
 @grouped

@@ -14,7 +14,8 @@ from typing import Annotated
 import typer
 
 from steptwin.cli.languageoptions import M1486FileOptions, WbcFileOptions, given_of
-from steptwin.cli.optiongroups import grouped, option_of
+from steptwin.cli.optiongroups import grouped
+from steptwin.options import option_of
 
 JSON_VERSION = 1
 """Raised when a member of the JSON changes its meaning or goes away."""

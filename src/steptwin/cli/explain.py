@@ -14,9 +14,10 @@ import typer
 
 from steptwin.cli.device import Json
 from steptwin.cli.languageoptions import M1486FileOptions, WbcFileOptions, given_of
-from steptwin.cli.optiongroups import grouped, option_of
+from steptwin.cli.optiongroups import grouped
 from steptwin.cli.writtenfiles import written
 from steptwin.errors import Misuse
+from steptwin.options import option_of
 
 if TYPE_CHECKING:
     from steptwin.explain.model import Explanation

@@ -7,21 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
-from steptwin.cli import completion
-from steptwin.cli.optiongroups import OptionGroup
+from steptwin.options import Option, OptionGroup
 
 
 @dataclass(frozen=True, kw_only=True)
 class WbcFileOptions(OptionGroup):
     heading = "Options of MIC488 programs"
 
-    positions: Annotated[Path | None, typer.Option(help="Position table. Default: the .csv of the same name.")] = None
-    config: Annotated[Path | None, typer.Option(help="Configuration. Default: the .cfg of the same name.")] = None
-    firmware: Annotated[
-        str | None, typer.Option(help="1.23, 1.40 or 1.70. Default 1.70.", autocompletion=completion.firmwares)
-    ] = None
+    positions: Annotated[Path | None, Option("Position table. Default: the .csv of the same name.")] = None
+    config: Annotated[Path | None, Option("Configuration. Default: the .cfg of the same name.")] = None
+    firmware: Annotated[str | None, Option("1.23, 1.40 or 1.70. Default 1.70.", completion="firmwares")] = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,9 +25,9 @@ class M1486FileOptions(OptionGroup):
 
     variant: Annotated[
         str | None,
-        typer.Option(help="Type A, B, C, E1, E2, or A2x and so on. Default A.", autocompletion=completion.variants),
+        Option("Type A, B, C, E1, E2, or A2x and so on. Default A.", completion="variants"),
     ] = None
-    interface: Annotated[str | None, typer.Option(help="Driver interface sd, dual or two. Default sd.")] = None
+    interface: Annotated[str | None, Option("Driver interface sd, dual or two. Default sd.")] = None
 
 
 def given_of(*groups: OptionGroup) -> dict[str, Any]:

@@ -1,43 +1,21 @@
-"""Groups of options: a frozen dataclass whose fields are options of a command, which takes the group as one argument."""
+"""Options of the shell from annotated fields and parameters (`steptwin.options`)."""
 
 from __future__ import annotations
 
-import copy
 import inspect
 from collections.abc import Callable, Iterator
-from dataclasses import Field, fields
+from dataclasses import fields
 from functools import wraps
-from typing import Annotated, Any, ClassVar, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
+import typer
 from typer.core import TyperCommand
 
-from steptwin.errors import Misuse
+from steptwin.cli import completion
+from steptwin.cli.writtenfiles import keep_apart
+from steptwin.options import Option, OptionGroup, option_of
 
-
-class OptionGroup:
-    """Base of the groups. A field is ``name: Annotated[type, typer.Option(...)] = default``.
-
-    The option of a field is its name; a field whose option is a word of Python, such as ``--from``, ends in ``_`` and names it.
-    """
-
-    heading: ClassVar[str] = "Options"
-    """Of its section in the help of a command."""
-
-    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
-
-    def given(self) -> dict[str, Any]:
-        """The values of the fields that have another value than their default."""
-        return {field.name: value for field in fields(self) if (value := vars(self)[field.name]) != field.default}
-
-    def refuse(self, what: str) -> None:
-        """Raises `Misuse` if an option has been given, because the options do not apply to ``what``."""
-        for name in self.given():
-            raise Misuse(f"{option_of(name)} is not for {what}")
-
-
-def option_of(name: str) -> str:
-    """``start_stop`` → ``--start-stop``."""
-    return f"--{name.strip('_').replace('_', '-')}"
+REPEATED = tuple[str, ...]
 
 
 class GroupedCommand(TyperCommand):
@@ -71,12 +49,18 @@ def grouped(command: Callable[..., None]) -> Callable[..., None]:
             groups[name] = annotation
             parameters += _options(annotation)
         else:
-            parameters.append(parameter.replace(annotation=annotation, kind=inspect.Parameter.KEYWORD_ONLY))
+            parameters.append(_parameter(name, annotation, parameter.default))
+    repeated = [parameter.name for parameter in parameters if parameter.default == ()]
+    for number, parameter in enumerate(parameters):
+        if parameter.name in repeated:
+            parameters[number] = parameter.replace(default=None)
 
     @wraps(command)
-    def flat(**values: object) -> None:
+    def flat(**values: Any) -> None:
+        for name in repeated:
+            values[name] = tuple(values[name] or ())
         for name, group in groups.items():
-            values[name] = group(**{field.name: values.pop(field.name) for field in fields(group)})
+            values[name] = group(**{field.name: values.pop(field.name) for field in fields(group) if field.name in values})
         command(**values)
 
     vars(flat)["__signature__"] = inspect.Signature(parameters)
@@ -86,9 +70,23 @@ def grouped(command: Callable[..., None]) -> Callable[..., None]:
 def _options(group: type[OptionGroup]) -> Iterator[inspect.Parameter]:
     types = get_type_hints(group, include_extras=True)
     for field in fields(group):
-        base, option = get_args(types[field.name])
-        headed = copy.copy(option)
-        headed.rich_help_panel = group.heading
-        yield inspect.Parameter(
-            field.name, inspect.Parameter.KEYWORD_ONLY, default=field.default, annotation=Annotated[base, headed]
-        )
+        if get_origin(types[field.name]) is Annotated:  # the others are for Python programs
+            yield _parameter(field.name, types[field.name], field.default, group.heading)
+
+
+def _parameter(name: str, annotation: Any, default: Any, heading: str | None = None) -> inspect.Parameter:
+    """The parameter as typer takes it."""
+    if get_origin(annotation) is Annotated:
+        base, text = get_args(annotation)
+        if isinstance(text, Option):
+            flags = text.flags or ((option_of(name),) if base is bool and default is False else ())
+            shown = typer.Option(
+                *flags,
+                help=text.help,
+                metavar=text.metavar,
+                autocompletion=None if text.completion is None else getattr(completion, text.completion),
+                callback=keep_apart if text.is_written else None,
+                rich_help_panel=heading,
+            )
+            annotation = Annotated[list[str] | None if base == REPEATED else base, shown]
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)

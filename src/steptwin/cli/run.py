@@ -14,10 +14,11 @@ import typer
 
 from steptwin.cli.device import Json, complain
 from steptwin.cli.languageoptions import M1486FileOptions, WbcFileOptions, given_of
-from steptwin.cli.optiongroups import OptionGroup, grouped, option_of
-from steptwin.cli.worldoptions import Coverage, ShownOptions, WorldRunOptions
+from steptwin.cli.optiongroups import grouped
 from steptwin.cli.writtenfiles import written
 from steptwin.errors import Misuse
+from steptwin.files.worldoptions import Coverage, ShownOptions, WorldRunOptions
+from steptwin.options import Option, OptionGroup, option_of
 
 if TYPE_CHECKING:
     from steptwin.files.timedinputs import TimedInput
@@ -60,30 +61,26 @@ Trace = Annotated[Path | None, written(help="Write a trace to a file (.jsonl, .h
 class ProgramOptions(OptionGroup):
     heading = "Options of programs"
 
-    print_world: Annotated[
-        bool, typer.Option("--print-world", help="Print the description of the world the program would run in, and end.")
-    ] = False
+    print_world: Annotated[bool, Option("Print the description of the world the program would run in, and end.")] = False
 
 
 @dataclass(frozen=True, kw_only=True)
 class WbcRunOptions(WbcFileOptions):
     travel: Annotated[
-        list[str] | None,
-        typer.Option(
+        tuple[str, ...],
+        Option(
             metavar="Mn=LOW..HIGH,...",
             help="Positions of the switches KL and KR, relative to the position at power-on: M1=-10..250, M1=-50.. or M1=..250.",
         ),
-    ] = None
+    ] = ()
     statement_time: Annotated[
-        str | None, typer.Option(metavar="TIME", help="Execution time of a statement. Default 1ms; 0 for none.")
+        str | None, Option(metavar="TIME", help="Execution time of a statement. Default 1ms; 0 for none.")
     ] = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class M1486RunOptions(M1486FileOptions):
-    wire: Annotated[
-        list[str] | None, typer.Option(help="Wire from a pin of one chip to an input of another, 0.B1=7.B3; repeatable.")
-    ] = None
+    wire: Annotated[tuple[str, ...], Option("Wire from a pin of one chip to an input of another, 0.B1=7.B3; repeatable.")] = ()
 
 
 class _CommonOptions(TypedDict):
@@ -104,7 +101,7 @@ def command(
     until: Until = None,
     inputs: Inputs = None,
     trace: Trace = None,
-    coverage: Coverage = None,
+    coverage: Coverage = (),
     why: Questions = None,
     properties: Properties = None,
     json: Json = False,
@@ -123,7 +120,7 @@ def command(
     if limit == 0:
         raise Misuse(f"--for {duration}: must be more than 0")
     _check_targets(trace, world.session)
-    if json and "-" in (coverage or ()):
+    if json and "-" in coverage:
         raise Misuse("--coverage - and --json both print on standard output: give a file, such as --coverage coverage.json")
     if json and why:
         raise Misuse("--why and --json both print on standard output: ask 'steptwin why' about a --session instead")
@@ -134,7 +131,7 @@ def command(
         limit=limit,
         inputs=tuple(changes),
         trace=trace,
-        coverage=tuple(coverage or ()),
+        coverage=coverage,
         questions=tuple(why or ()),
         as_json=json,
     )
@@ -194,20 +191,5 @@ def _run_world(
     from steptwin.languages.run_world import WorldRun
     from steptwin.languages.run_world import run as run_world
 
-    wanted = WorldRun(
-        world=file,
-        moment=world.moment,
-        seed=world.seed,
-        overrides=world.overrides,
-        state=world.state,
-        until=until,
-        faults=tuple(world.fault or ()),
-        properties=tuple(properties),
-        session=world.session,
-        allow_outside=world.allow_outside,
-        strict=world.strict,
-        names=tuple(shown.of or ()),
-        kinds=tuple(shown.show or ()),
-        **common,
-    )
+    wanted = WorldRun(world=file, run=world, shown=shown, until=until, properties=properties, **common)
     return run_world(wanted, typer.echo, complain)

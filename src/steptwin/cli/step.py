@@ -10,11 +10,13 @@ from typing import Annotated, Any
 import typer
 
 from steptwin.cli.device import Json, Twin
+from steptwin.cli.optiongroups import grouped
 from steptwin.cli.selected import ask_twin
-from steptwin.cli.worldoptions import Of, Show
 from steptwin.cli.worldtime import print_time
+from steptwin.files.worldoptions import ShownOptions
 
 
+@grouped
 def command(
     duration: Annotated[
         str | None, typer.Argument(metavar="TIME", help="How far, such as 10ms. Else to the next thing that happens by itself.")
@@ -22,10 +24,10 @@ def command(
     until: Annotated[
         str | None, typer.Option(metavar="CONDITION", help="Until this is true, after TIME (else 1h) at the latest.")
     ] = None,
-    of: Of = None,
-    show: Show = None,
     twin: Twin = None,
     json: Json = False,
+    *,
+    shown: ShownOptions,
 ) -> None:
     """Advance a world by a time, to a condition or to its next event, show what happened, and pause."""
     from steptwin.files.timedinputs import parse_duration
@@ -36,10 +38,10 @@ def command(
     from steptwin.subject.payloads import STEP_KINDS, named_in
 
     selection = ALL
-    if of or show:
+    if shown.given():
         world = read_description(ask_twin(twin, Describe()))
         parts = (*world.machines, *world.axes, *world.elements, *world.lines)
-        selection = read_selection(of or (), show or (), (*(part.name for part in parts), *world.buttons), sorted(STEP_KINDS))
+        selection = read_selection(shown.of, shown.show, (*(part.name for part in parts), *world.buttons), sorted(STEP_KINDS))
     wanted = Advance(None if duration is None else parse_duration(duration, "step"), until=until)
     events: list[dict[str, Any]] = []
     while True:

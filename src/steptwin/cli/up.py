@@ -5,7 +5,6 @@ From Python: `steptwin.files.world.World`, which runs in virtual time.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,17 +12,9 @@ import typer
 
 from steptwin.cli.optiongroups import grouped
 from steptwin.cli.pages import PageFormat, PageSection, show
-from steptwin.cli.worldoptions import (
-    AuditInto,
-    Coverage,
-    LiveOptions,
-    LogOptions,
-    ReadyFile,
-    ShownOptions,
-    WorldRunOptions,
-    up_options,
-)
 from steptwin.errors import Misuse
+from steptwin.files.worldoptions import Coverage, ShownOptions, WorldRunOptions
+from steptwin.live.options import AuditInto, LiveOptions, LogOptions, ReadyFile, UpOptions
 from steptwin.machine import MILLISECOND
 
 if TYPE_CHECKING:
@@ -38,7 +29,7 @@ def command(
     ] = None,
     *,
     past: Annotated[bool, typer.Option("--past", help="Keep the past, as far as memory permits, for 'steptwin why'.")] = False,
-    coverage: Coverage = None,
+    coverage: Coverage = (),
     ready_file: ReadyFile = None,
     audit: AuditInto = None,
     keys: Annotated[bool, typer.Option("--keys", help="Show all keys of a description.")] = False,
@@ -60,12 +51,20 @@ def command(
     from steptwin.files.auditfile import audit_into
     from steptwin.live.running import up as run_up
 
-    wanted = replace(up_options(world, ready_file, live, options, log), past=past, coverage=tuple(coverage or ()))
-    wanted = replace(wanted, names=tuple(shown.of or ()), kinds=tuple(shown.show or ()))
     with audit_into(audit) as commands:
-        has_held = run_up(replace(wanted, audit=commands))
-    if not has_held:
-        raise typer.Exit(1)
+        wanted = UpOptions(
+            world=world,
+            run=options,
+            live=live,
+            shown=shown,
+            log=log,
+            ready_file=ready_file,
+            past=past,
+            coverage=coverage,
+            audit=commands,
+        )
+        if not run_up(wanted):
+            raise typer.Exit(1)
 
 
 def sections() -> list[PageSection]:

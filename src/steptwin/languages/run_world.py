@@ -22,10 +22,10 @@ from steptwin.files.export import axis_views, bar, write_trace
 from steptwin.files.export.progress import TimeProgress
 from steptwin.files.timedinputs import TimedInput
 from steptwin.files.world import LONGEST_RUN_NS, World
+from steptwin.files.worldoptions import ShownOptions, WorldRunOptions
 from steptwin.languages.program_run import report_causes
 from steptwin.live.interrupts import FirstInterrupt
 from steptwin.machine import SECOND, Nanos
-from steptwin.simulation.describe.overrides import Overrides
 from steptwin.simulation.kinds.kind import ProgramAct, ProgramReport
 from steptwin.simulation.logic.condition import INSTEAD
 from steptwin.simulation.scheduler.trace import TraceRecord
@@ -53,34 +53,19 @@ class WorldRun:
 
     world: Path
     """A description, or a session to continue."""
-    moment: Nanos | None = None
-    """The moment of the session to continue from; None: its end."""
-    seed: int | None = None
-    overrides: Overrides = field(default_factory=dict)
-    """Values that replace those of the description."""
-    state: Path | None = None
-    """Directory of the non-volatile memory; None: that of the description."""
+    run: WorldRunOptions = field(default_factory=WorldRunOptions)
+    shown: ShownOptions = field(default_factory=ShownOptions)
     limit: Nanos | None = None
     until: str | None = None
     inputs: Sequence[TimedInput] = ()
-    faults: Sequence[str] = ()
     trace: Path | None = None
     coverage: Sequence[str] = ()
     """Files for coverage of programs; ``-`` for a table."""
     questions: Sequence[str] = ()
-    """What is asked at the end (`steptwin.why`)."""
+    """Questions that are answered at the end (`steptwin.why`)."""
     properties: Sequence[str] = ()
-    """What must hold in the run (`steptwin.campaign.properties`)."""
-    session: Path | None = None
-    allow_outside: bool = False
-    """Files of the description may lie anywhere."""
-    strict: bool = False
-    """Whether a wait that timed out counts as a failure."""
+    """Properties that must hold in the run (`steptwin.campaign.properties`)."""
     as_json: bool = False
-    names: Sequence[str] = ()
-    """What is shown of what happens: of these controllers, elements and lines only
-    (`steptwin.simulation.world.records.Selection`)."""
-    kinds: Sequence[str] = ()
 
 
 def run(options: WorldRun, out: Print, warn: Print) -> bool:
@@ -94,12 +79,12 @@ def run(options: WorldRun, out: Print, warn: Print) -> bool:
     with begin_world(
         options.world,
         warn,
-        moment=options.moment,
-        seed=options.seed,
-        overrides=options.overrides,
+        moment=options.run.moment,
+        seed=options.run.seed,
+        overrides=options.run.overrides,
         keep_trace=keep_trace,
-        allow_outside=options.allow_outside,
-        state=options.state,
+        allow_outside=options.run.allow_outside,
+        state=options.run.state,
     ) as world:
         reports.observe(world, options.world.parent)
         return _run_and_report(world, options, reports, out)
@@ -121,7 +106,7 @@ def _run_and_report(world: World, options: WorldRun, reports: CoverageReports, o
     known = Counter(record.machine for record in before)
     _arrange(world, options)
     properties = watch_together([read_property(text) for text in options.properties], world)
-    selection = read_selection(options.names, options.kinds, named_in(world.parts))
+    selection = read_selection(options.shown.of, options.shown.show, named_in(world.parts))
     usual = USUAL_LIMIT_NS if options.until is None else LONGEST_RUN_NS
     limit = options.limit if options.limit is not None else usual
     watches = {} if options.as_json else _watched(world)
@@ -133,9 +118,9 @@ def _run_and_report(world: World, options: WorldRun, reports: CoverageReports, o
     measures = {name: value for one in properties for name, value in one.measures().items()}
     written = _write(world, options)
     session = sessions.session_of(world)
-    if options.session is not None:
-        sessions.save(session, options.session)
-        written.append(options.session)
+    if options.run.session is not None:
+        sessions.save(session, options.run.session)
+        written.append(options.run.session)
     tables: list[str] = []
     written += reports.write(tables.append)
     in_vain = options.until if reason is None else None
@@ -152,7 +137,7 @@ def _run_and_report(world: World, options: WorldRun, reports: CoverageReports, o
         raise KeyboardInterrupt
     in_time = not world.overdue and in_vain is None
     holds = all(one.holds for one in verdicts)
-    return not world.failures and holds and (in_time or not options.strict)
+    return not world.failures and holds and (in_time or not options.run.strict)
 
 
 def _watched(world: World) -> dict[str, ProgramReport]:
@@ -203,7 +188,7 @@ class WorldRunResult(NamedTuple):
 
 def _arrange(world: World, options: WorldRun) -> None:
     """Apply the inputs and faults of the command line."""
-    set_faults(world, options.faults)
+    set_faults(world, options.run.fault)
     for given in options.inputs:
         machine, dot, pin = given.pin.rpartition(".")
         names = {name.upper(): name for name in world.machines}

@@ -22,8 +22,8 @@ from steptwin.inputfiles import read_bytes
 from steptwin.later import start
 from steptwin.live.gateways import open_gateways, recording
 from steptwin.live.keptsettings import keep_settings
+from steptwin.live.options import LogOptions
 from steptwin.live.server import Server
-from steptwin.live.telling import Telling
 from steptwin.live.twins import find_device
 from steptwin.live.withoutworld import serve_without_world
 from steptwin.machine import Nanos
@@ -37,17 +37,17 @@ from steptwin.subject.jogs import Held
 from steptwin.textcodec import decode
 
 
-def bridge(file: Path, *, listen_any: bool, ready_file: Path | None, audit: Path | None, telling: Telling) -> None:
+def bridge(file: Path, *, listen_any: bool, ready_file: Path | None, audit: Path | None, log: LogOptions) -> None:
     """Serve the devices of ``file`` until SIGINT, SIGTERM or SIGHUP. Raises `SteptwinError` with a text for the user."""
     wanted = read_device_file(str(file), decode(read_bytes(file), str(file)).text)
     check_addresses([gateway.listen for gateway in wanted.gateways], listen_any=listen_any)
 
-    with audit_into(audit) as log:
+    with audit_into(audit) as commands:
 
         async def open_all(server: Server) -> None:
-            await _open(server, wanted, file, log, listen_any=listen_any)
+            await _open(server, wanted, file, commands, listen_any=listen_any)
 
-        asyncio.run(serve_without_world(ready_file, open_all, telling))
+        asyncio.run(serve_without_world(ready_file, open_all, log))
 
 
 async def _open(server: Server, wanted: DeviceFile, file: Path, audit: Audit | None, *, listen_any: bool) -> None:

@@ -28,18 +28,17 @@ from steptwin.live.clock import Clock
 from steptwin.live.display import Display, Lines, Notices, banner, remarks_on
 from steptwin.live.gateways import LiveWorldSubject, open_gateways, recording
 from steptwin.live.lookback import Lookback
+from steptwin.live.options import UpOptions
 from steptwin.live.output import Output
 from steptwin.live.pace import Pace, read_speed
 from steptwin.live.rfc2217 import TwinLine
 from steptwin.live.server import Server, clear_ready_file
 from steptwin.live.serving import check_name, shows_live_view
-from steptwin.live.telling import Telling
 from steptwin.live.tracedport import TracedPort
 from steptwin.live.transports import TRANSPORTS, VISION
 from steptwin.live.world import LiveWorld, PlacePort, VisionPort, announced
 from steptwin.live.world_control import WorldControl
 from steptwin.machine import Nanos, SendingPort
-from steptwin.simulation.describe.overrides import Overrides
 from steptwin.simulation.kinds.kind import LineSpec, LinkKind
 from steptwin.simulation.kinds.lines import SCRIPTS
 from steptwin.simulation.kinds.registry import line_kinds
@@ -48,55 +47,6 @@ from steptwin.simulation.toml.addresses import check_addresses, parse_address
 from steptwin.simulation.world.inputs import Leave
 from steptwin.simulation.world.records import is_shown, named_in, read_selection
 from steptwin.tracing import is_traced
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class UpOptions:
-    """The command's options as given; see ``steptwin up --help``."""
-
-    world: Path | None
-    """A description, or a session to continue; None for a world made from options."""
-    moment: Nanos | None = None
-    """The moment of the session to continue from; None: its end."""
-    seed: int | None = None
-    overrides: Overrides = field(default_factory=dict)
-    """Values that replace those of the description."""
-    state: Path | None = None
-    """Directory of the non-volatile memory; None: that of the description."""
-    speed: str = "1"
-    name: str | None = None
-    session: Path | None = None
-    """Where the session is written at the end."""
-    keeps_inputs: bool = False
-    """Whether a session is recorded that is only written on request."""
-    trace: str | None = None
-    """A file or directory, ``ring N`` or ``off``; None: the setting of the description."""
-    past: bool = False
-    """Whether the past is kept, for questions about it."""
-    coverage: Sequence[str] = ()
-    """Files for coverage of programs; ``-`` for a table."""
-    faults: Sequence[str] = ()
-    ready_file: Path | None = None
-    control: str | None = None
-    """HOST:PORT on this computer for the control endpoint, besides the local socket."""
-    strict: bool = False
-    """Whether a wait that timed out counts as a failure."""
-    listen_any: bool = False
-    log_frames: bool = False
-    names: Sequence[str] = ()
-    """What is shown: of these controllers, elements and lines only (`steptwin.simulation.world.records.Selection`)."""
-    kinds: Sequence[str] = ()
-    audit: Audit | None = None
-    """Where commands of gateways are recorded."""
-    allow_outside: bool = False
-    """Files of the description may lie anywhere."""
-    telling: Telling = field(default_factory=Telling)
-    is_closed: bool = False
-    """Whether nothing is open for other programs: neither lines nor the control endpoint."""
-
-    @property
-    def records_session(self) -> bool:
-        return self.keeps_inputs or self.session is not None
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,35 +72,35 @@ def up(options: UpOptions, addition: Addition | None = None) -> bool:
     """
     if options.world is None:
         raise Misuse("a world is missing: give its description (.toml) or a session (.json)")
-    check_name(options.name or options.world.stem)
-    read_speed(options.speed, least=0)
+    check_name(options.live.name or options.world.stem)
+    read_speed(options.live.speed, least=0)
     with begin_world(
         options.world,
         lambda text: sys.stderr.write(f"{text}\n"),
-        moment=options.moment,
-        seed=options.seed,
-        overrides=options.overrides,
-        keep_trace=options.trace not in (None, "off") or not is_session(options.world),
+        moment=options.run.moment,
+        seed=options.run.seed,
+        overrides=options.run.overrides,
+        keep_trace=options.live.trace not in (None, "off") or not is_session(options.world),
         keep_inputs=options.records_session,
-        allow_outside=options.allow_outside,
-        state=options.state,
+        allow_outside=options.run.allow_outside,
+        state=options.run.state,
     ) as world:
         return up_with(world, options, addition)
 
 
 def up_with(world: World, options: UpOptions, addition: Addition | None = None) -> bool:
     """As `up`, with an existing world."""
-    name = options.name or (world.spec.name if options.world is None else options.world.stem)
-    speed = read_speed(options.speed, least=0)
+    name = options.live.name or (world.spec.name if options.world is None else options.world.stem)
+    speed = read_speed(options.live.speed, least=0)
     if not options.is_closed:
         send_away(world)
     past = [] if world.now else [record for record in world.trace if is_shown(record)]
-    kept = read_kept(options.trace or world.spec.trace or "off")
+    kept = read_kept(options.live.trace or world.spec.trace or "off")
     if kept is None:
         world.trace.let_go()
         if not options.records_session:
             world.stop_recording()
-    set_faults(world, options.faults)
+    set_faults(world, options.run.fault)
     reports = CoverageReports(options.coverage)
     reports.observe(world, Path() if options.world is None else options.world.parent)
     outside = [line for line in world.spec.lines if line.is_open]
@@ -158,15 +108,15 @@ def up_with(world: World, options: UpOptions, addition: Addition | None = None) 
         raise Misuse(f"--speed max: line {outside[0].name!r} has external clients, which need real time; use 'steptwin run'")
     addresses = [address for line in world.spec.lines for key, address in line.links.items() if TRANSPORTS[key].is_address]
     addresses += [gateway.listen for gateway in world.spec.gateways]
-    check_addresses((*addresses, *(address for _, address in world.spec.vision_addresses())), listen_any=options.listen_any)
+    check_addresses((*addresses, *(address for _, address in world.spec.vision_addresses())), listen_any=options.live.listen_any)
     if isinstance(kept, Path):
         check_target(kept)
-    if options.session is not None:
-        check_session_target(options.session)
+    if options.run.session is not None:
+        check_session_target(options.run.session)
     if options.ready_file is not None:
         clear_ready_file(options.ready_file)
-    asyncio.run(_serve(replace(options, name=name), world, past, kept, reports, addition))
-    return not world.failures and not (options.strict and world.overdue)
+    asyncio.run(_serve(replace(options, live=replace(options.live, name=name)), world, past, kept, reports, addition))
+    return not world.failures and not (options.run.strict and world.overdue)
 
 
 def send_away(world: World) -> None:
@@ -185,13 +135,13 @@ async def _serve(
     addition: Addition | None,
 ) -> None:
     with ExitStack() as stack:
-        output = options.telling.output()
+        output = options.log.output()
         stack.callback(output.close)
-        stack.enter_context(options.telling.tracing(world.spec.name, output.notice))
+        stack.enter_context(options.log.tracing(world.spec.name, output.notice))
         live = LiveWorld(world)
         cell = Cell(live, Clock(begin=world.now))
         quiet = addition is not None
-        display = Notices(live, output, frames=options.log_frames) if quiet else _display(live, cell, output, options)
+        display = Notices(live, output, frames=options.live.log_frames) if quiet else _display(live, cell, output, options)
         live.show = display.notice
         server = Server(cell, display.notice)
         live.share_reads(cell)
@@ -202,9 +152,9 @@ async def _serve(
             await _open(server, live, pace, options, addition)
             recorder = _recorder(live, kept)
             begun = True
-            head = banner(world, server.end_points, remarks_on(world, listen_any=options.listen_any))
+            head = banner(world, server.end_points, remarks_on(world, listen_any=options.live.listen_any))
             display.begin(head, server.announcement(), past)
-            pace.begin(read_speed(options.speed, least=0))
+            pace.begin(read_speed(options.live.speed, least=0))
             await display.show(server)
             cell.enter()
         finally:
@@ -215,9 +165,9 @@ async def _serve(
 
 
 def _display(live: LiveWorld, cell: Cell, output: Output, options: UpOptions) -> Display:
-    selection = read_selection(options.names, options.kinds, named_in(live.world.parts))
-    if not shows_live_view(output, log_frames=options.log_frames):
-        return Lines(live, output, frames=options.log_frames, selection=selection)
+    selection = read_selection(options.shown.of, options.shown.show, named_in(live.world.parts))
+    if not shows_live_view(output, log_frames=options.live.log_frames):
+        return Lines(live, output, frames=options.live.log_frames, selection=selection)
     from steptwin.live.view import LiveView
 
     return LiveView(live, cell, output, selection)
@@ -244,7 +194,7 @@ def _keep(
     world.advance(world.now)
     world.settle_all()
     failures: list[str] = []
-    session = options.session
+    session = options.run.session
     writing: list[Callable[[], list[Path]]] = [] if session is None else [partial(_write_session, session, live)]
     if recorder is not None and isinstance(kept, Path):
         writing.append(partial(_write_trace, recorder, kept, world.now))
@@ -256,7 +206,7 @@ def _keep(
         except Misuse as error:
             failures.append(str(error))
     ended = "" if world.stopped is None else f", ended by: {world.stopped}"
-    inputs = f", {len(live.session().inputs)} inputs" if options.session is not None else ""
+    inputs = f", {len(live.session().inputs)} inputs" if options.run.session is not None else ""
     digest = f", digest {world.trace.digest()}" if world.trace.is_recorded else ""
     output.line(f"ran for {world.time:.3f} s{inputs}{ended}{digest}")
     if failures:
@@ -284,7 +234,7 @@ def _write_trace(recorder: TraceFile, where: Path, ended: Nanos) -> list[Path]:
 
 
 async def _open(server: Server, live: LiveWorld, pace: Pace, options: UpOptions, addition: Addition | None) -> None:
-    name = options.name or live.world.spec.name
+    name = options.live.name or live.world.spec.name
     control = WorldControl(server.cell, live, pace, server.announcement)
     server.introduce(name, partial(announced, live.world), options.world)
     if options.audit is None and live.world.spec.history is not None:
@@ -302,7 +252,7 @@ async def _open(server: Server, live: LiveWorld, pace: Pace, options: UpOptions,
         spec, subject = live.world.spec, LiveWorldSubject(control, live)
         subject.audit = server.audit
         opened = await open_gateways(
-            server, spec.gateways, spec.history, folder, subject, options.audit, listen_any=options.listen_any
+            server, spec.gateways, spec.history, folder, subject, options.audit, listen_any=options.live.listen_any
         )
         running.gateways.extend(opened)
     if options.ready_file is not None:
@@ -310,13 +260,13 @@ async def _open(server: Server, live: LiveWorld, pace: Pace, options: UpOptions,
 
 
 async def _open_for_others(server: Server, live: LiveWorld, control: WorldControl, options: UpOptions) -> None:
-    address = None if options.control is None else parse_address(options.control, listen_any=False)
+    address = None if options.live.control is None else parse_address(options.live.control, listen_any=False)
     await server.open_control(control, address)
     for line in live.world.spec.lines:
         await _open_line(server, live, line, options)
     for controller, where in live.world.spec.vision_addresses():
         make_port = partial(VisionPort, live, controller)
-        await server.open(VISION, where, f"vision records, {controller}", make_port, listen_any=options.listen_any)
+        await server.open(VISION, where, f"vision records, {controller}", make_port, listen_any=options.live.listen_any)
 
 
 async def _open_line(server: Server, live: LiveWorld, line: LineSpec, options: UpOptions) -> None:
@@ -333,7 +283,7 @@ async def _open_line(server: Server, live: LiveWorld, line: LineSpec, options: U
     on = "" if len(live.world.spec.lines) == 1 else f", {line.name}"
     links = line_kinds()[line.kind].opened_by
     folder = Path() if options.world is None else options.world.parent
-    how = {"listen_any": options.listen_any, "tls": line.tls, "folder": folder}
+    how = {"listen_any": options.live.listen_any, "tls": line.tls, "folder": folder}
     for key, where in line.links.items():
         link, transport = links[key], TRANSPORTS[key]
         make_port = maker(link, several=transport.has_several)

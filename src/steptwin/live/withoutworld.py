@@ -9,8 +9,8 @@ from typing import Any
 
 from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
+from steptwin.live.options import LogOptions
 from steptwin.live.server import Server, clear_ready_file
-from steptwin.live.telling import Telling
 from steptwin.machine import Nanos
 
 
@@ -30,13 +30,13 @@ class _Nothing:
 
 
 async def serve_without_world(
-    ready_file: Path | None, addition: Callable[[Server], Coroutine[Any, Any, None]], telling: Telling
+    ready_file: Path | None, addition: Callable[[Server], Coroutine[Any, Any, None]], log: LogOptions
 ) -> None:
     """Serve what ``addition`` opens until SIGINT, SIGTERM or SIGHUP."""
     with ExitStack() as stack:
-        output = telling.output()
+        output = log.output()
         stack.callback(output.close)
-        stack.enter_context(telling.tracing("devices", output.notice))
+        stack.enter_context(log.tracing("devices", output.notice))
         if ready_file is not None:
             clear_ready_file(ready_file)
         server = Server(Cell(_Nothing(), Clock()), output.notice)

@@ -5,15 +5,16 @@ from __future__ import annotations
 import pytest
 
 from steptwin.errors import Misuse
-from steptwin.live.running import UpOptions
+from steptwin.files.worldoptions import WorldRunOptions
+from steptwin.live.options import UpOptions
 from steptwin.live.studio.demo import demo_world
 
 
 def test_values_of_the_demo_machine_can_be_overridden() -> None:
-    world = demo_world(UpOptions(world=None, overrides={"x.start": 9}), free_ports=True)
+    world = demo_world(UpOptions(world=None, run=WorldRunOptions(with_=("x.start=9",))), free_ports=True)
     assert world.read("x.position") == 9.0
 
 
 def test_an_override_of_nothing_is_refused() -> None:
     with pytest.raises(Misuse, match=r"override 'nosuch.thing': there is no 'nosuch'"):
-        demo_world(UpOptions(world=None, overrides={"nosuch.thing": 4}), free_ports=True)
+        demo_world(UpOptions(world=None, run=WorldRunOptions(with_=("nosuch.thing=4",))), free_ports=True)

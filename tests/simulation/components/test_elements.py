@@ -18,7 +18,8 @@ from steptwin.errors import Misuse
 from steptwin.files.export import axis_views, read_trace, write_trace
 from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
-from steptwin.live.running import UpOptions, up
+from steptwin.live.options import LiveOptions, UpOptions
+from steptwin.live.running import up
 from steptwin.machine import MILLISECOND
 from steptwin.simulation.components.button import BUTTON
 from steptwin.simulation.components.contact import ContactSpec
@@ -149,7 +150,7 @@ def test_run_and_up_have_it(tmp_path: Path, capfd: pytest.CaptureFixture[str], m
     assert "busy.lit == 1" in ended.output
     assert "t.busy" in (tmp_path / "t.csv").read_text().splitlines()[0]
     place.write_text(TEXT.replace("{ expect", '{ stop = "done" },\n  { expect'), "utf-8")
-    assert up(UpOptions(world=place, speed="1000"))
+    assert up(UpOptions(world=place, live=LiveOptions(speed="1000")))
     assert "it has been replaced" in capfd.readouterr().out
 
 

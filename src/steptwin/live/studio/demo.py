@@ -9,7 +9,7 @@ from steptwin.files.world import World
 from steptwin.inputfiles import read_bytes
 from steptwin.live.clients import listening
 from steptwin.live.directory import runtime_directory
-from steptwin.live.running import UpOptions
+from steptwin.live.options import UpOptions
 from steptwin.simulation.describe.description import read_world
 from steptwin.simulation.toml.addresses import Address
 from steptwin.system import HAS_PTYS
@@ -30,10 +30,10 @@ def demo_world(options: UpOptions, *, free_ports: bool = False) -> World:
         text,
         files,
         name=NAME,
-        seed=options.seed,
-        overrides=options.overrides,
+        seed=options.run.seed,
+        overrides=options.run.overrides,
         keep_inputs=options.records_session,
-        state=None if options.state is None else str(options.state),
+        state=None if options.run.state is None else str(options.run.state),
     )
 
 

@@ -2,31 +2,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 from steptwin.access.roles import Role
+from steptwin.options import Option, OptionGroup
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StudioOptions:
-    """The command's own options as given; see ``steptwin studio --help``."""
+@dataclass(frozen=True, kw_only=True)
+class StudioOptions(OptionGroup):
+    """The page and its service."""
 
-    http: str | None = None
-    remote: bool = False
-    """Whether others may reach it without TLS."""
-    certificate: Path | None = None
-    key: Path | None = None
-    tokens: Path | None = None
-    open_to_local_users: bool = False
-    """Whether no token is asked for, at an address of this computer."""
-    audit: Path | None = None
-    browser: bool = True
-    devices: Sequence[str] = ()
-    """Addresses of devices. With them there is no demo machine."""
-    view: bool = False
-    """Whether a session is shown as it was, and everybody has the role viewer."""
+    heading = "Options of the page"
+
+    http: Annotated[
+        str | None, Option("Address of the page. Default: 127.0.0.1:8488, or the next free port.", metavar="HOST:PORT")
+    ] = None
+    remote: Annotated[bool, Option("Permit an --http address that others can reach, without TLS; with tokens.")] = False
+    certificate: Annotated[Path | None, Option("TLS: the certificate (PEM).", metavar="FILE")] = None
+    key: Annotated[Path | None, Option("TLS: its key (PEM).", metavar="FILE")] = None
+    tokens: Annotated[
+        Path | None,
+        Option(
+            "Lines ROLE NAME TOKEN; roles are viewer, operator, engineer. Nobody else may read it. "
+            "Default: a file of this user, made by the first studio.",
+            metavar="FILE",
+        ),
+    ] = None
+    open_to_local_users: Annotated[bool, Option("Ask for no token: every user of this computer is engineer.")] = False
+    audit: Annotated[
+        Path | None, Option("Append every command and its user to a file of JSON lines.", metavar="FILE", is_written=True)
+    ] = None
+    device: Annotated[
+        tuple[str, ...],
+        Option(
+            "A device to show, as for the other commands: /dev/ttyUSB0,unit=2, HOST:PORT, /dev/ttyUSB1,kind=m1486,chip=7. "
+            "Repeatable. Without MACHINE.toml there is no world then.",
+            metavar="DEVICE",
+            flags=("--device", "-d"),
+            completion="devices",
+        ),
+    ] = ()
+    view: Annotated[bool, Option("Show a session as it was: paused at its end, and nothing can be changed.")] = False
+    browser: Annotated[bool, Option("Open the page where there is a desktop.")] = True
     is_demo: bool = False
     """Whether no file of the user is behind it: only what reaches a device needs a token."""
 

@@ -33,8 +33,9 @@ from steptwin.files.world import World
 from steptwin.httpservice import Tls, listen
 from steptwin.live.keptsettings import keep_settings, state_directory
 from steptwin.live.lookback import Lookback
+from steptwin.live.options import LiveOptions, UpOptions
 from steptwin.live.ports import serial_ports, twin_ports
-from steptwin.live.running import Running, UpOptions, send_away, up, up_with
+from steptwin.live.running import Running, send_away, up, up_with
 from steptwin.live.server import EndPoint, Server
 from steptwin.live.studio.branches import BranchStart, WorldBranches
 from steptwin.live.studio.campaigns import FolderCampaigns
@@ -73,9 +74,9 @@ def studio(own: StudioOptions, options: UpOptions) -> bool:
 
     Raises `Misuse` or another `SteptwinError` with a text for the user.
     """
-    if own.view and (options.world is None or own.devices):
+    if own.view and (options.world is None or own.device):
         raise Misuse("--view shows one session (.json), and no device: name its file")
-    own = replace(own, is_demo=options.world is None and not own.devices and not _keeps_files(own, options))
+    own = replace(own, is_demo=options.world is None and not own.device and not _keeps_files(own, options))
     entrance = _entrance(own)
     with ExitStack() as stack:
         audit = Audit(wall_clock) if own.audit is None else Audit(wall_clock, stack.enter_context(AuditFile(own.audit)).add)
@@ -85,11 +86,11 @@ def studio(own: StudioOptions, options: UpOptions) -> bool:
             world, history = recorded(options.world, lambda text: sys.stderr.write(f"{text}\n"))
             stack.enter_context(world)
             opening = partial(page.open, beside=options, history=history)
-            return up_with(world, replace(options, speed="0", is_closed=True), opening)
+            return up_with(world, replace(options, live=replace(options.live, speed="0"), is_closed=True), opening)
         if options.world is not None:
             return up(replace(options, keeps_inputs=True, audit=audit), partial(page.open, beside=options))
-        if own.devices:
-            asyncio.run(serve_without_world(options.ready_file, page.open_without_world, options.telling))
+        if own.device:
+            asyncio.run(serve_without_world(options.ready_file, page.open_without_world, options.log))
             return True
         options = replace(options, keeps_inputs=True)
         with demo_world(options) as world:
@@ -108,7 +109,8 @@ def studio_of_branch(start: BranchStart) -> None:
     ):
         send_away(world)
         page = _Page(start.own, entrance, listening, Audit(wall_clock))
-        up_with(world, UpOptions(world=None, ready_file=start.ready_file, speed="0", is_closed=True), partial(page.open))
+        options = UpOptions(world=None, live=LiveOptions(speed="0"), ready_file=start.ready_file, is_closed=True)
+        up_with(world, options, partial(page.open))
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,8 +186,8 @@ def _tokens(file: Path | None, *, is_demo: bool) -> tuple[Path | None, tuple[Tok
 
 def _keeps_files(own: StudioOptions, options: UpOptions) -> bool:
     """Whether what happens is written into files that the user has named."""
-    traced = options.trace is not None and isinstance(read_kept(options.trace), Path)
-    return traced or any((own.audit, options.state, options.session, options.coverage))
+    traced = options.live.trace is not None and isinstance(read_kept(options.live.trace), Path)
+    return traced or any((own.audit, options.run.state, options.run.session, options.coverage))
 
 
 class _Page:
@@ -243,7 +245,7 @@ class _Page:
         stem = live.world.spec.name if beside.world is None else beside.world.stem
         may_view = is_loopback(self._entrance.address.host)
         access = self._access_of_views() if may_view else None
-        recordings = WorldRecordings(live, server.cell, folder, stem, beside.session, access)
+        recordings = WorldRecordings(live, server.cell, folder, stem, beside.run.session, access)
         server.join(recordings)
         return recordings
 
@@ -258,7 +260,7 @@ class _Page:
         host = self._entrance.address.host
         if not is_loopback(host):
             return None
-        return replace(self._own, http=str(Address(host, 0)), audit=None, browser=False, devices=(), view=False)
+        return replace(self._own, http=str(Address(host, 0)), audit=None, browser=False, device=(), view=False)
 
     async def open_without_world(self, server: Server) -> None:
         """Serve it in the event loop of ``server``."""
@@ -296,7 +298,7 @@ class _Page:
         )
         hub = Hub(subject, subject, around)
         try:
-            for device in self._own.devices:
+            for device in self._own.device:
                 await connections.open(device)
         except BaseException:
             await connections.close()
