@@ -55,7 +55,7 @@ class Entry:
 
 
 def _short(value: object) -> object:
-    """Of fields that are too long to be kept: texts such as programs are only counted."""
+    """Value of a field for the log: texts that are too long, such as programs, are only counted."""
     text = str(value)
     return value if len(text) <= LONGEST_VALUE else f"({len(text)} characters)"
 

@@ -1,4 +1,4 @@
-"""What each command of a subject needs (`steptwin.subject.commands`): one row each, complete."""
+"""Permissions that each command of a subject needs (`steptwin.subject.commands`): one row each, complete."""
 
 from __future__ import annotations
 

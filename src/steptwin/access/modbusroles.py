@@ -6,7 +6,7 @@ from steptwin.access.roles import ACT, LOOK, ROLES, Permit, Role
 from steptwin.wire.pdu import READS
 
 ROLE_OID = "1.3.6.1.4.1.50316.802.1"
-"""Of the extension of a certificate; its value is a UTF8String."""
+"""Identifier of the extension of a certificate; its value is a UTF8String."""
 _UTF8_STRING = 0x0C
 LONGEST_ROLE = 127
 """Bytes, so that the length takes one."""
@@ -26,7 +26,7 @@ def role_of(value: bytes) -> Role | None:
 
 
 def permit_of(function: int) -> Permit:
-    """What a request with this function code needs: reading is looking, all else acts on the controller."""
+    """Permission that a request with this function code needs: reading is looking, all else acts on the controller."""
     return LOOK if function in READS else ACT
 
 

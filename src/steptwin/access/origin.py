@@ -23,7 +23,7 @@ OTHER_ORIGIN = Message("access.other-origin", "Origin {origin} is another site; 
 
 
 class Origins:
-    """Of a server at ``port``. ``names``: host names under which it may be asked, besides those of this computer.
+    """Origins of a server at ``port``. ``names``: host names under which it may be asked, besides those of this computer.
 
     ``by_address``: also by any address in numbers, which no site can have for a name. ``has_tls``: it is asked with https.
     """

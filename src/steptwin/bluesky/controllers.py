@@ -63,7 +63,7 @@ class DriverConnector(DeviceConnector):
         return self._part
 
     def motor_place(self, number: int) -> MotorPlace:
-        """Of the axis ``number``."""
+        """Place of the axis ``number``."""
 
         def positions() -> Limits | None:
             return None if self._part is None else self._part.datasheet.axes[number - 1].positions

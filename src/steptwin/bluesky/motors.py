@@ -36,7 +36,7 @@ SAMPLE_S = 0.02
 
 
 class MotorPlace(NamedTuple):
-    """What the parent of a motor knows of it once it is connected: its place, and the positions that it can have."""
+    """Place of a motor and the positions that it can have, which its parent knows once it is connected."""
 
     source: Callable[[], str]
     positions: Callable[[], Limits | None]

@@ -118,7 +118,7 @@ class Calculator:
         return times[0] if times else None
 
     def _unknown(self, known: Mapping[str, float], find: str | None) -> str:
-        """What a time determines."""
+        """The quantity that a time determines."""
         needed = [one.name for one in self.model.quantities if one.default is None and one.same_as is None]
         missing = [name for name in needed if name not in known and name != find]
         can = [one.name for one in self.model.quantities if not one.choices]
@@ -254,7 +254,7 @@ SHOWN = 1e-6
 """Relative: smaller differences are not visible in printed numbers."""
 LARGEST = 1e12
 LEAST_PART = 1e-9
-"""Of a quantity whose range begins at 0, the least that is tried, relative to a pulse."""
+"""Least value that is tried of a quantity whose range begins at 0, relative to a pulse."""
 
 
 def _least(quantity: MoveQuantity) -> float:
@@ -296,7 +296,7 @@ FROM_UP_TO = Message("calc.from-up-to", "from {low:.10g} up to {high:.10g}{unit}
 
 
 def range_text(quantity: MoveQuantity) -> str:
-    """What is permitted, with the unit."""
+    """Permitted range, with the unit."""
     if quantity.choices:
         return ", ".join(map(str, quantity.choices))
     low, high = quantity.limits.low or 0.0, quantity.limits.high

@@ -29,14 +29,14 @@ class MoveQuantity:
     pulses: float = 1.0
     """Pulses (per s, per s²) in one of its unit."""
     limits: Limits
-    """Of its size; a distance may also be negative."""
+    """Permitted range of its size; a distance may also be negative."""
     choices: tuple[int, ...] = ()
     """All that is permitted, where it is a choice; it cannot be calculated then."""
     default: float | None = None
     same_as: str | None = None
     """The quantity whose value it has where none is given."""
     code: str = ""
-    """What it is set with: the name of a register, the letter of a command. Empty: it is given with each motion."""
+    """Name of the register or letter of the command that sets it. Empty: it is given with each motion."""
     back: str = ""
     """The same, for a negative value; ``code`` where there is no difference."""
     detail: str = ""
@@ -76,7 +76,7 @@ class Model(Protocol):
         ...
 
     def notes(self, values: Mapping[str, float], profile: Profile) -> list[MessageText]:
-        """What is worth knowing of them."""
+        """Remarks on them."""
         ...
 
     def formulas(self, values: Mapping[str, float], profile: Profile) -> list[Formula]: ...

@@ -19,7 +19,7 @@ from steptwin.numerals import read_number
 
 
 class Dimension(Enum):
-    """What a quantity measures. The value is its unit's suffix behind a unit of distance."""
+    """Dimension of a quantity. The value is its unit's suffix behind a unit of distance."""
 
     DISTANCE = ""
     SPEED = "/s"
@@ -49,7 +49,7 @@ def _positive(name: str, value: float, unit: str) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveMechanics:
-    """What turns pulses into motion."""
+    """Mechanics that turn pulses into motion."""
 
     motor_steps: float = 200.0
     """Full steps in a revolution of the motor: 200 for 1.8°."""

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 RESULTS, SUMMARY = "results.db", "summary.json"
 SUFFIX = ".results"
-"""Of the folder of results beside the file of a campaign."""
+"""Suffix of the folder of results beside the file of a campaign."""
 """Files in the folder of the results."""
 
 
@@ -69,7 +69,7 @@ class Campaign:
         self.covered = 0
         """In how many runs what programs execute was counted."""
         self.coverage = Coverage()
-        """What they executed, after a `run` that counts it."""
+        """Statements that they executed, after a `run` that counts them."""
         self._runner: CaseRunner | None = None
 
     @classmethod

@@ -22,7 +22,7 @@ WAITS = "waits of the scripts"
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What a property says of a run."""
+    """Verdict of a property on a run."""
 
     name: str
     holds: bool
@@ -61,7 +61,7 @@ class StepAt:
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """What is particular to one run. It is JSON (`plain`), and pickles.
+    """A run by its values. It is JSON (`plain`) and can be pickled.
 
     ``values`` are those of what varies, by its path or name; times in seconds. ``seed`` is that of all chance in the world.
     """
@@ -90,7 +90,7 @@ class Case:
 
     @classmethod
     def of_plain(cls, plain: Mapping[str, Any]) -> Case:
-        """What `plain` gave, also after JSON."""
+        """Read the result of `plain`, also after JSON."""
         faults = tuple(FaultAt(**one) for one in plain["faults"])
         steps = tuple(StepAt(**one) for one in plain["steps"])
         return cls(plain["number"], dict(plain["values"]), faults, steps, plain["seed"], plain["end_ns"])
@@ -141,12 +141,12 @@ class CaseResult:
 
     @classmethod
     def of_plain(cls, plain: Mapping[str, Any]) -> CaseResult:
-        """What `plain` gave, also after JSON."""
+        """Read the result of `plain`, also after JSON."""
         verdicts = tuple(Verdict(**one) for one in plain["verdicts"])
         return cls(plain["number"], verdicts, plain["digest"], plain["end_ns"], dict(plain["measures"]), plain["error"])
 
 
 def digest_of(plain: Any) -> str:
-    """Of values that JSON has: 32 hexadecimal digits, equal for equal values in whatever order of their keys."""
+    """Digest of values that JSON has: 32 hexadecimal digits, equal for equal values in whatever order of their keys."""
     text = json.dumps(plain, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
     return blake2b(text.encode(), digest_size=DIGEST_BYTES).hexdigest()

@@ -32,7 +32,7 @@ class CaseDimension(NamedTuple):
 
 
 class Cases:
-    """Of a description."""
+    """Cases of a description."""
 
     def __init__(self, description: CampaignDescription) -> None:
         self.description = description

@@ -33,7 +33,7 @@ _LATE = "this is after end, so that it never happens"
 
 
 class CampaignChecks:
-    """What tables of a campaign say about one another, and about its world. ``head``: the values of ``[campaign]``."""
+    """Checks of the tables of a campaign against one another and against its world. ``head``: the values of ``[campaign]``."""
 
     def __init__(self, toml: TomlText, head: Mapping[str, Any], vary: tuple[Varied, ...]) -> None:
         self._toml = toml

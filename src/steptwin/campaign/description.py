@@ -80,7 +80,7 @@ class CampaignDescription:
     runs: int | None
     """None: as many as the grid has, or as the time permits."""
     time_ns: Nanos | None
-    """Of the wall clock."""
+    """Longest time of the wall clock."""
     until_failure: bool
     end_ns: Nanos
     until: str | None
@@ -95,7 +95,7 @@ class CampaignDescription:
     expectations: bool = True
     """Whether a run fails where a script expects something in vain."""
     matrix: MatrixRules = MatrixRules()
-    """Of the fault matrix."""
+    """Settings of the fault matrix."""
     search: str = SEARCHES[0]
 
     @cached_property

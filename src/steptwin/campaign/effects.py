@@ -1,4 +1,4 @@
-"""What a fault did to a machine: judged from a run with it and the run without any."""
+"""Effect of a fault on a machine, judged from a run with it and the run without any."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class FaultEffect(enum.StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class RunFacts:
-    """What is known at the end of a run. ``alarm_ns``: when the alarm was there first; ``overdue``: the first wait of a script
+    """Facts at the end of a run. ``alarm_ns``: when the alarm was there first; ``overdue``: the first wait of a script
     that ran out of time; ``struck_ns``: when the fault happened first."""
 
     result: CaseResult
@@ -156,7 +156,7 @@ def _said(verdict: Verdict) -> str:
 
 
 def _missing(facts: RunFacts, nominal: RunFacts) -> str:
-    """What says that the run did not make its parts; empty if nothing does."""
+    """Reason for which the run did not make its parts; empty if there is none."""
     if facts.is_done is not None:
         return "" if facts.is_done else "not done"
     if facts.overdues > nominal.overdues and facts.overdue is not None:
@@ -167,7 +167,7 @@ def _missing(facts: RunFacts, nominal: RunFacts) -> str:
 
 
 def _detection(facts: RunFacts, nominal: RunFacts) -> tuple[str, Nanos | None]:
-    """What noticed the fault first, and when."""
+    """The first that noticed the fault, and the moment."""
     found: list[tuple[Nanos, str]] = []
     if facts.alarm_ns is not None and nominal.alarm_ns is None:
         found.append((facts.alarm_ns, "alarm"))

@@ -16,7 +16,7 @@ from steptwin.campaign.workers import BatchResult, Workers, run_batch
 TASK_S = 0.25
 """Aim for the duration of a task: a tenth of a second at least, for the cost of its way to a worker and back."""
 MOST_CASES = 500
-"""Of a task."""
+"""Most cases of a task."""
 WAITING = 2
 """Tasks for each worker, of which one runs."""
 MOST_TRIES = 2

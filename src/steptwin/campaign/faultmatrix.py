@@ -102,7 +102,7 @@ class FaultMatrix:
 
 
 class _CellTask(NamedTuple):
-    """What a worker runs."""
+    """Task of a worker."""
 
     phase: int
     case: Case

@@ -1,4 +1,4 @@
-"""What a campaign found: its failures by cause, each with its simplest case."""
+"""Findings of a campaign: its failures by cause, each with its simplest case."""
 
 from __future__ import annotations
 

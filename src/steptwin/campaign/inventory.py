@@ -28,7 +28,7 @@ TRIED: dict[str, tuple[dict[str, FaultValue], ...]] = {
 
 
 class FaultyPart(enum.StrEnum):
-    """What a fault is of."""
+    """Kind of part that has a fault."""
 
     SENSOR = "sensor"
     ACTUATOR = "actuator"

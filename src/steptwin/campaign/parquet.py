@@ -12,7 +12,7 @@ from pyarrow import parquet
 from steptwin.campaign.store import StoredCase, export_rows
 
 _ROWS = 10_000
-"""Of a group."""
+"""Rows in a group."""
 
 
 def write_cases(results: Callable[[], Iterable[StoredCase]], file: IO[bytes]) -> None:

@@ -29,7 +29,7 @@ class CyclePhase:
     end: Nanos
     total: Nanos
     name: str
-    """What changed at its beginning."""
+    """Name of the change at its beginning."""
 
     @property
     def middle(self) -> Nanos:

@@ -38,7 +38,7 @@ from steptwin.simulation.toml.values import flag, name_value, number, positive_t
 MOST_RUNS = 1_000_000_000
 MOST_PHASES = 1000
 LEAST_SHARE = 1e-6
-"""Of a normal distribution must be left where it is cut off: far out its values cannot be told apart."""
+"""Least probability inside the limits of a truncated normal distribution: far out its values cannot be distinguished."""
 
 
 def _condition(value: Any) -> str:
@@ -185,7 +185,7 @@ ROWS: Mapping[str, TableRows] = {
         ),
     ),
 }  # fmt: skip
-"""What the tables may contain."""
+"""Keys that the tables may contain."""
 
 
 def load_campaign(path: str | Path) -> CampaignDescription:

@@ -87,14 +87,14 @@ def text_of_test(case: Case, result: CaseResult, name: str, campaign: str, at: s
 
 
 def summary(result: CaseResult) -> str:
-    """What is wrong, in a line; empty if nothing is."""
+    """The mistake, in a line; empty if there is none."""
     if result.error is not None:
         return result.error.strip().partition("\n")[0]
     return "; ".join(f"{one.name}: {one.why}" if one.why else one.name for one in result.verdicts if not one.holds)
 
 
 def where(case: Case, description: CampaignDescription) -> str:
-    """What is particular to a case of a campaign, in words: values that it varies as times have units."""
+    """Text of the values of one case of a campaign: values that it varies as times have units."""
     times = {one.name for one in description.vary if not isinstance(one.spread, Choice) and one.spread.is_time}
     parts = [f"{name} = {_value_text(value, is_time=name in times)}" for name, value in case.values.items()]
     parts += [f"{one.at_ns / SECOND:.9g} s: {one.fault}" for one in case.faults]

@@ -34,7 +34,9 @@ MOST_BLUEPRINTS = 16
 
 
 class CaseRunner:
-    """What all cases have in common is made once: the blueprint of the world, and the beginning that all runs share.
+    """Runner of the cases of a campaign.
+
+    The blueprint of the world and the beginning that all runs share are made once.
 
     Raises `WorldError` for a world that is wrong whatever varies, and `Misuse` for what is refused of properties and measures.
     """
@@ -46,9 +48,9 @@ class CaseRunner:
         self._beginning: PlantSnapshot | None = None
         self._properties = [read_property(one.text, one.name) for one in description.properties]
         self._seen: list[WatchState | None] = [None] * len(self._properties)
-        """Of the common beginning, by each property."""
+        """State after the common beginning, by property."""
         self._coverage: list[Any] = []
-        """Of the common beginning, as plain values."""
+        """Coverage of the common beginning, as plain values."""
         if description.start_ns is not None:
             world = self._anew({}, description.seed)
             coverage = Coverage()
@@ -188,7 +190,7 @@ class _Measures:
 
 
 def _told(error: Exception) -> str:
-    """What it is and where it is from, in a line."""
+    """Kind and origin of an error, in a line."""
     place = traceback.extract_tb(error.__traceback__)[-1]
     return f"{type(error).__name__}: {error} ({Path(place.filename).name}, {place.name})".replace("\n", " ")
 

@@ -32,7 +32,7 @@ _PARAMETER = re.compile(r"(?<==)-?\d+(?:\.\d+)?(?:[eE][+-]?\d+)?(?=\s|$)")
 
 
 class CaseFailure(NamedTuple):
-    """What fails, and why in words without numbers: what distinct failures differ in."""
+    """Property that fails, and the reason in words without numbers: distinct failures differ in it."""
 
     property: str
     cause: str

@@ -36,7 +36,7 @@ from steptwin.errors import Misuse
 from steptwin.history.database import POSTGRESQL, SQLITE, engine_of, failure, shown
 
 FORMAT = 1
-"""Of the tables; another one is refused."""
+"""Version of the tables; another one is refused."""
 _CREATION = 0x73746570
 """The advisory lock of PostgreSQL for the creation of the tables."""
 _STREAMED = 1000
@@ -171,7 +171,7 @@ class CampaignStore:
             return connection.execute(wanted).scalar()
 
     def coverage(self) -> tuple[Coverage, int]:
-        """What has been counted, and in how many cases."""
+        """Counts, and the number of their cases."""
         with self._begin() as connection:
             row = connection.execute(select(CAMPAIGN.c.coverage, CAMPAIGN.c.covered).where(CAMPAIGN.c.id == self._id)).one()
             return Coverage.of_plain(json.loads(row.coverage or "[]")), int(row.covered)

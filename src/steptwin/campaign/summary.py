@@ -1,4 +1,4 @@
-"""What came of a campaign, in a few numbers."""
+"""Result of a campaign, in a few numbers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from steptwin.campaign.case import DIGEST_BYTES, Case, CaseResult
 
 CONFIDENCE = 0.95
 _Z = 1.959963984540054
-"""Of a normal distribution, two-sided, for `CONFIDENCE`."""
+"""Quantile of a normal distribution, two-sided, for `CONFIDENCE`."""
 MOST_FAILURES = 1000
 """Failures that a summary lists; the database has all."""
 LONGEST_WHY = 300
@@ -37,7 +37,7 @@ def wilson(passed: int, runs: int) -> PassInterval:
 
 @dataclass(slots=True)
 class PropertySummary:
-    """Of one property: how often it did not hold, and its least robustness with the first case that has it."""
+    """Result of one property: how often it did not hold, and its least robustness with the first case that has it."""
 
     failed: int = 0
     robustness: float = float("inf")
@@ -69,7 +69,7 @@ class CampaignSummary:
     def of(
         cls, name: str, campaign: str, seed: int, results: Iterable[tuple[Case, CaseResult]], before: int | None = None
     ) -> CampaignSummary:
-        """Of results in the order of their numbers, ``before`` a number."""
+        """Summary of the results in the order of their numbers, ``before`` a number."""
         found = cls(name=name, campaign=campaign, seed=seed)
         whole = blake2b(digest_size=DIGEST_BYTES)
         for case, result in results:

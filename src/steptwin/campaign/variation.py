@@ -1,4 +1,4 @@
-"""What varies: how a number from 0 to 1 becomes a value."""
+"""Variation: how a number from 0 to 1 becomes a value."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class Normal:
 
     @property
     def _shares(self) -> tuple[float, float]:
-        """Of the whole distribution that are below ``low``, and below ``high``."""
+        """Shares of the whole distribution below ``low`` and below ``high``."""
         curve = NormalDist(self.mean, self.deviation)
         return 0.0 if self.low is None else curve.cdf(self.low), 1.0 if self.high is None else curve.cdf(self.high)
 

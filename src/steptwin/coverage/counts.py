@@ -1,4 +1,4 @@
-"""What was executed, by text: the same text under the same path adds up, whichever controller or world executed it."""
+"""Counts of what was executed, by text: the same text under the same path adds up, whichever controller or world executed it."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class Summary(NamedTuple):
 
     @property
     def percent(self) -> float:
-        """Of statements and ways that were executed; 100 where there are none."""
+        """Percentage of statements and ways that were executed; 100 where there are none."""
         total = self.statements + self.branches
         return 100.0 if total == 0 else 100.0 * (total - self.missed - self.missed_branches) / total
 

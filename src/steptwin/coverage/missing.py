@@ -1,4 +1,4 @@
-"""What was not executed, as text: lines, and ways out of branches."""
+"""Text of what was not executed: lines, and ways out of branches."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def missing(text: TextCoverage) -> str:
 
 
 def missed_ways(text: TextCoverage) -> list[Way]:
-    """Of branches that were executed."""
+    """Ways not taken out of branches that were executed."""
     return [way for way in text.ways if text.hits[way.origin] and not text.taken[way]]
 
 

@@ -50,7 +50,7 @@ class _Branch(NamedTuple):
 
 
 class _Counter:
-    """Of one controller."""
+    """Counter of one controller."""
 
     def __init__(self, programs: Programs, coverage: Coverage, locate: Callable[[str], str], now: Nanos) -> None:
         self._programs = programs

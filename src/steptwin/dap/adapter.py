@@ -105,7 +105,7 @@ class Adapter:
             raise Misuse(f"{command}: an argument is of another type: {error}") from error
 
     def after(self, command: str) -> None:
-        """What comes after the response to a request that was answered."""
+        """Send what comes after the response to a request that was answered."""
         if command in ("launch", "attach"):
             self._send("initialized", {})
 

@@ -243,7 +243,7 @@ class AttachedTwin:
         return stop
 
     def unasked(self) -> DebugTravel | None:
-        """What another client has begun meanwhile; None for nothing."""
+        """Run that another client has begun meanwhile; None for none."""
         for event in self._events(0.0):
             if isinstance(event.payload, StoppedPayload):
                 return self._at_once(self._stop(event, event.payload))

@@ -1,4 +1,4 @@
-"""What the debugger can do, as the answer to ``initialize``."""
+"""Capabilities of the debugger, as the answer to ``initialize``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a session debugs, and the numbers by which the editor refers to it: threads, frames, groups of values, lines."""
+"""Controllers that are debugged, and the numbers by which the editor refers to it: threads, frames, groups of values, lines."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from steptwin.debug.values import Location
 from steptwin.errors import Misuse
 
 ResponseBody: TypeAlias = Mapping[str, object]
-"""Of a response or an event."""
+"""Body of a response or an event."""
 Arguments: TypeAlias = Mapping[str, Any]
 
 FRAMES = 1000
@@ -25,7 +25,7 @@ class Debugged:
     def __init__(self) -> None:
         self.target: Target | None = None
         self.travel: DebugTravel | None = None
-        """What runs now."""
+        """The run in progress."""
         self.sources = Sources(())
         self.first_line = self.first_column = 1
         """The editor counts from here."""
@@ -50,11 +50,11 @@ class Debugged:
         return threads[thread - 1]
 
     def machine_of_frame(self, frame: object) -> str:
-        """Of the first controller where no frame is named."""
+        """Controller of a frame; the first controller where no frame is named."""
         return self.machine(1) if frame is None else self.machine_of(frame, "frameId")
 
     def machine_of(self, reference: object, name: str) -> str:
-        """Of a frame or scope by its number; ``name``: of the argument that has it. Raises `Misuse`."""
+        """Controller of a frame or scope by its number; ``name`` is that of the argument that has it. Raises `Misuse`."""
         threads = self.started().threads
         if not isinstance(reference, int) or not 1 <= reference // FRAMES <= len(threads):
             raise Misuse(f"{name} = {reference!r}: nothing that is shown has this number")

@@ -49,7 +49,7 @@ class Sources:
         return [text for text in self._texts if text.path == path]
 
     def path(self, source: Mapping[str, Any]) -> Path:
-        """Of a source of the editor. Raises `Misuse`."""
+        """Path of a source of the editor. Raises `Misuse`."""
         reference = source.get("sourceReference")
         return self.numbered(reference).path if reference else Path(source["path"]).resolve()
 

@@ -1,4 +1,4 @@
-"""What an editor debugs: a world in this process (`steptwin.debug.debugger.Debugger`), or a twin in another one."""
+"""Target of an editor that debugs: a world in this process (`steptwin.debug.debugger.Debugger`), or a twin in another one."""
 
 from __future__ import annotations
 

@@ -81,7 +81,7 @@ class Breakpoint:
         return times[at] == time and self._counts.counts(self._dropped + at + 1)
 
     def forget_after(self, time: Nanos) -> None:
-        """What comes later will be different."""
+        """Forget what is known of the time after a moment: what comes later will be different."""
         del self._times[bisect_left(self._times, time + 1) :]
 
     def take_hits(self, other: Breakpoint) -> None:

@@ -113,7 +113,7 @@ def _paths(world: Plant, machine: str) -> list[str]:
 
 
 def _read_by_program(world: Plant, machine: str, name: str) -> ReadAt:
-    """What a name means to the statement of a moment, or else to the controller."""
+    """Meaning of a name for the statement of a moment, or else for the controller."""
     programs = world.programs_of(machine)
 
     def read(now: Nanos) -> float:

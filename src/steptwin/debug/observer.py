@@ -1,4 +1,4 @@
-"""What a debugger observes in a world that runs: statements, breakpoints, events, values that change."""
+"""Observer of a world that runs, for a debugger: statements, breakpoints, events, values that change."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Observer:
         self.is_on = False
         self.stepping: Collection[str] = ()
         self.codes: Collection[str] = ()
-        """Of events that are noted."""
+        """Kinds of events that are noted."""
         self.begun: list[Begun] = []
         self.logged: list[Logged] = []
         self.happened: list[ObservedEvent] = []

@@ -34,7 +34,7 @@ def scope(world: Plant, machine: str, name: str) -> Scope:
 
 
 def _expression(world: Plant, machine: str, value: ShownValue) -> str:
-    """What evaluates to a value: its name, or what follows the name of the axis where a controller has but one."""
+    """Expression of a value: its name, or what follows the name of the axis where a controller has but one."""
     _, _, last = value.name.partition(".")
     for text in (value.name, last):
         with suppress(Misuse):
@@ -131,7 +131,7 @@ CANNOT_BE_SET = Message(
 
 
 def setting(world: Plant, machine: str, name: str, value: float) -> ExternalInput:
-    """What gives a variable, an input or a register another value. Raises `Misuse` for what cannot be set."""
+    """Input that gives a variable, an input or a register another value. Raises `Misuse` for what cannot be set."""
     own = world.programs_of(machine)
     variables = {known.upper(): known for known in own.variables(world.now)}
     if name.upper() in variables:

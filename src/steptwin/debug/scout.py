@@ -20,12 +20,12 @@ from steptwin.simulation.world.history import History, Past
 from steptwin.subject.time import next_due
 
 Parts: TypeAlias = Generator[None, None, None]
-"""Of what can be interrupted."""
+"""Parts of a run that can be interrupted."""
 Finding: TypeAlias = Generator[None, None, "Stopped | None"]
 
 
 class Goal(NamedTuple):
-    """What a step looks for: a statement of one of these controllers, at most ``depth`` deep in calls where that is given."""
+    """Target of a step: a statement of one of these controllers, at most ``depth`` deep in calls where that is given."""
 
     machines: Collection[str] = ()
     depth: int | None = None
@@ -43,7 +43,7 @@ class Candidate(NamedTuple):
 
 
 class Scout:
-    """Of the world of ``history``."""
+    """Look-ahead runs of the world of ``history``."""
 
     def __init__(self, history: History) -> None:
         self._history = history
@@ -85,7 +85,7 @@ class Scout:
         self._past.forget()
 
     def changed(self, moment: Nanos) -> None:
-        """What comes after a moment will be different from what it was."""
+        """Forget what comes after a moment: it will be different from what it was."""
         self.points.forget_after(moment)
         self._logged = min(self._logged, moment)
         self._past.forget()
@@ -192,7 +192,7 @@ class Scout:
     # ------------------------------------------------------------------ reasons to stop
 
     def _candidates(self, goal: Goal) -> list[Candidate]:
-        """What was observed, each with the stop that it is a reason for; in the order of time."""
+        """Observations, each with the stop that it is a reason for, in the order of time."""
         found = [Candidate(_stop_at(begun), begun) for begun in self._observer.begun if begun.hit or begun.undecided]
         found += [
             Candidate(Stopped(goal.reason, begun.stand, begun.machine))

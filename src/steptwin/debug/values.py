@@ -1,4 +1,4 @@
-"""What a debugger is given and what it gives: plain values."""
+"""Plain values that a debugger takes and gives."""
 
 from __future__ import annotations
 
@@ -93,12 +93,12 @@ class Events(enum.Enum):
 
 
 class SetPoint(NamedTuple):
-    """What became of a breakpoint: where it is, or why it is nowhere."""
+    """Result of setting a breakpoint: where it is, or why it is nowhere."""
 
     number: int
     places: Sequence[Place] = ()
     line: int | None = None
-    """Of the statement, which may come after the line that was asked for."""
+    """Line of the statement, which may come after the line that was asked for."""
     problem: str = ""
     note: str = ""
     """Why it is set, but no run comes there."""
@@ -136,7 +136,7 @@ class ShownValue(NamedTuple):
     number: float | None = None
     is_settable: bool = False
     expression: str = ""
-    """What evaluates to it; empty where nothing does."""
+    """Expression of it; empty where there is none."""
 
 
 class Scope(NamedTuple):

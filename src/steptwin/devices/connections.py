@@ -29,7 +29,7 @@ NAME_FORM = "1 to 40 letters, digits, '-' and '_', the first no digit"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Computer:
-    """What a computer has and knows. Both may block, and raise `SteptwinError`."""
+    """Ports and twins of a computer. Both may block, and raise `SteptwinError`."""
 
     ports: Callable[[], Sequence[Mapping[str, object]]]
     """``address`` and ``what`` of serial ports."""
@@ -93,7 +93,7 @@ class DeviceConnections:
         return self._connected(machine).device.shadow_state(after)
 
     def traffic(self) -> dict[str, ExchangeCounts]:
-        """What has been sent over the line of each device, by the name of the device."""
+        """Traffic on the line of each device, by the name of the device."""
         return {name: self._lines[one.key].line.counts for name, one in self._devices.items()}
 
     def _connected(self, machine: str) -> _Connected:

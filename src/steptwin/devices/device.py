@@ -47,7 +47,7 @@ JOG_WAIT_S = 2.0
 """For the jog before of the same axis to end."""
 LOOKS = (command.ReadPoints, command.ReadPins, command.Describe, command.Time, command.Encoders, command.ReadState)
 WRITES = (steps.Write, steps.Request, steps.Send)
-"""What may change settings."""
+"""Commands that may change settings."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -308,7 +308,7 @@ class ConnectedDevice:
         self._subject.publish(StatusPayload("settings-kept", f"settings before the first write are in {where}"))
 
     async def settings(self) -> str:
-        """What can be read and written, as JSON. Raises `LineFailure`."""
+        """Values that can be read and written, as JSON. Raises `LineFailure`."""
         async with self._turn:
             return await self._device.settings_text()
 

@@ -75,7 +75,7 @@ class _ComparedAxis:
 
 
 class Shadow:
-    """Of the machine ``name``, from the moment ``now`` on. Raises `SteptwinError` where its twin cannot be made."""
+    """Shadow of the controller ``name``, from the moment ``now`` on. Raises `SteptwinError` where its twin cannot be made."""
 
     def __init__(self, name: str, sheet: Datasheet, twin: DeviceTwin, now: Nanos) -> None:
         self.name = name
@@ -98,13 +98,13 @@ class Shadow:
 
     @property
     def points(self) -> tuple[str, ...]:
-        """What is to be read of the device for each sample."""
+        """Values to be read of the device for each sample."""
         axes = (f"{axis.sheet.name}.{what}" for axis in self._axes.values() for what in ("position", "velocity"))
         return tuple(f"{self.name}.{path}" for path in (*axes, *self._inputs))
 
     @property
     def registers(self) -> tuple[str, ...]:
-        """What is to be read of the device for `compare_registers`."""
+        """Values to be read of the device for `compare_registers`."""
         return tuple(f"{self.name}.{register}" for register in self._twin.compared)
 
     # ------------------------------------------------------------------ the twin

@@ -13,7 +13,10 @@ MOST_KNOWN = 8
 
 
 class DescriptionKey(NamedTuple):
-    """What a description depends on, besides the files that it names. ``path``: its name in messages; ``overrides``: as text."""
+    """Settings that a description depends on, besides the files that it names.
+
+    ``path``: its name in messages; ``overrides``: as text.
+    """
 
     path: str
     text: str

@@ -14,7 +14,7 @@ SECOND_US = 1_000_000
 MINUTE_US = 60 * SECOND_US
 DAY_US = 24 * 60 * MINUTE_US
 MOST_MINUTES = 10
-"""Of a transaction."""
+"""Most minutes in a transaction."""
 SUMMARIES = "summaries"
 
 

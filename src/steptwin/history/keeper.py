@@ -35,7 +35,7 @@ class HistoryKeeper:
         self._notice: Callable[[str], object] = lambda _: None
         self._url = read_url(spec.database, folder)
         self.past = KeptValues(self._url)
-        """What it has kept."""
+        """The values that it has kept."""
         self._folder = folder / (spec.spool or f"{subject.description.name}.spool")
         self._recorder: Recorder | None = None
         self._spool: Spool | None = None
@@ -115,7 +115,7 @@ class HistoryKeeper:
 
     @property
     def url(self) -> str:
-        """Of its database, with its password."""
+        """Address of its database, with its password."""
         return self._url.render_as_string(hide_password=False)
 
     def state(self) -> GatewayState:

@@ -1,4 +1,4 @@
-"""What a history has kept, for the gateways beside it."""
+"""The past that a history has kept, for the gateways beside it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from sqlalchemy.engine import URL
 from steptwin.gateways.contract import PastValue
 
 MOVING_S = 0.1
-"""Of an axis that moves, a position in so many seconds is given."""
+"""Interval between two positions of an axis that moves, s."""
 
 
 class KeptValues:

@@ -34,7 +34,7 @@ from steptwin.nearmiss import NearMiss
 
 TEXTS = "text"
 MOST_VALUES = 2_000_000
-"""Of a series."""
+"""Most values of a series."""
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 
@@ -110,7 +110,7 @@ Moment: TypeAlias = datetime | float | None
 
 @dataclass(frozen=True, slots=True)
 class _Bounds:
-    """Of moments of the wall clock, us, or of the time of the subject, ns."""
+    """Bounds in moments of the wall clock, us, or of the time of the subject, ns."""
 
     is_wall: bool
     first: int | None
@@ -412,7 +412,7 @@ def _of_samples(point: str, rows: list[_Row], runs: Mapping[int, KeptRun], bound
 
 
 def _check_size(point: str, found: int, length_s: float, every_s: float | None) -> None:
-    """Of the values that are found and those of another length. Raises `Misuse`."""
+    """Check the number of the values that are found and those of another length. Raises `Misuse`."""
     if found + (0.0 if every_s is None else length_s / every_s) > MOST_VALUES:
         raise Misuse(f"{point} has more than {MOST_VALUES} values here: take a shorter stretch, or one value in a longer time")
 

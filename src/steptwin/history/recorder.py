@@ -1,4 +1,4 @@
-"""What happens at a subject, as rows: motions of twins as their plans, values when they change, events."""
+"""Recorder of a subject, as rows: motions of twins as their plans, values when they change, events."""
 
 from __future__ import annotations
 
@@ -191,7 +191,7 @@ class Recorder:
     # ------------------------------------------------------------------ looking
 
     async def look(self, *, has_room: bool = True) -> list[RunHead | RowBatch]:
-        """What has happened since the last look: a batch of the present run; the heads of others that have begun, because time
+        """Changes since the last call: a batch of the present run; the heads of others that have begun, because time
         has gone back, and their batches. Once there is room after rows were lost, it has their number and everything."""
         clock = await self._sampler.take(CLOCK)
         now, wall = _time(clock), self._clock.wall_us()

@@ -1,4 +1,4 @@
-"""What is kept, on its way to the database: batches of rows, as lines of JSON."""
+"""Rows on their way to the database: batches of rows, as lines of JSON."""
 
 from __future__ import annotations
 
@@ -90,14 +90,14 @@ class RowBatch:
 
 
 def read_head(line: bytes) -> RunHead:
-    """What `RunHead.line` gives. Raises `ValueError` or `TypeError` for anything else."""
+    """Read the result of `RunHead.line`. Raises `ValueError` or `TypeError` for anything else."""
     key, subject, is_virtual, began_ns, began_us, points = json.loads(line)
     rows = tuple(PointRow(*point) for point in points)
     return RunHead(key=key, subject=subject, is_virtual=is_virtual, began_ns=began_ns, began_us=began_us, points=rows)
 
 
 def read_batch(line: bytes) -> RowBatch:
-    """What `RowBatch.line` gives. Raises `ValueError` or `TypeError` for anything else."""
+    """Read the result of `RowBatch.line`. Raises `ValueError` or `TypeError` for anything else."""
     run, number, time, at_us, is_last, samples, plans, events = json.loads(line)
     return RowBatch(
         run=run,

@@ -1,4 +1,4 @@
-"""What the database has not taken yet, in files: it survives the end of the process.
+"""Rows that the database has not taken yet, in files, which survive the end of the process.
 
 A folder has ``RUN.head``, one for each recording, and segments ``NUMBER-RUN.rows`` with a batch in each line. One thread appends,
 another one takes from the front.
@@ -26,7 +26,7 @@ MOST_BYTES = 1 << 30
 LEAST_FREE_BYTES = 200 << 20
 """Left on the disk for others."""
 TAKE_BYTES = 2 << 20
-"""Of batches that are taken at once."""
+"""Most bytes of batches that are taken at once."""
 HEAD, ROWS, REFUSED, LOCK = ".head", ".rows", "refused", "lock"
 
 

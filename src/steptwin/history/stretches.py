@@ -20,7 +20,7 @@ GRID = 1000
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """Of a history, between two dates; or of one ``run`` of it, between two times since its begin, s."""
+    """Part of a history, between two dates; or of one ``run`` of it, between two times since its begin, s."""
 
     begin: Moment
     end: Moment

@@ -24,7 +24,7 @@ REMOVAL_S = 3600.0
 END_S = 5.0
 """For what is left when it is closed; the rest stays in the spool."""
 MOST_TRIES = 5
-"""Of rows that collide with those of another writer."""
+"""Most tries for rows that collide with those of another writer."""
 
 
 class HistoryWriter:

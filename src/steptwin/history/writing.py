@@ -59,7 +59,7 @@ class TableWriter:
         return min((row.at_us for batch in fresh for row in batch.samples), default=None)
 
     def forget(self) -> None:
-        """What was learnt in a transaction that has not come to its end."""
+        """Forget what was learnt in a transaction that has not come to its end."""
         self._points.clear()
         self._texts.clear()
 

@@ -145,7 +145,7 @@ TOKEN_KINDS = {
     SymbolKind.LABEL: TokenKind.LABEL,
     SymbolKind.POSITION: TokenKind.POSITION,
 }
-"""Of the names in programs."""
+"""Meanings of the names in programs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,7 +174,7 @@ class Hint:
     place: int
     label: str
     text: str = ""
-    """What it means."""
+    """Its meaning."""
 
 
 @dataclass(frozen=True, slots=True)

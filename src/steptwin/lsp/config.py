@@ -132,7 +132,7 @@ class ConfigAnalysis(Analysis):
         return sorted(found, key=lambda token: token.span)
 
     def hints(self) -> Sequence[Hint]:
-        """What the numbers mean."""
+        """Meanings of the numbers."""
         found: list[Hint] = []
         for entry in self._file.entries:
             key = self._key(entry)
@@ -143,7 +143,7 @@ class ConfigAnalysis(Analysis):
 
 
 def _section_meaning(section: str) -> str:
-    """What a section of the configuration is about."""
+    """Meaning of a section of the configuration."""
     kind, number = section.rstrip("0123456789").lower(), section.lstrip("AINXSainxs")
     if kind == "axis":
         return f"is axis M{int(number) + 1}."

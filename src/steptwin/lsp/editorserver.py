@@ -33,7 +33,7 @@ OTHERS_DELAY_S = 0.3
 """Delay before the other files of a machine are analysed again."""
 
 MOST_DIAGNOSTICS = 1000
-"""Of one text: editors become slow with more, and one mistake is often the reason of all."""
+"""Most findings of one text: editors become slow with more, and one mistake is often the reason of all."""
 _RANKS = {severity: rank for rank, severity in enumerate(Severity)}
 
 
@@ -48,7 +48,7 @@ class EditorServer(LanguageServer):
         self._delays: dict[str, float] = {}
         self._timers: dict[str, asyncio.TimerHandle] = {}
         self.number: int | str | None = None
-        """Of the request that is handled; None of a notification."""
+        """Number of the request that is handled; None for a notification."""
         self.is_answering = False
         """Whether a handler is at work, which may be interrupted."""
 

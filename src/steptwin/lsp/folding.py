@@ -1,4 +1,4 @@
-"""What can be folded in a text of any language."""
+"""Ranges that can be folded in a text of any language."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is done at each message of the protocol: a handler asks the session and converts its answer; `HANDLERS` names them all.
+"""Handlers of the messages of the protocol: each asks the session and converts its answer; `HANDLERS` names them all.
 
 They are synchronous: an answer belongs to one state of the texts.
 """

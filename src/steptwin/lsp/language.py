@@ -1,4 +1,4 @@
-"""What the editor server needs of a language: one value for each, in `steptwin.lsp.languages`."""
+"""Interface between the editor server and a language: one value for each, in `steptwin.lsp.languages`."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class OtherTexts(Protocol):
     """The other texts and files of a session. Addresses are normal ones."""
 
     def analysis(self, uri: str) -> Analysis | None:
-        """Of another text; None if there is none."""
+        """Analysis of another text; None if there is none."""
         ...
 
     def lines(self, uri: str) -> LineIndex | None:
@@ -53,7 +53,7 @@ class OtherTexts(Protocol):
         ...
 
     def kept(self, uri: str, make: Callable[[], T]) -> T:
-        """What a language keeps of a text beyond its changes, until it is closed."""
+        """Value that a language keeps of a text beyond its changes, until it is closed."""
         ...
 
     def read(self, uri: str) -> bytes:
@@ -72,13 +72,13 @@ class EditorLanguage:
     name: str
     """For clients (``languageId``)."""
     suffix: str
-    """Of its files."""
+    """Suffix of its files."""
     is_meant: Callable[[str], bool] = lambda text: True
     """Whether a text in a file with this suffix is one, because other programs use the suffix, too."""
     shares_name: bool = False
     """Whether a machine has one of its files under the same name as its others."""
     around: Callable[[OtherTexts, str], tuple[object, ...]] = lambda session, uri: ()
-    """What the analysis of a text depends on beside the text."""
+    """Sources of the analysis of a text beside the text."""
     analyse: Callable[[OtherTexts, str, LineIndex], Analysis]
     most_characters: int = MOST_CHARACTERS
     """Longer texts are not analysed."""

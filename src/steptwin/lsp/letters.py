@@ -1,4 +1,4 @@
-"""What fits the letters that have been typed."""
+"""Names that fit the letters that have been typed."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ _LINE_END = re.compile(r"(\r\n|\n|\r)")
 
 
 class Encoding(enum.Enum):
-    """What a column counts."""
+    """Unit of columns."""
 
     UTF8 = "utf-8"
     UTF16 = "utf-16"

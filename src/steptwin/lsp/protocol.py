@@ -1,4 +1,4 @@
-"""What the protocol asks of every server, where pygls does otherwise: no second copy of texts, an answer to every request."""
+"""Duties of every server by the protocol, where pygls does otherwise: no second copy of texts, an answer to every request."""
 
 from __future__ import annotations
 

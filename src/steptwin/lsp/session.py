@@ -1,4 +1,4 @@
-"""What one client sees: the texts it has open, and their analyses. No input, no output but through `Files`.
+"""View of one client: the texts it has open, and their analyses. No input, no output but through `Files`.
 
 Texts go by normal addresses (`steptwin.lsp.files.normal`), whatever spelling the client uses. A change makes a new analysis of
 that text only; the others of its machine are made anew when they are next asked for and something they look at has changed.
@@ -29,7 +29,7 @@ M = TypeVar("M", bound=MachineFiles)
 
 @dataclass
 class _Derived:
-    """What was made of a text: valid as long as it is the same object."""
+    """Value that was made of a text: valid as long as it is the same object."""
 
     lines: LineIndex
     made: dict[tuple[object, ...], Any] = field(default_factory=dict)

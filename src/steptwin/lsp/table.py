@@ -40,7 +40,7 @@ _MOST_VALUES = 8
 
 @dataclass(frozen=True, slots=True)
 class UsedRows:
-    """What the programs of a table use of it: names in upper case; whether they name rows by numbers that are not known."""
+    """Rows of a table that its programs use: names in upper case; whether they name rows by numbers that are not known."""
 
     names: frozenset[str]
     numbers: frozenset[int] = frozenset()

@@ -26,7 +26,7 @@ from steptwin.motion.trig import PI, QUARTER, cosine, sine
 SETTLED_P = 1.0 / 1024
 """An oscillation of this amplitude (pulses) is over."""
 FARTHEST_NS: Nanos = 1 << 55
-"""What is not reached by then is never reached."""
+"""Longest time; a position that is not reached by then is never reached."""
 
 
 class Spring(NamedTuple):
@@ -83,7 +83,7 @@ class ResponseStretch:
 
     @property
     def amplitude(self) -> float:
-        """Of the oscillation at the beginning, pulses."""
+        """Amplitude of the oscillation at the beginning, pulses."""
         return sqrt(self.cosine_p * self.cosine_p + self.sine_p * self.sine_p)
 
     def settled(self) -> Nanos:

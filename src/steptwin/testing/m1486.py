@@ -33,7 +33,7 @@ T = TypeVar("T")
 
 MARKER = "m1486"
 BAUD = 4800
-"""Of a serial port, where ``--device`` gives no other: the highest that pins can choose at 12 MHz."""
+"""Rate of a serial port, where ``--device`` gives no other: the highest that pins can choose at 12 MHz."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +45,7 @@ class M1486Marker:
     address: int = OPEN_ADDRESS
     """0 to 15."""
     interface: str = "sd"
-    """Of the driver: sd, dual or two."""
+    """Interface of the driver: sd, dual or two."""
     program: str | Path | None = None
     """A program to switch on with."""
     time: Literal["real", "virtual"] = "real"
@@ -53,7 +53,7 @@ class M1486Marker:
     speed: float = 1.0
     """In real time: seconds of the twin per second, 0.001 to 1000."""
     link: Literal["tcp", "pty"] = "tcp"
-    """What ``address`` and ``channel`` are: characters over TCP, or a pseudo terminal."""
+    """Link of ``address`` and ``channel``: characters over TCP, or a pseudo terminal."""
     faults: Sequence[str] = ()
     """Faults that are set from the beginning, as for `M1486Rig.fault`."""
     seed: int = 0

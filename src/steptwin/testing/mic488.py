@@ -37,9 +37,9 @@ T = TypeVar("T")
 
 MARKER = "mic488"
 NAME = "mic488"
-"""Of the controller in its world."""
+"""Name of the controller in its world."""
 CONFIG = "machine.cfg"
-"""What its configuration is called there."""
+"""Name of its configuration there."""
 LINKS: Mapping[str, tuple[str, str]] = {"tcp": ("tcp", "tcp"), "rtu": ("rtu_tcp", "rtu"), "pty": ("pty", "rtu")}
 """The key of the line and the kind of place of each link."""
 
@@ -49,7 +49,7 @@ class Mic488Marker:
     """The options of ``@pytest.mark.mic488``. Paths are relative to the test."""
 
     firmware: str | None = None
-    """Of the twin (default 1.70); a device with another one skips the test."""
+    """Firmware of the twin (default 1.70); a device with another one skips the test."""
     config: str | Path | ControllerConfig | None = None
     """The vendor tool's ``.cfg``. Without it the twin is the machine of ``serve mic488 --demo``: millimetres, 100 pulses per mm,
     switches KL at −10 mm on IN1–IN4 and KR at 250 mm on IN5–IN8. With it inputs are the test's alone."""
@@ -64,7 +64,7 @@ class Mic488Marker:
     speed: float = 1.0
     """In real time: seconds of the twin per second, 0.001 to 1000."""
     link: Literal["tcp", "rtu", "pty"] = "tcp"
-    """What ``address`` and ``driver`` speak: Modbus TCP, RTU over TCP, RTU on a pseudo terminal."""
+    """Protocol of ``address`` and ``driver``: Modbus TCP, RTU over TCP, RTU on a pseudo terminal."""
     faults: Sequence[str] = ()
     """Faults that are set from the beginning, as for `Mic488Rig.fault`."""
     seed: int = 0

@@ -42,7 +42,7 @@ D = TypeVar("D", bound="DataclassInstance")
 MOST_SHOWN = 24
 """So many of the last frames and events are shown when a test fails."""
 WIDTH = 200
-"""Of the meaning of a frame, there."""
+"""Most characters of the meaning of a frame."""
 WITHIN_S = 10.0
 """How long `Rig.until` waits, where no other limit is given."""
 

@@ -40,7 +40,7 @@ MARKER = "steptwin_world"
 
 @dataclass(frozen=True, slots=True)
 class WorldOptions:
-    """What ``@pytest.mark.steptwin_world`` takes."""
+    """Arguments of ``@pytest.mark.steptwin_world``."""
 
     file: str | Path | None = None
     """The world's TOML, beside the test."""
@@ -67,7 +67,7 @@ class WorldAxis(NamedTuple):
     """The mechanics of an axis at one moment."""
 
     position: float
-    """Of the load, in the axis' units."""
+    """Position of the load, in the axis' units."""
     unit: str
     lost: int
     """Pulses the motor has lost so far."""

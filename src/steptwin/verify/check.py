@@ -11,7 +11,7 @@ from steptwin.errors import LineFailure
 
 
 class CheckNeed(enum.IntEnum):
-    """What a check does to the controller."""
+    """Effect of a check on the controller."""
 
     READ = 0
     """Nothing: it reads, and sends requests that are to be refused and would write present values if they were not."""
@@ -91,7 +91,7 @@ class Check(Generic[T]):
 
 @dataclass(frozen=True, slots=True)
 class CheckResult:
-    """Of one interpretation. ``why`` it was not checked; ``probes`` otherwise."""
+    """Result for one interpretation: ``why`` it was not checked, or its ``probes``."""
 
     id: str
     outcome: CheckOutcome

@@ -1,4 +1,4 @@
-"""What is checked of a kind of device: one value for each, `steptwin.verify.kinds.CHECKED`."""
+"""Checks of a kind of device: one value for each, `steptwin.verify.kinds.CHECKED`."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from steptwin.verify.check import Check, CheckNeed, CheckRequest, CheckSteps, No
 INVALID_COMMAND = "%"
 """A character that is in no command: its line is wrong data (M-11)."""
 COMMENT = "; yy"
-"""Of characters that are in no command, as a chip that does not know comments may take what follows for commands."""
+"""Comment of characters that are in no command, as a chip that does not know comments may take what follows for commands."""
 _FLAGS, _INTERFACE, _SERIES, _TYPE, _RESERVED = 14, 15, 16, 20, 7
 """Bytes that U sends."""
 SELECT_S = 0.1
@@ -50,7 +50,7 @@ class ChipTalk:
             raise LineFailure("the chip does not respond: it may move, wait or run a program")
 
     def sent(self, text: str, *, answers: int = 1) -> CheckSteps[bytes]:
-        """What came for characters, without their echo; ``answers``: the number of bytes expected."""
+        """Answer to characters, without their echo; ``answers``: the number of bytes expected."""
         data = text.encode("ascii")
         echo = data if self.has_echo else b""
         size = len(echo) + answers

@@ -14,7 +14,7 @@ from steptwin.wire import pdu, rtu
 from steptwin.wire.crc import crc16
 
 TRIES = 3
-"""Of a write that puts a value back, and of a read whose answer was lost."""
+"""Tries of a write that puts a value back, and of a read whose answer was lost."""
 _MBAP = 7
 
 

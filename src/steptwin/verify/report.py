@@ -1,4 +1,4 @@
-"""What the checks have found, as a value, a text and JSON."""
+"""Result of the checks, as a value, a text and JSON."""
 
 from __future__ import annotations
 

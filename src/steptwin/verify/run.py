@@ -71,7 +71,7 @@ def _over(
 
 
 def carry_out(channel: Channel, steps: CheckSteps[R]) -> R:
-    """What the steps return."""
+    """Carry out the steps, and return their result."""
     try:
         send = next(steps)
         while True:

@@ -70,5 +70,5 @@ def read_answer(plain: Mapping[str, Any]) -> Answer:
 
 
 def since_before(begin: Nanos) -> str:
-    """Of what has not changed in a past that is known from a moment on."""
+    """Sentence about what has not changed in a past that is known from a moment on."""
     return f"since before {begin / SECOND:.6f} s" if begin else "from the beginning"

@@ -138,7 +138,7 @@ class Causes:
         return Cause(link, nothing if first is None and self._log.is_whole else before)
 
     def _of_element(self, name: str, change: Change) -> FoundCause:
-        """What changed an output of an element: an input at the same moment, or one before, as much earlier as it delays."""
+        """Cause of a change of an element's output: an input at the same moment, or one before, as much earlier as it delays."""
         part = self._parts[name]
         sources = [source for terminal in _inputs(part) for source in self._sources(PinName(name, terminal))]
         last = [found for source in sources if (found := self._before(source, change, change.time))]
@@ -228,7 +228,7 @@ class Causes:
     # ------------------------------------------------------------------ controllers
 
     def at_moment(self, machine: str, time: Nanos, wanted: Resource | None) -> FoundCause:
-        """What changed something of a controller that no record shows."""
+        """Cause of a change in a controller that no record shows."""
         group = self._log.group(machine)
         found = self.in_machine(machine, Change(time, 0.0, group, len(self._log.records[group])), wanted)
         if found is None and wanted is not None:
@@ -236,7 +236,7 @@ class Causes:
         return found
 
     def in_machine(self, machine: str, change: Change, wanted: Resource | None) -> FoundCause:
-        """What changed something of a controller at a moment; ``wanted``: what, if that is known."""
+        """Cause of a change in a controller at a moment; ``wanted``: the resource, if it is known."""
         index = self._statement_at(machine, change, wanted)
         since = -1 if index is None else self._log.executed[machine][index].position
         outside = self._from_outside(machine, change, since)
@@ -274,7 +274,7 @@ class Causes:
         return None
 
     def _inside(self, machine: str, change: Change, wanted: Resource | None) -> FoundCause:
-        """What the controller did by itself: because of an input, or because what an earlier statement began has ended."""
+        """Cause of an act of the controller itself: an input, or the end of what an earlier statement began."""
         after: Callable[[], FoundCause] = partial(self._earlier, machine, change.time, wanted)
         event: TraceRecord | None = None
         for position, record in self._log.at(change.group, change.time):
@@ -377,7 +377,7 @@ class Causes:
     # ------------------------------------------------------------------ programs
 
     def use(self, machine: str, index: int) -> StatementUse:
-        """What an executed statement reads and changes; nothing, if its text was replaced since."""
+        """Reads and changes of an executed statement; none if its text was replaced since."""
         executed = self._log.executed[machine][index]
         if not self._log.is_of_present_text(executed):
             return StatementUse()

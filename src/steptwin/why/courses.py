@@ -76,7 +76,7 @@ class Courses:
             self._remembered += len(turns) + len(lacking)
 
     def remember(self, name: str, interval: Interval, value: float) -> None:
-        """What has a name has one value in a whole interval."""
+        """Note that a signal has one value in a whole interval."""
         self._known.setdefault((name, interval.state.snapshot.now), _Course(interval.end, [(interval.state.snapshot.now, value)]))
 
     def _has(self, wanted: Collection[str], interval: Interval, at: Nanos) -> bool:

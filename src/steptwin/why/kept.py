@@ -22,14 +22,14 @@ from steptwin.why.search import Asked, LastChanges, PastStates
 FIRST_SPAN_NS: Nanos = 5 * SECOND
 """So much of the past is looked at first, and `FURTHER` times as much where the causes are older."""
 FIRST_STATEMENTS = 5500
-"""Of a program, at most as many at first: some more than the last ones, among which the one that decided is looked for."""
+"""Most statements of a program at first: some more than the last ones, among which the one that decided is looked for."""
 FURTHER = 8
 MOST_NOTED = 500_000
 """Limit of the records and statements that are noted: some 100 MB."""
 
 
 class StatesAndInputs(PastStates, Protocol):
-    """What `steptwin.simulation.world.history.History` has of the past of a world."""
+    """The past of a world in `steptwin.simulation.world.history.History`."""
 
     def keeps_inputs_from(self, number: int) -> bool: ...
     def inputs_from(self, number: int) -> Sequence[RecordedInput]: ...
@@ -90,7 +90,7 @@ class PastQuestions:
 
 
 class _Known:
-    """What is known of the past from a state of it on. ``moment``: from the newest state at or before it."""
+    """Log of the past from a state of it on. ``moment``: from the newest state at or before it."""
 
     def __init__(self, history: StatesAndInputs, moment: Nanos, most: int) -> None:
         state = history.state_at(moment)

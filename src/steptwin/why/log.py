@@ -1,4 +1,4 @@
-"""What happened in a world, with all that can be a cause: its trace, the statements of its programs, the steps of its scripts.
+"""Log of a world with all that can be a cause: its trace, the statements of its programs, the steps of its scripts.
 
 A running world does not note this. Its past is run again with the inputs that it kept: from its beginning, or from a state of it.
 """
@@ -261,7 +261,7 @@ class CauseLog:
         return changes[index - 1] if index else None
 
     def hold(self, signal: str, at: Nanos) -> Hold | None:
-        """What holds a signal at a moment, since when."""
+        """Cause that holds a signal at a moment, and since when."""
         last = next((hold for hold in reversed(self._holds.get(signal, ())) if hold.time <= at), None)
         return None if last is None or last.held is None else last
 
@@ -315,11 +315,11 @@ class CauseLog:
         return self._group_of.get(name, -1)
 
     def acts_at(self, time: Nanos) -> Iterator[Act]:
-        """What scripts did at a moment, and what came from outside, the last one first."""
+        """Acts of scripts and from outside at a moment, the last one first."""
         return takewhile(lambda act: act.time == time, self.acts_before(time, len(self.acts)))
 
     def acts_before(self, until: Nanos, most: int) -> Iterator[Act]:
-        """What scripts did by a moment, and what came from outside, the last one first; ``most`` of them."""
+        """Acts of scripts and from outside by a moment, the last one first; ``most`` of them."""
         last = bisect_right(self.acts, until, key=lambda act: act.time) - 1
         return (self.acts[index] for index in range(last, max(-1, last - most), -1))
 

@@ -65,7 +65,10 @@ class PointTurns:
 
 
 class _Reader:
-    """Of one controller. ``points``: the turns of each. As `steptwin.simulation.scheduler.followers.KernelFollower`."""
+    """Reader of the points of one controller. ``points``: the turns of each.
+
+    As `steptwin.simulation.scheduler.followers.KernelFollower`.
+    """
 
     def __init__(self, noted: PointTurns, world: Plant, owner: str) -> None:
         self._all = noted
@@ -147,7 +150,7 @@ class _Cells:
         return self._turns.setdefault(cell, [(self._begin, self._first[cell])])
 
     def turns(self, memory: MemoryCells) -> list[PointTurn]:
-        """Of a value in it."""
+        """Turns of a value in it."""
         words = [int(self._first[cell]) for cell in memory.cells]
         found = [(self._begin, float(memory.value(words)))]
         changes = [(time, number, word) for number, cell in enumerate(memory.cells) for time, word in self._turns.get(cell, ())]

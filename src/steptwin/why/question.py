@@ -144,8 +144,8 @@ class Why:
     # ------------------------------------------------------------------ signals and conditions
 
     def asked(self, question: str) -> Asked | None:
-        """What `LastChanges` looks for; None for a controller, for a bare quantity that moves all the time, and where `idle` is
-        asked about. Raises `Misuse`."""
+        """The change that `LastChanges` searches for; None for a controller, for a bare quantity that moves all the time, and for
+        `idle`. Raises `Misuse`."""
         text = _text_of(question)
         if not text or text in self.log.world.machines:
             return None
@@ -227,7 +227,7 @@ class Why:
                 raise Misuse(VARIABLE_OF_A_PROGRAM(name=name, machine=machine))
 
     def _registers(self, name: str) -> Iterator[str]:
-        """What a name of a program language means, of each controller with a program: ``table.USER_REGISTER[10]:real`` for
+        """Meanings of a name of a program language for each controller with a program: ``table.USER_REGISTER[10]:real`` for
         ``$R10``, also with the controller before it."""
         owner, dot, rest = name.rpartition(".")
         for machine, programs in self.log.world.programs.items():
@@ -333,7 +333,7 @@ class Why:
         return _Level(partial(self._courses.level, watched[name], interval), self._unit(name))
 
     def _changed(self, signals: Sequence[str], time: Nanos) -> Cause | None:
-        """What made one of these signals change at a moment."""
+        """Cause of a change of one of these signals at a moment."""
         log, causes = self.log, self._causes
         last = causes.last([name for name in signals if (change := log.last_change(name, time)) and change.time == time], time)
         if last is not None:
@@ -356,7 +356,7 @@ class Why:
         return causes.at_moment(owner, time, wanted)
 
     def _moving(self, signal: str, at: Nanos) -> Asking:
-        """Of a quantity that changes all the time: the motion, or since when a point of a controller stands."""
+        """Cause of a quantity that changes all the time: the motion, or since when a point of a controller stands."""
         world = self.log.world
         other, state = self._make(), next(self._on_the_way.until(at))
         other.restore(state.snapshot)
@@ -375,7 +375,7 @@ class Why:
     # ------------------------------------------------------------------ programs
 
     def _wait(self, machine: str, at: Nanos) -> Asking:
-        """What the program of a controller waits for."""
+        """Cause for which the program of a controller waits."""
         log, causes = self.log, self._causes
         index = log.last_executed(machine, at)
         if index < 0:

@@ -48,7 +48,7 @@ class Found(NamedTuple):
 
 
 class PastStates(Protocol):
-    """What a search needs of a world's past; see `steptwin.simulation.world.history.History`."""
+    """The past of a world as a search needs it; see `steptwin.simulation.world.history.History`."""
 
     @property
     def world(self) -> Plant: ...
@@ -65,14 +65,14 @@ FoundTurn: TypeAlias = Generator[None, None, "Nanos | None"]
 
 
 class LastChanges:
-    """Of the past in ``history``. ``second_world`` makes one like it, at a snapshot."""
+    """Search in the past in ``history``. ``second_world`` makes one like it, at a snapshot."""
 
     def __init__(self, history: PastStates, second_world: Callable[[Plant, PlantSnapshot], Plant]) -> None:
         self._history = history
         self._make = second_world
         self._branch = history.branch
         self._known: dict[str, tuple[Nanos, Found]] = {}
-        """What was found before a moment, by question."""
+        """Results of searches before a moment, by question."""
         self._world: Plant | None = None
         self._values: dict[tuple[str, Nanos], float] = {}
         """At states, while a search goes on."""

@@ -15,7 +15,7 @@ from steptwin.simulation.world.plant import Plant
 
 MOST_KEPT = 64
 LEAST_DISTANCE_NS: Nanos = SECOND // 2
-"""Of states in time; longer in a long run, of which about `MOST_KEPT` states are taken while it doubles."""
+"""Least distance of states in time; longer in a long run, of which about `MOST_KEPT` states are taken while it doubles."""
 
 
 class Interval(NamedTuple):
@@ -33,7 +33,7 @@ class Standing(NamedTuple):
 
 
 class StatesOnTheWay:
-    """Of ``world``, the first one where it is now."""
+    """States of ``world``, the first one where it is now."""
 
     def __init__(self, world: Plant) -> None:
         self._world = world
@@ -41,7 +41,7 @@ class StatesOnTheWay:
         self._begin = world.now
         self._states = StatesByAge(MOST_KEPT)
         self._rests: dict[Nanos, Mapping[str, Standing]] = {}
-        """What stands at the moments of the states."""
+        """Signals that stand at the moments of the states."""
         self.pass_by(0)
 
     def pass_by(self, inputs: int) -> None:
@@ -93,7 +93,7 @@ def _moving(world: Plant) -> Iterator[tuple[str, SignalOf]]:
 
 
 def rest_of(signal: SignalOf, now: Nanos) -> Standing | None:
-    """What it stands at; None while it moves."""
+    """Value at which it stands; None while it moves."""
     if next(signal.turns(now), None) is not None:
         return None
     value = signal.value(now)

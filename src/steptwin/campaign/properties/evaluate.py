@@ -48,7 +48,7 @@ def forced(value: float, *, holds: bool) -> float:
 
 
 class Evaluation:
-    """Of the courses of all comparisons, over one time."""
+    """Evaluation of the courses of all comparisons, over one time."""
 
     def __init__(self, atoms: Mapping[Atom, Shape]) -> None:
         self._atoms = atoms

@@ -77,9 +77,9 @@ class ComparisonRecord:
         self.kernel, self.names = self._followed()
         self._closed: Shape = []
         self._known: object = None
-        """What the present way depends on."""
+        """Version of the sources of the present way."""
         self._begin: Nanos | None = None
-        """Of the stretch that is not closed."""
+        """Begin of the stretch that is not closed."""
         self._first = 0.0
         """The value at `_begin`."""
         self._seen: Nanos = 0
@@ -178,7 +178,7 @@ class ComparisonRecord:
         self._go_on(now)
 
     def _note(self, now: Nanos) -> None:
-        """What changes with events only."""
+        """Note the values that change with events only."""
         sides = self._left_at(now), self._right_at(now) if self._limit is None else self._limit
         if self._begin is not None:
             if sides == self._known:
@@ -188,7 +188,7 @@ class ComparisonRecord:
         self._begin, self._first, self._known = now, self._value(now), sides
 
     def _version(self, now: Nanos) -> object:
-        """What the way depends on; None if that is unknown."""
+        """Version of the sources of the way; None if it is unknown."""
         versions = [one.version() for one in self._moving.values()]
         if None in versions:
             return None

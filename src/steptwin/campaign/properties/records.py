@@ -15,7 +15,7 @@ from steptwin.simulation.world.plant import Plant
 
 
 class SharedRecord:
-    """Of one comparison: a record, which may be that of the opposite, whose distance is the negative."""
+    """Source of one comparison: a record, which may be that of the opposite, whose distance is the negative."""
 
     __slots__ = ("_is_opposite", "record")
 

@@ -120,7 +120,7 @@ def within(course: Shape, length: Nanos) -> Shape:
 
 
 def _reached(slope: Slope, length: Nanos, begin: Nanos, end: Nanos) -> Shape:
-    """What one stretch gives to each moment."""
+    """Contribution of one stretch to each moment."""
     if slope.last >= slope.first:
         parts = [Slope(slope.begin - length, slope.end - length, slope.first, slope.last)]
         parts.append(Slope(slope.end - length + 1, slope.end, slope.last, slope.last))

@@ -204,7 +204,7 @@ class _PropertyParser(ConditionParser):
         return CycleTime(begin, end, sign, self._time())
 
     def _one_before_time(self) -> Quantity | PropertyFormula:
-        """What ends a cycle: its own sign, if it has one, is followed by another."""
+        """Read the end of a cycle: its own sign, if it has one, is followed by another."""
         if self._accept("not"):
             return self._formula(self._one_before_time()).negated()
         return self._enclosed_first() if self._peek() == "(" else self._compare_once()

@@ -22,7 +22,7 @@ from steptwin.simulation.world.plant import Plant
 
 @dataclass(frozen=True, slots=True)
 class WatchState:
-    """What a `PropertyWatch` knows of the time before a moment, for a branch that begins there. It is plain and pickles."""
+    """Knowledge of a `PropertyWatch` about the time before a moment, for a branch that begins there. It is plain and pickles."""
 
     text: str
     now: Nanos
@@ -108,7 +108,7 @@ class PropertyWatch:
         return WatchState(self.which.text, world.now, courses)
 
     def verdict(self) -> Verdict:
-        """Of the run up to now, as if it ended."""
+        """Verdict on the run up to now, as if it ended."""
         found = Evaluation(self._courses())
         value = value_at(found.course(self._formula), found.begin)
         moment, by = found.decided(self._formula, found.begin)
@@ -129,7 +129,7 @@ class PropertyWatch:
         return f"{text}: not so at {at}"
 
     def measures(self) -> dict[str, float]:
-        """Of each cycle time in the property: the least, greatest and mean, s, and how many cycles there were."""
+        """Least, greatest and mean of each cycle time in the property, s, and how many cycles there were."""
         several = list(dict.fromkeys(measured(self._formula)))
         if not several:
             return {}

@@ -40,7 +40,7 @@ def quantity_text(node: Quantity) -> str:
 
 
 def found_text(comparison: Comparison, value: float, scale: float, unit: str) -> str:
-    """What there was where a comparison did not hold: ``value`` is its distance from holding, as a share of ``scale``.
+    """Text of the value where a comparison did not hold: ``value`` is its distance from holding, as a share of ``scale``.
 
     A share of 1 is one of 1 or more, and that of an equality has no side: no more is said.
     """

@@ -30,7 +30,7 @@ class CampaignReport:
     found: Sequence[FoundFailure]
     influences: Sequence[Influence]
     indices: Sequence[SobolIndex] = ()
-    """Of the design that gives them."""
+    """Sobol indices of the design that gives them."""
     histograms: Sequence[Histogram]
     search: str
 

@@ -17,7 +17,7 @@ SURE = 0.05
 
 
 def compare(before: Path, after: Path) -> dict[str, Any]:
-    """What differs between the reports in two folders, as JSON. Raises `Misuse` for a folder without one.
+    """Differences between the reports in two folders, as JSON. Raises `Misuse` for a folder without one.
 
     ``p_value``: how often chance alone makes pass rates differ so much (two proportions, pooled, two-sided).
     """
@@ -89,7 +89,7 @@ def _measures(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any
 
 
 def lines(found: Mapping[str, Any]) -> list[str]:
-    """What `compare` gave, for people."""
+    """Lines that describe the result of `compare`."""
     text = [
         f"{when}: {one['name']}, {one['runs']} runs, {one['failed']} failed"
         for when in ("before", "after")

@@ -1,4 +1,4 @@
-"""What pages of reports have in common: one file each, which needs nothing else."""
+"""Common parts of pages of reports: one file each, which needs nothing else."""
 
 from __future__ import annotations
 

@@ -65,7 +65,7 @@ class RunColumns:
 
 
 def _numbers(case: Case, faults: Sequence[str]) -> Mapping[str, float]:
-    """What varies as numbers: values, and 1 for each fault that is there."""
+    """Varied values as numbers: values, and 1 for each fault that is there."""
     found = {name: float(value) for name, value in case.values.items() if not isinstance(value, str)}
     for fault in case.faults:
         words = faults[fault.table] if 0 <= fault.table < len(faults) else str(replace(read_fault(fault.fault), name=""))

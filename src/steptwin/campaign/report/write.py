@@ -76,5 +76,5 @@ def _indices(campaign: Campaign, columns: RunColumns) -> list[SobolIndex]:
 
 
 def _unit(name: str, units: Mapping[str, str]) -> str:
-    """Of a measure of the description, or of a cycle time of a property."""
+    """Unit of a measure of the description, or of a cycle time of a property."""
     return units.get(name, "" if name.endswith(" cycles") else "s")

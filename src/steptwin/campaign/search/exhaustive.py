@@ -29,7 +29,7 @@ def without_faults(description: CampaignDescription) -> Case:
 
 
 class ExhaustiveCases:
-    """Of a description, by number from 0. Its own faults and values that vary are left out; its steps are done."""
+    """Cases of a description, by number from 0. Its own faults and values that vary are left out; its steps are done."""
 
     def __init__(self, description: CampaignDescription) -> None:
         self.description = description

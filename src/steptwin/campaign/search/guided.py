@@ -34,7 +34,7 @@ class PointChooser(Protocol):
         ...
 
     def tell(self, distances: Sequence[float]) -> None:
-        """Of the last points."""
+        """Take the distances of the last points."""
         ...
 
 

@@ -69,7 +69,7 @@ def moved_track(
 
 
 def _driven(load: AxisTrack, per_pulse: float, coupling: PinTrack | None, until: Nanos) -> Iterator[MovedPart]:
-    """What a load moves through a coupling that may slip."""
+    """Motion of a load behind a coupling that may slip."""
     return (_scaled(part, per_pulse, 0.0) for part in _slipping(_parts(load, until), coupling))
 
 
@@ -125,7 +125,7 @@ def _slipping(parts: Iterable[MovedPart], coupling: PinTrack | None) -> Iterator
 
 
 def _lifted(parts: Iterable[MovedPart], points: tuple[tuple[float, float], ...], turn: float) -> Iterator[MovedPart]:
-    """What a cam does with the angles of its shaft: lifts, linear between points, in every revolution."""
+    """Motion of a cam with the angles of its shaft: lifts, linear between points, in every revolution."""
     around = [*points, (points[0][0] + turn, points[0][1])]
     for part in parts:
         for begin, end in pairwise([part.begin, *_corners(part, [angle for angle, _ in points], turn), part.end]):
@@ -173,7 +173,7 @@ def _stuck(parts: list[MovedPart], name: str, pins: Mapping[str, PinTrack]) -> I
 
 
 def _summed(load: Iterable[MovedPart], other: Iterable[MovedPart], offset: float) -> Iterator[MovedPart]:
-    """What two loads move together; before the first part of ``other`` that stands where it begins."""
+    """Joint motion of two loads; before the first part of ``other`` that stands where it begins."""
     beside = [*other]
     begins = [part.begin for part in beside]
     for part in _cut(load, begins):

@@ -37,7 +37,7 @@ _SCALE_IN, _MARGIN_IN = 0.55, 0.12
 """Left of a panel: room for the numbers of its scale, then its label, then the margin."""
 _MOTION_IN, _ROW_IN, _GAP_IN = 0.78, 0.24, 0.1
 _COLUMNS = 1500
-"""Of pixels across the picture: more points than a few in each are not seen."""
+"""Number of pixels across the picture: more points than a few in each are not seen."""
 _GREY = "(grey: commanded)"
 _CLOCK_STEPS_S = (30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 21600, 43200, 86400)
 

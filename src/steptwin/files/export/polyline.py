@@ -18,7 +18,7 @@ _POSITION_STEPS = 2000
 _SPEED_STEPS = 500
 """A straight line between two points is off by less than the range of all values divided by this."""
 _MOST_POINTS = 200
-"""Of one segment."""
+"""Most points of one segment."""
 
 
 class PolylineCurve(NamedTuple):
@@ -68,7 +68,7 @@ def curve(track: AxisTrack, begin: Nanos, until: Nanos, resolution: Nanos = 0) -
 
 
 def pieces_of(profile: Profile, begin: Nanos, until: Nanos) -> list[PolylinePiece]:
-    """What ``profile`` does from ``begin`` to ``until``, without gaps."""
+    """Motion of ``profile`` from ``begin`` to ``until``, without gaps."""
     pieces: list[PolylinePiece] = []
     at = begin
     for segment, end_ns in zip(profile.segments, profile.ends, strict=True):

@@ -29,7 +29,7 @@ class Recording:
     marks: list[TraceRecord]
     """Frames, statements, events, inputs and faults, in order."""
     moved: list[AxisTrack]
-    """Of the elements that axes move, in their units."""
+    """Positions of the elements that axes move, in their units."""
     last: Nanos
     """When something changed last, analog inputs apart: their sources never end; ``until`` where something moves on."""
     title: str = ""
@@ -134,7 +134,7 @@ class _Sorting:
         )
 
     def _moved(self, until: Nanos) -> list[AxisTrack]:
-        """What the axes move besides their loads; not a gantry of which one axis is not chosen."""
+        """Elements that the axes move besides their loads; not a gantry of which one axis is not chosen."""
         found: list[AxisTrack] = []
         loads = {place: track.load(its) for place, track in self._axes.items() if (its := track.view.mechanics) is not None}
         for (machine, subject), track in self._axes.items():

@@ -23,7 +23,7 @@ from steptwin.simulation.scheduler.trace import TraceRecord
 
 _SCRIPTS = ("model.js", "draw.js", "timeline.js")
 _MOST_BYTES = 64
-"""Of a frame in the page."""
+"""Most bytes of a frame in the page."""
 
 
 def write_timeline(recording: Recording, file: IO[str], progress: TimeProgress) -> None:

@@ -110,7 +110,7 @@ def _begin(file: IO[str], trace: Trace, views: AxisViews, title: str) -> None:
 
 
 Kept: TypeAlias = int | Path | None
-"""What is kept of a trace: a number of records, a file or directory, or None."""
+"""The kept part of a trace: a number of records, a file or directory, or None."""
 
 
 def read_kept(text: str) -> Kept:

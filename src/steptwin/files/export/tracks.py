@@ -35,7 +35,7 @@ class AxisTrack:
 
     @property
     def plain_name(self) -> str:
-        """Of what an axis moves, as one word."""
+        """Kind of what an axis moves, as one word."""
         return f"{self.view.name.replace(' ', '_')}_{self.view.unit}"
 
     def plan(self, now: Nanos) -> Plan:

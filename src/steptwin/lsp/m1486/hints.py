@@ -1,4 +1,4 @@
-"""What is written behind the commands: distances in full steps, times of moves, the memory taken."""
+"""Hints behind the commands: distances in full steps, times of moves, the memory taken."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from steptwin.m1486.variants import Variant
 from steptwin.machine import SECOND
 
 MOST_COMMANDS = 1_000
-"""Of a program whose moves are timed: more than any chip holds."""
+"""Most commands of a program whose moves are timed: more than any chip holds."""
 
 
 def hints(program: ParsedProgram, memory: Sequence[ChipMemory], variant: Variant, interface: Interface) -> Iterator[Hint]:

@@ -111,7 +111,7 @@ def _lines(span: Span, interface: Interface) -> Iterator[Completion]:
 
 
 def signature(line: str, column: int, variant: Variant) -> Signature | None:
-    """What the command takes whose number is being typed."""
+    """Parameters of the command whose number is being typed."""
     before = line[:column]
     found = _COMMAND.match(before) if ";" not in before else None
     specs = rows(found[1].upper()) if found is not None else ()

@@ -1,4 +1,4 @@
-"""What commands and numbers of the M1486 mean, in words: for hovers, completions and hints."""
+"""Meanings of commands and numbers of the M1486, in words: for hovers, completions and hints."""
 
 from __future__ import annotations
 

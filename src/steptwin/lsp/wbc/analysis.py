@@ -80,7 +80,7 @@ class WbcAnalysis(Analysis):
 
     @cached_property
     def used_rows(self) -> UsedRows:
-        """What of a position table is used: names, and rows by number; a row by a variable may be any."""
+        """Used rows of a position table: names, and rows by number; a row by a variable may be any."""
         names: set[str] = {use.symbol.key for use in self.uses if use.symbol.kind is SymbolKind.POSITION}
         numbers: set[int] = set()
         by_variable = False
@@ -294,7 +294,7 @@ def _fold(found: list[Fold], first: int | None, last: int) -> None:
 
 
 def _fold_kind(line: SourceLine) -> FoldKind | None:
-    """Of lines that are folded with their neighbours: comments and constants."""
+    """Kind of lines that are folded with their neighbours: comments and constants."""
     if isinstance(line.statement, ConstantDefinition):
         return FoldKind.REGION
     return FoldKind.COMMENT if line.statement is None and line.comment is not None else None

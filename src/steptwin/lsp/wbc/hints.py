@@ -1,4 +1,4 @@
-"""What is written behind the words of a program: values of constants, rows of positions, times of moves, memory."""
+"""Hints behind the words of a program: values of constants, rows of positions, times of moves, memory."""
 
 from __future__ import annotations
 

@@ -71,7 +71,7 @@ _OPERANDS = {
 
 
 def context(words: Sequence[Lexeme]) -> Context:
-    """What may follow the words of a line."""
+    """Context behind the words of a line: what may follow."""
     if not words:
         return Context(Expected.STATEMENT)
     first = words[0].text.upper()

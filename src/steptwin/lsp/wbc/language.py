@@ -125,7 +125,7 @@ def _programs_of(session: OtherTexts, table: str) -> list[str]:
 
 
 def _used_rows(session: OtherTexts, table: str) -> UsedRows | None:
-    """What programs use of a table; None where there is no program."""
+    """Rows of a table that programs use; None where there is no program."""
     analyses = map(session.analysis, _programs_of(session, table))
     used = [one.used_rows for one in analyses if isinstance(one, WbcAnalysis)]
     if not used:

@@ -1,4 +1,4 @@
-"""What the names of a program mean, in words: for hovers, completions and hints."""
+"""Meanings of the names of a program, in words: for hovers, completions and hints."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Names:
         return cls(program, ProgramScope(program, around.positions, around.dialect, []), labels, values, around)
 
     def meaning(self, key: str) -> str:
-        """What a constant stands for, as it is written."""
+        """Value of a constant, as it is written."""
         return self.values.get(key, "")
 
 

@@ -23,7 +23,8 @@ _BUILT = frozenset({*KINDS, *ELEMENTS, "world", "line", USE})
 
 
 class ElementSignals:
-    """Of one description, whose states come one after the other: what cannot be built leaves what is known."""
+    """Signals of the elements of one description, whose states come one after the other. A state that cannot be
+    built leaves what is known."""
 
     def __init__(self) -> None:
         self._text: str | None = None

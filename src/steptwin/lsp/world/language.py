@@ -17,7 +17,7 @@ from steptwin.lsp.world.built import ElementSignals
 from steptwin.simulation.kinds.registry import KINDS
 
 FILES: dict[str, Callable[[str, Mapping[str, Any]], MachineFiles | None]] = {"mic488": controller_of, "m1486": chip_of}
-"""What reads the files of a controller from the address of a description and its table there, by kinds of controllers."""
+"""Readers of the files of a controller from the address of a description and its table there, by kinds of controllers."""
 
 
 def _is_world(text: str) -> bool:

@@ -37,12 +37,12 @@ class TableOutline:
 
     @property
     def kind(self) -> str:
-        """What its keys are those of."""
+        """Kind of table to which its keys belong."""
         return self.names[-1] if self.names else ""
 
 
 class WorldOutline:
-    """Of one text."""
+    """Outline of one text."""
 
     def __init__(self, lines: LineIndex) -> None:
         self._lines = lines
@@ -129,7 +129,7 @@ class WorldOutline:
                 yield self._lines.text[inner.start : inner.end]
 
     def _text_span(self, span: Span) -> Span:
-        """What stands between quotation marks."""
+        """Span of the text between quotation marks."""
         text = self._lines.text[span.start : span.end]
         quoted = len(text) > 1 and text[0] in "\"'" and text[-1] == text[0]
         return Span(span.start + 1, span.end - 1) if quoted else span

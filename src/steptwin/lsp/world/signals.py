@@ -40,7 +40,7 @@ class WorldSignals:
         return {name: kind.datasheet_of(None) for name, kind in self.controllers.items()}
 
     def items(self, before: str, place: int, table: TableOutline) -> Iterator[Completion] | None:
-        """What can be named at a place in a table; None where no signal can be. ``before``: the line up to there."""
+        """Names that fit a place in a table; None where no signal fits. ``before``: the line up to there."""
         is_read = _CONDITION.search(before) is not None
         levels = None if is_read else _LEVELS.search(before)
         if not is_read and levels is None:
@@ -70,7 +70,7 @@ class WorldSignals:
             yield from (Completion(f"{owner}.{name}", CompletionKind.VALUE, span, unit) for name, unit in units.items())
 
     def hover(self, line: str, start: int, place: int) -> Hover | None:
-        """What a signal is. ``start``: the place of the line."""
+        """Meaning of a signal. ``start``: the place of the line."""
         for found in _SIGNAL.finditer(line):
             if start + found.start() <= place <= start + found.end():
                 owner, _, name = found[0].partition(".")
@@ -84,7 +84,7 @@ class WorldSignals:
         return None
 
     def _of_element(self, owner: str, name: str) -> str | None:
-        """What a signal of an element is."""
+        """Meaning of a signal of an element."""
         use, unit = self._outline.definitions.get(owner), self._elements(None).get(owner, {}).get(name)
         if use is None or unit is None:
             return None
