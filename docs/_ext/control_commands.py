@@ -7,8 +7,8 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 from sphinx.util.typing import ExtensionMetadata
 
+from steptwin.fields import Field
 from steptwin.subject.commands import COMMANDS
-from steptwin.subject.fields import Field
 
 
 class ControlCommands(SphinxDirective):

@@ -26,7 +26,7 @@ from steptwin.mic488.status import ControllerStatus
 from steptwin.simulation.faults import read as read_fault
 from steptwin.simulation.script import steps as do
 from steptwin.subject import commands as command
-from steptwin.subject.commands import row_of
+from steptwin.subject.commands import type_of
 from steptwin.subject.contract import read_description
 from steptwin.subject.events import read_event
 from steptwin.subject.following import Following, filter_of
@@ -61,7 +61,7 @@ ONLY_TWINS = (do.Set((("table", "IN3", 1.0),)), do.SetFault(read_fault("busy uni
 def test_what_only_a_twin_can_do_is_refused(table: DeviceSubject, wanted: command.Command) -> None:
     with pytest.raises(Refusal, match=r"is not possible for this device \(bus\); possible are describe, read, pins, .*write"):
         table.do(wanted)
-    assert row_of(wanted).name not in table.description.commands
+    assert type_of(wanted).name not in table.description.commands
 
 
 def test_the_description_of_a_device(table: DeviceSubject, rig: Rig) -> None:

@@ -15,7 +15,7 @@ from steptwin.messages import Message
 from steptwin.nearmiss import NearMiss
 from steptwin.simulation.script import steps
 from steptwin.subject import commands as command
-from steptwin.subject.commands import COMMANDS, Command, row_of
+from steptwin.subject.commands import COMMANDS, Command, type_of
 from steptwin.subject.contract import UNKNOWN, Description, Reading, Result
 from steptwin.subject.events import Event, Numbering
 from steptwin.subject.following import Filter, Followers, Following
@@ -134,7 +134,7 @@ class CompositeSubject:
             return there  # several devices share the line
         if isinstance(wanted, steps.Send) and wanted.line in self._several:
             return self._addressed(wanted)
-        for field in row_of(wanted).fields:
+        for field in type_of(wanted).fields:
             value: Any = getattr(wanted, field.key)
             if field.name == "machine" and value is not None:
                 found.append(self._part_called(value))
@@ -143,14 +143,14 @@ class CompositeSubject:
             elif field.name == "values" and value is not None:
                 found += [self._part_called(machine) for machine, _, _ in value]
         if len(set(map(id, found))) > 1:
-            raise Misuse(ONE_CONTROLLER_AT_A_TIME(command=row_of(wanted).name))
+            raise Misuse(ONE_CONTROLLER_AT_A_TIME(command=type_of(wanted).name))
         if found:
             return found[0]
         if self._world is None and not self._parts:
-            raise Refusal(NO_DEVICE_FOR(command=row_of(wanted).name))
+            raise Refusal(NO_DEVICE_FOR(command=type_of(wanted).name))
         if self._world is None and len(self._parts) > 1:
             can = self.description.commands
-            name = row_of(wanted).name
+            name = type_of(wanted).name
             raise Refusal(NAME_THE_MACHINE(command=name) if name in can else NOT_POSSIBLE(command=name, names=list(can)))
         return self._parts[0]
 

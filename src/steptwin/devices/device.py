@@ -23,7 +23,7 @@ from steptwin.messages import Message, text_of
 from steptwin.simulation.script import steps
 from steptwin.simulation.script.control import Halt, ended
 from steptwin.subject import commands as command
-from steptwin.subject.commands import Command, row_of
+from steptwin.subject.commands import Command, type_of
 from steptwin.subject.contract import UNKNOWN, Description, Reading, Result
 from steptwin.subject.events import Event
 from steptwin.subject.following import Filter, Followers
@@ -184,7 +184,7 @@ class ConnectedDevice:
         return await later(self._do(wanted))
 
     async def _do(self, wanted: Command) -> Result:
-        name = row_of(wanted).name
+        name = type_of(wanted).name
         with span(f"device {name}", {"command": name, "machine": self.name}, is_part=True):
             return await self._done(wanted)
 
@@ -193,7 +193,7 @@ class ConnectedDevice:
             if self._is_stop(wanted):
                 return await self._stop(wanted)
             if self.lost is not None:
-                raise LineFailure(CONNECTION_IS_LOST(command=row_of(wanted).name, lost=text_of(self.lost)))
+                raise LineFailure(CONNECTION_IS_LOST(command=type_of(wanted).name, lost=text_of(self.lost)))
             if type(wanted) in LOOKS or self._effect_of(wanted) is RawEffect.LOOK:
                 return await self._subject.do(wanted)
             return await self._in_turn(wanted)
@@ -234,7 +234,7 @@ class ConnectedDevice:
         self._refuse_while_stopping(wanted)
         stops, asked = self._stops, self._around.clock()
         if self._waiting >= MOST_WAITING:
-            raise Refusal(TOO_MANY_WAITING(command=row_of(wanted).name, most=MOST_WAITING))
+            raise Refusal(TOO_MANY_WAITING(command=type_of(wanted).name, most=MOST_WAITING))
         self._waiting += 1
         try:
             await self._turn.acquire()
@@ -286,14 +286,14 @@ class ConnectedDevice:
 
     def _refuse_while_stopping(self, wanted: Command) -> None:
         if self._stopping:
-            raise Refusal(STOP_IS_BEING_EXECUTED(command=row_of(wanted).name))
+            raise Refusal(STOP_IS_BEING_EXECUTED(command=type_of(wanted).name))
 
     def _refuse_late(self, wanted: Command, stops: int, asked: Nanos) -> None:
         """Refuse what a stop has overtaken, and what was asked for too long ago."""
         if self._stops != stops:
-            raise Refusal(STOPPED_MEANWHILE(command=row_of(wanted).name))
+            raise Refusal(STOPPED_MEANWHILE(command=type_of(wanted).name))
         if self._around.clock() - asked > PATIENCE_NS:
-            raise Refusal(WAITED_TOO_LONG(command=row_of(wanted).name, most_s=PATIENCE_NS // SECOND))
+            raise Refusal(WAITED_TOO_LONG(command=type_of(wanted).name, most_s=PATIENCE_NS // SECOND))
 
     def _look_away(self) -> None:
         """The last values of a device that does not answer while it moves are out of date."""

@@ -23,7 +23,7 @@ from steptwin.simulation.describe.description import read_world
 from steptwin.simulation.script import steps
 from steptwin.simulation.world.plant import Plant
 from steptwin.subject import commands as command
-from steptwin.subject.commands import Command, row_of
+from steptwin.subject.commands import Command, type_of
 from steptwin.subject.devicetwin import DeviceTwin
 from steptwin.subject.world import WorldSubject
 
@@ -113,7 +113,7 @@ class Shadow:
         try:
             self._subject.do(wanted)
         except SteptwinError as error:
-            text = f"{row_of(wanted).name}: {error}"
+            text = f"{type_of(wanted).name}: {error}"
             if text not in self.problems and len(self.problems) < MOST_PROBLEMS:
                 self.problems.append(text)
 

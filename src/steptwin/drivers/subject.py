@@ -28,7 +28,7 @@ from steptwin.messages import Message
 from steptwin.nearmiss import NearMiss
 from steptwin.simulation.script import steps
 from steptwin.subject import commands as command
-from steptwin.subject.commands import COMMANDS, Command, row_of
+from steptwin.subject.commands import COMMANDS, Command, type_of
 from steptwin.subject.contract import GOOD, UNKNOWN, Description, LinePart, MachinePart, Reading, Result
 from steptwin.subject.controls import controls_of
 from steptwin.subject.devicetwin import DeviceTwin
@@ -250,7 +250,7 @@ class AsyncDeviceSubject:
         if action is None:
             raise Refusal(
                 COMMAND_IS_NOT_POSSIBLE(
-                    command=row_of(wanted).name, place=self._line.place, names=list(self.description.commands)
+                    command=type_of(wanted).name, place=self._line.place, names=list(self.description.commands)
                 )
             )
         self._check_names(wanted)
@@ -312,7 +312,7 @@ class AsyncDeviceSubject:
 
     def _check_names(self, wanted: Command) -> None:
         """Check the names of machines and lines in a command."""
-        for field in row_of(wanted).fields:
+        for field in type_of(wanted).fields:
             value: Any = getattr(wanted, field.key)
             if field.name == "machine":
                 self._check_name("machine", value, self.name)

@@ -14,7 +14,7 @@ from steptwin.datasheet import PointEffect
 from steptwin.errors import Refusal, SteptwinError
 from steptwin.gateways.contract import GatewaySubject
 from steptwin.simulation.script.steps import Request, Write
-from steptwin.subject.commands import Command, Home, Move, ReadState, StopAxes, plain_command, row_of
+from steptwin.subject.commands import Command, Home, Move, ReadState, StopAxes, plain_command, type_of
 from steptwin.subject.contract import MachinePart, Result
 from steptwin.subject.dispatch import code_of
 from steptwin.subject.events import Event
@@ -68,7 +68,7 @@ class GatewayClient:
         ignores it. Raises `NotPermitted`, `Misuse`, `Refusal` and `LineFailure`."""
         try:
             with self.noted(subject, wanted):
-                name = row_of(wanted).name
+                name = type_of(wanted).name
                 self.check_role(name, PERMITS[name].role if needed is None else needed)
                 return await _done(subject, wanted)
         except Ignored as ignored:
@@ -79,7 +79,7 @@ class GatewayClient:
     @contextmanager
     def noted(self, subject: GatewaySubject, wanted: Command) -> Generator[None]:
         """Record a command in the audit log of ``subject``, with what becomes of it within. Who looks is not recorded."""
-        outcome, name = "internal", row_of(wanted).name
+        outcome, name = "internal", type_of(wanted).name
         try:
             with span(f"gateway {name}", {"command": name, "client": str(self), "role": self.role.title}):
                 yield
@@ -88,7 +88,7 @@ class GatewayClient:
             outcome = IGNORED if isinstance(error, Ignored) else code_of(error)
             raise
         finally:
-            if subject.audit is not None and (isinstance(wanted, StopAxes) or PERMITS[row_of(wanted).name] != LOOK):
+            if subject.audit is not None and (isinstance(wanted, StopAxes) or PERMITS[type_of(wanted).name] != LOOK):
                 fields = plain_command(wanted)
                 subject.audit(self, str(fields.pop("do")), fields, outcome)
 
@@ -99,7 +99,7 @@ class GatewayClient:
 
     def check(self, wanted: Command) -> None:
         """Raises `NotPermitted`."""
-        name = row_of(wanted).name
+        name = type_of(wanted).name
         self.check_role(name, PERMITS[name].role)
 
     def check_role(self, name: str, needed: Role) -> None:
@@ -190,5 +190,5 @@ async def _check_drive(subject: GatewaySubject, wanted: Move | Home, following: 
         await asyncio.sleep(BETWEEN_LOOKS_S)
         missed, events = following.take()
         if missed or any(isinstance(one.payload, InputPayload) and one.payload.what == "stop" for one in events):
-            raise Refusal(f"{row_of(wanted).name} was not sent: a stop was requested meanwhile")
+            raise Refusal(f"{type_of(wanted).name} was not sent: a stop was requested meanwhile")
     raise Ignored(f"{part.name}: M{wanted.axis} is not enabled: switch its drive on first")

@@ -18,7 +18,7 @@ from steptwin.machine import Nanos
 from steptwin.simulation.describe.gateways import GatewaySpec
 from steptwin.simulation.describe.historytable import HISTORY, HistorySpec
 from steptwin.simulation.kinds.lines import LineTraffic
-from steptwin.subject.commands import Command, Jog, row_of
+from steptwin.subject.commands import Command, Jog, type_of
 from steptwin.subject.contract import Description, Reading, Result
 from steptwin.subject.events import Event
 from steptwin.subject.following import Filter, Following
@@ -101,7 +101,7 @@ class LiveWorldSubject:
         return self._control.read(*points)
 
     async def do(self, wanted: Command, /) -> Result:
-        name = row_of(wanted).name
+        name = type_of(wanted).name
         with span(f"twin {name}", {"command": name}, is_part=True) as noted:
             result = self._control.do(wanted)
             noted.note("time_ns", result.time)

@@ -13,6 +13,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING
 
 from steptwin.errors import Misuse
+from steptwin.fields import FASTEST, SLOWEST
 from steptwin.files import session as sessions
 from steptwin.files.beginning import check_session_target, is_session
 from steptwin.files.export import axis_views, check_target, write_trace
@@ -28,7 +29,6 @@ from steptwin.subject import commands as command
 from steptwin.subject import events
 from steptwin.subject.dispatch import Action
 from steptwin.subject.events import line_of
-from steptwin.subject.fields import FASTEST, SLOWEST
 from steptwin.subject.following import Following
 from steptwin.subject.time import MOST_SHOWN, end_of, happened, shown_of
 

@@ -4,36 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol, TypeAlias
+from typing import Annotated, Protocol, TypeAlias
 
 from steptwin.access.roles import KEEP, LOOK
+from steptwin.fields import TIME, Meaning, Schema, whole
 from steptwin.machine import Nanos
-from steptwin.studio.requestrow import NOTHING, RequestRow
-from steptwin.studio.shapes import MOMENT
-from steptwin.subject.fields import TIME, Field, Schema, whole
-from steptwin.subject.shapes import members
-
-
-@dataclass(frozen=True, slots=True)
-class ListBranches:
-    """The branches that are open."""
-
-
-@dataclass(frozen=True, slots=True)
-class StartBranch:
-    """Opens a branch from a moment of the past, or from the present."""
-
-    moment: Nanos | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class EndBranch:
-    """Ends a branch."""
-
-    branch: int
-
-
-BranchRequest: TypeAlias = ListBranches | StartBranch | EndBranch
+from steptwin.studio.requesttype import request
+from steptwin.subject.shapes import MOMENT, TEXT, WHOLE, list_of, members
 
 
 class Branches(Protocol):
@@ -54,29 +31,35 @@ class Branches(Protocol):
 
 _BRANCH: Schema = members(
     {
-        "branch": {"type": "integer"},
+        "branch": WHOLE,
         "from_ns": {**MOMENT, "description": "Where it began. Virtual time, as decimal text [ns]"},
-        "url": {"type": "string", "description": "Of its page; the token there is the one of here."},
+        "url": {**TEXT, "description": "Of its page; the token there is the one of here."},
     }
 )
 
-BRANCHES = (
-    RequestRow("branches", ListBranches, LOOK, "The branches of the world that are open.", {"type": "array", "items": _BRANCH}),
-    RequestRow(
-        "start_branch",
-        StartBranch,
-        KEEP,
-        "Begin another world, without ports, in the state of a moment of the past. It is a studio of its own, in which time "
-        "stands at first. Nothing changes in the world here.",
-        _BRANCH,
-        (Field("at_ns", TIME, "Which moment; the present without.", None, "ns", "moment"),),
-    ),
-    RequestRow(
-        "end_branch",
-        EndBranch,
-        KEEP,
-        "End a branch; what is in it is lost.",
-        NOTHING,
-        (Field("branch", whole(1, 2**53), "Its number."),),
-    ),
+
+@request("branches", LOOK, "The branches of the world that are open.", list_of(_BRANCH))
+@dataclass(frozen=True, slots=True)
+class ListBranches:
+    pass
+
+
+@request(
+    "start_branch",
+    KEEP,
+    "Begin another world, without ports, in the state of a moment of the past. It is a studio of its own, in which time "
+    "stands at first. Nothing changes in the world here.",
+    _BRANCH,
 )
+@dataclass(frozen=True, slots=True)
+class StartBranch:
+    moment: Annotated[Nanos | None, Meaning("Which moment; the present without.", TIME, unit="ns", name="at_ns")] = None
+
+
+@request("end_branch", KEEP, "End a branch; what is in it is lost.")
+@dataclass(frozen=True, slots=True)
+class EndBranch:
+    branch: Annotated[int, Meaning("Its number.", whole(1, 2**53))]
+
+
+BranchRequest: TypeAlias = ListBranches | StartBranch | EndBranch

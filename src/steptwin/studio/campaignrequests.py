@@ -4,34 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol, TypeAlias
+from typing import Annotated, Protocol, TypeAlias
 
 from steptwin.access.roles import KEEP, LOOK
-from steptwin.studio.requestrow import NOTHING, RequestRow
-from steptwin.subject.fields import TEXT, Field, Schema
-from steptwin.subject.shapes import members
-
-
-@dataclass(frozen=True, slots=True)
-class ListCampaigns:
-    """The campaigns beside the description of the world, with their progress."""
-
-
-@dataclass(frozen=True, slots=True)
-class RunCampaign:
-    """Runs a campaign, or what is left of it."""
-
-    campaign: str
-
-
-@dataclass(frozen=True, slots=True)
-class EndCampaign:
-    """Ends a campaign that runs; its results stay."""
-
-    campaign: str
-
-
-CampaignRequest: TypeAlias = ListCampaigns | RunCampaign | EndCampaign
+from steptwin.fields import Meaning
+from steptwin.studio.requesttype import request
+from steptwin.subject.shapes import FLAG, NUMBER, TEXT, WHOLE, list_of, members, or_null
 
 
 class Campaigns(Protocol):
@@ -54,18 +32,10 @@ class Campaigns(Protocol):
         ...
 
 
-_TEXT: Schema = {"type": "string"}
-_WHOLE: Schema = {"type": "integer"}
-
-
-def _or_null(schema: Schema) -> Schema:
-    return {"anyOf": [schema, {"type": "null"}]}
-
-
 _PROPERTY = members(
     {
-        "name": _TEXT,
-        "failed": {**_WHOLE, "description": "Runs in which it did not hold."},
+        "name": TEXT,
+        "failed": {**WHOLE, "description": "Runs in which it did not hold."},
         "robustness": {
             "type": ["number", "null"],
             "description": "The least one: how far from violated, -1 to 1; negative where it was violated.",
@@ -74,54 +44,67 @@ _PROPERTY = members(
 )
 _CAUSE = members(
     {
-        "what": {**_TEXT, "description": "What failed."},
-        "where": {**_or_null(_TEXT), "description": "The simplest case that fails so, in words."},
-        "runs": _WHOLE,
-        "session": {**_or_null(_TEXT), "description": "The simplest run that fails in this way, among the files of the results."},
-        "timeline": {**_or_null(_TEXT), "description": "Of that run."},
+        "what": {**TEXT, "description": "What failed."},
+        "where": {**or_null(TEXT), "description": "The simplest case that fails so, in words."},
+        "runs": WHOLE,
+        "session": {**or_null(TEXT), "description": "The simplest run that fails in this way, among the files of the results."},
+        "timeline": {**or_null(TEXT), "description": "Of that run."},
     }
 )
 _RESULT = members(
     {
-        "runs": _WHOLE,
-        "failed": _WHOLE,
+        "runs": WHOLE,
+        "failed": WHOLE,
         "pass_rate": {"type": ["number", "null"]},
-        "interval": {"type": "array", "items": {"type": "number"}, "description": "Of the pass rate, 95 %."},
-        "properties": {"type": "array", "items": _PROPERTY},
-        "causes": {"type": "array", "items": _CAUSE},
+        "interval": {**list_of(NUMBER), "description": "Of the pass rate, 95 %."},
+        "properties": list_of(_PROPERTY),
+        "causes": list_of(_CAUSE),
     }
 )
 _CAMPAIGN = members(
     {
-        "campaign": {**_TEXT, "description": "Path of its file from the folder of the description."},
-        "name": _TEXT,
-        "results": {**_TEXT, "description": "Path of the folder of its results, for GET /api/campaigns/RESULTS/report.html."},
-        "error": {**_or_null(_TEXT), "description": "Why its file cannot be read, or why it did not run."},
-        "is_running": {"type": "boolean", "description": "Whether this studio runs it at present."},
-        "done": {**_WHOLE, "description": "Runs whose results are there."},
-        "failed": {**_WHOLE, "description": "Those of them that failed."},
-        "total": {**_or_null(_WHOLE), "description": "How many runs it has, where its file says so."},
-        "changed": {**_or_null(_TEXT), "description": "When its results changed last: wall clock, ISO 8601."},
-        "result": {**_or_null(_RESULT), "description": "Of the last one that ended; its report is among the files."},
+        "campaign": {**TEXT, "description": "Path of its file from the folder of the description."},
+        "name": TEXT,
+        "results": {**TEXT, "description": "Path of the folder of its results, for GET /api/campaigns/RESULTS/report.html."},
+        "error": {**or_null(TEXT), "description": "Why its file cannot be read, or why it did not run."},
+        "is_running": {**FLAG, "description": "Whether this studio runs it at present."},
+        "done": {**WHOLE, "description": "Runs whose results are there."},
+        "failed": {**WHOLE, "description": "Those of them that failed."},
+        "total": {**or_null(WHOLE), "description": "How many runs it has, where its file says so."},
+        "changed": {**or_null(TEXT), "description": "When its results changed last: wall clock, ISO 8601."},
+        "result": {**or_null(_RESULT), "description": "Of the last one that ended; its report is among the files."},
     }
 )
-_NAME = Field("campaign", TEXT, "As in the answer to campaigns.")
 
-CAMPAIGNS = (
-    RequestRow(
-        "campaigns",
-        ListCampaigns,
-        LOOK,
-        "The campaigns of this world: files with a table [campaign] in the folder of its description or just below it.",
-        {"type": "array", "items": _CAMPAIGN},
-    ),
-    RequestRow(
-        "run_campaign",
-        RunCampaign,
-        KEEP,
-        "Run a campaign, or what is left of it, in processes beside the studio. Nothing changes in the world here.",
-        NOTHING,
-        (_NAME,),
-    ),
-    RequestRow("end_campaign", EndCampaign, KEEP, "End a campaign; run_campaign goes on with it.", NOTHING, (_NAME,)),
+
+_Name: TypeAlias = Annotated[str, Meaning("As in the answer to campaigns.")]
+
+
+@request(
+    "campaigns",
+    LOOK,
+    "The campaigns of this world: files with a table [campaign] in the folder of its description or just below it.",
+    list_of(_CAMPAIGN),
 )
+@dataclass(frozen=True, slots=True)
+class ListCampaigns:
+    pass
+
+
+@request(
+    "run_campaign",
+    KEEP,
+    "Run a campaign, or what is left of it, in processes beside the studio. Nothing changes in the world here.",
+)
+@dataclass(frozen=True, slots=True)
+class RunCampaign:
+    campaign: _Name
+
+
+@request("end_campaign", KEEP, "End a campaign; run_campaign goes on with it.")
+@dataclass(frozen=True, slots=True)
+class EndCampaign:
+    campaign: _Name
+
+
+CampaignRequest: TypeAlias = ListCampaigns | RunCampaign | EndCampaign

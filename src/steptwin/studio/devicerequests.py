@@ -3,106 +3,75 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Annotated, TypeAlias
 
 from steptwin.access.roles import KEEP, LOOK
+from steptwin.fields import TIME, Meaning, Schema
 from steptwin.machine import Nanos
-from steptwin.studio.requestrow import NOTHING, RequestRow
-from steptwin.studio.shapes import MOMENT
-from steptwin.subject.fields import FLAG, TEXT, TIME, Field, Schema
-from steptwin.subject.shapes import members
-
-
-@dataclass(frozen=True, slots=True)
-class ReadSettings:
-    """The settings of a device, to be kept."""
-
-    machine: str
-
-
-@dataclass(frozen=True, slots=True)
-class SetShadow:
-    """Puts a twin beside a device, or removes it."""
-
-    machine: str
-    on: bool = True
-
-
-@dataclass(frozen=True, slots=True)
-class ReadShadow:
-    """How a device and the twin beside it differ."""
-
-    machine: str
-    after: Nanos
-
-
-DeviceRequest: TypeAlias = ReadSettings | SetShadow | ReadShadow
-
-_TEXT: Schema = {"type": "string"}
-_WHOLE: Schema = {"type": "integer"}
-_NUMBER: Schema = {"type": "number"}
-
-
-def _or_null(schema: Schema) -> Schema:
-    return {"anyOf": [schema, {"type": "null"}]}
-
-
-def _list(schema: Schema) -> Schema:
-    return {"type": "array", "items": schema}
-
+from steptwin.studio.requesttype import request
+from steptwin.subject.shapes import MOMENT, NUMBER, TEXT, WHOLE, list_of, members, or_null
 
 _DIFFERENCE = members(
     {
         "at_ns": {**MOMENT, "description": "Since when, from the beginning of the shadow, as decimal text [ns]"},
-        "what": {**_TEXT, "description": "An axis or a register."},
-        "device": _NUMBER,
-        "twin": _NUMBER,
+        "what": {**TEXT, "description": "An axis or a register."},
+        "device": NUMBER,
+        "twin": NUMBER,
     }
 )
 _SAMPLE: Schema = {
     "type": "array",
-    "items": _or_null(_NUMBER),
+    "items": or_null(NUMBER),
     "minItems": 4,
     "maxItems": 4,
     "description": "Time from the beginning [s], position of the device, of the twin, tolerance; null: not compared.",
 }
-_AXIS = members({"axis": _WHOLE, "name": _TEXT, "unit": _TEXT, "first": _or_null(_DIFFERENCE), "samples": _list(_SAMPLE)})
+_AXIS = members({"axis": WHOLE, "name": TEXT, "unit": TEXT, "first": or_null(_DIFFERENCE), "samples": list_of(_SAMPLE)})
 _SHADOW = members(
     {
-        "machine": _TEXT,
-        "axes": _list(_AXIS),
-        "registers": {**_list(_DIFFERENCE), "description": "Those that differ now."},
-        "compared": {**_WHOLE, "description": "Registers that are compared at rest."},
-        "first": {**_or_null(_DIFFERENCE), "description": "The first difference of all."},
-        "problems": {**_list(_TEXT), "description": "Commands that the twin refused."},
+        "machine": TEXT,
+        "axes": list_of(_AXIS),
+        "registers": {**list_of(_DIFFERENCE), "description": "Those that differ now."},
+        "compared": {**WHOLE, "description": "Registers that are compared at rest."},
+        "first": {**or_null(_DIFFERENCE), "description": "The first difference of all."},
+        "problems": {**list_of(TEXT), "description": "Commands that the twin refused."},
     }
 )
-_MACHINE = Field("machine", TEXT, "Of a device.")
 
-OF_DEVICES = (
-    RequestRow(
-        "settings",
-        ReadSettings,
-        KEEP,
-        "What can be read and written in a device, as the text that is kept before the first write.",
-        members({"machine": _TEXT, "text": _TEXT}),
-        (_MACHINE,),
-    ),
-    RequestRow(
-        "shadow",
-        SetShadow,
-        KEEP,
-        "Put a twin beside a device at rest, which is given the same commands from then on, or remove it. Of the device it only "
-        "reads.",
-        NOTHING,
-        (_MACHINE, Field("on", FLAG, "Whether there is to be one.", True)),
-    ),
-    RequestRow(
-        "shadow_state",
-        ReadShadow,
-        LOOK,
-        "How a device and the twin beside it differ; null without one.",
-        _or_null(_SHADOW),
-        (_MACHINE, Field("after_ns", TIME, "Only samples later than this, from the beginning of the shadow.", 0, "ns", "after")),
-    ),
+
+_Device: TypeAlias = Annotated[str, Meaning("Of a device.")]
+
+
+@request(
+    "settings",
+    KEEP,
+    "What can be read and written in a device, as the text that is kept before the first write.",
+    members({"machine": TEXT, "text": TEXT}),
 )
+@dataclass(frozen=True, slots=True)
+class ReadSettings:
+    machine: _Device
+
+
+@request(
+    "shadow",
+    KEEP,
+    "Put a twin beside a device at rest, which is given the same commands from then on, or remove it. Of the device it only "
+    "reads.",
+)
+@dataclass(frozen=True, slots=True)
+class SetShadow:
+    machine: _Device
+    on: Annotated[bool, Meaning("Whether there is to be one.")] = True
+
+
+@request("shadow_state", LOOK, "How a device and the twin beside it differ; null without one.", or_null(_SHADOW))
+@dataclass(frozen=True, slots=True)
+class ReadShadow:
+    machine: _Device
+    after: Annotated[
+        Nanos, Meaning("Only samples later than this, from the beginning of the shadow.", TIME, unit="ns", name="after_ns")
+    ] = 0
+
+
+DeviceRequest: TypeAlias = ReadSettings | SetShadow | ReadShadow

@@ -4,28 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeAlias
+from typing import Annotated, Any, Protocol, TypeAlias
 
 from steptwin.access.roles import LOOK, SERVICE
+from steptwin.fields import LONGEST_TEXT, Meaning, Schema, ValueType, check_text, whole, wrong
 from steptwin.simulation.describe.arrangement import MOST_PLACED, MOST_PX, DrawnPlace
-from steptwin.studio.requestrow import RequestRow
-from steptwin.subject.fields import LONGEST_TEXT, Field, Schema, ValueType, check_text, whole, wrong
-from steptwin.subject.shapes import members
-
-
-@dataclass(frozen=True, slots=True)
-class ReadDrawing:
-    """Where axes and elements are drawn."""
-
-
-@dataclass(frozen=True, slots=True)
-class SaveDrawing:
-    """Writes it into the description."""
-
-    places: tuple[DrawnPlace, ...]
-
-
-DrawingRequest: TypeAlias = ReadDrawing | SaveDrawing
+from steptwin.studio.requesttype import request
+from steptwin.subject.shapes import TEXT, members, or_null
 
 
 class Arrangement(Protocol):
@@ -69,30 +54,40 @@ PLACES = ValueType(
     lambda places: {of: [x, y] for of, x, y in places},
 )
 
-_FILE: Schema = {"anyOf": [{"type": "string"}, {"type": "null"}], "description": "Of the description; null: it is in none."}
+_FILE: Schema = {**or_null(TEXT), "description": "Of the description; null: it is in none."}
 _DRAWING = members({"places": {"type": "object", "additionalProperties": _CORNER}, "file": _FILE})
 _SAVED = members(
     {
         "file": {**_FILE, "description": "What has been written; null: it cannot be written."},
-        "name": {"type": "string", "description": "For a file."},
-        "text": {"type": "string", "description": "The description with these places."},
+        "name": {**TEXT, "description": "For a file."},
+        "text": {**TEXT, "description": "The description with these places."},
     }
 )
 
-DRAWINGS = (
-    RequestRow(
-        "drawing",
-        ReadDrawing,
-        LOOK,
-        "Where the page draws axes and elements: x and y of the upper left corner in pixels, by name. Empty: by itself.",
-        _DRAWING,
-    ),
-    RequestRow(
-        "save_drawing",
-        SaveDrawing,
-        SERVICE._replace(control=False),
-        "Write these places into the description of the world, as [[drawing]], in the place of those there.",
-        _SAVED,
-        (Field("places", PLACES, "By the names of axes and elements; 'tool path', 'all buttons'. None: it is drawn by itself."),),
-    ),
+
+@request(
+    "drawing",
+    LOOK,
+    "Where the page draws axes and elements: x and y of the upper left corner in pixels, by name. Empty: by itself.",
+    _DRAWING,
 )
+@dataclass(frozen=True, slots=True)
+class ReadDrawing:
+    pass
+
+
+@request(
+    "save_drawing",
+    SERVICE._replace(control=False),
+    "Write these places into the description of the world, as [[drawing]], in the place of those there.",
+    _SAVED,
+)
+@dataclass(frozen=True, slots=True)
+class SaveDrawing:
+    places: Annotated[
+        tuple[DrawnPlace, ...],
+        Meaning("By the names of axes and elements; 'tool path', 'all buttons'. None: it is drawn by itself.", PLACES),
+    ]
+
+
+DrawingRequest: TypeAlias = ReadDrawing | SaveDrawing

@@ -33,7 +33,6 @@ from steptwin.studio.viewers import (
     until_first,
 )
 from steptwin.subject.dispatch import failure, fields_of, read_message
-from steptwin.subject.fields import read_fields
 
 PATH = "/editor"
 MOST_EDITORS = 32
@@ -95,7 +94,7 @@ class Editors:
         message = read_message((text or "").encode("utf-8", "replace"))
         if message["do"] != "hello":
             raise Misuse(HELLO_COMES_FIRST())
-        token: str | None = read_fields("hello", REQUESTS["hello"].fields, fields_of(message))["token"]
+        token: str | None = REQUESTS["hello"].read(fields_of(message)).token
         self._gate.enter(token)
         if self._count >= MOST_EDITORS:
             raise Refusal(TOO_MANY_EDITORS(most=MOST_EDITORS))

@@ -6,41 +6,34 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from steptwin.access.roles import ROLES
-from steptwin.studio.shapes import MOMENT
-from steptwin.subject.fields import Schema
-from steptwin.subject.shapes import members
+from steptwin.fields import Schema
+from steptwin.subject.shapes import FLAG, MOMENT, NUMBER, TEXT, WHOLE, list_of, members, or_null
 
 VERSION = 1
 """Of the messages; in the message hello."""
 
 _COUNT: Schema = {"type": "integer", "minimum": 0}
-_WHOLE: Schema = {"type": "integer"}
-_TEXT: Schema = {"type": "string"}
 SPEED: Schema = {
-    "anyOf": [{"type": "number"}, {"const": "max"}],
+    "anyOf": [NUMBER, {"const": "max"}],
     "description": "Virtual seconds in a second; the one at which time will go on where it stands.",
 }
 
 
-def _or_null(schema: Schema) -> dict[str, object]:
-    return {"anyOf": [schema, {"type": "null"}]}
-
-
-CONTROL = _or_null(members({"viewer": _WHOLE, "name": _TEXT}))
+CONTROL = or_null(members({"viewer": WHOLE, "name": TEXT}))
 LEASES: Schema = {
     "type": "array",
     "items": members(
         {
-            "lease": _WHOLE,
-            "viewer": _WHOLE,
-            "machine": _TEXT,
-            "axis": _WHOLE,
-            "velocity": {"type": "number", "description": "[units of the data sheet/s]"},
+            "lease": WHOLE,
+            "viewer": WHOLE,
+            "machine": TEXT,
+            "axis": WHOLE,
+            "velocity": {**NUMBER, "description": "[units of the data sheet/s]"},
         }
     ),
 }
 EVENTS: Schema = {"type": "array", "items": {"$ref": "#/$defs/(event)"}}
-_MAY: Schema = {"type": "array", "items": _TEXT}
+_MAY: Schema = list_of(TEXT)
 _PRESENT: Mapping[str, Schema] = {
     "state": {
         "type": "object",
@@ -50,7 +43,7 @@ _PRESENT: Mapping[str, Schema] = {
     "faults": {"type": "array", "items": {"type": "object"}, "description": "As the answer to faults."},
     "plans": {"type": "array", "items": {"$ref": "#/$defs/(event)"}, "description": "Present plans of all axes."},
 }
-CLOCK = members({"time_ns": MOMENT, "running": {"type": "boolean"}, "speed": SPEED})
+CLOCK = members({"time_ns": MOMENT, "running": FLAG, "speed": SPEED})
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,9 +68,9 @@ _ROWS = (
         members(
             {
                 "version": {"const": VERSION},
-                "program": {**_TEXT, "description": "Version of steptwin."},
-                "viewer": {**_WHOLE, "description": "Number of this viewer."},
-                "name": _TEXT,
+                "program": {**TEXT, "description": "Version of steptwin."},
+                "viewer": {**WHOLE, "description": "Number of this viewer."},
+                "name": TEXT,
                 "role": {"enum": list(ROLES)},
                 "may": {**_MAY, "description": "Names of requests that can be done here by this role."},
                 "with_token": {**_MAY, "description": "Names of requests for which this viewer would have to give a token."},
@@ -86,7 +79,7 @@ _ROWS = (
                 "leases": LEASES,
                 "number": {**_COUNT, "description": "Events with greater numbers are news."},
                 "time_ns": MOMENT,
-                "pace": members({"running": {"type": "boolean"}, "speed": SPEED}),
+                "pace": members({"running": FLAG, "speed": SPEED}),
                 "virtual": {
                     "type": "boolean",
                     "description": "Whether all machines are twins; a device gives samples, not plans.",
@@ -111,7 +104,7 @@ _ROWS = (
                 "type": "array",
                 "items": {
                     "type": "array",
-                    "prefixItems": [{"type": "integer"}, {"type": ["number", "null"]}],
+                    "prefixItems": [WHOLE, {"type": ["number", "null"]}],
                     "minItems": 2,
                     "maxItems": 2,
                 },
@@ -123,7 +116,7 @@ _ROWS = (
     MessageRow(
         "past",
         "The moment of the past that this viewer looks at from now on; null for the present. Events go on as they happen.",
-        _or_null(
+        or_null(
             members(
                 {
                     "time_ns": MOMENT,
@@ -137,7 +130,7 @@ _ROWS = (
     MessageRow("control", "Who holds control from now on.", CONTROL),
     MessageRow("viewers", "How many viewers there are now.", _COUNT),
     MessageRow("leases", "The jogs that are held now.", LEASES),
-    MessageRow("lost", "The connection to the device is lost, and why; null when it is there again.", _or_null(_TEXT)),
+    MessageRow("lost", "The connection to the device is lost, and why; null when it is there again.", or_null(TEXT)),
 )
 
 MESSAGES: Mapping[str, MessageRow] = {row.name: row for row in _ROWS}

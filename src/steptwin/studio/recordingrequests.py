@@ -4,35 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol, TypeAlias
+from typing import Annotated, Protocol, TypeAlias
 
 from steptwin.access.roles import KEEP, LOOK
-from steptwin.studio.requestrow import RequestRow
-from steptwin.studio.shapes import MOMENT
-from steptwin.subject.fields import TEXT, Field, Schema
-from steptwin.subject.shapes import members
-
-
-@dataclass(frozen=True, slots=True)
-class ReadRecordings:
-    """What is recorded, and which sessions have been saved."""
-
-
-@dataclass(frozen=True, slots=True)
-class SaveRecording:
-    """Saves the session up to now."""
-
-    name: str | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class ViewRecording:
-    """Opens a saved session as a page of its own."""
-
-    name: str
-
-
-RecordingRequest: TypeAlias = ReadRecordings | SaveRecording | ViewRecording
+from steptwin.fields import Meaning
+from steptwin.studio.requesttype import request
+from steptwin.subject.shapes import FLAG, MOMENT, TEXT, WHOLE, list_of, members, or_null
 
 
 class Recordings(Protocol):
@@ -60,71 +37,68 @@ class Recordings(Protocol):
         ...
 
 
-_TEXT: Schema = {"type": "string"}
-_WHOLE: Schema = {"type": "integer"}
-
-
-def _or_null(schema: Schema) -> Schema:
-    return {"anyOf": [schema, {"type": "null"}]}
-
-
 _SAVED = members(
     {
-        "name": {**_TEXT, "description": "Of the file, without .json."},
-        "bytes": _WHOLE,
-        "saved": {**_TEXT, "description": "Wall clock, ISO 8601."},
+        "name": {**TEXT, "description": "Of the file, without .json."},
+        "bytes": WHOLE,
+        "saved": {**TEXT, "description": "Wall clock, ISO 8601."},
         "until_ns": MOMENT,
     }
 )
 _SESSION = members(
     {
         "until_ns": MOMENT,
-        "inputs": _WHOLE,
-        "most_inputs": _WHOLE,
-        "bytes": _WHOLE,
-        "most_bytes": _WHOLE,
-        "is_full": {"type": "boolean", "description": "Whether it has ended for want of room."},
-        "file": {**_or_null(_TEXT), "description": "Where it is written at the end of the studio."},
+        "inputs": WHOLE,
+        "most_inputs": WHOLE,
+        "bytes": WHOLE,
+        "most_bytes": WHOLE,
+        "is_full": {**FLAG, "description": "Whether it has ended for want of room."},
+        "file": {**or_null(TEXT), "description": "Where it is written at the end of the studio."},
     }
 )
-_PAST = members({"from_ns": MOMENT, "states": _WHOLE, "inputs": _WHOLE, "most_inputs": _WHOLE})
+_PAST = members({"from_ns": MOMENT, "states": WHOLE, "inputs": WHOLE, "most_inputs": WHOLE})
 _TRACE = members(
     {
         "kind": {"enum": ["none", "ring", "file"]},
-        "file": _or_null(_TEXT),
-        "records": _or_null(_WHOLE),
-        "most_records": _or_null(_WHOLE),
-        "from_ns": {**_or_null(MOMENT), "description": "Of the oldest record of a ring."},
+        "file": or_null(TEXT),
+        "records": or_null(WHOLE),
+        "most_records": or_null(WHOLE),
+        "from_ns": {**or_null(MOMENT), "description": "Of the oldest record of a ring."},
     }
 )
 _RECORDINGS = members(
     {
-        "session": {**_or_null(_SESSION), "description": "Inputs from outside since the beginning; null: none is recorded."},
-        "past": {**_or_null(_PAST), "description": "What look can show."},
+        "session": {**or_null(_SESSION), "description": "Inputs from outside since the beginning; null: none is recorded."},
+        "past": {**or_null(_PAST), "description": "What look can show."},
         "trace": {**_TRACE, "description": "What happened, as --trace keeps it."},
-        "folder": {**_TEXT, "description": "Where sessions are saved."},
-        "saved": {"type": "array", "items": _SAVED, "description": "Sessions there, the newest first."},
-        "formats": {"type": "array", "items": _TEXT, "description": "What GET /api/recordings/NAME.FORMAT makes of them."},
+        "folder": {**TEXT, "description": "Where sessions are saved."},
+        "saved": {**list_of(_SAVED), "description": "Sessions there, the newest first."},
+        "formats": {**list_of(TEXT), "description": "What GET /api/recordings/NAME.FORMAT makes of them."},
     }
 )
-_NAME = Field("name", TEXT, "Of a saved session.")
 
-RECORDINGS = (
-    RequestRow("recordings", ReadRecordings, LOOK, "What is recorded of the world, and which sessions are saved.", _RECORDINGS),
-    RequestRow(
-        "save_recording",
-        SaveRecording,
-        KEEP,
-        "Save the session up to now as a file beside the world. Nothing changes in the world.",
-        _SAVED,
-        (Field("name", TEXT, "Of the file, without .json; the world and the time of day without.", None),),
-    ),
-    RequestRow(
-        "view_recording",
-        ViewRecording,
-        KEEP,
-        "Open a saved session as a page of its own, as steptwin studio FILE --view does; at a loopback address only.",
-        members({"url": _TEXT}),
-        (_NAME,),
-    ),
+
+@request("recordings", LOOK, "What is recorded of the world, and which sessions are saved.", _RECORDINGS)
+@dataclass(frozen=True, slots=True)
+class ReadRecordings:
+    pass
+
+
+@request("save_recording", KEEP, "Save the session up to now as a file beside the world. Nothing changes in the world.", _SAVED)
+@dataclass(frozen=True, slots=True)
+class SaveRecording:
+    name: Annotated[str | None, Meaning("Of the file, without .json; the world and the time of day without.")] = None
+
+
+@request(
+    "view_recording",
+    KEEP,
+    "Open a saved session as a page of its own, as steptwin studio FILE --view does; at a loopback address only.",
+    members({"url": TEXT}),
 )
+@dataclass(frozen=True, slots=True)
+class ViewRecording:
+    name: Annotated[str, Meaning("Of a saved session.")]
+
+
+RecordingRequest: TypeAlias = ReadRecordings | SaveRecording | ViewRecording

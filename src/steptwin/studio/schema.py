@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 
+from steptwin.fields import Field
 from steptwin.studio.messages import MESSAGES, VERSION
 from steptwin.studio.requests import LEASE, OF_CONNECTION, REQUESTS, permit_of
 from steptwin.subject.commands import COMMANDS
-from steptwin.subject.fields import Field
 from steptwin.subject.schema import DIALECT, definitions, request_schema
 
 

@@ -34,7 +34,7 @@ from steptwin.studio.hub import Hub
 from steptwin.studio.looking import OF_A_MOMENT, Looking
 from steptwin.studio.messages import VERSION
 from steptwin.studio.programs import ProgramTexts
-from steptwin.studio.requests import IN_THE_PAST, OF_CONNECTION, REQUESTS, WITH_TOKEN, check_name, permit_of, read_request
+from steptwin.studio.requests import IN_THE_PAST, OF_CONNECTION, REQUESTS, WITH_TOKEN, check_name, permit_of
 from steptwin.studio.streams import Batch, StreamPosition
 from steptwin.studio.watches import Watched
 from steptwin.subject import commands as command
@@ -177,7 +177,7 @@ class ViewerSession:
         fields = fields_of(message)
         row = REQUESTS.get(name)
         if row is not None:
-            request = read_request(row, fields)
+            request = row.read(fields)
             return Wanted(name, fields, lambda _: self._asked(request))
         wanted = read_command(name, fields)
         return Wanted(name, fields, lambda identity: self._command(wanted, identity))

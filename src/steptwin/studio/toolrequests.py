@@ -3,30 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, TypeAlias
+from dataclasses import dataclass, field
+from typing import Annotated, Any, TypeAlias
 
 from steptwin.access.roles import LOOK
 from steptwin.calc import Formula, MovePart, RequiredSetting
 from steptwin.diagnostics import Severity
 from steptwin.errors import Misuse
-from steptwin.messages import Message
-from steptwin.studio.requestrow import RequestRow
-from steptwin.subject.fields import (
+from steptwin.fields import (
     HEX,
     MOST_ITEMS,
-    TEXT,
     TIME,
-    Field,
+    AxisNumber,
+    MachineName,
+    Meaning,
     Schema,
     ValueType,
     choice,
+    fields_of,
     number,
     read_fields,
-    whole,
     wrong,
 )
-from steptwin.subject.shapes import members, with_sentences
+from steptwin.machine import Nanos
+from steptwin.messages import Message
+from steptwin.studio.requesttype import request
+from steptwin.subject.shapes import FLAG, NUMBER, TEXT, WHOLE, list_of, members, or_null, with_sentences
 from steptwin.wire.pcapng import CapturedFrame
 
 LONGEST_FILE = 48_000
@@ -35,146 +37,81 @@ MOST_FRAMES = 5000
 """Of a capture: as many as the page keeps."""
 
 
-@dataclass(frozen=True, slots=True)
-class ReadQuantities:
-    """Requests the quantities of a move of an axis."""
-
-    machine: str
-    axis: int
+_NUMBERS: Schema = {"type": "object", "additionalProperties": NUMBER}
+_TEXTS: Schema = {"type": "object", "additionalProperties": TEXT}
 
 
-@dataclass(frozen=True, slots=True)
-class Calculate:
-    """Calculates a move from its quantities."""
-
-    machine: str
-    axis: int
-    given: Mapping[str, float]
-    find: str | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class ConvertGear:
-    """Calculates pulses in each unit from the mechanics."""
-
-    motor_steps: float
-    microsteps: float
-    ratio: float
-    lead: float | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class ReadConfiguration:
-    """Requests the configuration of a controller as a form."""
-
-    machine: str
-
-
-@dataclass(frozen=True, slots=True)
-class EditConfiguration:
-    """Requests the form of a configuration text after changes."""
-
-    machine: str
-    text: str
-    changes: Mapping[str, str]
-
-
-@dataclass(frozen=True, slots=True)
-class MakeCapture:
-    """Requests a capture file (pcapng) of frames."""
-
-    frames: Sequence[CapturedFrame]
-
-
-ToolRequest: TypeAlias = ReadQuantities | Calculate | ConvertGear | ReadConfiguration | EditConfiguration | MakeCapture
-
-_TEXT: Schema = {"type": "string"}
-_WHOLE: Schema = {"type": "integer"}
-_NUMBER: Schema = {"type": "number"}
-_FLAG: Schema = {"type": "boolean"}
-_NUMBERS: Schema = {"type": "object", "additionalProperties": _NUMBER}
-_TEXTS: Schema = {"type": "object", "additionalProperties": _TEXT}
-
-
-def _or_null(schema: Schema) -> Schema:
-    return {"anyOf": [schema, {"type": "null"}]}
-
-
-def _list(schema: Schema) -> Schema:
-    return {"type": "array", "items": schema}
-
-
-_LIMITS = members({"low": _or_null(_NUMBER), "high": _or_null(_NUMBER), "is_low_excluded": _FLAG})
+_LIMITS = members({"low": or_null(NUMBER), "high": or_null(NUMBER), "is_low_excluded": FLAG})
 _QUANTITY = members(
     {
-        "name": _TEXT,
-        "meaning": _TEXT,
-        "unit": _TEXT,
-        "pulses": {**_NUMBER, "description": "Pulses (per s, per s²) in one of its unit."},
+        "name": TEXT,
+        "meaning": TEXT,
+        "unit": TEXT,
+        "pulses": {**NUMBER, "description": "Pulses (per s, per s²) in one of its unit."},
         "limits": _LIMITS,
-        "choices": _list(_WHOLE),
-        "default": _or_null(_NUMBER),
-        "same_as": {**_or_null(_TEXT), "description": "The quantity whose value it has where none is given."},
-        "code": {**_TEXT, "description": "Register or command that sets it; empty where it is given with a motion."},
-        "detail": {**_TEXT, "description": "The fact of the state that it is."},
-        "source": _TEXT,
+        "choices": list_of(WHOLE),
+        "default": or_null(NUMBER),
+        "same_as": {**or_null(TEXT), "description": "The quantity whose value it has where none is given."},
+        "code": {**TEXT, "description": "Register or command that sets it; empty where it is given with a motion."},
+        "detail": {**TEXT, "description": "The fact of the state that it is."},
+        "source": TEXT,
     }
 )
-_QUANTITIES = members({"title": _TEXT, "quantities": _list(_QUANTITY), "times": _list(_QUANTITY)})
+_QUANTITIES = members({"title": TEXT, "quantities": list_of(_QUANTITY), "times": list_of(_QUANTITY)})
 _MOVE = with_sentences(
     {
-        "title": _TEXT,
-        "found": _or_null(_TEXT),
-        "exact": {**_or_null(_NUMBER), "description": "Of what was found, before it was made what the controller takes."},
+        "title": TEXT,
+        "found": or_null(TEXT),
+        "exact": {**or_null(NUMBER), "description": "Of what was found, before it was made what the controller takes."},
         "values": _NUMBERS,
         "units": _TEXTS,
         "times": _NUMBERS,
-        "peak": _NUMBER,
-        "reaches": {**_FLAG, "description": "Whether the peak is the velocity."},
-        "parts": _list(members({name: _TEXT if name == "name" else _NUMBER for name in MovePart._fields})),
-        "formulas": _list(with_sentences(dict.fromkeys(Formula._fields, _TEXT), "name", "text")),
-        "notes": _list(_TEXT),
-        "settings": _list(members({name: _NUMBER if name == "value" else _TEXT for name in RequiredSetting._fields})),
+        "peak": NUMBER,
+        "reaches": {**FLAG, "description": "Whether the peak is the velocity."},
+        "parts": list_of(members({name: TEXT if name == "name" else NUMBER for name in MovePart._fields})),
+        "formulas": list_of(with_sentences(dict.fromkeys(Formula._fields, TEXT), "name", "text")),
+        "notes": list_of(TEXT),
+        "settings": list_of(members({name: NUMBER if name == "value" else TEXT for name in RequiredSetting._fields})),
         "curve": {
             "type": "array",
-            "items": {"type": "array", "items": _NUMBER, "minItems": 3, "maxItems": 3},
+            "items": {"type": "array", "items": NUMBER, "minItems": 3, "maxItems": 3},
             "description": "Time [s], position, velocity.",
         },
     },
     lists=("notes",),
 )
-_FINDING = members(
+FINDING = members(
     {
-        **dict.fromkeys(("line", "column", "end_line", "end_column"), _WHOLE),
+        **dict.fromkeys(("line", "column", "end_line", "end_column"), WHOLE),
         "severity": {"enum": [one.value for one in Severity]},
-        "code": _TEXT,
-        "message": _TEXT,
-        "hint": _or_null(_TEXT),
+        "code": TEXT,
+        "message": TEXT,
+        "hint": or_null(TEXT),
     }
 )
 _SETTING = members(
     {
-        "name": _TEXT,
-        "meaning": _TEXT,
-        "unit": _TEXT,
-        "text": {**_TEXT, "description": "As it is written; empty where it is not in the file."},
-        "value": _NUMBER,
-        "default": _NUMBER,
+        "name": TEXT,
+        "meaning": TEXT,
+        "unit": TEXT,
+        "text": {**TEXT, "description": "As it is written; empty where it is not in the file."},
+        "value": NUMBER,
+        "default": NUMBER,
         "limits": _LIMITS,
-        "is_whole": _FLAG,
+        "is_whole": FLAG,
         "choices": _TEXTS,
-        "point": {**_TEXT, "description": "The point that has it at run time; empty without one."},
-        "source": _TEXT,
+        "point": {**TEXT, "description": "The point that has it at run time; empty without one."},
+        "source": TEXT,
     }
 )
 _FORM = members(
     {
-        "name": {**_TEXT, "description": "Of the file."},
-        "text": _TEXT,
-        "sections": _list(members({"name": _TEXT, "title": _TEXT, "settings": _list(_SETTING)})),
-        "diagnostics": _list(_FINDING),
+        "name": {**TEXT, "description": "Of the file."},
+        "text": TEXT,
+        "sections": list_of(members({"name": TEXT, "title": TEXT, "settings": list_of(_SETTING)})),
+        "diagnostics": list_of(FINDING),
         "is_file": {
-            **_FLAG,
+            **FLAG,
             "description": "false: no file; the text has what the registers of the controller show, and no more.",
         },
         "points": {
@@ -221,23 +158,28 @@ def _table(value: Any) -> Mapping[str, Any]:
     return value
 
 
+@dataclass(frozen=True, slots=True)
+class _Frame:
+    time: Annotated[Nanos, Meaning("Virtual time.", TIME, name="time_ns")]
+    machine: Annotated[str, Meaning("The line.")]
+    client: Annotated[str, Meaning("The client of the line.")]
+    direction: Annotated[str, Meaning("in: to the controller.", choice("in", "out"))]
+    data: Annotated[bytes, Meaning("Its bytes, in hexadecimal.", HEX)]
+
+    @property
+    def captured(self) -> CapturedFrame:
+        return CapturedFrame(self.time, self.machine, self.client, self.direction == "in", self.data)
+
+
+_OF_FRAME = fields_of(_Frame)
+
+
 def _frames(value: Any) -> Sequence[CapturedFrame]:
     if not isinstance(value, list) or len(value) > MOST_FRAMES:
         raise wrong(value, _FRAMES.what)
-    return [_frame(read_fields("frame", _OF_FRAME, _table(one))) for one in value]
+    return [_Frame(**read_fields("frame", _OF_FRAME, _table(one))).captured for one in value]
 
 
-def _frame(of: Mapping[str, Any]) -> CapturedFrame:
-    return CapturedFrame(of["time_ns"], of["machine"], of["client"], of["direction"] == "in", of["data"])
-
-
-_OF_FRAME = (
-    Field("time_ns", TIME, "Virtual time."),
-    Field("machine", TEXT, "The line."),
-    Field("client", TEXT, "The client of the line."),
-    Field("direction", choice("in", "out"), "in: to the controller."),
-    Field("data", HEX, "Its bytes, in hexadecimal."),
-)
 _FRAMES = ValueType(
     f"a list of at most {MOST_FRAMES} frames",
     {"type": "array", "maxItems": MOST_FRAMES, "items": members({field.name: field.schema() for field in _OF_FRAME})},
@@ -245,73 +187,78 @@ _FRAMES = ValueType(
 )
 _GIVEN = ValueType('{"QUANTITY": NUMBER, ...}', {**_NUMBERS, "maxProperties": MOST_ITEMS}, _numbers, dict)
 _CHANGES = ValueType('{"SECTION.KEY": TEXT, ...}', {**_TEXTS, "maxProperties": MOST_ITEMS}, _texts, dict)
-_MACHINE = Field("machine", TEXT, "The name of a machine.")
-_AXIS = Field("axis", whole(1, 64), "The number of an axis.")
 _RATIO = number(0.0, 1e6)
 
-TOOLS = (
-    RequestRow(
-        "calculator",
-        ReadQuantities,
-        LOOK,
-        "The quantities of a move of an axis, and the times of which one may be given in place of a quantity.",
-        _QUANTITIES,
-        (_MACHINE, _AXIS),
-    ),
-    RequestRow(
-        "calculate",
-        Calculate,
-        LOOK,
-        "A move from rest to rest, as the controller would plan it: its times, or with one time the quantity that is left out.",
-        _MOVE,
-        (
-            _MACHINE,
-            _AXIS,
-            Field("given", _GIVEN, "Quantities by name, and a time at most."),
-            Field("find", TEXT, "What a time determines; the one that is left out without.", None),
-        ),
-    ),
-    RequestRow(
-        "gear",
-        ConvertGear,
-        LOOK,
-        "Pulses in each unit (GEAR), from the mechanics.",
-        _NUMBERS,
-        (
-            Field("motor_steps", _RATIO, "Full steps in a revolution of the motor.", 200.0),
-            Field("microsteps", _RATIO, "Pulses in a full step."),
-            Field("ratio", _RATIO, "Revolutions of the motor in one of what it drives.", 1.0),
-            Field("lead", _RATIO, "Travel in one revolution of what is driven; it turns without.", None, "mm"),
-        ),
-    ),
-    RequestRow(
-        "configuration",
-        ReadConfiguration,
-        LOOK,
-        "The configuration of a controller as a form: sections, settings with meaning, unit and range, what is wrong. It is "
-        "that of its file; without one, what its registers show.",
-        _FORM,
-        (_MACHINE,),
-    ),
-    RequestRow(
-        "capture",
-        MakeCapture,
-        LOOK,
-        "A capture file (pcapng) for Wireshark, of frames as events have them. Modbus TCP is in packets of TCP, serial lines "
-        "are as captures of an RTAC.",
-        members({"data": {**_TEXT, "contentEncoding": "base64"}}),
-        (Field("frames", _FRAMES, "In their order."),),
-    ),
-    RequestRow(
-        "edit_configuration",
-        EditConfiguration,
-        LOOK,
-        "The form of a text of such a file, with other values in it. Nothing is written.",
-        _FORM,
-        (
-            _MACHINE,
-            Field("text", _FILE, "The file."),
-            Field("changes", _CHANGES, "Values by SECTION.KEY, such as Axis0.Gear.", {}),
-        ),
-    ),
+
+@request(
+    "calculator",
+    LOOK,
+    "The quantities of a move of an axis, and the times of which one may be given in place of a quantity.",
+    _QUANTITIES,
 )
+@dataclass(frozen=True, slots=True)
+class ReadQuantities:
+    machine: MachineName
+    axis: AxisNumber
+
+
+@request(
+    "calculate",
+    LOOK,
+    "A move from rest to rest, as the controller would plan it: its times, or with one time the quantity that is left out.",
+    _MOVE,
+)
+@dataclass(frozen=True, slots=True)
+class Calculate:
+    machine: MachineName
+    axis: AxisNumber
+    given: Annotated[Mapping[str, float], Meaning("Quantities by name, and a time at most.", _GIVEN)]
+    find: Annotated[str | None, Meaning("What a time determines; the one that is left out without.")] = None
+
+
+@request("gear", LOOK, "Pulses in each unit (GEAR), from the mechanics.", _NUMBERS)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConvertGear:
+    motor_steps: Annotated[float, Meaning("Full steps in a revolution of the motor.", _RATIO)] = 200.0
+    microsteps: Annotated[float, Meaning("Pulses in a full step.", _RATIO)]
+    ratio: Annotated[float, Meaning("Revolutions of the motor in one of what it drives.", _RATIO)] = 1.0
+    lead: Annotated[float | None, Meaning("Travel in one revolution of what is driven; it turns without.", _RATIO, unit="mm")] = (
+        None
+    )
+
+
+@request(
+    "configuration",
+    LOOK,
+    "The configuration of a controller as a form: sections, settings with meaning, unit and range, what is wrong. It is "
+    "that of its file; without one, what its registers show.",
+    _FORM,
+)
+@dataclass(frozen=True, slots=True)
+class ReadConfiguration:
+    machine: MachineName
+
+
+@request(
+    "capture",
+    LOOK,
+    "A capture file (pcapng) for Wireshark, of frames as events have them. Modbus TCP is in packets of TCP, serial lines "
+    "are as captures of an RTAC.",
+    members({"data": {**TEXT, "contentEncoding": "base64"}}),
+)
+@dataclass(frozen=True, slots=True)
+class MakeCapture:
+    frames: Annotated[Sequence[CapturedFrame], Meaning("In their order.", _FRAMES)]
+
+
+@request("edit_configuration", LOOK, "The form of a text of such a file, with other values in it. Nothing is written.", _FORM)
+@dataclass(frozen=True, slots=True)
+class EditConfiguration:
+    machine: MachineName
+    text: Annotated[str, Meaning("The file.", _FILE)]
+    changes: Annotated[Mapping[str, str], Meaning("Values by SECTION.KEY, such as Axis0.Gear.", _CHANGES)] = field(
+        default_factory=dict
+    )
+
+
+ToolRequest: TypeAlias = ReadQuantities | Calculate | ConvertGear | ReadConfiguration | MakeCapture | EditConfiguration

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from typing import get_args
 
 from steptwin.datasheet import Argument, AxisDescription, Datasheet, FactType, Limits
+from steptwin.fields import Field
+from steptwin.simulation.script.command import UNITS
 from steptwin.simulation.script.control import ControllerCommand
-from steptwin.subject.commands import COMMANDS, UNITS, Command
-from steptwin.subject.fields import Field
+from steptwin.subject.commands import COMMANDS, Command
 
 _TYPES = {"integer": FactType.WHOLE.value, "number": FactType.NUMBER.value, "boolean": FactType.TRUTH.value}
 """By the types of JSON Schema."""

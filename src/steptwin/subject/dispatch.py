@@ -7,11 +7,11 @@ from collections.abc import Awaitable, Callable, Mapping
 from typing import Any, TypeAlias
 
 from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
+from steptwin.fields import ID
 from steptwin.messages import Message, read_message_text, text_of, with_messages
 from steptwin.plaintypes import shown
-from steptwin.subject.commands import COMMANDS, VERSION, Command, read_command, row_of
+from steptwin.subject.commands import COMMANDS, VERSION, Command, read_command, type_of
 from steptwin.subject.contract import Result
-from steptwin.subject.fields import ID
 
 LONGEST_REQUEST = 1 << 20
 """Limit of a message, bytes: sufficient for the longest permitted program in any JSON encoding."""
@@ -58,7 +58,7 @@ class Dispatcher:
     def _action(self, command: Command) -> Action:
         action = self._actions.get(type(command))
         if action is None:
-            raise Refusal(COMMAND_NOT_SUPPORTED(command=row_of(command).name, names=list(self.names)))
+            raise Refusal(COMMAND_NOT_SUPPORTED(command=type_of(command).name, names=list(self.names)))
         return action
 
 

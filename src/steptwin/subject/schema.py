@@ -9,46 +9,42 @@ from typing import get_type_hints
 
 from steptwin.controllerstate import ControllerState
 from steptwin.datasheet import Datasheet
-from steptwin.subject.commands import COMMANDS, VERSION, CommandRow
+from steptwin.fields import LONGEST_ID, Field
+from steptwin.simulation.script.command import CommandType
+from steptwin.subject.commands import COMMANDS, VERSION
 from steptwin.subject.contract import Description
 from steptwin.subject.controls import ControlDescription
-from steptwin.subject.fields import LONGEST_ID, Field
 from steptwin.subject.payloads import KINDS
-from steptwin.subject.shapes import members, shape, with_sentences
+from steptwin.subject.shapes import FLAG, MOMENT, NUMBER, TEXT, WHOLE, members, or_null, shape, with_sentences
 from steptwin.tables import complete
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _ID = {"type": ["string", "integer", "null"], "maxLength": LONGEST_ID, "description": "Comes back with the answer."}
-_MOMENT = {"type": "string", "pattern": "^[0-9]{1,20}$", "description": "Virtual time, as decimal text [ns]"}
 _NUMBER = {"type": "integer", "minimum": 1, "description": "Commands and events are numbered together."}
 _NUMBER_OF_EVENT = {**_NUMBER, "minimum": 0, "description": "Commands and events are numbered together; 0: a plan from before."}
-_TEXT = {"type": "string"}
 _TEXT_OR_NULL = {"type": ["string", "null"]}
-_WHOLE = {"type": "integer"}
-_REAL = {"type": "number"}
 _REAL_OR_NULL = {"type": ["number", "null"]}
-_FLAG = {"type": "boolean"}
 _NUMBERS = {"type": "array", "items": {"type": ["number", "null"]}}
 _ARC = members(
     {
         "end_s": {"type": ["number", "null"]},
-        "direction": _WHOLE,
+        "direction": WHOLE,
         "way": _NUMBERS,
         "course": _NUMBERS,
-        "half": _WHOLE,
-        "end_p": _REAL,
+        "half": WHOLE,
+        "end_p": NUMBER,
     }
 )
 _PLAN = {
     "type": "object",
     "description": "Numbers for the position at any moment; docs/control.md has the formulas.",
     "properties": {
-        "start_ns": _MOMENT,
-        "base": _WHOLE,
-        "final": _REAL,
+        "start_ns": MOMENT,
+        "base": WHOLE,
+        "final": NUMBER,
         "segments": {"type": "array", "items": {"anyOf": [_NUMBERS, _ARC]}},
         "microstepping": _NUMBERS,
-        "divisions": {"type": "array", "items": {"type": "array", "items": _WHOLE}},
+        "divisions": {"type": "array", "items": {"type": "array", "items": WHOLE}},
     },
     "required": ["start_ns", "base", "final", "segments"],
     "additionalProperties": False,
@@ -58,50 +54,50 @@ _PAYLOADS: Mapping[str, Mapping[str, object]] = complete(
     KINDS,
     "schema",
     {
-        "plan": {"axis": _TEXT, "plan": _PLAN, "origin": {"type": ["integer", "null"]}},
-        "coordinate": {"axis": _TEXT, "origin": _WHOLE},
-        "sample": {"axis": _TEXT, "position": _REAL_OR_NULL, "unit": _TEXT, "velocity": _REAL_OR_NULL},
+        "plan": {"axis": TEXT, "plan": _PLAN, "origin": {"type": ["integer", "null"]}},
+        "coordinate": {"axis": TEXT, "origin": WHOLE},
+        "sample": {"axis": TEXT, "position": _REAL_OR_NULL, "unit": TEXT, "velocity": _REAL_OR_NULL},
         "load": {
-            "axis": _TEXT,
-            "pieces": {"type": "array", "items": members({"time_ns": _MOMENT, "follows": _FLAG, "pulses": _WHOLE})},
+            "axis": TEXT,
+            "pieces": {"type": "array", "items": members({"time_ns": MOMENT, "follows": FLAG, "pulses": WHOLE})},
         },
-        "free": {"axis": _TEXT, "plan": _PLAN},
-        "edge": {"pin": _TEXT, "level": _REAL},
+        "free": {"axis": TEXT, "plan": _PLAN},
+        "edge": {"pin": TEXT, "level": NUMBER},
         "frame": {
-            "client": _TEXT,
+            "client": TEXT,
             "direction": {"enum": ["in", "out"]},
-            "data": {**_TEXT, "description": "Hexadecimal; empty for bytes that belong to no frame."},
-            "words": {**_TEXT, "description": "Its meaning."},
+            "data": {**TEXT, "description": "Hexadecimal; empty for bytes that belong to no frame."},
+            "words": {**TEXT, "description": "Its meaning."},
         },
         "write": {
-            "client": {**_TEXT, "description": "Its place on the line."},
-            "source": {**_TEXT, "description": "Who is there: an address, the owner of a certificate, a path, or script."},
-            "words": {**_TEXT, "description": "What was written."},
+            "client": {**TEXT, "description": "Its place on the line."},
+            "source": {**TEXT, "description": "Who is there: an address, the owner of a certificate, a path, or script."},
+            "words": {**TEXT, "description": "What was written."},
             "outcome": {"enum": ["done", "refusal", ""], "description": "Empty where there is no answer."},
         },
-        "statement": {"program": _TEXT, "line": _WHOLE},
-        "status": {"code": _TEXT, "axis": _TEXT_OR_NULL, "facts": {"type": "object"}},
-        "note": {"note": _TEXT},
-        "report": {"code": _TEXT, "what": _TEXT},
-        "button": {"button": _TEXT, "pressed": _FLAG},
-        "input": {"what": _TEXT, "value": {}},
-        "fault": {"fault": _TEXT, "words": _TEXT},
-        "restored": {"snapshot": {"anyOf": [_TEXT, {"type": "null"}], "description": "Its name; null without one."}},
+        "statement": {"program": TEXT, "line": WHOLE},
+        "status": {"code": TEXT, "axis": _TEXT_OR_NULL, "facts": {"type": "object"}},
+        "note": {"note": TEXT},
+        "report": {"code": TEXT, "what": TEXT},
+        "button": {"button": TEXT, "pressed": FLAG},
+        "input": {"what": TEXT, "value": {}},
+        "fault": {"fault": TEXT, "words": TEXT},
+        "restored": {"snapshot": {"anyOf": [TEXT, {"type": "null"}], "description": "Its name; null without one."}},
         "stopped": {
-            "reason": _TEXT,
-            "what": _TEXT,
-            "breakpoints": {"type": "array", "items": _WHOLE},
+            "reason": TEXT,
+            "what": TEXT,
+            "breakpoints": {"type": "array", "items": WHOLE},
             "program": _TEXT_OR_NULL,
             "line": {"type": ["integer", "null"]},
-            "past": _FLAG,
+            "past": FLAG,
         },
-        "log": {"words": _TEXT, "program": _TEXT, "line": _WHOLE},
+        "log": {"words": TEXT, "program": TEXT, "line": WHOLE},
         "breakpoints": {
             "breakpoints": {
                 "type": "array",
                 "items": members(
                     {
-                        "number": _WHOLE,
+                        "number": WHOLE,
                         "machine": _TEXT_OR_NULL,
                         "program": _TEXT_OR_NULL,
                         "line": {"type": ["integer", "null"]},
@@ -109,9 +105,9 @@ _PAYLOADS: Mapping[str, Mapping[str, object]] = complete(
                     }
                 ),
             },
-            "stop_on": {"type": "array", "items": _TEXT},
+            "stop_on": {"type": "array", "items": TEXT},
         },
-        "pace": {"paused": _FLAG, "speed": {"anyOf": [_REAL, {"const": "max"}, {"type": "null"}]}},
+        "pace": {"paused": FLAG, "speed": {"anyOf": [NUMBER, {"const": "max"}, {"type": "null"}]}},
     },
 )
 
@@ -140,18 +136,18 @@ def definitions() -> dict[str, dict[str, object]]:
 
 def _sentence() -> dict[str, object]:
     """As `with_messages` writes it."""
-    found = members({"id": _TEXT, "values": {"type": "object"}})
+    found = members({"id": TEXT, "values": {"type": "object"}})
     return {**found, "description": "A message without its text. A value with a text is a message itself."}
 
 
-def _request(row: CommandRow) -> dict[str, object]:
+def _request(row: CommandType) -> dict[str, object]:
     return request_schema(row.name, f"{row.meaning} Answer: {row.answer}.", row.fields)
 
 
 def request_schema(name: str, meaning: str, fields: Iterable[Field]) -> dict[str, object]:
     """Of a request with these fields."""
     fields = list(fields)
-    properties = {field.name: _or_null(field.schema(), is_required=field.is_required) for field in fields}
+    properties = {field.name: _field_schema(field) for field in fields}
     return {
         "type": "object",
         "description": meaning,
@@ -161,21 +157,22 @@ def request_schema(name: str, meaning: str, fields: Iterable[Field]) -> dict[str
     }
 
 
-def _or_null(schema: dict[str, object], *, is_required: bool) -> dict[str, object]:
-    """Null is as if the field were not there."""
-    if is_required:
+def _field_schema(field: Field) -> dict[str, object]:
+    """Null is as if an optional field were not there."""
+    schema = field.schema()
+    if field.is_required:
         return schema
     described = schema.pop("description")
-    return {"anyOf": [schema, {"type": "null"}], "description": described}
+    return {**or_null(schema), "description": described}
 
 
 def _answer() -> dict[str, object]:
     code = {"enum": ["misuse", "refusal", "failure", "internal"]}
-    error = with_sentences({"code": code, "message": _TEXT}, "message")
+    error = with_sentences({"code": code, "message": TEXT}, "message")
     return {
         "type": "object",
         "description": "Every request has exactly one.",
-        "properties": {"id": _ID, "ok": {}, "number": _NUMBER, "time_ns": _MOMENT, "error": error},
+        "properties": {"id": _ID, "ok": {}, "number": _NUMBER, "time_ns": MOMENT, "error": error},
         "oneOf": [{"required": ["ok", "number", "time_ns"]}, {"required": ["error"]}],
     }
 
@@ -185,10 +182,10 @@ def _event() -> dict[str, object]:
 
 
 def _event_of(kind: str, given: Mapping[str, object]) -> dict[str, object]:
-    head = {"number": _NUMBER_OF_EVENT, "time_ns": _MOMENT, "machine": {"type": "string"}, "kind": {"const": kind}}
+    head = {"number": _NUMBER_OF_EVENT, "time_ns": MOMENT, "machine": {"type": "string"}, "kind": {"const": kind}}
     cause = {"type": ["integer", "null"], "minimum": 1, "description": "The command or the event that led to it."}
     text = {"type": "string", "description": "As text; it adds nothing to the rest."}
-    words = [name for name in ("words", "what", "text") if given.get(name, text) in (_TEXT, text)]
+    words = [name for name in ("words", "what", "text") if given.get(name, text) in (TEXT, text)]
     return with_sentences({**head, **given, "cause": cause, "text": text}, *words)
 
 
@@ -205,13 +202,13 @@ def _description() -> dict[str, object]:
     """As `Description.plain` writes it."""
     machine = with_sentences(
         {
-            "name": _TEXT,
+            "name": TEXT,
             "datasheet": {"type": "integer", "minimum": 0, "description": "Index of its data sheet."},
             "line": _TEXT_OR_NULL,
             "unit": {"type": ["integer", "null"], "description": "Slave address, or address of a chip."},
             "controls": {
                 "type": "array",
-                "items": _TEXT,
+                "items": TEXT,
                 "description": "Which of enable, move, home, jog, stop, program it takes.",
             },
             "takes": {

@@ -8,6 +8,14 @@ from collections.abc import Iterable, Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
+from steptwin.fields import Schema
+
+TEXT: Schema = {"type": "string"}
+WHOLE: Schema = {"type": "integer"}
+NUMBER: Schema = {"type": "number"}
+FLAG: Schema = {"type": "boolean"}
+MOMENT: Schema = {"type": "string", "pattern": "^[0-9]{1,20}$", "description": "Virtual time, as decimal text [ns]"}
+
 _PLAIN: Mapping[object, dict[str, object]] = {
     str: {"type": "string"},
     int: {"type": "integer"},
@@ -38,6 +46,14 @@ def shape(kind: Any) -> dict[str, object]:
     hints = get_type_hints(kind)
     names = [field.name for field in fields(kind)]
     return members({name: shape(hints[name]) for name in names})
+
+
+def or_null(schema: Schema) -> dict[str, object]:
+    return {"anyOf": [schema, {"type": "null"}]}
+
+
+def list_of(schema: Schema) -> dict[str, object]:
+    return {"type": "array", "items": schema}
 
 
 def members(properties: Mapping[str, object], *optional: str) -> dict[str, object]:

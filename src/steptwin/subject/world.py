@@ -17,6 +17,7 @@ from steptwin.simulation.kinds.programs import StatementFollower
 from steptwin.simulation.kinds.registry import line_kinds
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.script import steps
+from steptwin.simulation.script.command import declared
 from steptwin.simulation.script.control import ControllerCommand, Halt, Jog, StopAxes, ended, standstill
 from steptwin.simulation.script.heldjog import HeldJog
 from steptwin.simulation.world.inputs import Download, EndScripts, ExternalInput, See
@@ -168,8 +169,8 @@ class WorldSubject:
         world, name = self.world, wanted.machine
         kind = world.kind(name)
         if type(wanted) not in kind.control:
-            known = ", ".join(command.name_of(one) for one in kind.control)
-            raise Refusal(CANNOT_DO(name=name, kind=kind.title, command=command.name_of(type(wanted)), known=known))
+            known = ", ".join(declared(one).name for one in kind.control)
+            raise Refusal(CANNOT_DO(name=name, kind=kind.title, command=command.type_of(wanted).name, known=known))
         step = ordered(world, wanted)
         self._apply_input(step)
         if isinstance(step, Halt):

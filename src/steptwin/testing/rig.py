@@ -25,7 +25,7 @@ from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.records import describe
 from steptwin.subject import commands as command
-from steptwin.subject.commands import Command, row_of
+from steptwin.subject.commands import Command, type_of
 from steptwin.testing.realtime import RealTime, WallTime
 from steptwin.testing.virtualtime import VirtualTime
 from steptwin.wire.frameline import FrameLine
@@ -237,7 +237,7 @@ class LineRig(Rig):
     def do(self, wanted: Command) -> Any:
         """Do a command (`steptwin.subject.commands`), as over the control endpoint; its answer. Raises `Misuse`. The twin's."""
         __tracebackhide__ = True
-        return self._do(row_of(wanted).name, wanted)
+        return self._do(type_of(wanted).name, wanted)
 
     def _do(self, what: str, wanted: Command) -> Any:
         __tracebackhide__ = True

@@ -17,7 +17,7 @@ from steptwin.gateways.clients import GatewayClient
 from steptwin.gateways.contract import GatewaySubject
 from steptwin.gateways.leases import JogLeases
 from steptwin.simulation.describe.gateways import MqttSpec
-from steptwin.subject.commands import Command, Jog, StopAxes, row_of
+from steptwin.subject.commands import Command, Jog, StopAxes, type_of
 from steptwin.subject.contract import Result
 from steptwin.subject.dispatch import JsonObject, failure, read_message, respond
 
@@ -115,7 +115,7 @@ class JsonCommands:
             self._kept.popitem(last=False)
 
     async def _do(self, client: GatewayClient, wanted: Command, lease: object) -> Result:
-        name = row_of(wanted).name
+        name = type_of(wanted).name
         if name not in COMMANDS:
             raise Refusal(f"{name} is not taken over MQTT; taken are {', '.join(COMMANDS)}")
         if isinstance(wanted, Jog):

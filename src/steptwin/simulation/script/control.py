@@ -5,41 +5,48 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Annotated, TypeAlias
 
 from steptwin.errors import Misuse
+from steptwin.fields import AxisNumber, MachineName, Meaning, choice, whole
+from steptwin.simulation.script.command import UNITS, command
+
+STOPPED = "program: what the program does now: running (it goes on), paused, stopped; null where that is not known"
 
 
+@command("enable", "Switch a drive on or off.")
 @dataclass(frozen=True, slots=True)
 class Enable:
     """Switch a drive on or off."""
 
-    machine: str
-    axis: int
-    on: bool = True
+    machine: MachineName
+    axis: AxisNumber
+    on: Annotated[bool, Meaning("Whether it is to be on.")] = True
 
 
+@command("move", "Begin to move.")
 @dataclass(frozen=True, slots=True)
 class Move:
     """Begin to move to a position, or by a distance."""
 
-    machine: str
-    axis: int
-    to: float | None = None
-    by: float | None = None
+    machine: MachineName
+    axis: AxisNumber
+    to: Annotated[float | None, Meaning("To this position.", unit=UNITS)] = None
+    by: Annotated[float | None, Meaning("By this distance.", unit=UNITS)] = None
 
     def __post_init__(self) -> None:
         if (self.to is None) is (self.by is None):
             raise Misuse("move: give either to (a position) or by (a distance)")
 
 
+@command("home", "Begin to home.")
 @dataclass(frozen=True, slots=True)
 class Home:
     """Begin to home; the sign of the velocity chooses the switch."""
 
-    machine: str
-    axis: int
-    velocity: float
+    machine: MachineName
+    axis: AxisNumber
+    velocity: Annotated[float, Meaning("Its sign chooses the switch.", unit=f"{UNITS}/s")]
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,29 +60,32 @@ class Seek:
     pin: str
 
 
+@command("jog", "Begin to move without end.")
 @dataclass(frozen=True, slots=True)
 class Jog:
     """Begin to move at a velocity, without end."""
 
-    machine: str
-    axis: int
-    velocity: float
+    machine: MachineName
+    axis: AxisNumber
+    velocity: Annotated[float, Meaning("Velocity with its sign.", unit=f"{UNITS}/s")]
 
 
+@command("stop", "Stop as fast as the controller does, with a ramp or without. The program of a MIC488 goes on.", STOPPED)
 @dataclass(frozen=True, slots=True)
 class StopAxes:
     """Stop an axis as fast as the controller does; without one, all axes of the machine."""
 
-    machine: str
-    axis: int | None = None
+    machine: MachineName
+    axis: Annotated[int | None, Meaning("The number of an axis; all without.", whole(1, 64))] = None
 
 
+@command("program", "Start, pause or stop the program of a machine.")
 @dataclass(frozen=True, slots=True)
 class ControlProgram:
     """Start, pause or stop the program of a machine."""
 
-    machine: str
-    action: str
+    machine: MachineName
+    action: Annotated[str, Meaning("What to do.", choice("start", "pause", "stop"))]
 
 
 @dataclass(frozen=True, slots=True)

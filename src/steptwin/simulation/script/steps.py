@@ -10,11 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass
-from typing import Any, TypeAlias, cast
+from typing import Annotated, Any, TypeAlias, cast
 
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
+from steptwin.fields import CHARACTERS, HEX, TIME, AxisNumber, MachineName, Meaning, choice, whole
+from steptwin.machine import SECOND, Nanos
 from steptwin.simulation.faults import Fault
+from steptwin.simulation.script.command import FAULT, LEVELS, UNITS, command
 from steptwin.simulation.script.control import Home, Move, Seek
 
 COUPLINGS = ("drive", "free", "blocked")
@@ -58,106 +60,123 @@ class Until:
         _check_ns(self.within)
 
 
+@command("set", "Inputs take levels, all of them or none.")
 @dataclass(frozen=True, slots=True)
 class Set:
     """Set inputs (machine, pin, level): 0, 1 or volts."""
 
-    levels: tuple[tuple[str, str, float], ...]
+    levels: Annotated[tuple[tuple[str, str, float], ...], Meaning("0, 1, volts.", LEVELS)]
 
 
+@command("press", "Press a button.")
 @dataclass(frozen=True, slots=True)
 class Press:
     """Press a button for ``duration``, or until it is released. A later press or release of it cancels the timed release."""
 
-    button: str
-    duration: Nanos | None = None
+    button: Annotated[str, Meaning("The name of a button.")]
+    duration: Annotated[Nanos | None, Meaning("How long; until it is released without.", TIME, unit="ns", name="for_ns")] = None
 
     def __post_init__(self) -> None:
         _check_ns(self.duration)
 
 
+@command("release", "Release a button.")
 @dataclass(frozen=True, slots=True)
 class Release:
-    button: str
+    button: Annotated[str, Meaning("The name of a button.")]
 
 
+@command("write", "Registers take values by name, as a Modbus master writes them.")
 @dataclass(frozen=True, slots=True)
 class Write:
     """Write registers by name (machine, register, value in configured units), as a Modbus master does."""
 
-    values: tuple[tuple[str, str, float], ...]
+    values: Annotated[tuple[tuple[str, str, float], ...], Meaning("Registers by MACHINE.REGISTER.", LEVELS, unit=UNITS)]
 
 
+@command("send", "Characters go to a line.")
 @dataclass(frozen=True, slots=True)
 class Send:
     """Send bytes to a line."""
 
-    line: str
-    data: bytes
+    line: Annotated[str, Meaning("The name of a line.")]
+    data: Annotated[bytes, Meaning("Characters, one byte each.", CHARACTERS, name="text")]
 
 
+@command(
+    "request",
+    "A Modbus request on a line.",
+    "pdu: that of the answer, null where it has not come at once; a frame event has it then",
+)
 @dataclass(frozen=True, slots=True)
 class Request:
     """Send a Modbus request on a line. Result: the PDU of the answer; b"" if none arrives in time."""
 
-    line: str
-    unit: int
-    pdu: bytes
-    within: Nanos
+    line: Annotated[str, Meaning("The name of a line.")]
+    unit: Annotated[int, Meaning("The slave address.", whole(0, 255))]
+    pdu: Annotated[bytes, Meaning("Function code and data.", HEX)]
+    within: Annotated[Nanos, Meaning("How long the answer is waited for.", TIME, unit="ns", name="within_ns")] = SECOND
 
     def __post_init__(self) -> None:
         _check_ns(self.within)
 
 
+@command("power_cycle", "Switch a machine off and on again.")
 @dataclass(frozen=True, slots=True)
 class PowerCycle:
-    machine: str
+    machine: MachineName
 
 
+@command("turn", "Turn the encoder shaft of an axis.")
 @dataclass(frozen=True, slots=True)
 class Turn:
     """Turn the encoder shaft of an axis by counts."""
 
-    machine: str
-    axis: int
-    counts: int
+    machine: MachineName
+    axis: AxisNumber
+    counts: Annotated[int, Meaning("By how much.", whole(-(2**31), 2**31 - 1), unit="encoder counts")]
 
 
+@command("couple", "What turns the encoder shaft of an axis without mechanics.")
 @dataclass(frozen=True, slots=True)
 class Couple:
     """Choose what turns the encoder shaft of an axis without mechanics: one of `COUPLINGS`."""
 
-    machine: str
-    axis: int
-    coupling: str
+    machine: MachineName
+    axis: AxisNumber
+    coupling: Annotated[str, Meaning("What turns it.", choice(*COUPLINGS), name="to")]
 
     def __post_init__(self) -> None:
         if self.coupling not in COUPLINGS:
             raise Misuse(f"{self.coupling!r}: an encoder shaft is turned by {', '.join(COUPLINGS)}")
 
 
+@command("fault", "Something goes wrong from now on.", "name")
 @dataclass(frozen=True, slots=True)
 class SetFault:
-    fault: Fault
+    fault: Annotated[Fault, Meaning("Which.", FAULT)]
 
 
+@command("clear_fault", "Remove a fault.")
 @dataclass(frozen=True, slots=True)
 class ClearFault:
-    name: str
+    name: Annotated[str, Meaning("The name of a fault.")]
 
 
+@command("expect", "A condition must hold; else that is reported.", "holds")
 @dataclass(frozen=True, slots=True)
 class Expect:
     """Check a condition; if it is false, it is reported and the run fails."""
 
-    condition: str
+    condition: Annotated[str, Meaning("Which.")]
 
 
+@command("note", "A text for the record.")
 @dataclass(frozen=True, slots=True)
 class Note:
     """Write a text into the trace."""
 
-    text: str
+    text: Annotated[str, Meaning("The text.")]
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, TypeAlias
+from typing import Annotated, NamedTuple, TypeAlias
 
+from steptwin.fields import PROGRAM, MachineName, Meaning
 from steptwin.simulation.script import steps as do
+from steptwin.simulation.script.command import command
 from steptwin.simulation.script.control import Halt
 
 
@@ -17,23 +19,29 @@ class Bytes(NamedTuple):
     data: bytes
 
 
+@command("see", "A record of a vision system comes to a controller.")
 class See(NamedTuple):
     """A record of a vision system arrives at a controller."""
 
-    machine: str
-    number: float
-    x: float
-    y: float
-    angle: float
+    machine: MachineName
+    number: Annotated[float, Meaning("The number of the record.")]
+    x: Annotated[float, Meaning("The x of the record.")]
+    y: Annotated[float, Meaning("The y of the record.")]
+    angle: Annotated[float, Meaning("The angle of the record.")]
 
 
+@command(
+    "download",
+    "Put a text into the program memory of a controller: a MIC488 has it at once, to an M1486 it is typed, and runs then.",
+)
 class Download(NamedTuple):
     """A text goes into the program memory of a controller."""
 
-    machine: str
-    place: str
+    machine: MachineName
+    place: Annotated[str, Meaning("Where, such as program 0, positions 0 (MIC488, by bank), program (M1486).")]
+
     """One of the places of `steptwin.simulation.world.worldprograms.program_texts`."""
-    text: str
+    text: Annotated[str, Meaning("The text. One with errors is refused with what is wrong.", PROGRAM)]
 
 
 class SetVariable(NamedTuple):

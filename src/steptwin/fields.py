@@ -1,23 +1,27 @@
-"""The fields of commands: type, unit, range; from JSON, to JSON, and as JSON Schema.
+"""Requests as annotated dataclasses: each attribute declares its field, from which it is read, checked, written and described::
+
+    @dataclass(frozen=True)
+    class Advance:
+        duration: Annotated[Nanos | None, Meaning("How long.", TIME, unit="ns", name="for_ns")] = None
 
 Moments and durations are whole nanoseconds as decimal text, which every JSON reader keeps exactly; a number is taken too.
 """
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from inspect import Parameter, signature
 from math import inf
-from typing import Any
+from types import NoneType
+from typing import Annotated, Any, TypeAlias, get_args, get_origin, get_type_hints
 
 from steptwin.durations import LONGEST_NS
 from steptwin.errors import Misuse
 from steptwin.messages import NONE, Message, text_of
 from steptwin.nearmiss import NearMiss
 from steptwin.plaintypes import shown
-from steptwin.simulation.faults import Fault
-from steptwin.simulation.faults import read as read_fault
-from steptwin.simulation.toml.values import pin_name
 
 LONGEST_TEXT = 4096
 """Characters of a text; the longest that are meant are paths."""
@@ -26,7 +30,7 @@ MOST_ITEMS = 1000
 FASTEST, SLOWEST = 1000.0, 0.001
 """Virtual seconds in a second."""
 
-MISSING: Any = object()
+MISSING: Any = dataclasses.MISSING
 """The default of a field that has to be given."""
 
 Schema = Mapping[str, object]
@@ -43,37 +47,96 @@ class ValueType:
 
 
 @dataclass(frozen=True, slots=True)
+class Meaning:
+    """The annotation of an attribute that is a field: its text for users, and what its type does not say.
+
+    ``form``: how it is read; texts, flags, numbers and lists of names need none. ``name``: in JSON, where that is another one.
+    """
+
+    text: str
+    form: ValueType | None = None
+    unit: str = ""
+    name: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Field:
-    """``attribute``: its name in the command, where that is another one."""
+    """A field of a request: its name in JSON, and ``key``, the attribute that has its value."""
 
     name: str
     form: ValueType
     meaning: str
-    default: Any = MISSING
-    unit: str = ""
-    attribute: str | None = None
+    default: Any
+    unit: str
+    key: str
 
     @property
     def is_required(self) -> bool:
         return self.default is MISSING
-
-    @property
-    def key(self) -> str:
-        return self.attribute or self.name
 
     def schema(self) -> dict[str, object]:
         text = f"{self.meaning} [{self.unit}]" if self.unit else self.meaning
         return {**self.form.schema, "description": text}
 
 
-UNKNOWN_FIELD = Message("subject.unknown-field", "{place}: no field {name}{hint}; fields are {names}")
-FIELD_IS_MISSING = Message("subject.field-is-missing", "{place}: {name} is missing, expected {what}: {meaning}")
-WRONG_FIELD = Message("subject.wrong-field", "{place}: {name}: {problem}")
+def fields_of(kind: type) -> tuple[Field, ...]:
+    """The fields of a dataclass or a named tuple.
+
+    Raises `TypeError` for an attribute without a `Meaning`, one whose type needs a form, and one that may be None but has
+    another default.
+    """
+    hints = get_type_hints(kind, include_extras=True)
+    defaults = _defaults(kind)
+    return tuple(_field(f"{kind.__name__}.{name}", name, hint, defaults[name]) for name, hint in hints.items())
 
 
-def read_fields(place: str, fields: Iterable[Field], given: Mapping[str, object]) -> dict[str, Any]:
-    """The values of ``fields`` by attribute. Raises `Misuse` for unknown, missing and wrong ones, with ``place``."""
-    fields = list(fields)
+def _defaults(kind: Any) -> Mapping[str, Any]:
+    if not dataclasses.is_dataclass(kind):
+        given = {name: one.default for name, one in signature(kind).parameters.items()}
+        return {name: MISSING if default is Parameter.empty else default for name, default in given.items()}
+    return {one.name: _default(one) for one in dataclasses.fields(kind)}
+
+
+def _default(attribute: dataclasses.Field[Any]) -> Any:
+    factory: Any = attribute.default_factory
+    return attribute.default if factory is MISSING else factory()
+
+
+def _field(place: str, key: str, hint: Any, default: Any) -> Field:
+    inner, *notes = get_args(hint) if get_origin(hint) is Annotated else (hint,)
+    meaning = next((one for one in notes if isinstance(one, Meaning)), None)
+    if meaning is None:
+        raise TypeError(f"{place} has no meaning")
+    types = [one for one in get_args(inner) if one is not NoneType] if NoneType in get_args(inner) else [inner]
+    if (types != [inner]) is not (default is None):
+        raise TypeError(f"{place}: None is the default of what may be None, and of nothing else")
+    form = meaning.form or _FORMS.get(types[0])
+    if form is None:
+        raise TypeError(f"{place} needs a form: {inner}")
+    return Field(meaning.name or key, form, meaning.text, default, meaning.unit, key)
+
+
+@dataclass(frozen=True, slots=True)
+class RequestType:
+    """A type of request: its name, its class with the fields of it, and its text for users."""
+
+    name: str
+    kind: Callable[..., Any]
+    meaning: str
+    fields: tuple[Field, ...]
+
+    def read(self, given: Mapping[str, object]) -> Any:
+        """The request with fields as in JSON. Raises `Misuse`."""
+        return self.kind(**read_fields(self.name, self.fields, given))
+
+
+UNKNOWN_FIELD = Message("fields.unknown-field", "{place}: no field {name}{hint}; fields are {names}")
+FIELD_IS_MISSING = Message("fields.field-is-missing", "{place}: {name} is missing, expected {what}: {meaning}")
+WRONG_FIELD = Message("fields.wrong-field", "{place}: {name}: {problem}")
+
+
+def read_fields(place: str, fields: tuple[Field, ...], given: Mapping[str, object]) -> dict[str, Any]:
+    """The values that are given, by attribute. Raises `Misuse` for unknown, missing and wrong fields, with ``place``."""
     known = [field.name for field in fields]
     for name in given:
         if name not in known:
@@ -85,7 +148,6 @@ def read_fields(place: str, fields: Iterable[Field], given: Mapping[str, object]
         if value is None and field.is_required:
             raise Misuse(FIELD_IS_MISSING(place=place, name=field.name, what=field.form.what, meaning=field.meaning))
         if value is None and (field.name not in given or field.default is None):
-            values[field.key] = field.default
             continue
         try:
             values[field.key] = field.form.read(value)
@@ -94,7 +156,7 @@ def read_fields(place: str, fields: Iterable[Field], given: Mapping[str, object]
     return values
 
 
-WRONG_VALUE = Message("subject.wrong-value", "{value}: expected {expected}")
+WRONG_VALUE = Message("fields.wrong-value", "{value}: expected {expected}")
 
 
 def wrong(value: object, form: str) -> Misuse:
@@ -104,8 +166,8 @@ def wrong(value: object, form: str) -> Misuse:
 # ---------------------------------------------------------------------- forms
 
 
-TEXT_TOO_LONG = Message("subject.text-too-long", "a text of {count} characters: permitted are at most {most}")
-TEXT_HAS_NUL_OR_SURROGATES = Message("subject.text-has-nul-or-surrogates", "{value}: a text takes neither NUL nor surrogates")
+TEXT_TOO_LONG = Message("fields.text-too-long", "a text of {count} characters: permitted are at most {most}")
+TEXT_HAS_NUL_OR_SURROGATES = Message("fields.text-has-nul-or-surrogates", "{value}: a text takes neither NUL nor surrogates")
 
 
 def check_text(value: str) -> str:
@@ -123,7 +185,7 @@ def _text(value: Any) -> str:
     return check_text(value)
 
 
-A_TEXT = Message("subject.a-text", "a text")
+A_TEXT = Message("fields.a-text", "a text")
 TEXT = ValueType(A_TEXT(), {"type": "string", "minLength": 1, "maxLength": LONGEST_TEXT}, _text)
 
 
@@ -131,7 +193,7 @@ LONGEST_PROGRAM = 170_000
 """Characters of a program; the longest that are meant have 4000 lines."""
 
 
-TEXT_HAS_SURROGATES = Message("subject.text-has-surrogates", "a text takes no surrogates")
+TEXT_HAS_SURROGATES = Message("fields.text-has-surrogates", "a text takes no surrogates")
 
 
 def _program(value: Any) -> str:
@@ -153,12 +215,12 @@ def _flag(value: Any) -> bool:
     return value
 
 
-TRUE_OR_FALSE = Message("subject.true-or-false", "true or false")
+TRUE_OR_FALSE = Message("fields.true-or-false", "true or false")
 FLAG = ValueType(TRUE_OR_FALSE(), {"type": "boolean"}, _flag)
 
 
-A_NUMBER = Message("subject.a-number", "a number from {least:g} to {most:g}")
-A_WHOLE_NUMBER = Message("subject.a-whole-number", "a whole number from {least} to {most}")
+A_NUMBER = Message("fields.a-number", "a number from {least:g} to {most:g}")
+A_WHOLE_NUMBER = Message("fields.a-whole-number", "a whole number from {least} to {most}")
 
 
 def number(least: float = -1e300, most: float = 1e300) -> ValueType:
@@ -196,33 +258,12 @@ def read_time(value: Any) -> int:
     return value
 
 
-NANOSECONDS = Message("subject.nanoseconds", "whole nanoseconds from 0 to {most}, as decimal text or a number")
+NANOSECONDS = Message("fields.nanoseconds", "whole nanoseconds from 0 to {most}, as decimal text or a number")
 TIME = ValueType(
     NANOSECONDS(most=LONGEST_NS),
     {"anyOf": [{"type": "string", "pattern": "^[0-9]{1,20}$"}, {"type": "integer", "minimum": 0, "maximum": LONGEST_NS}]},
     read_time,
     str,
-)
-
-
-def _levels(value: Any) -> tuple[tuple[str, str, float], ...]:
-    if not isinstance(value, dict) or not 0 < len(value) <= MOST_ITEMS:
-        raise wrong(value, LEVELS.what)
-    level = number()
-    return tuple((*pin_name(check_text(name)), level.read(one)) for name, one in value.items())
-
-
-LEVELS = ValueType(
-    '{"MACHINE.NAME": NUMBER, ...}',
-    {
-        "type": "object",
-        "minProperties": 1,
-        "maxProperties": MOST_ITEMS,
-        "additionalProperties": {"type": "number"},
-        "propertyNames": {"pattern": "^[^.]+[.].+$", "maxLength": LONGEST_TEXT},
-    },
-    _levels,
-    lambda levels: {f"{machine}.{name}": value for machine, name, value in levels},
 )
 
 
@@ -232,7 +273,7 @@ def _names(value: Any) -> tuple[str, ...]:
     return tuple(map(_text, value))
 
 
-TEXTS = Message("subject.texts", "a list of texts")
+TEXTS = Message("fields.texts", "a list of texts")
 NAMES = ValueType(TEXTS(), {"type": "array", "items": TEXT.schema, "maxItems": MOST_ITEMS}, _names, list)
 
 
@@ -247,8 +288,8 @@ def choice(*words: str) -> ValueType:
     return ValueType(what, {"enum": list(words)}, read)
 
 
-A_LIST_OF = Message("subject.a-list-of", "a list of {what}s: {names}")
-UNKNOWN_NAME = Message("subject.unknown-name", "no {what} {name}{hint}; there are {names}")
+A_LIST_OF = Message("fields.a-list-of", "a list of {what}s: {names}")
+UNKNOWN_NAME = Message("fields.unknown-name", "no {what} {name}{hint}; there are {names}")
 
 
 def choices(words: Iterable[str], what: str) -> ValueType:
@@ -275,7 +316,7 @@ def _id(value: Any) -> object:
     raise wrong(value, ID.what)
 
 
-AN_ID = Message("subject.an-id", "a text of at most {most} characters, or a whole number below 2^63")
+AN_ID = Message("fields.an-id", "a text of at most {most} characters, or a whole number below 2^63")
 ID = ValueType(
     AN_ID(most=LONGEST_ID),
     {"type": ["string", "integer"], "minLength": 1, "maxLength": LONGEST_ID},
@@ -294,11 +335,11 @@ def _hex(value: Any) -> bytes:
     return data
 
 
-HEXADECIMAL = Message("subject.hexadecimal", "bytes as hexadecimal digits")
+HEXADECIMAL = Message("fields.hexadecimal", "bytes as hexadecimal digits")
 HEX = ValueType(HEXADECIMAL(), {"type": "string", "pattern": "^([0-9A-Fa-f]{2} ?)+$"}, _hex, lambda data: data.hex())
 
 
-NO_8_BIT_CHARACTER = Message("subject.no-8-bit-character", "{text!r} is not an 8-bit character")
+NO_8_BIT_CHARACTER = Message("fields.no-8-bit-character", "{text!r} is not an 8-bit character")
 
 
 def _characters(value: Any) -> bytes:
@@ -310,21 +351,13 @@ def _characters(value: Any) -> bytes:
         raise Misuse(NO_8_BIT_CHARACTER(text=value[error.start])) from None
 
 
-ONE_BYTE_EACH = Message("subject.one-byte-each", "characters, one byte each")
+ONE_BYTE_EACH = Message("fields.one-byte-each", "characters, one byte each")
 CHARACTERS = ValueType(
     ONE_BYTE_EACH(),
     {"type": "string", "minLength": 1, "maxLength": LONGEST_DATA},
     _characters,
     lambda data: data.decode("latin-1"),
 )
-
-
-def _fault(value: Any) -> Fault:
-    return read_fault(_text(value))
-
-
-A_FAULT = Message("subject.a-fault", "a fault such as 'crc unit=1 nth=3'")
-FAULT = ValueType(A_FAULT(), TEXT.schema, _fault, str)
 
 
 def _speed(value: Any) -> float:
@@ -335,10 +368,15 @@ def _speed(value: Any) -> float:
     return float(value)
 
 
-A_SPEED = Message("subject.a-speed", "a number from {slowest:g} to {fastest:g}, or 'max'")
+A_SPEED = Message("fields.a-speed", "a number from {slowest:g} to {fastest:g}, or 'max'")
 SPEED = ValueType(
     A_SPEED(slowest=SLOWEST, fastest=FASTEST),
     {"anyOf": [{"type": "number", "minimum": SLOWEST, "maximum": FASTEST}, {"const": "max"}]},
     _speed,
     lambda speed: "max" if speed == inf else speed,
 )
+
+_FORMS: Mapping[object, ValueType] = {str: TEXT, bool: FLAG, float: number(), tuple[str, ...]: NAMES}
+"""By type, where it says all."""
+AxisNumber: TypeAlias = Annotated[int, Meaning("The number of an axis.", whole(1, 64))]
+MachineName: TypeAlias = Annotated[str, Meaning("The name of a machine.")]
