@@ -181,7 +181,7 @@ _NO_NUMBER = {
     "Input should be a valid number, unable to parse string as a number": "a number, without a unit",
     "Input should be a valid integer, unable to parse string as an integer": "a whole number",
 }
-"""What the library that reads options says of a value, and what it means."""
+"""Sentences of the library that reads options, and ours for them."""
 
 
 def _usage(error: TyperException) -> str:

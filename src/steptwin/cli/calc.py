@@ -63,7 +63,7 @@ class MechanicsOptions(OptionGroup):
     ] = None
 
     def values(self) -> dict[str, float]:
-        """What is given; the lead in mm. Raises `Misuse`."""
+        """Given values; the lead in mm. Raises `Misuse`."""
         from steptwin.calc import read_lead
 
         found = self.given()

@@ -250,7 +250,7 @@ def _print(plain: Any, out: Print, causes: Sequence[str] = ()) -> None:
 
 
 def _given(case: Any) -> str:
-    """What is particular to a case."""
+    """Text of the values of a case."""
     values = [f"{name} = {value}" for name, value in case["values"].items()]
     faults = [f"{one['fault']} at {one['at_ns'] / 1e9:g} s" for one in case["faults"]]
     return ", ".join([*values, *faults]) or f"seed {case['seed']}"

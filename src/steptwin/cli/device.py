@@ -56,7 +56,7 @@ def find(device: str | None, *, whole_line: bool = False) -> DeviceAddress:
 
 
 def kind_of(address: DeviceAddress) -> AnyDriverKind:
-    """What the drivers of the device offer."""
+    """Kind of the device."""
     from steptwin.drivers.kinds import DRIVERS
 
     return DRIVERS[address.kind]

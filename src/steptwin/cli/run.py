@@ -160,7 +160,7 @@ def _check_targets(trace: Path | None, session: Path | None) -> None:
 def _program_runner(
     file: Path,
 ) -> Callable[[_CommonOptions, str | None, ProgramOptions, Mapping[str, Any]], bool]:
-    """What runs a program. Raises `Misuse` for what is none."""
+    """Function that runs a program. Raises `Misuse` for what is none."""
     from steptwin.languages import LANGUAGES, by_suffix
     from steptwin.languages.program_run import ProgramRun
 

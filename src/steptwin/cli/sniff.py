@@ -63,7 +63,7 @@ def command(
 
 
 def _decoding(protocol: str, variants: Mapping[str, str | None]) -> Decoding:
-    """What decodes a protocol. Raises `Misuse` also for a variant of another kind of controller."""
+    """Decoding of a protocol. Raises `Misuse` also for a variant of another kind of controller."""
     from steptwin.drivers.kinds import DRIVERS
 
     known = {kind.decoding.protocol: (kind, kind.decoding) for kind in DRIVERS.values() if kind.decoding is not None}

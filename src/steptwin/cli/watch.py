@@ -20,7 +20,7 @@ from steptwin.errors import Misuse
 Look = Callable[[], dict[str, tuple[Any, str]]]
 MOST_HZ = 50.0
 LEAST_WIDTH = 10
-"""Of a column: as wide as most values."""
+"""Width of a column: as wide as most values."""
 
 
 def command(

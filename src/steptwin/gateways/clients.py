@@ -1,4 +1,4 @@
-"""What clients of a gateway may do: the roles of `steptwin.access`, by tokens."""
+"""Permissions of the clients of a gateway: the roles of `steptwin.access`, by tokens."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ class PastValues(Protocol):
     """The values that a history has kept."""
 
     async def values(self, point: str, begin: datetime | None, end: datetime | None, most: int | None) -> list[PastValue]:
-        """Of ``MACHINE.POINT``, oldest first: the one that held at ``begin``, and the others up to ``end``; the first ``most``.
+        """Values of ``MACHINE.POINT``, oldest first: the one at ``begin``, the others up to ``end``; at most ``most``.
 
         Raises `Misuse` for what has not been kept, `LineFailure`.
         """
@@ -45,7 +45,7 @@ class PastValues(Protocol):
 
 
 class GatewaySubject(SampledSubject, Protocol):
-    """What gateways see: a world, or devices. Answers of devices come later."""
+    """Subject of gateways: a world, or devices. Answers of devices come later."""
 
     @property
     def past(self) -> PastValues | None:
@@ -66,7 +66,7 @@ class GatewaySubject(SampledSubject, Protocol):
         ...
 
     def traffic(self) -> Mapping[str, LineTraffic]:
-        """What has been sent over each line, by its name; of a device by ``NAME.line``."""
+        """Traffic on each line, by its name; that of a device by ``NAME.line``."""
         ...
 
     def plans(self, what: Filter) -> list[Event]:

@@ -32,7 +32,7 @@ from steptwin.subject.payloads import (
 BUSY = ("running", "waiting")
 """Programs in these states change what they show without an event."""
 EFFECT_NS: Nanos = SECOND
-"""What is sent without an answer may have its effect so long after it, or after the last effect: characters take their time."""
+"""Longest time from what is sent without an answer to its effect, or between two effects: characters take their time."""
 _OF_PROGRAM = ("program", "status", "details")
 _SILENT = (NotePayload, PacePayload, ReportPayload, ButtonPayload)
 """These change nothing of a controller by themselves."""
@@ -150,7 +150,7 @@ class HeldState:
         return self.state
 
     def _settle(self, now: Nanos) -> None:
-        """What changes without events from now on."""
+        """Find what changes without events from now on."""
         if self.state is None:
             raise AssertionError
         self._stale.clear()
@@ -176,5 +176,5 @@ def is_resting(state: State) -> bool:
 
 
 def parts_only(state: Mapping[str, Any], registers: Mapping[str, float | None]) -> State:
-    """Of a state that has been read, what changes; and the registers that gateways name."""
+    """Changing parts of a state that has been read, and the registers that gateways name."""
     return {**{name: state[name] for name in (*PARTS, "axes")}, "registers": registers}

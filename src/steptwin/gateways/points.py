@@ -42,7 +42,7 @@ class GatewayPoint:
     type: PointType
     unit: str = ""
     limits: Limits | None = None
-    """Of its values; None where they are not known."""
+    """Limits of its values; None where they are not known."""
     part: Callable[[State], Any]
     """The part of a state in which it is, which it shares with the others of its `group`."""
     of: Callable[[Any], PointValue]
@@ -56,7 +56,7 @@ class GatewayPoint:
 
     @property
     def group(self) -> str:
-        """What it belongs to below its controller: an axis, ``pins`` …; empty for the controller itself."""
+        """Group below its controller: an axis, ``pins`` …; empty for the controller itself."""
         return self.path[0] if len(self.path) > 1 else ""
 
     def read(self, state: State) -> PointValue:
@@ -81,7 +81,7 @@ _BY_NAME = ("program", "pins", "details", "registers")
 
 
 def values_of(points: Sequence[GatewayPoint]) -> Callable[[Any], tuple[PointValue, ...]]:
-    """What reads the points of one group in their part, all at once."""
+    """Function that reads the points of one group in their part, all at once."""
     if len(points) > 1 and points[0].group in _BY_NAME:
         return itemgetter(*(point.path[-1] for point in points))
     reads = [point.of for point in points]
@@ -121,7 +121,7 @@ _STATUS, _PROGRAM_PART, _PINS, _DETAILS, _REGISTERS = map(itemgetter, ("status",
 
 
 def _of_status(key: str) -> Callable[[Any], PointValue]:
-    """Of an axis."""
+    """Reader of a status of an axis."""
     return lambda axis: cast("PointValue", axis["status"][key])
 
 

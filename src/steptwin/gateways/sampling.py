@@ -28,7 +28,7 @@ from steptwin.subject.following import USUAL, Filter, Following
 from steptwin.subject.payloads import RestoredPayload
 
 KINDS = USUAL | {"write"}
-"""Of events; a write of a program on a line may change what no other event tells."""
+"""Kinds of events; a write of a program on a line may change what no other event tells."""
 MOST_EVENTS = 16_384
 RESTING_INTERVALS = 10
 """A device at rest is sampled once in so many intervals."""
@@ -65,7 +65,7 @@ class SampledSubject(Protocol):
 
     @property
     def samples(self) -> SharedSamples:
-        """What the samplers of its gateways share."""
+        """Shared part of the samplers of its gateways."""
         ...
 
     async def do(self, wanted: command.Command, /) -> Result:
@@ -76,7 +76,7 @@ class SampledSubject(Protocol):
 
 
 class SharedSamples:
-    """What the samplers of ``subject`` share: events, and samples that one of them has just taken."""
+    """Shared part of the samplers of ``subject``: events, and samples that one of them has just taken."""
 
     def __init__(self, subject: SampledSubject) -> None:
         self._subject = subject
@@ -87,7 +87,7 @@ class SharedSamples:
         self._past: set[str] = set()
         """Controllers that have to be read as a whole."""
         self._held: dict[str, HeldState] = {}
-        """Of twins."""
+        """Held states of twins."""
         self._whole: dict[str, float] = {}
         """When each of them was read as a whole."""
         self._on_line: dict[str, list[str]] = {}
@@ -242,7 +242,7 @@ class Sampler:
         self.registers = {name: tuple(of) for name, of in registers.items()}
         self._shared = subject.samples
         self._slots = max(round(interval / SECOND / TICK_S), 1)
-        """Of an interval, as long as `TICK_S` each; moments are numbers of slots of the event loop's time."""
+        """Slots of an interval, as long as `TICK_S` each; moments are numbers of slots of the event loop's time."""
         self._last: dict[str, int] = {}
         """Controllers that are looked at, and when each of them was due the last time."""
         self._phases: dict[str, int] = {}
@@ -257,7 +257,7 @@ class Sampler:
         self._read: list[Sample] = []
         """Samples of devices, whose answers come later."""
         self._failed: BaseException | None = None
-        """What has ended the reading of a device."""
+        """Error that has ended the reading of a device."""
         self._real = frozenset(part.name for part in subject.description.machines if part.is_real)
         self._shared.join(self)
 

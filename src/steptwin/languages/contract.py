@@ -1,4 +1,4 @@
-"""What commands do with the files of a language: one value for each, in `steptwin.languages`."""
+"""Actions of commands on the files of a language: one value for each, in `steptwin.languages`."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class FileLanguage:
     options: frozenset[str] = frozenset()
     """Names of the options that apply to its files; others are refused."""
     not_text: str = ""
-    """What to do with its files, which are no text, as the end of a message."""
+    """Advice on its files, which are no text, as the end of a message."""
     check: Callable[[SourceText, GivenOptions], CheckReport] | None = None
     explain: Callable[[SourceText, GivenOptions], list[Explanation]] | None = None
     """An explanation for each controller that the program is for."""

@@ -41,7 +41,7 @@ class ProgramRun:
     coverage: Sequence[str] = ()
     """Files for coverage of the program; ``-`` for a table."""
     questions: Sequence[str] = ()
-    """What is asked at the end (`steptwin.why`)."""
+    """Questions that are answered at the end (`steptwin.why`)."""
     as_json: bool = False
     print_world: bool = False
 

@@ -183,7 +183,7 @@ class WorldRunResult(NamedTuple):
     written: list[Path]
     verdicts: list[Verdict]
     measures: dict[str, float]
-    """Of cycle times in properties."""
+    """Measured cycle times in properties."""
 
 
 def _arrange(world: World, options: WorldRun) -> None:
@@ -304,7 +304,7 @@ def _verdict_text(verdict: Verdict) -> str:
 
 
 def _print_unfinished(world: World, began: Nanos, selection: Selection, out: Print) -> None:
-    """What stands still: usually that is why something did not happen."""
+    """Print what stands still: usually that is why something did not happen."""
     waits = [one for one in waiting(world) if one.who not in world.machines or selection.takes_of(one.who)]
     for one in waits[:MOST_WAITS]:
         out(f"{one.who} waits for {one.what}")

@@ -18,7 +18,7 @@ LONGEST_DELAY_NS: Nanos = 500 * MILLISECOND
 
 
 class Advanceable(Protocol):
-    """What a cell advances in real time: a kernel or a whole world. The methods are those of `Kernel`."""
+    """Subject of a cell, which advances it in real time: a kernel or a whole world. The methods are those of `Kernel`."""
 
     stale: bool
 

@@ -53,7 +53,7 @@ UNKNOWN_PROGRAM = Message("live.unknown-program", "{machine} has no program {pro
 
 
 class Debugging:
-    """Of ``live``; ``pace`` is that of its time."""
+    """Debugger of ``live``; ``pace`` is that of its time."""
 
     def __init__(self, live: LiveWorld, cell: Cell, pace: Pace) -> None:
         self._live = live
@@ -62,7 +62,7 @@ class Debugging:
         self._breakpoints: dict[int, _Requested] = {}
         """They stay without a follower; time does not stop at them then."""
         self._set: dict[int, SetPoint] = {}
-        """What became of them."""
+        """Results of setting them."""
         self._next = 1
         self._events: tuple[str, ...] = ()
         self._said = BreakpointsPayload((), ())
@@ -144,7 +144,7 @@ class Debugging:
         self._renew()
 
     def _numbers(self, points: Sequence[int]) -> tuple[int, ...]:
-        """Of breakpoints, by their numbers in the debugger."""
+        """Numbers of breakpoints, by those in the debugger."""
         return tuple(number for number, found in self._set.items() if found.number in points)
 
     def _plain(self, number: int) -> dict[str, object]:
@@ -249,7 +249,7 @@ class _OpenDebugger:
         self.stopped: dict[str, object] | None = None
         """The payload of the present stop; None while time goes on."""
         self._then: Goal | None = None
-        """What to look for when it has come to the present."""
+        """Goal of the search once it has come to the present."""
         live.world.input_watchers.append(self._given)
         live.run_control = self
         if pace.is_paused:

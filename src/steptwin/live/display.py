@@ -58,7 +58,7 @@ class Lines:
 
 
 class Notices:
-    """What runs, and notices; no records. With ``frames`` every frame."""
+    """Display of the head and of notices, without records. With ``frames`` every frame."""
 
     def __init__(self, live: LiveWorld, output: Output, *, frames: bool) -> None:
         self._output = output

@@ -77,7 +77,7 @@ def _make_keeper(spec: HistorySpec, subject: GatewaySubject, folder: Path) -> Hi
 
 
 def recording(audit: Audit | None, now: Callable[[], Nanos]) -> CommandLog | None:
-    """What enters commands of gateways into ``audit``, at the moment that ``now`` gives."""
+    """Log of commands of gateways that enters them into ``audit``, at the moment that ``now`` gives."""
     if audit is None:
         return None
     return lambda who, do, fields, outcome: audit.add(who, now(), do, fields, outcome)

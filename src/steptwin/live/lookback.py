@@ -33,7 +33,7 @@ TOO_MANY_LOOK_BACK = Message("live.too-many-look-back", "{most} viewers look bac
 
 
 class Lookback:
-    """Of ``live``, from now on, or with ``history`` from its beginning. A `Link` of its server."""
+    """Past of ``live``, from now on, or with ``history`` from its beginning. A `Link` of its server."""
 
     def __init__(self, live: LiveWorld, cell: Cell, pace: Pace, history: History | None = None) -> None:
         self._live = live

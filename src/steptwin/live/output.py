@@ -46,18 +46,18 @@ class Output:
         self.write(text + "\n")
 
     def notice(self, text: str) -> None:
-        """What a user has to know."""
+        """Print a notice, which a user has to know."""
         self.line(text)
 
     def record(self, record: TraceRecord) -> None:
-        """What has happened in a world."""
+        """Print a record of a world."""
         self.line(describe(record))
 
     def frame(self, frame: FrameLine) -> None:
         self.line(str(frame))
 
     def begin(self, head: Sequence[str], announcement: Mapping[str, object]) -> None:
-        """What is served: as text, and as the ready file has it (`steptwin.live.server.Server.announcement`)."""
+        """Print what is served: as text, and as the ready file has it (`steptwin.live.server.Server.announcement`)."""
         for text in head:
             self.line(text)
 

@@ -66,7 +66,7 @@ class Companion(Protocol):
 
 
 class RunControl(Protocol):
-    """Of a debugger: decides up to where a world may go."""
+    """Control of a run by a debugger, which decides up to where a world may go."""
 
     def look_ahead(self, until: Nanos) -> tuple[Nanos, bool]:
         """The world is at the present; up to where it may go, at most to ``until``, and whether it is to stop there."""
@@ -218,7 +218,7 @@ class LiveWorld:
         return RecordedSession(self.now, len(self.world.inputs), self._recorded_bytes, is_full=False)
 
     def traffic(self) -> list[dict[str, object]]:
-        """Of each line: the programs that are connected, and what has been sent, as JSON."""
+        """Traffic of each line: the programs that are connected, and what has been sent, as JSON."""
         connected = Counter(port.line for port in self.ports)
         return [{"line": name, "clients": connected[name], **line.traffic._asdict()} for name, line in self.world.lines.items()]
 

@@ -21,7 +21,7 @@ class Calculations:
         self._sheets = sheets
 
     def quantities(self, machine: str, axis: int) -> Mapping[str, object]:
-        """What a move of an axis is made of. Raises `Misuse` for another controller, `Refusal` where there is no calculator."""
+        """Quantities of a move of an axis. Raises `Misuse` for another controller, `Refusal` where there is no calculator."""
         calculator = self._calculator(machine, axis)
         return {
             "title": calculator.model.title,

@@ -140,7 +140,7 @@ class Editors:
                 raise Refusal(TOO_MANY_TEXTS(most=MOST_DOCUMENTS))
 
     async def _elsewhere(self, call: Callable[[], T]) -> T:
-        """What a call gives that is made in the other thread."""
+        """Result of a call in the other thread."""
         if self._loop is None:
             self._loop = asyncio.new_event_loop()
             self._thread = threading.Thread(target=self._loop.run_forever, name="editor server", daemon=True)

@@ -112,7 +112,7 @@ NO_POINTS = Message("studio.no-points", "points: at least one is needed")
 
 
 class Hub:
-    """Of one subject."""
+    """State shared by all viewers of one subject."""
 
     def __init__(self, subject: Served, jogs: Jogs, around: Surroundings) -> None:
         self.subject = subject
@@ -122,7 +122,7 @@ class Hub:
         self.watches = Watches()
         self.viewers: dict[int, Viewer] = {}
         self.description = ""
-        """Of the subject, as JSON."""
+        """Description of the subject, as JSON."""
         self.descriptions = 0
         """Number of descriptions so far: a viewer with another one is sent the whole state."""
         self._described: Description | None = None

@@ -141,7 +141,7 @@ class Looking:
         self.leave()
 
     async def events(self, begin: Nanos, end: Nanos, kinds: tuple[str, ...] | None) -> dict[str, object]:
-        """What happened between two moments, whichever is shown. Raises `Misuse`, and `Refusal` if no past is kept."""
+        """Events between two moments, whichever is shown. Raises `Misuse`, and `Refusal` if no past is kept."""
         lookback = self._lookback
         if lookback is None:
             raise Refusal(NO_PAST_EVENTS())
@@ -157,7 +157,7 @@ class Looking:
     # ------------------------------------------------------------------ what the viewer is sent
 
     def message(self, may: list[str]) -> dict[str, object] | None:
-        """What there was at the moment; None for the present."""
+        """Message of the moment that is shown; None for the present."""
         self.is_changed = False
         look, lookback = self._look, self._lookback
         if look is None or lookback is None:

@@ -1,4 +1,4 @@
-"""What the studio sends without being asked: one table of messages with their members."""
+"""Messages that the studio sends without being asked: one table of messages with their members."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from steptwin.fields import Schema
 from steptwin.subject.shapes import FLAG, MOMENT, NUMBER, TEXT, WHOLE, list_of, members, or_null
 
 VERSION = 1
-"""Of the messages; in the message hello."""
+"""Version of the messages; in the message hello."""
 
 _COUNT: Schema = {"type": "integer", "minimum": 0}
 SPEED: Schema = {

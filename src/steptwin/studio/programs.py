@@ -16,7 +16,7 @@ class ProgramTexts(Protocol):
         ...
 
     def memory(self, machine: str, place: str, text: str) -> Sequence[Mapping[str, object]]:
-        """What a text takes of the memory at a place; empty for one with errors. Raises `Misuse` where there is no place."""
+        """Use of the memory at a place by a text; empty for one with errors. Raises `Misuse` where there is no place."""
         ...
 
     def files(self) -> Mapping[str, bytes]:

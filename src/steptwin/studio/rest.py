@@ -306,7 +306,7 @@ PAGE_POLICY = (
     "sandbox allow-scripts allow-downloads; default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
     "img-src data:"
 )
-"""Of pages that a campaign has made: they have no origin, and reach nothing."""
+"""Policy of pages that a campaign has made: they have no origin, and reach nothing."""
 FILE_RESPONSE: dict[str, Any] = {
     "description": "The file.",
     "content": {FILE_TYPE: {"schema": {"type": "string", "format": "binary"}}},

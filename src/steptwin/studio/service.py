@@ -46,7 +46,7 @@ class StudioService:
 
 
 def make_app(hub: Hub, clock: Callable[[], int]) -> FastAPI:
-    """What is behind the guard."""
+    """Application behind the guard."""
     app = FastAPI(title="steptwin studio", version=__version__, docs_url=None, redoc_url=None)
     Rest(hub, clock).add_to(app)
     describe_api(app, has_tokens=hub.around.gate.has_tokens)

@@ -48,7 +48,7 @@ from steptwin.wire.pcapng import capture
 RATE, BURST = 200.0, 1000.0
 """Rate limit of a viewer: requests per second, and burst; stops have a separate limit of the same size."""
 STOPS = frozenset({"stop", "stop_all"})
-"""What needs no hello, and has a limit of its own."""
+"""Requests that need no hello, and have a limit of their own."""
 MOST_WATCHES = 32
 MOST_WATCHED = 2000
 """Limit of watched points of a viewer."""

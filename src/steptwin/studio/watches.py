@@ -50,7 +50,7 @@ class SharedValues:
 
 
 class Watched:
-    """What one viewer watches. Times are of the wall clock."""
+    """Watches of one viewer. Times are of the wall clock."""
 
     __slots__ = ("_due", "_sent", "interval_ns", "number", "values")
 

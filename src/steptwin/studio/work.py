@@ -20,7 +20,7 @@ class Cancelled(Exception):
 
 @dataclass(slots=True)
 class Work:
-    """What is going on, and what it has brought. Written by its thread, read by the event loop."""
+    """Work in progress, and its results. Written by its thread, read by the event loop."""
 
     kind: str
     doing: str = ""

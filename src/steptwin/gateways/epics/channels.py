@@ -58,7 +58,7 @@ class _RecordChannel(ChannelData):
         await self.record.put(_PUTTER.get(), self.row.name, self._given(self.preprocess_value(value)))
 
     def _given(self, value: Any) -> FieldValue:
-        """What the library has read, as a number or text of Python. Raises `Misuse`."""
+        """Value that the library has read, as a number or text of Python. Raises `Misuse`."""
         row = self.row
         if row.type is not FieldType.STATES:
             return str(value) if row.type is FieldType.STRING else float(value) if row.type is FieldType.DOUBLE else int(value)
@@ -137,7 +137,7 @@ def _alarm(alarm: RecordAlarm) -> dict[str, Any]:
 
 
 def _limits(record: Record, row: FieldRow) -> dict[str, float]:
-    """Of display and control, as the library calls them."""
+    """Limits of display and control, as the library calls them."""
     if row.quantity is FieldQuantity.PURE or row.type in (FieldType.STRING, FieldType.STATES):
         return {}
     low, high = ends_of(record.limits_of(row))

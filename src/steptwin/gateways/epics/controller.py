@@ -1,4 +1,4 @@
-"""What the records of one controller share: its samples, and its commands."""
+"""Shared part of the records of one controller: its samples, and its commands."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ class EpicsController:
             await record.take(sample, is_sure=is_sure)
 
     async def read(self, points: Sequence[str]) -> list[float | None]:
-        """Of this controller. Raises `SteptwinError`."""
+        """Values of points of this controller. Raises `SteptwinError`."""
         if not points:
             return []
         found = (await self._subject.do(ReadPoints(tuple(f"{self.name}.{point}" for point in points)))).value

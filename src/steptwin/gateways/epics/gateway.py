@@ -45,7 +45,7 @@ class EpicsGateway:
         self._failed: str | None = None
         """Why nothing is published any more."""
         self._error: BaseException | None = None
-        """What a look at a controller has ended with."""
+        """Error that ended the reading of a controller."""
         self._leaving: set[asyncio.Task[None]] = set()
 
     @property

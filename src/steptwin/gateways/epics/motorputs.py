@@ -1,4 +1,4 @@
-"""What a put to each field of a motor record does."""
+"""Effects of a put to each field of a motor record."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ BETWEEN = SECOND // 10
 RELATIVE = 1e-6
 """Registers have numbers of 32 bits."""
 _LOOK_AHEAD_S = 0.3
-"""Of a jog: two looks at it, and the time that a jog takes to end."""
+"""Look-ahead of a jog: two samples of it, and the time that a jog takes to end."""
 _ALARMS = {
     StatusLevel.OK.value: NO_ALARM,
     StatusLevel.WARNING.value: RecordAlarm(AlarmKind.STATE, AlarmSeverity.MINOR),
@@ -58,7 +58,7 @@ _STAT = MOTOR_FIELDS["STAT"].states
 
 @dataclass(slots=True)
 class RecordMotion:
-    """What the record waits for. ``target``: dial position of a move; ``button``: the field that is 1 meanwhile."""
+    """Motion for which the record waits. ``target``: dial position of a move; ``button``: the field that is 1 meanwhile."""
 
     target: float | None = None
     button: str | None = None
@@ -135,7 +135,7 @@ class MotorRecord(RecordBase):
         return per.get(row.quantity, self.unit)
 
     def limits_of(self, row: FieldRow) -> Limits | None:
-        """Of positions those of the record; where it has none, those of the axis."""
+        """Limits: of positions those of the record; where it has none, those of the axis."""
         if row.quantity is FieldQuantity.VELOCITY:
             return Limits(0.0, self._number("VMAX")) if self.values["VMAX"] else None
         if row.quantity not in (FieldQuantity.USER, FieldQuantity.DIAL):
@@ -299,7 +299,7 @@ class MotorRecord(RecordBase):
             self._end(self._motion, state)
 
     def _is_over(self, motion: RecordMotion, time: Nanos, *, has_moved: bool) -> bool:
-        """Of an axis that rests."""
+        """Whether the motion of an axis that rests has ended."""
         if motion.rests_since is None:
             motion.rests_since = time
         if time >= motion.rests_since + (ON_ITS_WAY if self._jog is not None or not motion.has_begun else BETWEEN):

@@ -38,14 +38,14 @@ _TYPES: dict[FieldType, Type] = {
     FieldType.STATES: NTEnum.buildType(extra=[("display", ("S", None, [("description", "s")]))]),
 }
 _STATUS = {AlarmKind.NO_ALARM: 0, AlarmKind.STATE: 1, AlarmKind.HIGH: 1, AlarmKind.COMM: 2, AlarmKind.UDF: 6}
-"""Of alarm_t: none, device, driver, undefined."""
+"""Status of alarm_t: none, device, driver, undefined."""
 _FORMS = ("Default", "String", "Binary", "Decimal", "Hex", "Exponential", "Engineering")
 """Choices of ``display.form``."""
 _NANO = 1_000_000_000
 
 
 class _ShownField(NamedTuple):
-    """What clients of a channel see that changes."""
+    """Changing values that clients of a channel see."""
 
     value: FieldValue
     status: int
@@ -63,7 +63,7 @@ class PvChannel:
     def __init__(self, provider: RecordProvider, name: str, found: tuple[Record, FieldRow], peer: str) -> None:
         self.name = name
         self.account = ""
-        """Of the client, as it says itself; known after its first put."""
+        """Account of the client, as it says itself; known after its first put."""
         record, row = found
         self._provider = provider
         self._record = record

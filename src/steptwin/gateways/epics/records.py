@@ -10,7 +10,7 @@ from steptwin.datasheet import Limits
 from steptwin.errors import Misuse
 
 FieldValue: TypeAlias = int | float | str
-"""Of a field with states the number of one."""
+"""Value of a field; where it has states, the number of one."""
 
 
 class FieldType(enum.Enum):
@@ -22,7 +22,7 @@ class FieldType(enum.Enum):
 
 
 class FieldQuantity(enum.Enum):
-    """What a number is, which gives its unit and its limits."""
+    """Quantity of a number, which gives its unit and its limits."""
 
     PURE = "a number"
     VALUE = "the value of a point"
@@ -81,7 +81,7 @@ TOO_LARGE = RecordAlarm(AlarmKind.HIGH, AlarmSeverity.INVALID)
 
 
 class Record(Protocol):
-    """What is behind the channels of a record."""
+    """Record behind its channels."""
 
     @property
     def precision(self) -> int: ...
@@ -155,7 +155,7 @@ class RecordBase:
 
 
 def found_field(records: dict[str, Record], name: str) -> tuple[Record, FieldRow]:
-    """Of ``RECORD`` or ``RECORD.FIELD``. Raises `KeyError` for what is not there."""
+    """Record and field of ``RECORD`` or ``RECORD.FIELD``. Raises `KeyError` for what is not there."""
     of, _, field = name.partition(".")
     record = records[of]
     row = record.field(field or DEFAULT_FIELD)

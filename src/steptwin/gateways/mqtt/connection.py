@@ -66,10 +66,10 @@ class BrokerLink(Protocol):
 
 
 class Face(Protocol):
-    """What a gateway says to a broker, and does for it."""
+    """Side of a gateway that a broker sees."""
 
     def will(self) -> Publication:
-        """What the broker publishes when this session is lost. Called once for each session, before all others."""
+        """Publication of the broker when this session is lost. Called once for each session, before all others."""
         ...
 
     async def run(self, link: BrokerLink) -> None:
@@ -256,7 +256,7 @@ async def _end(tasks: Iterable[asyncio.Task[None]]) -> None:
 
 
 _LOST = ("unspecified error", "disconnected during message iteration")
-"""What the library calls it."""
+"""Names of the library for it."""
 
 
 def _words(error: Exception) -> str:

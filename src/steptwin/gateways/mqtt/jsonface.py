@@ -33,7 +33,7 @@ from steptwin.subject.dispatch import failure
 from steptwin.subject.following import Filter
 
 KINDS = frozenset({"status", "report", "note", "fault", "button", "input"})
-"""Of events that are published."""
+"""Kinds of events that are published."""
 CLOCK_S = 1.0
 """How often the time is published."""
 MOST_COMMANDS = 1000
@@ -53,10 +53,10 @@ class JsonFace:
         self._following = subject.follow(Filter(KINDS), spec.store)
         self._instance = secrets.token_hex(8)
         self._texts: dict[str, ControllerText] = {}
-        """What has been published in this session, by controller."""
+        """Texts that have been published in this session, by controller."""
         self._doing: set[asyncio.Task[None]] = set()
         self._others: dict[str, bytes] = {}
-        """What is known of whoever uses these topics, until this gateway does."""
+        """Messages of whoever uses these topics, until this gateway does."""
         self._is_online = False
 
     def close(self) -> None:

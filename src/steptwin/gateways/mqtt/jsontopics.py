@@ -64,7 +64,7 @@ class GroupText:
         self._has_answers = len(names) > len(group.points)
         self._read = values_of(group.points)
         self._typed = [*(point.typed for point in group.points), bool]
-        """What gives each value its type; the last one that of `ANSWERS`."""
+        """Types of the values; the last one is that of `ANSWERS`."""
         self._names = [encode(name).decode() for name in names]
         self._values: tuple[PointValue, ...] = ()
         self._texts: list[str] = []
@@ -129,7 +129,7 @@ class Topics:
         return f"{self.base}/{own}"
 
     def describe(self, commands: Iterable[str]) -> dict[str, object]:
-        """What there is: units and meanings, once."""
+        """Description of the values: units and meanings, once."""
         controllers = [
             {
                 "name": part.name,

@@ -55,7 +55,7 @@ class _Change(NamedTuple):
 
 
 class _Device:
-    """What is known of a device, or of the edge node."""
+    """State of a device, or of the edge node."""
 
     def __init__(self, rows: tuple[MetricRow, ...]) -> None:
         self.rows = rows
@@ -66,7 +66,7 @@ class _Device:
         self.is_born = False
         """In this session."""
         self.state: State | None = None
-        """Of the last sample."""
+        """State of the last sample."""
         self.groups: dict[str, list[tuple[MetricRow, GatewayPoint]]] = {}
         """Metrics that show points, by the part of a state in which these are."""
         for row in rows:

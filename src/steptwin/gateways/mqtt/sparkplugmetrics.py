@@ -37,7 +37,7 @@ class MetricRow:
     start: SparkplugValue = None
     """The value of one without a point."""
     command: Callable[[SparkplugValue], Command] | None = None
-    """What a command to it does; raises `Misuse`. None where there is none."""
+    """Command that a value sent to it means; raises `Misuse`. None where there is none."""
 
     def birth(self, value: SparkplugValue, at: int) -> SparkplugMetric:
         return SparkplugMetric(

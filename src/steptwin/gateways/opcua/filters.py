@@ -22,7 +22,7 @@ class ChangeFilter(NamedTuple):
     band: float = 0.0
 
     def trigger_only(self) -> ua.DataChangeFilter:
-        """What the library is to look at."""
+        """Filter that the library applies."""
         return ua.DataChangeFilter(self.trigger)
 
 

@@ -54,7 +54,7 @@ def standard(number: Any) -> ua.NodeId:
 
 
 def status(code: Any) -> ua.StatusCode:
-    """Of ``ua.StatusCodes``."""
+    """Status for one of ``ua.StatusCodes``."""
     return ua.StatusCode(code)
 
 

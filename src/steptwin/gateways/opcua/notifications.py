@@ -32,7 +32,7 @@ FIELDS = [
     ("Number", ua.VariantType.Int64),
     ("Cause", ua.VariantType.Int64),
 ]
-"""Of the type of event, besides those that every event has."""
+"""Fields of the type of event, besides those that every event has."""
 SERVER = ""
 
 

@@ -61,7 +61,7 @@ class Security(UserManager):
 
     @property
     def policies(self) -> Sequence[ua.SecurityPolicyType]:
-        """What is permitted: at least what ``security`` names."""
+        """Permitted policies: at least what ``security`` names."""
         if self._options.certificate is None:
             return (ua.SecurityPolicyType.NoSecurity,)
         least = self._options.security

@@ -1,4 +1,4 @@
-"""What is behind the nodes: present values, commands, and the values of what clients subscribe to."""
+"""Values and commands behind the nodes: present values, commands, and the values of what clients subscribe to."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class WatchedNodes:
         self._notified: dict[ua.NodeId, PointValue] = {}
         """The last value of each; missing: the next one is notified, whatever it is."""
         self._state: State | None = None
-        """Of the last sample; None: everything has to be looked at."""
+        """State of the last sample; None: every value has to be compared."""
 
     def add(self, node: PointNode) -> None:
         self._groups.setdefault(node.point.group, {})[node.id] = node
@@ -91,11 +91,11 @@ class NodeService:
         self._arrays = builder.arrays
         self._past = past
         self._watched_arrays: dict[ua.NodeId, int] = {}
-        """What has been subscribed to, and publications until it is read again."""
+        """Subscribed arrays, and publications until they are read again."""
         self._of_node = builder.nodes()
         self._leases = JogLeases(subject)
         self._watched: dict[str, WatchedNodes] = {}
-        """What has been subscribed to, by controller."""
+        """Subscribed nodes, by controller."""
 
     # ------------------------------------------------------------------ values
 

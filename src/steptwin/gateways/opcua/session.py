@@ -70,7 +70,7 @@ ANONYMOUS = User(role=UserRole.Anonymous)
 
 
 class SessionRequests(Protocol):
-    """What sessions ask of the gateway."""
+    """Requests of sessions to the gateway."""
 
     async def refresh(self, nodes: Iterable[ua.NodeId]) -> None:
         """Give the variables among ``nodes`` their present values."""
@@ -207,7 +207,7 @@ class MonitoredItem:
     """The client's."""
     filter: ChangeFilter
     size: int = 0
-    """Of the queue of the library."""
+    """Size of the queue of the library."""
     notified: ua.DataValue | None = None
     """The value that the client knows."""
 

@@ -28,7 +28,7 @@ MODULE = "steptwin.live.studio.branch"
 
 @dataclass(frozen=True, slots=True)
 class BranchStart:
-    """What the process of a branch is given on its standard input, pickled. ``source`` is the name of the description."""
+    """Start of a branch, which its process reads from its standard input, pickled. ``source`` is the name of the description."""
 
     own: StudioOptions
     ready_file: Path

@@ -183,7 +183,7 @@ def _changed(database: Path) -> str:
 
 
 def _result(report: Path) -> dict[str, object] | None:
-    """Of a campaign that has ended; None where it has not."""
+    """Result of a campaign that has ended; None where it has not."""
     with suppress(SteptwinError, LookupError, TypeError, ValueError, AttributeError):
         plain = json.loads(read_recorded(report))
         return {

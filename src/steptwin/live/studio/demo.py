@@ -19,7 +19,7 @@ FOLDER = Path(__file__).with_name("demo_machine")
 NAME = "demo"
 HOST = "127.0.0.1"
 PORTS = (5020, 5021, 5022)
-"""Of the bus over Modbus TCP and RTU over TCP, and of the chips, as those of `steptwin serve`."""
+"""Ports of the bus over Modbus TCP and RTU over TCP, and of the chips, as those of `steptwin serve`."""
 
 
 def demo_world(options: UpOptions, *, free_ports: bool = False) -> World:

@@ -38,7 +38,7 @@ class OpenedPage:
     def __init__(self, url: str, *, is_secret: bool, port: int) -> None:
         """Raises `Misuse` where the file cannot be written."""
         self.file: Path | None = None
-        """What the browser reads the address from; None if that is no secret."""
+        """File from which the browser reads the address; None if that is no secret."""
         if is_secret:
             self.file = runtime_directory() / f"studio-{port}.html"
             try:

@@ -22,7 +22,7 @@ T = TypeVar("T")
 STEPS = 800
 """Positions of a motion that are given for a stretch, beside the ends of its parts."""
 MOST_VALUES = 4000
-"""Of a point; where there are more, it is read in equal steps."""
+"""Most values of a point; where there are more, it is read in equal steps."""
 MOST_RUNS = 500
 """The last ones."""
 COUNT_OF_POINTS = Message("live.count-of-points", "points: {count} are given: permitted are 1 to {most}")
@@ -70,7 +70,7 @@ class WorldPlant:
         return None
 
     async def _read(self, work: Callable[[HistoryDatabase], T]) -> T:
-        """What ``work`` reads, in a thread. Raises `Refusal` where there is no history."""
+        """Read with ``work`` in a thread. Raises `Refusal` where there is no history."""
         url = self._url
         if url is None:
             raise Refusal(NO_HISTORY(table=HISTORY))
@@ -155,7 +155,7 @@ def _compare(
 
 
 def _plain(value: object) -> object:
-    """Of numpy: for JSON."""
+    """Number of numpy as one for JSON."""
     return None if value is None or value != value else value if isinstance(value, str) else float(value)  # type: ignore[arg-type]  # noqa: PLR0124
 
 

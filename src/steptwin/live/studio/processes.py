@@ -64,7 +64,7 @@ class ChildProcesses:
         return str(next(point["url"] for point in points if point["kind"] == "http"))
 
     def end(self, process: Process) -> bytes:
-        """What it has written about errors."""
+        """End it; return what it has written about errors."""
         self._running.discard(process)
         process.terminate()
         return process.communicate()[1]

@@ -329,7 +329,7 @@ class _Page:
 
 
 def _arrangement(live: LiveWorld, path: Path | None) -> WorldArrangement:
-    """Of the description at ``path``, or of a session, whose description is in no file."""
+    """Arrangement of the description at ``path``, or of a session, whose description is in no file."""
     shown = live.subject.description
     names = [part.name for part in (*shown.axes, *shown.elements)]
     return WorldArrangement(live.world.spec, names, None if path is None or is_session(path) else path)
@@ -342,7 +342,7 @@ def _campaigns(path: Path | None) -> FolderCampaigns | None:
 
 @dataclass(slots=True)
 class _Links:
-    """Of viewers and of devices: when viewers have gone, jogs end, and then devices can be left."""
+    """Links of viewers and of devices: when viewers have gone, jogs end, and then devices can be left."""
 
     service: StudioService
     work: DeviceWork
@@ -362,7 +362,7 @@ TEXTS_OF_A_DEVICE = Message("live.texts-of-a-device", "{machine} is a device: th
 
 
 class _NoPrograms:
-    """Of devices, whose program texts are not known."""
+    """Programs of devices, whose texts are not known."""
 
     def list(self) -> Sequence[Mapping[str, object]]:
         return ()

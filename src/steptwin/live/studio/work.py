@@ -1,4 +1,4 @@
-"""What the studio does on lines of this computer: the search of ``steptwin scan``, the checks of ``steptwin verify``."""
+"""Work of the studio on lines of this computer: the search of ``steptwin scan``, the checks of ``steptwin verify``."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ class OpenLink:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Transport:
     kind: str
-    """Of its end points: ``rtu-tcp``."""
+    """Kind of its end points: ``rtu-tcp``."""
     is_address: bool
     """Whether the value of its key is an address on which it listens."""
     has_several: bool

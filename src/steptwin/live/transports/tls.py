@@ -229,7 +229,7 @@ class _Entrance(asyncio.Protocol):
             link.entrances.discard(self)
 
     def data_received(self, data: bytes) -> None:
-        """What comes with the end of the handshake."""
+        """Take bytes that come with the end of the handshake."""
         self._received += data
 
     def write(self, data: bytes) -> None:
