@@ -259,6 +259,11 @@ def test_commands_that_do_not_concern_the_position_are_not_counted_as_followed()
     assert codes("L200\n" + "W1\n" * 30 + "E\nB64\nR\nG640")[-1:] == ["M221"]
 
 
+def test_register_9_is_the_position_counter() -> None:
+    assert codes("b640\nr\nh", B)[-1:] == ["M221"]
+    assert "M221" not in codes("b640\nr\n:64\n>9\nh", B)
+
+
 def test_h_leads_to_0_of_what_the_counter_shows() -> None:
     """The counter shows 2^24 - 64, and the way to 0 is as long: after it G begins one round of 24 bits lower."""
     found = check("=64\nb128\nr\nh\nr\ng64", B).diagnostics

@@ -24,6 +24,9 @@ def value(name: str) -> Resource:
 
 
 ANY_AXIS, ANY_PIN = axis(""), pin("")
+SIGNALS = pin("BOOST"), pin("DIRECTION"), pin("B1")
+OPERANDS = ANY_PIN, value("variable"), value("register5")
+"""Of + - * /: functions 46 and 58 make lines or a register of the number."""
 
 WBC = """\
 x = AIN2 + $D4
@@ -99,15 +102,30 @@ def test_statements_of_wbc() -> None:
         ("Z21", StatementUse((pin("B21"),), waits=True)),
         ("T2", StatementUse(writes=(pin("B2"),))),
         ("C1", StatementUse(writes=(pin("B1"),))),
-        ("T40", StatementUse()),  # a function
-        ("!12", StatementUse((value("variable"),), (ANY_PIN,))),
-        ("?12", StatementUse((ANY_PIN,), (value("variable"),))),
-        *((text, StatementUse(writes=(value("variable"),))) for text in (":5", "+5", "-5", "*5", "/5", "<1")),
+        ("T", StatementUse((value("variable"),), (ANY_PIN, *SIGNALS), keeps=True)),
+        ("T40", StatementUse(writes=SIGNALS)),
+        ("T41", StatementUse()),
+        ("T80", StatementUse(writes=(value("flag80"),), keeps=True)),
+        ("!12", StatementUse((value("variable"), value("register10")), (pin("B1"), pin("B2")))),
+        ("?12", StatementUse((pin("B1"), pin("B2")), (value("variable"),))),
+        (":5", StatementUse(writes=(value("variable"),))),
+        ("+5", StatementUse(OPERANDS, (value("variable"), value("flag87")), keeps=True)),
+        ("-5", StatementUse(OPERANDS, (value("variable"), value("flag87")), keeps=True)),
+        ("*5", StatementUse(OPERANDS, (value("variable"),))),
+        ("/5", StatementUse(OPERANDS, (value("variable"), value("register10")))),
+        ("<1", StatementUse((value("register1"),), (value("variable"),))),
+        (">1", StatementUse((value("variable"),), (value("register1"),))),
+        (">9", StatementUse((value("variable"),), (axis(1),))),
+        ("=64", StatementUse(writes=(axis(1),))),
+        ("N2", StatementUse(writes=(pin("N"),))),
+        ("J", StatementUse((value("variable"),), governs=range(1 << 16))),
+        ("I80H1", StatementUse((value("flag80"),), governs=range(1 << 16))),
+        ("U1", StatementUse(waits=True)),
         ("I3H1", StatementUse((pin("B3"),), governs=range(1 << 16))),
         ("W100", StatementUse(waits=True)),
-        ("R", StatementUse((axis(1),), (axis(1),), waits=True)),
-        (")4", StatementUse((axis(1), pin("B4")), (axis(1),), waits=True)),
-        ("(4", StatementUse((axis(1), pin("B4")), (axis(1),), waits=True)),
+        ("R", StatementUse((axis(1),), (axis(1), *SIGNALS), waits=True)),
+        (")4", StatementUse((axis(1), pin("B4")), (axis(1), *SIGNALS), waits=True)),
+        ("(4", StatementUse((axis(1), pin("B4")), (axis(1), *SIGNALS), waits=True)),
         ("V300", StatementUse()),
         ("@7", StatementUse()),
     ],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from itertools import pairwise
 
 from steptwin.controlflow import ControlFlow
@@ -12,25 +12,22 @@ from steptwin.explain.blocks import Timing, blocks_of
 from steptwin.explain.loops import TextLoop, executed, text_loops
 from steptwin.explain.model import EndlessLoop, ExplainedStatement, Explanation, LongWait, MemoryPart, MemorySection, Usage
 from steptwin.m1486.check import check
-from steptwin.m1486.commands import TABLE, When, when
+from steptwin.m1486.commands import ArgType, When, when
 from steptwin.m1486.commands import rows as find_rows
+from steptwin.m1486.commanduse import ChipState, Control, NextMove, Wait
 from steptwin.m1486.drive import speed_curve
 from steptwin.m1486.flow import FlowAnalysis, Settings, follow
 from steptwin.m1486.functions import USER_FLAGS
-from steptwin.m1486.lines import LINES, STEP_DIRECTION, Interface, line_group
+from steptwin.m1486.lines import LINES, STEP_DIRECTION, Interface
 from steptwin.m1486.microsteps import HIGHEST_SPEED
-from steptwin.m1486.structure import CommandStream, stored_bits, streams
+from steptwin.m1486.structure import CommandStream, is_computed, stored_bits, streams
 from steptwin.m1486.successors import flow_of
 from steptwin.m1486.syntax import ChipCommand, JumpCondition, parse
 from steptwin.m1486.variants import DEFAULT, Store, Variant
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.motion.ramps import plan_distance
+from steptwin.tables import complete
 
-_WRITES = frozenset("CT!")
-_JUMPS = frozenset("J'")
-_NUMERIC = find_rows(":")[0].section
-_CALCULATES = frozenset(row.key for row in TABLE if row.section == _NUMERIC) - {">", "?", "!"}
-"""What gives the internal variable another value, besides the levels of lines."""
 _ERRORS = "steptwin check finds errors in this program: a chip drops such commands and, unless function 44 is ON, stops there"
 _NO_INTERRUPTS = "an M1486 has no interrupts: K and LIMIT stop its motion, and function 51 decides whether the program goes on"
 
@@ -75,7 +72,10 @@ class _Chip:
         self._time = statement_time
         self._flow: ControlFlow = flow_of(stream, variant, interface)
         self._paths: FlowAnalysis = follow(stream, variant, interface)
-        self._starts = [0, *(i for i, c in enumerate(self._commands) if c.key == "\\" and stream.in_file[i] is None)]
+        self._starts = [
+            0,
+            *(i for i, c in enumerate(self._commands) if c.use.control is Control.RESTART and stream.in_file[i] is None),
+        ]
         self._statements = [
             ExplainedStatement(source.position(command.span.start)[0], str(command)) for command in self._commands
         ]
@@ -118,9 +118,11 @@ class _Chip:
             asked = command.argument
             what = f"B{asked.line}" if asked.line in LINES else f"flag {asked.line}"
             return f"{what} {'high' if asked.high else 'low'}"
-        if command.key in "IE" and len(self._flow.after[number]) > 1:
-            return "else" if command.key == "I" else "done" if target == number + 1 else "again"
-        if command.key in "J'" and command.from_variable:
+        if command.use.control is Control.BRANCH:
+            return "else" if len(self._flow.after[number]) > 1 else ""
+        if command.use.control is Control.REPEAT and len(self._flow.after[number]) > 1:
+            return "done" if target == number + 1 else "again"
+        if is_computed(command):
             return f"variable = {self._commands[target].number}" if target < len(self._commands) else ""
         return ""
 
@@ -130,25 +132,33 @@ class _Chip:
         command = self._commands[index]
         if when(command.key, command.number) is not When.QUEUED:
             return Timing(0)
-        match command.key:
-            case "W":
-                if command.number is None:
-                    return Timing(None, "the time in the internal variable")
-                return Timing(max(self._time, command.number * MILLISECOND // self._variant.clock))
-            case "R":
-                known = {move_duration(state, self._variant) for state in self._paths.states.get(index, ())}
-                duration = known.pop() if len(known) == 1 else None
-                return Timing(self._time, "the end of the motion") if duration is None else Timing(max(self._time, duration))
-            case "O" | "Z" | ")" | "(":
-                return Timing(self._time, self._line_text(command))
-            case "U":
-                return Timing(self._time, "the serial line, if it is not free")
+        return _TIMINGS[command.use.waits](self, index)
+
+    def _own_time(self, index: int) -> Timing:
         return Timing(self._time)
 
-    def _line_text(self, command: ChipCommand) -> str:
-        if command.key in "OZ":
-            return f"{self._line(command)} {'high' if command.key == 'O' else 'low'}"
-        return f"the end of the seek, {self._line(command)}"
+    def _given_time(self, index: int) -> Timing:
+        number = self._commands[index].number
+        if number is None:
+            return Timing(None, "the time in the internal variable")
+        return Timing(max(self._time, number * MILLISECOND // self._variant.clock))
+
+    def _move_time(self, index: int) -> Timing:
+        known = {move_duration(state, self._variant) for state in self._paths.states.get(index, ())}
+        duration = known.pop() if len(known) == 1 else None
+        return Timing(self._time, "the end of the motion") if duration is None else Timing(max(self._time, duration))
+
+    def _line_time(self, index: int) -> Timing:
+        return Timing(self._time, self._level_text(self._commands[index]))
+
+    def _seek_time(self, index: int) -> Timing:
+        return Timing(self._time, f"the end of the seek, {self._line(self._commands[index])}")
+
+    def _sending_time(self, index: int) -> Timing:
+        return Timing(self._time, "the serial line, if it is not free")
+
+    def _level_text(self, command: ChipCommand) -> str:
+        return f"{self._line(command)} {'high' if command.use.level else 'low'}"
 
     @staticmethod
     def _line(command: ChipCommand) -> str:
@@ -187,10 +197,11 @@ class _Chip:
         registers: dict[int, tuple[set[int], set[int]]] = {}
         for index in sorted(reached):
             command, line = self._commands[index], self._statements[index].line
-            for used in _lines_of(command):
-                (written if command.key in _WRITES else read).setdefault(used, set()).add(line)
-            if command.key in "<>" and command.number is not None:
-                registers.setdefault(command.number, (set(), set()))[command.key == ">"].add(line)
+            for used in command.lines:
+                (written if _writes_lines(command) else read).setdefault(used, set()).add(line)
+            if command.number is not None and find_rows(command.key)[0].kind is ArgType.REGISTER:
+                writes = ChipState.VARIABLE not in command.use.writes
+                registers.setdefault(command.number, (set(), set()))[writes].add(line)
         lines = [
             Usage(f"B{n}", tuple(sorted(read.get(n, ()))), tuple(sorted(written.get(n, ())))) for n in sorted({*read, *written})
         ]
@@ -198,7 +209,7 @@ class _Chip:
         goals = [
             Usage(str(self._commands[i].number), (self._statements[i].line,), ())
             for i in sorted(reached)
-            if self._commands[i].key == "G" and self._commands[i].number is not None
+            if self._commands[i].use.next_move is NextMove.TO_POSITION and self._commands[i].number is not None
         ]
         return {"lines": lines, "registers": kept, "positions": goals}
 
@@ -210,11 +221,11 @@ class _Chip:
         for index in sorted(reached):
             command = self._commands[index]
             line, text = self._statements[index]
-            if command.key in "OZ" and len(command.key) == 1:
-                found.append((index, LongWait(line, text, f"only something outside makes {self._line_text(command)}")))
-            elif command.key in (")", "("):
+            if command.use.waits is Wait.LINE:
+                found.append((index, LongWait(line, text, f"only something outside makes {self._level_text(command)}")))
+            elif command.use.waits is Wait.SEEK:
                 found.append((index, LongWait(line, text, f"only {self._line(command)} ends the seek", "K or LIMIT")))
-            elif command.key == "R" and index in endless:
+            elif command.use.waits is Wait.MOTION and index in endless:
                 found.append((index, LongWait(line, text, "after G+ or G- the move has no end", "K or LIMIT")))
         for loop in text_loops(self._flow, reached):
             reason = self._polling(loop)
@@ -231,7 +242,7 @@ class _Chip:
         work = [
             n
             for i, c in enumerate(self._commands)
-            if c.key in ("G+", "G-") and i in self._paths.states
+            if c.use.next_move is NextMove.ENDLESS and i in self._paths.states
             for n in self._flow.next[i]
         ]
         while work:
@@ -239,16 +250,18 @@ class _Chip:
             if index in seen or index >= len(self._commands):
                 continue
             seen.add(index)
-            if self._commands[index].key not in ("F", "B", "G", "H", "\\"):
+            use = self._commands[index].use
+            if ChipState.DISTANCE not in use.writes or use.next_move in (NextMove.ENDLESS, NextMove.REVERSED):
                 work += self._flow.next[index]
         return seen
 
     def _polling(self, loop: TextLoop) -> str:
         """Until when a loop repeats, if that depends only on what it does not change itself; empty otherwise."""
         done = [self._commands[i] for i in executed(self._flow, loop) if i < len(self._commands)]
-        if not loop.exits or any(command.from_variable and command.key in _WRITES for command in done):
+        if not loop.exits or any(command.from_variable and _writes_lines(command) for command in done):
             return ""
-        written = {line for command in done if command.key in _WRITES for line in (*_lines_of(command), command.number)}
+        written = {line for command in done if _writes_lines(command) for line in command.lines}
+        written |= {command.number or 0 for command in done if ChipState.FLAGS in command.use.writes}
         names: dict[str, None] = {}
         flags: dict[str, None] = {}
         for exit_ in (self._commands[i] for i in loop.exits):
@@ -257,7 +270,7 @@ class _Chip:
                 names[f"B{asked.line}"] = None
             elif isinstance(asked, JumpCondition) and asked.line in USER_FLAGS and asked.line not in written:
                 flags[f"flag {asked.line}"] = None
-            elif exit_.key in _JUMPS and exit_.from_variable and (read := self._only_read(done)):
+            elif is_computed(exit_) and (read := self._only_read(done)):
                 names.update(dict.fromkeys(f"B{line}" for line in read if line not in written))
             else:
                 return ""
@@ -268,24 +281,33 @@ class _Chip:
     @staticmethod
     def _only_read(done: Collection[ChipCommand]) -> Sequence[int]:
         """The lines from which the internal variable has its value, if nothing else gives it one."""
-        if any(command.key in _CALCULATES for command in done):
+        given = [command for command in done if ChipState.VARIABLE in command.use.writes]
+        if any(find_rows(command.key)[0].kind is not ArgType.LINES for command in given):
             return ()
-        return sorted({line for command in done if command.key == "?" for line in _lines_of(command)})
+        return sorted({line for command in given for line in command.lines})
 
     def _loops(self) -> list[EndlessLoop]:
         found: list[EndlessLoop] = []
         for loop in self._flow.without_way_out(self._starts):
-            reads = {f"B{line}" for i in loop if self._commands[i].key not in _WRITES for line in _lines_of(self._commands[i])}
+            reads = {f"B{line}" for i in loop if not _writes_lines(self._commands[i]) for line in self._commands[i].lines}
             found.append(EndlessLoop(tuple(loop), tuple(sorted(reads, key=lambda name: int(name[1:]))), ()))
         return found
 
 
-def _lines_of(command: ChipCommand) -> Sequence[int]:
-    """The lines that a command names."""
-    if isinstance(command.argument, JumpCondition):
-        return (command.argument.line,) if command.argument.line in LINES else ()
-    if command.number is None:
-        return ()
-    if command.key in "?!":
-        return tuple(line_group(command.number) or ())
-    return (command.number,) if command.key in ("C", "T", "O", "Z", ")", "(") and command.number in LINES else ()
+def _writes_lines(command: ChipCommand) -> bool:
+    return ChipState.LINES in command.use.writes
+
+
+_TIMINGS: Mapping[Wait, Callable[[_Chip, int], Timing]] = complete(
+    "wait",
+    Wait,
+    "timing",
+    {
+        Wait.NOTHING: _Chip._own_time,
+        Wait.TIME: _Chip._given_time,
+        Wait.LINE: _Chip._line_time,
+        Wait.MOTION: _Chip._move_time,
+        Wait.SEEK: _Chip._seek_time,
+        Wait.SENDING: _Chip._sending_time,
+    },
+)

@@ -72,7 +72,8 @@ def m1486_grammar() -> Grammar:
     named = {spec.key for spec in TABLE if spec.kind in _NAMED}
     values = {key: [spec.values or () for spec in TABLE if (spec.key, spec.kind) == (key, ArgType.NUMBER)] for key in named}
     numbers = [(key, str(value)) for key, found in values.items() for permitted in found for value in permitted]
-    numeric = {key for key in keys - named - labels if takes_number(key)} - {"I", "X"}
+    others = {spec.key for spec in TABLE if spec.kind in (ArgType.CONDITION, ArgType.ADDRESS)}
+    numeric = {key for key in keys - named - labels - others if takes_number(key)}
     letters_of = {
         "keyword.control.m1486": {spec.key for spec in TABLE if spec.section == "VII.1" and spec.key not in named},
         "keyword.other.m1486": {spec.key for spec in TABLE if spec.section != "VII.1" or spec.key in named},

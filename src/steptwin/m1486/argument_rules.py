@@ -8,13 +8,14 @@ from dataclasses import replace
 from steptwin.diagnostics import Diagnostic, Fix
 from steptwin.m1486 import findings
 from steptwin.m1486.commands import ArgType, CommandSpec, find, grouped, permitted_text, range_text, rows
+from steptwin.m1486.commanduse import ChipState, Wait
 from steptwin.m1486.functions import CARRY, is_reserved
-from steptwin.m1486.lines import LINES, Interface, line_group
+from steptwin.m1486.lines import LINES, Interface
 from steptwin.m1486.registers import UPLOADS
+from steptwin.m1486.structure import is_computed
 from steptwin.m1486.syntax import ChipCommand, JumpCondition
 from steptwin.m1486.variants import VARIANTS, Variant
 
-_REFUSES_OCCUPIED = frozenset("CT!OZ()")
 _INSTEAD_OF_ZERO = {"=": "C100", "G": "H"}
 """Zero is no distance and no position; other commands express the intention."""
 
@@ -23,11 +24,11 @@ def free_labels(commands: Iterable[ChipCommand], variant: Variant) -> Mapping[in
     """For labels that the variant does not have others that are free; empty if there are too few, or labels are computed."""
     used: set[int] = set()
     for command in commands:
-        if command.key in ("J", "'") and command.from_variable:
+        if is_computed(command):
             return {}
         if isinstance(command.argument, JumpCondition):
             used.add(command.argument.label)
-        elif command.key in ("@", "J", "'") and command.number is not None:
+        elif command.number is not None and rows(command.key)[0].kind is ArgType.LABEL:
             used.add(command.number)
     wrong = sorted(label for label in used if label > variant.labels)
     free = [label for label in range(1, variant.labels + 1) if label not in used]
@@ -57,14 +58,6 @@ def number_problem(command: ChipCommand, number: int, variant: Variant, interfac
     return _reserved(command, spec, number) or _occupied(command, spec, number, interface)
 
 
-def lines_of(spec: CommandSpec, number: int) -> range:
-    """The I/O lines that a command with this number reads or writes."""
-    if spec.kind is ArgType.LINE or (spec.kind is ArgType.CONDITION and number in LINES):
-        return range(number, number + 1)
-    group = line_group(number) if spec.kind is ArgType.LINES else None
-    return group or range(0)
-
-
 def lines_text(lines: range | list[int]) -> str:
     return ", ".join(f"B{line}" for line in lines)
 
@@ -78,7 +71,7 @@ def _out_of_range(command: ChipCommand, number: int, variant: Variant) -> Diagno
     if kind in (ArgType.LABEL, ArgType.ADDRESS):
         subject = f"label {grouped(number)}" if kind is ArgType.LABEL else f"address {number:X}"
         hint += f" on {variant.title}{_others_that_take(key, number, variant)}"
-    elif key in "TC" and number == CARRY:
+    elif number == CARRY and any(spec.kind is ArgType.FLAG for spec in rows(key)):
         hint = f"flag {CARRY}, the carry, is set and cleared by + and - only; {hint}"
     elif kind is ArgType.LINES:
         hint = f"{_lines_reached(number)}; {hint}"
@@ -129,11 +122,12 @@ def _reserved(command: ChipCommand, spec: CommandSpec, number: int) -> Diagnosti
 
 
 def _occupied(command: ChipCommand, spec: CommandSpec, number: int, interface: Interface) -> Diagnostic | None:
-    taken = [line for line in lines_of(spec, number) if line in interface.occupied]
+    taken = [line for line in spec.lines(number) if line in interface.occupied]
     if not taken:
         return None
     # M-21: commands that write such a line, or wait for it, are refused; reading it is possible and of no use.
-    finding = findings.LINE_OCCUPIED if command.key in _REFUSES_OCCUPIED else findings.LINE_READ_OCCUPIED
+    refuses = ChipState.LINES in spec.use.writes or spec.use.waits in (Wait.LINE, Wait.SEEK)
+    finding = findings.LINE_OCCUPIED if refuses else findings.LINE_READ_OCCUPIED
     free = lines_text([line for line in LINES if line not in interface.occupied])
     verb = "belongs" if len(taken) == 1 else "belong"
     message = f"{lines_text(taken)} {verb} to the {interface.title} interface"

@@ -9,12 +9,14 @@ Distances are minimum microsteps (full step / 64), speeds full steps/s, times mi
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache, reduce
 
-from steptwin.m1486.functions import CARRY, FUNCTIONS, USER_FLAGS
+from steptwin.m1486.commanduse import EVERYTHING, NOTHING, ChipState, CommandUse, Control, Motion, NextMove, Setting, Wait
+from steptwin.m1486.functions import CARRY, FUNCTIONS, USER_FLAGS, function
 from steptwin.m1486.lines import LINES, line_group
 from steptwin.m1486.microsteps import MICROSTEPS, QUALIFICATIONS, UNIT
-from steptwin.m1486.registers import REGISTERS, UPLOAD_RANGE
+from steptwin.m1486.registers import REGISTERS, UPLOAD_RANGE, register
 from steptwin.m1486.variants import Variant
 
 
@@ -56,6 +58,7 @@ class CommandSpec:
     values: range | tuple[int, ...] | None
     effect: str
     section: str
+    use: CommandUse
     unit: str = ""
     when: When = When.QUEUED
 
@@ -71,7 +74,34 @@ class CommandSpec:
             return variant.addresses
         return () if self.values is None else self.values
 
+    def lines(self, number: int) -> range:
+        """The I/O lines that the number names."""
+        if self.kind in (ArgType.LINE, ArgType.CONDITION) and number in LINES:
+            return range(number, number + 1)
+        group = line_group(number) if self.kind is ArgType.LINES else None
+        return group or range(0)
 
+    def use_with(self, number: int | None) -> CommandUse:
+        """What it does with this number; None: with the internal variable, or without number."""
+        named = self._named(number)
+        return replace(self.use, reads=self.use.reads & named, writes=self.use.writes & named)
+
+    def _named(self, number: int | None) -> ChipState:
+        """What a command can read and change whose number names one of several things."""
+        if number is None:
+            return EVERYTHING
+        if self.kind is ArgType.REGISTER:
+            return ~_ANY_REGISTER | register(number).state
+        if self.kind is ArgType.FUNCTION:
+            return _S.FUNCTIONS | function(number).acts_on
+        if self.kind is ArgType.CONDITION:
+            return _S.LINES if number in LINES else _S.CARRY if number == CARRY else _S.FLAGS
+        return EVERYTHING
+
+
+_S = ChipState
+_ANY_REGISTER = _S.REGISTERS | _S.POSITION | _S.REMAINDER
+_FUNCTION_STATE = _S.FUNCTIONS | _S.SIGNALS | _S.HELD
 _24_BIT = range(2**24)
 _DISTANCE = range(1, 16_000_001)
 _BYTE = range(1, 256)
@@ -89,82 +119,118 @@ FREE_DIVISORS = frozenset((2, 4, 8, 16, 32, 64))
 
 _PROGRAM, _MOTION, _IO, _SEQUENCER = "VII.1", "VII.2", "VII.3", "VII.4"
 _CONFIGURATION, _AUXILIARY, _NUMERIC = "VII.5", "VII.6", "VII.7"
-_C = CommandSpec
+_C, _U = CommandSpec, CommandUse
+_MOVES = _S.MOTION | _S.POSITION | _S.SIGNALS | _S.HELD
+"""LIMIT that is low holds the program as soon as a motion begins."""
+_STARTS = _S.MOTION | _S.POSITION | _S.SETTINGS | _S.FUNCTIONS
+_SEEK = _U(_STARTS | _S.LINES, _MOVES, waits=Wait.SEEK, motion=Motion.SEEK)
+_OPERANDS = _S.VARIABLE | _S.FUNCTIONS | _S.LINES | _S.REGISTERS
+"""Functions 46 and 58 make lines or a register of the number."""
 
 _ROWS: tuple[CommandSpec, ...] = (
     # Program control
-    _C("@", "Address", ArgType.LABEL, None, "Gives the next command a label.", _PROGRAM, when=When.COMPRESSED),
-    _C("L", "Loop", ArgType.NUMBER, _BYTE, "Runs the commands up to the matching E this many times.", _PROGRAM, "times"),
-    _C("E", "End of loop", ArgType.NONE, None, "Goes back to the matching L until its count is done.", _PROGRAM),
-    _C("I", "If", ArgType.CONDITION, CONDITIONS, "Jumps to the label when the line or flag has the level named.", _PROGRAM),
-    _C("J", "Jump", ArgType.LABEL, None, "Goes on at the label.", _PROGRAM),
+    _C("@", "Address", ArgType.LABEL, None, "Gives the next command a label.", _PROGRAM,
+       _U(NOTHING, _S.MEMORY), when=When.COMPRESSED),
+    _C("L", "Loop", ArgType.NUMBER, _BYTE, "Runs the commands up to the matching E this many times.", _PROGRAM,
+       _U(_S.LOOPS, _S.LOOPS), "times"),
+    _C("E", "End of loop", ArgType.NONE, None, "Goes back to the matching L until its count is done.", _PROGRAM,
+       _U(_S.LOOPS, _S.LOOPS, Control.REPEAT)),
+    _C("I", "If", ArgType.CONDITION, CONDITIONS, "Jumps to the label when the line or flag has the level named.", _PROGRAM,
+       _U(_S.LINES | _S.FLAGS | _S.CARRY, NOTHING, Control.BRANCH)),
+    _C("J", "Jump", ArgType.LABEL, None, "Goes on at the label.", _PROGRAM, _U(NOTHING, NOTHING, Control.JUMP)),
     _C("K", "Kill", ArgType.NONE, None, "Stops the motion with its ramp, and the program too while function 51 is OFF.",
-       _PROGRAM, when=When.RECEIVED),
+       _PROGRAM, _U(_S.MOTION | _S.FUNCTIONS, _S.MOTION | _S.POSITION | _S.HELD), when=When.RECEIVED),
     _C("C", "Clear kill", ArgType.NUMBER, (CLEAR_KILL,), "Lets a program go on that Kill has stopped.",
-       _PROGRAM, when=When.RECEIVED),
-    _C("U", "Upload", ArgType.UPLOAD, UPLOAD_RANGE, "Sends one byte to the host.", _PROGRAM),
-    _C("W", "Wait", ArgType.NUMBER, _DISTANCE, "Waits.", _PROGRAM, "ms"),
-    _C("[", "Disable", ArgType.NONE, None, "From here on commands are stored, not run.", _PROGRAM, when=When.COMPRESSED),
-    _C("]", "Enable", ArgType.NONE, None, "Runs the commands stored since [.", _PROGRAM, when=When.COMPRESSED),
-    _C("'", "Subroutine", ArgType.LABEL, None, "Goes on at the label and comes back at the next dot.", _PROGRAM),
-    _C(".", "End of subroutine", ArgType.NONE, None, "Goes back to the command after the call.", _PROGRAM),
+       _PROGRAM, _U(NOTHING, _S.HELD), when=When.RECEIVED),
+    _C("U", "Upload", ArgType.UPLOAD, UPLOAD_RANGE, "Sends one byte to the host.", _PROGRAM,
+       _U(_S.POSITION | _S.VARIABLE | _S.FLAGS | _S.CARRY | _S.FUNCTIONS | _S.SENDING, _S.SENDING, waits=Wait.SENDING)),
+    _C("W", "Wait", ArgType.NUMBER, _DISTANCE, "Waits.", _PROGRAM, _U(NOTHING, NOTHING, waits=Wait.TIME), "ms"),
+    _C("[", "Disable", ArgType.NONE, None, "From here on commands are stored, not run.", _PROGRAM,
+       _U(_S.MEMORY, _S.MEMORY), when=When.COMPRESSED),
+    _C("]", "Enable", ArgType.NONE, None, "Runs the commands stored since [.", _PROGRAM,
+       _U(_S.MEMORY, _S.MEMORY, motion=Motion.STORED), when=When.COMPRESSED),
+    _C("'", "Subroutine", ArgType.LABEL, None, "Goes on at the label and comes back at the next dot.", _PROGRAM,
+       _U(_S.CALL, _S.CALL, Control.CALL)),
+    _C(".", "End of subroutine", ArgType.NONE, None, "Goes back to the command after the call.", _PROGRAM,
+       _U(_S.CALL, _S.CALL, Control.RETURN)),
     # Motion control
     _C("B", "Backward", ArgType.NUMBER, _DISTANCE, "Sets distance and negative direction of the next move.",
-       _MOTION, UNIT),
-    _C("D", "Direction", ArgType.NONE, None, "Reverses the direction of the next move.", _MOTION),
+       _MOTION, _U(_S.SETTINGS, _S.DISTANCE, next_move=NextMove.BACKWARD), UNIT),
+    _C("D", "Direction", ArgType.NONE, None, "Reverses the direction of the next move.", _MOTION,
+       _U(_S.DISTANCE, _S.DISTANCE, next_move=NextMove.REVERSED)),
     _C("F", "Forward", ArgType.NUMBER, _DISTANCE, "Sets distance and positive direction of the next move.",
-       _MOTION, UNIT),
+       _MOTION, _U(_S.SETTINGS, _S.DISTANCE, next_move=NextMove.FORWARD), UNIT),
     _C("G", "Go absolute", ArgType.NUMBER, _DISTANCE, "Sets distance and direction from the present position to this one.",
-       _MOTION, UNIT),
-    _C("G+", "Go positive", ArgType.NONE, None, "The next move runs in positive direction until Kill or LIMIT.", _MOTION),
-    _C("G-", "Go negative", ArgType.NONE, None, "The next move runs in negative direction until Kill or LIMIT.", _MOTION),
-    _C("H", "Home", ArgType.NONE, None, "Sets distance and direction from the present position to 0.", _MOTION),
-    _C("=", "Equal", ArgType.NUMBER, _DISTANCE, "Gives the position counter a value.", _MOTION, UNIT),
-    _C("C", "Clear position counter", ArgType.NUMBER, (CLEAR_POSITION,), "Sets the position counter to 0.", _MOTION),
-    _C("A", "Acceleration", ArgType.NUMBER, range(1, 65_001), "Sets acceleration and deceleration.", _MOTION, "step/s²"),
+       _MOTION, _U(_S.SETTINGS | _S.POSITION, _S.DISTANCE, next_move=NextMove.TO_POSITION), UNIT),
+    _C("G+", "Go positive", ArgType.NONE, None, "The next move runs in positive direction until Kill or LIMIT.", _MOTION,
+       _U(NOTHING, _S.DISTANCE, next_move=NextMove.ENDLESS)),
+    _C("G-", "Go negative", ArgType.NONE, None, "The next move runs in negative direction until Kill or LIMIT.", _MOTION,
+       _U(NOTHING, _S.DISTANCE, next_move=NextMove.ENDLESS)),
+    _C("H", "Home", ArgType.NONE, None, "Sets distance and direction from the present position to 0.", _MOTION,
+       _U(_S.POSITION, _S.DISTANCE, next_move=NextMove.TO_ZERO)),
+    _C("=", "Equal", ArgType.NUMBER, _DISTANCE, "Gives the position counter a value.", _MOTION,
+       _U(_S.SETTINGS, _S.POSITION), UNIT),
+    _C("C", "Clear position counter", ArgType.NUMBER, (CLEAR_POSITION,), "Sets the position counter to 0.", _MOTION,
+       _U(NOTHING, _S.POSITION)),
+    _C("A", "Acceleration", ArgType.NUMBER, range(1, 65_001), "Sets acceleration and deceleration.", _MOTION,
+       _U(NOTHING, _S.SETTINGS, sets=Setting.ACCELERATION), "step/s²"),
     _C("S", "Start/stop", ArgType.NUMBER, range(16, 1_951), "Sets the speed at which a move starts and ends.",
-       _MOTION, "step/s"),
+       _MOTION, _U(NOTHING, _S.SETTINGS, sets=Setting.START_STOP), "step/s"),
     _C("P", "Profile", ArgType.NUMBER, _PROFILE,
        "Sets the speed from which the acceleration is parabolic; above 7000 and V there is no such part.",
-       _MOTION, "step/s"),
-    _C("V", "Velocity", ArgType.NUMBER, range(16, 20_001), "Sets the highest speed of a move.", _MOTION, "step/s"),
-    _C("R", "Run", ArgType.NONE, None, "Makes the move specified last.", _MOTION),
+       _MOTION, _U(NOTHING, _S.SETTINGS, sets=Setting.PROFILE), "step/s"),
+    _C("V", "Velocity", ArgType.NUMBER, range(16, 20_001), "Sets the highest speed of a move.", _MOTION,
+       _U(NOTHING, _S.SETTINGS, sets=Setting.VELOCITY), "step/s"),
+    _C("R", "Run", ArgType.NONE, None, "Makes the move specified last.", _MOTION,
+       _U(_STARTS | _S.DISTANCE, _MOVES, waits=Wait.MOTION, motion=Motion.MOVE)),
     _C(")", "Seek positive", ArgType.LINE, LINES,
-       "Moves at start/stop speed in positive direction until the line has its end level.", _MOTION),
+       "Moves at start/stop speed in positive direction until the line has its end level.", _MOTION, _SEEK),
     _C("(", "Seek negative", ArgType.LINE, LINES,
-       "Moves at start/stop speed in negative direction until the line has its end level.", _MOTION),
+       "Moves at start/stop speed in negative direction until the line has its end level.", _MOTION, _SEEK),
     # User I/O
-    _C("C", "Clear", ArgType.LINE, LINES, "Sets an output low.", _IO),
-    _C("O", "One", ArgType.LINE, LINES, "Waits until the line is high.", _IO),
-    _C("T", "Turn on", ArgType.LINE, LINES, "Sets an output high.", _IO),
-    _C("Z", "Zero", ArgType.LINE, LINES, "Waits until the line is low.", _IO),
+    _C("C", "Clear", ArgType.LINE, LINES, "Sets an output low.", _IO, _U(NOTHING, _S.LINES, level=0)),
+    _C("O", "One", ArgType.LINE, LINES, "Waits until the line is high.", _IO, _U(_S.LINES, NOTHING, waits=Wait.LINE, level=1)),
+    _C("T", "Turn on", ArgType.LINE, LINES, "Sets an output high.", _IO, _U(NOTHING, _S.LINES, level=1)),
+    _C("Z", "Zero", ArgType.LINE, LINES, "Waits until the line is low.", _IO, _U(_S.LINES, NOTHING, waits=Wait.LINE, level=0)),
     # Sequencer
-    _C("M", "Microstep", ArgType.NUMBER, MICROSTEPS, "Sets the microsteps per full step at low speed.", _SEQUENCER),
-    _C("Q", "Qualification", ArgType.NUMBER, QUALIFICATIONS, "Sets the microsteps per full step at high speed.", _SEQUENCER),
-    _C("N", "Number of characteristic", ArgType.NUMBER, range(1, 8), "Chooses the waveform of the phase currents.", _SEQUENCER),
+    _C("M", "Microstep", ArgType.NUMBER, MICROSTEPS, "Sets the microsteps per full step at low speed.", _SEQUENCER,
+       _U(NOTHING, _S.SETTINGS, sets=Setting.MICROSTEP)),
+    _C("Q", "Qualification", ArgType.NUMBER, QUALIFICATIONS, "Sets the microsteps per full step at high speed.", _SEQUENCER,
+       _U(NOTHING, _S.SETTINGS, sets=Setting.QUALIFICATION)),
+    _C("N", "Number of characteristic", ArgType.NUMBER, range(1, 8), "Chooses the waveform of the phase currents.", _SEQUENCER,
+       _U(NOTHING, _S.WAVEFORM, sets=Setting.WAVEFORM)),
     # Configuration
     _C("\\", "Reset", ArgType.NONE, None, "Sets everything to its defaults; E types erase the EEPROM too.",
-       _CONFIGURATION, when=When.COMPRESSED),
-    _C("X", "indeX", ArgType.ADDRESS, None, "Lets only the chip with this address listen.", _CONFIGURATION, when=When.RECEIVED),
-    _C("XG", "indeX all", ArgType.NONE, None, "Lets all chips listen.", _CONFIGURATION, when=When.RECEIVED),
+       _CONFIGURATION, _U(NOTHING, ~(_S.LISTENING | _S.SENDING), Control.RESTART), when=When.COMPRESSED),
+    _C("X", "indeX", ArgType.ADDRESS, None, "Lets only the chip with this address listen.", _CONFIGURATION,
+       _U(NOTHING, _S.LISTENING), when=When.RECEIVED),
+    _C("XG", "indeX all", ArgType.NONE, None, "Lets all chips listen.", _CONFIGURATION,
+       _U(NOTHING, _S.LISTENING), when=When.RECEIVED),
     # Auxiliary functions and flags
-    _C("T", "Function on", ArgType.FUNCTION, FUNCTIONS, "Switches a function on.", _AUXILIARY),
-    _C("C", "Function off", ArgType.FUNCTION, FUNCTIONS, "Switches a function off.", _AUXILIARY),
-    _C("T", "Flag on", ArgType.FLAG, USER_FLAGS, "Sets a user flag.", _AUXILIARY),
-    _C("C", "Flag off", ArgType.FLAG, USER_FLAGS, "Clears a user flag.", _AUXILIARY),
+    _C("T", "Function on", ArgType.FUNCTION, FUNCTIONS, "Switches a function on.", _AUXILIARY,
+       _U(NOTHING, _S.FUNCTIONS | _S.SIGNALS, level=1)),
+    _C("C", "Function off", ArgType.FUNCTION, FUNCTIONS, "Switches a function off.", _AUXILIARY,
+       _U(_S.FUNCTIONS, _FUNCTION_STATE, level=0)),
+    _C("T", "Flag on", ArgType.FLAG, USER_FLAGS, "Sets a user flag.", _AUXILIARY, _U(NOTHING, _S.FLAGS, level=1)),
+    _C("C", "Flag off", ArgType.FLAG, USER_FLAGS, "Clears a user flag.", _AUXILIARY, _U(NOTHING, _S.FLAGS, level=0)),
     # Numeric unit
-    _C(":", "Load", ArgType.NUMBER, _24_BIT, "Gives the internal variable a value.", _NUMERIC),
-    _C("?", "Query", ArgType.LINES, _LINE_GROUPS, "Reads lines into the internal variable, lowest line = lowest bit.", _NUMERIC),
-    _C("!", "Order", ArgType.LINES, _LINE_GROUPS, "Puts the internal variable out on lines, lowest line = lowest bit.", _NUMERIC),
+    _C(":", "Load", ArgType.NUMBER, _24_BIT, "Gives the internal variable a value.", _NUMERIC,
+       _U(NOTHING, _S.VARIABLE, sets=Setting.VARIABLE)),
+    _C("?", "Query", ArgType.LINES, _LINE_GROUPS, "Reads lines into the internal variable, lowest line = lowest bit.", _NUMERIC,
+       _U(_S.LINES | _S.FUNCTIONS, _S.VARIABLE)),
+    _C("!", "Order", ArgType.LINES, _LINE_GROUPS, "Puts the internal variable out on lines, lowest line = lowest bit.", _NUMERIC,
+       _U(_S.VARIABLE | _S.REMAINDER | _S.FUNCTIONS, _S.LINES)),
     _C(">", "Move to register", ArgType.REGISTER, range(1, len(REGISTERS) + 1),
-       "Copies the internal variable to a register.", _NUMERIC),
+       "Copies the internal variable to a register.", _NUMERIC, _U(_S.VARIABLE, _ANY_REGISTER)),
     _C("<", "Move from register", ArgType.REGISTER, range(1, len(REGISTERS) + 1),
-       "Copies a register to the internal variable.", _NUMERIC),
-    _C("+", "Add", ArgType.NUMBER, _BYTE, "Adds to the internal variable; sets flag 87 on overflow.", _NUMERIC),
+       "Copies a register to the internal variable.", _NUMERIC, _U(_ANY_REGISTER, _S.VARIABLE)),
+    _C("+", "Add", ArgType.NUMBER, _BYTE, "Adds to the internal variable; sets flag 87 on overflow.", _NUMERIC,
+       _U(_OPERANDS, _S.VARIABLE | _S.CARRY)),
     _C("-", "Subtract", ArgType.NUMBER, _BYTE, "Subtracts from the internal variable; sets flag 87 when that is too small.",
-       _NUMERIC),
-    _C("*", "Multiply", ArgType.NUMBER, _BYTE, "Multiplies the internal variable.", _NUMERIC),
-    _C("/", "Divide", ArgType.NUMBER, _BYTE, "Divides the internal variable; the remainder goes to register 10.", _NUMERIC),
+       _NUMERIC, _U(_OPERANDS, _S.VARIABLE | _S.CARRY)),
+    _C("*", "Multiply", ArgType.NUMBER, _BYTE, "Multiplies the internal variable.", _NUMERIC, _U(_OPERANDS, _S.VARIABLE)),
+    _C("/", "Divide", ArgType.NUMBER, _BYTE, "Divides the internal variable; the remainder goes to register 10.", _NUMERIC,
+       _U(_OPERANDS, _S.VARIABLE | _S.REMAINDER)),
 )  # fmt: skip
 
 _STATED_BITS = {"@": 0, "[": 0, "]": 0, "\\": 0, "I": 32}
@@ -208,6 +274,11 @@ TABLE: tuple[CommandSpec, ...] = _ROWS
 _BY_KEY = _index()
 _BITS = {letter: _letter_bits(letter) for letter in dict.fromkeys(s.letter for s in _ROWS)}
 
+_REFUSED = CommandUse(NOTHING, NOTHING)
+_USES_KEPT = 4096
+
+CALCULATING: tuple[str, ...] = tuple(s.name for s in _ROWS if ChipState.VARIABLE in s.use.reads & s.use.writes)
+"""Names of the commands that make a new value of the internal variable from the one before."""
 LETTERS: frozenset[str] = frozenset(_BITS)
 """Every character that can begin a command; letters stand here as capitals."""
 
@@ -244,13 +315,31 @@ def memory_bits(key: str) -> int:
     return _BITS[key[0]]
 
 
+def meant(key: str, number: int | None) -> tuple[CommandSpec, ...]:
+    """The rows that a command can mean on some variant: all of its key where the internal variable is the number."""
+    found = rows(key)
+    return found if number is None else tuple(spec for spec in found if spec.values is None or number in spec.values)
+
+
 def when(key: str, argument: int | None) -> When:
     """When the command acts; one of the commands with the letter C acts at once."""
-    specs = rows(key)
-    for spec in specs:
-        if argument is not None and spec.values is not None and argument in spec.values:
-            return spec.when
-    return When.QUEUED if len(specs) != 1 else specs[0].when
+    found = meant(key, argument)
+    return found[0].when if len(found) == 1 else When.QUEUED
+
+
+@lru_cache(_USES_KEPT)
+def use_of(key: str, number: int | None) -> CommandUse:
+    """What a command does with a number; with the internal variable, for which None stands, what any number can make of it."""
+    uses = [spec.use_with(number) for spec in meant(key, number)]
+    if not uses:
+        return _REFUSED
+    use = reduce(_either, uses)
+    return replace(use, reads=use.reads | ChipState.VARIABLE) if number is None and takes_variable(key) else use
+
+
+def _either(one: CommandUse, other: CommandUse) -> CommandUse:
+    """One of two commands of a letter, which differ in what they name."""
+    return CommandUse(one.reads | other.reads, one.writes | other.writes, level=one.level if one.level == other.level else None)
 
 
 def grouped(number: int) -> str:

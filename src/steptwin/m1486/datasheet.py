@@ -17,6 +17,7 @@ from steptwin.datasheet import (
 )
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.commands import TABLE, ArgType, CommandSpec
+from steptwin.m1486.commanduse import Motion
 from steptwin.m1486.details import DETAILS
 from steptwin.m1486.events import EVENTS
 from steptwin.m1486.microsteps import FULL_STEP, UNIT
@@ -25,8 +26,6 @@ from steptwin.m1486.points import POINTS
 from steptwin.m1486.variants import Variant
 
 MOTION_SECTION = "VII.2"
-STARTS = frozenset({"R", ")", "(", "]"})
-"""Commands that start a motion, or the file that may; the others of the section on motions set the next motion."""
 _ALSO_CHANGE = {
     "M1": ("status", "program", "pins", "details"),
     WAVEFORM: ("pins",),
@@ -106,8 +105,9 @@ def _command(spec: CommandSpec, variant: Variant) -> CommandDescription:
                 values=() if is_range else tuple(permitted),
             ),
         )
+    # The others of the section on motions set the next motion.
     effect = PointEffect.PARAMETER if spec.section == MOTION_SECTION else PointEffect.ACTS
-    if spec.key in STARTS:
+    if spec.use.motion is not Motion.NONE:
         effect = PointEffect.MOVES
     return CommandDescription(
         name=spec.name,

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 
 from steptwin.controllerstate import DetailRow, DetailValue
 from steptwin.datasheet import Detail, FactType
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.commands import TABLE
+from steptwin.m1486.commanduse import Setting
 from steptwin.m1486.drive import ChipDrive
 from steptwin.m1486.encoding import decode
 from steptwin.m1486.functions import CARRY, FUNCTIONS, USER_FLAGS
@@ -15,6 +16,7 @@ from steptwin.m1486.microsteps import UNIT
 from steptwin.m1486.registers import GENERAL
 from steptwin.m1486.syntax import ChipCommand
 from steptwin.machine import Nanos
+from steptwin.tables import complete
 
 
 def next_command(chip: M1486Chip) -> ChipCommand | None:
@@ -40,16 +42,20 @@ def flags_on(chip: M1486Chip) -> list[int]:
     return [*flags, CARRY] if chip.unit.carry else flags
 
 
-_SETTINGS: dict[str, Callable[[ChipDrive], int]] = {
-    "S": lambda drive: drive.start_stop,
-    "A": lambda drive: drive.acceleration,
-    "P": lambda drive: drive.profile_speed,
-    "V": lambda drive: drive.velocity,
-    "M": lambda drive: drive.microstep,
-    "Q": lambda drive: drive.qualification,
-    "N": lambda drive: drive.characteristic,
-}
-"""Settings by command."""
+_SETTINGS: Mapping[Setting, Callable[[ChipDrive], int]] = complete(
+    "setting",
+    [setting for setting in Setting if setting is not Setting.VARIABLE],
+    "value",
+    {
+        Setting.START_STOP: lambda drive: drive.start_stop,
+        Setting.ACCELERATION: lambda drive: drive.acceleration,
+        Setting.PROFILE: lambda drive: drive.profile_speed,
+        Setting.VELOCITY: lambda drive: drive.velocity,
+        Setting.MICROSTEP: lambda drive: drive.microstep,
+        Setting.QUALIFICATION: lambda drive: drive.qualification,
+        Setting.WAVEFORM: lambda drive: drive.characteristic,
+    },
+)
 BRIEF = frozenset({"listens", "memory_used", "input_waiting", "counter", "counter_valid", "variable", "flags_on", "functions_on"})
 _TEXT, _WHOLE, _TRUTH = FactType.TEXT, FactType.WHOLE, FactType.TRUTH
 
@@ -72,8 +78,8 @@ def _rows() -> Iterator[DetailRow[M1486Chip]]:
     yield row("counter", "Position counter, 24 bits", _WHOLE, lambda chip, now: chip.drive.counter_u(now), UNIT)
     yield row("counter_valid", "Whether the counter shows the position (M-16)", _TRUTH, lambda chip, now: chip.drive.is_valid)
     for spec in TABLE:
-        if spec.key in _SETTINGS:
-            yield row(spec.key, spec.name, _WHOLE, _setting(_SETTINGS[spec.key]), spec.unit)
+        if spec.use.sets in _SETTINGS:
+            yield row(spec.key, spec.name, _WHOLE, _setting(_SETTINGS[spec.use.sets]), spec.unit)
     yield row("next_distance", "Distance of the next move; null without end", FactType.WHOLE, _next_distance, UNIT)
     yield row("next_direction", "Direction of the next move: 1 or -1", _WHOLE, _next_direction)
     yield row("variable", "Internal variable, 24 bits", _WHOLE, lambda chip, now: chip.unit.variable)

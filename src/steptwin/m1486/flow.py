@@ -7,18 +7,21 @@ microsteps, speeds in full steps/s.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import operator
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import reduce
 from typing import NamedTuple
 
-from steptwin.m1486.commands import find
+from steptwin.m1486.commands import CALCULATING, ArgType, CommandSpec, find
+from steptwin.m1486.commanduse import ChipState, CommandUse, Control, NextMove
 from steptwin.m1486.functions import CONTINUE, INPUT, REGISTER, RUNSIGN
-from steptwin.m1486.lines import Interface, line_group
-from steptwin.m1486.microsteps import DEFAULT_DISTANCE_U, DEFAULT_PROFILE, DEFAULT_VELOCITY, microstep_size
-from steptwin.m1486.structure import CommandStream
-from steptwin.m1486.syntax import ChipCommand, JumpCondition
+from steptwin.m1486.lines import Interface
+from steptwin.m1486.microsteps import DEFAULT_DISTANCE_U, DEFAULT_PROFILE, DEFAULT_VELOCITY, UNIT, microstep_size
+from steptwin.m1486.structure import CommandStream, written_label
+from steptwin.m1486.syntax import ChipCommand
 from steptwin.m1486.variants import Variant
+from steptwin.tables import complete
 
 MOST_STATES = 32
 """Enough for a line group of five lines; more settings at one place are merged."""
@@ -44,18 +47,14 @@ class Settings(NamedTuple):
     register_operand: int | None
 
 
-_SETTING = {
-    "M": "microstep",
-    "Q": "qualification",
-    "S": "start_stop",
-    "V": "velocity",
-    "P": "profile",
-    "A": "acceleration",
-    "F": "distance",
-    "B": "distance",
-    ":": "variable",
-}
 _FUNCTION_SETTING = {RUNSIGN: "runsign", INPUT: "lines_operand", REGISTER: "register_operand"}
+_KNOWN = {
+    ChipState.SETTINGS: ("microstep", "qualification", "start_stop", "velocity", "profile", "acceleration"),
+    ChipState.DISTANCE: ("distance",),
+    ChipState.VARIABLE: ("variable",),
+    ChipState.FUNCTIONS: tuple(_FUNCTION_SETTING.values()),
+}
+"""The settings that are followed, by what a command changes."""
 
 
 def defaults(variant: Variant, interface: Interface) -> Settings:
@@ -92,9 +91,15 @@ def value(command: ChipCommand, state: Settings) -> int | None:
     return state.variable if command.from_variable else command.number
 
 
+def may_turn_on(function: int, command: ChipCommand) -> bool:
+    """Whether a command turns a function on, or can, with the internal variable."""
+    use = command.use
+    return ChipState.FUNCTIONS in use.writes and use.level == 1 and command.number in (None, function)
+
+
 def continues_after_wrong_data(stream: CommandStream) -> bool:
     """Whether function 44 may be ON, so that a wrong command is left out and the next one executed (M-11)."""
-    return any(command.key == "T" and (command.from_variable or command.number == CONTINUE) for command in stream.commands)
+    return any(may_turn_on(CONTINUE, command) for command in stream.commands)
 
 
 def loop_starts(stream: CommandStream, index: int) -> tuple[int, ...]:
@@ -155,7 +160,7 @@ class _Walk:
         self.arrive(0, _MAIN, self.start)
         for index, command in enumerate(self.stream.commands):
             # A reset ends the running program, also an endless one.
-            if command.key == "\\" and self.stream.in_file[index] is None:
+            if command.use.control is Control.RESTART and self.stream.in_file[index] is None:
                 self.arrive(index, _MAIN, self.start)
         while self.open or self.leave_endless_calls():
             index, call, state = self.open.pop()
@@ -183,31 +188,39 @@ class _Walk:
         return bool(self.open)
 
     def step(self, index: int, call: int, state: Settings) -> None:
-        command = self.stream.commands[index]
-        match command.key:
-            case "J":
-                self.jump(index, call, state, value(command, state))
-            case "I":
-                if isinstance(command.argument, JumpCondition):
-                    self.jump(index, call, state, command.argument.label)
-                self.arrive(index + 1, call, state)
-            case "'" if call != _MAIN:
-                self.flow.nested_calls.add(index)
-                self.arrive(index + 1, call, state)
-            case "'":
-                self.jump(index, index, state, value(command, state))
-            case ".":
-                self.come_back(index, call, state)
-            case "E":
-                for target in (*loop_starts(self.stream, index), index + 1):
-                    self.arrive(target, call, state)
-            case "\\" if self.stream.in_file[index] is None:
-                self.arrive(index + 1, _MAIN, self.start)
-            case _:
-                for after in _after(command, state, self.variant):
-                    self.arrive(index + 1, call, after)
+        _STEPS[self.stream.commands[index].use.control](self, index, call, state)
 
-    def jump(self, index: int, call: int, state: Settings, label: int | None) -> None:
+    def go_on(self, index: int, call: int, state: Settings) -> None:
+        for after in _after(self.stream.commands[index], state, self.variant):
+            self.arrive(index + 1, call, after)
+
+    def branch(self, index: int, call: int, state: Settings) -> None:
+        label = written_label(self.stream.commands[index])
+        if label is not None:
+            self.jump_to(index, call, state, label)
+        self.arrive(index + 1, call, state)
+
+    def call(self, index: int, call: int, state: Settings) -> None:
+        if call == _MAIN:
+            self.jump(index, index, state)
+        else:
+            self.flow.nested_calls.add(index)
+            self.arrive(index + 1, call, state)
+
+    def repeat(self, index: int, call: int, state: Settings) -> None:
+        for target in (*loop_starts(self.stream, index), index + 1):
+            self.arrive(target, call, state)
+
+    def restart(self, index: int, call: int, state: Settings) -> None:
+        if self.stream.in_file[index] is None:
+            self.arrive(index + 1, _MAIN, self.start)
+        else:
+            self.arrive(index + 1, call, state)
+
+    def jump(self, index: int, call: int, state: Settings) -> None:
+        self.jump_to(index, call, state, value(self.stream.commands[index], state))
+
+    def jump_to(self, index: int, call: int, state: Settings, label: int | None) -> None:
         """Continue at ``label``; at every label if it is unknown; at the next command if it does not exist."""
         if label is None:
             targets = list(self.stream.visible_labels(index).values())
@@ -231,63 +244,88 @@ class _Walk:
             self.arrive(call + 1, _MAIN, state)
 
 
+_STEPS: Mapping[Control, Callable[[_Walk, int, int, Settings], None]] = complete(
+    "control",
+    Control,
+    "way of a flow analysis",
+    {
+        Control.NEXT: _Walk.go_on,
+        Control.JUMP: _Walk.jump,
+        Control.BRANCH: _Walk.branch,
+        Control.CALL: _Walk.call,
+        Control.RETURN: _Walk.come_back,
+        Control.REPEAT: _Walk.repeat,
+        Control.RESTART: _Walk.restart,
+    },
+)
+
+
 def _after(command: ChipCommand, state: Settings, variant: Variant) -> Iterable[Settings]:
-    """The settings after a command that the next one follows."""
-    key = command.key
+    """The settings after a command that the next one follows. What it changes is unknown unless a rule here says more."""
     number = value(command, state)
-    if key in "+-*/":
-        return (state._replace(variable=_arithmetic(key, state, number)),)
-    if key == "<":
-        return (state._replace(variable=None),)
-    if key in ("G", "G+", "G-", "H"):
-        return (state._replace(distance=None),)
-    if number is None:
-        return (_after_unknown(command, state),)
-    if find(key, number, variant) is None or _is_wrong_multiple(key, number, state):
+    if number is None and command.from_variable:
+        return (state._replace(**_changed(command.use)),)
+    spec = find(command.key, number, variant)
+    if spec is None or _is_wrong_multiple(spec, number, state):
         return (state,)
-    if key == "?":
-        return _readings(state, number)
-    if key in _SETTING:
-        return (state._replace(**{_SETTING[key]: number}),)
-    if key in "TC" and number in _FUNCTION_SETTING:
-        return (state._replace(**{_FUNCTION_SETTING[number]: int(key == "T")}),)
-    return (state,)
+    changed, use = _changed(spec.use), spec.use
+    if use.sets is not None:
+        changed = dict.fromkeys(changed, number)
+    elif use.next_move is not NextMove.UNCHANGED:
+        changed["distance"] = _DISTANCES[use.next_move](number, state.distance)
+    elif spec.kind is ArgType.FUNCTION:
+        changed = {name: use.level for function, name in _FUNCTION_SETTING.items() if function == number}
+    elif spec.name in _RESULTS:
+        changed["variable"] = _result(spec.name, state, number)
+    elif changed and spec.kind is ArgType.LINES:
+        return _readings(state, spec.lines(number or 0))
+    return (state._replace(**changed),)
 
 
-def _is_wrong_multiple(key: str, number: int, state: Settings) -> bool:
-    return key in "FB" and state.microstep is not None and number % microstep_size(state.microstep) != 0
+def _changed(use: CommandUse) -> dict[str, int | None]:
+    """The settings that a command changes, as unknown ones."""
+    if use.sets is not None:
+        return dict.fromkeys({use.sets.value}.intersection(Settings._fields))
+    return dict.fromkeys(name for state, names in _KNOWN.items() if state & use.writes for name in names)
 
 
-def _after_unknown(command: ChipCommand, state: Settings) -> Settings:
-    if not command.from_variable:
-        return state
-    if command.key in "TC":
-        return state._replace(runsign=None, lines_operand=None, register_operand=None)
-    if command.key == "?":
-        return state._replace(variable=None)
-    return state._replace(**{_SETTING[command.key]: None}) if command.key in _SETTING else state
+def _is_wrong_multiple(spec: CommandSpec, number: int | None, state: Settings) -> bool:
+    return spec.unit == UNIT and state.microstep is not None and (number or 0) % microstep_size(state.microstep) != 0
 
 
-def _readings(state: Settings, group: int) -> Iterable[Settings]:
-    lines = line_group(group)
-    if lines is None or 2 ** len(lines) > MOST_STATES:
+def _readings(state: Settings, lines: range) -> Iterable[Settings]:
+    if 2 ** len(lines) > MOST_STATES:
         return (state._replace(variable=None),)
     return (state._replace(variable=reading) for reading in range(2 ** len(lines)))
 
 
-def _arithmetic(key: str, state: Settings, operand: int | None) -> int | None:
+_DISTANCES: Mapping[NextMove, Callable[[int | None, int | None], int | None]] = complete(
+    "next move",
+    NextMove,
+    "distance",
+    {
+        **dict.fromkeys((NextMove.FORWARD, NextMove.BACKWARD), lambda number, distance: number),
+        **dict.fromkeys((NextMove.REVERSED, NextMove.UNCHANGED), lambda number, distance: distance),
+        **dict.fromkeys((NextMove.TO_POSITION, NextMove.TO_ZERO, NextMove.ENDLESS), lambda number, distance: None),
+    },
+)
+"""Without direction, by number and distance before."""
+
+_RESULTS: Mapping[str, Callable[[int, int], int]] = complete(
+    "command that calculates",
+    CALCULATING,
+    "result",
+    {
+        "Add": operator.add,
+        "Subtract": operator.sub,
+        "Multiply": operator.mul,
+        "Divide": lambda variable, operand: variable // operand if operand else variable,
+    },
+)
+
+
+def _result(name: str, state: Settings, operand: int | None) -> int | None:
     """The internal variable after + - * /, modulo 2^24 (M-13); None where operand or variable are unknown."""
-    if state.lines_operand != 0 or state.register_operand != 0:
+    if state.lines_operand != 0 or state.register_operand != 0 or state.variable is None or operand is None:
         return None
-    if state.variable is None or operand is None:
-        return None
-    match key:
-        case "+":
-            result = state.variable + operand
-        case "-":
-            result = state.variable - operand
-        case "*":
-            result = state.variable * operand
-        case _:
-            result = state.variable // operand if operand else state.variable
-    return result % 2**24
+    return _RESULTS[name](state.variable, operand) % 2**24

@@ -8,14 +8,26 @@ from itertools import groupby
 
 from steptwin.diagnostics import Diagnostic, Fix, Severity, Span
 from steptwin.m1486 import findings
-from steptwin.m1486.argument_rules import lines_of, lines_text, number_problem
-from steptwin.m1486.commands import DIVIDEND_LIMIT, FREE_DIVISORS, PROFILE_RANGE, When, find, grouped, when
+from steptwin.m1486.argument_rules import lines_text, number_problem
+from steptwin.m1486.commands import (
+    CALCULATING,
+    DIVIDEND_LIMIT,
+    FREE_DIVISORS,
+    PROFILE_RANGE,
+    ArgType,
+    When,
+    find,
+    grouped,
+    rows,
+    when,
+)
+from steptwin.m1486.commanduse import ChipState, Control, Motion
 from steptwin.m1486.findings import ChipFinding
 from steptwin.m1486.flow import FlowAnalysis, Settings, follow, value
 from steptwin.m1486.lines import LINES, RUNSIGN_LINE, Interface, line_group
-from steptwin.m1486.microsteps import HIGHEST_SPEED, PAIRS, low_range_limit, microstep_size
+from steptwin.m1486.microsteps import HIGHEST_SPEED, PAIRS, UNIT, low_range_limit, microstep_size
 from steptwin.m1486.registers import GENERAL
-from steptwin.m1486.structure import CommandStream, written_label
+from steptwin.m1486.structure import CommandStream, is_computed, written_label
 from steptwin.m1486.structure_rules import label_problem
 from steptwin.m1486.successors import flow_of
 from steptwin.m1486.syntax import ChipCommand
@@ -24,9 +36,6 @@ from steptwin.m1486.variants import Variant
 ACCELERATION_PER_START_STOP = 65
 """Ratio of acceleration to start/stop speed above which the missing table would be needed (M-4)."""
 
-_MOVES = frozenset("R)(")
-_DISTANCES = frozenset("FBG=")
-_ARITHMETIC = frozenset("+-*/")
 _Fault = tuple[ChipFinding, str, str | None]
 """An error because of a setting: the finding, the message, the hint."""
 _Rule = Callable[[ChipCommand, Settings], _Fault | None]
@@ -38,17 +47,21 @@ def flow_rules(stream: CommandStream, variant: Variant, interface: Interface) ->
         command = stream.commands[index]
         for rule in _RULES:
             yield from _judge(command, states, rule)
-        if command.key in _ARITHMETIC:
+        if _calculates(command):
             yield from _judge(command, states, lambda c, s: _operand(c, s, interface))
         if command.from_variable:
             yield from _from_variable(stream, index, states, variant, interface)
-        if command.key in "CT!":
+        if ChipState.LINES in command.use.writes:
             yield from _runsign(command, states, variant)
     yield from _calls(stream, flow)
     yield from _labels(stream, flow)
     yield from _never_reached(stream, flow)
     yield from _started_again(stream, variant, interface)
     yield from _shared_registers(stream, flow, variant)
+
+
+def _calculates(command: ChipCommand) -> bool:
+    return rows(command.key)[0].name in CALCULATING
 
 
 def _judge(command: ChipCommand, states: set[Settings], rule: _Rule) -> Iterator[Diagnostic]:
@@ -68,13 +81,14 @@ def _judge(command: ChipCommand, states: set[Settings], rule: _Rule) -> Iterator
 
 
 def _distance(command: ChipCommand, state: Settings) -> _Fault | None:
-    distance = value(command, state) if command.key in _DISTANCES else state.distance if command.key == "R" else None
+    is_move = command.use.motion is Motion.MOVE
+    distance = state.distance if is_move else value(command, state) if rows(command.key)[0].unit == UNIT else None
     if not distance or state.microstep is None:
         return None
     size = microstep_size(state.microstep)
     if distance % size == 0:
         return None
-    what = "the distance" if command.key == "R" else command.key
+    what = "the distance" if is_move else command.key
     hint = f"with M{state.microstep} a microstep is {size} minimum microsteps"
     return findings.NOT_A_MULTIPLE, f"{what} {grouped(distance)} is not a multiple of {size}", hint
 
@@ -86,7 +100,7 @@ def _nearest_multiple(distance: int, states: set[Settings]) -> str:
 
 
 def _pair(command: ChipCommand, state: Settings) -> _Fault | None:
-    if command.key not in _MOVES or state.microstep is None or state.qualification is None:
+    if command.use.motion not in (Motion.MOVE, Motion.SEEK) or state.microstep is None or state.qualification is None:
         return None
     allowed = PAIRS[state.microstep]
     if state.qualification in allowed:
@@ -96,14 +110,19 @@ def _pair(command: ChipCommand, state: Settings) -> _Fault | None:
 
 
 def _no_ramp(command: ChipCommand, state: Settings) -> _Fault | None:
-    if command.key != "R" or state.velocity is None or state.start_stop is None or state.velocity > state.start_stop:
+    if (
+        command.use.motion is not Motion.MOVE
+        or state.velocity is None
+        or state.start_stop is None
+        or state.velocity > state.start_stop
+    ):
         return None
     message = f"V {state.velocity} is not above S {state.start_stop}"
     return findings.NO_RAMP, message, "the move runs at V without a ramp"
 
 
 def _too_fast(command: ChipCommand, state: Settings) -> _Fault | None:
-    if command.key != "R" or state.velocity is None or state.qualification is None or state.microstep is None:
+    if command.use.motion is not Motion.MOVE or state.velocity is None or state.qualification is None or state.microstep is None:
         return None
     highest = HIGHEST_SPEED[state.qualification]
     if state.velocity <= highest or state.velocity <= low_range_limit(state.microstep):
@@ -115,7 +134,14 @@ def _too_fast(command: ChipCommand, state: Settings) -> _Fault | None:
 def _fine_end(command: ChipCommand, state: Settings) -> _Fault | None:
     """M-39: the rest of a distance below one step of Q."""
     m, q, distance = state.microstep, state.qualification, state.distance
-    if command.key != "R" or m is None or q is None or distance is None or state.start_stop is None or state.velocity is None:
+    if (
+        command.use.motion is not Motion.MOVE
+        or m is None
+        or q is None
+        or distance is None
+        or state.start_stop is None
+        or state.velocity is None
+    ):
         return None
     speed, limit = min(state.start_stop, state.velocity), low_range_limit(m)
     fine, coarse = microstep_size(m), microstep_size(q)
@@ -130,7 +156,7 @@ def _fine_end(command: ChipCommand, state: Settings) -> _Fault | None:
 
 
 def _profile(command: ChipCommand, state: Settings) -> _Fault | None:
-    if command.key != "R" or state.profile is None or state.velocity is None:
+    if command.use.motion is not Motion.MOVE or state.profile is None or state.velocity is None:
         return None
     if state.profile in PROFILE_RANGE or state.profile > state.velocity:
         return None
@@ -141,7 +167,7 @@ def _profile(command: ChipCommand, state: Settings) -> _Fault | None:
 
 def _acceleration(command: ChipCommand, state: Settings) -> _Fault | None:
     # M-4: nothing is enforced; the table with the limits is missing.
-    if command.key != "R" or state.acceleration is None or state.start_stop is None:
+    if command.use.motion is not Motion.MOVE or state.acceleration is None or state.start_stop is None:
         return None
     if state.acceleration <= ACCELERATION_PER_START_STOP * state.start_stop:
         return None
@@ -209,7 +235,7 @@ def _variable_problem(
 ) -> Diagnostic | None:
     command = stream.commands[index]
     problem = number_problem(command, number, variant, interface)
-    if problem is None and command.key in ("J", "'"):
+    if problem is None and is_computed(command):
         problem = next(label_problem(stream, index, number, variant), None)
     return problem if problem is not None and problem.severity is Severity.ERROR else None
 
@@ -218,7 +244,7 @@ def _runsign(command: ChipCommand, states: set[Settings], variant: Variant) -> I
     for state in states:
         number = value(command, state)
         spec = None if number is None else find(command.key, number, variant)
-        if number is None or spec is None or not state.runsign or RUNSIGN_LINE not in lines_of(spec, number):
+        if number is None or spec is None or not state.runsign or RUNSIGN_LINE not in spec.lines(number):
             continue
         message = f"{command} writes B{RUNSIGN_LINE} while function 40 (Runsign) is ON"
         yield findings.RUNSIGN_LINE_USED(command.span, message, "C40 gives the line back")
@@ -268,7 +294,7 @@ def _never_reached(stream: CommandStream, flow: FlowAnalysis) -> Iterator[Diagno
 def _started_again(stream: CommandStream, variant: Variant, interface: Interface) -> Iterator[Diagnostic]:
     """A J behind a file that starts it at a label from which the file comes to its end, and so to this J again."""
     for index, command in enumerate(stream.commands):
-        if command.key != "J" or stream.in_file[index] is not None or not stream.files:
+        if command.use.control is not Control.JUMP or stream.in_file[index] is not None or not stream.files:
             continue
         label = written_label(command)
         target = None if label is None else stream.resolve(index, label)
@@ -286,8 +312,9 @@ def _shared_registers(stream: CommandStream, flow: FlowAnalysis, variant: Varian
         return
     for index, states in sorted(flow.states.items()):
         command = stream.commands[index]
-        moves = command.key in "<>" and any((value(command, s) or 0) in GENERAL for s in states)
-        operates = command.key in _ARITHMETIC and any(s.register_operand for s in states)
+        is_register = rows(command.key)[0].kind is ArgType.REGISTER
+        moves = is_register and any((value(command, s) or 0) in GENERAL for s in states)
+        operates = _calculates(command) and any(s.register_operand for s in states)
         if moves or operates:
             message = f"on {variant.title} the registers lie in the last {variant.shared_bits} bits of the command memory"
             hint = f"safe with \\ as the first command and at most {limit} bits; these are {stream.bits} bits"

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from steptwin.m1486.commanduse import NOTHING, ChipState
+
 FUNCTIONS = range(40, 64)
 USER_FLAGS = range(80, 87)
 CARRY = 87
@@ -32,6 +34,8 @@ class AuxiliaryFunction:
     name: str = ""
     on: str = ""
     off: str = ""
+    acts_on: ChipState = NOTHING
+    """What changes at once when it is switched, besides the function itself."""
 
     @property
     def default(self) -> bool:
@@ -43,11 +47,13 @@ def default(number: int) -> bool:
     return number in range(48, 56)
 
 
+_LIMIT = ChipState.HELD
+"""LIMIT that is low already holds the program."""
 _NAMED = (
-    AuxiliaryFunction(RUNSIGN, "Runsign", "B1 is low while the motor runs, high at rest", "B1 is a user line"),
+    AuxiliaryFunction(RUNSIGN, "Runsign", "B1 is low while the motor runs, high at rest", "B1 is a user line", ChipState.SIGNALS),
     AuxiliaryFunction(RETURN, "Return", "every character received is sent back", "the chip sends only what was asked for"),
-    AuxiliaryFunction(LIMITOFF, "Limitoff", "LIMIT does nothing", "LIMIT stops the motion"),
-    AuxiliaryFunction(EDGE, "Edge", "LIMIT acts on its falling edge", "LIMIT acts while it is low"),
+    AuxiliaryFunction(LIMITOFF, "Limitoff", "LIMIT does nothing", "LIMIT stops the motion", _LIMIT),
+    AuxiliaryFunction(EDGE, "Edge", "LIMIT acts on its falling edge", "LIMIT acts while it is low", _LIMIT),
     AuxiliaryFunction(CONTINUE, "Continue", "the program goes on after wrong data", "wrong data stop the program"),
     AuxiliaryFunction(OUTPUTS, "Outputs", "outputs keep their values at shutdown", "shutdown ties all outputs low"),
     AuxiliaryFunction(INPUT, "Input", "the operand of + - * / is read from lines", "the operand is the number given"),
@@ -55,7 +61,7 @@ _NAMED = (
     AuxiliaryFunction(
         FULLSTEP, "Fullstep", "after a forced stop the motor goes on to a full step", "a forced stop ends where it ends"
     ),
-    AuxiliaryFunction(RECOVER, "Recover", "the program goes on after Kill or LIMIT", "Kill and LIMIT stop the program"),
+    AuxiliaryFunction(RECOVER, "Recover", "the program goes on after Kill or LIMIT", "Kill and LIMIT stop the program", _LIMIT),
     AuxiliaryFunction(FULLSTEPSS, "Fullstepss", "a seek stops on a multiple of 4 full steps", "a seek stops on any microstep"),
     AuxiliaryFunction(
         REPORT, "Report", "sends 7FH when the input buffer is empty, 7EH when three bytes are free", "sends neither"

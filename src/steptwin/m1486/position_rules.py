@@ -6,21 +6,26 @@ The counter has 24 bits without a sign. The manual advises initial values that k
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from steptwin.diagnostics import Diagnostic
 from steptwin.m1486 import findings
-from steptwin.m1486.commands import CLEAR_POSITION, When, find, grouped, when
-from steptwin.m1486.microsteps import DEFAULT_DISTANCE_U
-from steptwin.m1486.structure import CommandStream
-from steptwin.m1486.syntax import ChipCommand, JumpCondition
+from steptwin.m1486.commands import CLEAR_POSITION, When, find, grouped, meant, when
+from steptwin.m1486.commanduse import TO_LABEL, ChipState, Control, Motion, NextMove
+from steptwin.m1486.microsteps import DEFAULT_DISTANCE_U, UNIT
+from steptwin.m1486.structure import CommandStream, written_label
+from steptwin.m1486.syntax import ChipCommand
 from steptwin.m1486.variants import Variant
+from steptwin.tables import complete
 
 MOST_COMMANDS = 2_000
 """Most commands followed along all paths together, of those that move, jump or are about a position; beyond it the rest of a
 program is not followed."""
 _COUNTER = range(2**24)
+_COUNTING = frozenset({NextMove.TO_POSITION, NextMove.TO_ZERO})
+"""Moves that count from the position counter."""
+_FOLLOWED = ChipState.POSITION | ChipState.DISTANCE | ChipState.LOOPS
 
 
 class _State(NamedTuple):
@@ -36,7 +41,9 @@ class _State(NamedTuple):
 def position_rules(stream: CommandStream, variant: Variant) -> Iterator[Diagnostic]:
     """A warning for each G and H that some path reaches while the position counter has passed its end."""
     onward = _onward(stream, variant)
-    asking = {index for index, command in enumerate(stream.commands) if command.key in "GH" and onward[index] == index}
+    asking = {
+        index for index, command in enumerate(stream.commands) if command.use.next_move in _COUNTING and onward[index] == index
+    }
     seen: set[_State] = set()
     waiting = deque((_State(onward[0]),))
     while waiting and asking and len(seen) < MOST_COMMANDS:
@@ -62,8 +69,8 @@ def _onward(stream: CommandStream, variant: Variant) -> Sequence[int]:
     found = [len(stream.commands)]
     for index in range(len(stream.commands) - 1, -1, -1):
         command = stream.commands[index]
-        ends = command.key == "\\" and stream.in_file[index] is None
-        acts = command.key in _FOLLOWED and when(command.key, command.number) is When.QUEUED and not _is_refused(command, variant)
+        ends = command.use.control is Control.RESTART and stream.in_file[index] is None
+        acts = _is_followed(command) and when(command.key, command.number) is When.QUEUED and not _is_refused(command, variant)
         found.append(index if ends or acts else found[-1])
     return found[::-1]
 
@@ -77,74 +84,101 @@ def _distance_to(target: int | None, position: int | None) -> int | None:
     return None if target is None or position is None else target - position % len(_COUNTER)
 
 
-def _after(stream: CommandStream, state: _State) -> Sequence[_State]:
-    """What comes after a command that is followed; places are not brought to the next such command."""
-    index, position, distance, back, loops = state
-    command = stream.commands[index]
-    after = index + 1
-    match command.key:
-        case "\\":
-            return (_State(after),)
-        case "J" | "'" | "I":
-            return _jumps(stream, state)
-        case "L":
-            loops = (*loops, (index, command.number or 1))
-        case "E":
-            after, loops = _end_of_loop(after, loops)
-        case "." if back is not None:
-            after, back = back, None
-        case _:
-            position, distance = _moved(command, position, distance)
-    return (_State(after, position, distance, back, loops),)
-
-
-def _moved(command: ChipCommand, position: int | None, distance: int | None) -> tuple[int | None, int | None]:
-    """Position and distance after a command that may change them."""
-    number = command.number
-    match command.key:
-        case "F" | "B":
-            distance = None if number is None else number if command.key == "F" else -number
-        case "D":
-            distance = None if distance is None else -distance
-        case "G" | "H":
-            distance = _distance_to(0 if command.key == "H" else number, position)
-        case "G+" | "G-":
-            distance = None
-        case "=":
-            position = number
-        case "C" if number == CLEAR_POSITION or command.from_variable:
-            position = 0 if number else None
-        case "R":
-            position = None if position is None or distance is None else position + distance
-        case ")" | "(":
-            position = None
-    return position, distance
-
-
-_FOLLOWED = frozenset(("F", "B", "D", "G", "H", "G+", "G-", "=", "C", "R", ")", "(", "L", "E", ".", "J", "'", "I"))
-"""The commands of `_after`, besides the end of what is typed."""
+def _is_followed(command: ChipCommand) -> bool:
+    use = command.use
+    return bool(use.writes & _FOLLOWED) or use.control is not Control.NEXT
 
 
 def _is_refused(command: ChipCommand, variant: Variant) -> bool:
     return command.number is not None and find(command.key, command.number, variant) is None
 
 
-def _end_of_loop(after: int, loops: tuple[tuple[int, int], ...]) -> tuple[int, tuple[tuple[int, int], ...]]:
-    if not loops:
-        return after, loops
-    begin, left = loops[-1]
+def _after(stream: CommandStream, state: _State) -> Sequence[_State]:
+    """What comes after a command that is followed; places are not brought to the next such command."""
+    return _AFTER[stream.commands[state.index].use.control](stream, state)
+
+
+def _next(stream: CommandStream, state: _State) -> Sequence[_State]:
+    index, position, distance, back, loops = state
+    command = stream.commands[index]
+    if ChipState.LOOPS in command.use.writes:
+        loops = (*loops, (index, command.number or 1))
+    position, distance = _moved(command, position, distance)
+    return (_State(index + 1, position, distance, back, loops),)
+
+
+def _moved(command: ChipCommand, position: int | None, distance: int | None) -> tuple[int | None, int | None]:
+    """Position and distance after a command that may change them."""
+    use = command.use
+    if ChipState.POSITION in use.writes:
+        position = _set_to(command) if use.motion is Motion.NONE else _POSITIONS[use.motion](position, distance)
+    return position, _DISTANCES[use.next_move](command.number, position, distance)
+
+
+def _set_to(command: ChipCommand) -> int | None:
+    """What a command without motion makes of the position counter, if the text says it."""
+    if command.number is None:
+        return None
+    (spec,) = meant(command.key, command.number)
+    return command.number if spec.unit == UNIT else 0 if spec.values == (CLEAR_POSITION,) else None
+
+
+def _repeat(stream: CommandStream, state: _State) -> Sequence[_State]:
+    *outer, (begin, left) = state.loops or ((state.index, 1),)
     if left > 1:
-        return begin + 1, (*loops[:-1], (begin, left - 1))
-    return after, loops[:-1]
+        return (state._replace(index=begin + 1, loops=(*outer, (begin, left - 1))),)
+    return (state._replace(index=state.index + 1, loops=tuple(outer)),)
 
 
 def _jumps(stream: CommandStream, state: _State) -> Sequence[_State]:
-    index, position, distance, back, loops = state
-    command = stream.commands[index]
-    label = command.argument.label if isinstance(command.argument, JumpCondition) else command.number
-    target = None if label is None else stream.resolve(index, label)
-    following = _State(index + 1, position, distance, back, loops)
+    command, following = stream.commands[state.index], state.index + 1
+    label = written_label(command)
+    target = None if label is None else stream.resolve(state.index, label)
     if target is None:
-        return (following,)
-    jumped = _State(target, position, distance, index + 1 if command.key == "'" else back, loops)
-    return (following, jumped) if command.key == "I" else (jumped,)
+        return (state._replace(index=following),)
+    control = command.use.control
+    jumped = state._replace(index=target, back=following if control is Control.CALL else state.back)
+    return (state._replace(index=following), jumped) if control is Control.BRANCH else (jumped,)
+
+
+_AFTER: Mapping[Control, Callable[[CommandStream, _State], Sequence[_State]]] = complete(
+    "control",
+    Control,
+    "way of the position",
+    {
+        Control.NEXT: _next,
+        **dict.fromkeys(TO_LABEL, _jumps),
+        Control.RETURN: lambda stream, state: (
+            state._replace(index=state.index + 1 if state.back is None else state.back, back=None),
+        ),
+        Control.REPEAT: _repeat,
+        Control.RESTART: lambda stream, state: (_State(state.index + 1),),
+    },
+)
+
+_POSITIONS: Mapping[Motion, Callable[[int | None, int | None], int | None]] = complete(
+    "motion",
+    Motion,
+    "position after it",
+    {
+        Motion.NONE: lambda position, distance: position,
+        Motion.MOVE: lambda position, distance: None if position is None or distance is None else position + distance,
+        **dict.fromkeys((Motion.SEEK, Motion.STORED), lambda position, distance: None),
+    },
+)
+
+_DISTANCES: Mapping[NextMove, Callable[[int | None, int | None, int | None], int | None]] = complete(
+    "next move",
+    NextMove,
+    "signed distance",
+    {
+        NextMove.UNCHANGED: lambda number, position, distance: distance,
+        NextMove.FORWARD: lambda number, position, distance: number,
+        NextMove.BACKWARD: lambda number, position, distance: None if number is None else -number,
+        NextMove.REVERSED: lambda number, position, distance: None if distance is None else -distance,
+        NextMove.TO_POSITION: lambda number, position, distance: _distance_to(number, position),
+        NextMove.TO_ZERO: lambda number, position, distance: _distance_to(0, position),
+        NextMove.ENDLESS: lambda number, position, distance: None,
+    },
+)
+"""By number, position and distance before."""

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from steptwin.m1486.commanduse import ChipState
+
 
 @dataclass(frozen=True, slots=True)
 class ChipRegister:
@@ -12,16 +14,22 @@ class ChipRegister:
     name: str
     is_operand: bool
     """May stand as operand of + - * / while function 58 is ON."""
+    state: ChipState
 
 
 POSITION_REGISTER = 9
 REMAINDER_REGISTER = 10
 
 REGISTERS: tuple[ChipRegister, ...] = (
-    *(ChipRegister(n, 16, f"general purpose {n}", True) for n in range(1, 9)),
-    ChipRegister(POSITION_REGISTER, 24, "position counter", False),
-    ChipRegister(REMAINDER_REGISTER, 8, "remainder of the last division", False),
+    *(ChipRegister(n, 16, f"general purpose {n}", True, ChipState.REGISTERS) for n in range(1, 9)),
+    ChipRegister(POSITION_REGISTER, 24, "position counter", False, ChipState.POSITION),
+    ChipRegister(REMAINDER_REGISTER, 8, "remainder of the last division", False, ChipState.REMAINDER),
 )
+
+
+def register(number: int) -> ChipRegister:
+    return REGISTERS[number - 1]
+
 
 GENERAL = range(1, 9)
 """The registers that share the command memory on some variants."""

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from steptwin.m1486.commands import When, memory_bits, when
+from steptwin.m1486.commanduse import Control
 from steptwin.m1486.syntax import ChipCommand, JumpCondition, ParsedProgram
 
 
@@ -24,7 +25,12 @@ def written_label(command: ChipCommand) -> int | None:
     """The label a jump, condition or call names as a number."""
     if isinstance(command.argument, JumpCondition):
         return command.argument.label
-    return command.argument if command.key in ("J", "'") else None
+    return command.argument if command.use.control in (Control.JUMP, Control.CALL) else None
+
+
+def is_computed(command: ChipCommand) -> bool:
+    """Whether it goes on at the label of the internal variable."""
+    return command.use.control in (Control.JUMP, Control.CALL) and command.from_variable
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +146,7 @@ def stream_of(address: int | None, commands: Sequence[ChipCommand]) -> CommandSt
 def _leaves_loop(stream: CommandStream, index: int) -> bool:
     """Whether a jump leads to another loop than that around it, or its label is computed."""
     command = stream.commands[index]
-    if command.key in ("J", "'") and command.from_variable:
+    if is_computed(command):
         return True
     label = written_label(command)
     target = None if label is None else stream.resolve(index, label)

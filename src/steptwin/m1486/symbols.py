@@ -6,13 +6,15 @@ from collections.abc import Iterator
 
 from steptwin.diagnostics import Span
 from steptwin.m1486.commands import ArgType, rows
+from steptwin.m1486.commanduse import ChipState
 from steptwin.m1486.functions import CARRY, FUNCTIONS, USER_FLAGS
 from steptwin.m1486.lines import LINES
 from steptwin.m1486.structure import written_label
 from steptwin.m1486.syntax import ChipCommand, JumpCondition, ParsedProgram
 from steptwin.symbols import Symbol, SymbolKind, SymbolRole, Use
 
-_WRITES = frozenset("TC>")
+_NAMED = ChipState.LINES | ChipState.FLAGS | ChipState.FUNCTIONS | ChipState.REGISTERS
+"""What the numbers of commands name."""
 FLAGS = range(USER_FLAGS.start, CARRY + 1)
 
 
@@ -51,7 +53,7 @@ def _of_number(command: ChipCommand) -> Iterator[Use]:
     number = command.number
     if number is None:
         return
-    role = SymbolRole.WRITE if command.key in _WRITES else SymbolRole.READ
+    role = SymbolRole.WRITE if any(spec.use.writes & _NAMED for spec in rows(command.key)) else SymbolRole.READ
     found = _symbol(command.key, number)
     if found is not None:
         yield Use(found, command.argument_span, role)

@@ -14,7 +14,8 @@ from typing import NamedTuple, NoReturn
 
 from steptwin.diagnostics import Diagnostic, Fix, Span
 from steptwin.m1486 import findings
-from steptwin.m1486.commands import CONDITIONS, LARGEST_LABEL, LETTERS, rows, takes_number, takes_variable
+from steptwin.m1486.commands import CONDITIONS, LARGEST_LABEL, LETTERS, meant, rows, takes_number, takes_variable, use_of
+from steptwin.m1486.commanduse import CommandUse
 from steptwin.m1486.findings import ChipFinding
 
 _NOWHERE = Span(0, 0)
@@ -63,6 +64,17 @@ class ChipCommand:
     def from_variable(self) -> bool:
         """True if the internal variable is the argument."""
         return self.argument is None and takes_variable(self.key)
+
+    @property
+    def use(self) -> CommandUse:
+        """What it reads, changes and waits for."""
+        return use_of(self.key, self.number)
+
+    @property
+    def lines(self) -> range:
+        """The I/O lines that its number names; none for the internal variable."""
+        found = () if self.number is None else meant(self.key, self.number)
+        return found[0].lines(self.number or 0) if found else range(0)
 
     def __str__(self) -> str:
         if isinstance(self.argument, JumpCondition):

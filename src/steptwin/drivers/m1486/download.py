@@ -14,8 +14,11 @@ from steptwin.drivers.m1486.unit import ChipUnit
 from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Misuse, Refusal
 from steptwin.m1486.check import check
+from steptwin.m1486.commands import TABLE
+from steptwin.m1486.commanduse import TO_LABEL, ChipState, Control
 from steptwin.m1486.lines import INTERFACES, STEP_DIRECTION, Interface
-from steptwin.m1486.syntax import ChipCommand, JumpCondition, ParsedProgram
+from steptwin.m1486.structure import written_label
+from steptwin.m1486.syntax import ChipCommand, ParsedProgram
 from steptwin.m1486.variants import Store, Variant
 from steptwin.machine import MILLISECOND, SECOND
 
@@ -27,7 +30,13 @@ MOST_ERRORS = 10
 ERASE_MARGIN_S = 0.1
 FULL_PAUSE_NS = 50 * MILLISECOND
 """Pause for the input buffer to empty when characters come back inverted."""
-MOVES = frozenset("r)(jk'[ie")
+MOVES = frozenset(
+    spec.letter.lower()
+    for spec in TABLE
+    if spec.key == "["
+    or spec.use.control in (*TO_LABEL, Control.REPEAT)
+    or (ChipState.MOTION in spec.use.writes and spec.use.control is not Control.RESTART)
+)
 """Commands that move, or jump to commands sent before."""
 
 
@@ -68,9 +77,8 @@ def probes(commands: Sequence[ChipCommand]) -> list[bool]:
             labels.setdefault(command.number, index)
         elif command.key == "E" and loops:
             begin = loops.pop()
-        elif command.key in ("J", "'", "I"):
-            condition = command.argument
-            label = condition.label if isinstance(condition, JumpCondition) else command.number
+        elif command.use.control in TO_LABEL:
+            label = written_label(command)
             begin = min(labels.values(), default=index) if label is None else labels.get(label, index)
         for inside in range(begin + 1, index + 1):
             allowed[inside] = False

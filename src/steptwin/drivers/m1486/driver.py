@@ -21,7 +21,8 @@ from steptwin.drivers.m1486.unit import PATIENCE_NS, SLICE_NS, ChipUnit
 from steptwin.drivers.m1486.waiting import wait_for
 from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Misuse
-from steptwin.m1486.commands import memory_bits
+from steptwin.m1486.commands import TABLE, When, memory_bits
+from steptwin.m1486.commanduse import ChipState, Control, Motion, Wait
 from steptwin.m1486.functions import CARRY, FUNCTIONS, LIMITOFF, RECOVER, REPORT, RETURN, USER_FLAGS
 from steptwin.m1486.lines import LINES, Interface
 from steptwin.m1486.microsteps import FULL_STEP
@@ -88,8 +89,24 @@ MARK = "u15"
 """The last command of a block: uploads the driver interface, a byte that is not a type letter."""
 START_BITS = sum(map(memory_bits, ":JU"))
 """What `AsyncM1486.start_program` stores: the label, the jump and the question whether it runs."""
-_TYPED = frozenset("abdfghmnpqsv:+-*/<>=tcw!?oz")
+_TYPED = frozenset(
+    spec.letter.lower()
+    for spec in TABLE
+    if spec.when is When.QUEUED
+    and (spec.use.control, spec.use.motion) == (Control.NEXT, Motion.NONE)
+    and ChipState.LOOPS not in spec.use.writes
+    and spec.use.waits is not Wait.SENDING
+)
 """Commands that may be sent alone: they move nothing, do not jump and are not answered."""
+_ONCE = frozenset(
+    spec.letter.lower() for spec in TABLE if spec.use.reads & spec.use.writes & (ChipState.VARIABLE | ChipState.DISTANCE)
+)
+"""Commands that do something else when they are sent a second time."""
+_NOT_IN_BLOCK = frozenset(
+    spec.letter.lower()
+    for spec in TABLE
+    if spec.use.waits is Wait.SENDING or (spec.when is not When.QUEUED and spec.letter not in "@C")
+)
 NO_DISTANCE = Message("drivers.m1486.no-distance", "{distance} {unit} is not a distance")
 DISTANCE_IS_OUT_OF_RANGE = Message(
     "drivers.m1486.distance-is-out-of-range", "distance {distance:g} {unit} is outside ±{most:g} {unit}"
@@ -605,7 +622,7 @@ class AsyncM1486:
             async with unit.turn(permission):
                 await unit.rest()
                 self._learn(command)
-                await unit.act(command, permission, once=command[0] in "d+-*/")
+                await unit.act(command, permission, once=command[0] in _ONCE)
                 permission.extend()
 
     def check_command(self, text: str) -> str:
@@ -642,7 +659,7 @@ class AsyncM1486:
             raise Misuse(f"{unit.variant.title} writes what is in [ ] into its EEPROM: use download")
         typed = [unit.checked(command) for command in commands]
         for command in typed:
-            if command[0] in "[]\\kxu" or command == "c75":
+            if command[0] in _NOT_IN_BLOCK or command == "c75":
                 raise Misuse(f"{command!r} has no place in a block")
         if 8 + sum(memory_bits(command[0].upper()) for command in (*typed, MARK)) > unit.variant.memory_bits - 8:
             raise Misuse(f"the block is larger than the command memory of {unit.variant.title}, {unit.variant.memory_bits} bits")

@@ -6,16 +6,25 @@ from collections.abc import Sequence
 
 from steptwin.drivers.m1486.failures import Restarted
 from steptwin.drivers.m1486.motion import ChipMotionCommand
-from steptwin.drivers.m1486.sentcommands import SentCommands, may_turn_on
+from steptwin.drivers.m1486.sentcommands import SentCommands
 from steptwin.drivers.m1486.settings import ChipSettings
-from steptwin.m1486.functions import CONTINUE, FUNCTIONS, TABLE
+from steptwin.m1486.commands import TABLE
+from steptwin.m1486.commanduse import ChipState, Wait
+from steptwin.m1486.flow import may_turn_on
+from steptwin.m1486.functions import CONTINUE, FUNCTIONS
+from steptwin.m1486.functions import TABLE as ALL_FUNCTIONS
 from steptwin.m1486.lines import Interface
 from steptwin.m1486.variants import Store, Variant
 from steptwin.machine import Nanos
 
 FUNCTION_BYTES = (17, 18, 19)
 """The numbers of ``U`` for functions 40 to 63."""
-_CHANGES_NOTHING_READABLE = frozenset("uxavspmqnfbgh")
+_UNREADABLE = ChipState.DISTANCE | ChipState.SETTINGS | ChipState.WAVEFORM | ChipState.SENDING | ChipState.LISTENING
+_CHANGES_NOTHING_READABLE = frozenset(
+    spec.letter.lower()
+    for spec in TABLE
+    if spec.use.writes and spec.use.writes in _UNREADABLE and spec.use.waits in (Wait.NOTHING, Wait.SENDING)
+)
 """Commands after which a chip at rest still is, and uploads what it did before."""
 
 
@@ -75,7 +84,7 @@ class ChipNotes:
 
     def note_defaults(self) -> None:
         """Note the functions after a reset."""
-        self._functions = {function.number: function.default for function in TABLE}
+        self._functions = {function.number: function.default for function in ALL_FUNCTIONS}
 
     def forget_functions(self, *numbers: int) -> None:
         """Forget functions that may have been switched, until they are read again."""

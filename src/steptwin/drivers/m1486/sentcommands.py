@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from steptwin.m1486.commanduse import TO_LABEL
+from steptwin.m1486.flow import may_turn_on
 from steptwin.m1486.lines import STEP_DIRECTION, Interface
 from steptwin.m1486.structure import stream_of, written_label
 from steptwin.m1486.successors import flow_of
@@ -21,11 +23,6 @@ class LabelledPart(NamedTuple):
     begins_at: int
     has_end: bool
     """Whether the last command can be reached, and with it what was sent since."""
-
-
-def may_turn_on(function: int, command: ChipCommand) -> bool:
-    """Whether a command turns a function on, or one that the internal variable names."""
-    return command.key == "T" and command.number in (None, function)
 
 
 class SentCommands:
@@ -48,7 +45,7 @@ class SentCommands:
         commands that were not downloaded here."""
         if any(may_turn_on(function, command) for command in self._commands):
             return True
-        jumps = [written_label(command) for command in self._commands if command.key in ("J", "I", "'")]
+        jumps = [written_label(command) for command in self._commands if command.use.control in TO_LABEL]
         here = {command.number for command in self._commands if command.key == "@"}
         return not here.issuperset(jumps) or (label is not None and label not in here)
 

@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 from math import isfinite
 
 from steptwin.errors import Misuse
-from steptwin.m1486.commands import find, range_text, rows
+from steptwin.m1486.commands import TABLE, find, range_text, rows
+from steptwin.m1486.commanduse import Setting
 from steptwin.m1486.flow import defaults
 from steptwin.m1486.lines import Interface
 from steptwin.m1486.microsteps import FULL_STEP, HIGHEST_SPEED, PAIRS, microstep_size
@@ -19,13 +20,10 @@ from steptwin.machine import SECOND, Nanos
 from steptwin.motion.ramps import SpeedCurve, longest_within, plan_distance
 
 COMMANDS = {
-    "start_stop": "s",
-    "acceleration": "a",
-    "velocity": "v",
-    "profile": "p",
-    "microstep": "m",
-    "qualification": "q",
-    "waveform": "n",
+    setting.value: spec.key.lower()
+    for setting in Setting
+    for spec in TABLE
+    if spec.use.sets is setting and setting is not Setting.VARIABLE
 }
 """The command of each setting."""
 

@@ -8,6 +8,7 @@ from steptwin.explain.m1486 import move_duration
 from steptwin.lsp.answers import Hint
 from steptwin.lsp.m1486 import texts
 from steptwin.m1486.check import ChipMemory
+from steptwin.m1486.commanduse import Motion
 from steptwin.m1486.flow import follow
 from steptwin.m1486.lines import Interface
 from steptwin.m1486.structure import streams
@@ -48,7 +49,7 @@ def _times(program: ParsedProgram, variant: Variant, interface: Interface) -> It
     for stream in streams(program):
         for index, states in follow(stream, variant, interface).states.items():
             command = stream.commands[index]
-            if command.key == "R":
+            if command.use.motion is Motion.MOVE:
                 known = {move_duration(state, variant) for state in states}
                 if len(known) == 1 and (duration := known.pop()) is not None:
                     yield Hint(

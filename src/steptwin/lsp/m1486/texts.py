@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from steptwin.m1486.commands import CommandSpec, When, find, grouped, range_text, rows, takes_variable
+from steptwin.m1486.commanduse import Wait
 from steptwin.m1486.functions import CARRY, default, function
 from steptwin.m1486.lines import SEEK_ENDS_LOW, SHARED_PINS, Interface
 from steptwin.m1486.microsteps import FULL_STEP, UNIT
@@ -88,7 +89,7 @@ def line_text(number: int, command: ChipCommand, interface: Interface) -> str:
         text += f" Its pin is also {SHARED_PINS[number]}."
     if number in interface.occupied:
         text += f" The {interface.title} interface needs the pin."
-    if command.key in "()":
+    if command.use.waits is Wait.SEEK:
         text += f" A seek ends when it is {'low' if number in SEEK_ENDS_LOW else 'high'}."
     return text
 

@@ -1,39 +1,81 @@
-"""What the commands of an M1486 read and change."""
+"""What the commands of an M1486 read and change, in the terms of all programs."""
 
 from __future__ import annotations
 
-from steptwin.m1486.functions import USER_FLAGS
-from steptwin.m1486.lines import LINES
+from collections.abc import Callable, Iterable, Mapping
+
+from steptwin.m1486.commanduse import NOTHING, ChipState, Control, Wait
+from steptwin.m1486.functions import CARRY, USER_FLAGS
+from steptwin.m1486.lines import RUNSIGN_LINE
+from steptwin.m1486.pins import OUTPUT_PINS, WAVEFORM
+from steptwin.m1486.registers import GENERAL, REMAINDER_REGISTER
+from steptwin.m1486.structure import is_computed
 from steptwin.m1486.syntax import ChipCommand
 from steptwin.simulation.kinds.programs import Resource, ResourceKind, StatementUse
+from steptwin.tables import complete
 
 _AXIS = Resource(ResourceKind.AXIS, "1")
-_ANY_PIN = Resource(ResourceKind.PIN, "")
-_VARIABLE = Resource(ResourceKind.VALUE, "variable")
 _EVERYTHING = range(1 << 16)
-"""A conditional jump decides about what comes after it, wherever that is."""
+"""A jump that depends on something decides about what comes after it, wherever that is."""
+_KEPT = ChipState.FLAGS | ChipState.CARRY
 
 
 def use_of(command: ChipCommand) -> StatementUse:
     """A move holds the program until its end."""
-    key, line = command.key, command.number
-    pin = () if line not in LINES else (Resource(ResourceKind.PIN, f"B{line}"),)
-    match key:
-        case "O" | "Z":
-            return StatementUse(pin, waits=True)
-        case "T" | "C":
-            return StatementUse(writes=pin, keeps=line in USER_FLAGS)
-        case "!":
-            return StatementUse((_VARIABLE,), (_ANY_PIN,))
-        case "?":
-            return StatementUse((_ANY_PIN,), (_VARIABLE,))
-        case ":" | "+" | "-" | "*" | "/" | "<":
-            return StatementUse(writes=(_VARIABLE,))
-        case "I":
-            return StatementUse(pin, governs=_EVERYTHING)
-        case "W":
-            return StatementUse(waits=True)
-        case "R" | ")" | "(":
-            return StatementUse((_AXIS, *pin), (_AXIS,), waits=True)
-        case _:
-            return StatementUse()
+    use = command.use
+    # What is sent does not decide how long that waits.
+    reads = NOTHING if use.waits is Wait.SENDING else use.reads
+    return StatementUse(
+        _resources(reads, command),
+        _resources(use.writes, command),
+        waits=use.waits is not Wait.NOTHING,
+        governs=_EVERYTHING if is_computed(command) or use.control is Control.BRANCH else range(0),
+        keeps=bool(use.writes & _KEPT),
+    )
+
+
+def _resources(state: ChipState, command: ChipCommand) -> tuple[Resource, ...]:
+    return tuple(dict.fromkeys(one for piece, named in _RESOURCES.items() if piece in state for one in named(command)))
+
+
+def _always(*found: Resource) -> Callable[[ChipCommand], Iterable[Resource]]:
+    return lambda command: found
+
+
+def _pin(name: str) -> Resource:
+    return Resource(ResourceKind.PIN, name)
+
+
+def _value(name: str) -> Resource:
+    return Resource(ResourceKind.VALUE, name)
+
+
+def _of_number(what: str, numbers: range) -> Callable[[ChipCommand], Iterable[Resource]]:
+    """The flag or register of the number; with the internal variable it is not known which."""
+    return lambda command: (_value(f"{what}{command.number}"),) if command.number in numbers else ()
+
+
+def _lines(command: ChipCommand) -> Iterable[Resource]:
+    return [_pin(f"B{line}") for line in command.lines] or (_pin(""),)
+
+
+_RESOURCES: Mapping[ChipState, Callable[[ChipCommand], Iterable[Resource]]] = complete(
+    "state",
+    ChipState,
+    "resource",
+    {
+        **dict.fromkeys((ChipState.MOTION, ChipState.POSITION), _always(_AXIS)),
+        ChipState.LINES: _lines,
+        ChipState.SIGNALS: _always(*map(_pin, (*OUTPUT_PINS, f"B{RUNSIGN_LINE}"))),
+        ChipState.WAVEFORM: _always(_pin(WAVEFORM)),
+        ChipState.VARIABLE: _always(_value("variable")),
+        ChipState.REGISTERS: _of_number("register", GENERAL),
+        ChipState.REMAINDER: _always(_value(f"register{REMAINDER_REGISTER}")),
+        ChipState.FLAGS: _of_number("flag", USER_FLAGS),
+        ChipState.CARRY: _always(_value(f"flag{CARRY}")),
+        # Neither pins nor axes, nor what a program calculates with.
+        **dict.fromkeys((ChipState.FUNCTIONS, ChipState.DISTANCE, ChipState.SETTINGS, ChipState.HELD), _always()),
+        **dict.fromkeys((ChipState.LOOPS, ChipState.CALL, ChipState.SENDING), _always()),
+        **dict.fromkeys((ChipState.LISTENING, ChipState.MEMORY), _always()),
+    },
+)
